@@ -1,0 +1,42 @@
+# The verbs of szlib.  Everything lives in .venv; a second call does not install again.
+PYTHON ?= python3
+VENV := .venv
+ifeq ($(OS),Windows_NT)
+BIN := $(VENV)/Scripts
+else
+BIN := $(VENV)/bin
+endif
+INSTALLED := $(VENV)/installed
+
+.PHONY: run test lab bench lock notebooks clean
+
+run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza
+	$(BIN)/szlib run
+
+test: $(INSTALLED)  ## style, types, and every test
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -n 2
+
+lab: $(INSTALLED)  ## open the workbook in JupyterLab
+	$(BIN)/jupyter lab notebooks
+
+bench: $(INSTALLED)  ## speed and memory, as ratios within one run
+	$(BIN)/python tests/bench.py
+
+notebooks: $(INSTALLED)  ## execute the notebooks anew, in place
+	$(BIN)/szlib run --in-place
+
+lock: $(INSTALLED)  ## pin every dependency with hashes, for every platform, from pyproject.toml
+	$(BIN)/uv pip compile pyproject.toml --universal --all-extras --generate-hashes --upgrade --quiet \
+	    --no-emit-index-url --custom-compile-command "make lock" --output-file environment.lock
+
+clean:  ## forget the environment and the results
+	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in ('$(VENV)', 'results')]"
+
+$(INSTALLED): environment.lock pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r environment.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(BIN)/python -c "open('$(INSTALLED)', 'w').close()"
