@@ -1,0 +1,142 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 4 - The hull and its slices
+#
+# **Question.** From scattered samples to a boundary: how near did people come, in each direction,
+# at
+# each walking speed?
+#
+# **Expectation.** The faster somebody walks, the more room they are given. Few samples exist for
+# any
+# one speed, so the paper borrows from neighbouring speeds: one convex hull over all of them, cut at
+# the speed of interest.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+import szlib
+from szlib import hulls, outliers, plotting
+from szlib.pages import ASSUMED, PAPER, Page, parameters
+
+# %% tags=["parameters"]
+data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+seed = 0
+results = "../results"
+speeds = [0.7, 0.9, 1.1, 1.3]
+
+# %%
+page = Page("04_hull", data=data, results=results, seed=seed)
+parameters(
+    [
+        ("hull over", "x', y', speed", PAPER, "sec. 2, fig. 4b"),
+        ("speed", "of the reference pedestrian, at the sample", PAPER, "not the mean of the encounter"),
+        ("slices", f"{speeds} m/s", ASSUMED, "the paper shows a range of speeds"),
+    ]
+)
+
+# %%
+samples = page.encounters()
+inliers = szlib.remove_outliers(samples)
+points = np.column_stack([outliers.complementary_points(inliers), inliers["speed"]])
+vertices = hulls.hull_vertices(points)
+print(f"{len(points):,} inliers, {len(vertices)} of them vertices of the hull")
+page.key |= {"inliers": len(points), "vertices": len(vertices)}
+
+# %% [markdown]
+# ## The hull in three dimensions
+
+# %%
+zone = szlib.SocialZone.fit(samples)
+ax = plotting.plot_hull(zone, speeds)
+page.figure(ax.figure, "hull")
+page.check("SocialZone.fit finds the same vertices", np.array_equal(zone.vertices, vertices), len(vertices))
+
+# %% [markdown]
+# ## A slice, and the zone it leaves free
+#
+# A slice is a convex polygon around the origin. With $R'(\theta)$ the distance from the origin to
+# its edge, the **minimum social zone** is
+#
+# $$r_{zone}(\theta) = r_{max} - R'(\theta)$$
+#
+# Map first, enclose second: an ellipse around the *slice* would be no zone.
+
+# %%
+section = hulls.slice_hull(vertices, 1.1, r_max=2.0)
+theta = np.linspace(-np.pi, np.pi, 721)
+rim = section.reach(theta)[:, None] * np.column_stack([np.cos(theta), np.sin(theta)])
+fig, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained")
+left.fill(*section.polygon.T, facecolor=plotting.BLUE, alpha=0.3)
+left.plot(*rim.T, color=plotting.BLUE)
+plotting.metres(left, "The slice at 1.1 m/s")
+left.set(xlabel="x' [m]", ylabel="y' [m]")
+right.fill(*section.boundary(theta).T, facecolor=plotting.ORANGE, alpha=0.4)
+right.plot(0, 0, marker=(3, 0, -90), color=plotting.BLACK, markersize=10)
+plotting.metres(right, "The zone it leaves free", person=True)
+page.figure(fig, "slice")
+
+# %% [markdown]
+# The zone must be empty: each inlier lies outside, or just on the edge of, the zone of its own speed.
+
+# %%
+some = inliers.sample(min(300, len(inliers)), random_state=seed)
+low, high = zone.speed_range
+some = some[some["speed"].between(low, high, inclusive="neither")]
+room = [2.0 - zone.slice(v).reach(angle) for v, angle in zip(some["speed"], some["los_angle"], strict=True)]
+margin = float((some["distance"] - room).min())
+page.check("nobody is inside the zone of their own speed", margin > -1e-9, margin)
+
+# %% [markdown]
+# ## What the hull does to speed
+#
+# A convex hull is widest in the middle of its range of speeds and closes at both ends. So the zone
+# *must* grow towards the slowest and the fastest walker, whatever people do:
+
+# %%
+low, high = zone.speed_range
+grid = np.linspace(low, high, 41)[2:-2]
+area = []
+for v in grid:
+    try:
+        boundary = zone.boundary(v)
+        area.append(
+            0.5 * abs(np.sum(boundary[:-1, 0] * boundary[1:, 1] - boundary[1:, 0] * boundary[:-1, 1]))
+        )
+    except szlib.ZoneError:
+        area.append(np.nan)
+ax = plotting.axes(None)
+ax.plot(grid, area, color=plotting.BLUE)
+ax.set(
+    xlabel="speed [m/s]", ylabel="area of the zone [m$^2$]", title="Zones grow towards both ends of the data"
+)
+page.figure(ax.figure, "area")
+
+# %%
+area = np.array(area)
+smallest = float(grid[np.nanargmin(area)])
+page.key["smallest zone at"] = smallest
+page.claim(
+    "the zone grows with speed between 0.7 and 1.3 m/s",
+    np.all(np.diff(area[(grid >= 0.7) & (grid <= 1.3)]) > 0),
+    f"smallest at {smallest:.2f} m/s",
+)
+
+# %% [markdown]
+# **What it means.** Read the zones in the middle of the data's range of speeds; near its ends they
+# say more about how few people walk so slowly or so fast than about the room they are given.
+
+# %%
+page.close()

@@ -1,0 +1,107 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 9 - Yielding by waiting
+#
+# **Question.** A passage is too narrow for two, and a person is in it. Who goes first?
+#
+# **Expectation.** The paper: the robot waits outside until the person is through, then it goes.
+
+# %%
+import pandas as pd
+from IPython.display import Image
+
+import szlib
+from szlib import scenes
+from szlib.pages import ASSUMED, PAPER, Page, parameters
+
+# %% tags=["parameters"]
+data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+seed = 0
+results = "../results"
+gamma = 0.05
+
+# %%
+page = Page("09_waiting", data=data, results=results, seed=seed)
+settings = szlib.MPCSettings(gamma=gamma)
+scenario = szlib.SCENARIOS["waiting"]
+person = scenario.people[0]
+parameters(
+    [
+        (
+            "person's speed",
+            f"{abs(person.velocity[0])} m/s",
+            PAPER,
+            "constant, known exactly, unaffected by the robot",
+        ),
+        ("places of robot, person, walls", "see the figure", ASSUMED, "the paper shows them without numbers"),
+        (
+            "controller",
+            "as in notebook 07",
+            PAPER,
+            f"N = {settings.N}, N_h = {settings.N_h}, gamma = {settings.gamma}",
+        ),
+    ]
+)
+
+# %%
+zone = page.zone().ellipse(settings.zone_speed)
+controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
+log = szlib.simulate(scenario, controller)
+metrics = log.metrics()
+pd.Series(metrics).to_frame("value")
+
+# %%
+ax = scenes.plot_scenario(log)
+page.figure(ax.figure, "scenario")
+
+# %%
+page.animation(movie := scenes.animate(log), "run")
+Image(movie)
+
+# %% [markdown]
+# ## Safe?
+#
+# The promises that must hold with any zone that leaves the scene passable: the goal, $h \ge 0$ at
+# every step
+# for every person and wall, no step without a solution, no speeding.
+
+# %%
+page.check("the goal is reached", metrics["success"])
+page.check("h >= 0 at every step", metrics["min_h"] >= 0, metrics["min_h"])
+page.check("no infeasible step", metrics["infeasible_steps"] == 0, metrics["infeasible_steps"])
+page.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metrics["max_speed"])
+page.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_speed", "time_yielding")}
+
+# %% [markdown]
+# ## As the paper says?
+
+# %%
+for claim in scenario.claims:
+    page.claim(claim.text, *claim.check(log))
+
+# %%
+figure = scenes.plot_run(log, title="The robot stands until the way is free")
+page.figure(figure, "run")
+figure
+
+# %%
+log.min_h().to_frame("smallest h [m]").round(3)
+
+# %% [markdown]
+# **What it means.** Nobody told the robot to wait. Waiting is what is left when the zone fills
+# the passage.
+
+# %%
+page.close()
