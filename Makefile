@@ -25,8 +25,8 @@ lab: $(INSTALLED)  ## open the workbook in JupyterLab
 bench: $(INSTALLED)  ## speed and memory, as ratios within one run
 	$(BIN)/python tests/bench.py
 
-notebooks: $(INSTALLED)  ## execute the notebooks anew, in place
-	$(BIN)/szlib run --in-place
+notebooks: $(INSTALLED)  ## execute the committed copies anew, and renew the README's pictures
+	$(BIN)/python notebooks/refresh.py
 
 lock: $(INSTALLED)  ## pin every dependency with hashes, for every platform, from pyproject.toml
 	$(BIN)/uv pip compile pyproject.toml --universal --all-extras --generate-hashes --upgrade --quiet \

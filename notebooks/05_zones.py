@@ -29,7 +29,7 @@ import numpy as np
 import szlib
 from szlib import plotting
 from szlib.pages import ASSUMED, PAPER, Page, parameters
-from szlib.plaza import PlazaSettings
+from szlib.truths import PlazaSettings
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

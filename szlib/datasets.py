@@ -109,8 +109,8 @@ def _atc_1hz() -> list[Path]:
         return [Path(store.fetch(name, progressbar=True)) for name in ATC_1HZ_FILES]
     except (OSError, ValueError) as error:  # requests' errors are OSErrors; ValueError: wrong hash
         raise DataError(
-            f"the ATC day could not be downloaded from {ATC_1HZ_URL} ({error}); "
-            f"go online, or put its files into a folder {ATC_1HZ}/ and name its parent in ${DATA_DIR_VARIABLE}"
+            f"the ATC day could not be downloaded from {ATC_1HZ_URL} ({error}); go online, or put its "
+            f"files into a folder {ATC_1HZ}/ and name its parent in ${DATA_DIR_VARIABLE}"
         ) from error
 
 

@@ -14,42 +14,35 @@ right through.  Who stands has no direction of motion, and so no zone.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
-from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
 import polars as pl
 from numpy.typing import NDArray
 
-from .ellipses import Ellipse
-from .encounters import ATC_SQUARE, AttentionalSpace, Square, wrap_angle
+from .encounters import wrap_angle
 from .errors import DataError, ZoneError
-from .outliers import R_MAX
-
-Array = NDArray[np.float64]
+from .truths import (
+    MARGIN,
+    SLOWEST,
+    SPACE,
+    Array,
+    PlazaSettings,
+    direction,
+    first_moment,
+    in_unit_disc,
+    swept_length,
+    to_left,
+    turned,
+    zones_at,
+)
 
 KINDS = ("overtaking", "head-on", "crossing", "together", "standing", "intruder")
 """Kinds of encounter; the first three by the angle between the directions of motion when closest."""
-SLOWEST = 0.45
-"""Who walks, walks at least that fast [m/s]; the paper looks at speeds from 0.4 m/s."""
 
-_SLOW, _FAST = 0.5, 1.5  # speeds at which the settings give the zone [m/s]
-_VECTORS = (
-    "walker_",
-    "other_",
-    "walker_v",
-    "other_v",
-    "swerve_",
-)  # columns of staged encounters, without x, y
-_ZONE_SLOW, _ZONE_FAST = Ellipse((0.04, 0.0), (0.88, 0.68)), Ellipse((0.06, 0.0), (1.0, 0.78))
-_JAPAN = ZoneInfo("Asia/Tokyo")
-_SPACE = AttentionalSpace()
-_MARGIN = 0.15  # what must be inside stays so in spite of the noise [m]
+_VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")  # of staged encounters, each with x and y
 _TRACKED = 3.4  # a pair is tracked for the window of 3 s, wherever the ticks of the clock fall [s]
-_LOOKED_AT = 3.15  # the window begins at the first tick or, at the latest, the next [s]
 _PAUSE = 1.0  # between a pair's end and the start of the next [s]
 _BEFORE = (0.5, 2.5)  # from a pair's start until the two are closest [s]
 _TOGETHER = 0.25  # who walk together drift apart slower than that [m/s]
@@ -57,90 +50,11 @@ _HASTE = 1.5  # intruders rush past faster than that [m/s]: LOF cannot tell many
 _BEND = 1.2  # sharpest curvature of a path in the walker's frame [1/m]
 _MOMENTS = np.linspace(0, _TRACKED, 52)  # at which a path is checked [s]
 _ROUNDS, _SHIFT, _PATIENCE = 5000, 0.001, 200  # draws; each keeps 1 mm more clear; new bearing after so many
-_BULGE = 0.003  # of the hull out of the free space that still counts as convex [m]
 _FRAMES = (33, 50)  # from one frame to the next [ms]
-_FIRST_ID, _ID_STEP, _FIRST_HOUR = 9_190_600, 100, 10  # ids as on the first day of ATC
+_FIRST_ID, _ID_STEP = 9_190_600, 100  # ids as on the first day of ATC
 _SHORT_GAP, _LONG_GAP = (0.1, 0.4), (0.6, 1.0)  # a track ends after 0.5 s of silence [s]
 _HEIGHT = (1.5, 1.8)  # of people [m]
 _VELOCITY_NOISE, _FACING_NOISE = 0.45, 0.3  # of the sensor's own velocity [m/s] and facing angle [rad]
-
-
-@dataclass(frozen=True)
-class PlazaSettings:
-    """Who comes to the plaza, how they walk, what they keep clear, and what the sensor makes of it.
-
-    Parameters
-    ----------
-    encounters : pairs of people.
-    slow, fast : the true zone at 0.5 and at 1.5 m/s, in the person's frame [m]; at other speeds,
-        centre, semi-axes and angle follow in proportion.
-    speeds : of the walkers, (lowest, highest) [m/s], evenly spread.
-    fastest : nobody is faster than that [m/s].
-    clearance : mean distance that people who pass keep from the zone (exponential) [m].
-    standing, together, intruders : shares of encounters with a person who stands, of two who walk
-        together, and with one who walks right through the walker's zone.
-    intrusion : how close intruders come, (nearest, farthest) [m].
-    noise : standard deviation of each coordinate measured [m].
-    gaps, losses : shares of tracks interrupted for 0.1-0.4 s, and for 0.6-1 s, which ends a track.
-    square : where people meet [m].
-    date : of the day, in Japan, "YYYY-MM-DD".
-
-    Raises
-    ------
-    DataError : a number has no meaning, or the square is too small for an encounter.
-    ZoneError : no hull can find this truth.  Points (x', y', speed) of people who keep out of the
-        zone, r' = r_max - r, fill a body that must be *convex*, or its hull bulges into the zone.  So
-        the zone must hold its person, reach less than r_max = 2 m, and not be too thin.
-    """
-
-    encounters: int = 2500
-    slow: Ellipse = _ZONE_SLOW
-    fast: Ellipse = _ZONE_FAST
-    speeds: tuple[float, float] = (SLOWEST, 1.55)
-    fastest: float = 2.2
-    clearance: float = 0.1
-    standing: float = 0.08
-    together: float = 0.12
-    intruders: float = 0.0025
-    intrusion: tuple[float, float] = (0.2, 0.4)
-    noise: float = 0.01
-    gaps: float = 0.05
-    losses: float = 0.01
-    square: Square = ATC_SQUARE
-    date: str = "2000-01-02"
-
-    def __post_init__(self) -> None:
-        shares = (self.standing, self.together, self.intruders)
-        if not (min(shares) >= 0 and sum(shares) <= 1):
-            raise DataError(f"standing, together, intruders must be shares, in sum at most 1; got {shares}")
-        if not (min(self.gaps, self.losses) >= 0 and self.gaps + self.losses <= 1):
-            raise DataError(f"gaps, losses must be shares, in sum at most 1; got {self.gaps}, {self.losses}")
-        if not (self.encounters >= 1 and 0 <= self.clearance < np.inf and 0 <= self.noise < np.inf):
-            raise DataError(
-                "expected encounters >= 1, clearance >= 0 m and noise >= 0 m; "
-                f"got {self.encounters}, {self.clearance} m, {self.noise} m"
-            )
-        if not SLOWEST <= self.speeds[0] < self.speeds[1] <= self.fastest < np.inf:
-            raise DataError(
-                f"expected {SLOWEST} <= lowest < highest speed <= fastest [m/s]; "
-                f"got {self.speeds} and {self.fastest}"
-            )
-        if not 0 < self.intrusion[0] <= self.intrusion[1] < np.inf:
-            raise DataError(f"expected 0 < nearest <= farthest intrusion; got {self.intrusion} m")
-        needed = np.hypot(_swept(self.speeds[1]), _SPACE.width) + 2 * _MARGIN
-        given = min(np.ptp(self.square.x), np.ptp(self.square.y))
-        if given < needed:
-            raise DataError(
-                f"at speeds up to {self.speeds[1]} m/s a square needs sides of {needed:.1f} m or more; "
-                f"got {given:.1f} m; take a larger square or slower walkers"
-            )
-        _first_moment(self)
-        _check_convex(self)
-
-    def true_zone(self, speed: float) -> Ellipse:
-        """The zone, in the person's frame [m], that others keep out of, by the person's `speed` [m/s]."""
-        (m, n), (a, b), angle = _zones(self, np.array(float(speed)))
-        return Ellipse((m, n), (a, b), float(angle))
 
 
 def make_plaza(path: str | Path, *, seed: int = 0, settings: PlazaSettings | None = None) -> Path:
@@ -181,13 +95,13 @@ def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) ->
     plan, speed, before, motion = _approaches(rng, settings)
     n = len(plan)
     heading = rng.uniform(-np.pi, np.pi, n)
-    ahead, swept = _direction(heading), _swept(speed)
-    half = (np.abs(ahead) * swept[:, None] + np.abs(_left(ahead)) * _SPACE.width) / 2
+    ahead, swept = direction(heading), swept_length(speed)
+    half = (np.abs(ahead) * swept[:, None] + np.abs(to_left(ahead)) * SPACE.width) / 2
     low, high = np.transpose([settings.square.x, settings.square.y])
-    middle = rng.uniform(low + half + _MARGIN, high - half - _MARGIN)
+    middle = rng.uniform(low + half + MARGIN, high - half - MARGIN)
     walker = middle + (speed * before - swept / 2)[:, None] * ahead
-    start = _first_moment(settings) + np.arange(n) * (_TRACKED + _PAUSE)
-    offset, other_v, swerve = np.moveaxis(_turned(motion, heading[:, None]), 1, 0)
+    start = first_moment(settings) + np.arange(n) * (_TRACKED + _PAUSE)
+    offset, other_v, swerve = np.moveaxis(turned(motion, heading[:, None]), 1, 0)
     apart = np.abs(np.arctan2(motion[:, 1, 1], motion[:, 1, 0]))
     kind = np.where(
         plan == "passing", np.select([apart < np.pi / 4, apart > 3 * np.pi / 4], KINDS[:2], KINDS[2]), plan
@@ -244,7 +158,7 @@ def _approaches(
         clear[todo] += _SHIFT
     raise ZoneError(
         f"{len(todo)} of {n} pairs find no way around each other's zones; expected zones that leave room in "
-        f"the attentional space of {_SPACE.length} m by {_SPACE.width} m; make `slow` and `fast` smaller"
+        f"the attentional space of {SPACE.length} m by {SPACE.width} m; make `slow` and `fast` smaller"
     )
 
 
@@ -263,14 +177,14 @@ def _draw(
     `bearing` is the touching point's parameter on the ellipse; intruders pass the person at that bearing.
     """
     n, standing, intruder = len(plan), plan == "standing", plan == "intruder"
-    center, semi_axes, angle = _zones(settings, speed)
+    center, semi_axes, angle = zones_at(settings, speed)
     a, b = semi_axes.T
     beside = np.arctan2(b * np.cos(angle), a * np.sin(angle)) + np.pi * rng.integers(2, size=n)
-    unit = _direction(np.where(standing, beside, bearing))
-    edge = _turned(_left(unit) * semi_axes, angle)
-    point = center + _turned(unit * semi_axes, angle)
-    tangent = np.where(intruder[:, None], _left(unit), edge / np.linalg.norm(edge, axis=-1, keepdims=True))
-    normal = -_left(tangent)
+    unit = direction(np.where(standing, beside, bearing))
+    edge = turned(to_left(unit) * semi_axes, angle)
+    point = center + turned(unit * semi_axes, angle)
+    tangent = np.where(intruder[:, None], to_left(unit), edge / np.linalg.norm(edge, axis=-1, keepdims=True))
+    normal = -to_left(tangent)
     intrusion = rng.uniform(*settings.intrusion, n)
     offset = np.where(intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal)
     pace = rng.uniform(np.where(intruder, _HASTE, _TOGETHER), 2 * settings.fastest)
@@ -292,19 +206,19 @@ def _possible(
     passing = velocity - speed[:, None, None] * [1.0, 0.0]
     where, moves = offset + passing * since + swerve * until**2 / 2, velocity + swerve * until
     x, y = where[:, 0].T
-    seen = (x >= _MARGIN) & (x <= _SPACE.length - _MARGIN) & (np.abs(y) <= _SPACE.width / 2 - _MARGIN)
+    seen = (x >= MARGIN) & (x <= SPACE.length - MARGIN) & (np.abs(y) <= SPACE.width / 2 - MARGIN)
     pace, course = np.linalg.norm(moves, axis=-1), np.arctan2(moves[..., 1], moves[..., 0])
     standing = plan == "standing"
     natural = ((pace <= settings.fastest) & ((pace >= SLOWEST) | standing[:, None])).all(axis=1)
     kept = _keeps_out(settings, where, np.broadcast_to(speed[:, None], pace.shape))
-    kept &= _keeps_out(settings, _turned(-where, -course), pace) | standing
+    kept &= _keeps_out(settings, turned(-where, -course), pace) | standing
     allowed = natural & (kept | (plan == "intruder"))
-    return np.asarray(seen & (np.hypot(x, y) >= 1 + _MARGIN) & allowed)
+    return np.asarray(seen & (np.hypot(x, y) >= 1 + MARGIN) & allowed)
 
 
 def _keeps_out(settings: PlazaSettings, points: Array, speed: Array) -> NDArray[np.bool_]:
     """Which paths (n, moments, 2) [m] keep out of zones at speeds (n, moments) all the time; (n,)."""
-    return np.asarray((np.linalg.norm(_in_unit_disc(settings, points, speed), axis=-1) >= 1).all(axis=1))
+    return np.asarray((np.linalg.norm(in_unit_disc(settings, points, speed), axis=-1) >= 1).all(axis=1))
 
 
 def _sensed(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.DataFrame:
@@ -346,86 +260,6 @@ def _sensed(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     return pl.DataFrame({name: column[there] for name, column in columns.items()})
 
 
-def _check_convex(settings: PlazaSettings) -> None:
-    """Raise ZoneError unless the midpoint of any two free points (x', y', speed) is free as well."""
-    unit, speed = _direction(np.linspace(0, 2 * np.pi, 90, endpoint=False)), np.linspace(*settings.speeds, 3)
-    shape = (len(speed), len(unit))
-    speed, unit = np.repeat(speed, shape[1]), np.tile(unit, (shape[0], 1))
-    reach = _reach(settings, unit, speed)
-    if not (reach < R_MAX).all():
-        raise ZoneError(
-            f"slow = {settings.slow}, fast = {settings.fast}: at {settings.speeds} m/s the zone must hold "
-            f"the person's own place and reach less than {R_MAX} m; make it smaller or centre it"
-        )
-    free = (R_MAX - reach)[:, None] * unit
-    middle, between = (free[:, None] + free) / 2, (speed[:, None] + speed) / 2
-    distance = np.linalg.norm(middle, axis=-1)
-    middle = np.where(distance[..., None] > 0, middle, [1.0, 0.0])
-    excess = (
-        distance + _reach(settings, middle / np.linalg.norm(middle, axis=-1, keepdims=True), between) - R_MAX
-    )
-    if excess.max() > _BULGE:
-        raise ZoneError(
-            f"slow = {settings.slow}, fast = {settings.fast}: no hull finds this zone, for the space it "
-            f"leaves free is not convex (by {excess.max():.3f} m, allowed: {_BULGE} m); make it rounder"
-        )
-
-
-def _reach(settings: PlazaSettings, unit: Array, speed: Array) -> Array:
-    """How far zones at speeds (...) reach along unit vectors (..., 2) [m]; inf: the person is outside."""
-    origin = _in_unit_disc(settings, np.zeros_like(unit), speed)
-    along = _in_unit_disc(settings, unit, speed) - origin
-    p, q, s = (np.sum(u * v, axis=-1) for u, v in ((along, origin), (along, along), (origin, origin)))
-    return np.where(s < 1, (np.sqrt(p**2 + q * np.maximum(1 - s, 0)) - p) / q, np.inf)
-
-
-def _zones(settings: PlazaSettings, speed: Array) -> tuple[Array, Array, Array]:
-    """Centres (..., 2), semi-axes (..., 2) [m] and angles (...) [rad] of the true zones at speeds (...)."""
-    slow, fast, share = settings.slow, settings.fast, (speed - _SLOW) / (_FAST - _SLOW)
-    turn = Ellipse((0, 0), (1, 1), fast.angle - slow.angle).angle  # the shorter way round
-    center, semi_axes = (
-        np.add(start, share[..., None] * np.subtract(end, start))
-        for start, end in ((slow.center, fast.center), (slow.semi_axes, fast.semi_axes))
-    )
-    return center, semi_axes, slow.angle + share * turn
-
-
-def _in_unit_disc(settings: PlazaSettings, points: Array, speed: Array) -> Array:
-    """Points (..., 2) [m] in coordinates in which the zones at speeds (...) are the unit disc."""
-    center, semi_axes, angle = _zones(settings, speed)
-    return _turned(points - center, -angle) / semi_axes
-
-
-def _first_moment(settings: PlazaSettings) -> float:
-    """When the first pair comes [s since 1970]."""
-    try:
-        day = datetime.strptime(settings.date, "%Y-%m-%d").replace(hour=_FIRST_HOUR, tzinfo=_JAPAN)
-    except ValueError as error:
-        raise DataError(f'date must be a day "YYYY-MM-DD"; got {settings.date!r}') from error
-    return day.timestamp()
-
-
-def _swept(speed: float | Array) -> Array:
-    """Length of what the attentional space sweeps over within the window [m]."""
-    return np.asarray(_SPACE.length + speed * _LOOKED_AT)
-
-
 def _spread(rng: np.random.Generator, n: int, low: float, high: float) -> Array:
     """n numbers in random order, one in each nth part from low to high."""
     return low + (high - low) * rng.permutation(np.arange(n) + rng.uniform(size=n)) / n
-
-
-def _direction(angle: Array) -> Array:
-    """Unit vectors (..., 2) at angles (...) [rad]."""
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def _left(vectors: Array) -> Array:
-    """Vectors (..., 2) turned by 90 degrees, counter-clockwise."""
-    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
-
-
-def _turned(vectors: Array, angle: Array) -> Array:
-    """Vectors (..., 2) turned by angles (...) [rad], counter-clockwise."""
-    cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
-    return np.asarray(cos * vectors + sin * _left(vectors))

@@ -11,7 +11,7 @@ import pytest
 
 from szlib import workbook
 
-SOURCES = sorted(workbook.NOTEBOOKS.glob("*.py"))
+SOURCES = sorted(workbook.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
 MAX_LINES = 25
 
 

@@ -10,7 +10,8 @@ import polars as pl
 import pytest
 
 import szlib
-from szlib.plaza import KINDS, PlazaSettings, make_plaza, positions, stage_encounters
+from szlib.plaza import KINDS, make_plaza, positions, stage_encounters
+from szlib.truths import PlazaSettings
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
 DEFAULT = PlazaSettings()
