@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import polars as pl
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from . import funnels
 from .errors import DataError, DataWarning
@@ -122,7 +124,7 @@ def _read_file(
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
             raise DataError(f"{path}: cannot be read as {layout.name} ({error}); {_EXPECTED}") from error
     metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
-    rows = rows.with_columns(reason=_reason(metres, "day" in rows.columns))
+    rows = rows.with_columns(reason=_reason(metres, layout.seconds, "day" in rows.columns))
     bad, good = rows.filter(pl.col("reason").is_not_null()), rows.filter(pl.col("reason").is_null())
     if bad.height > good.height:
         line, why = bad["line"][0], bad["reason"][0]
@@ -139,9 +141,8 @@ def _read_file(
         _check_unit(good, layout, path)
     if "day" not in rows.columns:
         # the name stands for the day where frames are counted, not time of day
-        day = pl.lit(_stem(path)) if layout.name == "ewap" else _calendar_day(tz)
         try:
-            good = good.with_columns(day=day)
+            good = good.with_columns(day=pl.lit(_stem(path)) if layout.name == "ewap" else _calendar_day(tz))
         except pl.exceptions.PolarsError as error:
             raise DataError(f"unknown time zone {tz!r} ({error}); expected one like 'Asia/Tokyo'") from error
     good = good.select(
@@ -154,7 +155,7 @@ def _read_file(
     return good, funnels.stage(f"read {path.name}", rows.height, good.height, reasons), layout
 
 
-def _reason(metres: float, with_day: bool) -> pl.Expr:
+def _reason(metres: float, seconds: float, with_day: bool) -> pl.Expr:
     """Why a row cannot be used; null where it can."""
     numbers, position = ["t", "id", "x", "y"], pl.col("x", "y")
     return (
@@ -162,7 +163,7 @@ def _reason(metres: float, with_day: bool) -> pl.Expr:
         .when(pl.any_horizontal(pl.col(numbers).is_null())).then(pl.lit("missing or not a number"))
         .when(~pl.all_horizontal(pl.col(numbers).is_finite())).then(pl.lit("not finite"))
         .when((pl.col("id") % 1 != 0) | (pl.col("id").abs() > 2**53)).then(pl.lit("id not a whole number"))
-        .when(pl.col("t").abs() > _LAST_SECOND).then(pl.lit("time not in seconds since 1970"))
+        .when(pl.col("t").abs() * seconds > _LAST_SECOND).then(pl.lit("time not in seconds since 1970"))
         .when(pl.any_horizontal(position.abs() * metres > _FARTHEST)).then(pl.lit("position not on Earth"))
         .when(pl.col("day").is_null() if with_day else pl.lit(False)).then(pl.lit("no day"))
     )  # fmt: skip
@@ -198,6 +199,8 @@ def _open(plain: Path, path: Path, name: str | None) -> tuple[Format, pl.LazyFra
         head = stream.readline(_LONGEST_LINE)
     if head[:4] == b"PAR1":
         return FORMATS["tidy"], _scan_parquet(plain, path)
+    if b"\0" in head:
+        raise DataError(f"{path}, line 1: is binary, not text; {_EXPECTED}")
     first = head.decode("utf-8", errors="replace").lstrip("\ufeff").strip()
     if not first:
         raise DataError(f"{path}, line 1: the file is empty or begins with a blank line; {_EXPECTED}")
@@ -237,7 +240,7 @@ def _scan_csv(plain: Path, layout: Format) -> pl.LazyFrame:
     scan = pl.scan_csv(
         plain, schema={**fields, "extra": pl.String}, has_header=False, skip_lines=int(layout.header),
         quote_char=None, encoding="utf8-lossy", ignore_errors=True, truncate_ragged_lines=True,
-        missing_columns="insert", raise_if_empty=False, glob=False,
+        missing_columns="insert", extra_columns="ignore", raise_if_empty=False, glob=False,
         row_index_name="line", row_index_offset=1 + layout.header,
     )  # fmt: skip
     ragged = pl.col("extra").is_not_null()
@@ -264,16 +267,20 @@ def _scan_lines(plain: Path, layout: Format) -> pl.LazyFrame:
 
 
 def _scan_parquet(plain: Path, path: Path) -> pl.LazyFrame:
+    """Read by pyarrow, as damaged files can make polars abort the whole process."""
     try:
-        scan = pl.scan_parquet(plain, glob=False)
-        names = scan.collect_schema().names()
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
+        with pq.ParquetFile(plain) as file:
+            names = file.schema_arrow.names
+            table = file.read([name for name in (*_TIXY, "day") if name in names])
+        table.validate(full=True)
+        columns = pa.table({name: table[name] for name in table.column_names})  # without their metadata
+    except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
         raise DataError(f"{path}: damaged Parquet ({error}); fetch or write the file again") from error
-    missing = [column for column in _TIXY if column not in names]
-    if missing:
+    if missing := [column for column in _TIXY if column not in names]:
         raise DataError(f"{path}: has no column {', '.join(missing)}; found {names}; {_EXPECTED}")
     day = [pl.col("day").cast(pl.String)] if "day" in names else []
     numbers = [pl.col(name).cast(pl.Float64, strict=False) for name in _TIXY]
+    scan = pl.LazyFrame(pl.from_arrow(columns))
     return scan.select(*numbers, *day, ragged=pl.lit(False)).with_row_index("line", offset=1)
 
 
