@@ -23,7 +23,7 @@ import pandas as pd
 
 from . import funnels
 from .errors import DataError
-from .tracks import COLUMNS, TICKS_PER_SECOND, check_columns, clock_index
+from .tracks import COLUMNS, TICKS_PER_SECOND, check_columns, clock_index, nearest_tick
 
 SAMPLE_COLUMNS = ["encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed"]
 
@@ -156,6 +156,7 @@ def find_encounters(
         np.arange(len(x)),
         [
             ("not in the square", inside),
+            ("velocity unknown", np.isfinite(speed)),
             ("a corner of the space outside the square", cornered),
             (f"slower than {min_speed} m/s", ready),
             ("nobody in the space", people >= 1),
@@ -224,10 +225,14 @@ def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame
     DataError : a table lacks a column or is empty, or a sample is not in `tracks`.
     """
     check_columns(tracks, COLUMNS)
-    check_columns(samples, SAMPLE_COLUMNS)
+    check_columns(samples, SAMPLE_COLUMNS[:5])
     people = tracks[tracks["id"].isin(samples["ref_id"]) | tracks["id"].isin(samples["other_id"])]
-    people = people[["day", "id", "x", "y", "vx", "vy"]].assign(tick=_tick(people))
-    keys = samples[["encounter", "day", "ref_id", "other_id"]].assign(tick=_tick(samples))
+    people = people[["day", "id", "x", "y", "vx", "vy"]].assign(
+        tick=nearest_tick(people["t"].to_numpy(float))
+    )
+    keys = samples[["encounter", "day", "ref_id", "other_id"]].assign(
+        tick=nearest_tick(samples["t"].to_numpy(float))
+    )
     ref, oth = (
         keys.merge(people, how="left", left_on=["day", who, "tick"], right_on=["day", "id", "tick"])
         for who in ("ref_id", "other_id")
@@ -244,10 +249,6 @@ def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame
         dx, dy = rows["x"].to_numpy() - x, rows["y"].to_numpy() - y
         out |= {f"{who}_x": cos * dx + sin * dy, f"{who}_y": cos * dy - sin * dx}
     return pd.DataFrame(out)
-
-
-def _tick(frame: pd.DataFrame) -> np.ndarray:
-    return np.rint(frame["t"].to_numpy(float) * TICKS_PER_SECOND).astype(np.int64)
 
 
 def _occupants(

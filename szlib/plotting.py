@@ -117,9 +117,7 @@ def plot_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | None = None)
     ax.plot(*starts.T, ".", color=BLUE, markersize=3)
     ax.autoscale_view()
     ax.legend(loc="upper right", fontsize=8)
-    return metres(
-        ax, f"{len(shown)} encounters as the reference pedestrian saw them", person=True
-    )
+    return metres(ax, f"{len(shown)} encounters as the reference pedestrian saw them", person=True)
 
 
 def plot_los(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:

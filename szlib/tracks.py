@@ -33,6 +33,9 @@ VELOCITY_SPAN = 0.5
 _LONGEST_INTERVAL = 5.0
 """Of samples further apart [s] nobody can tell what a person did in between (assumed)."""
 
+_ROUNDING = 1e-6
+"""Of time stamps of ms near 1e9 s, which doubles hold to 2e-7 [s]."""
+
 _LAST_SECOND = 1e11
 """Later times [s] are no times of people; up to here ticks are exact."""
 
@@ -94,9 +97,9 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
         max_gap = _usual_gap(step[same], raw.attrs.get("max_gap"))
     if not max_gap > 1 / TICKS_PER_SECOND:
         raise DataError(f"max_gap must be a time in seconds, longer than the clock's 0.1 s; got {max_gap}")
-    piece = np.cumsum(~(same & (step <= max_gap))) - 1
+    piece = np.cumsum(~(same & (step <= max_gap + _ROUNDING))) - 1
     row, tick = _ticks(t, piece)
-    after = np.minimum(row + 1, len(t) - 1)
+    after = np.where(np.r_[piece[1:] == piece[:-1], False][row], row + 1, row)
     span = np.where(after > row, t[after] - t[row], 1.0)
     weight = np.clip((tick / TICKS_PER_SECOND - t[row]) / span, 0.0, 1.0)[:, None]
     positions = xy[row] + weight * (xy[after] - xy[row])
@@ -121,6 +124,11 @@ def check_columns(frame: pd.DataFrame, needed: Sequence[str]) -> None:
         raise DataError(f"the table is empty; expected rows of {list(needed)}")
 
 
+def nearest_tick(t: np.ndarray) -> np.ndarray:
+    """Number of the clock's tick nearest to each time [s], counted from t = 0."""
+    return np.asarray(np.rint(t * TICKS_PER_SECOND).astype(np.int64))
+
+
 def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Order and ticks of a track table: row order by person and time, tick number, gap-free piece.
 
@@ -130,7 +138,7 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
     check_columns(tracks, COLUMNS)
     _check_values(tracks)
     t = tracks["t"].to_numpy(float)
-    tick = np.rint(t * TICKS_PER_SECOND)
+    tick = nearest_tick(t)
     off = ~(np.abs(t * TICKS_PER_SECOND - tick) < 1e-3)
     if off.any():
         value = t[np.flatnonzero(off)[0]]
@@ -138,7 +146,6 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
             f"t = {value} s is not a multiple of 0.1 s; "
             "bring the table to the clock with szlib.tracks.to_clock"
         )
-    tick = tick.astype(np.int64)
     person = _person_codes(tracks)
     order = _order(person, tick)
     tick, person = tick[order], person[order]
@@ -178,7 +185,7 @@ def _usual_gap(intervals: np.ndarray, of_format: float | None) -> float:
 
 def _ticks(t: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Every tick within every piece: the input row just before it, and its number."""
-    tolerance = 1e-4  # of a tick: time stamps of ms near 1e9 s carry rounding of 2e-6 ticks
+    tolerance = TICKS_PER_SECOND * _ROUNDING
     first = np.ceil(t * TICKS_PER_SECOND - tolerance).astype(np.int64)
     last_of_piece = np.r_[piece[1:] != piece[:-1], True]
     end = np.where(
