@@ -90,7 +90,7 @@ class Cells:
         """Number of the cell in time, for times [s]."""
         return np.asarray(np.floor(t * (1 / self.width)).astype(np.int64))
 
-    def slot(self, rows: Rows, slots: int = _CELLS) -> np.ndarray:
+    def slot(self, rows: Rows, slots: int) -> np.ndarray:
         """Slot of each row's cell in a table; successive cells of a person have successive slots."""
         person = (rows.id.astype(np.int64) * _MIXER) >> _SHIFT
         return np.asarray((person + self.number(rows.t)) & (slots - 1))
@@ -227,7 +227,7 @@ def _one_pass(cells: Cells, blocks: Blocks) -> Iterator[Rows]:
 
 
 def _needed(cells: Cells, rows: Rows) -> np.ndarray:
-    slot, sides = cells.slot(rows), np.zeros((4, _CELLS), bool)
+    slot, sides = cells.slot(rows, _CELLS), np.zeros((4, _CELLS), bool)
     cells.mark(sides, rows, slot)
     return np.asarray(cells.needed(sides)[slot])
 

@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import polars as pl
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from . import funnels
 from .errors import DataError, DataWarning
@@ -307,16 +309,20 @@ def _scan_lines(plain: Path, layout: Format) -> pl.LazyFrame:
 
 
 def _scan_parquet(plain: Path, path: Path) -> pl.LazyFrame:
+    """Read by pyarrow, as damaged files can make polars abort the whole process."""
     try:
-        scan = pl.scan_parquet(plain, glob=False)
-        names = scan.collect_schema().names()
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
+        with pq.ParquetFile(plain) as file:
+            names = file.schema_arrow.names
+            table = file.read([name for name in (*_TIXY, "day") if name in names])
+        table.validate(full=True)
+        columns = pa.table({name: table[name] for name in table.column_names})  # without their metadata
+    except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
         raise DataError(f"{path}: damaged Parquet ({error}); fetch or write the file again") from error
-    missing = [column for column in _TIXY if column not in names]
-    if missing:
+    if missing := [column for column in _TIXY if column not in names]:
         raise DataError(f"{path}: has no column {', '.join(missing)}; found {names}; {_EXPECTED}")
     day = [pl.col("day").cast(pl.String)] if "day" in names else []
     numbers = [pl.col(name).cast(pl.Float64, strict=False) for name in _TIXY]
+    scan = pl.LazyFrame(pl.from_arrow(columns))
     return scan.select(*numbers, *day, ragged=pl.lit(False)).with_row_index("line", offset=1)
 
 
