@@ -15,6 +15,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "extraction",
         "funnels",
         "hulls",
+        "loaders",
         "meetings",
         "mpc",
         "nearby",

@@ -86,14 +86,14 @@ class Cells:
         """Cells needed after one with a tick inside."""
         return ceil((max(self.duration, VELOCITY_SPAN) + self.max_gap + _SLACK) / self.width)
 
-    def number(self, t: np.ndarray) -> np.ndarray:
+    def number(self, t: np.ndarray | np.floating) -> np.ndarray:
         """Number of the cell in time, for times [s]."""
         return np.asarray(np.floor(t * (1 / self.width)).astype(np.int64))
 
-    def slot(self, rows: Rows, slots: int) -> np.ndarray:
+    def slot(self, rows: Rows, number: np.ndarray, slots: int) -> np.ndarray:
         """Slot of each row's cell in a table; successive cells of a person have successive slots."""
         person = (rows.id.astype(np.int64) * _MIXER) >> _SHIFT
-        return np.asarray((person + self.number(rows.t)) & (slots - 1))
+        return np.asarray((person + number) & (slots - 1))
 
     def mark(self, sides: np.ndarray, rows: Rows, slot: np.ndarray) -> None:
         """Mark in `sides` (4, slots) the cells with a row that is not outside of each of the four edges."""
@@ -201,7 +201,7 @@ class Blocks:
             if block["reason"].null_count() < block.height:
                 bad = block.filter(pl.col("reason").is_not_null())
                 self.first = self.first or bad.select("line", "reason").row(0)
-                self.reasons.update(dict(bad["reason"].value_counts().iter_rows()))
+                self.reasons.update(dict(bad.group_by("reason", maintain_order=True).len().iter_rows()))
                 rows = rows.where(block["reason"].is_null().to_numpy())
             if len(rows.t):
                 self.good += len(rows.t)
@@ -214,20 +214,22 @@ def _one_pass(cells: Cells, blocks: Blocks) -> Iterator[Rows]:
     waiting = Rows(*np.zeros((4, 0)))
     decided = newest = np.iinfo(np.int64).min // 2
     for block in blocks:
-        if cells.number(block.t).min() < newest:
+        if cells.number(block.t.min()) < newest:
             raise _Unsorted
         known = Rows(*map(np.concatenate, zip(waiting, block, strict=True)))
-        number, needed = cells.number(known.t), _needed(cells, known)
+        number = cells.number(known.t)
+        needed = _needed(cells, known, number)
         newest = int(number.max())
         ripe = newest - cells.before - 2
         yield known.where(needed & (number > decided) & (number <= ripe))
         decided = max(decided, ripe)
         waiting = known.where(number >= decided - cells.after)
-    yield waiting.where(_needed(cells, waiting) & (cells.number(waiting.t) > decided))
+    number = cells.number(waiting.t)
+    yield waiting.where(_needed(cells, waiting, number) & (number > decided))
 
 
-def _needed(cells: Cells, rows: Rows) -> np.ndarray:
-    slot, sides = cells.slot(rows, _CELLS), np.zeros((4, _CELLS), bool)
+def _needed(cells: Cells, rows: Rows, number: np.ndarray) -> np.ndarray:
+    slot, sides = cells.slot(rows, number, _CELLS), np.zeros((4, _CELLS), bool)
     cells.mark(sides, rows, slot)
     return np.asarray(cells.needed(sides)[slot])
 
@@ -236,7 +238,7 @@ def _two_passes(cells: Cells, blocks: Blocks) -> Iterator[Rows]:
     """The rows of needed cells, of rows in any order."""
     sides = np.zeros((4, _ALL_CELLS), bool)
     for block in blocks:
-        cells.mark(sides, block, cells.slot(block, _ALL_CELLS))
+        cells.mark(sides, block, cells.slot(block, cells.number(block.t), _ALL_CELLS))
     needed = cells.needed(sides)
     for block in blocks:
-        yield block.where(needed[cells.slot(block, _ALL_CELLS)])
+        yield block.where(needed[cells.slot(block, cells.number(block.t), _ALL_CELLS)])

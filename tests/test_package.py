@@ -15,7 +15,7 @@ import szlib
 
 PACKAGE = Path(szlib.__file__).parent
 ORDER = [
-    "errors", "funnels", "ellipses", "readers", "tracks", "encounters", "outliers", "hulls", "zones",
+    "errors", "funnels", "ellipses", "readers", "tracks", "encounters", "loaders", "outliers", "hulls", "zones",
     "truths", "plaza", "datasets", "nearby", "extraction", "barriers", "settings", "meetings", "mpc",
     "simulation", "scenarios", "plotting", "scenes", "pages", "workbook",
 ]  # fmt: skip
