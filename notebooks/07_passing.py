@@ -28,7 +28,7 @@ from IPython.display import Image
 
 import szlib
 from szlib import scenes
-from szlib.pages import Page, parameters
+from szlib.pages import Page, settings_table
 from szlib.scenarios import avoidance_start
 
 # %% tags=["parameters"]
@@ -41,7 +41,7 @@ interactive = False  # True: a slider for gamma
 # %%
 page = Page("07_passing", data=data, results=results, seed=seed)
 settings = szlib.MPCSettings(gamma=gamma)
-parameters([(name, getattr(settings, name), badge, "") for name, badge in settings.badges().items()])
+settings_table(settings)
 
 # %% [markdown]
 # ## The problem, ten times a second (eq. 2)

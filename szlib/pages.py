@@ -6,7 +6,9 @@ support it the page says "not supported here", with the numbers, and the run goe
 
 from __future__ import annotations
 
+import inspect
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from pandas.io.formats.style import Styler
 
 from . import __version__, datasets
 from .encounters import find_encounters
@@ -23,6 +26,8 @@ from .zones import SocialZone
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from .settings import MPCSettings
 
 PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
 """Badges: where a parameter comes from."""
@@ -127,7 +132,7 @@ class Page:
         file.write_bytes(content)
         self.figures.append(file.name)
 
-    def close(self) -> pd.DataFrame:
+    def close(self) -> Styler:
         """Write the page down for the summary; returns its checks and claims to read."""
         record = {
             "notebook": self.name,
@@ -139,8 +144,8 @@ class Page:
         _replace(
             self.out / "pages" / f"{self.name}.json", lambda file: file.write_text(text, encoding="utf-8")
         )
-        columns = ["kind", "name", "result", "value"]
-        return pd.DataFrame([{c: row[c] for c in columns} for row in self.checks], columns=columns)
+        rows = [(c["kind"], c["name"], c["result"], _told(c["value"])) for c in self.checks]
+        return _whole(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
 
     def _record(self, kind: str, name: str, passed: bool, value: object, result: str) -> None:
         value = _plain(value)
@@ -152,13 +157,35 @@ class Page:
         return {"data": datasets.label(self.data), "seed": self.seed, "files": files, "szlib": __version__}
 
 
-def parameters(rows: Sequence[tuple[str, object, str, str]]) -> pd.DataFrame:
+def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
     """A table of parameters for a notebook: name, value, badge (paper, assumed, measured), why."""
     unknown = {badge for _, _, badge, _ in rows} - {PAPER, ASSUMED, MEASURED}
     if unknown:
         raise ValueError(f"badges must be {PAPER}, {ASSUMED} or {MEASURED}; got {sorted(unknown)}")
-    table = pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"])
-    return table.set_index("parameter")
+    return _whole(pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"]))
+
+
+def settings_table(settings: MPCSettings) -> Styler:
+    """The controller's parameters as such a table; what each one is stands in the docstring of its class."""
+    told: dict[str, str] = {}
+    names: list[str] = []
+    for line in (inspect.getdoc(type(settings)) or "").splitlines():
+        entry = re.fullmatch(r"([A-Za-z_]\w*(?:, \w+)*) : (.*)", line)
+        if entry:
+            names = entry[1].split(", ")
+            told |= dict.fromkeys(names, entry[2])
+        elif line.startswith("    ") and names:
+            told |= {name: f"{told[name]} {line.strip()}" for name in names}
+        else:
+            names = []
+    badges = settings.badges()
+    return parameters([(name, getattr(settings, name), badge, told[name]) for name, badge in badges.items()])
+
+
+def _whole(table: pd.DataFrame) -> Styler:
+    """A table whose long texts are shown to their end, the same HTML every time."""
+    left = [{"selector": "td, th", "props": "text-align: left"}]
+    return Styler(table, uuid="szlib", cell_ids=False).hide(axis="index").set_table_styles(left)  # type: ignore[arg-type]
 
 
 def _plain(value: Any) -> Any:
@@ -173,6 +200,8 @@ def _plain(value: Any) -> Any:
 
 
 def _told(value: Any) -> str:
+    if value is None:
+        return ""
     if isinstance(value, dict):
         return ", ".join(f"{k}: {_told(v)}" for k, v in value.items())
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -211,7 +211,7 @@ def test_the_missing_directions_are_those_that_miss_the_slice(towards: int) -> N
     ("corners", "low", "high"),
     [
         ([(0, -1), (1, 0), (0, 1)], 90, -90),  # the origin on an edge
-        ([(0, 0), (1, 0), (1, 1)], 45, 0),  # the origin on a corner
+        ([(0, 0), (0, 1), (-1, 1)], 135, 90),  # the origin on a corner
         ([(-1, -0.5), (-0.2, 0), (-1, 0.5)], -153, 153),
     ],
 )

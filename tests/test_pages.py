@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import szlib
 from szlib import pages
 from szlib.pages import Page, parameters
 
@@ -27,7 +28,7 @@ def test_checks_and_claims_are_written_down(page, capsys):
     assert [c["passed"] for c in left["checks"]] == [True, False, False]
     assert [c["value"] for c in left["checks"]] == [0.5, [1, 2], {"n": 3}]
     assert left["key_figures"] == {"count": 7}
-    assert list(table["result"]) == ["holds", "FAILED", "not supported here"]
+    assert list(table.data["result"]) == ["holds", "FAILED", "not supported here"]
     assert "FAILED" in capsys.readouterr().out
 
 
@@ -60,6 +61,13 @@ def test_an_unreadable_zone_is_fitted_again_and_said_so(page, monkeypatch, capsy
 
 def test_badges():
     table = parameters([("gamma", 0.05, "measured", "why")])
-    assert table.loc["gamma", "badge"] == "measured"
+    assert table.data.set_index("parameter").loc["gamma", "badge"] == "measured"
     with pytest.raises(ValueError, match="guessed"):
         parameters([("gamma", 0.05, "guessed", "")])
+
+
+def test_every_setting_of_the_controller_is_explained_and_has_a_badge():
+    table = pages.settings_table(szlib.MPCSettings()).data
+    assert set(table["parameter"]) == set(szlib.MPCSettings.__dataclass_fields__)
+    assert table["why"].str.len().min() > 5
+    assert "v_max" in table.set_index("parameter").index

@@ -242,6 +242,15 @@ def test_every_format_counts_its_lines(tmp_path: Path, name: str, line: int) -> 
     assert told.startswith(f"a.csv, first at line {line}: rows set aside: 1 x missing or")
 
 
+def test_a_file_of_mostly_bad_rows_is_refused(tmp_path: Path) -> None:
+    frame, told = read_quietly(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z"])))
+    assert (len(frame), told) == (3, "a.csv, first at line 4: rows set aside: 3 x missing or extra fields")
+    with pytest.raises(
+        szlib.DataError, match=r"a\.csv, line 4: missing or extra fields; 4 of 7 rows cannot be"
+    ):
+        read_raw(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z", "x"])))
+
+
 def test_rows_without_a_day_are_set_aside(tmp_path: Path) -> None:
     rows = samples().assign(day="2013-01-06")
     rows.loc[[3, 4], "day"] = None
@@ -460,7 +469,7 @@ def test_any_accident_is_read_with_a_funnel_or_refused(
 def test_any_accident_to_parquet_is_read_or_refused(tmp_path: Path) -> None:
     samples(count=30).to_parquet(tmp_path / "a.parquet")
     content, rng = (tmp_path / "a.parquet").read_bytes(), random.Random(5)
-    for turn in range(60):
+    for turn in range(120):
         broken = bytearray(content)
         for _ in range(rng.randint(1, 4)):
             broken[rng.randrange(len(broken))] = rng.randrange(256)

@@ -105,6 +105,19 @@ def test_samples_on_the_clock_come_through_as_they_are() -> None:
     np.testing.assert_allclose(tracks[["x", "y"]], raw[["x", "y"]], rtol=0, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    "t",
+    [0.1 * np.arange(600), np.cumsum(np.full(600, 0.1)), np.arange(600, 12_000, 6) * (1 / 15)],
+    ids=["products", "sums", "every sixth frame at 15 Hz"],
+)
+def test_times_hit_their_ticks_in_spite_of_rounding(t: np.ndarray) -> None:
+    ticks = np.rint(t * 10).astype(int)
+    tracks = to_clock(make_raw(t))
+    np.testing.assert_array_equal(np.rint(tracks["t"] * 10), np.arange(ticks[0], ticks[-1] + 1))
+    pairs = make_raw(np.r_[t, t + 0.05]).assign(id=np.tile(np.arange(len(t)), 2))
+    assert len(to_clock(pairs)) == len(t)  # each person is seen from just one tick to before the next
+
+
 @pytest.mark.parametrize("begin", [BEGIN, 0.0, -3.0])
 def test_two_people_share_the_ticks(begin: float) -> None:
     rng = np.random.default_rng(1)
