@@ -8,6 +8,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
     submodules=[
         "barriers",
+        "commands",
         "datasets",
         "ellipses",
         "encounters",
@@ -15,6 +16,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "extraction",
         "funnels",
         "hulls",
+        "jobs",
         "loaders",
         "meetings",
         "mpc",

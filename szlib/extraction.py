@@ -32,6 +32,7 @@ from tqdm import tqdm
 from . import __version__, datasets, funnels
 from .encounters import ATC_SQUARE, SAMPLE_COLUMNS, AttentionalSpace, Square, find_encounters
 from .errors import DataError, DataWarning, SzlibError
+from .jobs import handed_out
 from .nearby import read_nearby
 from .readers import FORMATS, layout_of, read_raw
 from .tracks import to_clock
@@ -191,29 +192,12 @@ def extract_days(
         if day not in excluded
     ]
     with tqdm(total=len(tasks), unit="day", disable=not progress) as bar:
-        rows += _handed_out(tasks, n_jobs, bar)
-    table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
-    return Extraction(folder, table, excluded)
-
-
-def _handed_out(tasks: Sequence[Any], n_jobs: int | None, bar: tqdm[Any]) -> list[dict[str, Any]]:
-    """The rows of all tasks, in any order."""
-    parallel = joblib.Parallel(n_jobs=n_jobs)
-    backend = joblib.parallel.get_active_backend()[0] if n_jobs is None else None
-    if backend is None or backend.supports_return_generator:
-        parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")
-    rows = []
-    try:
-        for row in parallel(tasks):
+        for row in handed_out(tasks, n_jobs=n_jobs):
             rows.append(row)
             bar.update()
             bar.set_postfix_str(f"{row['day']} {row['status']}")
-    except joblib.externals.loky.process_executor.TerminatedWorkerError as error:
-        raise SzlibError(
-            f"a worker process was killed after {len(rows)} of {len(tasks)} days, perhaps for lack of memory "
-            f"({error}); finished days are kept: run again, with fewer processes"
-        ) from error
-    return rows
+    table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
+    return Extraction(folder, table, excluded)
 
 
 def extract_day(day: str, files: Sequence[str], out: str, chain: Chain) -> dict[str, Any]:
