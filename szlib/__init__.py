@@ -25,6 +25,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "pages",
         "plaza",
         "plotting",
+        "quality",
         "readers",
         "scenarios",
         "scenes",

@@ -31,15 +31,18 @@ ROWS = 15_000_000
 PAPER_SAMPLES = 16_181 * 31
 """Encounters in the paper, 31 samples each."""
 
-_BARE = """
+BARE = """
 import sys, polars as pl
+# begin
 names = [f"f{i}" for i in range(8)]
 near = pl.col("f2").is_between(-23500, -2500) & pl.col("f3").is_between(-15000, 13000)
 scan = pl.scan_csv(sys.argv[1], has_header=False, new_columns=names).filter(near).select(names[:4])
+scan.collect(engine="streaming")
 """
-BARE = _BARE + "scan.collect(engine='streaming')"
 OURS = """
 import sys, szlib, tempfile
+szlib.extract_days
+# begin
 for day in sys.argv[1:]:
     with tempfile.TemporaryDirectory() as out:
         done = szlib.extract_days(day, out=out, progress=False)
@@ -48,6 +51,7 @@ for day in sys.argv[1:]:
 """
 PANDAS = """
 import sys, numpy as np, pandas as pd
+# begin
 rows = pd.read_csv(sys.argv[1], header=None, usecols=[0, 1, 2, 3], names=["t", "id", "x", "y"])
 rows["tick"] = (rows["t"] * 10).round().astype(int)
 ticks = rows.groupby(["id", "tick"], as_index=False)[["x", "y"]].mean()
@@ -55,20 +59,31 @@ ticks[["vx", "vy"]] = ticks.groupby("id")[["x", "y"]].diff(5)
 near = ticks[ticks["x"].between(-18500, -7500) & ticks["y"].between(-10000, 8000)]
 pairs = near.merge(near, on="tick")
 """
+"""Reads, brings to the clock and pairs; no window is looked for."""
+ZONE = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import szlib
+from bench_data import paper_samples
+samples = paper_samples()
+# begin
+szlib.SocialZone.fit(samples)
+"""
 _TIMED = """
 import time, resource
+{imports}
 begun = time.perf_counter()
 {program}
 print(time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)
 """
-"""Measures from inside, without the start of the interpreter, and with the imports that a program needs."""
 
 
 def run(program: str, *files: Path) -> tuple[float, float]:
-    """Seconds and peak memory [MB] of a program in a process of its own."""
+    """Seconds, without imports, and peak memory [MB] of a program in a process of its own."""
+    imports, program = program.split("# begin")
     environment = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
     done = subprocess.run(
-        [sys.executable, "-c", _TIMED.format(program=program), *map(str, files)],
+        [sys.executable, "-c", _TIMED.format(imports=imports, program=program), *map(str, files)],
         capture_output=True,
         text=True,
         check=True,
@@ -169,11 +184,7 @@ def bench_lof() -> dict[str, float]:
 
 def bench_zone() -> dict[str, float]:
     """From as many samples as the paper's to zones: outliers, hull, slices, ellipses."""
-    program = (
-        "import sys\nsys.path.insert(0, sys.argv[1])\nimport szlib\nfrom bench_data import paper_samples\n"
-        "szlib.SocialZone.fit(paper_samples())"
-    )
-    seconds, memory = run(program, Path(__file__).parent)
+    seconds, memory = run(ZONE, Path(__file__).parent)
     return {"s": seconds, "peak MB": memory}
 
 

@@ -15,8 +15,8 @@ import szlib
 
 PACKAGE = Path(szlib.__file__).parent
 ORDER = [
-    "errors", "funnels", "ellipses", "readers", "tracks", "encounters", "loaders", "outliers", "hulls",
-    "zones", "truths", "plaza", "datasets", "nearby", "jobs", "extraction", "barriers", "settings",
+    "errors", "funnels", "ellipses", "readers", "tracks", "encounters", "quality", "loaders", "outliers",
+    "hulls", "zones", "truths", "plaza", "datasets", "nearby", "jobs", "extraction", "barriers", "settings",
     "meetings", "mpc", "simulation", "scenarios", "plotting", "scenes", "pages", "commands", "workbook",
 ]  # fmt: skip
 """From the ground up: a module imports only from those before it."""
