@@ -6,7 +6,8 @@ dict, so that provenance travels with the data and nothing is dropped in silence
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -43,3 +44,18 @@ def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         rows += [(s["stage"], f"- {reason}", count) for reason, count in s["set_aside"].items()]
         rows.append((s["stage"], "kept", s["kept"]))
     return pd.DataFrame(rows, columns=["stage", "what", "rows"])
+
+
+def add(funnels: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
+    """One funnel of many: stages of the same name are added up, in the order in which they first come."""
+    sums: dict[str, list[Mapping[str, Any]]] = {}
+    for stages in funnels:
+        for s in stages:
+            sums.setdefault(s["stage"], []).append(s)
+    added = []
+    for name, parts in sums.items():
+        reasons: Counter[str] = Counter()
+        for part in parts:
+            reasons.update(part["set_aside"])
+        added.append(stage(name, sum(p["entered"] for p in parts), sum(p["kept"] for p in parts), reasons))
+    return added

@@ -11,7 +11,7 @@ import shutil
 import tempfile
 import warnings
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -91,20 +91,34 @@ def read_raw(
         raise DataError(f"unknown file_format {file_format!r}; expected one of {list(FORMATS)}")
     parts, stages, layouts = zip(*(_read_file(file, file_format, unit, tz) for file in files), strict=True)
     _check_sequences([_stem(f) for f, layout in zip(files, layouts, strict=True) if layout.name == "ewap"])
+    return merge(parts, stages, layouts, excluded)
+
+
+def merge(
+    parts: Sequence[pl.DataFrame],
+    stages: Sequence[dict[str, Any]],
+    layouts: Sequence[Format],
+    excluded: Sequence[str],
+) -> pd.DataFrame:
+    """Rows (day, id, t, x, y) of all files as one table as from `read_raw`: sorted, without duplicates."""
+    if len({part.schema["day"] for part in parts}) > 1:
+        parts = [part.with_columns(pl.col("day").cast(pl.String)) for part in parts]
     merged = pl.concat(parts)
-    wanted = merged.filter(~pl.col("day").is_in(excluded))
+    wanted = merged.filter(~pl.col("day").cast(pl.String).is_in(excluded)) if excluded else merged
     keys = ["day", "id", "t"]
-    rows = wanted.sort(keys, maintain_order=True).unique(keys, keep="first", maintain_order=True)
+    rows = wanted.sort(keys, maintain_order=True)
+    rows = rows.filter(pl.any_horizontal(pl.col(keys).ne_missing(pl.col(keys).shift())))
     doubled = {"duplicate (day, id, t)": wanted.height - rows.height}
     _warn("all files", doubled)
     if rows.height == 0:
         raise DataError(f"all {merged.height} rows lie on excluded days {excluded}; check `exclude`")
     frame = pd.DataFrame({name: rows[name].to_numpy() for name in ("id", "t", "x", "y")})
-    days = rows["day"].unique().sort().to_list()
+    days = rows["day"].unique().sort()
     codes = rows["day"].replace_strict(days, range(len(days)), return_dtype=pl.Int32).to_numpy()
-    frame.insert(0, "day", pd.Series(pd.Categorical.from_codes(codes, days)))
-    gaps = [layout.max_gap for layout in layouts]
-    frame.attrs["max_gap"] = None if None in gaps else max(gaps)
+    names = pd.Index(days.cast(pl.String).to_list())
+    frame.insert(0, "day", pd.Series(pd.Categorical.from_codes(codes, names)))
+    gaps = [layout.max_gap for layout in layouts if layout.max_gap is not None]
+    frame.attrs["max_gap"] = max(gaps) if len(gaps) == len(layouts) else None
     reasons = {"excluded day": merged.height - wanted.height, **doubled}
     return funnels.carry(frame, [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)])
 
@@ -117,45 +131,59 @@ def _read_file(
         raise DataError(
             f"{path}: " + ("is a folder; pass the files in it" if path.is_dir() else "no such file")
         )
-    with _plain(path) as plain:
-        layout, scan = _open(plain, path, name)
-        try:
+    with plain_file(path) as plain:
+        layout, scan = recognise(plain, path, name)
+        with readable(path, layout):
             rows = scan.collect()
-        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-            raise DataError(f"{path}: cannot be read as {layout.name} ({error}); {_EXPECTED}") from error
     metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
-    rows = rows.with_columns(reason=_reason(metres, layout.seconds, "day" in rows.columns))
+    rows = rows.with_columns(reason=fault(metres, layout.seconds, "day" in rows.columns))
     bad, good = rows.filter(pl.col("reason").is_not_null()), rows.filter(pl.col("reason").is_null())
-    if bad.height > good.height:
-        line, why = bad["line"][0], bad["reason"][0]
+    reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
+    first = bad.select("line", "reason").row(0) if bad.height else None
+    stage = read_stage(path, layout, good.height, reasons, first)
+    if unit is None:
+        check_unit(good, layout, path)
+    return in_metres(good, path, layout, metres, tz), stage, layout
+
+
+def read_stage(
+    path: Path, layout: Format, good: int, reasons: dict[str, int], first: tuple[int, str] | None
+) -> dict[str, Any]:
+    """Funnel stage of one file; `first` is the line of the first bad row and its reason.
+
+    Warns of rows set aside; raises DataError where they are more than the good ones, or there are none.
+    """
+    bad = sum(reasons.values())
+    if first and bad > good:
         raise DataError(
-            f"{path}, line {line}: {why}; {bad.height} of {rows.height} rows cannot be used "
+            f"{path}, line {first[0]}: {first[1]}; {bad} of {bad + good} rows cannot be used "
             f"as {layout.name}; {_EXPECTED}"
         )
-    if good.height == 0:
+    if good == 0:
         raise DataError(f"{path}: holds no row; {_EXPECTED}")
-    reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
-    if bad.height:
-        _warn(f"{path.name}, first at line {bad['line'][0]}", reasons)
-    if unit is None:
-        _check_unit(good, layout, path)
-    if "day" not in rows.columns:
+    if first:
+        _warn(f"{path.name}, first at line {first[0]}", reasons)
+    return funnels.stage(f"read {path.name}", good + bad, good, reasons)
+
+
+def in_metres(good: pl.DataFrame, path: Path, layout: Format, metres: float, tz: str) -> pl.DataFrame:
+    """Usable rows as day, id, t [s], x, y [m]."""
+    if "day" not in good.columns:
         # the name stands for the day where frames are counted, not time of day
         try:
             good = good.with_columns(day=pl.lit(_stem(path)) if layout.name == "ewap" else _calendar_day(tz))
         except pl.exceptions.PolarsError as error:
             raise DataError(f"unknown time zone {tz!r} ({error}); expected one like 'Asia/Tokyo'") from error
-    good = good.select(
+    return good.select(
         "day",
         pl.col("id").cast(pl.Int64),
         pl.col("t") * layout.seconds,
         pl.col("x") * metres,
         pl.col("y") * metres,
     )
-    return good, funnels.stage(f"read {path.name}", rows.height, good.height, reasons), layout
 
 
-def _reason(metres: float, seconds: float, with_day: bool) -> pl.Expr:
+def fault(metres: float, seconds: float, with_day: bool) -> pl.Expr:
     """Why a row cannot be used; null where it can."""
     numbers, position = ["t", "id", "x", "y"], pl.col("x", "y")
     return (
@@ -170,7 +198,7 @@ def _reason(metres: float, seconds: float, with_day: bool) -> pl.Expr:
 
 
 @contextmanager
-def _plain(path: Path) -> Iterator[Path]:
+def plain_file(path: Path) -> Iterator[Path]:
     """The file itself, or its content in a temporary file where it is gzipped."""
     try:
         with path.open("rb") as stream:
@@ -193,7 +221,16 @@ def _plain(path: Path) -> Iterator[Path]:
         yield unpacked
 
 
-def _open(plain: Path, path: Path, name: str | None) -> tuple[Format, pl.LazyFrame]:
+@contextmanager
+def readable(path: Path, layout: Format) -> Iterator[None]:
+    """Raise DataError where Polars cannot read the file."""
+    try:
+        yield
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        raise DataError(f"{path}: cannot be read as {layout.name} ({error}); {_EXPECTED}") from error
+
+
+def recognise(plain: Path, path: Path, name: str | None) -> tuple[Format, pl.LazyFrame]:
     """Recognise the layout by the first line; a scan gives line, t, id, x, y (, day) and `ragged`."""
     with plain.open("rb") as stream:
         head = stream.readline(_LONGEST_LINE)
@@ -204,11 +241,7 @@ def _open(plain: Path, path: Path, name: str | None) -> tuple[Format, pl.LazyFra
     first = head.decode("utf-8", errors="replace").lstrip("\ufeff").strip()
     if not first:
         raise DataError(f"{path}, line 1: the file is empty or begins with a blank line; {_EXPECTED}")
-    layout = (
-        FORMATS[name]
-        if name
-        else next(filter(lambda f: _looks_like(first, f), FORMATS.values()), FORMATS["tidy"])
-    )
+    layout = layout_of(first, name)
     if layout.header:
         names = [part.strip().strip('"') for part in first.split(",")]
         shown = first if len(first) <= 80 else first[:77] + "..."
@@ -219,6 +252,15 @@ def _open(plain: Path, path: Path, name: str | None) -> tuple[Format, pl.LazyFra
         columns = {column: names.index(column) for column in (*_TIXY, "day") if column in names}
         layout = Format("tidy", len(names), columns, header=True)
     return layout, _scan_lines(plain, layout) if layout.separator == " " else _scan_csv(plain, layout)
+
+
+def layout_of(first: str, name: str | None) -> Format:
+    """The layout of that name, or the one that a file's first line looks like."""
+    return (
+        FORMATS[name]
+        if name
+        else next(filter(lambda f: _looks_like(first, f), FORMATS.values()), FORMATS["tidy"])
+    )
 
 
 def _looks_like(first: str, layout: Format) -> bool:
@@ -284,7 +326,7 @@ def _scan_parquet(plain: Path, path: Path) -> pl.LazyFrame:
     return scan.select(*numbers, *day, ragged=pl.lit(False)).with_row_index("line", offset=1)
 
 
-def _check_unit(rows: pl.DataFrame, layout: Format, path: Path) -> None:
+def check_unit(rows: pl.DataFrame, layout: Format, path: Path) -> None:
     """Raise DataError where a site of that size cannot be."""
     positions = rows.select("x", "y").to_numpy()
     if layout.metres < 1 and (reach := float(np.abs(positions).max())) * layout.metres < _MIN_SITE:
@@ -316,7 +358,7 @@ def _check_sequences(names: list[str]) -> None:
 
 def _calendar_day(tz: str) -> pl.Expr:
     local = pl.from_epoch(pl.col("t").floor().cast(pl.Int64), time_unit="s").dt.convert_time_zone(tz)
-    return local.dt.strftime("%Y-%m-%d")
+    return local.dt.date()
 
 
 def _warn(where: str, reasons: dict[str, int]) -> None:

@@ -23,7 +23,9 @@ import papermill
 from tqdm import tqdm
 
 from . import __version__, datasets
+from .commands import add_commands, add_scheduler
 from .errors import DataError, SzlibError
+from .jobs import cluster
 
 NOTEBOOKS = Path(__file__).resolve().parent.parent / "notebooks"
 """The workbook's home: beside the package in the repository."""
@@ -35,12 +37,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line `szlib`; returns the exit code: 0 where every check holds."""
     options = _parser().parse_args(arguments)
     try:
+        if options.command is not None:
+            return int(options.command(options))
         summary = run(
             options.data[0] if len(options.data) == 1 else options.data,
             out=options.out,
             jobs=options.jobs,
             only=options.only,
             parameters=dict(_assignment(text) for text in options.parameter),
+            scheduler=options.scheduler,
         )
     except SzlibError as error:
         print(f"szlib: {error}", file=sys.stderr)
@@ -59,6 +64,7 @@ def run(
     jobs: int = 1,
     only: Iterable[str] = (),
     parameters: Mapping[str, Any] | None = None,
+    scheduler: str | None = None,
 ) -> dict[str, Any]:
     """Execute the notebooks on a data set, and gather what they found.
 
@@ -69,6 +75,7 @@ def run(
     jobs : notebooks at a time, once the zone is there.
     only : numbers ("07") or names of the notebooks to run; all of them by default.
     parameters : further parameters of the notebooks, such as {"seed": 1}.
+    scheduler : address of a Dask cluster that shares this file system and runs the notebooks.
 
     Returns
     -------
@@ -97,7 +104,7 @@ def run(
     with tqdm(total=len(sources), unit="notebook", desc=datasets.label(data)) as bar:
         first = [source for source in sources if source.stem[:2] <= LAST_PRODUCER]
         rest = sources[len(first) :]
-        with ProcessPoolExecutor(max(jobs, 1), mp_context=get_context("spawn")) as pool:
+        with cluster(scheduler) as client, _pool(client, jobs) as pool:
             try:
                 for batch in [*([source] for source in first), rest]:
                     for future in as_completed(_submit(pool, batch, given, home)):
@@ -106,7 +113,7 @@ def run(
                         bar.update()
                         bar.set_postfix_str(f"{name} {outcome['status']}")
             except KeyboardInterrupt:
-                pool.shutdown(wait=False, cancel_futures=True)
+                pool.shutdown(wait=False, **({} if client else {"cancel_futures": True}))
                 raise
     notebooks = {source.stem: told[source.stem] for source in sources}
     passed = all(
@@ -145,6 +152,14 @@ def render(summary: Mapping[str, Any]) -> str:
         if page.get("error"):
             notes.append(f"{name}: {page['error']}")
     return "\n".join([*lines, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
+
+
+def _pool(client: Any, jobs: int) -> Executor:
+    """The workers of a Dask cluster, or processes here."""
+    if client is not None:
+        executor: Executor = client.get_executor(pure=False)
+        return executor
+    return ProcessPoolExecutor(max(jobs, 1), mp_context=get_context("spawn"))
 
 
 def _submit(pool: Executor, sources: Iterable[Path], given: dict[str, Any], home: Path) -> list[Future[Any]]:
@@ -237,11 +252,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"szlib {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    parser.set_defaults(command=None)
+    add_commands(commands)
     command = commands.add_parser("run", help="execute the notebooks, headless, and check their results")
     command.add_argument(
         "--data", nargs="+", default=[datasets.SYNTHETIC], metavar="DATA",
         help="synthetic (default), atc-1hz, or files, folders or globs of tracks",
     )  # fmt: skip
+    add_scheduler(command)
     command.add_argument(
         "--out", default="results", metavar="FOLDER", help="where results go (default: results)"
     )

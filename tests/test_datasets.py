@@ -5,6 +5,7 @@ import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
@@ -91,3 +92,72 @@ def test_labels_are_fit_for_folders():
     assert datasets.label("/data/atc-20121024.csv.gz") == "atc-20121024"
     assert datasets.label(["/data/a.csv", "/data/b.csv"]) == "a-and-1-more"
     assert datasets.label("/data/*.csv") == "files"
+
+
+class Moody(Quiet):
+    """Goes through `moods`, one a request, then serves."""
+
+    moods: ClassVar[list[str]] = []
+
+    def do_GET(self) -> None:
+        mood = self.moods.pop(0) if self.moods else "well"
+        content = (Path(self.directory) / "a.csv").read_bytes()
+        if mood == "broken":
+            self.send_error(500)
+            return
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        if mood == "truncating":
+            self.wfile.write(content[: len(content) // 2])
+            self.close_connection = True
+        elif mood == "slow":
+            for byte in content:
+                self.wfile.write(bytes([byte]))
+                threading.Event().wait(0.01)  # retries do not sleep here, this does
+        else:
+            self.wfile.write(b"x" * len(content) if mood == "lying" else content)
+
+
+@pytest.fixture
+def moody(served, monkeypatch):
+    """The same server, in moods; retries do not wait."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Moody, directory=str(served)))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    monkeypatch.setattr(datasets, "ATC_1HZ_URL", f"http://127.0.0.1:{server.server_port}/")
+    monkeypatch.setattr("pooch.core.time.sleep", lambda seconds: None)
+    yield Moody.moods
+    Moody.moods.clear()
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.mark.parametrize("mood", ["broken", "truncating", "slow", "lying"])
+def test_a_server_that_recovers_is_asked_again(moody, served, tmp_path, mood):
+    moody += [mood] * 2
+    (file,) = datasets.find("atc-1hz", cache=tmp_path)
+    assert file.read_bytes() == (served / "a.csv").read_bytes()
+    assert [path.name for path in file.parent.iterdir()] == ["a.csv"]
+
+
+@pytest.mark.parametrize("mood", ["broken", "truncating", "lying"])
+def test_a_server_that_never_recovers_leaves_nothing_half_written(moody, tmp_path, mood):
+    moody += [mood] * 99
+    with pytest.raises(DataError, match=r"could not be downloaded.*SZLIB_DATA_DIR"):
+        datasets.find("atc-1hz", cache=tmp_path)
+    assert not [path for path in (tmp_path / "cache").rglob("*") if path.is_file()]
+    moody.clear()
+    assert datasets.find("atc-1hz", cache=tmp_path), "and the next attempt begins anew"
+
+
+def test_a_download_that_is_interrupted_leaves_nothing_half_written(moody, tmp_path, monkeypatch):
+    def interrupt(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    moody += ["slow"]
+    with monkeypatch.context() as context:
+        context.setattr("pooch.core.hash_matches", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            datasets.find("atc-1hz", cache=tmp_path)
+    assert not [path for path in (tmp_path / "cache").rglob("*") if path.is_file()]
+    assert datasets.find("atc-1hz", cache=tmp_path)

@@ -15,16 +15,17 @@ import szlib
 
 PACKAGE = Path(szlib.__file__).parent
 ORDER = [
-    "errors", "funnels", "ellipses", "readers", "tracks", "encounters", "outliers", "hulls", "zones",
-    "truths", "plaza", "datasets", "barriers", "settings", "meetings", "mpc", "simulation", "scenarios",
-    "plotting", "scenes", "pages", "workbook",
+    "errors", "funnels", "ellipses", "readers", "tracks", "encounters", "quality", "loaders", "outliers",
+    "hulls", "zones", "truths", "plaza", "datasets", "nearby", "jobs", "extraction", "barriers", "settings",
+    "meetings", "mpc", "simulation", "scenarios", "plotting", "scenes", "pages", "commands", "workbook",
 ]  # fmt: skip
 """From the ground up: a module imports only from those before it."""
 FIGURES = {"plotting", "scenes"}
 MODULES = sorted(path.stem for path in PACKAGE.glob("*.py") if path.stem != "__init__")
 PUBLIC = [
     "ATC_SQUARE", "AttentionalSpace", "DataError", "Ellipse", "MPCCBF", "MPCSettings", "SCENARIOS",
-    "SocialZone", "SolverError", "SzlibError", "ZoneError", "ellipse_distance", "find_encounters",
+    "SocialZone", "SolverError", "SzlibError", "ZoneError", "ellipse_distance", "extract_days",
+    "find_encounters",
     "minimum_enclosing_ellipse", "read_tracks", "remove_outliers", "segment_distance", "simulate",
 ]  # fmt: skip
 PROMISED = [

@@ -1,0 +1,201 @@
+"""Speed and memory of the data half at full size, as ratios within one run (see bench.py).
+
+The raw day is $SZLIB_RAW_DAY, a file in the raw ATC format, else one made of the plaza, repeated until it
+is as large as a real one.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+import pandas as pd
+import polars as pl
+from sklearn.neighbors import LocalOutlierFactor
+
+import szlib
+from szlib import outliers
+from szlib.plaza import make_plaza
+
+RAW_DAY_VARIABLE = "SZLIB_RAW_DAY"
+ROWS = 15_000_000
+"""Of a real day."""
+PAPER_SAMPLES = 16_181 * 31
+"""Encounters in the paper, 31 samples each."""
+
+BARE = """
+import sys, polars as pl
+# begin
+names = [f"f{i}" for i in range(8)]
+near = pl.col("f2").is_between(-23500, -2500) & pl.col("f3").is_between(-15000, 13000)
+scan = pl.scan_csv(sys.argv[1], has_header=False, new_columns=names).filter(near).select(names[:4])
+scan.collect(engine="streaming")
+"""
+OURS = """
+import sys, szlib, tempfile
+szlib.extract_days
+# begin
+for day in sys.argv[1:]:
+    with tempfile.TemporaryDirectory() as out:
+        done = szlib.extract_days(day, out=out, progress=False)
+        if len(done.failed):
+            raise SystemExit(str(done))
+"""
+PANDAS = """
+import sys, numpy as np, pandas as pd
+# begin
+rows = pd.read_csv(sys.argv[1], header=None, usecols=[0, 1, 2, 3], names=["t", "id", "x", "y"])
+rows["tick"] = (rows["t"] * 10).round().astype(int)
+ticks = rows.groupby(["id", "tick"], as_index=False)[["x", "y"]].mean()
+ticks[["vx", "vy"]] = ticks.groupby("id")[["x", "y"]].diff(5)
+near = ticks[ticks["x"].between(-18500, -7500) & ticks["y"].between(-10000, 8000)]
+pairs = near.merge(near, on="tick")
+"""
+"""Reads, brings to the clock and pairs; no window is looked for."""
+ZONE = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import szlib
+from bench_data import paper_samples
+samples = paper_samples()
+# begin
+szlib.SocialZone.fit(samples)
+"""
+_TIMED = """
+import time, resource
+{imports}
+begun = time.perf_counter()
+{program}
+print(time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)
+"""
+
+
+def run(program: str, *files: Path) -> tuple[float, float]:
+    """Seconds, without imports, and peak memory [MB] of a program in a process of its own."""
+    imports, program = program.split("# begin")
+    environment = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
+    done = subprocess.run(
+        [sys.executable, "-c", _TIMED.format(imports=imports, program=program), *map(str, files)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment,
+    )
+    seconds, memory = map(float, done.stdout.split()[-2:])
+    return seconds, memory
+
+
+@contextmanager
+def raw_day() -> Iterator[Path]:
+    """A raw day of full size."""
+    given = os.environ.get(RAW_DAY_VARIABLE)
+    if given:
+        yield Path(given)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        plaza = pl.read_csv(make_plaza(Path(folder) / "plaza.csv", seed=0), has_header=False)
+        copies = -(-ROWS // plaza.height)
+        shift = (
+            plaza["column_1"].max() - plaza["column_1"].min()
+        ) / 20  # people of other copies come between
+        day = Path(folder) / "day.csv"
+        people = plaza["column_2"].max()
+        pl.concat(
+            [
+                plaza.lazy().with_columns(
+                    column_1=pl.col("column_1") + shift * copy / copies,
+                    column_2=pl.col("column_2") + people * copy,
+                    column_3=pl.col("column_3") + 37.0 * (copy - copies / 2),
+                )
+                for copy in range(copies)
+            ]
+        ).sort("column_1").sink_csv(day, include_header=False, float_precision=3)
+        yield day
+
+
+def bench_raw_day(repeats: int = 5) -> dict[str, float]:
+    """A full raw day, file to encounters, against a bare streaming scan; and the most direct pandas."""
+    with raw_day() as day:
+        run(BARE, day), run(OURS, day)
+        pairs = [(run(OURS, day), run(BARE, day)) for _ in range(repeats)]
+        pandas = run(PANDAS, day)
+    ours, bare = median(p[0][0] for p in pairs), median(p[1][0] for p in pairs)
+    return {
+        "s": ours,
+        "ours / bare scan": ours / bare,
+        "least ratio": min(p[0][0] / p[1][0] for p in pairs),
+        "peak MB": max(p[0][1] for p in pairs),
+        "pandas s": pandas[0],
+        "pandas / ours": pandas[0] / ours,
+        "pandas peak MB": pandas[1],
+    }
+
+
+def bench_days(repeats: int = 3) -> dict[str, float]:
+    """1, 2 and 4 days one after the other: time per day, and peak memory, against those of one day."""
+    found = {}
+    with raw_day() as day:
+        rounds = [{n: run(OURS, *[day] * n) for n in (1, 2, 4)} for _ in range(repeats)]
+    one, memory = (median(r[1][k] for r in rounds) for k in (0, 1))
+    for n in (2, 4):
+        found[f"{n} days / {n} x one"] = median(r[n][0] for r in rounds) / (n * one)
+        found[f"{n} days, memory / one"] = median(r[n][1] for r in rounds) / memory
+    return found
+
+
+def paper_samples(n: int = PAPER_SAMPLES, seed: int = 0) -> pd.DataFrame:
+    """Samples as many as in the paper, all around the zone of a person, at speeds from 0.4 to 1.8 m/s."""
+    rng = np.random.default_rng(seed)
+    angle, speed = rng.uniform(-np.pi, np.pi, n), rng.uniform(0.4, 1.8, n)
+    nearest = 0.5 + 0.2 * speed + 0.1 * np.cos(angle)
+    return pd.DataFrame(
+        {
+            "encounter": np.arange(n) // 31,
+            "los_angle": angle,
+            "distance": np.minimum(nearest + rng.exponential(0.5, n), 1.99),
+            "speed": speed,
+        }
+    )
+
+
+def bench_lof() -> dict[str, float]:
+    """LOF on as many samples as the paper's, against scikit-learn's own on the same points."""
+    samples = paper_samples()
+    points = outliers.complementary_points(samples)
+    begun = time.perf_counter()
+    theirs = LocalOutlierFactor(contamination=outliers.FRACTION).fit_predict(points) == -1
+    between = time.perf_counter()
+    ours = outliers.is_outlier(samples)
+    ended = time.perf_counter()
+    return {
+        "s": ended - between,
+        "ours / scikit-learn": (ended - between) / (between - begun),
+        "labels that differ": float((ours != theirs).sum()),
+    }
+
+
+def bench_zone() -> dict[str, float]:
+    """From as many samples as the paper's to zones: outliers, hull, slices, ellipses."""
+    seconds, memory = run(ZONE, Path(__file__).parent)
+    return {"s": seconds, "peak MB": memory}
+
+
+CASES: dict[str, Callable[[], dict[str, float]]] = {
+    "raw day to encounters": bench_raw_day,
+    "1, 2, 4 raw days": bench_days,
+    "LOF, paper size": bench_lof,
+    "zone, paper size": bench_zone,
+}
+
+
+if __name__ == "__main__":
+    for name, bench in CASES.items():
+        print(f"{name:<24}", ", ".join(f"{key}: {value:.3g}" for key, value in bench().items()), flush=True)
