@@ -126,7 +126,7 @@ class MPCCBF:
     walls : segments, shape (n, 2, 2): end points [m].
     settings : every other parameter.
     max_people : how many people to build for now. More make the controller grow once, which takes
-        a moment and is logged as a warning by the logger "szlib".
+        a moment and is told by the logger "szlib" (at level INFO).
 
     Raises
     ------
@@ -213,7 +213,7 @@ class MPCCBF:
         if n_people > built:
             if self.settings.terminal == "person" and n_people > 1:
                 raise SolverError(f"terminal='person' is for one person; got {n_people}; use 'rest'")
-            _log.warning("the controller was built for %d people and now grows to %d", built, n_people)
+            _log.info("the controller was built for %d people and now grows to %d", built, n_people)
             self._build(n_people)
         return self._solvers[n_people]
 

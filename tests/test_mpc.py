@@ -126,6 +126,7 @@ def test_the_problem_is_built_once_for_each_number_of_people(solver):
 
 
 def test_more_people_than_built_for_make_the_controller_grow_once_and_say_so(caplog):
+    caplog.set_level("INFO", logger="szlib")
     controller = szlib.MPCCBF(ZONE, max_people=1)
     crowd = [szlib.Person((3.0 * i, 2.0), (0.1, 0.0)) for i in range(3)]
     expected = szlib.MPCCBF(ZONE, max_people=3).step((-4, 0, 0, 0), GOAL, crowd).control
