@@ -14,7 +14,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pandas as pd
 from joblib import Parallel, delayed
@@ -23,8 +23,8 @@ from tqdm import tqdm
 from . import __version__
 from .distances import with_margin
 from .errors import SolverError, SzlibError
-from .mpc import MPCSettings
-from .runs import Run, Zones, drive, metrics
+from .mpc import TOLERANCE, MPCSettings
+from .runs import Outcome, Run, Zones, drive, metrics
 from .worlds import Behaviour, Worlds, world
 
 CHUNK = 50
@@ -120,6 +120,18 @@ class Setup:
             raise SolverError(
                 f"world {seed} broke the controller: {error}; see worlds.world({seed})"
             ) from error
+
+
+def tally(rows: pd.DataFrame) -> pd.Series[Any]:
+    """Rows of `rollouts` in one: worlds, share of each outcome, steps by what they say, least h [m]."""
+    numbers: dict[str, Any] = {"worlds": len(rows)}
+    numbers |= {name: int(rows[name].sum()) for name in ("infeasible", "flagged", "silent")}
+    numbers |= {
+        "share h < 0": float((rows["min_h"] < -TOLERANCE).mean()),
+        "min_h": float(rows["min_h"].min()),
+    }
+    numbers |= {ending: float((rows["outcome"] == ending).mean()) for ending in get_args(Outcome)}
+    return pd.Series(numbers)
 
 
 def replay(seed: int, **parameters: Any) -> Run:

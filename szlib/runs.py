@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,10 @@ from .mpc import MPCCBF, TOLERANCE, MPCSettings, Rung
 from .simulation import BODY_RADIUS, GOAL_RADIUS, STOPPED, Scenario, advance
 from .worlds import Behaviour
 
+Outcome = Literal[
+    "arrived", "hit wall", "run into", "squeezed", "drove in", "boxed in", "deadlock", "out of time"
+]
+"""How a run ended; see `outcome`."""
 Zones = Callable[[Ellipse], Ellipse]
 """What the controller keeps in place of a person's own zone, made from it."""
 CROWDED = 0.2
@@ -185,7 +189,7 @@ def metrics(run: Run) -> dict[str, Any]:
     }
 
 
-def outcome(run: Run) -> str:
+def outcome(run: Run) -> Outcome:
     """How a run ended; where a barrier was broken, how that began.
 
     "arrived", or where h fell below 0 first: "hit wall"; "run into", by a person who came nearer while
@@ -204,7 +208,7 @@ def outcome(run: Run) -> str:
     return "deadlock" if way_exists(run) else "boxed in"
 
 
-def _breach(run: Run, k: int) -> str:
+def _breach(run: Run, k: int) -> Outcome:
     """Who broke the barrier at state k."""
     i = int(run.h[k].argmin())
     if i >= len(run.scenario.people):

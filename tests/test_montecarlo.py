@@ -6,7 +6,7 @@ import pytest
 
 import szlib
 from szlib import montecarlo
-from szlib.montecarlo import replay, rollouts
+from szlib.montecarlo import replay, rollouts, tally
 from szlib.runs import drive, metrics, outcome
 from szlib.worlds import ONE_PERSON, Worlds
 
@@ -101,6 +101,15 @@ def test_margin_keeps_the_euclidean_distance_of_walls():
 def test_open_space_with_the_whole_horizon():
     table = rollouts(10, worlds=ONE_PERSON, settings=szlib.MPCSettings(N_h=8), n_jobs=1, progress=False)
     assert table["min_h"].min() >= -1e-6
+
+
+def test_tally_counts_every_world_once():
+    rows = rollouts(6, worlds=SHORT, n_jobs=1, progress=False)
+    told = tally(rows)
+    assert told["worlds"] == 6
+    assert told[list(ENDINGS)].sum() == pytest.approx(1)
+    assert told["flagged"] == rows["flagged"].sum()
+    assert told["min_h"] == rows["min_h"].min()
 
 
 def test_bad_input():
