@@ -230,7 +230,7 @@ class MPCCBF:
     def _climb_down(self, solver: Solver, parameters: Array) -> tuple[Rung, Array, Numbers]:
         """The first rung that holds, its plan, and the plan's numbers."""
         ends = self.settings.terminal != "none"
-        shifted = np.concatenate([self._plan[2:], np.zeros(2) if ends else self._plan[-2:]])
+        shifted = np.concatenate([self._plan[2:], (0.0, 0.0)])
         rung: Rung
         for rung in ("warm", "cold"):
             guess = shifted if rung == "warm" else self._brake(parameters[2:4])

@@ -123,19 +123,16 @@ class Buffered:
 
 @dataclass(frozen=True)
 class Numbers:
-    """A plan in numbers: see `Problem` for rows, terminal and h; states have shape (N+1, 4)."""
+    """A plan in numbers: see `Problem` for rows and h; states have shape (N+1, 4).
+
+    `slack` is the largest violation of a row or of the terminal condition, 0 if none.
+    """
 
     cost: float
+    slack: float
     rows: Array
-    terminal: Array
     states: Array
     h: Array
-
-    @property
-    def slack(self) -> float:
-        """Largest violation of a hard row, 0 if none."""
-        off = float(np.abs(self.terminal).max()) if self.terminal.size else 0.0
-        return max(0.0, -float(self.rows.min()), off)
 
 
 class Evaluator:
@@ -151,13 +148,14 @@ class Evaluator:
     def __call__(self, plan: Array, parameters: Array) -> Numbers:
         self._inputs[:], self._parameters[:] = plan, parameters
         self._function.call()
-        cost, rows, terminal, states, h = self._function.results
-        states, h = states.reshape(-1, 4).copy(), h.reshape(self._shape).copy()
-        return Numbers(float(cost[0]), rows.copy(), terminal.copy(), states, h)
+        totals, rows, states, h = self._function.results
+        cost, slack = totals.tolist()
+        return Numbers(cost, slack, rows.copy(), states.reshape(-1, 4).copy(), h.reshape(self._shape).copy())
 
 
 @lru_cache(maxsize=256)
 def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, int]:
     p = build_problem(settings, n_people, n_walls)
-    outputs = [p.cost, p.rows, p.terminal, p.states, p.h.T]
+    slack = ca.mmax(ca.vertcat(0, -p.rows, ca.fabs(p.terminal)))
+    outputs = [ca.vertcat(p.cost, slack), p.rows, p.states, p.h.T]
     return p.function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf

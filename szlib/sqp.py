@@ -27,8 +27,11 @@ from .problem import Buffered, Evaluator, build_problem, slack_weight
 from .settings import MPCSettings
 
 Outcome = Literal["converged", "stalled", "failed"]
-CONVERGED = 1e-5
-"""The last step of the SQP moves no input by more than this [m/s2]."""
+CONVERGED = {True: 1e-2, False: 1e-5}
+"""The last step of the SQP moves no input by more than this [m/s2]: with the exact Hessian, when the
+error is of the order of its square, and without."""
+VIOLATED = 5e-7
+"""Nor does it leave the rows violated by more than this in sum, unless all of it is slack."""
 SHORTEST = 1e-3
 """A step that must be cut to less than this share of its length leads nowhere."""
 ROUNDING = 1e-12
@@ -46,21 +49,22 @@ class Sqp:
         self.evaluate = Evaluator(settings, n_people, n_walls)
         derive, measure, self._gain = _functions(settings, n_people, n_walls)
         n, m, n_rows = derive.nnz_in(0), derive.nnz_in(2), self.evaluate.n_rows
-        self._inputs, self._trial = np.zeros(n), np.zeros(n)
+        self._inputs, self._step, self._share = np.zeros(n), np.zeros(n), np.ones(1)
         self._parameters, self._multipliers = np.zeros(derive.nnz_in(1)), np.zeros(m)
-        self._on_rows, self._on_cbf = self._multipliers[:n_rows], self._multipliers[: self.evaluate.n_cbf]
+        self._on_cbf = self._multipliers[: self.evaluate.n_cbf]
         self._derive = Buffered(derive, self._inputs, self._parameters, self._multipliers)
-        self._measure = Buffered(measure, self._trial, self._parameters)
-        self._violation = self._measure.results[1]
-        _, _, self._values, self._gradient, jacobian, hessian = self._derive.results
-        self._jacobian, self._hessian = jacobian.reshape(m, n), hessian.reshape(n, n)
-        self._lower, self._upper = np.zeros(n + m), np.full(n + m, np.inf)
-        self._weights = np.zeros(n + m)
+        self._measure = Buffered(
+            measure, self._inputs, self._parameters, self._multipliers, self._step, self._share
+        )
+        self._before, self._lower, self._upper, gradient, jacobian, hessian = self._derive.results
+        self._after, self._trial, self._values = self._measure.results
+        self._jacobian = jacobian.reshape(m, n)
+        self._program = (hessian.reshape(n, n), gradient, self._jacobian, self._upper, self._lower)
         self._sense = np.repeat(np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows])
+        self._weights = np.zeros(n + m)
         self._model = daqp.Model()
         self._model.settings = _DAQP
-        self._bound(self._values)
-        self._model.setup(np.eye(n), self._gradient, self._jacobian, self._upper, self._lower, self._sense)
+        self._model.setup(np.eye(n), *self._program[1:], self._sense)
 
     def reset(self) -> None:
         """Forget every multiplier and active row."""
@@ -78,111 +82,121 @@ class Sqp:
         return plan, outcome != "failed"
 
     def _solve(self, guess: Array, parameters: Array) -> tuple[Array, Outcome]:
-        self._parameters[:], self._inputs[:] = parameters, guess
-        if self._gain is not None:
-            np.dot(self._gain, parameters[:6], out=self._trial)
-            self._measure.call()
-            if _largest(self._trial) <= self.settings.a_max and self._violation[0] == 0:
-                self._multipliers[:] = 0
-                return self._trial.copy(), "converged"
-        limit = slack_weight(self.settings, parameters)
-        self._weights[:] = limit
-        outcome = self._iterate(limit)
-        if outcome == "failed":
-            self.reset()
-        return self._inputs.clip(-self.settings.a_max, self.settings.a_max), outcome
+        self._parameters[:] = parameters
+        outcome: Outcome = "converged"
+        if not self._is_free():
+            self._inputs[:] = guess
+            self._weights[:] = limit = slack_weight(self.settings, parameters)
+            outcome = self._iterate(limit)
+            if outcome == "failed":
+                self.reset()
+        return self._inputs.copy(), outcome
+
+    def _is_free(self) -> bool:
+        """True if the minimum of the cost alone, now `_inputs`, satisfies everything."""
+        if self._gain is None:
+            return False
+        np.dot(self._gain, self._parameters[:6], out=self._inputs)
+        if not -self.settings.a_max <= self._inputs.min() <= self._inputs.max() <= self.settings.a_max:
+            return False
+        self._step[:] = self._multipliers[:] = 0
+        self._measure.call()
+        return bool(self._after[1] == 0)
 
     def _iterate(self, limit: float) -> Outcome:
         """Improve `_inputs`; no price above `limit`, the weight of slack."""
-        price = 0.0
+        price = curved = 0.0
         for _ in range(self.settings.max_iterations):
-            curved = self._on_rows.any()
-            step = self._step()
-            if step is None:
+            exact = self._linearise()
+            step, _, flag, info = self._model.solve()
+            if flag < 0:
                 return "failed"
-            np.add(self._inputs, step, out=self._trial)
-            price = max(price, min(2 * _largest(self._multipliers), limit))
-            cost, violation = self._derive.results[:2]
-            before, after = float(cost[0] + price * violation[0]), self._merit(price)
-            solved = not curved and self._violation[0] == 0 and not self._on_rows.any()
-            solved = solved or _largest(step) <= CONVERGED
-            if not solved and after > before * (1 + ROUNDING) and not self._lower_merit(step, price, before):
-                return "stalled"
+            self._step[:], self._multipliers[:] = step, info["lam"][step.size :]
+            self._share[0] = 1.0
+            self._measure.call()
+            cost, violation, size, steepest, on_rows = self._after.tolist()
+            price = max(price, min(1.1 * steepest, limit))
+            cost_before, violation_before, curved = self._before.tolist()
+            before, after = cost_before + price * violation_before, cost + price * violation
+            settled = violation <= VIOLATED or steepest >= limit
+            solved = curved == on_rows == violation == 0 or (size <= CONVERGED[exact] and settled)
+            if not solved and after > before * (1 + ROUNDING) and not self._lower_merit(price, before):
+                return "converged" if size <= CONVERGED[False] else "stalled"
             self._inputs[:] = self._trial
             if solved:
                 return "converged"
         return "failed"
 
-    def _step(self) -> Array | None:
-        """The solution of the program at `_inputs`, or None; its multipliers become the current ones."""
+    def _linearise(self) -> bool:
+        """Hand over the program at `_inputs`; True if with the exact Hessian."""
         self._derive.call()
-        self._bound(self._values)
-        if self._update() < 0:
+        exact = self._model.update(*self._program) >= 0
+        if not exact:
             self._on_cbf[:] = 0
             self._derive.call()
-            self._update()
+            self._model.update(*self._program)
         self._model.soft_weights(w_l=self._weights, w_u=self._weights)
-        step, _, flag, info = self._model.solve()
-        if flag < 0:
-            return None
-        self._multipliers[:] = info["lam"][step.size :]
-        return np.asarray(step)
+        return exact
 
-    def _bound(self, values: Array) -> None:
-        """The bounds of the program, where the rows and the terminal condition have these values."""
-        n, a_max = self._inputs.size, self.settings.a_max
-        np.subtract(-a_max, self._inputs, out=self._lower[:n])
-        np.subtract(a_max, self._inputs, out=self._upper[:n])
-        np.negative(values, out=self._lower[n:])
-        end = n + self._on_rows.size
-        self._upper[end:] = self._lower[end:]
-
-    def _update(self) -> int:
-        """Hand the program over; negative if its Hessian is not positive definite."""
-        return int(
-            self._model.update(self._hessian, self._gradient, self._jacobian, self._upper, self._lower)
-        )
-
-    def _merit(self, price: float) -> float:
-        """Cost and violation at `_trial`."""
+    def _merit(self, price: float, share: float) -> float:
+        """Cost and violation after this share of the step."""
+        self._share[0] = share
         self._measure.call()
-        return float(self._measure.results[0][0] + price * self._violation[0])
+        return float(self._after[0] + price * self._after[1])
 
-    def _lower_merit(self, step: Array, price: float, before: float) -> bool:
+    def _lower_merit(self, price: float, before: float) -> bool:
         """Set `_trial` to where the merit is lower: corrected to second order, else on a shorter step."""
-        self._bound(self._measure.results[2] - self._jacobian @ step)
+        step, n = self._step.copy(), self._step.size
+        self._lower[n:] = self._jacobian @ step - self._values
+        end = n + self.evaluate.n_rows
+        self._upper[end:] = self._lower[end:]
         self._model.update(bupper=self._upper, blower=self._lower)
         corrected, _, flag, _ = self._model.solve()
-        np.add(self._inputs, corrected, out=self._trial)
-        if flag > 0 and self._merit(price) < before:
+        self._step[:] = corrected
+        if flag > 0 and self._merit(price, 1.0) < before:
             return True
-        share = 0.5
+        self._step[:], share = step, 0.5
         while share >= SHORTEST:
-            np.add(self._inputs, share * step, out=self._trial)
-            if self._merit(price) < before:
+            if self._merit(price, share) < before:
                 return True
             share /= 2
         return False
 
 
-def _largest(values: Array) -> float:
-    return max(float(values.max()), -float(values.min()))
-
-
 @lru_cache(maxsize=256)
 def _functions(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any, Array | None]:
-    """Derivatives, merit, and the unconstrained solution as a matrix on the state and the target."""
+    """The program at the inputs, the merit after a step, and the minimum of the cost as a matrix.
+
+    derive : (inputs, parameters, multipliers) -> (cost, violation, largest multiplier of a row), lower
+        and upper bounds, gradient, Jacobian, Hessian of the Lagrangian.
+    measure : (inputs, parameters, multipliers, step, share) -> (cost, violation, largest element of
+        the step, largest multiplier, largest of a row) there, the inputs there, the values of rows
+        and terminal condition there.
+    The matrix takes state and target to inputs; there is none if there is a terminal condition.
+    """
     p = build_problem(settings, n_people, n_walls)
-    values = ca.vertcat(p.rows, p.terminal)
-    multipliers = ca.SX.sym("multipliers", values.numel())
+    values, n_rows = ca.vertcat(p.rows, p.terminal), p.rows.numel()
+    multipliers, step, share = (
+        ca.SX.sym("l", values.numel()),
+        ca.SX.sym("d", p.inputs.numel()),
+        ca.SX.sym("s"),
+    )
     gradient, jacobian = ca.gradient(p.cost, p.inputs), ca.jacobian(values, p.inputs)
     hessian = ca.hessian(p.cost + ca.dot(multipliers, values), p.inputs)[0]
     violation = ca.sum1(ca.fmax(0, -p.rows)) + ca.sum1(ca.fabs(p.terminal))
-    merit = [p.cost, violation, values]
+    on_rows = ca.norm_inf(multipliers[:n_rows])
+    lower = ca.vertcat(-settings.a_max - p.inputs, -values)
+    upper = ca.vertcat(settings.a_max - p.inputs, ca.inf * ca.SX.ones(n_rows), -p.terminal)
+    merit = ca.vertcat(p.cost, violation, on_rows)
     derive = p.function(
-        "derive", [p.inputs, p.parameters, multipliers], [*merit, gradient, jacobian.T, hessian]
+        "derive", [p.inputs, p.parameters, multipliers], [merit, lower, upper, gradient, jacobian.T, hessian]
     )
-    measure = p.function("measure", [p.inputs, p.parameters], merit)
+    trial = ca.fmax(-settings.a_max, ca.fmin(p.inputs + share * step, settings.a_max))
+    cost, violation, values = ca.substitute([p.cost, violation, values], [p.inputs], [trial])
+    merit = ca.vertcat(cost, violation, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
+    measure = p.function(
+        "measure", [p.inputs, p.parameters, multipliers, step, share], [merit, trial, values]
+    )
     if p.terminal.numel():
         return derive, measure, None
     state_and_target = p.parameters[:6]
