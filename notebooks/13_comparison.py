@@ -83,8 +83,9 @@ page.figure(ax.figure, "zones")
 
 # %%
 rows = comparisons.compare(worlds, seed=seed, n_jobs=n_jobs, progress=False)
+surprises = [name for name in BEHAVIOURS if name != "as expected"]
 wrong = comparisons.compare(
-    worlds, seed=seed, zones=["fitted"], behaviours=list(BEHAVIOURS), n_jobs=n_jobs, progress=False
+    worlds, seed=seed, zones=["fitted"], behaviours=surprises, n_jobs=n_jobs, progress=False
 )
 page.check("nothing is missing", not rows["path_length"].isna().any(), len(rows) + len(wrong))
 page.check("no step that called itself safe led to h < 0", (rows["silent"] == 0).all())
@@ -107,9 +108,7 @@ told(comparisons.summarise(rows)).T
 # the notebooks is shown from here on.
 
 # %%
-mine = comparisons.summarise(
-    pd.concat([rows, wrong]).drop_duplicates(["seed", "zone", "formulation", "behaviour"])
-)
+mine = comparisons.summarise(pd.concat([rows, wrong]))
 mine.round(4).to_csv(page.out / "13_comparison.csv", index=False)
 full = pd.read_csv(full_table)
 expected = full[full["behaviour"] == "as expected"]
