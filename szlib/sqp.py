@@ -7,7 +7,7 @@ The unknowns are the 2 N inputs. Each iteration solves
 
 with the exact Hessian H of the Lagrangian where it is positive definite; else without the curvature
 of the barriers (Gauss-Newton). Rows are soft, by an exact penalty, so that every program has a
-solution. A step has to lower cost + price * violation, with a price of twice the largest multiplier so
+solution. A step has to lower cost + price * violation, with a price just above the largest multiplier so
 far; one that does not is corrected to second order, then shortened. Where no row has a multiplier, the
 program's cost is exact, and the first solution that satisfies the true rows is the answer. Where not
 even a bound is met, the answer is a linear feedback of the error, K (x - g), without any program.
@@ -32,6 +32,8 @@ CONVERGED = {True: 1e-2, False: 1e-5}
 error is of the order of its square, and without."""
 VIOLATED = 5e-7
 """Nor does it leave the rows violated by more than this in sum, unless all of it is slack."""
+PRICE = 1.1
+"""Price of violation in the merit, as a multiple of the largest multiplier: exact above 1."""
 SHORTEST = 1e-3
 """A step that must be cut to less than this share of its length leads nowhere."""
 ROUNDING = 1e-12
@@ -87,6 +89,7 @@ class Sqp:
         if not self._is_free():
             self._inputs[:] = guess
             self._weights[:] = limit = slack_weight(self.settings, parameters)
+            self._model.soft_weights(w_l=self._weights, w_u=self._weights)
             outcome = self._iterate(limit)
             if outcome == "failed":
                 self.reset()
@@ -115,7 +118,7 @@ class Sqp:
             self._share[0] = 1.0
             self._measure.call()
             cost, violation, size, steepest, on_rows = self._after.tolist()
-            price = max(price, min(1.1 * steepest, limit))
+            price = max(price, min(PRICE * steepest, limit))
             cost_before, violation_before, curved = self._before.tolist()
             before, after = cost_before + price * violation_before, cost + price * violation
             settled = violation <= VIOLATED or steepest >= limit
@@ -130,12 +133,11 @@ class Sqp:
     def _linearise(self) -> bool:
         """Hand over the program at `_inputs`; True if with the exact Hessian."""
         self._derive.call()
-        exact = self._model.update(*self._program) >= 0
+        exact = bool(self._model.update(*self._program) >= 0)
         if not exact:
             self._on_cbf[:] = 0
             self._derive.call()
             self._model.update(*self._program)
-        self._model.soft_weights(w_l=self._weights, w_u=self._weights)
         return exact
 
     def _merit(self, price: float, share: float) -> float:

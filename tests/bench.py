@@ -238,7 +238,7 @@ def main() -> None:
     found = {}
     for name in wanted:
         bench = cases[name]
-        found[name] = {key: round(value, 4) for key, value in bench().items()}
+        found[name] = {key: float(f"{value:.4g}") for key, value in bench().items()}
         print(
             f"{name:<24}", ", ".join(f"{key}: {value:.3g}" for key, value in found[name].items()), flush=True
         )

@@ -1,7 +1,9 @@
 """The two solvers side by side, the rungs of the ladder, and what the terminal conditions promise."""
 
+import ast
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -49,6 +51,18 @@ def test_the_scenarios_of_the_paper_run_the_same_with_both(name):
         assert all(claim.check(log)[0] for claim in scenario.claims)
     assert sqp.metrics()["passing_side"] == ipopt.metrics()["passing_side"]
     assert sqp.metrics()["time_to_goal"] == pytest.approx(ipopt.metrics()["time_to_goal"], abs=0.2)
+
+
+@pytest.mark.parametrize(("package", "where"), [("casadi", {"problem", "ipopt", "sqp"}), ("daqp", {"sqp"})])
+def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
+    found = set()
+    for file in Path(szlib.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            if any(name.split(".")[0] == package for name in names):
+                found.add(file.stem)
+    assert found == where
 
 
 # the ladder
