@@ -36,12 +36,12 @@ from szlib.pages import ASSUMED, Page, parameters
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 seed = 0
 results = "../results"
-worlds = 4  # worlds for each method; 300 for the table that is saved
+worlds = 4  # worlds for each method; 100 for the table that is saved
 n_jobs = 1
 
 # %%
 page = Page("13_comparison", data=data, results=results, seed=seed)
-full_table = Path("tables/13_comparison.csv")  # of worlds = 300
+full_table = Path("tables/13_comparison.csv")  # of worlds = 100
 parameters(
     [
         ("worlds", worlds, ASSUMED, "the same ones for every method"),
@@ -104,7 +104,7 @@ told(comparisons.summarise(rows)).T
 # %% [markdown]
 # ## The full run
 #
-# `szlib run --only 13 -p worlds=300` leaves its table among the results; the copy committed beside
+# `szlib run --only 13 -p worlds=100` leaves its table among the results; the copy committed beside
 # the notebooks is shown from here on.
 
 # %%
