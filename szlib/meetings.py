@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, cos, sin
-from typing import Protocol
+from math import acos, atan2, cos, hypot, inf, sin, sqrt
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 
-from .barriers import Array, barrier, finite, segment_distance
+from .barriers import Array, barrier, ellipse_formula, finite, segment_distance
 from .ellipses import Ellipse
 from .errors import SolverError, ZoneError
 from .settings import MPCSettings
@@ -72,15 +72,39 @@ class Person:
         return Person((x + vx * seconds, y + vy * seconds), self.velocity, self.heading, self.zone)
 
 
+class Placed(NamedTuple):
+    """A person's zone in the world: the two foci and the semi-major axis [m], and its velocity [m/s]."""
+
+    xa: float
+    ya: float
+    xb: float
+    yb: float
+    a: float
+    vx: float
+    vy: float
+
+    def distance(self, x: float, y: float) -> float:
+        """Approximate distance of (x, y) to the zone now [m]."""
+        return float(ellipse_formula(x, y, *self[:5]))
+
+
+def place(person: Person, zone: Ellipse) -> Placed:
+    """The zone, of the person's own frame, around a person."""
+    (x, y), heading = person.position, cast(float, person.heading)
+    c, s = cos(heading), sin(heading)
+    (ma, na), (mb, nb) = zone.foci.tolist()
+    foci = (x + ma * c - na * s, y + ma * s + na * c, x + mb * c - nb * s, y + mb * s + nb * c)
+    return Placed(*foci, zone.semi_axes[0], *person.velocity)
+
+
 def steer(
-    state: Array,
-    goal: Array,
-    placed: Sequence[Ellipse],
-    people: Sequence[Person],
+    position: tuple[float, float],
+    goal: tuple[float, float],
+    people: Sequence[Placed],
     walls: Array,
     s: MPCSettings,
-) -> Array:
-    """Where to be drawn to, shape (2,) [m]: the goal, or around a person whom the robot meets head-on.
+) -> tuple[float, float]:
+    """Where to be drawn to [m]: the goal, or around a person whom the robot meets head-on.
 
     A person blocks the way where the line to the goal enters the set h < 0, itself an ellipse with
     the foci of the zone. Its two tangents from the robot lie at the angles +-w about -grad h, the
@@ -95,47 +119,51 @@ def steer(
     Only where the barrier can be felt yet, h <= closing speed * dt / gamma, and for people who do
     not walk across the way: those open it by themselves. The nearest such person counts.
     """
-    position = state[:2]
-    way = goal - position
-    distance = float(np.hypot(*way))
+    (x, y), way = position, (goal[0] - position[0], goal[1] - position[1])
+    distance = hypot(*way)
     if distance == 0 or s.tie == 0:
         return goal
-    nearest, target = np.inf, goal
-    for person, zone in zip(people, placed, strict=True):
-        to_foci = zone.foci - position
-        r1, r2 = np.hypot(to_foci[:, 0], to_foci[:, 1])
-        h = float(barrier((r1 + r2) / 2 - zone.semi_axes[0], s.r_robot, s.eps))
-        if h > nearest or h > distance or min(r1, r2) == 0:
+    nearest, target = inf, goal
+    for zone in people:
+        h = barrier(zone.distance(x, y), s.r_robot, s.eps)
+        pace = hypot(zone.vx, zone.vy)
+        if h > min(nearest, distance, (s.v_max + pace) * s.dt / s.gamma):
             continue
-        inward = to_foci[0] / r1 + to_foci[1] / r2
-        inward /= np.hypot(*inward)
-        pace = float(np.hypot(*person.velocity))
-        across = abs(_cross(way / distance, np.asarray(person.velocity))) > s.tie * pace
-        if across or h > (s.v_max + pace) * s.dt / s.gamma:
+        to_a, to_b = (zone.xa - x, zone.ya - y), (zone.xb - x, zone.yb - y)
+        ra, rb = hypot(*to_a), hypot(*to_b)
+        across = abs(_cross(way, (zone.vx, zone.vy))) > s.tie * pace * distance
+        if across or min(ra, rb) == 0:
             continue
-        reach = zone.semi_axes[0] + s.r_robot + s.eps
-        w = np.arccos(np.clip((r1**2 + r2**2 - 4 * reach**2) / (2 * r1 * r2), -1, 1)) / 2
-        b = atan2(_cross(inward, way), inward @ way)
+        inward = (to_a[0] / ra + to_b[0] / rb, to_a[1] / ra + to_b[1] / rb)
+        reach = zone.a + s.r_robot + s.eps
+        cosine = (ra**2 + rb**2 - 4 * reach**2) / (2 * ra * rb)
+        w = acos(max(-1.0, min(1.0, cosine))) / 2
+        b = atan2(_cross(inward, way), inward[0] * way[0] + inward[1] * way[1])
         nearest, target = h, goal
         for left in (s.pass_side == "left", s.pass_side != "left"):
             lead = (b if left else -b) / (s.tie * w)
-            beside = np.array([-way[1], way[0]]) / distance * (1 if left else -1)
-            if -1 <= lead < 2 and _has_room(zone, reach, beside, walls, s):
+            if -1 <= lead < 2 and _has_room(zone, reach, way, left, walls, s):
                 turn = ((w if left else -w) - b) * min(1.0, 2 - lead)
-                rotation = np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
-                target = position + rotation @ way
+                c, d = cos(turn), sin(turn)
+                target = (x + c * way[0] - d * way[1], y + d * way[0] + c * way[1])
                 break
     return target
 
 
-def _has_room(zone: Ellipse, reach: float, beside: Array, walls: Array, s: MPCSettings) -> bool:
-    """True if no wall stands between the zone's centre and where the robot passes, in direction `beside`."""
-    major = np.array([cos(zone.angle), sin(zone.angle)])
-    c2 = zone.semi_axes[0] ** 2 - zone.semi_axes[1] ** 2
-    width = np.sqrt(reach**2 - c2 * _cross(major, beside) ** 2)
-    points = np.asarray(zone.center) + np.linspace(0, width, 20)[:, None] * beside
+def _has_room(
+    zone: Placed, reach: float, way: tuple[float, float], left: bool, walls: Array, s: MPCSettings
+) -> bool:
+    """True if no wall stands between the zone's centre and where the robot passes on that side."""
+    if not len(walls):
+        return True
+    length = hypot(*way) if left else -hypot(*way)
+    beside = (-way[1] / length, way[0] / length)
+    half = ((zone.xa - zone.xb) / 2, (zone.ya - zone.yb) / 2)
+    width = sqrt(reach**2 - _cross(half, beside) ** 2)
+    center = np.array([(zone.xa + zone.xb) / 2, (zone.ya + zone.yb) / 2])
+    points = center + np.linspace(0, width, 20)[:, None] * np.array(beside)
     return all((barrier(segment_distance(points, *wall), s.r_robot, s.eps) >= 0).all() for wall in walls)
 
 
-def _cross(u: Array, v: Array) -> float:
-    return float(u[0] * v[1] - u[1] * v[0])
+def _cross(u: tuple[float, float], v: tuple[float, float]) -> float:
+    return u[0] * v[1] - u[1] * v[0]

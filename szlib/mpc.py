@@ -1,55 +1,64 @@
 """The controller: model predictive control with barriers around people and walls (MPC-CBF).
 
-    min over u_0 .. u_{N-1}
-        (x_N - g)' P (x_N - g) + sum_{k=1}^{N-1} (x_k - g)' Q (x_k - g) + sum_{k=0}^{N-1} u_k' R u_k
-    subject to
-        x_{k+1} = A x_k + B u_k,  x_0 given                           double integrator   (paper, eq. 8)
-        -a_max <= u_k <= a_max                                        acceleration        k = 0 .. N-1
-        |(vx, vy)_k|^2 <= v_max^2                                     Euclidean speed     k = 1 .. N
-        h_i(x_{k+1}, k+1) - (1 - gamma) h_i(x_k, k) >= 0              every person, wall  k = 0 .. N_h-1
+The problem stands in `szlib.problem`; it is solved by `szlib.sqp` or `szlib.ipopt`. Each step climbs
+down a ladder until a rung holds:
 
-(paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., k) takes person i at constant
-velocity, k steps ahead. `g` is the goal at rest, but for meetings head-on (`steer`). The states are
-eliminated: 2 N unknowns remain. The *relaxed* problem adds a slack s >= 0 to each barrier row, and
-to the speed rows if the robot is already too fast, and penalises their sum: exactly, so wherever
-the hard problem has a solution near by, both have the same one.
+    warm      the problem, from the last plan, shifted
+    cold      the problem, from full braking
+    kept      the last plan, shifted, if it still satisfies the problem        terminal condition only
+    relaxed   the problem with penalised slack
+    kept      the last plan, shifted, if it is a way to a safe end             terminal condition only
+    braking   to rest as soon as the bounds allow
 
-`Problem` is the definition, in symbols; what solves it (here IPOPT, as in the paper) only reads it.
+The terminal condition and what it is good for
+----------------------------------------------
+`terminal="rest"` (barriers on the whole horizon, v_N = 0). *Recursive feasibility*: let everybody
+stand, h(x_0) >= 0, and let u_0 .. u_{N-1} satisfy the problem. One step later take u_1 .. u_{N-1}, 0.
+Its states are x_1 .. x_N, x_N, for v_N = 0. Bounds, speed and the terminal condition hold, and so do
+the barrier rows of the steps that both plans share. The new row is
+h(x_N) - (1 - gamma) h(x_N) = gamma h(x_N), and the old rows give h(x_{k+1}) >= (1 - gamma) h(x_k), so
+h(x_N) >= (1 - gamma)^N h(x_0) >= 0: it holds as well. So a robot that starts in the safe set with a
+solution, at rest for instance (u = 0), has one for ever, and h >= 0 for ever.
+
+*Passive safety*: if people walk as predicted, the new row may fail: they come closer while the robot
+rests. Call a plan safe to its end if h >= 0 at all its states up to the one from which on it rests.
+By the inequality above each solution is; and the shift of one that is, is one. So where the problem
+has no solution, the ladder applies the relaxed plan only if it is safe to its end, and else the
+last plan, shifted. Then at the first instant at which any h < 0 the robot is at rest: nobody is
+hit by a moving robot.
+
+`terminal="person"` (one person, walking at velocity w, |w| <= v_max, no wall; v_N = w). Seen from the
+person both arguments are the first one: appending 0 keeps the robot at their pace, so
+h(x_{N+1}, N+1) = h(x_N, N), and the problem is recursively feasible although they walk.
 """
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from time import perf_counter
-from typing import Any, Literal, cast
+from typing import Literal, Protocol, cast, get_args
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .barriers import (
-    Array,
-    barrier,
-    cbf_residual,
-    check_wall,
-    ellipse_distance,
-    ellipse_formula,
-    finite,
-    segment_distance,
-    segment_formula,
-)
+from .barriers import Array, barrier, check_wall, finite, segment_formula
 from .ellipses import Ellipse
 from .errors import SolverError
-from .meetings import Person, SpeedZone, as_ellipse, steer
+from .ipopt import Ipopt
+from .meetings import Person, Placed, SpeedZone, as_ellipse, place, steer
+from .problem import TOLERANCE, Evaluator, Numbers
 from .settings import MPCSettings
+from .sqp import Sqp
 
-__all__ = ["MPCCBF", "MPCSettings", "Person", "Step"]
+__all__ = ["MPCCBF", "TOLERANCE", "MPCSettings", "Person", "Step"]
 
-Status = Literal["optimal", "relaxed", "braking"]
-TOLERANCE = 1e-6
-"""Largest violation of a hard row, in its own unit, that still counts as satisfied."""
+Rung = Literal["warm", "cold", "kept", "relaxed", "braking"]
+RUNGS: tuple[Rung, ...] = get_args(Rung)
+Status = Literal["optimal", "kept", "relaxed", "braking"]
+
+_log = logging.getLogger("szlib")
 
 
 @dataclass(frozen=True)
@@ -60,9 +69,9 @@ class Step:
     ----------
     control : acceleration (ax, ay) to apply now, within its bounds, shape (2,) [m/s2].
     predicted : states x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s].
-    status : "optimal": a solver converged and every hard row holds; "relaxed": the hard problem was
-        not solved, and the plan violates it by `slack`; "braking": no solver converged, full braking.
-    slack : largest violation of a hard row by the plan, 0 if none [m for barriers, m2/s2 for speed].
+    rung : the rung of the ladder that gave the plan; see `szlib.mpc`.
+    slack : largest violation of a hard row by the plan, 0 if none [m for barriers, m2/s2 for speed,
+        m/s for the terminal velocity].
     residual : h_{k+1} - (1-gamma) h_k, people before walls, shape (people + walls, N_h) [m].
     h : barriers in the state itself, people before walls, shape (people + walls,) [m]; where one is
         negative, the robot already is where it should not be, and the plan leads out again.
@@ -73,7 +82,7 @@ class Step:
 
     control: Array
     predicted: Array
-    status: Status
+    rung: Rung
     slack: float
     residual: Array
     h: Array
@@ -82,146 +91,29 @@ class Step:
     solve_time: float
 
     @property
+    def status(self) -> Status:
+        """ "optimal": a solver converged and every hard row holds; else the rung."""
+        return "optimal" if self.rung in ("warm", "cold") else cast(Status, self.rung)
+
+    @property
+    def feasible(self) -> bool:
+        """True if the plan satisfies the hard problem, whatever rung it comes from; else see `slack`."""
+        return self.slack <= TOLERANCE
+
+    @property
     def safe(self) -> bool:
         """True if the plan satisfies the hard problem, from a state that satisfies every barrier."""
-        return self.status == "optimal" and bool((self.h >= -TOLERANCE).all())
+        return self.feasible and bool((self.h >= -TOLERANCE).all())
 
 
-@dataclass(frozen=True)
-class Problem:
-    """The optimal control problem in symbols, for so many people and walls; rows are meant >= 0.
+class Solver(Protocol):
+    """What `Ipopt` and `Sqp` have in common; inputs have shape (2N,) [m/s2]."""
 
-    `parameters` stacks the state (4), the target (2), then for each person the foci and a of the zone
-    and the velocity (7), then the end points of each wall (4).
-    """
+    evaluate: Evaluator
 
-    inputs: Any
-    parameters: Any
-    states: Any
-    cost: Any
-    cbf: Any
-    speed: Any
-
-
-@lru_cache(maxsize=64)
-def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem:
-    """Write down the problem of this module's docstring; once for each size and settings."""
-    s = settings
-    inputs, start, target = ca.SX.sym("u", 2, s.N), ca.SX.sym("x0", 4), ca.SX.sym("target", 2)
-    people, walls = ca.SX.sym("person", 7, n_people), ca.SX.sym("wall", 4, n_walls)
-
-    states = [start]
-    for k in range(s.N):
-        position, velocity, u = states[-1][:2], states[-1][2:], inputs[:, k]
-        states.append(ca.vertcat(position + s.dt * velocity + 0.5 * s.dt**2 * u, velocity + s.dt * u))
-
-    error = [x - ca.vertcat(target, 0, 0) for x in states]
-    cost = ca.dot(ca.DM(s.P), error[s.N] ** 2)
-    cost += sum(ca.dot(ca.DM(s.Q), error[k] ** 2) for k in range(1, s.N))
-    cost += sum(ca.dot(ca.DM(s.R), inputs[:, k] ** 2) for k in range(s.N))
-
-    near = list(enumerate(states[: s.N_h + 1]))
-    distances = []
-    for i in range(n_people):
-        xa, ya, xb, yb, a, vx, vy = ca.vertsplit(people[:, i])
-        seen = [(x[0] - k * s.dt * vx, x[1] - k * s.dt * vy) for k, x in near]
-        distances.append([ellipse_formula(x, y, xa, ya, xb, yb, a) for x, y in seen])
-    for j in range(n_walls):
-        distances.append([segment_formula(x[0], x[1], *ca.vertsplit(walls[:, j])) for _, x in near])
-    h = [[barrier(d, s.r_robot, s.eps) for d in row] for row in distances]
-    cbf = [cbf_residual(row[k + 1], row[k], s.gamma) for row in h for k in range(s.N_h)]
-
-    return Problem(
-        inputs=ca.vec(inputs),
-        parameters=ca.vertcat(start, target, ca.vec(people), ca.vec(walls)),
-        states=ca.horzcat(*states),
-        cost=cost,
-        cbf=ca.vertcat(*cbf),
-        speed=ca.vertcat(*(s.v_max**2 - ca.sumsqr(x[2:]) for x in states[1:])),
-    )
-
-
-_IPOPT = {
-    "print_level": 0,
-    "sb": "yes",
-    # The start is close to the solution: the plan of the step before, shifted.
-    "mu_init": 1e-2,
-    "bound_push": 1e-3,
-    "bound_frac": 1e-3,
-    "bound_mult_init_method": "mu-based",
-    # The problem is small and nearly quadratic: leave each barrier subproblem early, step boldly.
-    "barrier_tol_factor": 1e3,
-    "mu_linear_decrease_factor": 0.02,
-    "mu_superlinear_decrease_power": 1.9,
-    "alpha_for_y": "min-dual-infeas",
-    "fast_step_computation": "yes",
-    "min_refinement_steps": 0,
-}
-"""Measured on the approach to a person: 7 iterations instead of 9.4, in 0.65 of the time."""
-
-
-@dataclass(frozen=True)
-class Ipopt:
-    """IPOPT behind a `Problem`: the hard and the relaxed one, and the numbers of a given plan."""
-
-    settings: MPCSettings
-    n_cbf: int
-    hard: Any
-    relaxed: Any
-    evaluate: Any
-
-    @staticmethod
-    @lru_cache(maxsize=64)
-    def build(settings: MPCSettings, n_people: int, n_walls: int) -> Ipopt:
-        """The solver of `build_problem(...)`; built once for each size and settings."""
-        p = build_problem(settings, n_people, n_walls)
-        options: dict[str, Any] = {"expand": True, "print_time": False, "calc_lam_p": False}
-        options["show_eval_warnings"] = False  # a failure is told by `Step.status`
-        options |= {f"ipopt.{name}": value for name, value in _IPOPT.items()}
-        options["ipopt.max_iter"] = settings.max_iterations
-        rows = ca.vertcat(p.cbf, p.speed)
-        # Slack counted by its penalty, in the unit of the cost: IPOPT would scale the rest away.
-        penalty, weight = ca.SX.sym("penalty", rows.numel()), ca.SX.sym("weight")
-        hard = {"x": p.inputs, "p": p.parameters, "f": p.cost, "g": rows}
-        relaxed = {
-            "x": ca.vertcat(p.inputs, penalty),
-            "p": ca.vertcat(p.parameters, weight),
-            "f": p.cost + ca.sum1(penalty),
-            "g": rows + penalty / weight,
-        }
-        return Ipopt(
-            settings=settings,
-            n_cbf=p.cbf.numel(),
-            hard=ca.nlpsol("hard", "ipopt", hard, options),
-            relaxed=ca.nlpsol("relaxed", "ipopt", relaxed, options),
-            evaluate=ca.Function("evaluate", [p.inputs, p.parameters], [p.cost, rows, p.states]),
-        )
-
-    def solve_hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
-        """Inputs, shape (2N,), and whether IPOPT says that it converged."""
-        a_max = self.settings.a_max
-        found = self.hard(x0=guess, p=parameters, lbx=-a_max, ubx=a_max, lbg=0, ubg=np.inf)
-        return self._inputs(found), bool(self.hard.stats()["success"])
-
-    def solve_relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
-        """The same for the problem with penalised slack."""
-        s, speed = self.settings, np.hypot(*parameters[2:4])
-        rows = np.asarray(self.evaluate(guess, parameters)[1]).ravel()
-        free = np.r_[np.ones(self.n_cbf), np.full(s.N, speed > s.v_max)]
-        weight = s.slack_weight * max(1.0, np.hypot(*(parameters[4:6] - parameters[:2])))
-        found = self.relaxed(
-            x0=np.r_[guess, np.maximum(-rows, 0) * free * weight],
-            p=np.r_[parameters, weight],
-            lbx=np.r_[np.full(guess.size, -s.a_max), np.zeros(rows.size)],
-            ubx=np.r_[np.full(guess.size, s.a_max), np.where(free > 0, np.inf, 0.0)],
-            lbg=0,
-            ubg=np.inf,
-        )
-        return self._inputs(found), bool(self.relaxed.stats()["success"])
-
-    def _inputs(self, found: dict[str, Any]) -> Array:
-        inputs = np.asarray(found["x"]).ravel()[: 2 * self.settings.N]
-        return np.asarray(np.clip(inputs, -self.settings.a_max, self.settings.a_max))
+    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
+    def reset(self) -> None: ...
 
 
 class MPCCBF:
@@ -233,10 +125,12 @@ class MPCCBF:
         such as a `SocialZone`, which is asked for `settings.zone_speed`.
     walls : segments, shape (n, 2, 2): end points [m].
     settings : every other parameter.
+    max_people : how many people to build for now. More make the controller grow once, which takes
+        a moment and is told by the logger "szlib" (at level INFO).
 
     Raises
     ------
-    SolverError : a wall is not finite or has no length.
+    SolverError : a wall is not finite or has no length, or settings and walls do not go together.
     ZoneError : `zone` is no zone.
     """
 
@@ -246,22 +140,36 @@ class MPCCBF:
         *,
         walls: ArrayLike | Sequence[ArrayLike] = (),
         settings: MPCSettings | None = None,
+        max_people: int = 1,
     ) -> None:
         self.settings = settings or MPCSettings()
         self.zone = as_ellipse(zone, self.settings.zone_speed)
         ends = [check_wall(wall) for wall in cast(Sequence[ArrayLike], walls)]
         self.walls = np.reshape(np.array(ends, float), (-1, 2, 2))
+        if self.settings.terminal == "person" and len(ends):
+            raise SolverError(f"terminal='person' is for open space; got {len(ends)} walls; use 'rest'")
+        if not isinstance(max_people, int) or max_people < 0:
+            raise SolverError(f"max_people must be a whole number >= 0; got {max_people!r}")
+        self._segments = [tuple(wall) for wall in self.walls.reshape(-1, 4).tolist()]
+        self._solvers: list[Solver] = []
+        self._build(max_people)
         self.reset()
+
+    def _build(self, n_people: int) -> None:
+        kind = Sqp if self.settings.solver == "sqp" else Ipopt
+        for n in range(len(self._solvers), n_people + 1):
+            self._solvers.append(kind(self.settings, n, len(self.walls)))
 
     def reset(self) -> None:
         """Forget the last plan and goal: what follows depends on nothing that went before."""
         self._plan = np.zeros(2 * self.settings.N)
-        self._goal: Array | None = None
+        self._goal: tuple[float, float] | None = None
+        for solver in self._solvers:
+            solver.reset()
 
     def step(self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()) -> Step:
         """The acceleration to apply for the next `dt`.
 
-        The ladder: the hard problem from the last plan, shifted; the relaxed problem; full braking.
         A goal is checked when it is new; from then on a moving robot always gets a control.
 
         Parameters
@@ -277,72 +185,99 @@ class MPCCBF:
         """
         began = perf_counter()
         x = finite("state", state, (4,))
-        g = finite("goal", goal, (2,))
-        placed = self.placed_zones(people)
-        if self._goal is None or not np.array_equal(g, self._goal):
-            self._check_goal(g, people)
-            self._goal = g.copy()
+        gx, gy = finite("goal", goal, (2,)).tolist()
+        if (gx, gy) != self._goal:
+            self._check_goal((gx, gy), people)
+            self._goal = (gx, gy)
+        solver = self._solver(len(people))
+        placed = [place(person, self._zone_of(person)) for person in people]
+        target = steer((float(x[0]), float(x[1])), (gx, gy), placed, self.walls, self.settings)
+        parameters = self._parameters(x, target, placed)
 
-        target = steer(x, g, placed, people, self.walls, self.settings)
-        zones = [(*z.foci.ravel(), z.semi_axes[0], *p.velocity) for z, p in zip(placed, people, strict=True)]
-        parameters = np.concatenate([x, target, *zones, self.walls.ravel()])
-        solver = Ipopt.build(self.settings, len(people), len(self.walls))
-
-        guess = np.r_[self._plan[2:], self._plan[-2:]]
-        plan, status, numbers = self._solve(solver, guess, parameters)
+        rung, plan, numbers = self._climb_down(solver, parameters)
         self._plan = plan
-        cost, rows, states = numbers
         return Step(
             control=plan[:2].copy(),
-            predicted=states,
-            status=status,
-            slack=float(max(0.0, -rows.min())),
-            residual=rows[: solver.n_cbf].reshape(-1, self.settings.N_h),
-            h=self._h(x[:2], placed),
-            target=target,
-            cost=cost,
+            predicted=numbers.states,
+            rung=rung,
+            slack=numbers.slack,
+            residual=numbers.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h),
+            h=numbers.h[:, 0],
+            target=parameters[4:6],
+            cost=numbers.cost,
             solve_time=perf_counter() - began,
         )
 
-    def _solve(
-        self, solver: Ipopt, guess: Array, parameters: Array
-    ) -> tuple[Array, Status, tuple[float, Array, Array]]:
-        for solve in (solver.solve_hard, solver.solve_relaxed):
-            plan, converged = solve(guess, parameters)
-            if converged and np.isfinite(plan).all():
-                numbers = _numbers(solver, plan, parameters)
-                if numbers[1].min() >= -TOLERANCE:
-                    return plan, "optimal", numbers
-                if solve == solver.solve_relaxed:
-                    return plan, "relaxed", numbers
+    def _solver(self, n_people: int) -> Solver:
+        built = len(self._solvers) - 1
+        if n_people > built:
+            if self.settings.terminal == "person" and n_people > 1:
+                raise SolverError(f"terminal='person' is for one person; got {n_people}; use 'rest'")
+            _log.info("the controller was built for %d people and now grows to %d", built, n_people)
+            self._build(n_people)
+        return self._solvers[n_people]
+
+    def _parameters(self, x: Array, target: tuple[float, float], placed: Sequence[Placed]) -> Array:
+        """The numbers of `Problem.parameters`."""
+        pace = placed[0][5:] if self.settings.terminal == "person" and placed else (0.0, 0.0)
+        numbers = [*x.tolist(), *target, *pace]
+        for zone in placed:
+            numbers += zone
+        for segment in self._segments:
+            numbers += segment
+        return np.array(numbers)
+
+    def _climb_down(self, solver: Solver, parameters: Array) -> tuple[Rung, Array, Numbers]:
+        """The first rung that holds, its plan, and the plan's numbers."""
+        ends = self.settings.terminal != "none"
+        shifted = np.concatenate([self._plan[2:], (0.0, 0.0)])
+        rung: Rung
+        for rung in ("warm", "cold"):
+            guess = shifted if rung == "warm" else self._brake(parameters[2:4])
+            plan, converged = solver.hard(guess, parameters)
+            if converged:
+                numbers = solver.evaluate(plan, parameters)
+                if numbers.slack <= TOLERANCE:
+                    return rung, plan, numbers
+        kept = solver.evaluate(shifted, parameters)
+        if ends and kept.slack <= TOLERANCE:
+            return "kept", shifted, kept
+        safe_end = ends and _safe_to_its_end(kept, parameters)
+        plan, converged = solver.relaxed(shifted, parameters)
+        if converged and np.isfinite(plan).all():
+            numbers = solver.evaluate(plan, parameters)
+            if not safe_end or _safe_to_its_end(numbers, parameters):
+                return ("warm" if numbers.slack <= TOLERANCE else "relaxed"), plan, numbers
+        if safe_end:
+            return "kept", shifted, kept
         plan = self._brake(parameters[2:4])
-        return plan, "braking", _numbers(solver, plan, parameters)
+        return "braking", plan, solver.evaluate(plan, parameters)
 
     def _brake(self, velocity: Array) -> Array:
         """The inputs that bring the robot to rest soonest along its path, shape (2N,) [m/s2]."""
-        s, v, plan = self.settings, velocity.copy(), []
+        s, (vx, vy) = self.settings, velocity.tolist()
+        plan: list[float] = []
         for _ in range(s.N):
-            u = -v / max(s.dt, float(np.abs(v).max()) / s.a_max)
-            v = v + s.dt * u
-            plan.append(u)
-        return np.concatenate(plan)
+            time = max(s.dt, max(abs(vx), abs(vy)) / s.a_max)
+            plan += (-vx / time, -vy / time)
+            vx, vy = vx - s.dt * vx / time, vy - s.dt * vy / time
+        return np.array(plan)
+
+    def _zone_of(self, person: Person) -> Ellipse:
+        return self.zone if person.zone is None else as_ellipse(person.zone, self.settings.zone_speed)
 
     def placed_zones(self, people: Sequence[Person]) -> list[Ellipse]:
         """The zone of each person, in the world frame."""
-        speed = self.settings.zone_speed
-        zones = [self.zone if p.zone is None else as_ellipse(p.zone, speed) for p in people]
-        return [z.placed(p.position, cast(float, p.heading)) for z, p in zip(zones, people, strict=True)]
+        return [self._zone_of(p).placed(p.position, cast(float, p.heading)) for p in people]
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h of every person and then of every wall at a position, shape (people + walls,) [m]."""
-        return self._h(finite("position", position, (2,)), self.placed_zones(people))
-
-    def _h(self, point: Array, placed: Sequence[Ellipse]) -> Array:
-        distances = [ellipse_distance(point, zone) for zone in placed]
-        distances += [segment_distance(point, *wall) for wall in self.walls]
+        x, y = finite("position", position, (2,)).tolist()
+        distances = [place(person, self._zone_of(person)).distance(x, y) for person in people]
+        distances += [segment_formula(x, y, *segment) for segment in self._segments]
         return np.asarray(barrier(np.array(distances, float), self.settings.r_robot, self.settings.eps))
 
-    def _check_goal(self, goal: Array, people: Sequence[Person]) -> None:
+    def _check_goal(self, goal: tuple[float, float], people: Sequence[Person]) -> None:
         standing = [p for p in people if p.stands]
         h = self.barriers(goal, standing)
         if (h < 0).any():
@@ -352,12 +287,13 @@ class MPCCBF:
             else:
                 what = f"too close to the wall {self.walls[i - len(standing)].tolist()}"
             raise SolverError(
-                f"the goal {goal.tolist()} cannot be reached: it lies {what} (h = {h[i]:.3f} m); "
+                f"the goal {list(goal)} cannot be reached: it lies {what} (h = {h[i]:.3f} m); "
                 "choose one where h >= 0"
             )
 
 
-def _numbers(solver: Ipopt, plan: Array, parameters: Array) -> tuple[float, Array, Array]:
-    """Cost, hard rows and states (N+1, 4) of a plan, calculated without the solver."""
-    cost, rows, states = solver.evaluate(plan, parameters)
-    return float(cost), np.asarray(rows).ravel(), np.asarray(states).T
+def _safe_to_its_end(plan: Numbers, parameters: Array) -> bool:
+    """True if the plan ends as it should, with h >= 0 at every state up to the one from which on it does."""
+    off = np.abs(plan.states[:, 2:] - parameters[6:8]).max(axis=1) > TOLERANCE
+    last = int(off.nonzero()[0].max(initial=-1)) + 1
+    return last < len(off) and bool((plan.h[:, : last + 1] >= -TOLERANCE).all())

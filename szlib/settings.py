@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from .barriers import finite
 from .errors import SolverError
 
 Side = Literal["right", "left"]
+Solver = Literal["sqp", "ipopt"]
+Terminal = Literal["none", "rest", "person"]
 
 
 def _from(badge: str, default: Any) -> Any:
@@ -25,7 +27,7 @@ class MPCSettings:
     ----------
     dt : time step [s].
     N : steps of the prediction horizon.
-    N_h : steps under barrier conditions, 1 <= N_h <= N.
+    N_h : steps under barrier conditions, 1 <= N_h <= N; all N of them if there is a terminal condition.
     gamma : share of h that a step may use up, 0 < gamma <= 1.
     Q, P : weights of the state (x, y, vx, vy) against the goal, on the way and at the end, >= 0.
     R : weights of the accelerations (ax, ay), > 0.
@@ -37,9 +39,12 @@ class MPCSettings:
     pass_side : the robot's own hand on which it passes a person whom it meets head-on.
     tie : a meeting is head-on while the goal lies within this share of the half-angle under which the
         robot sees the person's zone; see `meetings.steer`. At most 0.5.
+    terminal : what the plan ends in: "none", as in the paper; "rest", zero velocity; "person", the
+        velocity of the one person there is, in open space. See the proof in `szlib.mpc`.
+    solver : "sqp", the condensed SQP of `szlib.sqp`, or "ipopt", as in the paper.
     slack_weight : penalty of slack [cost per m, and per m of distance to the goal (at least 1 m)],
         to which the multipliers of the barriers are in proportion.
-    max_iterations : iterations that IPOPT may take before the next rung of the ladder.
+    max_iterations : iterations that a solver may take before the next rung of the ladder.
 
     Raises
     ------
@@ -60,6 +65,8 @@ class MPCSettings:
     zone_speed: float = _from("paper", 1.1)
     pass_side: Side = _from("assumed", "right")  # noqa: RUF009
     tie: float = _from("assumed", 0.25)
+    terminal: Terminal = _from("paper", "none")  # noqa: RUF009
+    solver: Solver = _from("measured", "sqp")  # noqa: RUF009
     slack_weight: float = _from("measured", 1e5)
     max_iterations: int = _from("assumed", 100)
 
@@ -81,7 +88,11 @@ class MPCSettings:
         _require(min(self.Q) >= 0, "Q", self.Q, "weights >= 0")
         _require(min(self.P) >= 0, "P", self.P, "weights >= 0")
         _require(min(self.R) > 0, "R", self.R, "weights > 0")
-        _require(self.pass_side in ("right", "left"), "pass_side", self.pass_side, "'right' or 'left'")
+        for name, choices in (("pass_side", Side), ("terminal", Terminal), ("solver", Solver)):
+            given, allowed = getattr(self, name), get_args(choices)
+            _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
+        if self.terminal != "none":
+            object.__setattr__(self, "N_h", self.N)
         _require(0 <= self.tie <= 0.5, "tie", self.tie, "in [0, 0.5]")
 
     @classmethod

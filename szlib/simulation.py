@@ -16,7 +16,7 @@ import pandas as pd
 
 from .barriers import Array, check_wall, finite
 from .errors import SolverError
-from .mpc import MPCCBF, Person, Step
+from .mpc import MPCCBF, RUNGS, TOLERANCE, Person, Step
 
 GOAL_RADIUS = 0.1
 """The robot has arrived within this distance of the goal [m], when it has stopped (assumed)."""
@@ -100,7 +100,7 @@ class SimulationLog:
     ----------
     scenario, controller : what was run.
     table : one row a step, the state at its time and the control decided there. Columns: t [s], x, y
-        [m], vx, vy, speed [m/s], ax, ay [m/s2], status, slack, solve_time [s], cbf_people (smallest
+        [m], vx, vy, speed [m/s], ax, ay [m/s2], status, rung, slack, solve_time [s], cbf_people (smallest
         residual of a person's barrier condition [m], inf without people), clearance [m] (from the
         robot's body to the nearest wall or person's body, Euclidean, person as a disc of
         `BODY_RADIUS`), and for each person i and wall j: person_i_x, person_i_y [m],
@@ -140,7 +140,9 @@ class SimulationLog:
         passing_side : the side, "right" or "left", on which the robot passes the person that came
             closest: "right" if the person is to the left of the line from start to goal when
             abeam of the robot; "none" if that never happens.
-        infeasible_steps : steps whose status is not "optimal".
+        infeasible_steps : steps whose plan violates the hard problem.
+        steps_warm, steps_cold, steps_kept, steps_relaxed, steps_braking : steps of each rung of the
+            ladder in `szlib.mpc`.
         solve_time_median, solve_time_p95, solve_time_max : of `Step.solve_time`.
         """
         table = self.table
@@ -163,7 +165,8 @@ class SimulationLog:
             "time_stopped": dt * int((later & away & (speed < STOPPED)).sum()),
             "time_yielding": dt * int((later & away & held)[:-1][slow].sum()),
             "passing_side": passing_side(self),
-            "infeasible_steps": int((table["status"] != "optimal").sum()),
+            "infeasible_steps": int((table["slack"] > TOLERANCE).sum()),
+            **{f"steps_{rung}": int((table["rung"] == rung).sum()) for rung in RUNGS},
             "solve_time_median": float(solve_time.median()),
             "solve_time_p95": float(solve_time.quantile(0.95)),
             "solve_time_max": float(solve_time.max()),
@@ -233,7 +236,7 @@ def _row(t: float, state: Array, people: list[Person], step: Step, controller: M
     gaps += [_euclidean(state[:2], wall) for wall in controller.walls]
     row = {
         "t": t, "x": x, "y": y, "vx": vx, "vy": vy, "speed": float(np.hypot(vx, vy)), "ax": ax, "ay": ay,
-        "status": step.status, "slack": step.slack, "solve_time": step.solve_time,
+        "status": step.status, "rung": step.rung, "slack": step.slack, "solve_time": step.solve_time,
         "cbf_people": float(step.residual[:n].min(initial=np.inf)),
         "clearance": float(min(gaps, default=np.inf)) - controller.settings.r_robot,
     }  # fmt: skip

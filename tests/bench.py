@@ -1,23 +1,31 @@
 """Speed, as ratios of two things run in turn in this one process: `make bench`.
 
 Prints a table and writes it to results/bench.json.  Bare seconds depend on the machine; ratios hardly.
+`--long` adds 4,000 states on which both solvers must agree, and 1,000 meetings head-on.  Names of
+cases after the options choose among them.
 """
 
+import importlib.util
+import itertools
 import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from meets import meetings, questions
+from tqdm import tqdm
 
 import szlib
-from szlib import datasets, mpc
+from szlib import datasets, ipopt, problem
+from szlib.barriers import Array
 from szlib.plaza import make_plaza
 
 
@@ -34,25 +42,149 @@ def in_turn(first: Callable[[], object], second: Callable[[], object], repeats: 
     return median(p[0] for p in pairs), median(p[1] for p in pairs)
 
 
-def bench_step() -> dict[str, float]:
-    """One control step, one person, no wall: the problem built once against built anew."""
-    zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
-    scenario = szlib.SCENARIOS["passing"]
-    states = szlib.simulate(scenario, szlib.MPCCBF(zone)).table[["x", "y", "vx", "vy"]].to_numpy()
-    once, rebuilt = szlib.MPCCBF(zone), szlib.MPCCBF(zone)
-    times = []
-    for state in states:
-        kept = seconds(lambda: once.step(state, scenario.goal, scenario.people))  # noqa: B023 - called at once
-        mpc.Ipopt.build.cache_clear()
-        mpc.build_problem.cache_clear()
-        anew = seconds(lambda: rebuilt.step(state, scenario.goal, scenario.people))  # noqa: B023
-        times.append((kept, anew))
-    kept, anew = np.array(times[5:]).T
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+Question = tuple[Array, Sequence[szlib.Person], Array]
+CROWD = szlib.Scenario(
+    "crowd",
+    (-4.0, 0.0, 0.0, 0.0),
+    (8.0, 0.5),
+    tuple(
+        szlib.Person(position, velocity)
+        for position, velocity in (
+            ((3.0, 0.3), (-0.5, 0.0)),
+            ((0.0, 2.5), (0.1, -0.3)),
+            ((5.0, -2.5), (-0.4, 0.2)),
+            ((8.0, 1.0), (-0.5, 0.1)),
+            ((1.0, -3.0), (0.3, 0.2)),
+        )
+    ),
+    [((-6, 5), (10, 5)), ((-6, -5), (10, -5)), ((4, 5), (4, 3.2)), ((0, -5), (0, -3.8))],
+)
+
+
+def controller_of(scenario: szlib.Scenario, **settings: Any) -> szlib.MPCCBF:
+    chosen = szlib.MPCSettings(**settings)
+    return szlib.MPCCBF(ZONE, walls=scenario.walls, settings=chosen, max_people=len(scenario.people))
+
+
+def way(scenario: szlib.Scenario) -> list[Question]:
+    """State, people and target at each step of a run."""
+    controller = controller_of(scenario)
+    log = szlib.simulate(scenario, controller)
+    controller.reset()
+    asked = []
+    for k, x in enumerate(log.table[["x", "y", "vx", "vy"]].to_numpy()):
+        people = [p.after(k * controller.settings.dt) for p in scenario.people]
+        asked.append((x, people, controller.step(x, scenario.goal, people).target))
+    return asked
+
+
+def race(
+    scenario: szlib.Scenario, rivals: dict[str, Callable[..., object]], repeats: int = 7
+) -> dict[str, Array]:
+    """Times of each rival along the way [s], shape (steps,): laps in turn, medians over them.
+
+    The first steps of a lap, where every rival is cold, do not count.
+    """
+    laps: dict[str, list[list[float]]] = {name: [] for name in rivals}
+    asked = way(scenario)
+    for _ in range(repeats):
+        for name, step in rivals.items():
+            laps[name].append([seconds(lambda: step(*each)) for each in asked][3:])  # noqa: B023 - at once
+    return {name: np.median(lap, axis=0) for name, lap in laps.items()}
+
+
+def ratios(times: dict[str, Array], rival: str) -> dict[str, float]:
+    """Median, p95 and maximum over the steps: of `sqp` in ms, and of the rival as multiples."""
+    ours, theirs = times["sqp"], times[rival]
     return {
-        "ms": 1e3 * median(kept),
-        "p95 ms": 1e3 * float(np.quantile(kept, 0.95)),
-        "rebuilt / built once": median(anew) / median(kept),
+        "sqp ms": 1e3 * float(np.median(ours)),
+        "sqp p99 ms": 1e3 * float(np.quantile(ours, 0.99)),
+        f"{rival} / sqp median": float(np.median(theirs) / np.median(ours)),
+        f"{rival} / sqp p95": float(np.quantile(theirs, 0.95) / np.quantile(ours, 0.95)),
+        f"{rival} / sqp max": float(theirs.max() / ours.max()),
     }
+
+
+def bench_solvers(scenario: szlib.Scenario) -> dict[str, float]:
+    """One control step by SQP against IPOPT, built once and warm: as tuned here, and as it comes."""
+    rivals = {name: controller_of(scenario, solver=name) for name in ("sqp", "ipopt")}
+    tuned = dict(ipopt._OPTIONS)
+    for name in tuned.keys() - {"print_level", "sb"}:
+        del ipopt._OPTIONS[name]
+    ipopt._solvers.cache_clear()
+    rivals["plain ipopt"] = controller_of(scenario, solver="ipopt")
+    ipopt._solvers.cache_clear()
+    ipopt._OPTIONS.update(tuned)
+    times = race(scenario, {name: asking(controller, scenario) for name, controller in rivals.items()})
+    return ratios(times, "ipopt") | ratios(times, "plain ipopt")
+
+
+def asking(controller: szlib.MPCCBF, scenario: szlib.Scenario) -> Callable[..., szlib.Step]:
+    return lambda state, people, target: controller.step(state, scenario.goal, people)
+
+
+def bench_rival() -> dict[str, float]:
+    """The same problem in do-mpc: the same controls, and how much longer they take."""
+    from rivals import do_mpc_step
+
+    scenario = szlib.SCENARIOS["passing"]
+    step, rival = asking(controller_of(scenario), scenario), do_mpc_step(szlib.MPCSettings(), ZONE)
+
+    def theirs(x: Array, people: Sequence[szlib.Person], target: Array) -> Array:
+        return rival(x, target, people[0])
+
+    apart = [np.abs(step(*each).control - theirs(*each)).max() for each in way(scenario)]
+    found = ratios(race(scenario, {"sqp": step, "do-mpc": theirs}, repeats=3), "do-mpc")
+    return found | {"largest difference of controls": max(apart)}
+
+
+def bench_build() -> dict[str, float]:
+    """IPOPT built once, against built anew at each step."""
+    scenario = szlib.SCENARIOS["passing"]
+    once, rebuilt = (controller_of(scenario, solver="ipopt") for _ in range(2))
+
+    def anew(x: Array, people: Sequence[szlib.Person], target: Array) -> None:
+        for cache in (problem.build_problem, problem._evaluation, ipopt._solvers):
+            cache.cache_clear()
+        rebuilt._solvers[1] = ipopt.Ipopt(rebuilt.settings, 1, 0)
+        rebuilt.step(x, scenario.goal, people)
+
+    times = race(scenario, {"once": asking(once, scenario), "anew": anew}, repeats=3)
+    return {"rebuilt / built once": float(np.median(times["anew"]) / np.median(times["once"]))}
+
+
+def check_agreement(count: int) -> dict[str, float]:
+    """Both solvers on seeded states, each from nothing: where they differ, and by how much where not."""
+    found = dict.fromkeys(("states", "both solve", "same", "lower by sqp", "lower by ipopt"), 0)
+    found |= dict.fromkeys(("only sqp", "only ipopt"), 0)
+    apart, residual = [0.0], [0.0]
+    for question in tqdm(itertools.islice(questions(seed=10), count), "agreement", count):
+        sqp, other = (question.ask(szlib.MPCSettings(solver=s, tie=0.0)) for s in ("sqp", "ipopt"))
+        solved = [step.status == "optimal" for step in (sqp, other)]
+        found["states"] += 1
+        found["both solve"] += all(solved)
+        found["only sqp"] += solved == [True, False]
+        found["only ipopt"] += solved == [False, True]
+        if all(solved):
+            relative = (sqp.cost - other.cost) / max(other.cost, 1e-9)
+            found["same"] += abs(relative) <= 1e-6
+            found["lower by sqp"] += relative < -1e-6
+            found["lower by ipopt"] += relative > 1e-6
+            residual.append(float(sqp.residual.min(initial=0)))
+            if abs(relative) <= 1e-6:
+                apart.append(float(np.abs(sqp.control - other.control).max()))
+    return found | {"largest |du|": max(apart), "least residual": min(residual)}
+
+
+def check_meetings(count: int, solver: str) -> dict[str, float]:
+    """Exactly symmetric meetings: how many end at the goal, and on the side that was to be expected."""
+    reached = side = 0
+    for scenario, place in tqdm(itertools.islice(meetings(seed=11), count), f"meetings, {solver}", count):
+        log = szlib.simulate(scenario, controller_of(scenario, solver=solver))
+        reached += log.success
+        side += log.metrics()["passing_side"] == ("left" if place == "wall" else "right")
+    return {"meetings": count, "goal reached": reached, "on the expected side": side}
 
 
 def bench_day() -> dict[str, float]:
@@ -86,12 +218,27 @@ def bench_import() -> dict[str, float]:
 
 
 def main() -> None:
-    cases = {"control step": bench_step, "import szlib": bench_import, "plaza": bench_plaza}
+    passing = szlib.SCENARIOS["passing"]
+    cases: dict[str, Callable[[], dict[str, float]]] = {
+        "one person": lambda: bench_solvers(passing),
+        "5 people, 4 walls": lambda: bench_solvers(CROWD),
+        "IPOPT": bench_build,
+        "import szlib": bench_import,
+        "plaza": bench_plaza,
+    }
+    if importlib.util.find_spec("do_mpc"):
+        cases["do-mpc"] = bench_rival
+    if "--long" in sys.argv:
+        cases["agreement"] = lambda: check_agreement(4000)
+        cases["head-on, sqp"] = lambda: check_meetings(1000, "sqp")
+        cases["head-on, ipopt"] = lambda: check_meetings(100, "ipopt")
     if os.environ.get(datasets.DATA_DIR_VARIABLE):
         cases["1 Hz day, files to zone"] = bench_day
+    wanted = [name for name in sys.argv[1:] if not name.startswith("--")] or list(cases)
     found = {}
-    for name, bench in cases.items():
-        found[name] = {key: round(value, 4) for key, value in bench().items()}
+    for name in wanted:
+        bench = cases[name]
+        found[name] = {key: float(f"{value:.4g}") for key, value in bench().items()}
         print(
             f"{name:<24}", ", ".join(f"{key}: {value:.3g}" for key, value in found[name].items()), flush=True
         )

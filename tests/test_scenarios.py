@@ -14,7 +14,8 @@ ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 KEYS = {
     "success", "time_to_goal", "path_length", "min_h", "min_clearance", "min_speed", "mean_speed",
     "max_speed", "time_stopped", "time_yielding", "passing_side", "infeasible_steps",
-    "solve_time_median", "solve_time_p95", "solve_time_max",
+    "solve_time_median", "solve_time_p95", "solve_time_max", "steps_warm", "steps_cold", "steps_kept",
+    "steps_relaxed", "steps_braking",
 }  # fmt: skip
 
 

@@ -1,0 +1,94 @@
+"""IPOPT behind the problem of `szlib.problem`, as in the paper."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from .barriers import Array
+from .problem import Evaluator, build_problem, slack_weight
+from .settings import MPCSettings
+
+_OPTIONS = {
+    "print_level": 0,
+    "sb": "yes",
+    # The start is close to the solution: the plan of the step before, shifted.
+    "mu_init": 1e-2,
+    "bound_push": 1e-3,
+    "bound_frac": 1e-3,
+    "bound_mult_init_method": "mu-based",
+    # The problem is small and nearly quadratic: leave each barrier subproblem early, step boldly.
+    "barrier_tol_factor": 1e3,
+    "mu_linear_decrease_factor": 0.02,
+    "mu_superlinear_decrease_power": 1.9,
+    "alpha_for_y": "min-dual-infeas",
+    "fast_step_computation": "yes",
+    "min_refinement_steps": 0,
+}
+"""Measured on the approach to a person: 7 iterations instead of 9.4, in 0.65 of the time."""
+
+
+class Ipopt:
+    """The hard and the relaxed problem, by IPOPT."""
+
+    def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
+        self.settings = settings
+        self.evaluate = Evaluator(settings, n_people, n_walls)
+        self._hard, self._relaxed, self._n_terminal = _solvers(settings, n_people, n_walls)
+
+    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+        """Inputs, shape (2N,), and whether IPOPT says that it converged."""
+        a_max, upper = self.settings.a_max, self._row_bounds()
+        found = self._hard(x0=guess, p=parameters, lbx=-a_max, ubx=a_max, lbg=0, ubg=upper)
+        return self._inputs(found), bool(self._hard.stats()["success"])
+
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+        """The same for the problem with penalised slack."""
+        s = self.settings
+        rows = self.evaluate(guess, parameters).rows
+        free = np.ones(rows.size)
+        free[self.evaluate.n_cbf :] = np.hypot(*parameters[2:4]) > s.v_max
+        weight = slack_weight(s, parameters)
+        found = self._relaxed(
+            x0=np.r_[guess, np.maximum(-rows, 0) * free * weight],
+            p=np.r_[parameters, weight],
+            lbx=np.r_[np.full(guess.size, -s.a_max), np.zeros(rows.size)],
+            ubx=np.r_[np.full(guess.size, s.a_max), np.where(free > 0, np.inf, 0.0)],
+            lbg=0,
+            ubg=self._row_bounds(),
+        )
+        return self._inputs(found), bool(self._relaxed.stats()["success"])
+
+    def reset(self) -> None:
+        """Nothing is remembered from one call to the next."""
+
+    def _row_bounds(self) -> Array:
+        rows = self._hard.numel_out("g")
+        return np.where(np.arange(rows) < rows - self._n_terminal, np.inf, 0.0)
+
+    def _inputs(self, found: dict[str, Any]) -> Array:
+        inputs = np.asarray(found["x"]).ravel()[: 2 * self.settings.N]
+        return np.asarray(np.clip(inputs, -self.settings.a_max, self.settings.a_max))
+
+
+@lru_cache(maxsize=256)
+def _solvers(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any, int]:
+    p = build_problem(settings, n_people, n_walls)
+    options: dict[str, Any] = {"expand": True, "print_time": False, "calc_lam_p": False}
+    options["show_eval_warnings"] = False  # a failure is told by `Step.status`
+    options |= {f"ipopt.{name}": value for name, value in _OPTIONS.items()}
+    options["ipopt.max_iter"] = settings.max_iterations
+    # Slack counted by its penalty, in the unit of the cost: IPOPT would scale the rest away.
+    penalty, weight = ca.SX.sym("penalty", p.rows.numel()), ca.SX.sym("weight")
+    hard = {"x": p.inputs, "p": p.parameters, "f": p.cost, "g": ca.vertcat(p.rows, p.terminal)}
+    relaxed = {
+        "x": ca.vertcat(p.inputs, penalty),
+        "p": ca.vertcat(p.parameters, weight),
+        "f": p.cost + ca.sum1(penalty),
+        "g": ca.vertcat(p.rows + penalty / weight, p.terminal),
+    }
+    solvers = [ca.nlpsol(name, "ipopt", nlp, options) for name, nlp in (("hard", hard), ("relaxed", relaxed))]
+    return solvers[0], solvers[1], p.terminal.numel()

@@ -1,0 +1,206 @@
+"""A condensed sequential quadratic program on the DAQP active-set solver, for the problem of `szlib.problem`.
+
+The unknowns are the 2 N inputs. Each iteration solves
+
+    min over d   1/2 d' H d + grad(cost)' d + weight * sum(s)
+    subject to   -a_max - u <= d <= a_max - u,   rows + J d + s >= 0,  s >= 0,   terminal + T d = 0
+
+with the exact Hessian H of the Lagrangian where it is positive definite; else without the curvature
+of the barriers (Gauss-Newton). Rows are soft, by an exact penalty, so that every program has a
+solution. A step has to lower cost + price * violation, with a price just above the largest multiplier so
+far; one that does not is corrected to second order, then shortened. Where no row has a multiplier, the
+program's cost is exact, and the first solution that satisfies the true rows is the answer. Where not
+even a bound is met, the answer is a linear feedback of the error, K (x - g), without any program.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, Literal
+
+import casadi as ca
+import daqp
+import numpy as np
+
+from .barriers import Array
+from .problem import Buffered, Evaluator, build_problem, slack_weight
+from .settings import MPCSettings
+
+Outcome = Literal["converged", "stalled", "failed"]
+CONVERGED = {True: 1e-2, False: 1e-5}
+"""The last step of the SQP moves no input by more than this [m/s2]: with the exact Hessian, when the
+error is of the order of its square, and without."""
+VIOLATED = 5e-7
+"""Nor does it leave the rows violated by more than this in sum, unless all of it is slack."""
+PRICE = 1.1
+"""Price of violation in the merit, as a multiple of the largest multiplier: exact above 1."""
+SHORTEST = 1e-3
+"""A step that must be cut to less than this share of its length leads nowhere."""
+ROUNDING = 1e-12
+"""Share by which the merit may rise from rounding alone."""
+_HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
+_DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3}
+"""Convex programs as they stand; next to the exact penalty, a quadratic one too small to matter."""
+
+
+class Sqp:
+    """The hard problem and the relaxed one, by SQP; it remembers multipliers from call to call."""
+
+    def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
+        self.settings = settings
+        self.evaluate = Evaluator(settings, n_people, n_walls)
+        derive, measure, self._gain = _functions(settings, n_people, n_walls)
+        n, m, n_rows = derive.nnz_in(0), derive.nnz_in(2), self.evaluate.n_rows
+        self._inputs, self._step, self._share = np.zeros(n), np.zeros(n), np.ones(1)
+        self._parameters, self._multipliers = np.zeros(derive.nnz_in(1)), np.zeros(m)
+        self._on_cbf = self._multipliers[: self.evaluate.n_cbf]
+        self._derive = Buffered(derive, self._inputs, self._parameters, self._multipliers)
+        self._measure = Buffered(
+            measure, self._inputs, self._parameters, self._multipliers, self._step, self._share
+        )
+        self._before, self._lower, self._upper, gradient, jacobian, hessian = self._derive.results
+        self._after, self._trial, self._values = self._measure.results
+        self._jacobian = jacobian.reshape(m, n)
+        self._program = (hessian.reshape(n, n), gradient, self._jacobian, self._upper, self._lower)
+        self._sense = np.repeat(np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows])
+        self._weights = np.zeros(n + m)
+        self._model = daqp.Model()
+        self._model.settings = _DAQP
+        self._model.setup(np.eye(n), *self._program[1:], self._sense)
+
+    def reset(self) -> None:
+        """Forget every multiplier and active row."""
+        self._multipliers[:] = 0
+        self._model.update(sense=self._sense)
+
+    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+        """Inputs, shape (2N,), and whether they converged; if rows stay violated, to the relaxed problem."""
+        plan, outcome = self._solve(guess, parameters)
+        return plan, outcome == "converged"
+
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+        """The same, where it is enough that no step lowers the merit any more."""
+        plan, outcome = self._solve(guess, parameters)
+        return plan, outcome != "failed"
+
+    def _solve(self, guess: Array, parameters: Array) -> tuple[Array, Outcome]:
+        self._parameters[:] = parameters
+        outcome: Outcome = "converged"
+        if not self._is_free():
+            self._inputs[:] = guess
+            self._weights[:] = limit = slack_weight(self.settings, parameters)
+            self._model.soft_weights(w_l=self._weights, w_u=self._weights)
+            outcome = self._iterate(limit)
+            if outcome == "failed":
+                self.reset()
+        return self._inputs.copy(), outcome
+
+    def _is_free(self) -> bool:
+        """True if the minimum of the cost alone, now `_inputs`, satisfies everything."""
+        if self._gain is None:
+            return False
+        np.dot(self._gain, self._parameters[:6], out=self._inputs)
+        if not -self.settings.a_max <= self._inputs.min() <= self._inputs.max() <= self.settings.a_max:
+            return False
+        self._step[:] = self._multipliers[:] = 0
+        self._measure.call()
+        return bool(self._after[1] == 0)
+
+    def _iterate(self, limit: float) -> Outcome:
+        """Improve `_inputs`; no price above `limit`, the weight of slack."""
+        price = curved = 0.0
+        for _ in range(self.settings.max_iterations):
+            exact = self._linearise()
+            step, _, flag, info = self._model.solve()
+            if flag < 0:
+                return "failed"
+            self._step[:], self._multipliers[:] = step, info["lam"][step.size :]
+            self._share[0] = 1.0
+            self._measure.call()
+            cost, violation, size, steepest, on_rows = self._after.tolist()
+            price = max(price, min(PRICE * steepest, limit))
+            cost_before, violation_before, curved = self._before.tolist()
+            before, after = cost_before + price * violation_before, cost + price * violation
+            settled = violation <= VIOLATED or steepest >= limit
+            solved = curved == on_rows == violation == 0 or (size <= CONVERGED[exact] and settled)
+            if not solved and after > before * (1 + ROUNDING) and not self._lower_merit(price, before):
+                return "converged" if size <= CONVERGED[False] else "stalled"
+            self._inputs[:] = self._trial
+            if solved:
+                return "converged"
+        return "failed"
+
+    def _linearise(self) -> bool:
+        """Hand over the program at `_inputs`; True if with the exact Hessian."""
+        self._derive.call()
+        exact = bool(self._model.update(*self._program) >= 0)
+        if not exact:
+            self._on_cbf[:] = 0
+            self._derive.call()
+            self._model.update(*self._program)
+        return exact
+
+    def _merit(self, price: float, share: float) -> float:
+        """Cost and violation after this share of the step."""
+        self._share[0] = share
+        self._measure.call()
+        return float(self._after[0] + price * self._after[1])
+
+    def _lower_merit(self, price: float, before: float) -> bool:
+        """Set `_trial` to where the merit is lower: corrected to second order, else on a shorter step."""
+        step, n = self._step.copy(), self._step.size
+        self._lower[n:] = self._jacobian @ step - self._values
+        end = n + self.evaluate.n_rows
+        self._upper[end:] = self._lower[end:]
+        self._model.update(bupper=self._upper, blower=self._lower)
+        corrected, _, flag, _ = self._model.solve()
+        self._step[:] = corrected
+        if flag > 0 and self._merit(price, 1.0) < before:
+            return True
+        self._step[:], share = step, 0.5
+        while share >= SHORTEST:
+            if self._merit(price, share) < before:
+                return True
+            share /= 2
+        return False
+
+
+@lru_cache(maxsize=256)
+def _functions(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any, Array | None]:
+    """The program at the inputs, the merit after a step, and the minimum of the cost as a matrix.
+
+    derive : (inputs, parameters, multipliers) -> (cost, violation, largest multiplier of a row), lower
+        and upper bounds, gradient, Jacobian, Hessian of the Lagrangian.
+    measure : (inputs, parameters, multipliers, step, share) -> (cost, violation, largest element of
+        the step, largest multiplier, largest of a row) there, the inputs there, the values of rows
+        and terminal condition there.
+    The matrix takes state and target to inputs; there is none if there is a terminal condition.
+    """
+    p = build_problem(settings, n_people, n_walls)
+    values, n_rows = ca.vertcat(p.rows, p.terminal), p.rows.numel()
+    multipliers, step, share = (
+        ca.SX.sym("l", values.numel()),
+        ca.SX.sym("d", p.inputs.numel()),
+        ca.SX.sym("s"),
+    )
+    gradient, jacobian = ca.gradient(p.cost, p.inputs), ca.jacobian(values, p.inputs)
+    hessian = ca.hessian(p.cost + ca.dot(multipliers, values), p.inputs)[0]
+    violation = ca.sum1(ca.fmax(0, -p.rows)) + ca.sum1(ca.fabs(p.terminal))
+    on_rows = ca.norm_inf(multipliers[:n_rows])
+    lower = ca.vertcat(-settings.a_max - p.inputs, -values)
+    upper = ca.vertcat(settings.a_max - p.inputs, ca.inf * ca.SX.ones(n_rows), -p.terminal)
+    merit = ca.vertcat(p.cost, violation, on_rows)
+    derive = p.function(
+        "derive", [p.inputs, p.parameters, multipliers], [merit, lower, upper, gradient, jacobian.T, hessian]
+    )
+    trial = ca.fmax(-settings.a_max, ca.fmin(p.inputs + share * step, settings.a_max))
+    cost, violation, values = ca.substitute([p.cost, violation, values], [p.inputs], [trial])
+    merit = ca.vertcat(cost, violation, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
+    measure = p.function(
+        "measure", [p.inputs, p.parameters, multipliers, step, share], [merit, trial, values]
+    )
+    if p.terminal.numel():
+        return derive, measure, None
+    state_and_target = p.parameters[:6]
+    curvature, pull = (np.asarray(ca.evalf(ca.jacobian(gradient, of))) for of in (p.inputs, state_and_target))
+    return derive, measure, np.asarray(-np.linalg.solve(curvature, pull), float)
