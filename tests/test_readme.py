@@ -5,16 +5,25 @@ from pathlib import Path
 
 import pytest
 
+import szlib
 from szlib import workbook
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_program_runs(capsys):
-    (program,) = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
-    exec(compile(program, "README.md", "exec"), {})
+PROGRAMS = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
+
+
+def test_the_first_program_runs(capsys):
+    exec(compile(PROGRAMS[0], "README.md", "exec"), {})
     assert "optimal 0.0" in capsys.readouterr().out
+
+
+def test_the_programs_name_what_exists():
+    for program in PROGRAMS:
+        compile(program, "README.md", "exec")
+        assert all(hasattr(szlib, name) for name in re.findall(r"szlib\.(\w+)", program))
 
 
 @pytest.mark.parametrize("target", sorted(set(re.findall(r"\]\((?!http)([^)#]+)\)", TEXT))))
