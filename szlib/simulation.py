@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from .barriers import Array, check_wall, finite
+from .distances import euclidean_to_segment
 from .errors import SolverError
 from .mpc import MPCCBF, RUNGS, TOLERANCE, Person, Step
 
@@ -233,7 +234,7 @@ def _row(t: float, state: Array, people: list[Person], step: Step, controller: M
     ax, ay = step.control.tolist()
     h, n = step.h, len(people)
     gaps = [np.hypot(x - p.position[0], y - p.position[1]) - BODY_RADIUS for p in people]
-    gaps += [_euclidean(state[:2], wall) for wall in controller.walls]
+    gaps += [float(euclidean_to_segment(state[:2], *wall)) for wall in controller.walls]
     row = {
         "t": t, "x": x, "y": y, "vx": vx, "vy": vy, "speed": float(np.hypot(vx, vy)), "ax": ax, "ay": ay,
         "status": step.status, "rung": step.rung, "slack": step.slack, "solve_time": step.solve_time,
@@ -244,13 +245,6 @@ def _row(t: float, state: Array, people: list[Person], step: Step, controller: M
         row |= {f"person_{i}_x": person.position[0], f"person_{i}_y": person.position[1]}
         row |= {f"person_{i}_heading": person.heading, f"h_person_{i}": float(h[i])}
     return row | {f"h_wall_{j}": float(h[n + j]) for j in range(len(controller.walls))}
-
-
-def _euclidean(point: Array, wall: Array) -> float:
-    """The true distance of a point to a segment [m]."""
-    along = wall[1] - wall[0]
-    share = np.clip((point - wall[0]) @ along / (along @ along), 0, 1)
-    return float(np.hypot(*(point - wall[0] - share * along)))
 
 
 def relative(log: SimulationLog, person: int) -> tuple[Array, Array]:
@@ -279,8 +273,8 @@ def avoidance_start(log: SimulationLog, person: int = 0, deviation: float = 0.1)
 
     Returns
     -------
-    (distance, h) [m] at the first row more than `deviation` [m] beside the line from start to goal;
-    NaN if it never is.
+    (distance, h) [m] where it is first `deviation` [m] beside the line from start to goal, between the
+    rows before and after; NaN if it never is.
     """
     start, course = log.scenario.start[:2], log.scenario.goal - log.scenario.start[:2]
     beside = log.table[["x", "y"]].to_numpy() - start
@@ -288,5 +282,9 @@ def avoidance_start(log: SimulationLog, person: int = 0, deviation: float = 0.1)
     rows = np.flatnonzero(beside > deviation)
     if not len(rows):
         return np.nan, np.nan
-    distance = np.hypot(*(side[rows[0]] for side in relative(log, person)))
-    return float(distance), float(log.table[f"h_person_{person}"].iloc[rows[0]])
+    last, first = max(int(rows[0]) - 1, 0), int(rows[0])
+    share = (deviation - beside[last]) / (beside[first] - beside[last]) if first > last else 1.0
+    ahead, left = relative(log, person)
+    h = log.table[f"h_person_{person}"].to_numpy()
+    x, y, barrier = (v[last] + share * (v[first] - v[last]) for v in (ahead, left, h))
+    return float(np.hypot(x, y)), float(barrier)

@@ -183,8 +183,8 @@ def test_the_passing_side_is_where_the_person_is_not():
 
 
 def test_avoidance_starts_where_the_line_is_left():
-    distance, h = avoidance_start(passing_log(y=[0.0, 0.05, -0.2, 0.0]))
-    assert distance == pytest.approx(np.hypot(0.5, 0.2)) and h == 1.0
+    distance, h = avoidance_start(passing_log(y=[0.0, -0.05, -0.2, 0.0]))  # 0.1 m beside it at x = -0.5 m
+    assert distance == pytest.approx(np.hypot(0.5, 0.1)) and h == 1.0
     assert np.isnan(avoidance_start(passing_log(y=0.0))).all()
 
 
