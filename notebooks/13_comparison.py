@@ -71,7 +71,7 @@ shades = (plotting.GREY, plotting.GREEN, plotting.ORANGE, plotting.RED, plotting
 for (name, make), shade in zip(ZONES.items(), shades, strict=True):
     ax.plot(*make(zone).curve().T, color=shade, linewidth=2, label=name)
 ax.plot(0, 0, marker=(3, 0, -90), color=plotting.BLACK, markersize=10)
-ax.legend(loc="upper left", fontsize=8)
+ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=5, fontsize=8)
 plotting.metres(ax, "Five zones of one person", person=True)
 page.figure(ax.figure, "zones")
 
@@ -79,7 +79,8 @@ page.figure(ax.figure, "zones")
 # ## Identical worlds
 #
 # Every method drives through the same worlds for 15 s. *Inside a zone* means that the robot's disc
-# overlaps it, in Euclidean distance. Intervals are 95 % bootstrap intervals over worlds.
+# overlaps it, in Euclidean distance. Time to goal counts the worlds in which it was reached.
+# Intervals are 95 % bootstrap intervals over worlds.
 
 # %%
 rows = comparisons.compare(worlds, seed=seed, n_jobs=n_jobs, progress=False)
@@ -178,9 +179,12 @@ longer = {name: float(table.loc[name, "whole horizon"] - table.loc[name, "paper"
 page.claim("and less to a myopic barrier (N_h = 2) than to a long one", min(longer.values()) >= 0, longer)
 
 # %% [markdown]
-# **What it means.** The zone decides how near the robot comes; the formulation decides how honest
-# and how cautious it is on the way. The figures above say by how much, with their intervals; where
-# two intervals overlap, these worlds do not tell the methods apart.
+# **What it means.** Without a zone the robot spends seconds where people let nobody come; a circle
+# of equal area or Kirby's zone let it in less, and Hall's keeps it out at the price of more worlds in
+# which it does not arrive in time. Coming to rest at the end of each plan costs about a second and a
+# half. With $\gamma = 0.05$ wrong predictions hardly lead into zones, as the paper says; what they
+# do cost is smoothness, as soon as people are seen 10 cm off. Where two intervals overlap, these
+# worlds do not tell the methods apart.
 
 # %%
 page.close()

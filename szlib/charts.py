@@ -44,13 +44,13 @@ def plot_overestimate(
     return metres(ax, "Where the distance is wrong")
 
 
-def plot_sweep(table: pd.DataFrame, *, title: str, best: str = "low", ax: Axes | None = None) -> Axes:
-    """A table as a heat map with its numbers: index down, columns across; `best` "low" or "high" is pale."""
+def plot_sweep(table: pd.DataFrame, *, title: str, worst: float, ax: Axes | None = None) -> Axes:
+    """A table as a heat map with its numbers: index down, columns across, pale at 0 and dark at `worst`."""
     ax = axes(ax, size=(5, 3.5))
     values = table.to_numpy(float)
-    ax.imshow(values if best == "low" else -values, cmap="Oranges", aspect="auto", alpha=0.9)
+    ax.imshow(np.clip(values / worst, 0, 1), cmap="Oranges", vmin=0, vmax=1.3, aspect="auto")
     for (row, column), value in np.ndenumerate(values):
-        ax.text(column, row, f"{value:.3g}", ha="center", va="center", fontsize=9)
+        ax.text(column, row, f"{round(value, 3) + 0.0:.3g}", ha="center", va="center", fontsize=9)
     ax.set_xticks(range(table.shape[1]), [f"{name:g}" for name in table.columns])
     ax.set_yticks(range(table.shape[0]), [f"{name:g}" for name in table.index])
     ax.set(xlabel=str(table.columns.name), ylabel=str(table.index.name), title=title)
@@ -71,8 +71,7 @@ def plot_intervals(
         ax.hlines(at, of["low"], of["high"], color=shade, linewidth=1.5)
         ax.plot(of["mean"], at, marker, color=shade, markersize=5, label=group)
     ax.set_yticks(range(len(names)), names)
-    ax.invert_yaxis()
-    ax.set(xlabel=label)
+    ax.set(xlabel=label, ylim=(len(names) - 0.5, -0.5))
     ax.grid(axis="x", color=GREY, alpha=0.3)
     return ax
 
@@ -80,7 +79,8 @@ def plot_intervals(
 def plot_grid(
     table: pd.DataFrame, metrics: Mapping[str, str], *, rows: str, colour: str, into: Sequence[Axes]
 ) -> None:
-    """Several metrics side by side, each into its Axes; `metrics` maps a column to its label."""
+    """Several metrics side by side, each into its Axes, with one legend below; column -> label."""
     for ax, (metric, label) in zip(into, metrics.items(), strict=False):
         plot_intervals(table, metric, rows=rows, colour=colour, label=label, ax=ax)
-    into[0].legend(loc="best", fontsize=8)
+    handles, names = into[0].get_legend_handles_labels()
+    into[0].figure.legend(handles, names, loc="outside lower center", ncols=len(names))
