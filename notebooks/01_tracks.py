@@ -14,13 +14,14 @@
 # %% [markdown]
 # # 1 - Tracks and the square
 #
-# **Question.** Where do people walk, how fast, and where is there open space enough to watch two of
-# them meet without a wall or a shop in the way?
+# **Question.** Where do people walk, how fast, and where is there open space enough to watch two
+# of them meet without a wall or a shop in the way?
 #
 # **Expectation.** A mall is crowded along its corridors and open in its middle. Walking speeds
-# gather near 1.2 m/s. The paper uses 92 days of the ATC mall in Osaka (Brščić et al., 2013); here
-# the default is a *synthetic plaza* whose social zone we know, so that every later step can be
-# proved, and `szlib run --data atc-1hz` repeats it all on a real day.
+# gather near 1.2 m/s on a real day; on the plaza they are spread evenly. The paper uses 92 days
+# of the ATC mall in Osaka (Brščić et al., 2013); here the default is a *synthetic plaza* whose
+# social zone we know, so that every later step can be proved, and `szlib run --data atc-1hz`
+# repeats it all on a real day.
 
 # %%
 import numpy as np
@@ -28,7 +29,7 @@ import pandas as pd
 
 import szlib
 from szlib import encounters, funnels, plotting, readers, tracks
-from szlib.pages import ASSUMED, MEASURED, PAPER, Page, parameters
+from szlib.pages import ASSUMED, MEASURED, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -56,18 +57,18 @@ parameters(
             "square",
             f"x {szlib.ATC_SQUARE.x}, y {szlib.ATC_SQUARE.y} m",
             ASSUMED,
-            "largest rectangle free of pillars and queues",
+            "free of pillars and queues",
         ),
-        ("event days", "none left out", PAPER, "the paper removed them by hand; pass `exclude`"),
+        ("event days", "none left out", ASSUMED, "the paper removed them by hand; pass exclude="),
     ]
 )
 
 # %% [markdown]
 # ## From files to rows
 #
-# `read_raw` takes ATC raw files (8 columns, mm), the public 1 Hz day (6 columns, m), EWAP `obsmat`
-# and tidy tables. A person is a pair *(day, id)*. Rows that cannot be used are set aside and
-# counted.
+# `read_raw` takes ATC raw files (8 columns, mm), the public 1 Hz day (6 columns, m), EWAP
+# `obsmat` and tidy tables. A person is a pair *(day, id)*. Rows that cannot be used are set aside
+# and counted.
 
 # %%
 files = page.files()
@@ -79,8 +80,8 @@ raw.head(3)
 # ## One clock
 #
 # Sensors see people at irregular times. `to_clock` interpolates to multiples of 0.1 s *within*
-# gap-free pieces - a person who vanishes behind somebody and comes back is not bridged - and takes
-# velocity from the displacement over one second.
+# gap-free pieces - a person who vanishes behind somebody and comes back is not bridged - and
+# takes velocity from the displacement over one second.
 
 # %%
 people = tracks.to_clock(raw)
@@ -99,8 +100,9 @@ page.key |= {
 # %% [markdown]
 # ## Never trust the velocity column
 #
-# ATC files carry a speed for each row. Beside the speed from displacement it shows what noise does
-# to a derivative: people who stand still seem to stroll. (Tables without such a column skip this.)
+# ATC files carry a speed for each row. Beside the speed from displacement it shows what noise
+# does to a derivative: people who stand still seem to stroll. (Tables without such a column skip
+# this.)
 
 # %%
 column = {"synthetic": (5, 1e-3), "atc-1hz": (4, 1.0)}.get(str(data))
@@ -123,8 +125,9 @@ if column:
 # %% [markdown]
 # ## The square
 #
-# The paper names "the rectangular central square" without coordinates (fig. 1). On the real day the
-# largest rectangle without pillars, walls or queues is the one below: 11 m by 18 m.
+# The paper names "the rectangular central square" without coordinates (fig. 1). On the real day
+# the largest rectangle without pillars, walls or queues is the one below: 11 m by 18 m. (On the
+# plaza everybody is in the square; the paper's fig. 1 is this map of the real day.)
 
 # %%
 ax = plotting.plot_map(people, szlib.ATC_SQUARE)
@@ -155,8 +158,7 @@ funnels.table(stages).tail(5)
 
 # %% [markdown]
 # **What it means.** We have people on one clock, in metres, with a velocity that can be trusted,
-# and
-# an open square to watch them in. Next: who meets whom?
+# and an open square to watch them in. Next: who meets whom?
 
 # %%
 page.close()

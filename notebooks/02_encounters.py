@@ -18,8 +18,8 @@
 # other?
 #
 # **Expectation.** People attend to what is ahead of them. The paper watches a rectangle of 4 m by
-# 5 m and keeps the moments in which only one other person is in it for 3 s: 16,181 trajectories in
-# 92 days, about 176 a day.
+# 5 m and keeps the moments in which only one other person is in it for 3 s: 16,181 trajectories
+# in 92 days, about 176 a day.
 
 # %%
 import numpy as np
@@ -53,8 +53,8 @@ parameters(
 # ## Four conditions
 #
 # Over a window of 3 s: (1) the space's corners stay inside the square, (2) nobody but one and the
-# same person is ever in it, and that person is there when the window opens, (3) at least 1 m away,
-# (4) the reference pedestrian walks at 0.4 m/s or more.
+# same person is ever in it, and that person is there when the window opens, (3) at least 1 m
+# away, (4) the reference pedestrian walks at 0.4 m/s or more.
 
 # %%
 tracks = page.tracks()
@@ -74,19 +74,22 @@ page.check(
     first["distance"].min() >= 1,
     float(first["distance"].min()),
 )
-page.check("and inside the space ahead", (first["los_angle"].abs() <= np.pi / 2).all())
+x, y = (first["distance"] * part(first["los_angle"]) for part in (np.cos, np.sin))
+there = (x > -1e-9) & (x < space.length + 1e-9) & (y.abs() < space.width / 2 + 1e-9)
+page.check("and inside the space ahead", there.all())
 page.check(
     "the reference pedestrian walks throughout", samples["speed"].min() >= 0.4, float(samples["speed"].min())
 )
 
 # %% [markdown]
-# The paper gathers 176 encounters a day. A day of the same mall should give as many, if our reading
-# of the four conditions is near the authors'.
+# The paper gathers 176 encounters a day. A day of the same mall should give as many, if our
+# reading of the four conditions is near the authors'. (The plaza is built to be busy: its count
+# says nothing.)
 
 # %%
 if data == "atc-1hz":
     page.claim(
-        "about as many encounters a day as in the paper (176)",
+        "as many encounters a day as in the paper (176), within a factor of two",
         0.5 < per_day / 176 < 2,
         f"{per_day:.0f} a day",
     )
@@ -119,10 +122,10 @@ page.figure(ax.figure, "los-distance")
 # %% [markdown]
 # ## Two readings of one sentence
 #
-# "Only one other pedestrian is present in this space for a duration of 3 seconds": must that person
-# *stay* inside for 3 s? Two people who meet close in at about 2.4 m/s and are past each other in
-# 2 s, so
-# the strict reading can never see a pass - and never a bearing beyond 90 degrees.
+# "Only one other pedestrian is present in this space for a duration of 3 seconds": must that
+# person *stay* inside for 3 s? Two people who meet close in at about 2.4 m/s and are past each
+# other in 2 s, so the strict reading can never see a pass - and never a bearing beyond 90
+# degrees.
 
 # %%
 readings = {
@@ -154,7 +157,9 @@ page.check(
 # %% [markdown]
 # ## The funnel
 #
-# Every 10 Hz tick of every person could open a window. Here is why most do not.
+# Every 10 Hz tick of every person could open a window. Here is why most do not. (On the plaza
+# only pairs meet, for little longer than a window: most of its ticks fail because the track ends.
+# Third people come with the real day, and with the tests.)
 
 # %%
 stages = funnels.of(samples)

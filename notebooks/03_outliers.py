@@ -18,9 +18,9 @@
 # nothing about the distance that people keep?
 #
 # **Expectation.** The *local outlier factor* (LOF, Breunig et al., 2000) compares how dense the
-# data
-# is around a sample with how dense it is around its neighbours. But people are sparse exactly where
-# they are close to each other, so LOF on plain distances would cut the zone's own edge.
+# data is around a sample with how dense it is around its neighbours. But people are sparse
+# exactly where they are close to each other, so LOF on plain distances would cut the zone's own
+# edge.
 
 # %%
 import matplotlib.pyplot as plt
@@ -57,8 +57,7 @@ parameters(
 # ## Inside out
 #
 # With the *complementary distance* $r' = r_{max} - r$ the many who keep away gather around the
-# origin
-# and the few who come close lie on the rim:
+# origin and the few who come close lie on the rim:
 #
 # $$(x', y') = (r_{max} - r)\,(\cos\theta_{LOS}, \sin\theta_{LOS})$$
 
@@ -83,8 +82,8 @@ page.key |= {"close samples": len(close), "outliers": removed}
 # %% [markdown]
 # ## Why inside out?
 #
-# The same LOF on the plain positions $r(\cos\theta, \sin\theta)$ takes other samples. Where do the
-# two disagree?
+# The same LOF on the plain positions $r(\cos\theta, \sin\theta)$ takes other samples. Where do
+# the two disagree?
 
 # %%
 from sklearn.neighbors import LocalOutlierFactor
@@ -106,20 +105,21 @@ page.figure(fig, "plain")
 distance = close["distance"].to_numpy()
 rim, rim_plain = (distance[outlier] < 1).sum(), (distance[plain_outlier] < 1).sum()
 page.claim(
-    "complementary coordinates spare the edge: fewer outliers nearer than 1 m",
+    "complementary coordinates spare the edge (fewer outliers nearer than 1 m)",
     rim < rim_plain,
     f"{rim} of {removed}, plain {rim_plain}",
 )
 
 # %% [markdown]
-# What else it takes lies near the origin of the complementary plane, at 2 m: there many bearings
-# shrink to a point, and density changes fast. Those samples never touch the hull.
+# On the plaza both take the intruders, and both cut a little of the rim; on the real day each
+# takes a piece of one streak. The complementary one spends part of its quota at 2 m, where many
+# bearings shrink to a point and density changes fast: those samples never touch the hull.
 
 # %% [markdown]
 # ## How much does it matter?
 #
-# The zone is the hull's complement, so a single sample on the rim can move it. Take away none, the
-# paper's share, and ten times as much:
+# The zone is the hull's complement, so a single sample on the rim can move it. Take away none,
+# the paper's share, and ten times as much:
 
 # %%
 for share in (0.0, fraction, 10 * fraction):
@@ -127,8 +127,9 @@ for share in (0.0, fraction, 10 * fraction):
     print(f"{share:5.1%} removed: nearest sample left at {rest['distance'].min():.2f} m")
 
 # %% [markdown]
-# **What it means.** LOF with a quota is a convention, not a discovery: it takes 0.2 % whatever the
-# data. It is a modest one: on the rim it leaves all but the loneliest samples.
+# **What it means.** LOF with a quota is a convention, not a discovery: it takes 0.2 % whatever
+# the data. And an intruder within the dense streak of its own track is not lonely: on a real day
+# LOF may leave the nearest samples in.
 
 # %%
 page.close()

@@ -15,13 +15,11 @@
 # # 4 - The hull and its slices
 #
 # **Question.** From scattered samples to a boundary: how near did people come, in each direction,
-# at
-# each walking speed?
+# at each walking speed?
 #
 # **Expectation.** The faster somebody walks, the more room they are given. Few samples exist for
-# any
-# one speed, so the paper borrows from neighbouring speeds: one convex hull over all of them, cut at
-# the speed of interest.
+# any one speed, so the paper borrows from neighbouring speeds: one convex hull over all of them,
+# cut at the speed of interest.
 
 # %%
 import matplotlib.pyplot as plt
@@ -44,6 +42,7 @@ parameters(
         ("hull over", "x', y', speed", PAPER, "sec. 2, fig. 4b"),
         ("speed", "of the reference pedestrian, at the sample", PAPER, "not the mean of the encounter"),
         ("slices", f"{speeds} m/s", ASSUMED, "the paper shows a range of speeds"),
+        ("zone", "r_max - R', not the slice", ASSUMED, "the paper does not say; map first, enclose second"),
     ]
 )
 
@@ -89,7 +88,9 @@ plotting.metres(right, "The zone it leaves free", person=True)
 page.figure(fig, "slice")
 
 # %% [markdown]
-# The zone must be empty: each inlier lies outside, or just on the edge of, the zone of its own speed.
+# The zone must be empty: each inlier lies outside, or just on the edge of, the zone of its own
+# speed. (That is a test of the code, not of people; and the outliers that were removed *are*
+# inside.)
 
 # %%
 some = inliers.sample(min(300, len(inliers)), random_state=seed)
@@ -97,13 +98,13 @@ low, high = zone.speed_range
 some = some[some["speed"].between(low, high, inclusive="neither")]
 room = [2.0 - zone.slice(v).reach(angle) for v, angle in zip(some["speed"], some["los_angle"], strict=True)]
 margin = float((some["distance"] - room).min())
-page.check("nobody is inside the zone of their own speed", margin > -1e-9, margin)
+page.check("no inlier is inside the zone of its own speed", margin > -1e-9, margin)
 
 # %% [markdown]
 # ## What the hull does to speed
 #
-# A convex hull is widest in the middle of its range of speeds and closes at both ends. So the zone
-# *must* grow towards the slowest and the fastest walker, whatever people do:
+# A convex hull cannot be wider at both ends of its speeds than between them. So its slices
+# shrink, and the zones grow, away from some speed in the middle, whatever people do:
 
 # %%
 low, high = zone.speed_range
@@ -120,7 +121,9 @@ for v in grid:
 ax = plotting.axes(None)
 ax.plot(grid, area, color=plotting.BLUE)
 ax.set(
-    xlabel="speed [m/s]", ylabel="area of the zone [m$^2$]", title="Zones grow towards both ends of the data"
+    xlabel="speed [m/s]",
+    ylabel="area of the zone [m$^2$]",
+    title=f"The zone is smallest at {grid[np.nanargmin(area)]:.2f} m/s",
 )
 page.figure(ax.figure, "area")
 
@@ -129,14 +132,14 @@ area = np.array(area)
 smallest = float(grid[np.nanargmin(area)])
 page.key["smallest zone at"] = smallest
 page.claim(
-    "the zone grows with speed between 0.7 and 1.3 m/s",
+    "the zone grows with speed between 0.7 and 1.3 m/s (part of any growth is the hull's own)",
     np.all(np.diff(area[(grid >= 0.7) & (grid <= 1.3)]) > 0),
     f"smallest at {smallest:.2f} m/s",
 )
 
 # %% [markdown]
-# **What it means.** Read the zones in the middle of the data's range of speeds; near its ends they
-# say more about how few people walk so slowly or so fast than about the room they are given.
+# **What it means.** Read the zones in the middle of the data's range of speeds; near its ends
+# they say more about how few people walk so slowly or so fast than about the room they are given.
 
 # %%
 page.close()

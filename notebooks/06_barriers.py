@@ -15,12 +15,11 @@
 # # 6 - Barriers
 #
 # **Question.** How does "stay out of the zone" become something that a controller can obey, ten
-# times
-# a second?
+# times a second?
 #
 # **Expectation.** A function $h$ that is zero at the edge, positive outside, and may fall only so
-# fast.
-# Then a robot that starts outside stays outside, and slows down as it comes near.
+# fast. As long as each step has a solution, a robot that starts outside stays outside, and slows
+# down as it comes near.
 
 # %%
 import matplotlib.pyplot as plt
@@ -43,7 +42,12 @@ parameters(
         ("robot radius", f"{settings.r_robot} m", PAPER, "a cylinder"),
         ("margin eps", f"{settings.eps} m", PAPER, "for the error of the approximate distances"),
         ("zone", "1.1 m/s", PAPER, "a little more than the robot's top speed"),
-        ("gamma", settings.gamma, MEASURED, "larger ones brake too late within N_h = 2 steps"),
+        (
+            "gamma",
+            settings.gamma,
+            MEASURED,
+            "in simulation: larger ones have infeasible steps",
+        ),
         (
             "slices of the audit",
             "segment of 2 m, the learned zone",
@@ -56,7 +60,13 @@ parameters(
 # %% [markdown]
 # ## Distance to a person's zone
 #
-# The sum of the distances to an ellipse's foci is constant on the ellipse (eq. 7), so
+# An ellipse with centre $(m, n)$ and angle $\theta$ (eq. 6, whose second term lacks the minus
+# sign in the paper) has the foci $\mathbf{c}_{a,b} = (m,n) \pm \sqrt{a^2-b^2}\,(\cos\theta,
+# \sin\theta)$:
+#
+# $$\frac{[(x-m)\cos\theta+(y-n)\sin\theta]^2}{a^2} + \frac{[-(x-m)\sin\theta+(y-n)\cos\theta]^2}{b^2} = 1$$
+#
+# The sum of the distances to its foci is constant on the ellipse (eq. 7), so
 #
 # $$d(\mathbf{x}) = \tfrac12\left(\|\mathbf{x}-\mathbf{c}_a\| + \|\mathbf{x}-\mathbf{c}_b\|\right)
 # - a$$
@@ -78,7 +88,8 @@ page.figure(ax.figure, "ellipse")
 # %% [markdown]
 # ## Distance to a wall
 #
-# A segment is a line, trimmed by a disc (Shapiro & Tsukanov, 1999), eq. 3-5:
+# A segment is a line, trimmed by a disc (Shapiro & Tsukanov, 1999), eq. 3-5, where the paper's
+# $\|t\|$ is $|t|$:
 #
 # $$g = \frac{(x-x_a)(y_b-y_a)-(y-y_a)(x_b-x_a)}{L},\quad
 #   t = \frac{(L/2)^2-\|\mathbf{x}-\mathbf{x}_c\|^2}{L},\quad
@@ -99,7 +110,8 @@ page.check("and Euclidean beside it", np.allclose(szlib.segment_distance(beside,
 # ## How wrong are they?
 #
 # Both are approximations. Where one *over*-estimates, the robot comes nearer than it thinks; the
-# margin of 5 cm is meant to cover that. What is the true distance where $d = r_{robot} + \epsilon$?
+# margin of 5 cm is meant to cover that. What is the true distance where $d = r_{robot} +
+# \epsilon$?
 
 # %%
 phi = np.linspace(0, 2 * np.pi, 361)
@@ -116,7 +128,7 @@ ax.plot(np.degrees(phi), 100 * over, color=plotting.BLUE)
 ax.axhline(100 * settings.eps, color=plotting.RED, linestyle="--", label="eps")
 ax.set(xlabel="direction from the zone's centre [deg]", ylabel="d - Euclidean [cm]", xticks=range(0, 361, 45))
 ax.set_title("Beside the person, the focal distance is shorter than the true one")
-ax.legend(loc="center right")
+ax.legend(loc="upper right", bbox_to_anchor=(1.0, 0.9))
 page.figure(ax.figure, "audit")
 page.claim(
     "eps covers the error around the zone", over.max() <= settings.eps, f"{100 * over.max():.1f} cm at worst"
@@ -124,7 +136,8 @@ page.claim(
 
 # %% [markdown]
 # Around the zone the approximation errs on the safe side. A wall is another matter: on the line
-# beyond its end, $d = s + s^2/L$ is *longer* than the true $s$, and the more so the shorter the wall.
+# beyond its end, $d = s + s^2/L$ is *longer* than the true $s$, and the more so the shorter the
+# wall.
 
 # %%
 for length in (1.0, 2.0, 3.0, 4.0, 8.0, 13.0):
@@ -141,13 +154,15 @@ for length in (1.0, 2.0, 3.0, 4.0, 8.0, 13.0):
 # %% [markdown]
 # ## The discrete barrier condition
 #
-# $h = d - r_{robot} - \epsilon$, and each step may use up a share $\gamma$ of what is left (eq. 1):
+# $h = d - r_{robot} - \epsilon$, and each step may use up a share $\gamma$ of what is left (eq.
+# 1):
 #
 # $$h(\mathbf{x}_{k+1}) - h(\mathbf{x}_k) \ge -\gamma\, h(\mathbf{x}_k)
 #   \quad\Rightarrow\quad h(\mathbf{x}_k) \ge (1-\gamma)^k\, h(\mathbf{x}_0)$$
 #
-# A robot that drives straight at somebody is thereby given a speed limit: $v \le \gamma h /
-# \Delta t$.
+# A robot that drives straight at somebody is thereby given a limit to the speed at which the two
+# close in, $v \le \gamma h / \Delta t$: its own speed is that minus theirs, and where they walk
+# towards it, it may have to go back.
 
 # %%
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -172,9 +187,11 @@ page.key |= {
 }
 
 # %% [markdown]
-# **What it means.** Distance has become a speed limit that tightens as the robot comes near. What
-# is
-# left is to find, ten times a second, the best acceleration that obeys it.
+# **What it means.** Distance has become a speed limit that tightens as the robot comes near; what
+# is left is to find, ten times a second, the best acceleration that obeys it. Around people the
+# margin is ample. But the walls of notebooks 09 and 10 are 3 m long, and at h = 0 the robot could
+# touch the end of one (7.5 cm of error, 5 cm of margin): so those notebooks check the Euclidean
+# clearance as well.
 
 # %%
 page.close()

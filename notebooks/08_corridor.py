@@ -14,8 +14,8 @@
 # %% [markdown]
 # # 8 - Meeting in a narrow corridor
 #
-# **Question.** A person walks towards the robot in a corridor just wide enough for both. Does the
-# robot barge past, or take care?
+# **Question.** A person walks towards the robot in a corridor 4.6 m wide, which leaves 0.4 m more
+# than the robot needs on either side of the zone. Does the robot barge past, or take care?
 #
 # **Expectation.** The paper: the robot slows down while it passes, because between the wall and
 # the zone the barrier leaves little speed.
@@ -26,7 +26,7 @@ from IPython.display import Image
 
 import szlib
 from szlib import scenes
-from szlib.pages import ASSUMED, PAPER, Page, parameters
+from szlib.pages import ASSUMED, MEASURED, PAPER, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -48,12 +48,9 @@ parameters(
             "constant, known exactly, unaffected by the robot",
         ),
         ("places of robot, person, walls", "see the figure", ASSUMED, "the paper shows them without numbers"),
-        (
-            "controller",
-            "as in notebook 07",
-            PAPER,
-            f"N = {settings.N}, N_h = {settings.N_h}, gamma = {settings.gamma}",
-        ),
+        ("N, N_h, dt", f"{settings.N}, {settings.N_h}, {settings.dt} s", PAPER, "sec. 4"),
+        ("gamma", gamma, MEASURED, "see notebook 06"),
+        ("Q, R, P, a_max, tie", "as in notebook 07", ASSUMED, "the paper gives none"),
     ]
 )
 
@@ -76,13 +73,13 @@ Image(movie)
 # ## Safe?
 #
 # The promises that must hold with any zone that leaves the scene passable: the goal, $h \ge 0$ at
-# every step
-# for every person and wall, no step without a solution, no speeding.
+# every step for every person and wall, no step without a solution, no speeding.
 
 # %%
 page.check("the goal is reached", metrics["success"])
 page.check("h >= 0 at every step", metrics["min_h"] >= 0, metrics["min_h"])
 page.check("no infeasible step", metrics["infeasible_steps"] == 0, metrics["infeasible_steps"])
+page.check("nothing is touched (Euclidean)", metrics["min_clearance"] > 0, metrics["min_clearance"])
 page.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metrics["max_speed"])
 page.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_speed", "time_yielding")}
 
@@ -94,7 +91,7 @@ for claim in scenario.claims:
     page.claim(claim.text, *claim.check(log))
 
 # %%
-figure = scenes.plot_run(log, title="The robot slows down to squeeze past")
+figure = scenes.plot_run(log, title="The robot slows down before the person, and speeds up beside them")
 page.figure(figure, "run")
 figure
 
@@ -102,9 +99,9 @@ figure
 log.min_h().to_frame("smallest h [m]").round(3)
 
 # %% [markdown]
-# **What it means.** There is room for both, but not for haste: near the wall and near the person
-# the barrier conditions leave only a small speed, and what looks like courtesy is the mathematics
-# of keeping a distance.
+# **What it means.** There is room for both, but not for haste: while the person comes nearer, the
+# barrier leaves the robot a small speed; once abeam, the way opens and it hurries on. What looks
+# like courtesy is the mathematics of keeping a distance.
 
 # %%
 page.close()

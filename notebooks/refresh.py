@@ -10,7 +10,7 @@ from nbclient import NotebookClient
 HERE = Path(__file__).parent
 FIGURES = HERE.parent / "results" / "synthetic" / "figures"
 PICTURES = {
-    "zones.png": "05_zones-zones.png",
+    "zone.png": "05_zones-zone.png",
     "los.png": "02_encounters-los.png",
     "hull.png": "04_hull-hull.png",
     "corridor.png": "08_corridor-scenario.png",

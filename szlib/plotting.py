@@ -7,6 +7,7 @@ told apart by everybody and in grey; sequences are viridis.  Lengths are in metr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -106,18 +107,19 @@ def plot_space(
 def plot_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | None = None) -> Axes:
     """Paths of the other person in the reference pedestrian's frame at the opening (paper, fig. 2).
 
-    `paths` as from `szlib.encounters.reference_frame`; the first `count` encounters are drawn.
+    `paths` as from `szlib.encounters.reference_frame`; `count` encounters, evenly spread, are drawn.
     """
     ax = axes(ax, size=(7, 5))
-    shown = [g for _, g in paths.groupby("encounter", sort=True)][:count]
+    every = [g for _, g in paths.groupby("encounter", sort=True)]
+    shown = [every[i] for i in np.unique(np.linspace(0, len(every) - 1, count).round().astype(int))]
     for who, colour, name in (("other", BLUE, "other person"), ("ref", ORANGE, "reference pedestrian")):
         lines = [g[[f"{who}_x", f"{who}_y"]].to_numpy() for g in shown]
         ax.add_collection(LineCollection(lines, colors=colour, linewidths=0.7, alpha=0.6, label=name))
     starts = np.array([[g["other_x"].iloc[0], g["other_y"].iloc[0]] for g in shown])
-    ax.plot(*starts.T, ".", color=BLUE, markersize=3)
+    ax.plot(*starts.T, ".", color=BLUE, markersize=3, label="at the opening")
     ax.autoscale_view()
     ax.legend(loc="upper right", fontsize=8)
-    return metres(ax, f"{len(shown)} encounters as the reference pedestrian saw them", person=True)
+    return metres(ax, f"{len(shown)} encounters, in the frame of their opening", person=True)
 
 
 def plot_los(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:
@@ -165,10 +167,10 @@ def plot_outliers(
         label=f"{(~outlier).sum():,} inliers",
     )
     ax.plot(*points[outlier].T, "x", color=RED, markersize=7, mew=1.8, label=f"{outlier.sum():,} outliers")
-    ax.add_patch(Circle((0, 0), r_max, fill=False, linestyle=":", color=BLACK))
+    ax.add_patch(Circle((0, 0), r_max, fill=False, linestyle=":", color=BLACK, label="contact, r = 0"))
     ax.set(xlim=(-1.05 * r_max, 1.05 * r_max), ylim=(-1.05 * r_max, 1.05 * r_max))
     ax.legend(loc="upper right")
-    metres(ax, "Turned inside out: the rim is where people touch")
+    metres(ax, "Turned inside out: the nearer, the farther out")
     ax.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
     return ax
 
@@ -215,17 +217,14 @@ def plot_zone(
     return metres(ax, f"Minimum social zone at {speed:g} m/s", person=True)
 
 
-def plot_zones(
-    ellipses: Mapping[float, Ellipse], *, truth: Mapping[float, Ellipse] | None = None, ax: Axes | None = None
-) -> Axes:
-    """Ellipses by speed around a person who walks to the right (paper, fig. 5); the truth dashed."""
+def plot_zones(ellipses: Mapping[float, Ellipse], *, ax: Axes | None = None) -> Axes:
+    """Ellipses by speed around a person who walks to the right (paper, fig. 5)."""
     ax = axes(ax, size=(6, 5))
-    for (speed, ellipse), colour in zip(sorted(ellipses.items()), colours(list(ellipses)), strict=True):
-        ax.plot(*ellipse.curve().T, color=colour, linewidth=2, label=f"{speed:g} m/s")
-        if truth is not None:
-            ax.plot(*truth[speed].curve().T, "--", color=colour, linewidth=1.2)
-    if truth is not None:
-        ax.plot([], [], "--", color=BLACK, linewidth=1.2, label="truth")
+    shown = sorted(ellipses.items())
+    for (speed, ellipse), colour, line in zip(
+        shown, colours(shown), cycle(("-", "--", ":", "-.")), strict=False
+    ):
+        ax.plot(*ellipse.curve().T, color=colour, linestyle=line, linewidth=2, label=f"{speed:g} m/s")
     ax.plot(0, 0, marker=(3, 0, -90), color=BLACK, markersize=10)
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     return metres(ax, "Minimum social zones by speed", person=True)

@@ -58,16 +58,15 @@ def plot_scenario(log: SimulationLog, *, every: float = 2.0, ax: Axes | None = N
     step = max(1, round(every / log.controller.settings.dt))
     _stage(ax, log.scenario)
     ax.plot(table["x"], table["y"], "o-", color=BLUE, markersize=1.5, linewidth=0.6, label="robot's path")
-    time, path = table["t"].to_numpy(), table[["x", "y"]].to_numpy()
+    time = table["t"].to_numpy()
     for row in range(0, len(table), step):
         depth = time[row] / max(last, 1e-9)
-        for zone in _zones(log, row):
-            _draw_zone(ax, zone, _PERSON(depth))
-        ax.add_patch(Circle(path[row], log.controller.settings.r_robot, color=_ROBOT(depth), alpha=0.6, lw=0))
-        _draw_people(ax, log, row)
+        _draw_moment(ax, log, row, robot=_ROBOT(depth), zone=_PERSON(depth))
+    ax.plot([], [], "o", color=BLUE, label="robot")
     ax.plot([], [], color=RED, label="zone")
+    ax.plot([], [], marker=(3, 0, 0), color=RED, linestyle="", label="person")
     _frame(ax, log)
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=5, fontsize=8)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=6, fontsize=8)
     return metres(ax, f"{log.scenario.title} (every {every:g} s, later is darker)")
 
 
@@ -79,7 +78,7 @@ def plot_run(log: SimulationLog, *, title: str, figure: Figure | None = None) ->
     upper.plot(table["t"], table["speed"], color=BLUE)
     upper.axhline(settings.v_max, color=GREY, linestyle="--", label="limit")
     upper.set(ylabel="speed [m/s]", ylim=(0, 1.15 * settings.v_max), title=title)
-    upper.legend(loc="lower right", fontsize=8)
+    upper.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
     styles = {"person": (RED, "-"), "wall": (BLACK, ":")}
     told: set[str] = set()
     for column in table.columns[table.columns.str.startswith("h_")]:
@@ -90,8 +89,8 @@ def plot_run(log: SimulationLog, *, title: str, figure: Figure | None = None) ->
         )
         told.add(kind)
     lower.axhline(0, color=GREY, linewidth=1)
-    lower.set(xlabel="time [s]", ylabel="h [m]", ylim=(-0.2, 3.0))
-    lower.legend(loc="upper right", fontsize=8)
+    lower.set(xlabel="time [s]", ylabel="h [m] (up to 3)", ylim=(-0.2, 3.0))
+    lower.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
     return figure
 
 
@@ -124,13 +123,9 @@ def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> by
         _stage(ax, log.scenario)
         ax.plot(log.table["x"][: row + 1], log.table["y"][: row + 1], color=BLUE, linewidth=1)
         ax.plot(*log.predicted[row, :, :2].T, ".", color=GREEN, markersize=3)
-        for zone in _zones(log, row):
-            _draw_zone(ax, zone, RED)
-        ax.add_patch(
-            Circle((now["x"], now["y"]), log.controller.settings.r_robot, color=BLUE, alpha=0.7, lw=0)
-        )
+        _draw_moment(ax, log, row, robot=BLUE, zone=RED)
         _frame(ax, log)
-        metres(ax, f"{log.scenario.title}: t = {now['t']:.1f} s, {now['speed']:.2f} m/s")
+        metres(ax, f"t = {now['t']:4.1f} s, robot at {now['speed']:.2f} m/s (shown twice as fast)")
         return []
 
     movie = FuncAnimation(figure, draw, frames=rows.tolist())  # type: ignore[arg-type]
@@ -154,9 +149,12 @@ def _draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> None:
     ax.add_patch(patch)
 
 
-def _draw_people(ax: Axes, log: SimulationLog, row: int) -> None:
-    """A triangle for each person, its tip where they face."""
+def _draw_moment(ax: Axes, log: SimulationLog, row: int, *, robot: Any, zone: Any) -> None:
+    """Robot and zones at one time; a triangle for each person, its tip where they face."""
     now = log.table.iloc[row]
+    for ellipse in _zones(log, row):
+        _draw_zone(ax, ellipse, zone)
+    ax.add_patch(Circle((now["x"], now["y"]), log.controller.settings.r_robot, color=robot, alpha=0.6, lw=0))
     for i in range(len(log.scenario.people)):
         turn = np.degrees(now[f"person_{i}_heading"]) - 90
         ax.plot(now[f"person_{i}_x"], now[f"person_{i}_y"], marker=(3, 0, turn), color=RED, markersize=6)

@@ -134,12 +134,12 @@ class SocialZone:
         return known if known is not None else _enclose(self.slice(speed))
 
     def table(self) -> pd.DataFrame:
-        """One row a fitted speed: speed [m/s], center_x, center_y, a, b [m], angle [deg], area [m2]."""
+        """One row a fitted speed: speed [m/s], center_x, center_y, a, b [m], angle_deg [deg], area [m2]."""
         rows = [
             (v, *e.center, *e.semi_axes, np.degrees(e.angle), e.area)
             for v, e in sorted(self.ellipses.items())
         ]
-        return pd.DataFrame(rows, columns=["speed", "center_x", "center_y", "a", "b", "angle", "area"])
+        return pd.DataFrame(rows, columns=["speed", "center_x", "center_y", "a", "b", "angle_deg", "area"])
 
     def save(self, path: str | Path) -> None:
         """Write the zone as JSON; the file is replaced as a whole or not at all."""

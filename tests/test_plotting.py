@@ -71,7 +71,7 @@ MAPS = {
     "los": lambda f: plotting.plot_los(f("samples")),
     "outliers": lambda f: plotting.plot_outliers(np.eye(2).repeat(3, axis=0), np.arange(6) < 1),
     "zone": lambda f: plotting.plot_zone(f("zone"), 1.1, truth=ZONE),
-    "zones": lambda f: plotting.plot_zones(f("zone").ellipses, truth=f("zone").ellipses),
+    "zones": lambda f: plotting.plot_zones(f("zone").ellipses),
     "ellipse": lambda f: scenes.plot_distance(ZONE),
     "segment": lambda f: scenes.plot_distance((np.array([-1.0, 0]), np.array([1.0, 0]))),
     "scenario": lambda f: scenes.plot_scenario(f("log")),

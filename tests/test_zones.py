@@ -157,7 +157,7 @@ def test_a_fitted_speed_is_the_one_in_the_table(zone: SocialZone) -> None:
         ellipse = zone.ellipse(row.speed)
         assert ellipse is zone.ellipses[row.speed]
         assert (row.center_x, row.center_y, row.a, row.b) == (*ellipse.center, *ellipse.semi_axes)
-        assert np.radians(row.angle) == pytest.approx(ellipse.angle)
+        assert np.radians(row.angle_deg) == pytest.approx(ellipse.angle)
         assert row.area == pytest.approx(np.pi * row.a * row.b)
 
 
