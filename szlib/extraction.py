@@ -41,6 +41,8 @@ _FORMAT, _VERSION = "szlib.extraction", 1
 _BLOCK = 1 << 20
 """Bytes of a file whose checksum is taken at a time."""
 _LONGEST_LINE = 100_000
+_READ = "read all files"
+"""The first stage of the funnel of many days."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,7 @@ class Extraction:
     def samples(self) -> pd.DataFrame:
         """Samples of all finished days, as from `szlib.find_encounters`, by day, encounters numbered anew.
 
+        The funnels of all days are added up, stage by stage.
         Independent of the order of the files, of what was kept, and of who computed it.  Raises DataError
         where no day was finished.
         """
@@ -129,7 +132,9 @@ class Extraction:
         parts, stages, count = [], [], 0
         for day in sorted(days):
             part = pd.read_parquet(self.out / f"{day}.parquet")
-            stages.append(funnels.of(part))
+            stages.append(
+                [s | {"stage": _READ} if s["stage"].startswith("read ") else s for s in funnels.of(part)]
+            )
             part = part[~part["day"].isin(self.exclude)]
             numbers, found = pd.factorize(part["encounter"])
             parts.append(part.assign(encounter=numbers + count, day=part["day"].astype(str)))

@@ -49,7 +49,7 @@ def cluster(address: str | None) -> Iterator[Any]:
     try:
         from distributed import Client
     except ImportError as error:
-        raise SzlibError("a scheduler needs Dask; install it with: pip install 'szlib[cluster]'") from error
+        raise SzlibError("a scheduler needs Dask; install it with: pip install -e '.[cluster]'") from error
     try:
         client = Client(address, timeout=_PATIENCE)
     except (OSError, ValueError) as error:

@@ -40,6 +40,7 @@ from .readers import (
     Format,
     check_unit,
     fault,
+    faults,
     in_metres,
     merge,
     plain_file,
@@ -148,7 +149,7 @@ def _read(
     scan: pl.LazyFrame, path: Path, layout: Format, cells: Cells, *, unit: str | None, tz: str
 ) -> pd.DataFrame:
     with readable(path, layout):
-        blocks = Blocks(scan, fault(cells.metres, layout.seconds, False))
+        blocks = Blocks(scan, cells.metres, layout.seconds)
         try:
             parts = list(_one_pass(cells, blocks))
         except _Unsorted:
@@ -187,7 +188,8 @@ class Blocks:
     """A scan's usable rows, block by block in the order of the file; counts what it has seen."""
 
     scan: pl.LazyFrame
-    fault: pl.Expr
+    metres: float
+    seconds: float
     good: int = 0
     reach: float = 0.0
     reasons: Counter[str] = field(default_factory=Counter)
@@ -195,14 +197,18 @@ class Blocks:
 
     def __iter__(self) -> Iterator[Rows]:
         self.good, self.reach, self.reasons, self.first = 0, 0.0, Counter(), None
-        named = self.scan.select("line", *Rows._fields, reason=self.fault)
-        for block in named.collect_batches(chunk_size=_ROWS_AT_ONCE, maintain_order=True, engine="streaming"):
+        told = self.metres, self.seconds, False
+        usable = ~pl.any_horizontal(faults(*told).values())
+        marked = self.scan.with_columns(usable=usable.fill_null(False))
+        for block in marked.collect_batches(
+            chunk_size=_ROWS_AT_ONCE, maintain_order=True, engine="streaming"
+        ):
             rows = Rows(*(block[name].to_numpy() for name in Rows._fields))
-            if block["reason"].null_count() < block.height:
-                bad = block.filter(pl.col("reason").is_not_null())
+            if not block["usable"].all():
+                bad = block.filter(~pl.col("usable")).with_columns(reason=fault(*told))
                 self.first = self.first or bad.select("line", "reason").row(0)
                 self.reasons.update(dict(bad.group_by("reason", maintain_order=True).len().iter_rows()))
-                rows = rows.where(block["reason"].is_null().to_numpy())
+                rows = rows.where(block["usable"].to_numpy())
             if len(rows.t):
                 self.good += len(rows.t)
                 self.reach = max(self.reach, *(float(np.abs(v).max()) for v in (rows.x, rows.y)))

@@ -183,18 +183,24 @@ def in_metres(good: pl.DataFrame, path: Path, layout: Format, metres: float, tz:
     )
 
 
+def faults(metres: float, seconds: float, with_day: bool) -> dict[str, pl.Expr]:
+    """Why a row cannot be used: reasons, and where each holds; the first one counts."""
+    numbers, position, person = ["t", "id", "x", "y"], pl.col("x", "y"), pl.col("id")
+    found = {
+        "missing or extra fields": pl.col("ragged"),
+        "missing or not a number": pl.any_horizontal(pl.col(numbers).is_null()),
+        "not finite": ~pl.all_horizontal(pl.col(numbers).is_finite()),
+        "id not a whole number": (person != person.floor()) | (person.abs() > 2**53),
+        "time not in seconds since 1970": pl.col("t").abs() * seconds > _LAST_SECOND,
+        "position not on Earth": pl.any_horizontal(position.abs() * metres > _FARTHEST),
+    }
+    return found | ({"no day": pl.col("day").is_null()} if with_day else {})
+
+
 def fault(metres: float, seconds: float, with_day: bool) -> pl.Expr:
     """Why a row cannot be used; null where it can."""
-    numbers, position = ["t", "id", "x", "y"], pl.col("x", "y")
-    return (
-        pl.when("ragged").then(pl.lit("missing or extra fields"))
-        .when(pl.any_horizontal(pl.col(numbers).is_null())).then(pl.lit("missing or not a number"))
-        .when(~pl.all_horizontal(pl.col(numbers).is_finite())).then(pl.lit("not finite"))
-        .when((pl.col("id") % 1 != 0) | (pl.col("id").abs() > 2**53)).then(pl.lit("id not a whole number"))
-        .when(pl.col("t").abs() * seconds > _LAST_SECOND).then(pl.lit("time not in seconds since 1970"))
-        .when(pl.any_horizontal(position.abs() * metres > _FARTHEST)).then(pl.lit("position not on Earth"))
-        .when(pl.col("day").is_null() if with_day else pl.lit(False)).then(pl.lit("no day"))
-    )  # fmt: skip
+    reasons = faults(metres, seconds, with_day).items()
+    return pl.coalesce(pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons)
 
 
 @contextmanager
