@@ -159,7 +159,7 @@ page.claim("and keeps the robot off the wall", nearest >= 0, nearest)
 
 # %%
 used = distances.with_margin(settings, wall)
-careful = szlib.MPCCBF(zone, walls=wall, settings=used)
+careful, refusal = szlib.MPCCBF(zone, walls=wall, settings=used), ""
 try:
     careful.step(start, goal)
 except szlib.SolverError as error:
