@@ -17,12 +17,13 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pandas as pd
-from joblib import Parallel, delayed
+from joblib import delayed
 from tqdm import tqdm
 
 from . import __version__
 from .distances import with_margin
 from .errors import SolverError, SzlibError
+from .jobs import handed_out
 from .mpc import TOLERANCE, MPCSettings
 from .runs import Outcome, Run, Zones, drive, metrics
 from .worlds import Behaviour, Worlds, world
@@ -80,11 +81,10 @@ def rollouts(
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "parameters.txt").write_text(setup.told() + "\n", encoding="utf-8")
     chunks = [range(first, min(first + CHUNK, seed + n)) for first in range(seed, seed + n, CHUNK)]
-    tasks = (delayed(_chunk)(setup, chunk, folder) for chunk in chunks)
-    parallel = Parallel(n_jobs=n_jobs, return_as="generator_unordered")
+    tasks = [delayed(_chunk)(setup, chunk, folder) for chunk in chunks]
     tables: list[pd.DataFrame] = []
     with tqdm(total=n, unit="world", disable=not progress) as bar:
-        for table in parallel(tasks):
+        for table in handed_out(tasks, n_jobs=n_jobs):
             tables.append(table)
             bar.update(len(table))
     return pd.concat(tables).sort_values("seed", ignore_index=True)

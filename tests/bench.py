@@ -18,6 +18,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import bench_data
 import numpy as np
 import pandas as pd
 from meets import meetings, questions
@@ -234,6 +235,8 @@ def main() -> None:
         cases["head-on, ipopt"] = lambda: check_meetings(100, "ipopt")
     if os.environ.get(datasets.DATA_DIR_VARIABLE):
         cases["1 Hz day, files to zone"] = bench_day
+    if "--long" in sys.argv or os.environ.get(bench_data.RAW_DAY_VARIABLE):
+        cases |= bench_data.CASES
     wanted = [name for name in sys.argv[1:] if not name.startswith("--")] or list(cases)
     found = {}
     for name in wanted:
