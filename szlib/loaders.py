@@ -20,6 +20,7 @@ the contract; put it into your test.
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +28,7 @@ import numpy as np
 import pandas as pd
 
 from . import funnels
-from .errors import DataError
+from .errors import DataError, DataWarning
 from .tracks import COLUMNS, TICKS_PER_SECOND, clock_index, nearest_tick, to_clock
 
 if TYPE_CHECKING:
@@ -73,9 +74,9 @@ def _check_velocities(tracks: pd.DataFrame, tick: np.ndarray, piece: np.ndarray)
 def read_groups(path: str | Path) -> pd.DataFrame:
     """Who walks together, from an EWAP ``groups.txt``: the ids of one group a line, parted by blanks.
 
-    Returns a table with columns group (number of the line's group, from 0) and id, in the order of the file.
-    Whoever is in no line walks alone.  Raises DataError, with the line, for what is no id, for a person in
-    two groups, and for a group of one.
+    Returns a table with columns group (numbered from 0) and id, in the order of the file.  Whoever is in
+    no line walks alone.  Lines that share a person make one group, told in a DataWarning: the ETH sequence
+    has such lines.  Raises DataError, with the line, for what is no id and for a group of one.
     """
     path = Path(path)
     try:
@@ -84,23 +85,30 @@ def read_groups(path: str | Path) -> pd.DataFrame:
         raise DataError(
             f"{path}: cannot be read as groups ({error}); expected ids, a group a line"
         ) from error
-    rows: list[tuple[int, int]] = []
-    known: dict[int, int] = {}
+    groups: list[dict[int, None]] = []
+    joined = []
     for number, line in enumerate(lines, start=1):
         fields = line.split()
         if not fields:
             continue
-        if not all(field.isdecimal() for field in fields) or len(fields) < 2:
+        if not all(field.isdecimal() for field in fields) or len(set(fields)) < 2:
             raise DataError(f"{path}, line {number}: {line[:80]!r} is no group; expected two ids or more")
-        group = rows[-1][0] + 1 if rows else 0
-        for person in map(int, fields):
-            if person in known:
-                raise DataError(
-                    f"{path}, line {number}: person {person} is in line {known[person]} already; "
-                    "join the two lines, or take the person out of one"
-                )
-            known[person] = number
-            rows.append((group, person))
+        group = dict.fromkeys(map(int, fields))
+        shared = [known for known in groups if not known.keys().isdisjoint(group)]
+        if shared:
+            joined.append(number)
+            for other in shared[1:]:
+                shared[0] |= other
+                groups.remove(other)
+            shared[0] |= group
+        else:
+            groups.append(group)
+    if joined:
+        told = ", ".join(map(str, joined))
+        warnings.warn(
+            f"{path.name}: joined to earlier groups that share people: line {told}", DataWarning, stacklevel=2
+        )
+    rows = [(number, person) for number, group in enumerate(groups) for person in group]
     return pd.DataFrame(rows, columns=["group", "id"]).astype("int64")
 
 

@@ -67,7 +67,9 @@ def test_a_loader_must_count() -> None:
 
 def test_groups_of_the_eth_sequence() -> None:
     folder = real_data("eth")
-    groups = read_groups(folder / "seq_eth_groups.txt")
+    with pytest.warns(szlib.DataWarning, match="line 37, 38"):  # 238 is in lines 36 and 37, 241 in 37 and 38
+        groups = read_groups(folder / "seq_eth_groups.txt")
+    assert groups.loc[groups["id"] == 241, "group"].item() == groups.loc[groups["id"] == 240, "group"].item()
     people = set(szlib.read_tracks(folder / "seq_eth_obsmat.txt")["id"])
     assert groups.groupby("group").size().min() == 2
     assert groups["id"].is_unique
@@ -79,7 +81,7 @@ def test_groups_of_the_eth_sequence() -> None:
     [
         ("1 2\n3 x\n", "line 2: '3 x' is no group"),
         ("1 2\n\n3\n", "line 3: '3' is no group"),
-        ("1 2\n3 1\n", "line 2: person 1 is in line 1 already"),
+        ("1 2\n3 3\n", "line 2: '3 3' is no group"),
         ("1 2\n3 4.5\n", "line 2"),
     ],
 )
@@ -95,6 +97,13 @@ def test_blank_lines_part_no_groups(tmp_path: Path) -> None:
     (tmp_path / "groups.txt").write_text(" 5 4\n\n 6 3 2 \n")
     groups = read_groups(tmp_path / "groups.txt")
     assert groups.to_numpy().tolist() == [[0, 5], [0, 4], [1, 6], [1, 3], [1, 2]]
+
+
+def test_lines_that_share_people_make_one_group(tmp_path: Path) -> None:
+    (tmp_path / "groups.txt").write_text("1 2\n3 4\n5 6\n4 2 7\n")
+    with pytest.warns(szlib.DataWarning, match="line 4"):
+        groups = read_groups(tmp_path / "groups.txt")
+    assert groups.groupby("group")["id"].apply(set).tolist() == [{1, 2, 3, 4, 7}, {5, 6}]
 
 
 def test_companions_are_set_aside_and_counted() -> None:
