@@ -184,22 +184,7 @@ def find_encounters(
     conditions.append(("overlaps an earlier window", _without_overlap(openings, whole, steps)))
     kept, tried = _sift(np.arange(len(openings)), conditions)
 
-    ref = (openings[kept, None] + np.arange(steps + 1)).ravel()
-    oth = (partner[kept, None] + np.arange(steps + 1)).ravel()
-    dx, dy = x[oth] - x[ref], y[oth] - y[ref]
-    ids = tracks["id"].to_numpy()[order]
-    samples = pd.DataFrame(
-        {
-            "encounter": np.repeat(np.arange(len(kept)), steps + 1),
-            "ref_id": ids[ref],
-            "other_id": ids[oth],
-            "t": tick[ref] / TICKS_PER_SECOND,
-            "los_angle": wrap_angle(np.arctan2(dy, dx) - heading[ref]),
-            "distance": np.hypot(dx, dy),
-            "speed": speed[ref],
-        }
-    )
-    samples.insert(1, "day", tracks["day"].astype("category").iloc[order[ref]].reset_index(drop=True))
+    samples = _sampled(tracks, order, openings[kept], partner[kept], steps)
     stages = [
         *funnels.of(tracks),
         funnels.stage("encounters: ticks that open a window", len(x), len(openings), opened),
@@ -249,6 +234,29 @@ def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame
         dx, dy = rows["x"].to_numpy() - x, rows["y"].to_numpy() - y
         out |= {f"{who}_x": cos * dx + sin * dy, f"{who}_y": cos * dy - sin * dx}
     return pd.DataFrame(out)
+
+
+def _sampled(
+    tracks: pd.DataFrame, order: np.ndarray, ref: np.ndarray, other: np.ndarray, steps: int
+) -> pd.DataFrame:
+    """The samples of windows that open at rows `ref` and `other` of the tracks in `order`."""
+    window = np.arange(steps + 1)
+    of_ref = tracks.iloc[order[(ref[:, None] + window).ravel()]].reset_index(drop=True)
+    of_other = tracks.iloc[order[(other[:, None] + window).ravel()]].reset_index(drop=True)
+    dx, dy = of_other["x"] - of_ref["x"], of_other["y"] - of_ref["y"]
+    bearing = np.arctan2(dy, dx) - np.arctan2(of_ref["vy"], of_ref["vx"])
+    return pd.DataFrame(
+        {
+            "encounter": np.repeat(np.arange(len(ref)), steps + 1),
+            "day": of_ref["day"].astype("category"),
+            "ref_id": of_ref["id"],
+            "other_id": of_other["id"],
+            "t": np.rint(of_ref["t"] * TICKS_PER_SECOND) / TICKS_PER_SECOND,
+            "los_angle": wrap_angle(np.asarray(bearing)),
+            "distance": np.hypot(dx, dy),
+            "speed": np.hypot(of_ref["vx"], of_ref["vy"]),
+        }
+    )
 
 
 def _occupants(
