@@ -28,8 +28,11 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib import encounters, funnels, plotting, readers, tracks
-from szlib.pages import ASSUMED, MEASURED, Page, parameters
+from szlib.encounters import search as encounters
+from szlib.tracks import clock as tracks
+from szlib.tracks import funnels, readers
+from szlib.workbook.figures import tracks as plotting
+from szlib.workbook.record import ASSUMED, MEASURED, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

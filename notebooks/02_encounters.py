@@ -26,8 +26,10 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib import encounters, funnels, plotting
-from szlib.pages import ASSUMED, PAPER, Page, parameters
+from szlib.encounters import search as encounters
+from szlib.tracks import funnels
+from szlib.workbook.figures import tracks as plotting
+from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

@@ -27,8 +27,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib import outliers, plotting
-from szlib.pages import ASSUMED, PAPER, Page, parameters
+from szlib.workbook.figures import tracks as plotting
+from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
+from szlib.zones import outliers
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

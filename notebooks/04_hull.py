@@ -26,8 +26,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib import hulls, outliers, plotting
-from szlib.pages import ASSUMED, PAPER, Page, parameters
+from szlib.workbook.figures import tracks as plotting
+from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
+from szlib.zones import hulls, outliers
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

@@ -27,9 +27,9 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib import plotting
-from szlib.pages import ASSUMED, PAPER, Page, parameters
-from szlib.truths import PlazaSettings
+from szlib.plaza.truth import PlazaSettings
+from szlib.workbook.figures import tracks as plotting
+from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

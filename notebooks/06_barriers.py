@@ -26,8 +26,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib import barriers, plotting, scenes
-from szlib.pages import ASSUMED, MEASURED, PAPER, Page, parameters
+from szlib.control import barriers
+from szlib.workbook.figures import simulation as scenes
+from szlib.workbook.figures import tracks as plotting
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

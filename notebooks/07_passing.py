@@ -27,9 +27,9 @@ import pandas as pd
 from IPython.display import Image
 
 import szlib
-from szlib import scenes
-from szlib.pages import Page, settings_table
-from szlib.scenarios import avoidance_start
+from szlib.simulation.closed_loop import avoidance_start
+from szlib.workbook.figures import simulation as scenes
+from szlib.workbook.record import Page, settings_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

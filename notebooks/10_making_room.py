@@ -25,8 +25,8 @@ import pandas as pd
 from IPython.display import Image
 
 import szlib
-from szlib import scenes
-from szlib.pages import ASSUMED, MEASURED, PAPER, Page, parameters
+from szlib.workbook.figures import simulation as scenes
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

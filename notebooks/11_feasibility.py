@@ -30,11 +30,12 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib import charts, plotting
-from szlib.pages import ASSUMED, MEASURED, PAPER, Page, parameters
-from szlib.runs import drive
-from szlib.simulation import advance
-from szlib.worlds import ONE_PERSON, Worlds
+from szlib.simulation.closed_loop import advance
+from szlib.simulation.runs import drive
+from szlib.simulation.worlds import ONE_PERSON, Worlds
+from szlib.workbook.figures import control as charts
+from szlib.workbook.figures import tracks as plotting
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -206,7 +207,7 @@ page.check("and h >= 0 throughout", kept["min_h"].min() >= -1e-6, kept["min_h"].
 meeting = replace(ONE_PERSON, standing=0.0)
 start_only = True
 for each in range(seed, seed + 4 * worlds):
-    scenario = szlib.worlds.world(each, meeting)
+    scenario = szlib.simulation.worlds.world(each, meeting)
     run = drive(scenario, szlib.MPCSettings(terminal="person"))
     feasible = run.slack <= 1e-6
     start_only &= bool(feasible[feasible.argmax() :].all())
@@ -238,7 +239,7 @@ page.key |= {"worlds driven": int(thousands["worlds"].sum())}
 thousands.set_index(["set", "formulation"]).T
 
 # %% [markdown]
-# Failures are worlds with a seed: `szlib.montecarlo.replay(seed, settings=..., worlds=...)` shows
+# Failures are worlds with a seed: `szlib.simulation.rollouts.replay(seed, settings=..., worlds=...)` shows
 # each again. The first that did not arrive here:
 
 # %%

@@ -28,9 +28,10 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib import charts, distances
-from szlib.pages import ASSUMED, PAPER, Page, parameters
-from szlib.runs import drive
+from szlib.control import distances
+from szlib.simulation.runs import drive
+from szlib.workbook.figures import control as charts
+from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

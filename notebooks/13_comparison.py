@@ -28,9 +28,11 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pandas as pd
 
-from szlib import charts, comparisons, plotting
-from szlib.comparisons import BEHAVIOURS, FORMULATIONS, WORLDS, ZONES
-from szlib.pages import ASSUMED, Page, parameters
+from szlib.simulation import comparisons
+from szlib.simulation.comparisons import BEHAVIOURS, FORMULATIONS, WORLDS, ZONES
+from szlib.workbook.figures import control as charts
+from szlib.workbook.figures import tracks as plotting
+from szlib.workbook.record import ASSUMED, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

@@ -27,10 +27,11 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib import funnels, plotting, quality
-from szlib.pages import ASSUMED, MEASURED, Page, parameters
-from szlib.plaza import make_plaza
-from szlib.truths import PlazaSettings
+from szlib.plaza.people import make_plaza
+from szlib.plaza.truth import PlazaSettings
+from szlib.tracks import funnels, quality
+from szlib.workbook.figures import tracks as plotting
+from szlib.workbook.record import ASSUMED, MEASURED, Page, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

@@ -21,13 +21,14 @@ from typing import Any
 import bench_data
 import numpy as np
 import pandas as pd
-from meets import meetings, questions
+from random_states import meetings, questions
 from tqdm import tqdm
 
 import szlib
-from szlib import datasets, ipopt, problem
-from szlib.barriers import Array
-from szlib.plaza import make_plaza
+from szlib.control import ipopt, problem
+from szlib.control.barriers import Array
+from szlib.plaza.people import make_plaza
+from szlib.tracks import datasets
 
 
 def seconds(call: Callable[[], object]) -> float:
@@ -81,16 +82,16 @@ def way(scenario: szlib.Scenario) -> list[Question]:
 
 
 def race(
-    scenario: szlib.Scenario, rivals: dict[str, Callable[..., object]], repeats: int = 7
+    scenario: szlib.Scenario, baselines: dict[str, Callable[..., object]], repeats: int = 7
 ) -> dict[str, Array]:
     """Times of each rival along the way [s], shape (steps,): laps in turn, medians over them.
 
     The first steps of a lap, where every rival is cold, do not count.
     """
-    laps: dict[str, list[list[float]]] = {name: [] for name in rivals}
+    laps: dict[str, list[list[float]]] = {name: [] for name in baselines}
     asked = way(scenario)
     for _ in range(repeats):
-        for name, step in rivals.items():
+        for name, step in baselines.items():
             laps[name].append([seconds(lambda: step(*each)) for each in asked][3:])  # noqa: B023 - at once
     return {name: np.median(lap, axis=0) for name, lap in laps.items()}
 
@@ -109,15 +110,15 @@ def ratios(times: dict[str, Array], rival: str) -> dict[str, float]:
 
 def bench_solvers(scenario: szlib.Scenario) -> dict[str, float]:
     """One control step by SQP against IPOPT, built once and warm: as tuned here, and as it comes."""
-    rivals = {name: controller_of(scenario, solver=name) for name in ("sqp", "ipopt")}
+    baselines = {name: controller_of(scenario, solver=name) for name in ("sqp", "ipopt")}
     tuned = dict(ipopt._OPTIONS)
     for name in tuned.keys() - {"print_level", "sb"}:
         del ipopt._OPTIONS[name]
     ipopt._solvers.cache_clear()
-    rivals["plain ipopt"] = controller_of(scenario, solver="ipopt")
+    baselines["plain ipopt"] = controller_of(scenario, solver="ipopt")
     ipopt._solvers.cache_clear()
     ipopt._OPTIONS.update(tuned)
-    times = race(scenario, {name: asking(controller, scenario) for name, controller in rivals.items()})
+    times = race(scenario, {name: asking(controller, scenario) for name, controller in baselines.items()})
     return ratios(times, "ipopt") | ratios(times, "plain ipopt")
 
 
@@ -127,7 +128,7 @@ def asking(controller: szlib.MPCCBF, scenario: szlib.Scenario) -> Callable[..., 
 
 def bench_rival() -> dict[str, float]:
     """The same problem in do-mpc: the same controls, and how much longer they take."""
-    from rivals import do_mpc_step
+    from baselines import do_mpc_step
 
     scenario = szlib.SCENARIOS["passing"]
     step, rival = asking(controller_of(scenario), scenario), do_mpc_step(szlib.MPCSettings(), ZONE)

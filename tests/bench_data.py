@@ -22,8 +22,8 @@ import polars as pl
 from sklearn.neighbors import LocalOutlierFactor
 
 import szlib
-from szlib import outliers
-from szlib.plaza import make_plaza
+from szlib.plaza.people import make_plaza
+from szlib.zones import outliers
 
 RAW_DAY_VARIABLE = "SZLIB_RAW_DAY"
 ROWS = 15_000_000

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import szlib
-from szlib import workbook
+from szlib.workbook import runner as workbook
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")

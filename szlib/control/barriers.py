@@ -1,0 +1,114 @@
+"""Barriers: how far the robot is from walls and social zones, and when that distance is safe.
+
+    segment   g = [(x-xa)(yb-ya) - (y-ya)(xb-xa)] / L,   t = [(L/2)^2 - |x-xc|^2] / L
+              d = sqrt(g^2 + ((|t| - t)/2)^2)                                (paper, eq. 3-5)
+    ellipse   d = (|x-ca| + |x-cb|)/2 - a,  ca and cb the foci              (paper, eq. 7)
+    barrier   h = d - r_robot - eps, safe where h >= 0                      (paper, sec. 4)
+    CBF       h(x_{k+1}) - h(x_k) >= -gamma h(x_k)                          (paper, eq. 1)
+
+`|t| - t` stands for the paper's norm of a scalar. Each formula is written once, in operators only,
+so that the same lines run on floats, on NumPy arrays and on the symbols of CasADi.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SolverError
+from ..zones.ellipses import Ellipse
+
+Array = NDArray[np.float64]
+
+
+def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
+    """Approximate distance of (x, y) to the segment from (xa, ya) to (xb, yb) [m] (paper, eq. 3-5)."""
+    length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
+    g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
+    t = ((length / 2) ** 2 - (x - (xa + xb) / 2) ** 2 - (y - (ya + yb) / 2) ** 2) / length
+    return (g**2 + ((abs(t) - t) / 2) ** 2) ** 0.5
+
+
+def ellipse_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any, a: Any) -> Any:
+    """Approximate distance of (x, y) to the ellipse of these foci and semi-major axis [m] (paper, eq. 7)."""
+    return (((x - xa) ** 2 + (y - ya) ** 2) ** 0.5 + ((x - xb) ** 2 + (y - yb) ** 2) ** 0.5) / 2 - a
+
+
+def barrier(distance: Any, radius: float, margin: float) -> Any:
+    """h = d - r_robot - eps [m]: safe where it is not negative (paper, sec. 4)."""
+    return distance - (radius + margin)
+
+
+def cbf_residual(h_next: Any, h: Any, gamma: float) -> Any:
+    """What the discrete CBF condition leaves over [m]: satisfied where it is not negative (paper, eq. 1)."""
+    return h_next - (1 - gamma) * h
+
+
+def segment_distance(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
+    """Approximate distance of points to the segment from a to b (paper, eq. 3-5).
+
+    Zero exactly on the segment and positive elsewhere. Euclidean for points in the disc that has the
+    segment as its diameter; beyond, an approximation that is exact to first order at the ends.
+
+    Parameters
+    ----------
+    points : positions, shape (..., 2) [m].
+    a, b : end points, shape (2,) [m].
+
+    Returns
+    -------
+    Distances, shape (...) [m].
+
+    Raises
+    ------
+    SolverError : the segment has no length, or a shape or a number is not usable.
+    """
+    xy = finite("points", points, (..., 2))
+    (xa, ya), (xb, yb) = check_wall([np.asarray(a), np.asarray(b)])
+    return np.asarray(segment_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb))
+
+
+def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
+    """Approximate signed distance of points to an ellipse, from the sum of focal distances (paper, eq. 7).
+
+    Zero on the ellipse, negative inside (at least -(a - c)), positive outside; Euclidean for a circle.
+
+    Parameters
+    ----------
+    points : positions, shape (..., 2), in the frame of the ellipse's centre [m].
+    ellipse : the social zone.
+
+    Returns
+    -------
+    Distances, shape (...) [m].
+    """
+    xy = finite("points", points, (..., 2))
+    (xa, ya), (xb, yb) = ellipse.foci
+    return np.asarray(ellipse_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb, ellipse.semi_axes[0]))
+
+
+def check_wall(wall: ArrayLike) -> Array:
+    """A wall's end points, shape (2, 2) [m]; SolverError unless finite and of positive length."""
+    ends = finite("wall", wall, (2, 2))
+    if np.array_equal(ends[0], ends[1]):
+        raise SolverError(f"a wall needs two different end points; got {ends[0].tolist()} twice")
+    return ends
+
+
+def finite(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
+    """A copy of `value` as finite floats of this shape (a leading ... for any); else SolverError."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise SolverError(f"{name} must have shape {shape}; got {value!r}") from error
+    if array.dtype.kind not in "iuf":
+        raise SolverError(f"{name} must be numbers of shape {shape}; got {value!r}")
+    fits = array.shape[-1:] == shape[1:] if ... in shape else array.shape == shape
+    if not fits:
+        raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
+    array = array.astype(float)
+    if not np.isfinite(array).all():
+        raise SolverError(f"{name} must be finite; got {array.tolist()}")
+    return array

@@ -1,0 +1,139 @@
+"""The paper's distances against the Euclidean ones, and the margin that makes them safe.
+
+A robot of radius r must stay r away from a wall or a zone, in Euclidean distance e. The barrier keeps
+d >= r + eps instead, so eps is large enough where {e < r} lies inside {d < r + eps}:
+
+    required margin = max of d over {e <= r}, less r
+
+*Ellipse*: none. With p the nearest point on the ellipse, |x-c| <= |x-p| + |p-c| for both foci, so
+d(x) <= e(x) + d(p) = e(x): the focal distance never over-estimates, for any eccentricity. Inside, the
+same with x and p exchanged gives |d| <= |e|.
+
+*Wall* of length L: r^2/L. Let the point at distance r from an end lie at the angle phi off the wall's
+line. Its trimming term is r cos phi + r^2/L, so d^2 = r^2 + 2 (r^3/L) cos phi + r^4/L^2, which is
+greatest straight ahead of the end: d = r + r^2/L. A point beside the wall, u <= L/2 from the end, has
+the term (r^2 - u (L-u))/L at most, and is exact where that is negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..zones.ellipses import Ellipse
+from .barriers import Array, check_wall, ellipse_distance, finite, segment_distance
+from .settings import MPCSettings
+
+_BISECTIONS = 60
+"""Halvings of a quarter turn until nothing is left of it in double precision."""
+
+
+def euclidean_to_segment(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
+    """Euclidean distance of points (..., 2) to the segment from a to b, shape (...) [m]."""
+    xy = finite("points", points, (..., 2))
+    start, end = check_wall([np.asarray(a), np.asarray(b)])
+    along = end - start
+    share = np.clip((xy - start) @ along / (along @ along), 0, 1)
+    away = xy - start - share[..., None] * along
+    return np.asarray(np.hypot(away[..., 0], away[..., 1]))
+
+
+def euclidean_to_ellipse(points: ArrayLike, ellipse: Ellipse) -> Array:
+    """Euclidean signed distance of points (..., 2) to an ellipse, negative inside, shape (...) [m].
+
+    Of (p, q) in the first quadrant of the ellipse's frame, the nearest point (a cos t, b sin t) is where
+    half the derivative of the squared distance by t,
+
+        a p sin t - b q cos t - (a^2 - b^2) sin t cos t,
+
+    which is negative below the one root inside the quadrant and positive above it, changes its sign.
+    """
+    offset = finite("points", points, (..., 2)) - ellipse.center
+    (a, b), cos, sin = ellipse.semi_axes, np.cos(ellipse.angle), np.sin(ellipse.angle)
+    p = np.abs(offset[..., 0] * cos + offset[..., 1] * sin)
+    q = np.abs(offset[..., 1] * cos - offset[..., 0] * sin)
+    low, high = np.zeros_like(p), np.full_like(p, np.pi / 2)
+    for _ in range(_BISECTIONS):
+        t = (low + high) / 2
+        below = a * p * np.sin(t) - b * q * np.cos(t) - (a**2 - b**2) * np.sin(t) * np.cos(t) < 0
+        low, high = np.where(below, t, low), np.where(below, high, t)
+    inside = (p / a) ** 2 + (q / b) ** 2 < 1
+    return np.asarray(np.hypot(p - a * np.cos(low), q - b * np.sin(low)) * np.where(inside, -1, 1))
+
+
+def required_margin(of: Ellipse | ArrayLike, r_robot: float) -> float:
+    """The least eps that keeps a robot of this radius out of a zone or off a wall, exactly [m].
+
+    0 for an ellipse, r_robot^2 / L for a wall of length L given by its ends, shape (2, 2) [m]; see the
+    proof at the top of this module.
+    """
+    if isinstance(of, Ellipse):
+        return 0.0
+    start, end = check_wall(of)
+    return float(r_robot**2 / np.hypot(*(end - start)))
+
+
+def with_margin(settings: MPCSettings, walls: Iterable[ArrayLike]) -> MPCSettings:
+    """The same settings with eps as large as the walls require; never smaller than it was.
+
+    One margin serves people and walls, so give a row of short walls as one long wall where you can.
+    """
+    needed = max((required_margin(wall, settings.r_robot) for wall in walls), default=0.0)
+    return replace(settings, eps=max(settings.eps, needed))
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What the approximate distance does on the line h = 0, where it decides.
+
+    Attributes
+    ----------
+    nearest, farthest : Euclidean gap left between the robot's disc and the zone or wall [m]; `nearest`
+        below 0 is a collision that the barrier calls safe, `farthest` beyond eps is room given away.
+    required : the margin that makes `nearest` 0 [m]; see `required_margin`.
+    """
+
+    nearest: float
+    farthest: float
+    required: float
+
+
+def audit(of: Ellipse | ArrayLike, *, r_robot: float, eps: float, n: int = 2001) -> Audit:
+    """Compare the distances on n points of each arc of h = 0 around a zone, or a wall given by its ends."""
+    points = safe_edge(of, r_robot + eps, n)
+    if isinstance(of, Ellipse):
+        gap = euclidean_to_ellipse(points, of) - r_robot
+    else:
+        gap = euclidean_to_segment(points, *check_wall(of)) - r_robot
+    return Audit(float(gap.min()), float(gap.max()), required_margin(of, r_robot))
+
+
+def safe_edge(of: Ellipse | ArrayLike, distance: float, n: int = 2001) -> Array:
+    """Points where the approximate distance is `distance` > 0, shape (m, 2) [m].
+
+    Around a zone the confocal ellipse of semi-major axis a + distance. Around a wall, in its own frame,
+    y = distance sin psi and x^2 = L^2/4 + L distance cos psi - y^2, for each end and side.
+    """
+    if isinstance(of, Ellipse):
+        (a, b), reach = of.semi_axes, of.semi_axes[0] + distance
+        return replace(of, semi_axes=(reach, float(np.sqrt(reach**2 - a**2 + b**2))), support=None).curve(n)
+    start, end = check_wall(of)
+    along = (end - start) / np.hypot(*(end - start))
+    length, psi = float(np.hypot(*(end - start))), np.linspace(0, np.pi / 2, n)
+    y = distance * np.sin(psi)
+    squared = length**2 / 4 + length * distance * np.cos(psi) - y**2
+    x, y = np.sqrt(squared[squared >= 0]), y[squared >= 0]
+    quarters = np.array([(sx * x, sy * y) for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
+    local = np.concatenate([q.T if i % 2 == 0 else q.T[::-1] for i, q in enumerate(quarters)])
+    return np.asarray((start + end) / 2 + local @ np.array([along, [-along[1], along[0]]]))
+
+
+def overestimate(points: ArrayLike, of: Ellipse | ArrayLike) -> Array:
+    """Approximate less Euclidean distance at points (..., 2), shape (...) [m]: dangerous where positive."""
+    if isinstance(of, Ellipse):
+        return ellipse_distance(points, of) - euclidean_to_ellipse(points, of)
+    ends = check_wall(of)
+    return segment_distance(points, *ends) - euclidean_to_segment(points, *ends)

@@ -1,0 +1,161 @@
+"""The optimal control problem of the controller, in symbols: written down once, for every solver.
+
+    min over u_0 .. u_{N-1}
+        (x_N - g)' P (x_N - g) + sum_{k=1}^{N-1} (x_k - g)' Q (x_k - g) + sum_{k=0}^{N-1} u_k' R u_k
+    subject to
+        x_{k+1} = A x_k + B u_k,  x_0 given                           double integrator   (paper, eq. 8)
+        -a_max <= u_k <= a_max                                        acceleration        k = 0 .. N-1
+        |(vx, vy)_k|^2 <= v_max^2                                     Euclidean speed     k = 1 .. N
+        h_i(x_{k+1}, k+1) - (1 - gamma) h_i(x_k, k) >= 0              every person, wall  k = 0 .. N_h-1
+        (vx, vy)_N = w                                                if there is a terminal condition
+
+(paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., k) takes person i at constant
+velocity, k steps ahead. `g` is the goal at rest, but for meetings head-on (`meetings.subgoal`); w is 0
+or the velocity of a person. The states are eliminated: 2 N unknowns remain. The *relaxed* problem
+adds a slack s >= 0 to each barrier row, and to the speed rows if the robot is already too fast, and
+penalises their sum: exactly, so wherever the hard problem has a solution near by, both have the
+same one. The terminal condition is never relaxed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import hypot
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from .barriers import Array, barrier, cbf_residual, ellipse_formula, segment_formula
+from .settings import MPCSettings
+
+TOLERANCE = 1e-6
+"""Largest violation of a hard row, in its own unit, that still counts as satisfied."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The problem for so many people and walls.
+
+    `rows` are meant >= 0: the `n_cbf` barrier conditions, person by person, then wall by wall, and
+    the N speed limits. `terminal` is meant to be 0, and empty without a terminal condition. `h` has a
+    row for each person and wall, a column for each of the states x_0 .. x_N. `parameters` stacks the
+    state (4), the target (2), the terminal velocity w (2), then for each person the foci and a of the
+    zone and the velocity (7), then the end points of each wall (4).
+    """
+
+    inputs: Any
+    parameters: Any
+    states: Any
+    cost: Any
+    rows: Any
+    terminal: Any
+    h: Any
+    n_cbf: int
+
+    def function(self, name: str, inputs: Sequence[Any], outputs: Sequence[Any]) -> Any:
+        """A CasADi function of these expressions, all dense."""
+        return ca.Function(name, list(inputs), [ca.densify(output) for output in outputs])
+
+
+@lru_cache(maxsize=256)
+def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem:
+    """Write down the problem of this module's docstring; once for each size and settings."""
+    s = settings
+    inputs, start, target = ca.SX.sym("u", 2, s.N), ca.SX.sym("x0", 4), ca.SX.sym("target", 2)
+    people, walls, w = ca.SX.sym("person", 7, n_people), ca.SX.sym("wall", 4, n_walls), ca.SX.sym("w", 2)
+
+    states = [start]
+    for k in range(s.N):
+        position, velocity, u = states[-1][:2], states[-1][2:], inputs[:, k]
+        states.append(ca.vertcat(position + s.dt * velocity + 0.5 * s.dt**2 * u, velocity + s.dt * u))
+
+    error = [x - ca.vertcat(target, 0, 0) for x in states]
+    cost = ca.dot(ca.DM(s.P), error[s.N] ** 2)
+    cost += sum(ca.dot(ca.DM(s.Q), error[k] ** 2) for k in range(1, s.N))
+    cost += sum(ca.dot(ca.DM(s.R), inputs[:, k] ** 2) for k in range(s.N))
+
+    distances = []
+    for i in range(n_people):
+        xa, ya, xb, yb, a, vx, vy = ca.vertsplit(people[:, i])
+        seen = [(x[0] - k * s.dt * vx, x[1] - k * s.dt * vy) for k, x in enumerate(states)]
+        distances.append([ellipse_formula(x, y, xa, ya, xb, yb, a) for x, y in seen])
+    for j in range(n_walls):
+        distances.append([segment_formula(x[0], x[1], *ca.vertsplit(walls[:, j])) for x in states])
+    h = [[barrier(d, s.r_robot, s.eps) for d in row] for row in distances]
+    cbf = [cbf_residual(row[k + 1], row[k], s.gamma) for row in h for k in range(s.N_h)]
+    speed = [s.v_max**2 - ca.sumsqr(x[2:]) for x in states[1:]]
+
+    return Problem(
+        inputs=ca.vec(inputs),
+        parameters=ca.vertcat(start, target, w, ca.vec(people), ca.vec(walls)),
+        states=ca.horzcat(*states),
+        cost=cost,
+        rows=ca.vertcat(*cbf, *speed),
+        terminal=ca.SX(0, 1) if s.terminal == "none" else states[-1][2:] - w,
+        h=ca.vertcat(*(ca.horzcat(*row) for row in h)) if h else ca.SX(0, s.N + 1),
+        n_cbf=len(cbf),
+    )
+
+
+def slack_weight(settings: MPCSettings, parameters: Array) -> float:
+    """Cost of a metre of slack: `settings.slack_weight` for each metre to the target, and at least one."""
+    x, y, _, _, gx, gy = parameters[:6].tolist()
+    return settings.slack_weight * max(1.0, hypot(gx - x, gy - y))
+
+
+class Buffered:
+    """A CasADi function between arrays that stay: fill the arguments, `call`, read `results`.
+
+    It saves the conversions of an ordinary call, which take ten times as long as these functions.
+    """
+
+    def __init__(self, function: Any, *arguments: Array) -> None:
+        self._buffer, self.call = function.buffer()
+        self.results = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
+        for i, array in enumerate(arguments):
+            self._buffer.set_arg(i, array.data)
+        for i, array in enumerate(self.results):
+            self._buffer.set_res(i, array.data)
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A plan in numbers: see `Problem` for rows and h; states have shape (N+1, 4).
+
+    `slack` is the largest violation of a row or of the terminal condition, 0 if none.
+    """
+
+    cost: float
+    slack: float
+    rows: Array
+    states: Array
+    h: Array
+
+
+class Evaluator:
+    """The numbers of any plan, without a solver; the first `n_cbf` of the `n_rows` rows are barriers."""
+
+    def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
+        function, self.n_cbf = _evaluation(settings, n_people, n_walls)
+        self.n_rows = function.nnz_out(1)
+        self._inputs, self._parameters = np.zeros(function.nnz_in(0)), np.zeros(function.nnz_in(1))
+        self._function = Buffered(function, self._inputs, self._parameters)
+        self._shape = (n_people + n_walls, settings.N + 1)
+
+    def __call__(self, plan: Array, parameters: Array) -> Numbers:
+        self._inputs[:], self._parameters[:] = plan, parameters
+        self._function.call()
+        totals, rows, states, h = self._function.results
+        cost, slack = totals.tolist()
+        return Numbers(cost, slack, rows.copy(), states.reshape(-1, 4).copy(), h.reshape(self._shape).copy())
+
+
+@lru_cache(maxsize=256)
+def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, int]:
+    p = build_problem(settings, n_people, n_walls)
+    slack = ca.mmax(ca.vertcat(0, -p.rows, ca.fabs(p.terminal)))
+    outputs = [ca.vertcat(p.cost, slack), p.rows, p.states, p.h.T]
+    return p.function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf

@@ -1,0 +1,183 @@
+"""Many days to encounters: a Parquet file and a funnel for each, resumable, on one machine or many.
+
+In the folder `out` each day leaves ``<day>.parquet``, its samples, and then ``<day>.json``, its record: the
+funnel, every parameter, and a key made of these and of the content of the day's files.  Both are written
+as a whole or not at all, the record last.  A day whose record has the right key, and whose samples have
+the right SHA-256, is not computed again; so a run that was stopped or killed goes on where it was.
+"""
+
+from __future__ import annotations
+
+import gzip
+import time
+import warnings
+import zlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+from zoneinfo import ZoneInfo
+
+import joblib
+import pandas as pd
+from tqdm import tqdm
+
+from ..errors import DataError, DataWarning, SzlibError
+from ..parallel import run_tasks
+from ..tracks import datasets, funnels
+from ..tracks.formats import LONGEST_LINE, layout_of
+from .pipeline import Chain
+from .records import day_key, finished_record, write_record
+
+_READ = "read all files"
+"""The first stage of the funnel of many days."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extraction:
+    """What `extract_days` has done.
+
+    Parameters
+    ----------
+    out : folder of the results.
+    table : one row a day: day, status ("done" now, "kept" from before, "excluded", "failed"), files, rows
+        read, unusable rows among them, encounters, samples, seconds, and why a day failed.
+    exclude : days that were left out.
+    """
+
+    out: Path
+    table: pd.DataFrame
+    exclude: tuple[str, ...] = ()
+
+    @property
+    def failed(self) -> pd.DataFrame:
+        """The days that failed, and why."""
+        return self.table[self.table["status"] == "failed"]
+
+    def samples(self) -> pd.DataFrame:
+        """Samples of all finished days, as from `szlib.find_encounters`, by day, encounters numbered anew.
+
+        The funnels of all days are added up, stage by stage.
+        Independent of the order of the files, of what was kept, and of who computed it.  Raises DataError
+        where no day was finished.
+        """
+        days = self.table.loc[self.table["status"].isin(["done", "kept"]), "day"]
+        if len(days) == 0:
+            raise DataError(f"no day was finished in {self.out}; see the table: {self}")
+        parts, stages, count = [], [], 0
+        for day in sorted(days):
+            part = pd.read_parquet(self.out / f"{day}.parquet")
+            stages.append(
+                [s | {"stage": _READ} if s["stage"].startswith("read ") else s for s in funnels.of(part)]
+            )
+            part = part[~part["day"].isin(self.exclude)]
+            numbers, found = pd.factorize(part["encounter"])
+            parts.append(part.assign(encounter=numbers + count, day=part["day"].astype(str)))
+            count += len(found)
+        samples = pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
+        return funnels.carry(samples.astype({"day": "category"}), funnels.add(stages))
+
+    def __str__(self) -> str:
+        shown = self.table.to_string(index=False, float_format="{:.1f}".format)
+        counts = self.table["status"].value_counts().sort_index()
+        return f"{shown}\n" + ", ".join(f"{n} {status}" for status, n in counts.items())
+
+
+def extract_days(
+    paths: str | Path | Sequence[str | Path],
+    *,
+    out: str | Path,
+    n_jobs: int | None = None,
+    exclude: Iterable[str] = (),
+    progress: bool = True,
+    **parameters: Any,
+) -> Extraction:
+    """Find the encounters of many days, each on its own, and keep them in a folder.
+
+    Parameters
+    ----------
+    paths : files, folders or globs.  Files that begin on the same calendar day make one day (the pieces
+        of the 1 Hz day); a recording that counts frames or has its own days is one by its name.
+    out : folder of the results; made if it is missing.  Only one run at a time may write into it.
+    n_jobs : processes; None takes what ``joblib.parallel_config`` says, such as a Dask cluster, or one.
+    exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
+    progress : whether to show a bar over the days.
+    parameters : of `szlib.read_tracks` and `szlib.find_encounters`: square, space, duration, min_distance,
+        min_speed, throughout, file_format, unit, max_gap, tz.
+
+    Returns
+    -------
+    An `Extraction`: its table says what became of each day; a day that fails does not stop the others.
+
+    Raises
+    ------
+    DataError : there is no such file or parameter, or the folder cannot be made.
+    """
+    unknown = sorted(set(parameters) - set(Chain.__dataclass_fields__))
+    if unknown:
+        raise DataError(f"unknown parameter {unknown}; expected some of {list(Chain.__dataclass_fields__)}")
+    chain, folder = Chain(**parameters), Path(out)
+    excluded = (exclude,) if isinstance(exclude, str) else tuple(sorted(map(str, exclude)))
+    days: dict[str, list[str]] = {}
+    for file in sorted({file.resolve() for file in datasets.find(paths)}):
+        days.setdefault(_day_of(file, chain), []).append(str(file))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DataError(f"{folder}: cannot be made ({error}); choose another folder") from error
+    rows = [_row(day, files, status="excluded") for day, files in days.items() if day in excluded]
+    tasks = [
+        joblib.delayed(extract_day)(day, files, str(folder.resolve()), chain)
+        for day, files in sorted(days.items())
+        if day not in excluded
+    ]
+    with tqdm(total=len(tasks), unit="day", disable=not progress) as bar:
+        for row in run_tasks(tasks, n_jobs=n_jobs):
+            rows.append(row)
+            bar.update()
+            bar.set_postfix_str(f"{row['day']} {row['status']}")
+    table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
+    return Extraction(folder, table, excluded)
+
+
+def extract_day(day: str, files: Sequence[str], out: str, chain: Chain) -> dict[str, Any]:
+    """Compute one day, or keep it if it is there; its row of the table.  Nothing but `out` is shared."""
+    begun = time.perf_counter()
+    row, folder = _row(day, files, status="failed"), Path(out)
+    try:
+        key = day_key(files, chain)
+        record = finished_record(folder, day, key)
+        status = "kept" if record else "done"
+        if record is None:
+            with warnings.catch_warnings():  # the table and the funnel tell of rows set aside
+                warnings.simplefilter("ignore", DataWarning)
+                samples = chain.encounters([Path(file) for file in files])
+            record = write_record(folder, day, key, samples, files, chain)
+        row |= {name: record[name] for name in ("rows", "unusable", "encounters", "samples")}
+        row["status"] = status
+    except (SzlibError, OSError, MemoryError) as error:
+        row["why"] = str(error) or type(error).__name__
+    return row | {"seconds": time.perf_counter() - begun}
+
+
+def _row(day: str, files: Sequence[str], status: str) -> dict[str, Any]:
+    counts = dict.fromkeys(("rows", "unusable", "encounters", "samples"), 0)
+    return {"day": day, "status": status, "files": len(files), **counts, "seconds": 0.0, "why": ""}
+
+
+def _day_of(file: Path, chain: Chain) -> str:
+    """The calendar day on which a file begins; its name where it has no time of day."""
+    name = file.name.split(".")[0]
+    try:
+        with file.open("rb") as stream:
+            packed = stream.read(2) == b"\x1f\x8b"
+        with gzip.open(file) if packed else file.open("rb") as stream:
+            first = stream.readline(LONGEST_LINE).decode("utf-8", errors="replace").lstrip("\ufeff").strip()
+        layout = layout_of(first, chain.file_format)
+        if layout.name not in ("atc-raw", "atc-1hz"):
+            return name
+        begun = float(first.split(layout.separator)[layout.columns["t"]])
+        return datetime.fromtimestamp(begun, ZoneInfo(chain.tz)).strftime("%Y-%m-%d")
+    except (OSError, EOFError, zlib.error, ValueError, OverflowError):  # reading the day will tell why
+        return name

@@ -1,0 +1,217 @@
+"""Random worlds: people who stand or walk, walls, a robot with somewhere to go - each from its seed.
+
+A world is a `Scenario` like the paper's four; what people do in it is a `Behaviour`: to walk on as the
+controller expects, or not. World frame, metres and seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from math import cos, pi, sin
+
+import numpy as np
+
+from ..control.barriers import Array, barrier, ellipse_distance, segment_distance
+from ..control.distances import euclidean_to_segment, with_margin
+from ..control.people import Person
+from ..control.settings import MPCSettings
+from ..errors import SolverError
+from ..zones.ellipses import Ellipse
+from .closed_loop import BODY_RADIUS, Scenario
+
+_TRIES = 5_000
+"""Draws after which a world is given up as impossible; a usual one takes fewer than a hundred."""
+_PATH_SAMPLES = 31
+"""Points of a person's path at which it is held clear of walls."""
+
+
+@dataclass(frozen=True)
+class Worlds:
+    """What a random world may hold; every range is drawn from uniformly (all of them assumed).
+
+    Parameters
+    ----------
+    people : least and greatest number of people.
+    standing : share of people who stand.
+    pace : slowest and fastest walk [m/s]; the paper's people walk at 0.5 m/s.
+    walls : share of worlds that have walls.
+    max_walls : greatest number of walls in such a world.
+    wall_length : shortest and longest wall [m].
+    size : start, goal, people and walls' midpoints lie in a square of this side [m].
+    travel : nearest and farthest goal [m].
+    start_speed : fastest start, in any direction [m/s].
+    min_h : least h of every person and wall at the start, and where full braking would end [m].
+    duration : time that the robot has [s].
+
+    Raises
+    ------
+    SolverError : a range is empty or a share is not in [0, 1].
+    """
+
+    people: tuple[int, int] = (1, 5)
+    standing: float = 0.5
+    pace: tuple[float, float] = (0.1, 0.5)
+    walls: float = 0.5
+    max_walls: int = 4
+    wall_length: tuple[float, float] = (1.0, 6.0)
+    size: float = 10.0
+    travel: tuple[float, float] = (3.0, 8.0)
+    start_speed: float = 1.0
+    min_h: float = 0.0
+    duration: float = 15.0
+
+    def __post_init__(self) -> None:
+        for name in ("people", "pace", "wall_length", "travel"):
+            low, high = getattr(self, name)
+            if not 0 <= low <= high < np.inf:
+                raise SolverError(f"{name} must be a range 0 <= low <= high; got {(low, high)}")
+        for name in ("standing", "walls"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise SolverError(f"{name} must be a share in [0, 1]; got {getattr(self, name)}")
+        for name in ("max_walls", "size", "duration"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise SolverError(f"{name} must be positive; got {getattr(self, name)}")
+
+
+ONE_PERSON = Worlds(people=(1, 1), walls=0.0, start_speed=0.0, min_h=0.3)
+"""One person in open space, a robot that starts at rest: here a controller has no excuse."""
+
+
+def world(seed: int, worlds: Worlds | None = None) -> Scenario:
+    """The world of this seed: the same one every time, whatever controller is to drive in it.
+
+    Start and goal are clear of walls by what a robot of the default radius requires, the goal also
+    of people who stand. People keep off walls and off each other's bodies at the start, and walkers
+    never cross a wall. Each person has the zone of the world, drawn by `random_zone`.
+
+    Raises
+    ------
+    SolverError : nothing that fits was found in many tries; ask for fewer people or more space.
+    """
+    w, rng = worlds or Worlds(), np.random.default_rng(seed)
+    for _ in range(_TRIES):
+        zone, walls = random_zone(rng), _walls(rng, w)
+        people = _people(rng, w, walls, zone)
+        x, goal = rng.uniform(-w.size / 2, w.size / 2, (2, 2))
+        speed, heading = w.start_speed * rng.uniform(), rng.uniform(-pi, pi)
+        velocity = speed * np.array([cos(heading), sin(heading)])
+        if not w.travel[0] <= np.hypot(*(goal - x)) <= w.travel[1]:
+            continue
+        s = with_margin(MPCSettings(), walls)
+        stop = x + velocity * speed / (2 * s.a_max)
+        standing = [person for person in people if person.stands]
+        if min(_h(x, people, walls, s), _h(stop, people, walls, s), _h(goal, standing, walls, s)) >= w.min_h:
+            return Scenario(
+                name=f"world {seed}",
+                title=f"World {seed}",
+                start=np.concatenate([x, velocity]),
+                goal=goal,
+                people=tuple(people),
+                walls=walls,
+                duration=w.duration,
+            )
+    raise SolverError(
+        f"no world of seed {seed} fits {w} in {_TRIES} tries; ask for fewer people or a larger size"
+    )
+
+
+def random_zone(rng: np.random.Generator) -> Ellipse:
+    """A zone of the fitted family: like those learned (1.0 m x 0.75 m), of any tilt, off centre."""
+    a = rng.uniform(0.7, 1.2)
+    center = (rng.uniform(-0.1, 0.2), rng.uniform(-0.1, 0.1))
+    return Ellipse(center, (a, a * rng.uniform(0.6, 1.0)), rng.uniform(-pi / 2, pi / 2))
+
+
+def _walls(rng: np.random.Generator, w: Worlds) -> Array:
+    count = int(rng.integers(1, w.max_walls, endpoint=True)) if rng.uniform() < w.walls else 0
+    middle = rng.uniform(-w.size / 2, w.size / 2, (count, 2))
+    angle, half = rng.uniform(0, pi, count), rng.uniform(*w.wall_length, count) / 2
+    along = half[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.stack([middle - along, middle + along], axis=1)
+
+
+def _people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellipse) -> list[Person]:
+    """People one by one, each off the walls and off those before; fewer where there is no room."""
+    people: list[Person] = []
+    for _ in range(int(rng.integers(*w.people, endpoint=True))):
+        for _ in range(100):
+            position, heading = rng.uniform(-w.size / 2, w.size / 2, 2), rng.uniform(-pi, pi)
+            pace = 0.0 if rng.uniform() < w.standing else rng.uniform(*w.pace)
+            velocity = pace * np.array([cos(heading), sin(heading)])
+            path = position + np.linspace(0, w.duration, _PATH_SAMPLES)[:, None] * velocity
+            off_walls = all(euclidean_to_segment(path, *wall).min() >= BODY_RADIUS for wall in walls)
+            apart = all(np.hypot(*(position - p.position)) >= 2 * BODY_RADIUS for p in people)
+            if off_walls and apart:
+                at, moves = (float(position[0]), float(position[1])), (float(velocity[0]), float(velocity[1]))
+                people.append(Person(at, moves, heading, zone))
+                break
+    return people
+
+
+def _h(point: Array, people: list[Person], walls: Array, s: MPCSettings) -> float:
+    """Smallest h of anybody or any wall [m]."""
+    distances = [ellipse_distance(point, _placed(person)) for person in people]
+    distances += [segment_distance(point, *wall) for wall in walls]
+    return float(barrier(min(distances, default=np.inf), s.r_robot, s.eps))
+
+
+def _placed(person: Person) -> Ellipse:
+    if not isinstance(person.zone, Ellipse):
+        raise SolverError(f"a person of a random world needs an Ellipse as zone; got {person.zone!r}")
+    return person.zone.placed(person.position, person.heading or 0.0)
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """What walkers do against the controller's expectation, and how well it sees (all assumed).
+
+    Parameters
+    ----------
+    pace : factor of a walker's speed once they change their mind; 0 stops them.
+    turn : by how much they turn then, to either side [rad].
+    noise : standard deviation of the position that the controller is told, each coordinate [m].
+    between : first and last time at which a walker changes their mind [s].
+
+    Raises
+    ------
+    SolverError : a number is negative or not finite.
+    """
+
+    pace: float = 1.0
+    turn: float = 0.0
+    noise: float = 0.0
+    between: tuple[float, float] = (1.0, 6.0)
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = np.asarray(getattr(self, each.name))
+            if not (np.isfinite(value) & (value >= 0)).all():
+                raise SolverError(f"{each.name} must be finite and >= 0; got {getattr(self, each.name)}")
+
+    def paths(
+        self, people: tuple[Person, ...], times: Sequence[float], seed: int
+    ) -> list[tuple[Person, ...]]:
+        """Everybody as they truly are at each time."""
+        rng = np.random.default_rng([seed, 1])
+        plans = [(p, rng.uniform(*self.between), self.turn * rng.choice([-1, 1])) for p in people]
+        return [tuple(self._at(t, *plan) for plan in plans) for t in times]
+
+    def _at(self, t: float, person: Person, when: float, turn: float) -> Person:
+        if t <= when or person.stands:
+            return person.after(t)
+        (vx, vy), heading = person.velocity, (person.heading or 0.0) + turn
+        speed = self.pace * float(np.hypot(vx, vy))
+        changed = (speed * cos(heading), speed * sin(heading))
+        here = person.after(when).position
+        return Person(here, changed, heading, person.zone).after(t - when)
+
+    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
+        """Everybody as the controller is told."""
+        if self.noise == 0:
+            return people
+        off = rng.normal(0.0, self.noise, (len(people), 2)).tolist()
+        return tuple(
+            Person((p.position[0] + dx, p.position[1] + dy), p.velocity, p.heading, p.zone)
+            for p, (dx, dy) in zip(people, off, strict=True)
+        )

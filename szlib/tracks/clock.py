@@ -1,0 +1,231 @@
+"""Pedestrian tracks on one clock, in one table.
+
+The track table has a row for each person and each tick of the clock:
+
+    day  local calendar date of the time stamp, "YYYY-MM-DD" (EWAP files: the file's name)
+    id   person; unique within a day only, the key is (day, id)
+    t    time [s], a multiple of 0.1 s
+    x y  position in the world [m]
+    vx vy  velocity [m/s], central difference over +-0.5 s
+
+It is sorted by day, id, t, without duplicates.  Two ticks further apart than one step of the clock
+mean that the person was lost in between: nobody is bridged across a gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..errors import DataError
+from . import funnels
+from .readers import read_raw
+
+TICKS_PER_SECOND = 10
+"""The common clock: positions at multiples of 0.1 s."""
+
+VELOCITY_SPAN = 0.5
+"""Half the time over which displacement gives velocity [s] (assumed)."""
+
+_LONGEST_INTERVAL = 5.0
+"""Of samples further apart [s] nobody can tell what a person did in between (assumed)."""
+
+_ROUNDING = 1e-6
+"""Of time stamps of ms near 1e9 s, which doubles hold to 2e-7 [s]."""
+
+_LAST_SECOND = 1e11
+"""Later times [s] are no times of people; up to here ticks are exact."""
+
+COLUMNS = ["day", "id", "t", "x", "y", "vx", "vy"]
+
+
+def read_tracks(
+    paths: str | Path | Iterable[str | Path],
+    *,
+    file_format: str | None = None,
+    unit: str | None = None,
+    max_gap: float | None = None,
+    tz: str = "Asia/Tokyo",
+    exclude: Iterable[str] = (),
+) -> pd.DataFrame:
+    """Read one file or many into one track table on the common clock.
+
+    Parameters
+    ----------
+    paths : a file, or several: ATC raw, ATC 1 Hz, EWAP obsmat, tidy CSV or Parquet; plain or .gz.
+    file_format : "atc-raw", "atc-1hz", "ewap" or "tidy"; None looks at the content.
+    unit : unit of the positions, "m" or "mm"; None takes the format's and checks that it is plausible.
+    max_gap : a longer silence ends a track [s], more than 0.1; None takes the format's (0.5 raw,
+        1.6 at 1 Hz, 0.9 EWAP; tidy: 4 sampling intervals, at least 0.5 and at most 5).
+    tz : time zone whose calendar says which day a time stamp belongs to (ATC: Japan).
+    exclude : days "YYYY-MM-DD" to leave out, as event days were left out in the paper (sec. 2).
+
+    Returns
+    -------
+    The track table; its funnel is in ``.attrs["funnel"]``, and a DataWarning counts what was set aside.
+
+    Raises
+    ------
+    DataError : names the file and line, what was found, what was expected and what to do.
+    """
+    raw = read_raw(paths, file_format=file_format, unit=unit, tz=tz, exclude=exclude)
+    return to_clock(raw, max_gap=max_gap)
+
+
+def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame:
+    """Bring positions to multiples of 0.1 s by linear interpolation within gap-free pieces.
+
+    `raw` has day, id, t [s], x, y [m], any order; `max_gap` [s] as in `read_tracks`.  Each piece
+    gives the ticks between its first and its last sample; a piece that covers no tick is counted
+    in the funnel.  Velocity is the displacement over +-0.5 s (less at the ends of a piece) divided
+    by its duration; a piece of a single tick has none (NaN).
+    """
+    check_columns(raw, ["day", "id", "t", "x", "y"])
+    _check_values(raw)
+    raw = _sorted(raw)
+    t, xy = raw["t"].to_numpy(float), raw[["x", "y"]].to_numpy(float)
+    person = _person_codes(raw)
+    same = np.r_[False, person[1:] == person[:-1]]
+    step = np.diff(t, prepend=np.nan)
+    if (step[same] <= 0).any():
+        at = int(np.flatnonzero(same & (step <= 0))[0])
+        raise DataError(f"person {raw['id'].iloc[at]} has two rows at t = {t[at]} s; keep one of them")
+    if max_gap is None:
+        max_gap = _usual_gap(step[same], raw.attrs.get("max_gap"))
+    if not max_gap > 1 / TICKS_PER_SECOND:
+        raise DataError(f"max_gap must be a time in seconds, longer than the clock's 0.1 s; got {max_gap}")
+    piece = np.cumsum(~(same & (step <= max_gap + _ROUNDING))) - 1
+    row, tick = _ticks(t, piece)
+    after = np.where(np.r_[piece[1:] == piece[:-1], False][row], row + 1, row)
+    span = np.where(after > row, t[after] - t[row], 1.0)
+    weight = np.clip((tick / TICKS_PER_SECOND - t[row]) / span, 0.0, 1.0)[:, None]
+    positions = xy[row] + weight * (xy[after] - xy[row])
+    velocities = _velocities(piece[row], positions)
+    table = pd.DataFrame({"id": raw["id"].to_numpy()[row], "t": tick / TICKS_PER_SECOND})
+    table.insert(0, "day", raw["day"].astype("category").iloc[row].reset_index(drop=True))
+    table[["x", "y"]], table[["vx", "vy"]] = positions, velocities
+    covered = np.isin(piece, piece[row])
+    lost = {"in a gap-free piece that covers no tick": len(t) - int(covered.sum())}
+    stages = [*funnels.of(raw), funnels.stage("clock: samples", len(t), int(covered.sum()), lost)]
+    return funnels.carry(table, stages)
+
+
+def check_columns(frame: pd.DataFrame, needed: Sequence[str]) -> None:
+    """Raise DataError where a table lacks a column, or has no row."""
+    missing = [name for name in needed if name not in frame.columns]
+    if missing:
+        raise DataError(
+            f"columns {missing} are missing; found {list(map(str, frame.columns))}, expected {list(needed)}"
+        )
+    if len(frame) == 0:
+        raise DataError(f"the table is empty; expected rows of {list(needed)}")
+
+
+def nearest_tick(t: np.ndarray) -> np.ndarray:
+    """Number of the clock's tick nearest to each time [s], counted from t = 0."""
+    return np.asarray(np.rint(t * TICKS_PER_SECOND).astype(np.int64))
+
+
+def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Order and ticks of a track table: row order by person and time, tick number, gap-free piece.
+
+    Returns integer arrays (order, tick, piece), the latter two in that order.  Raises DataError for
+    times off the clock and for two rows of a person at one tick.
+    """
+    check_columns(tracks, COLUMNS)
+    _check_values(tracks)
+    t = tracks["t"].to_numpy(float)
+    tick = nearest_tick(t)
+    off = ~(np.abs(t * TICKS_PER_SECOND - tick) < 1e-3)
+    if off.any():
+        value = t[np.flatnonzero(off)[0]]
+        raise DataError(
+            f"t = {value} s is not a multiple of 0.1 s; "
+            "bring the table to the clock with szlib.tracks.clock.to_clock"
+        )
+    person = _person_codes(tracks)
+    order = _order(person, tick)
+    tick, person = tick[order], person[order]
+    same = person[1:] == person[:-1]
+    if (same & (tick[1:] == tick[:-1])).any():
+        row = order[int(np.flatnonzero(same & (tick[1:] == tick[:-1]))[0])]
+        raise DataError(f"person {tracks['id'].iloc[row]} has two rows at t = {t[row]} s; keep one of them")
+    piece = np.r_[0, np.cumsum(~(same & (np.diff(tick) == 1)))]
+    return order, tick, piece
+
+
+def _check_values(frame: pd.DataFrame) -> None:
+    """Raise DataError where a row has no person, or no finite time and position."""
+    good = frame[["day", "id"]].notna().to_numpy().all(axis=1)
+    good = good & (np.abs(frame["t"].to_numpy(float)) < _LAST_SECOND)
+    good = good & np.isfinite(frame[["x", "y"]].to_numpy(float)).all(axis=1)
+    if not good.all():
+        row = int(np.flatnonzero(~good)[0])
+        found = frame[["day", "id", "t", "x", "y"]].iloc[row].to_dict()
+        raise DataError(
+            f"row {frame.index[row]}: got {found}; expected a day, an id, t in seconds and finite x, y; "
+            "drop the row"
+        )
+
+
+def _usual_gap(intervals: np.ndarray, of_format: float | None) -> float:
+    """The silence that ends a track [s]: the format's, or that of samples at these intervals [s]."""
+    usual = float(np.median(intervals)) if len(intervals) else 0.0
+    max_gap = of_format or float(np.clip(4 * usual, 0.5, _LONGEST_INTERVAL))
+    if usual > max_gap:
+        raise DataError(
+            f"a person's samples are {usual:.3g} s apart (median), expected at most {max_gap:g} s, or every "
+            "track falls to pieces; are times in seconds? if so, pass max_gap"
+        )
+    return max_gap
+
+
+def _ticks(t: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every tick within every piece: the input row just before it, and its number."""
+    tolerance = TICKS_PER_SECOND * _ROUNDING
+    first = np.ceil(t * TICKS_PER_SECOND - tolerance).astype(np.int64)
+    last_of_piece = np.r_[piece[1:] != piece[:-1], True]
+    end = np.where(
+        last_of_piece, np.floor(t * TICKS_PER_SECOND + tolerance).astype(np.int64) + 1, np.r_[first[1:], 0]
+    )
+    count = np.maximum(end - first, 0)
+    row = np.repeat(np.arange(len(t)), count)
+    tick = first[row] + np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    # the row just before a tick must not be the last of its piece, or there is nothing to interpolate to
+    alone = last_of_piece & np.r_[True, last_of_piece[:-1]]
+    return np.where(last_of_piece[row] & ~alone[row], row - 1, row), tick
+
+
+def _velocities(piece: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Displacement over +-0.5 s within each piece, by its duration [m/s]; NaN for a single tick."""
+    reach = round(VELOCITY_SPAN * TICKS_PER_SECOND)
+    row = np.arange(len(piece))
+    starts = np.flatnonzero(np.r_[True, piece[1:] != piece[:-1]][: len(piece)])
+    lengths = np.diff(np.r_[starts, len(piece)])
+    start, end = np.repeat(starts, lengths), np.repeat(starts + lengths - 1, lengths)
+    before, after = np.maximum(row - reach, start), np.minimum(row + reach, end)
+    duration = np.where(after > before, (after - before) / TICKS_PER_SECOND, np.nan)
+    return np.asarray((positions[after] - positions[before]) / duration[:, None])
+
+
+def _person_codes(frame: pd.DataFrame) -> np.ndarray:
+    """One integer for each (day, id), ordered by day, then id."""
+    day = pd.factorize(frame["day"], sort=True)[0].astype(np.int64)
+    person, people = pd.factorize(frame["id"], sort=True)
+    return np.asarray(day * len(people) + person)
+
+
+def _sorted(raw: pd.DataFrame) -> pd.DataFrame:
+    order = _order(_person_codes(raw), raw["t"].to_numpy(float))
+    return raw.iloc[order]
+
+
+def _order(person: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Row order by person, then time; a sorted table is not sorted again."""
+    same = person[1:] == person[:-1]
+    if ((person[1:] > person[:-1]) | (same & (time[1:] >= time[:-1]))).all():
+        return np.arange(len(person))
+    return np.lexsort((time, person))

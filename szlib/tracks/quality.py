@@ -1,0 +1,96 @@
+"""What a file of tracks is like before anybody uses it: frames, gaps, visits, and what it says of speed.
+
+Everything is streamed; a full raw day is one row a person and second when it arrives here.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import polars as pl
+
+from .formats import FORMATS, plain_file, readable, recognise
+from .readers import fault
+
+STANDING = 0.1
+"""Who moves less than that within a second is standing [m] (measured: sensor noise stays below it)."""
+_SAID = {"atc-raw": ("f5", 1e-3), "atc-1hz": ("f4", 1.0)}
+"""Field of the file's own speed, and what one unit of it is [m/s]."""
+
+
+def seconds(path: str | Path) -> pd.DataFrame:
+    """One row a person and second: id, second [s], x, y [m] when first seen in it, rows, said [m/s].
+
+    `said` is the mean of the file's own speed (NaN where it has none), `moved` [m] the displacement until
+    the next second (NaN where the person is not seen then).  Unusable rows are left out.
+
+    Raises DataError as `szlib.read_tracks`.
+    """
+    path = Path(path)
+    with plain_file(path) as plain:
+        layout, scan = recognise(plain, path, None)
+        said = _said(plain, layout.name)
+        usable = scan.filter(fault(layout.metres, layout.seconds, "day" in scan.collect_schema()).is_null())
+        time = pl.col("t") * layout.seconds
+        grouped = usable.group_by(pl.col("id").cast(pl.Int64), second=time.floor()).agg(
+            pl.col("x", "y").sort_by("t").first() * layout.metres, rows=pl.len()
+        )
+        with readable(path, layout):
+            rows = grouped.sort("id", "second").collect(engine="streaming").to_pandas()
+            spoken = None if said is None else said.collect(engine="streaming").to_pandas()
+    rows = rows.assign(said=np.nan) if spoken is None else rows.merge(spoken, how="left", on=["id", "second"])
+    step = rows[["id", "second", "x", "y"]].diff()
+    followed = ((step["id"] == 0) & (step["second"] == 1)).to_numpy()
+    moved = np.where(followed, np.hypot(step["x"], step["y"]), np.nan)
+    return rows.assign(moved=np.r_[moved[1:], np.nan])
+
+
+def _said(plain: Path, name: str) -> pl.LazyFrame | None:
+    if name not in _SAID:
+        return None
+    column, unit = _SAID[name]
+    names = [f"f{i}" for i in range(FORMATS[name].fields)]
+    scan = pl.scan_csv(
+        plain, schema=dict.fromkeys(names, pl.Float64), has_header=False, ignore_errors=True,
+        truncate_ragged_lines=True, missing_columns="insert", glob=False,
+    )  # fmt: skip
+    whole = pl.col("f1").is_not_null() & (pl.col("f1") % 1 == 0) & pl.col("f0").is_finite()
+    keys = [pl.col("f1").cast(pl.Int64).alias("id"), pl.col("f0").floor().alias("second")]
+    return scan.filter(whole).group_by(keys).agg(said=pl.col(column).mean() * unit)
+
+
+def frame_intervals(path: str | Path) -> np.ndarray:
+    """Times from one frame to the next [s]; a frame is a time at which anybody was seen."""
+    path = Path(path)
+    with plain_file(path) as plain:
+        layout, scan = recognise(plain, path, None)
+        with readable(path, layout):
+            frames = scan.select(pl.col("t").drop_nulls().unique()).collect(engine="streaming")["t"]
+    return np.asarray(np.diff(np.sort(frames.to_numpy())) * layout.seconds)
+
+
+def people(path: str | Path) -> pd.DataFrame:
+    """One row a person: id, begun, ended, longest_gap [s], rows."""
+    path = Path(path)
+    with plain_file(path) as plain:
+        layout, scan = recognise(plain, path, None)
+        usable = scan.filter(fault(layout.metres, layout.seconds, "day" in scan.collect_schema()).is_null())
+        time = pl.col("t") * layout.seconds
+        grouped = usable.group_by(pl.col("id").cast(pl.Int64)).agg(
+            begun=time.min(), ended=time.max(), longest_gap=time.sort().diff().max(), rows=pl.len()
+        )
+        with readable(path, layout):
+            return grouped.sort("id").collect(engine="streaming").to_pandas()
+
+
+def by_hour(rows: pd.DataFrame, *, tz: str = "Asia/Tokyo") -> pd.DataFrame:
+    """From `seconds`: for each day and hour the visits (people seen) and the mean number who stand."""
+    local = pd.to_datetime(rows["second"], unit="s", utc=True).dt.tz_convert(tz)
+    keyed = rows.assign(
+        day=local.dt.strftime("%Y-%m-%d"), hour=local.dt.hour, stands=rows["moved"] < STANDING
+    )
+    grouped = keyed.groupby(["day", "hour"], as_index=False)
+    table = grouped.agg(visits=("id", "nunique"), standing=("stands", "sum"), seconds=("second", "nunique"))
+    return table.assign(standing=table["standing"] / table["seconds"]).drop(columns="seconds")

@@ -1,0 +1,205 @@
+"""Files of tracks as they are: one sorted table day, id, t, x, y in seconds and metres.
+
+Rows that cannot be used are set aside, counted by reason in the funnel of each file, and told in a
+DataWarning; a file that cannot be used raises a DataError that names the file and the line.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import polars as pl
+
+from ..errors import DataError, DataWarning
+from . import funnels
+from .formats import EXPECTED, FORMATS, Format, plain_file, readable, recognise
+
+_MAX_SITE = 1000.0
+"""A site wider than this [m] means that millimetres were read as metres."""
+_MIN_SITE = 0.5
+"""A site that reaches less far than this [m] means that metres were read as millimetres."""
+_LAST_SECOND = 4_102_444_800.0
+"""2100-01-01; later time stamps are not seconds since 1970."""
+_FARTHEST = 2e7
+"""Farther [m] from the origin of any grid is no place on Earth."""
+
+
+def read_raw(
+    paths: str | Path | Iterable[str | Path],
+    *,
+    file_format: str | None = None,
+    unit: str | None = None,
+    tz: str = "Asia/Tokyo",
+    exclude: Iterable[str] = (),
+) -> pd.DataFrame:
+    """Read files as they are: day, id, t [s], x, y [m], sorted, without duplicates.
+
+    Parameters and errors are those of `szlib.read_tracks`.  ``.attrs["max_gap"]`` keeps the format's
+    longest gap [s] for `to_clock`, ``.attrs["funnel"]`` counts every row.
+    """
+    files = [Path(paths)] if isinstance(paths, str | Path) else [Path(p) for p in paths]
+    excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
+    if not files:
+        raise DataError("no track file was given; pass at least one path")
+    if unit not in (None, "m", "mm"):
+        raise DataError(f"unit must be 'm' or 'mm'; got {unit!r}")
+    if file_format is not None and file_format not in FORMATS:
+        raise DataError(f"unknown file_format {file_format!r}; expected one of {list(FORMATS)}")
+    parts, stages, layouts = zip(*(_read_file(file, file_format, unit, tz) for file in files), strict=True)
+    _check_sequences([_stem(f) for f, layout in zip(files, layouts, strict=True) if layout.name == "ewap"])
+    return merge(parts, stages, layouts, excluded)
+
+
+def merge(
+    parts: Sequence[pl.DataFrame],
+    stages: Sequence[dict[str, Any]],
+    layouts: Sequence[Format],
+    excluded: Sequence[str],
+) -> pd.DataFrame:
+    """Rows (day, id, t, x, y) of all files as one table as from `read_raw`: sorted, without duplicates."""
+    if len({part.schema["day"] for part in parts}) > 1:
+        parts = [part.with_columns(pl.col("day").cast(pl.String)) for part in parts]
+    merged = pl.concat(parts)
+    wanted = merged.filter(~pl.col("day").cast(pl.String).is_in(excluded)) if excluded else merged
+    keys = ["day", "id", "t"]
+    rows = wanted.sort(keys, maintain_order=True)
+    rows = rows.filter(pl.any_horizontal(pl.col(keys).ne_missing(pl.col(keys).shift())))
+    doubled = {"duplicate (day, id, t)": wanted.height - rows.height}
+    _warn("all files", doubled)
+    if rows.height == 0:
+        raise DataError(f"all {merged.height} rows lie on excluded days {excluded}; check `exclude`")
+    frame = pd.DataFrame({name: rows[name].to_numpy() for name in ("id", "t", "x", "y")})
+    days = rows["day"].unique().sort()
+    codes = rows["day"].replace_strict(days, range(len(days)), return_dtype=pl.Int32).to_numpy()
+    names = pd.Index(days.cast(pl.String).to_list())
+    frame.insert(0, "day", pd.Series(pd.Categorical.from_codes(codes, names)))
+    gaps = [layout.max_gap for layout in layouts if layout.max_gap is not None]
+    frame.attrs["max_gap"] = max(gaps) if len(gaps) == len(layouts) else None
+    reasons = {"excluded day": merged.height - wanted.height, **doubled}
+    return funnels.carry(frame, [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)])
+
+
+def _read_file(
+    path: Path, name: str | None, unit: str | None, tz: str
+) -> tuple[pl.DataFrame, dict[str, Any], Format]:
+    """One file: its usable rows (day, id, t, x, y), its funnel stage, its layout."""
+    if not path.is_file():
+        raise DataError(
+            f"{path}: " + ("is a folder; pass the files in it" if path.is_dir() else "no such file")
+        )
+    with plain_file(path) as plain:
+        layout, scan = recognise(plain, path, name)
+        with readable(path, layout):
+            rows = scan.collect()
+    metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
+    rows = rows.with_columns(reason=fault(metres, layout.seconds, "day" in rows.columns))
+    bad, good = rows.filter(pl.col("reason").is_not_null()), rows.filter(pl.col("reason").is_null())
+    reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
+    first = bad.select("line", "reason").row(0) if bad.height else None
+    stage = read_stage(path, layout, good.height, reasons, first)
+    if unit is None:
+        check_unit(good, layout, path)
+    return in_metres(good, path, layout, metres, tz), stage, layout
+
+
+def read_stage(
+    path: Path, layout: Format, good: int, reasons: dict[str, int], first: tuple[int, str] | None
+) -> dict[str, Any]:
+    """Funnel stage of one file; `first` is the line of the first bad row and its reason.
+
+    Warns of rows set aside; raises DataError where they are more than the good ones, or there are none.
+    """
+    bad = sum(reasons.values())
+    if first and bad > good:
+        raise DataError(
+            f"{path}, line {first[0]}: {first[1]}; {bad} of {bad + good} rows cannot be used "
+            f"as {layout.name}; {EXPECTED}"
+        )
+    if good == 0:
+        raise DataError(f"{path}: holds no row; {EXPECTED}")
+    if first:
+        _warn(f"{path.name}, first at line {first[0]}", reasons)
+    return funnels.stage(f"read {path.name}", good + bad, good, reasons)
+
+
+def in_metres(good: pl.DataFrame, path: Path, layout: Format, metres: float, tz: str) -> pl.DataFrame:
+    """Usable rows as day, id, t [s], x, y [m]."""
+    if "day" not in good.columns:
+        # the name stands for the day where frames are counted, not time of day
+        try:
+            good = good.with_columns(day=pl.lit(_stem(path)) if layout.name == "ewap" else _calendar_day(tz))
+        except pl.exceptions.PolarsError as error:
+            raise DataError(f"unknown time zone {tz!r} ({error}); expected one like 'Asia/Tokyo'") from error
+    return good.select(
+        "day",
+        pl.col("id").cast(pl.Int64),
+        pl.col("t") * layout.seconds,
+        pl.col("x") * metres,
+        pl.col("y") * metres,
+    )
+
+
+def faults(metres: float, seconds: float, with_day: bool) -> dict[str, pl.Expr]:
+    """Why a row cannot be used: reasons, and where each holds; the first one counts."""
+    numbers, position, person = ["t", "id", "x", "y"], pl.col("x", "y"), pl.col("id")
+    found = {
+        "missing or extra fields": pl.col("ragged"),
+        "missing or not a number": pl.any_horizontal(pl.col(numbers).is_null()),
+        "not finite": ~pl.all_horizontal(pl.col(numbers).is_finite()),
+        "id not a whole number": (person != person.floor()) | (person.abs() > 2**53),
+        "time not in seconds since 1970": pl.col("t").abs() * seconds > _LAST_SECOND,
+        "position not on Earth": pl.any_horizontal(position.abs() * metres > _FARTHEST),
+    }
+    return found | ({"no day": pl.col("day").is_null()} if with_day else {})
+
+
+def fault(metres: float, seconds: float, with_day: bool) -> pl.Expr:
+    """Why a row cannot be used; null where it can."""
+    reasons = faults(metres, seconds, with_day).items()
+    return pl.coalesce(pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons)
+
+
+def check_unit(rows: pl.DataFrame, layout: Format, path: Path) -> None:
+    """Raise DataError where a site of that size cannot be."""
+    positions = rows.select("x", "y").to_numpy()
+    if layout.metres < 1 and (reach := float(np.abs(positions).max())) * layout.metres < _MIN_SITE:
+        raise DataError(
+            f"{path}: positions reach only {reach:.3g}, expected millimetres as in {layout.name}; if they "
+            "are metres, pass unit='m' (if the site is that small, unit='mm')"
+        )
+    if layout.metres == 1:
+        low, high = np.quantile(positions, [0.01, 0.99], axis=0)
+        if (spread := float((high - low).max())) > _MAX_SITE:
+            raise DataError(
+                f"{path}: positions spread over {spread:.3g}, expected metres as in {layout.name}; if they "
+                "are millimetres, pass unit='mm' (if the site is that wide, unit='m')"
+            )
+
+
+def _stem(path: Path) -> str:
+    return path.name.split(".")[0]
+
+
+def _check_sequences(names: list[str]) -> None:
+    """Raise DataError where two EWAP files of one name would be taken for one day."""
+    if doubled := sorted({name for name in names if names.count(name) > 1}):
+        raise DataError(
+            f"several EWAP files are called {', '.join(doubled)}: their people would be mixed; "
+            "pass each file once, and rename those that are other recordings"
+        )
+
+
+def _calendar_day(tz: str) -> pl.Expr:
+    local = pl.from_epoch(pl.col("t").floor().cast(pl.Int64), time_unit="s").dt.convert_time_zone(tz)
+    return local.dt.date()
+
+
+def _warn(where: str, reasons: dict[str, int]) -> None:
+    told = ", ".join(f"{count} x {reason}" for reason, count in reasons.items() if count)
+    if told:
+        warnings.warn(f"{where}: rows set aside: {told}", DataWarning, stacklevel=2)

@@ -1,0 +1,13 @@
+"""How is it told: figures, the records of notebooks, their headless execution, the command line.
+
+figures       every figure, one file a room
+record        what a notebook writes down: checks, claims, figures, artefacts
+runner        the notebooks executed by papermill
+command_line  `szlib run | inspect | extract`
+"""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach(
+    __name__, submodules=["figures", "record", "runner", "command_line"]
+)

@@ -1,0 +1,15 @@
+"""Every figure: `plot_*` draws on the axes it is given, or on new ones, and returns them.
+
+style       colours, sizes, labels in metres
+tracks      where people were, how fast, and what became of the rows
+encounters  the attentional space and the other person
+zones       outliers, the hull, zones by speed
+control     distances and barriers
+simulation  runs of the robot, animations, sweeps and comparisons
+"""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach(
+    __name__, submodules=["style", "tracks", "encounters", "zones", "control", "simulation"]
+)

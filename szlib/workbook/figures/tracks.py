@@ -1,0 +1,62 @@
+"""Figures of tracks: where people were, how fast, and what became of the rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
+from ...encounters.geometry import Square
+from .style import BLUE, RED, SEQUENCE, axes, metres
+
+
+def plot_map(tracks: pd.DataFrame, square: Square, *, cell: float = 0.25, ax: Axes | None = None) -> Axes:
+    """Where people were: person-seconds per square metre on a log scale, and the square (paper, fig. 1)."""
+    ax = axes(ax, size=(9, 5))
+    x, y = tracks["x"].to_numpy(), tracks["y"].to_numpy()
+    edges = [np.arange(np.floor(v.min()), np.ceil(v.max()) + cell, cell) for v in (x, y)]
+    seconds = np.histogram2d(x, y, bins=edges)[0] / 10 / cell**2
+    shown = np.ma.masked_less_equal(np.log10(np.maximum(seconds, 1e-9)), -0.5)
+    image = ax.pcolormesh(edges[0], edges[1], shown.T, cmap=SEQUENCE, rasterized=True)
+    ax.figure.colorbar(image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$")
+    corner, size = (square.x[0], square.y[0]), (square.x[1] - square.x[0], square.y[1] - square.y[0])
+    ax.add_patch(Rectangle(corner, *size, fill=False, edgecolor=RED, linewidth=2, label="the square"))
+    ax.legend(loc="lower right")
+    ax.margins(0.02)
+    return metres(ax, "Where people were seen, and the open square")
+
+
+def plot_speeds(by_column: np.ndarray, by_displacement: np.ndarray, *, ax: Axes | None = None) -> Axes:
+    """Speed as recorded against speed from displacement [m/s], both shape (n,)."""
+    ax = axes(ax)
+    bins = np.linspace(0, 2.5, 101)
+    for values, name, colour, line in (
+        (by_displacement, "from displacement", BLUE, "-"),
+        (by_column, "the file's column", RED, "--"),
+    ):
+        ax.hist(
+            values,
+            bins=bins.tolist(),
+            histtype="step",
+            color=colour,
+            linestyle=line,
+            linewidth=1.6,
+            label=name,
+        )
+    ax.set(xlabel="speed [m/s]", ylabel="samples", title="The velocity column never stands still")
+    ax.legend()
+    return ax
+
+
+def plot_funnel(funnel: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+    """What each stage kept, on a log scale; `funnel` as from `szlib.tracks.funnels.table`."""
+    kept = funnel[funnel["what"] == "kept"]
+    ax = axes(ax, size=(8, 0.4 * len(kept) + 1))
+    ax.barh(kept["stage"], kept["rows"], color=BLUE)
+    for at, rows in enumerate(kept["rows"]):
+        ax.annotate(f" {rows:,}", (rows, at), va="center", fontsize=8)
+    ax.invert_yaxis()
+    ax.set(xscale="log", xlabel="rows kept", title="From rows of tracks to a hull")
+    ax.set_xlim(right=float(kept["rows"].max()) * 8)
+    return ax

@@ -1,0 +1,96 @@
+"""Figures of zones: outliers, the hull and its slices, ellipses by speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import cycle
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from scipy.spatial import ConvexHull
+
+from ...zones.ellipses import Ellipse
+from ...zones.social_zone import SocialZone
+from .style import BLACK, BLUE, GREY, RED, axes, colours, metres
+
+
+def plot_outliers(
+    points: np.ndarray, outlier: np.ndarray, *, r_max: float = 2.0, ax: Axes | None = None
+) -> Axes:
+    """In- and outliers in the complementary plane; points (n, 2), outlier (n,) (paper, fig. 4a)."""
+    ax = axes(ax, size=(6, 5))
+    ax.plot(
+        *points[~outlier].T,
+        ".",
+        color=GREY,
+        markersize=2,
+        rasterized=True,
+        label=f"{(~outlier).sum():,} inliers",
+    )
+    ax.plot(*points[outlier].T, "x", color=RED, markersize=7, mew=1.8, label=f"{outlier.sum():,} outliers")
+    ax.add_patch(Circle((0, 0), r_max, fill=False, linestyle=":", color=BLACK, label="contact, r = 0"))
+    ax.set(xlim=(-1.05 * r_max, 1.05 * r_max), ylim=(-1.05 * r_max, 1.05 * r_max))
+    ax.legend(loc="upper right")
+    metres(ax, "Turned inside out: the nearer, the farther out")
+    ax.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
+    return ax
+
+
+def plot_hull(zone: SocialZone, speeds: Sequence[float] = (0.7, 0.9, 1.1, 1.3), *, ax: Any = None) -> Axes3D:
+    """The hull over (x', y', speed) with its slices (paper, fig. 4b)."""
+    if ax is None:
+        ax = plt.figure(figsize=(7, 6), layout="constrained").add_subplot(projection="3d")
+    hull = ConvexHull(zone.vertices)
+    faces = Poly3DCollection(
+        zone.vertices[hull.simplices], facecolor=GREY, edgecolor=GREY, alpha=0.12, linewidth=0.3
+    )
+    ax.add_collection3d(faces)
+    for speed, colour in zip(speeds, colours(speeds), strict=True):
+        corners = zone.slice(speed).polygon
+        closed = np.vstack([corners, corners[:1]])
+        ax.plot(*closed.T, np.full(len(closed), speed), color=colour, linewidth=2.5, label=f"{speed:g} m/s")
+    ax.auto_scale_xyz(*zone.vertices.T)
+    ax.set(
+        xlabel="x' [m]",
+        ylabel="y' [m]",
+        zlabel="speed [m/s]",
+        title="The hull of the inliers, and its slices by speed",
+    )
+    ax.legend(loc="upper left", fontsize=8)
+    ax.view_init(elev=18, azim=-60)
+    return ax
+
+
+def plot_zone(
+    zone: SocialZone, speed: float, *, truth: Ellipse | None = None, ax: Axes | None = None
+) -> Axes:
+    """The zone's boundary at one speed, and the smallest ellipse around it with its support points."""
+    ax = axes(ax, size=(5, 4.5))
+    ellipse = zone.ellipse(speed)
+    ax.fill(*zone.boundary(speed).T, facecolor=GREY, alpha=0.4, label="zone: r_max - R'")
+    ax.plot(*ellipse.curve().T, color=BLUE, linewidth=2, label="smallest enclosing ellipse")
+    if ellipse.support is not None:
+        ax.plot(*ellipse.support.T, "o", color=BLUE, label=f"its {len(ellipse.support)} support points")
+    if truth is not None:
+        ax.plot(*truth.curve().T, "--", color=RED, linewidth=2, label="truth")
+    ax.plot(0, 0, marker=(3, 0, -90), color=BLACK, markersize=10)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), fontsize=8, ncols=2)
+    return metres(ax, f"Minimum social zone at {speed:g} m/s", person=True)
+
+
+def plot_zones(ellipses: Mapping[float, Ellipse], *, ax: Axes | None = None) -> Axes:
+    """Ellipses by speed around a person who walks to the right (paper, fig. 5)."""
+    ax = axes(ax, size=(6, 5))
+    shown = sorted(ellipses.items())
+    for (speed, ellipse), colour, line in zip(
+        shown, colours(shown), cycle(("-", "--", ":", "-.")), strict=False
+    ):
+        ax.plot(*ellipse.curve().T, color=colour, linestyle=line, linewidth=2, label=f"{speed:g} m/s")
+    ax.plot(0, 0, marker=(3, 0, -90), color=BLACK, markersize=10)
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+    return metres(ax, "Minimum social zones by speed", person=True)

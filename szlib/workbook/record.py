@@ -1,0 +1,227 @@
+"""What a notebook writes down: its checks, its figures, its key numbers, its artefacts.
+
+A *check* must hold, or the run fails.  A *claim* of the paper is measured: where the data does not
+support it the page says "not supported here", with the numbers, and the run goes on.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from pandas.io.formats.style import Styler
+
+from .. import __version__
+from ..encounters.search import find_encounters
+from ..errors import ZoneError
+from ..plaza.people import make_plaza
+from ..tracks import datasets
+from ..tracks.clock import read_tracks
+from ..zones.social_zone import SocialZone
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..control.settings import MPCSettings
+
+PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
+"""Badges: where a parameter comes from."""
+
+
+@dataclass
+class Page:
+    """The record of one notebook.
+
+    Parameters
+    ----------
+    name : of the notebook, "NN_topic".
+    data : "synthetic" (the plaza, written among the results), or as in `szlib.tracks.datasets.find`.
+    results : folder that holds a folder of results for each data set.
+    seed : of everything random, the synthetic plaza included.
+    """
+
+    name: str
+    data: str | Sequence[str]
+    results: str | Path = "../results"
+    seed: int = 0
+    checks: list[dict[str, Any]] = field(default_factory=list)
+    figures: list[str] = field(default_factory=list)
+    key: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        (self.out / "pages").mkdir(parents=True, exist_ok=True)
+
+    @property
+    def out(self) -> Path:
+        """Where this data set's results go."""
+        return Path(self.results) / datasets.label(self.data)
+
+    @property
+    def synthetic(self) -> bool:
+        """Whether the data is the plaza, whose truth is known."""
+        return self.data == datasets.SYNTHETIC
+
+    def files(self) -> list[Path]:
+        """The files of the data set."""
+        return data_files(self.data, folder=self.out, seed=self.seed)
+
+    def tracks(self) -> pd.DataFrame:
+        """The track table of the data set."""
+        return read_tracks(self.files())
+
+    def encounters(self) -> pd.DataFrame:
+        """The encounters that notebook 02 left, or found now where there are none of this data and seed."""
+        file = self.out / "encounters.parquet"
+        if file.exists():
+            samples = pd.read_parquet(file)
+            if samples.attrs.get("source") == self._source():
+                return samples
+        return self.keep_encounters(find_encounters(self.tracks()))
+
+    def keep_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
+        """Leave the encounters for the notebooks to come."""
+        samples.attrs["source"] = self._source()
+        _replace(self.out / "encounters.parquet", samples.to_parquet)
+        return samples
+
+    def zone(self) -> SocialZone:
+        """The zone that notebook 05 left, or fitted now where there is none of this data and seed."""
+        file = self.out / "zone.json"
+        if file.exists():
+            try:
+                zone = SocialZone.load(file)
+            except ZoneError as error:
+                print(f"fitting the zone again: {error}")
+            else:
+                if zone.provenance.get("source") == self._source():
+                    return zone
+        return self.keep_zone(SocialZone.fit(self.encounters()))
+
+    def keep_zone(self, zone: SocialZone) -> SocialZone:
+        """Leave the zone for the notebooks to come."""
+        zone = replace(zone, provenance={**zone.provenance, "source": self._source()})
+        zone.save(self.out / "zone.json")
+        return zone
+
+    def check(self, what: str, passed: object, value: object = None) -> None:
+        """Record what must hold; a failure fails the run, after the notebook has gone to its end."""
+        self._record("check", what, bool(passed), value, "holds" if passed else "FAILED")
+
+    def claim(self, what: str, supported: object, value: object = None) -> None:
+        """Record whether the data supports a claim of the paper; if not, the run goes on."""
+        self._record(
+            "claim", what, bool(supported), value, "supported" if supported else "not supported here"
+        )
+
+    def figure(self, figure: Figure, name: str) -> None:
+        """Save a figure among the results as NN_topic-name.png."""
+        file = self.out / "figures" / f"{self.name}-{name}.png"
+        file.parent.mkdir(exist_ok=True)
+        figure.savefig(file, dpi=150, bbox_inches="tight")
+        self.figures.append(file.name)
+
+    def animation(self, content: bytes, name: str) -> None:
+        """Save an animated picture among the results as NN_topic-name.gif."""
+        file = self.out / "figures" / f"{self.name}-{name}.gif"
+        file.parent.mkdir(exist_ok=True)
+        file.write_bytes(content)
+        self.figures.append(file.name)
+
+    def close(self) -> Styler:
+        """Write the page down for the summary; returns its checks and claims to read."""
+        record = {
+            "notebook": self.name,
+            "checks": self.checks,
+            "key_figures": self.key,
+            "figures": self.figures,
+        }
+        text = json.dumps(record, indent=1, default=_plain)
+        _replace(
+            self.out / "pages" / f"{self.name}.json", lambda file: file.write_text(text, encoding="utf-8")
+        )
+        rows = [(c["kind"], c["name"], c["result"], _told(c["value"])) for c in self.checks]
+        return _whole(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
+
+    def _record(self, kind: str, name: str, passed: bool, value: object, result: str) -> None:
+        value = _plain(value)
+        self.checks.append({"kind": kind, "name": name, "passed": passed, "value": value, "result": result})
+        print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({_told(value)})"))
+
+    def _source(self) -> dict[str, Any]:
+        files = [[file.name, file.stat().st_size] for file in self.files()]
+        return {"data": datasets.label(self.data), "seed": self.seed, "files": files, "szlib": __version__}
+
+
+def data_files(data: str | Sequence[str], *, folder: Path, seed: int) -> list[Path]:
+    """The files of a data set; those of the plaza of this seed are written into `folder` if missing."""
+    if data != datasets.SYNTHETIC:
+        return datasets.find(data)
+    file = folder / f"plaza-{seed}.csv"
+    if not file.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        make_plaza(file, seed=seed)
+    return [file]
+
+
+def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
+    """A table of parameters for a notebook: name, value, badge (paper, assumed, measured), why."""
+    unknown = {badge for _, _, badge, _ in rows} - {PAPER, ASSUMED, MEASURED}
+    if unknown:
+        raise ValueError(f"badges must be {PAPER}, {ASSUMED} or {MEASURED}; got {sorted(unknown)}")
+    return _whole(pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"]))
+
+
+def settings_table(settings: MPCSettings) -> Styler:
+    """The controller's parameters as such a table; what each one is stands in the docstring of its class."""
+    told: dict[str, str] = {}
+    names: list[str] = []
+    for line in (inspect.getdoc(type(settings)) or "").splitlines():
+        entry = re.fullmatch(r"([A-Za-z_]\w*(?:, \w+)*) : (.*)", line)
+        if entry:
+            names = entry[1].split(", ")
+            told |= dict.fromkeys(names, entry[2])
+        elif line.startswith("    ") and names:
+            told |= {name: f"{told[name]} {line.strip()}" for name in names}
+        else:
+            names = []
+    badges = settings.badges()
+    return parameters([(name, getattr(settings, name), badge, told[name]) for name, badge in badges.items()])
+
+
+def _whole(table: pd.DataFrame) -> Styler:
+    """A table whose long texts are shown to their end, the same HTML every time."""
+    left = [{"selector": "td, th", "props": "text-align: left"}]
+    return Styler(table, uuid="szlib", cell_ids=False).hide(axis="index").set_table_styles(left)  # type: ignore[arg-type]
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers as Python's, rounded to what a reader can use."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(v) for v in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    return round(value, 6) if isinstance(value, float) else value
+
+
+def _told(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, dict):
+        return ", ".join(f"{k}: {_told(v)}" for k, v in value.items())
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _replace(file: Path, write: Any) -> None:
+    """Write a file as a whole or not at all."""
+    unfinished = file.with_name(f".{file.name}")
+    write(unfinished)
+    unfinished.replace(file)

@@ -1,0 +1,119 @@
+"""The exact distances against shapely's, and the margin against its definition."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+import szlib
+from szlib.control.distances import (
+    audit,
+    euclidean_to_ellipse,
+    euclidean_to_segment,
+    overestimate,
+    required_margin,
+    safe_edge,
+    with_margin,
+)
+
+coordinate = st.floats(-3, 3, allow_subnormal=False)
+points = st.tuples(coordinate, coordinate)
+ellipses = st.builds(
+    lambda center, a, share, angle: szlib.Ellipse(center, (a, share * a), angle),
+    points, st.floats(0.1, 2), st.floats(0.05, 1), st.floats(-3, 3),
+)  # fmt: skip
+lengths = st.floats(0.1, 20)
+radii = st.floats(0.1, 1)
+
+
+@given(points, points, points)
+def test_segment_is_shapelys(point, a, b):
+    if np.hypot(*np.subtract(a, b)) < 1e-3:
+        return
+    exact = shapely.LineString([a, b]).distance(shapely.Point(point))
+    assert euclidean_to_segment(point, a, b) == pytest.approx(exact, abs=1e-9)
+
+
+@given(points, ellipses)
+def test_ellipse_is_shapelys(point, ellipse):
+    # The polygon of n corners lies inside the curve, by at most a (1 - cos(pi/n)).
+    n = 20_000
+    exact = shapely.LinearRing(ellipse.curve(n + 1)).distance(shapely.Point(point))
+    found = euclidean_to_ellipse(point, ellipse)
+    assert abs(found) == pytest.approx(exact, abs=2 * ellipse.semi_axes[0] * (1 - np.cos(np.pi / n)) + 1e-9)
+    assert (found < 0) == (ellipse.level(point) < 1) or exact < 1e-9
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0])
+def test_on_the_axes_of_an_ellipse(angle):
+    ellipse = szlib.Ellipse((0.0, 0.0), (2.0, 1.0), angle)
+    along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    at = np.array([0 * along, 3 * along, 3 * across, 1.9 * along, 0.5 * across])
+    # Beyond the centre of curvature, a - b^2/a = 1.5 from the centre, the vertex is nearest.
+    assert euclidean_to_ellipse(at, ellipse) == pytest.approx([-1, 1, 2, -0.1, -0.5], abs=1e-9)
+
+
+@given(st.lists(points, min_size=1, max_size=20), ellipses)
+def test_focal_distance_never_overestimates(some, ellipse):
+    true = euclidean_to_ellipse(some, ellipse)
+    assert (np.abs(szlib.ellipse_distance(some, ellipse)) <= np.abs(true) + 1e-9).all()
+    assert (overestimate(some, ellipse)[true > 0] <= 1e-9).all()
+
+
+@given(lengths, radii, st.floats(0, 2 * np.pi), st.floats(0, 1))
+@example(1.0, 0.5, 0.0, 1.0)
+def test_required_margin_of_a_wall_is_enough(length, radius, phi, share):
+    """Wherever the robot's disc touches the wall, d < r + margin."""
+    half = np.array([length / 2, 0.0])
+    point = np.array([share * length / 2 + radius * np.cos(phi), radius * np.sin(phi)])
+    true = euclidean_to_segment(point, -half, half)
+    assert true <= radius + 1e-12
+    margin = required_margin([-half, half], radius)
+    assert szlib.segment_distance(point, -half, half) <= radius + margin + 1e-9
+
+
+@given(lengths, radii)
+def test_and_no_smaller_one_is(length, radius):
+    half = np.array([length / 2, 0.0])
+    tip = half + np.array([radius, 0.0])
+    assert szlib.segment_distance(tip, -half, half) == pytest.approx(
+        radius + required_margin([-half, half], radius)
+    )
+
+
+@given(ellipses, st.floats(0.05, 1.5))
+def test_safe_edge_of_an_ellipse(ellipse, distance):
+    assert szlib.ellipse_distance(safe_edge(ellipse, distance, 50), ellipse) == pytest.approx(
+        distance, abs=1e-9
+    )
+
+
+@given(points, points, st.floats(0.05, 1.5))
+def test_safe_edge_of_a_wall(a, b, distance):
+    if np.hypot(*np.subtract(a, b)) < 1e-2:
+        return
+    edge = safe_edge([a, b], distance, 50)
+    assert szlib.segment_distance(edge, a, b) == pytest.approx(distance, abs=1e-6)
+
+
+def test_the_papers_margin():
+    wall = lambda length: [(-length / 2, 0.0), (length / 2, 0.0)]  # noqa: E731
+    one = audit(wall(1.0), r_robot=0.5, eps=0.05)
+    assert one.nearest == pytest.approx((np.sqrt(1 + 4 * 0.55) - 1) / 2 - 0.5)  # d = s + s^2/L on the line
+    assert audit(wall(5.0), r_robot=0.5, eps=0.05).nearest == pytest.approx(0, abs=1e-12)
+    for length in (0.3, 1.0, 3.0):
+        enough = audit(wall(length), r_robot=0.5, eps=required_margin(wall(length), 0.5))
+        assert enough.nearest == pytest.approx(0, abs=1e-9)
+    zone = audit(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), r_robot=0.5, eps=0.05)
+    assert zone.nearest == pytest.approx(0.05)
+    assert zone.farthest > 0.05
+
+
+def test_controller_uses_the_margin():
+    walls = [[(0.0, 0.0), (1.0, 0.0)], [(0.0, 5.0), (9.0, 5.0)]]
+    settings = with_margin(szlib.MPCSettings(), walls)
+    assert settings.eps == 0.25
+    assert with_margin(settings, []) == settings
+    controller = szlib.MPCCBF(szlib.Ellipse((0.0, 0.0), (1.0, 0.7)), walls=walls, settings=settings)
+    assert controller.barriers((1.5, 0.0))[0] == pytest.approx(0)

@@ -1,0 +1,240 @@
+"""The two solvers side by side, the rungs of the ladder, and what the terminal conditions promise."""
+
+import ast
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+from random_states import ZONE, meetings, questions
+
+import szlib
+from szlib.control.problem import TOLERANCE
+from szlib.simulation.closed_loop import advance
+
+SOLVERS = ("sqp", "ipopt")
+GOAL = (4.0, 0.0)
+FACING = szlib.Person((0.0, 0.0), heading=np.pi)
+FORMULATIONS = ({}, {"N_h": 8}, {"terminal": "rest"})
+
+
+def controller_of(solver, walls=(), **settings):
+    return szlib.MPCCBF(ZONE, walls=walls, settings=szlib.MPCSettings(solver=solver, **settings))
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
+def test_both_solvers_find_the_same_plan_or_another_local_one_of_the_same_problem(formulation):
+    same = other = only_one = 0
+    for question in islice(questions(seed=1), 100):
+        sqp, ipopt = (
+            question.ask(szlib.MPCSettings(solver=solver, tie=0.0, **formulation)) for solver in SOLVERS
+        )
+        if not (sqp.status == ipopt.status == "optimal"):
+            only_one += sqp.status != ipopt.status
+            continue
+        assert sqp.residual.min(initial=0) >= -TOLERANCE
+        if sqp.cost == pytest.approx(ipopt.cost, rel=1e-6):
+            same += 1
+            assert sqp.control == pytest.approx(ipopt.control, abs=1e-3)
+        else:
+            other += 1
+    assert same > 70 and other <= 2 and only_one <= 1
+
+
+@pytest.mark.parametrize("name", szlib.SCENARIOS)
+def test_the_scenarios_of_the_paper_run_the_same_with_both(name):
+    scenario = szlib.SCENARIOS[name]
+    sqp, ipopt = (szlib.simulate(scenario, controller_of(s, scenario.walls)) for s in SOLVERS)
+    for log in (sqp, ipopt):
+        assert log.metrics()["infeasible_steps"] == 0
+        assert all(claim.check(log)[0] for claim in scenario.claims)
+    assert sqp.metrics()["passing_side"] == ipopt.metrics()["passing_side"]
+    assert sqp.metrics()["time_to_goal"] == pytest.approx(ipopt.metrics()["time_to_goal"], abs=0.2)
+
+
+@pytest.mark.parametrize(("package", "where"), [("casadi", {"problem", "ipopt", "sqp"}), ("daqp", {"sqp"})])
+def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
+    found = set()
+    for file in Path(szlib.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
+            if any(name.split(".")[0] == package for name in names):
+                found.add(file.stem)
+    assert found == where
+
+
+# the ladder
+
+
+def broken(monkeypatch, controller, *names):
+    for name in names:
+        monkeypatch.setattr(controller._solvers[1], name, lambda guess, _: (guess, False))
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_rungs_warm_and_cold_give_the_same_control(solver):
+    controller = controller_of(solver)
+    state = np.array([-3.0, 0.4, 0.5, 0.0])
+    warm = controller.step(state, GOAL, [FACING])
+    controller._plan[:] = np.nan
+    cold = controller.step(state, GOAL, [FACING])
+    assert (warm.rung, cold.rung) == ("warm", "cold")
+    assert cold.control == pytest.approx(warm.control, abs=1e-5)
+    assert warm.feasible and cold.feasible
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_rung_kept_goes_on_with_a_plan_that_still_holds(solver, monkeypatch):
+    controller = controller_of(solver, terminal="rest")
+    state = np.array([-2.6, 0.4, 0.5, 0.0])
+    before = controller.step(state, GOAL, [FACING])
+    broken(monkeypatch, controller, "hard", "relaxed")
+    for k in range(1, 8):
+        state = advance(state, before.control if k == 1 else step.control, 0.1)  # noqa: F821
+        step = controller.step(state, GOAL, [FACING])
+        assert step.rung == step.status == "kept" and step.feasible
+        assert state == pytest.approx(before.predicted[k])
+    assert step.predicted[1, 2:] == pytest.approx((0, 0), abs=TOLERANCE)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("formulation", ({}, {"N_h": 8}), ids=str)
+def test_the_rung_relaxed_says_by_how_much_the_hard_problem_is_violated(solver, formulation):
+    step = controller_of(solver, **formulation).step((-1.9, 0.0, 0.7, 0.0), GOAL, [FACING])
+    assert step.rung == step.status == "relaxed"
+    assert step.slack == pytest.approx(-step.residual.min()) and step.slack > 1e-3
+    assert not step.feasible and not step.safe
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_rung_braking_is_what_remains_when_no_solver_has_an_answer(solver, monkeypatch):
+    controller = controller_of(solver)
+    broken(monkeypatch, controller, "hard", "relaxed")
+    step = controller.step((-3.0, 0.0, 0.8, -0.4), GOAL, [FACING])
+    assert step.rung == step.status == "braking"
+    assert step.control == pytest.approx((-1.0, 0.5))
+    assert step.predicted[-1, 2:] == pytest.approx((0, 0), abs=1e-12)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_robot_too_fast_to_stop_within_the_horizon_brakes(solver):
+    controller = controller_of(solver, terminal="rest")
+    step = controller.step((-4.0, 0.0, 1.0, 0.0), GOAL, [FACING])
+    assert step.rung == "braking"
+    assert step.slack == pytest.approx(0.2) and not step.feasible
+    assert step.control == pytest.approx((-1.0, 0.0))
+
+
+def test_the_rungs_are_counted():
+    close = szlib.Person((0.0, 0.0), (-0.5, 0.0))
+    scenario = szlib.Scenario("close", (-1.9, 0.0, 0.0, 0.0), (4.0, 0.0), (close,))
+    log = szlib.simulate(scenario, controller_of("sqp"))
+    counts = {k: v for k, v in log.metrics().items() if k.startswith("steps_")}
+    assert sum(counts.values()) == len(log.table)
+    assert counts["steps_relaxed"] == (log.table["rung"] == "relaxed").sum() > 0
+    assert log.metrics()["infeasible_steps"] == (log.table["slack"] > TOLERANCE).sum() > 0
+
+
+# what the terminal conditions promise
+
+
+def drive(controller, state, goal, people, steps):
+    """States, steps and people, as predicted."""
+    for _ in range(steps):
+        step = controller.step(state, goal, people)
+        yield state, step, people
+        state = advance(state, step.control, controller.settings.dt)
+        people = [p.after(controller.settings.dt) for p in people]
+
+
+@pytest.mark.parametrize(("solver", "worlds"), [("sqp", 60), ("ipopt", 3)])
+def test_with_rest_at_its_end_no_plan_among_walls_and_standing_people_is_ever_infeasible(solver, worlds):
+    asked = 0
+    for question in islice(questions(seed=2), worlds):
+        people = [replace(p, velocity=(0.0, 0.0)) for p in question.people]
+        controller = controller_of(solver, question.walls, terminal="rest")
+        state = np.r_[question.state[:2], 0, 0]
+        if min(controller.barriers(p, people).min(initial=0) for p in (state[:2], question.goal)) < 0:
+            continue
+        for x, step, _ in drive(controller, state, question.goal, people, 120):
+            asked += 1
+            assert step.feasible, (x, step.rung, step.slack)
+            assert step.h.min(initial=0) >= -TOLERANCE
+            assert np.abs(step.predicted[-1, 2:]).max() <= TOLERANCE
+    assert asked > 40 * worlds
+
+
+def rooms(seed):
+    """A robot at rest in a closed room, and two people who walk through it at up to 1.2 m/s, without end."""
+    rng = np.random.default_rng(seed)
+    corners = 3.0 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    walls = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    while True:
+        angles = rng.uniform(-np.pi, np.pi, 2)
+        starts = 6 * np.c_[np.cos(angles), np.sin(angles)]
+        courses = rng.uniform(-2, 2, (2, 2)) - starts
+        paces = rng.uniform(0.3, 1.2, 2) / np.hypot(*courses.T)
+        people = [
+            szlib.Person(tuple(p), tuple(v * pace)) for p, v, pace in zip(starts, courses, paces, strict=True)
+        ]
+        yield np.r_[rng.uniform(-2, 2, 2), 0, 0], rng.uniform(-2, 2, 2), people, walls
+
+
+@pytest.mark.parametrize(("solver", "worlds"), [("sqp", 60), ("ipopt", 3)])
+def test_with_rest_at_its_end_nobody_who_walks_as_predicted_is_hit_by_a_moving_robot(solver, worlds):
+    rungs, reached = set(), 0
+    for state, goal, people, walls in islice(rooms(seed=3), worlds):
+        controller = controller_of(solver, walls, terminal="rest")
+        for x, step, _ in drive(controller, state, goal, people, 150):
+            rungs.add(step.rung)
+            if step.h.min() < -10 * TOLERANCE:
+                reached += 1
+                assert x[2:] == pytest.approx((0, 0), abs=1e-5)
+                break
+    assert reached >= worlds // 10
+    assert solver == "ipopt" or {"warm", "kept", "relaxed"} <= rungs
+
+
+@pytest.mark.parametrize(("solver", "worlds"), [("sqp", 30), ("ipopt", 3)])
+def test_at_a_persons_pace_at_its_end_no_plan_is_infeasible_although_they_walk(solver, worlds):
+    rng, asked = np.random.default_rng(4), 0
+    while asked < worlds * 100:
+        person = szlib.Person(tuple(rng.uniform(-1, 1, 2)), tuple(rng.uniform(-0.5, 0.5, 2)))
+        controller = controller_of(solver, terminal="person")
+        state = np.r_[rng.uniform(-4, 4, 2), 0, 0]
+        if not controller.step(state, -state[:2], [person]).safe:
+            continue
+        for x, step, _ in drive(controller, state, -state[:2], [person], 100):
+            asked += 1
+            assert step.feasible, (x, step.rung, step.slack)
+            assert step.h.min() >= -TOLERANCE
+            assert step.predicted[-1, 2:] == pytest.approx(person.velocity, abs=TOLERANCE)
+
+
+def test_a_terminal_condition_that_makes_no_sense_is_refused():
+    with pytest.raises(szlib.SolverError, match="open space; got 1 walls"):
+        controller_of("sqp", [((0, 5), (1, 5))], terminal="person")
+    with pytest.raises(szlib.SolverError, match="one person; got 2"):
+        controller_of("sqp", terminal="person").step((-4, 0, 0, 0), GOAL, [FACING, FACING])
+    with pytest.raises(szlib.SolverError, match="max_people must be"):
+        szlib.MPCCBF(ZONE, max_people=-1)
+    assert szlib.MPCSettings(terminal="rest").N_h == 8
+
+
+# head-on
+
+
+@pytest.mark.parametrize(("solver", "count"), [("sqp", 40), ("ipopt", 5)])
+def test_symmetric_meetings_are_passed_on_the_chosen_side_or_where_there_is_room(solver, count):
+    for scenario, place in islice(meetings(seed=5), count):
+        log = szlib.simulate(scenario, controller_of(solver, scenario.walls))
+        assert log.success, (place, scenario)
+        assert log.metrics()["passing_side"] == ("left" if place == "wall" else "right"), (place, scenario)
+
+
+def test_a_symmetric_meeting_is_the_same_every_time():
+    scenario, _ = next(meetings(seed=6))
+    first, again = (szlib.simulate(scenario, controller_of("sqp", scenario.walls)) for _ in range(2))
+    assert np.array_equal(first.predicted, again.predicted)

@@ -1,0 +1,289 @@
+"""Many days: whoever computes them, in whatever order, however often they are killed, the result is one."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import joblib
+import pandas as pd
+import pytest
+
+import szlib
+from szlib.encounters import days as extraction
+from szlib.plaza.people import make_plaza
+from szlib.plaza.truth import PlazaSettings
+from szlib.tracks import funnels
+
+DATES = ("2012-10-24", "2012-10-28", "2012-10-31", "2012-11-04")
+HERE = {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
+"""Other processes import the same szlib."""
+ONE_RUN = "import sys, szlib; szlib.extract_days(sys.argv[2:], out=sys.argv[1], n_jobs={}, progress=False)"
+
+
+@pytest.fixture(scope="module")
+def days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("days")
+    return [
+        make_plaza(
+            folder / f"atc-{date.replace('-', '')}.csv",
+            seed=seed,
+            settings=PlazaSettings(encounters=60, date=date),
+        )
+        for seed, date in enumerate(DATES)
+    ]
+
+
+def extract(paths: object, out: Path, **given: object) -> szlib.Extraction:
+    return szlib.extract_days(paths, out=out, progress=False, **given)  # type: ignore[arg-type]
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file of a folder, hidden ones too."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def reference(days: list[Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    out = tmp_path_factory.mktemp("reference")
+    assert set(extract(days, out).table["status"]) == {"done"}
+    return contents(out)
+
+
+def test_days_are_those_of_the_whole_table(days: list[Path], tmp_path: Path) -> None:
+    ours = extract(days, tmp_path / "out").samples()
+    whole = szlib.find_encounters(szlib.read_tracks(days))
+    pd.testing.assert_frame_equal(ours, whole, check_exact=True, check_categorical=False)
+    assert len(ours) > 0
+    read = [stage for stage in funnels.of(ours) if stage["stage"].startswith("read ")]
+    entered, kept = sum(s["entered"] for s in read), sum(s["kept"] for s in read)
+    assert entered == sum(len(day.read_text().splitlines()) for day in days)
+    assert kept == next(s["entered"] for s in funnels.of(ours) if s["stage"] == "near the square")
+
+
+def test_the_result_depends_neither_on_order_nor_on_processes_nor_on_blocks(
+    days: list[Path], reference: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    extract(days[::-1], tmp_path / "reversed")
+    extract(str(days[0].parent / "*.csv"), tmp_path / "two", n_jobs=2)
+    monkeypatch.setattr("szlib.encounters.streaming._ROWS_AT_ONCE", 700)
+    extract([days[0].parent], tmp_path / "blocks")
+    for name in ("reversed", "two", "blocks"):
+        assert contents(tmp_path / name) == reference
+    zones = [
+        szlib.SocialZone.fit(extract(paths, tmp_path / "two").samples(), speeds=(0.9, 1.1))
+        for paths in (days, days[::-1])
+    ]
+    assert zones[0].ellipses == zones[1].ellipses
+    assert zones[0].provenance == zones[1].provenance
+
+
+def test_what_is_there_is_kept_and_what_changed_is_done_again(days: list[Path], tmp_path: Path) -> None:
+    out, copies = tmp_path / "out", [tmp_path / day.name for day in days]
+    for copy, day in zip(copies, days, strict=True):
+        copy.write_bytes(day.read_bytes())
+
+    def statuses(**given: object) -> list[str]:
+        return list(extract(given.pop("paths", copies), out, **given).table["status"])
+
+    assert statuses(paths=copies[:3]) == ["done"] * 3
+    assert statuses() == ["kept"] * 3 + ["done"], "a further day"
+    assert statuses(exclude=[DATES[1]]) == ["kept", "excluded", "kept", "kept"], "excluded days stay"
+    os.utime(copies[0])
+    assert statuses(n_jobs=2) == ["kept"] * 4, "content counts, not the time of the file"
+    content = bytearray(copies[2].read_bytes())
+    content[-2] ^= 1  # the last digit of the last row
+    copies[2].write_bytes(content)
+    assert statuses() == ["kept", "kept", "done", "kept"]
+    (out / f"{DATES[3]}.parquet").write_bytes((out / f"{DATES[3]}.parquet").read_bytes()[:-1])
+    (out / f"{DATES[0]}.json").write_text("{")
+    assert statuses() == ["done", "kept", "kept", "done"], "what is damaged is done again"
+    assert statuses(min_speed=0.5) == ["done"] * 4
+    assert statuses() == ["done"] * 4
+    record = json.loads((out / f"{DATES[0]}.json").read_text())
+    assert record["parameters"]["min_speed"] == 0.4
+    assert record["rows"] == sum(s["entered"] for s in record["funnel"] if s["stage"].startswith("read"))
+
+
+def test_days_that_fail_do_not_stop_the_others(days: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "atc-20121107.csv").write_text("1352246400.0,1,2,3,4,5,6,7\n" + "rubbish\n" * 5)
+    (tmp_path / "broken.csv.gz").write_bytes(b"\x1f\x8b rubbish")
+    done = extract([*days[:2], tmp_path], tmp_path / "out")
+    assert list(done.table["status"]) == ["done", "done", "failed", "failed"]
+    assert list(done.failed["day"]) == ["2012-11-07", "broken"]
+    assert "line 2: missing or extra fields" in done.failed["why"].iloc[0]
+    assert "damaged .gz" in done.failed["why"].iloc[1]
+    assert "2 done, 2 failed" in str(done)
+    assert list(done.samples()["day"].cat.categories) == list(DATES[:2])
+
+
+def test_pieces_of_one_day_are_one_day(days: list[Path], tmp_path: Path) -> None:
+    lines = days[0].read_text().splitlines(keepends=True)
+    for part in range(2):  # as in the public 1 Hz day: people of one hour in several files
+        (tmp_path / f"part{part}.csv").write_text("".join(lines[part::2]))
+    pieces = extract(sorted(tmp_path.glob("part*.csv")), tmp_path / "pieces")
+    assert list(pieces.table["files"]) == [2]
+    whole = extract(days[:1], tmp_path / "whole").samples()
+    pd.testing.assert_frame_equal(pieces.samples(), whole, check_exact=True)
+
+
+def test_a_day_on_which_nobody_met(days: list[Path], tmp_path: Path) -> None:
+    far = extract(days[:2], tmp_path / "far", square=szlib.Square(x=(500, 520), y=(500, 520)))
+    assert list(far.table["encounters"]) == [0, 0]
+    samples = far.samples()
+    assert len(samples) == 0
+    assert list(samples.columns) == list(szlib.find_encounters(szlib.read_tracks(days[0])).columns)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"speed": 1}, "unknown parameter"),
+        ({"tz": "Mars"}, "unknown time zone 'Mars'"),
+        ({"unit": "cm"}, "unit must be 'm' or 'mm'"),
+        ({"file_format": "csv"}, "unknown file_format 'csv'"),
+    ],
+)
+def test_parameters_without_a_meaning(
+    days: list[Path], tmp_path: Path, given: dict[str, object], told: str
+) -> None:
+    with pytest.raises(szlib.DataError, match=told):
+        extract(days, tmp_path / "out", **given)
+
+
+def test_an_output_that_cannot_be_written(days: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(szlib.DataError, match="cannot be made"):
+        extract(days, tmp_path / "file" / "out")
+    with pytest.raises(szlib.DataError, match="no such file"):
+        extract(tmp_path / "nothing.csv", tmp_path / "out")
+
+
+def test_a_full_disk_is_told_and_earlier_days_stay_intact(
+    days: list[Path], reference: dict[str, bytes], tmp_path: Path
+) -> None:
+    extract(days[:2], tmp_path)
+    before = contents(tmp_path)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(
+        resource.RLIMIT_FSIZE, (4096, hard)
+    )  # no file may grow beyond 4 KiB: as on a full disk
+    try:
+        full = extract(days, tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert list(full.table["status"]) == ["kept", "kept", "failed", "failed"]
+    assert "cannot be written" in full.failed["why"].iloc[0]
+    assert "make room" in full.failed["why"].iloc[0]
+    assert contents(tmp_path) == before, "nothing half-written stays"
+    extract(days, tmp_path)
+    assert contents(tmp_path) == reference
+
+
+def test_an_output_that_is_read_only(
+    days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    refused = extract(days[:1], tmp_path / "out")
+    assert "Read-only file system" in refused.failed["why"].iloc[0]
+    with pytest.raises(szlib.DataError, match="no day was finished"):
+        refused.samples()
+
+
+def kill_and_resume(days: list[Path], out: Path, reference: dict[str, bytes], kills: int, seed: int) -> int:
+    """Kill runs at random moments, each with its processes; then let one finish. How often it struck."""
+    rng, struck, longest = random.Random(seed), 0, 4.0
+    for _ in range(kills):
+        command = [sys.executable, "-c", ONE_RUN.format(2), str(out), *map(str, days)]
+        begun = time.monotonic()
+        run = subprocess.Popen(
+            command, start_new_session=True, stderr=subprocess.DEVNULL, env=os.environ | HERE
+        )
+        try:
+            run.wait(timeout=rng.uniform(0.3, longest))
+            longest = max(1.0, time.monotonic() - begun)
+        except subprocess.TimeoutExpired:
+            os.killpg(run.pid, signal.SIGKILL)
+            run.wait()
+            struck += 1
+        finished = {name for name in contents(out) if not name.startswith(".")} if out.exists() else set()
+        for name in finished:
+            if name.endswith(".json"):
+                assert contents(out)[name] == reference[name], "a record that is there is whole"
+        if rng.random() < 0.3 and finished:
+            (out / rng.choice(sorted(finished))).unlink()
+    extract(days, out, n_jobs=2)
+    left = {name: content for name, content in contents(out).items() if not name.startswith(".")}
+    assert left == reference
+    return struck
+
+
+def test_killed_at_random_moments_the_result_is_the_same(
+    days: list[Path], reference: dict[str, bytes], tmp_path: Path
+) -> None:
+    assert kill_and_resume(days, tmp_path / "out", reference, kills=3, seed=1) > 0
+
+
+def test_a_worker_that_dies_is_told(
+    days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(extraction, "extract_day", _die)
+    with pytest.raises(szlib.SzlibError, match="a worker process was killed"):
+        extract(days, tmp_path / "out", n_jobs=2)
+
+
+def _die(*_: object) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_dask_cluster_that_loses_a_worker_gives_the_same(
+    days: list[Path], reference: dict[str, bytes], tmp_path: Path
+) -> None:
+    """In a process of its own: the cluster leaves sockets and threads behind."""
+    pytest.importorskip("distributed")
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import os, signal, sys, threading, time\n"
+        "import joblib, szlib\n"
+        "from pathlib import Path\n"
+        "from distributed import Client, LocalCluster\n"
+        "if __name__ == '__main__':\n"
+        "    out = Path(sys.argv[1])\n"
+        "    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True,\n"
+        "                      dashboard_address=None) as cluster, Client(cluster) as client:\n"
+        "        victim = next(iter(client.run(os.getpid).values()))\n"
+        "        def strike():\n"
+        "            while not list(out.glob('*.json')):\n"
+        "                time.sleep(0.01)\n"
+        "            os.kill(victim, signal.SIGKILL)\n"
+        "        threading.Thread(target=strike, daemon=True).start()\n"
+        "        with joblib.parallel_config('dask'):\n"
+        "            done = szlib.extract_days(sys.argv[2:], out=out, progress=False)\n"
+        "        print(victim in client.run(os.getpid).values(), *done.table['status'])\n"
+    )
+    out = tmp_path / "out"
+    done = subprocess.run(
+        [sys.executable, str(program), str(out), *map(str, days)],
+        capture_output=True, text=True, timeout=120, check=True, env=os.environ | HERE,
+    )  # fmt: skip
+    assert done.stdout.split()[0] == "False", "the worker is gone"
+    assert set(done.stdout.split()[1:]) <= {"done", "kept"}
+    assert contents(out) == reference
+
+
+def test_joblib_decides_where_no_number_of_processes_is_given(
+    days: list[Path], reference: dict[str, bytes], tmp_path: Path
+) -> None:
+    with joblib.parallel_config("threading", n_jobs=2):
+        extract(days, tmp_path)
+    assert contents(tmp_path) == reference

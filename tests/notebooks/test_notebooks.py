@@ -1,0 +1,99 @@
+"""The notebooks: each pair holds together, each was executed, and all of them prove their results."""
+
+import json
+import os
+import re
+from pathlib import Path
+
+import jupytext
+import nbformat
+import pytest
+
+from szlib.workbook import runner as workbook
+
+SOURCES = sorted(workbook.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
+MAX_LINES = 25
+
+
+def cells(source: Path) -> list[nbformat.NotebookNode]:
+    return jupytext.read(source).cells
+
+
+def code_lines(cell: nbformat.NotebookNode) -> int:
+    return sum(1 for line in cell.source.splitlines() if line.strip() and not line.strip().startswith("#"))
+
+
+def test_there_are_ten_and_no_stray_copies():
+    assert [s.stem[:2] for s in SOURCES] == [f"{n:02d}" for n in range(1, len(SOURCES) + 1)]
+    assert len(SOURCES) >= 10
+    assert [p.stem for p in sorted(workbook.NOTEBOOKS.glob("*.ipynb"))] == [s.stem for s in SOURCES]
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.stem)
+class TestEach:
+    def test_the_pair_holds_together(self, source):
+        executed = nbformat.read(source.with_suffix(".ipynb"), as_version=4)
+        told = [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in executed.cells]
+        assert told == [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in cells(source)]
+
+    def test_every_cell_was_executed_in_order_without_error(self, source):
+        code = [
+            c
+            for c in nbformat.read(source.with_suffix(".ipynb"), as_version=4).cells
+            if c.cell_type == "code"
+        ]
+        assert [c.execution_count for c in code] == list(range(1, len(code) + 1))
+        assert all(out.output_type != "error" for c in code for out in c.outputs)
+
+    def test_committed_copies_are_small_and_name_no_machine(self, source):
+        text = source.with_suffix(".ipynb").read_text(encoding="utf-8")
+        assert len(text) < 1_048_576
+        assert not re.search(r"/(home|root|work|Users)/|[A-Z]:\\\\Users", text)
+
+    def test_rhythm(self, source):
+        all_cells = cells(source)
+        assert all_cells[0].cell_type == "markdown"
+        assert "**Question.**" in all_cells[0].source
+        assert "**Expectation.**" in all_cells[0].source
+        assert "**What it means.**" in all_cells[-2].source
+        assert all_cells[-1].source == "page.close()"
+        assert sum("parameters" in c.metadata.get("tags", []) for c in all_cells) == 1
+        assert max(code_lines(c) for c in all_cells if c.cell_type == "code") <= MAX_LINES
+
+    def test_knows_the_common_parameters(self, source):
+        (tagged,) = [c for c in cells(source) if "parameters" in c.metadata.get("tags", [])]
+        assert {"data", "seed", "results"} <= {
+            line.split("=")[0].strip() for line in tagged.source.splitlines()
+        }
+
+
+def proven(summary: dict, home: Path) -> None:
+    assert summary["passed"], workbook.render(summary)
+    assert json.loads((home / "summary.json").read_text(encoding="utf-8"))["passed"]
+    assert list(summary["notebooks"]) == [s.stem for s in SOURCES]
+    for name, page in summary["notebooks"].items():
+        assert page["seconds"] > 0
+        assert page["checks"], name
+        assert all({"name", "passed", "value"} <= set(c) for c in page["checks"])
+        assert all((home / "figures" / figure).stat().st_size > 1000 for figure in page["figures"])
+    for artefact in ("encounters.parquet", "zone.json"):
+        assert (home / artefact).exists()
+
+
+def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
+    summary = workbook.run(out=tmp_path, jobs=2)
+    proven(summary, tmp_path / "synthetic")
+    claims = [c for page in summary["notebooks"].values() for c in page["checks"] if c["kind"] == "claim"]
+    assert sum(c["passed"] for c in claims) > len(claims) / 2
+    assert any("true zone found" in c["name"] for c in summary["notebooks"]["05_zones"]["checks"])
+
+
+@pytest.mark.skipif(
+    not os.environ.get("SZLIB_DATA_DIR"), reason="SZLIB_DATA_DIR names no folder with real data"
+)
+def test_the_workbook_completes_on_the_real_day(tmp_path):
+    summary = workbook.run("atc-1hz", out=tmp_path, jobs=2)
+    proven(summary, tmp_path / "atc-1hz")
+    assert summary["notebooks"]["01_tracks"]["key_figures"]["rows"] == 624_951
+    told = {c["name"]: c["result"] for page in summary["notebooks"].values() for c in page["checks"]}
+    assert told["the zone at 1.1 m/s reaches farther ahead than behind"] == "not supported here"

@@ -1,0 +1,272 @@
+"""The synthetic plaza proves the pipeline: the zone that people there respect must come out of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+
+import szlib
+from szlib.plaza.people import KINDS, make_plaza, positions, stage_encounters
+from szlib.plaza.truth import PlazaSettings
+
+SPEEDS = (0.7, 0.9, 1.1, 1.3)
+DEFAULT = PlazaSettings()
+ASIDE = PlazaSettings(
+    slow=szlib.Ellipse((0.0, -0.06), (0.80, 0.58), 0.2), fast=szlib.Ellipse((0.0, -0.06), (0.86, 0.62), 0.2)
+)
+"""Tilted, and off to the person's right."""
+NAMES = ["time", "id", "x", "y", "z", "velocity", "motion_angle", "facing_angle"]
+FEW = PlazaSettings(encounters=150)
+
+
+def samples_of(folder: Path, seed: int, settings: PlazaSettings) -> pd.DataFrame:
+    return szlib.find_encounters(
+        szlib.read_tracks(make_plaza(folder / "plaza.csv", seed=seed, settings=settings))
+    )
+
+
+def raw_rows(path: Path) -> pl.DataFrame:
+    return pl.read_csv(path, has_header=False, new_columns=NAMES)
+
+
+def errors(zone: szlib.SocialZone, settings: PlazaSettings) -> tuple[float, float]:
+    """Largest error of centre and semi-axes [m], and of orientation [deg], over `SPEEDS`."""
+    metres, degrees = [], []
+    for speed in SPEEDS:
+        fit, truth = zone.ellipse(speed), settings.true_zone(speed)
+        metres += list(np.subtract([*fit.center, *fit.semi_axes], [*truth.center, *truth.semi_axes]))
+        degrees.append(np.degrees((fit.angle - truth.angle + np.pi / 2) % np.pi - np.pi / 2))
+    return float(np.max(np.abs(metres))), float(np.max(np.abs(degrees)))
+
+
+def in_frame(staged: pd.DataFrame, moments: int = 86) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of both people, every 0.04 s: speed, and bearing and distance of the partner, each (n, moments, 2)."""
+    t = (staged["start"].to_numpy()[:, None] + np.arange(moments) * 0.04).ravel()
+    where, moves = positions(staged.iloc[np.repeat(np.arange(len(staged)), moments)], t)
+    apart = where[:, ::-1] - where
+    course = np.arctan2(moves[..., 1], moves[..., 0])
+    bearing = np.arctan2(apart[..., 1], apart[..., 0]) - course
+    shape = (len(staged), moments, 2)
+    return (
+        np.hypot(*np.moveaxis(moves, -1, 0)).reshape(shape),
+        bearing.reshape(shape),
+        np.hypot(*np.moveaxis(apart, -1, 0)).reshape(shape),
+    )
+
+
+def levels(
+    settings: PlazaSettings, speed: np.ndarray, bearing: np.ndarray, distance: np.ndarray
+) -> np.ndarray:
+    """Level of each point in the true zone of its own speed, one `Ellipse` a point."""
+    points = np.stack([distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1).reshape(-1, 2)
+    zones = (settings.true_zone(v) for v in speed.ravel())
+    return np.array([zone.level(p) for zone, p in zip(zones, points, strict=True)]).reshape(speed.shape)
+
+
+@pytest.fixture(scope="module")
+def staged() -> pd.DataFrame:
+    return stage_encounters(seed=3)
+
+
+@pytest.fixture(scope="module")
+def raw(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pl.DataFrame]:
+    path = make_plaza(tmp_path_factory.mktemp("raw") / "atc-20000102.csv", seed=1, settings=FEW)
+    return path, raw_rows(path)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_pipeline_finds_the_true_zone(tmp_path: Path, seed: int) -> None:
+    metres, degrees = errors(szlib.SocialZone.fit(samples_of(tmp_path, seed, DEFAULT)), DEFAULT)
+    assert metres < 0.05
+    assert degrees < 10
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_another_truth_is_found_as_well(tmp_path: Path, seed: int) -> None:
+    zone = szlib.SocialZone.fit(samples_of(tmp_path, seed, ASIDE))
+    metres, degrees = errors(zone, ASIDE)
+    assert metres < 0.05
+    assert degrees < 10
+    assert all(zone.ellipse(v).angle > 0 and zone.ellipse(v).center[1] < -0.03 for v in SPEEDS)
+
+
+def test_without_intruders_it_is_found_too_and_without_outlier_removal(tmp_path: Path) -> None:
+    polite = PlazaSettings(intruders=0.0)
+    samples = samples_of(tmp_path, 2, polite)
+    for fraction in (0.002, 0.0):
+        metres, degrees = errors(szlib.SocialZone.fit(samples, outlier_fraction=fraction), polite)
+        assert metres < 0.05
+        assert degrees < 10
+
+
+def test_intruders_spoil_the_zone_unless_outliers_are_removed(tmp_path: Path) -> None:
+    samples = samples_of(tmp_path, 2, DEFAULT)
+    assert errors(szlib.SocialZone.fit(samples), DEFAULT)[0] < 0.05
+    try:
+        metres = errors(szlib.SocialZone.fit(samples, outlier_fraction=0.0), DEFAULT)[0]
+    except szlib.ZoneError:  # intruders so near that nothing is left of the zone
+        return
+    assert metres > 0.15
+
+
+def test_a_reader_that_swaps_x_and_y_is_found_out(tmp_path: Path) -> None:
+    tracks = szlib.read_tracks(make_plaza(tmp_path / "plaza.csv", seed=4, settings=ASIDE))
+    swapped = tracks.rename(columns={"x": "y", "y": "x", "vx": "vy", "vy": "vx"})
+    assert len(szlib.find_encounters(swapped)) < len(szlib.find_encounters(tracks)) / 2
+    square = szlib.Square(x=szlib.ATC_SQUARE.y, y=szlib.ATC_SQUARE.x)
+    zone = szlib.SocialZone.fit(szlib.find_encounters(swapped, square=square))
+    assert errors(zone, ASIDE)[1] > 10
+
+
+def test_a_clock_that_is_late_for_some_is_found_out(tmp_path: Path) -> None:
+    polite = PlazaSettings(intruders=0.0)
+    tracks = szlib.read_tracks(make_plaza(tmp_path / "plaza.csv", seed=4, settings=polite))
+    tracks.loc[tracks["id"] % 200 == 0, "t"] += 0.2
+    assert errors(szlib.SocialZone.fit(szlib.find_encounters(tracks)), polite)[0] > 0.1
+
+
+def test_everybody_but_the_intruders_respects_both_zones(staged: pd.DataFrame) -> None:
+    some = staged.iloc[::5]
+    speed, bearing, distance = in_frame(some)
+    level = levels(DEFAULT, speed, bearing, distance)
+    walks = speed > 0.3
+    respected = ((level > 0.98) | ~walks).all(axis=(1, 2))  # a path is checked at moments: mm in between
+    assert respected[(some["kind"] != "intruder").to_numpy()].all()
+    intruders = staged[staged["kind"] == "intruder"]
+    assert (levels(DEFAULT, *in_frame(intruders))[..., 0].min(axis=1) < 0.4).all()
+
+
+def test_all_kinds_of_motion_are_there(staged: pd.DataFrame) -> None:
+    assert set(staged["kind"]) == set(KINDS)
+    other = np.hypot(staged["other_vx"], staged["other_vy"])
+    walker = np.hypot(staged["walker_vx"], staged["walker_vy"])
+    cosine = (staged["other_vx"] * staged["walker_vx"] + staged["other_vy"] * staged["walker_vy"]) / (
+        walker * other.clip(lower=1e-9)
+    )
+    kind = staged["kind"]
+    assert (other[kind == "standing"] < 1e-9).all()
+    assert (other[kind != "standing"] > 0.4).all()
+    assert (cosine[kind == "head-on"] < -0.7).all()
+    assert (cosine[kind.isin(["overtaking", "together"])] > 0.7).all()
+    assert (cosine[kind == "crossing"].abs() < 0.71).all()
+    drift = np.hypot(staged["other_vx"] - staged["walker_vx"], staged["other_vy"] - staged["walker_vy"])
+    assert (drift[kind == "together"] <= 0.25).all()
+    assert (kind.value_counts() > 100).drop("intruder").all()
+
+
+def test_shares_are_as_set() -> None:
+    counts = stage_encounters(
+        settings=PlazaSettings(encounters=400, standing=0.1, together=0.2, intruders=0.05)
+    )
+    counts = counts["kind"].value_counts()
+    assert (counts["standing"], counts["together"], counts["intruder"]) == (40, 80, 20)
+
+
+def test_most_pairs_are_seen_as_the_encounter_they_are(tmp_path: Path, staged: pd.DataFrame) -> None:
+    samples = samples_of(tmp_path, 3, DEFAULT)
+    refs = set(samples["ref_id"])
+    walkers = 9_190_600 + 200 * np.arange(len(staged))
+    assert np.mean([walker in refs for walker in walkers]) > 0.9
+
+
+def test_a_seed_gives_the_same_bytes_and_another_seed_others(tmp_path: Path) -> None:
+    one, same, other = (
+        make_plaza(tmp_path / f"{k}.csv", seed=seed, settings=FEW).read_bytes()
+        for k, seed in enumerate((5, 5, 6))
+    )
+    assert one == same
+    assert one != other
+
+
+def test_the_file_is_as_the_sensor_writes_it(raw: tuple[Path, pl.DataFrame]) -> None:
+    path, rows = raw
+    assert path.read_text().splitlines()[0].count(",") == 7
+    assert (rows["time"].diff().drop_nulls() >= 0).all()
+    frames = rows["time"].unique().sort()
+    steps = np.rint(1000 * frames.diff().drop_nulls().to_numpy())
+    within = steps[steps < 500]
+    assert within.min() >= 33
+    assert np.mean(within <= 50) > 0.98  # longer where both people of a frame are in a gap
+    assert len(np.unique(within)) > 10
+    assert rows.group_by("time").len()["len"].max() == 2
+    assert rows["id"].min() == 9_190_600
+    assert (rows["id"] % 100 == 0).all()
+    assert rows["x"].dtype == pl.Int64
+    assert rows.select(pl.col("motion_angle", "facing_angle").abs().max()).row(0) <= (3.142, 3.142)
+    assert rows["z"].is_between(1_300, 2_000).all()
+
+
+def test_the_velocity_column_is_inflated(tmp_path: Path) -> None:
+    standing = PlazaSettings(encounters=50, standing=1.0, together=0.0, intruders=0.0)
+    rows = raw_rows(make_plaza(tmp_path / "standing.csv", settings=standing))
+    still = rows.filter(pl.col("id") % 200 == 100)
+    assert 400 < still["velocity"].median() < 700
+
+
+def test_tracks_have_gaps_short_and_long(tmp_path: Path) -> None:
+    broken = PlazaSettings(encounters=300, gaps=0.5, losses=0.3)
+    rows = raw_rows(make_plaza(tmp_path / "gaps.csv", settings=broken))
+    steps = rows.select(pl.col("time").diff().over("id")).drop_nulls().to_series().to_numpy()
+    assert 250 < ((steps > 0.1) & (steps < 0.5)).sum() < 350  # 300 of 600 tracks
+    assert 150 < (steps > 0.5).sum() < 210  # 180
+
+
+def test_a_day_is_the_day_that_was_asked_for(tmp_path: Path) -> None:
+    tracks = szlib.read_tracks(
+        make_plaza(tmp_path / "p.csv", settings=PlazaSettings(encounters=5, date="2001-05-06"))
+    )
+    assert list(tracks["day"].unique()) == ["2001-05-06"]
+
+
+def test_the_truth_is_linear_in_speed_and_turns_the_shorter_way() -> None:
+    settings = PlazaSettings(
+        slow=szlib.Ellipse((0.0, 0.0), (0.80, 0.70), np.pi / 2 - 0.04),
+        fast=szlib.Ellipse((0.04, 0.02), (0.84, 0.72), 0.04 - np.pi / 2),
+    )
+    middle = settings.true_zone(1.0)
+    assert middle.center == pytest.approx((0.02, 0.01))
+    assert middle.semi_axes == pytest.approx((0.82, 0.71))
+    assert middle.angle == pytest.approx(np.pi / 2)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"encounters": 0},
+        {"noise": -0.01},
+        {"intruders": 1.5},
+        {"gaps": 0.7, "losses": 0.7},
+        {"speeds": (1.2, 0.6)},
+        {"fastest": 1.0},
+        {"intrusion": (0.4, 0.2)},
+        {"date": "02.01.2000"},
+        {"square": szlib.Square(x=(0, 8), y=(0, 20))},
+    ],
+)
+def test_settings_without_meaning_are_refused(given: dict[str, object]) -> None:
+    with pytest.raises(szlib.DataError, match="got"):
+        PlazaSettings(**given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("zone", "why"),
+    [
+        (szlib.Ellipse((0.0, 0.0), (1.1, 0.6)), "not convex"),
+        (szlib.Ellipse((1.0, 0.0), (0.9, 0.7)), "own place"),
+        (szlib.Ellipse((0.0, 0.0), (2.1, 2.0)), "own place"),
+    ],
+)
+def test_a_truth_that_no_hull_finds_is_refused(zone: szlib.Ellipse, why: str) -> None:
+    with pytest.raises(szlib.ZoneError, match=why):
+        PlazaSettings(slow=zone, fast=zone)
+
+
+def test_a_folder_that_is_not_there_is_told_and_nothing_is_left_behind(tmp_path: Path) -> None:
+    with pytest.raises(szlib.DataError, match="cannot write"):
+        make_plaza(tmp_path / "nowhere" / "plaza.csv", settings=FEW)
+    make_plaza(tmp_path / "plaza.csv", settings=FEW)
+    assert [file.name for file in tmp_path.iterdir()] == ["plaza.csv"]

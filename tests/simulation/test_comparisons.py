@@ -1,0 +1,102 @@
+"""Zones of the literature are what their sources say; comparisons are paired, intervals are honest."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+
+import szlib
+from szlib.simulation.comparisons import (
+    BEHAVIOURS,
+    FORMULATIONS,
+    WORLDS,
+    ZONES,
+    compare,
+    kirby_curve,
+    summarise,
+    time_inside,
+)
+from szlib.simulation.rollouts import replay
+from szlib.simulation.worlds import world
+
+FITTED = szlib.Ellipse((0.1, -0.02), (1.0, 0.7), 0.3)
+
+
+def test_zones():
+    zones = {name: zone(FITTED) for name, zone in ZONES.items()}
+    assert zones["fitted"] == FITTED
+    assert zones["equal circle"].area == pytest.approx(FITTED.area)
+    assert zones["Hall"].semi_axes == (1.2, 1.2)
+    assert zones["none"].semi_axes == (0.25, 0.25)
+
+
+def test_kirbys_zone_is_enclosed_by_its_ellipse_and_not_by_a_smaller_one():
+    curve = kirby_curve(np.linspace(-np.pi, np.pi, 2001), 0.5)
+    reach = [curve[:, 0].max(), curve[:, 0].min(), curve[:, 1].max()]
+    assert reach == pytest.approx([1.0, -0.5, 2 / 3], abs=1e-5)
+    ellipse = ZONES["Kirby"](FITTED)
+    assert ellipse.level(curve).max() == pytest.approx(1.0, abs=1e-6)
+    outline, inside = shapely.Polygon(ellipse.curve(2001)), shapely.Polygon(curve)
+    assert outline.buffer(1e-4).contains(inside)
+    assert ellipse.area < 1.15 * inside.area
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_nobody_begins_inside_any_zone(seed):
+    scenario = world(seed, WORLDS)
+    for zone in ZONES.values():
+        controller = szlib.MPCCBF(zone(scenario.people[0].zone), walls=scenario.walls)
+        people = [szlib.Person(p.position, p.velocity, p.heading) for p in scenario.people]
+        assert controller.barriers(scenario.start[:2], people).min() >= 0
+
+
+def test_time_inside_counts_the_worlds_own_zone_whatever_is_kept():
+    run = replay(0, worlds=WORLDS, zones=ZONES["none"])
+    inside = time_inside(run)
+    bodies = run.clearance[:, : len(run.scenario.people)]
+    assert inside["inside none"] == pytest.approx(0.1 * (bodies.min(axis=1) < 0).sum())
+    assert inside["inside none"] <= inside["inside equal circle"] <= inside["inside Hall"]
+
+
+def test_compare_is_paired():
+    rows = compare(2, zones=("none", "fitted"), formulations=("paper",), n_jobs=1, progress=False)
+    assert len(rows) == 4
+    assert rows.groupby("zone")["seed"].apply(list).tolist() == [[0, 1], [0, 1]]
+    assert rows["people"].tolist()[:2] == rows["people"].tolist()[2:]
+    told = summarise(rows, against={"zone": "fitted"}).set_index(["zone", "metric"])
+    assert (told.loc["fitted"][["mean", "low", "high"]] == 0).all(axis=None)
+    with pytest.raises(szlib.SolverError, match="unknown: Hull; there are none, equal circle"):
+        compare(1, zones=("Hull",))
+
+
+def table(**columns):
+    seeds = np.tile(np.arange(200), 2)
+    return pd.DataFrame({"seed": seeds, "zone": np.repeat(["a", "b"], 200), **columns})
+
+
+def test_intervals_cover_the_mean_and_pairs_sharpen_them():
+    rng = np.random.default_rng(0)
+    world_effect = rng.normal(0, 10, 200)
+    x = np.concatenate([world_effect + 1, world_effect + rng.normal(0, 0.1, 200)])
+    alone = summarise(table(x=x), ["zone"], ["x"]).set_index("zone")
+    assert (alone["low"] < alone["mean"]).all()
+    assert (alone["mean"] < alone["high"]).all()
+    spread = np.std(x[:200]) / np.sqrt(200)
+    assert alone.loc["a", "high"] - alone.loc["a", "low"] == pytest.approx(2 * 1.96 * spread, rel=0.15)
+    paired = summarise(table(x=x), ["zone"], ["x"], against={"zone": "b"}).set_index("zone")
+    assert paired.loc["a", "mean"] == pytest.approx(1, abs=0.05)
+    assert paired.loc["a", "high"] - paired.loc["a", "low"] < 0.1
+    assert paired.loc["b", ["low", "high"]].tolist() == [0, 0]
+
+
+def test_what_a_world_lacks_is_left_out():
+    rows = table(x=np.where(np.arange(400) % 2, np.nan, 3.0))
+    told = summarise(rows, ["zone"], ["x"])
+    assert told[["mean", "low", "high"]].to_numpy() == pytest.approx(3.0)
+    assert told["n"].tolist() == [100, 100]
+
+
+def test_names():
+    assert list(FORMULATIONS) == ["paper", "whole horizon", "rest"]
+    assert FORMULATIONS["whole horizon"].N_h == szlib.MPCSettings().N
+    assert "as expected" in BEHAVIOURS

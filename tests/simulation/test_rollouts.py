@@ -1,0 +1,129 @@
+"""Rollouts: the same rows whatever the order, honest flags, failures told apart and replayed."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import szlib
+from szlib.simulation import rollouts as montecarlo
+from szlib.simulation.rollouts import replay, rollouts, tally
+from szlib.simulation.runs import drive, metrics, outcome
+from szlib.simulation.worlds import ONE_PERSON, Worlds
+
+ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
+SETTINGS = szlib.MPCSettings()
+TIMES = ["solve_time_median", "solve_time_p99", "solve_time_max"]
+SHORT = Worlds(duration=2.0)
+
+
+def scenario(goal=(4.0, 0.0), people=(), walls=(), duration=15.0, velocity=(0.0, 0.0)):
+    start = np.array([-2.0, 0.0, *velocity])
+    walls = np.reshape(np.array(walls, float), (-1, 2, 2))
+    return szlib.Scenario("", start, np.array(goal), people=people, walls=walls, duration=duration)
+
+
+def person(position, velocity=(0.0, 0.0), heading=0.0):
+    return szlib.Person(position, velocity, heading, ZONE)
+
+
+def test_a_drive_is_what_simulate_does():
+    world = scenario(people=(person((1.0, 0.3)),), walls=[[(-3, 2.5), (5, 2.5)]])
+    run = drive(world, SETTINGS)
+    log = szlib.simulate(world, szlib.MPCCBF(ZONE, walls=world.walls))
+    n = len(log.table)
+    assert np.array_equal(run.states[:n], log.table[["x", "y", "vx", "vy"]])
+    assert run.h[:n] == pytest.approx(log.table[["h_person_0", "h_wall_0"]].to_numpy(), abs=1e-12)
+    assert run.clearance[:n].min(axis=1) == pytest.approx(log.table["clearance"].to_numpy(), abs=1e-12)
+    ours, theirs = metrics(run), log.metrics()
+    same = ["success", "time_to_goal", "path_length"]
+    assert {k: ours[k] for k in same} == pytest.approx({k: theirs[k] for k in same})
+
+
+def test_jobs_and_interruptions_change_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(montecarlo, "CHUNK", 2)
+    alone = rollouts(5, worlds=SHORT, n_jobs=1, progress=False)
+    kept = rollouts(3, worlds=SHORT, n_jobs=1, progress=False, out=tmp_path)
+    more = rollouts(5, worlds=SHORT, n_jobs=1, progress=False, out=tmp_path)
+    pd.testing.assert_frame_equal(alone.drop(columns=TIMES), more.drop(columns=TIMES))
+    pd.testing.assert_frame_equal(kept[:2], more[:2])  # solve times too: the finished chunk was read
+    assert not list(tmp_path.rglob(".*"))
+    other = rollouts(
+        2, worlds=SHORT, settings=szlib.MPCSettings(gamma=0.1), n_jobs=1, progress=False, out=tmp_path
+    )
+    assert len(other) == 2
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_row_can_be_replayed():
+    row = rollouts(2, seed=7, worlds=SHORT, n_jobs=1, progress=False).iloc[1]
+    again = pd.Series(metrics(replay(8, worlds=SHORT)))
+    pd.testing.assert_series_equal(row.drop([*TIMES, "seed"]), again.drop(TIMES), check_names=False)
+
+
+def test_columns_hold_numbers_and_no_breach_is_silent():
+    table = rollouts(12, worlds=Worlds(people=(3, 5), walls=1.0), n_jobs=1, progress=False)
+    assert table["seed"].tolist() == list(range(12))
+    assert not table.drop(columns="time_to_goal").isna().any().any()
+    assert table["time_to_goal"].isna().equals(~table["success"])
+    assert (table["silent"] == 0).all()
+    assert (table[["warm", "cold", "kept", "relaxed", "braking"]].sum(axis=1) == 150).all()
+    assert (table["min_h"] == table[["min_h_people", "min_h_walls"]].min(axis=1)).all()
+
+
+ROOM = [[(-9, y), (9, y)] for y in (-9, 9)] + [[(x, -9), (x, 9)] for x in (-9, 9)]
+DEAD_END = [[(-2.6, -4), (-2.6, 4)], [(-4, 0.6), (4, 0.6)], [(-4, -0.6), (4, -0.6)]]
+ENDINGS = {
+    "arrived": scenario(),
+    "out of time": scenario(goal=(20.0, 0.0)),
+    "deadlock": scenario(walls=[[(0, -8), (0, 8)]]),
+    "boxed in": scenario(walls=[*ROOM, [(0, -9), (0, 9)]]),
+    "drove in": scenario(people=(person((-0.3, 0.0)),), velocity=(1.0, 0.0), goal=(8.0, 0.0)),
+    "hit wall": scenario(walls=[[(-1.4, -3), (-1.4, 3)]], velocity=(1.0, 0.0), goal=(8.0, 0.0)),
+    "run into": scenario(people=(person((1.0, 0.0), (-4.0, 0.0), np.pi),)),
+    "squeezed": scenario(people=(person((1.0, 0.0), (-2.0, 0.0), np.pi),), walls=DEAD_END),
+}
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_how_it_ended(ending):
+    assert outcome(drive(ENDINGS[ending], SETTINGS)) == ending
+
+
+def test_margin_keeps_the_euclidean_distance_of_walls():
+    worlds = Worlds(
+        people=(1, 1), walls=1.0, max_walls=1, wall_length=(1.0, 1.0), size=5.0, travel=(2.0, 4.0)
+    )
+    assert replay(1, worlds=worlds, margin=True).settings.eps == pytest.approx(0.25)
+    run = replay(1, worlds=worlds, margin=True)
+    assert run.clearance[:, 1].min() >= 0
+
+
+def test_open_space_with_the_whole_horizon():
+    table = rollouts(10, worlds=ONE_PERSON, settings=szlib.MPCSettings(N_h=8), n_jobs=1, progress=False)
+    assert table["min_h"].min() >= -1e-6
+
+
+def test_tally_counts_every_world_once():
+    rows = rollouts(6, worlds=SHORT, n_jobs=1, progress=False)
+    told = tally(rows)
+    assert told["worlds"] == 6
+    assert told[list(ENDINGS)].sum() == pytest.approx(1)
+    assert told["flagged"] == rows["flagged"].sum()
+    assert told["min_h"] == rows["min_h"].min()
+
+
+def test_bad_input():
+    with pytest.raises(szlib.SolverError, match="n must be at least 1"):
+        rollouts(0)
+    nobody = scenario(people=(szlib.Person((1.0, 0.0), heading=0.0),))
+    with pytest.raises(szlib.SolverError, match="needs a zone of their own"):
+        drive(nobody, SETTINGS)
+
+
+def test_a_world_that_breaks_the_controller_is_named():
+    with pytest.raises(szlib.SolverError, match=r"world 5 broke the controller: .* cannot be reached"):
+        replay(5, worlds=Worlds(standing=1.0), zones=huge)
+
+
+def huge(zone):
+    return szlib.Ellipse(zone.center, (20.0, 20.0))

@@ -1,0 +1,233 @@
+"""The four meetings of the paper, their claims, and the metrics of a run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+
+import szlib
+from szlib.simulation.closed_loop import BODY_RADIUS, SimulationLog, avoidance_start
+
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
+KEYS = {
+    "success", "time_to_goal", "path_length", "min_h", "min_clearance", "min_speed", "mean_speed",
+    "max_speed", "time_stopped", "time_yielding", "passing_side", "infeasible_steps",
+    "solve_time_median", "solve_time_p95", "solve_time_max", "steps_warm", "steps_cold", "steps_kept",
+    "steps_relaxed", "steps_braking",
+}  # fmt: skip
+
+
+def run(scenario, zone=ZONE, **settings):
+    controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=szlib.MPCSettings(**settings))
+    return szlib.simulate(scenario, controller)
+
+
+@pytest.fixture(scope="module")
+def logs():
+    return {name: run(scenario) for name, scenario in szlib.SCENARIOS.items()}
+
+
+def test_the_four_scenarios_of_the_paper_are_there():
+    assert list(szlib.SCENARIOS) == ["passing", "corridor", "waiting", "making_room"]
+    for scenario in szlib.SCENARIOS.values():
+        assert scenario.walls.shape[1:] == (2, 2) and scenario.start.shape == (4,)
+        assert all(np.hypot(*p.velocity) in (0, 0.5) for p in scenario.people)
+        assert scenario.claims and scenario.title
+
+
+@pytest.mark.parametrize("name", szlib.SCENARIOS)
+def test_the_robot_arrives_and_never_leaves_the_safe_set(logs, name):
+    log, metrics = logs[name], logs[name].metrics()
+    assert set(metrics) >= KEYS
+    assert metrics["success"] and metrics["infeasible_steps"] == 0
+    assert (log.min_h() >= 0).all()
+    assert metrics["max_speed"] <= 1 + 1e-6
+    assert metrics["min_clearance"] > 0
+
+
+@pytest.mark.parametrize("name", szlib.SCENARIOS)
+def test_what_the_paper_claims_holds(logs, name):
+    for claim in szlib.SCENARIOS[name].claims:
+        holds, value = claim.check(logs[name])
+        assert holds, f"{claim.text} got {value}"
+        assert np.isfinite(value)
+
+
+@pytest.mark.parametrize("name", szlib.SCENARIOS)
+@pytest.mark.parametrize(
+    "zone",
+    [
+        szlib.Ellipse((0.2, 0.0), (1.15, 0.8), 0.2),
+        szlib.Ellipse((0.2, 0.0), (1.15, 0.8), -0.2),
+        szlib.Ellipse((0.05, 0.0), (0.85, 0.6), 0.2),
+        szlib.Ellipse((0.15, 0.0), (0.85, 0.6), -0.2),
+    ],
+)
+def test_the_claims_do_not_hang_on_one_zone(name, zone):
+    scenario = szlib.SCENARIOS[name]
+    log = run(scenario, zone)
+    assert log.success and log.min_h().min() >= 0 and log.metrics()["infeasible_steps"] == 0
+    assert all(claim.check(log)[0] for claim in scenario.claims)
+
+
+def test_a_zone_without_a_front_starts_avoidance_at_the_same_distance_from_either_side():
+    symmetric = szlib.Ellipse((0.0, 0.0), (1.0, 0.7))
+    scenario = szlib.SCENARIOS["passing"]
+    front, back = (avoidance_start(run(s, symmetric))[0] for s in (scenario, scenario.turned()))
+    assert front == pytest.approx(back, abs=1e-3)
+    assert not scenario.claims[0].check(run(scenario, szlib.Ellipse((-0.2, 0.0), (1.0, 0.7))))[0]
+
+
+def test_the_other_hand_gives_the_mirror_image():
+    for name in ("passing", "corridor"):
+        right, left = run(szlib.SCENARIOS[name]), run(szlib.SCENARIOS[name], pass_side="left")
+        assert (right.metrics()["passing_side"], left.metrics()["passing_side"]) == ("right", "left")
+        assert right.table["y"].to_numpy() == pytest.approx(-left.table["y"].to_numpy(), abs=1e-3)
+
+
+def test_a_run_is_repeatable(logs):
+    log = logs["making_room"]
+    again = szlib.simulate(log.scenario, log.controller)
+    pd.testing.assert_frame_equal(
+        log.table.drop(columns="solve_time"), again.table.drop(columns="solve_time"), check_exact=True
+    )
+
+
+def test_the_table_tells_the_motion_and_the_barriers(logs):
+    log = logs["waiting"]
+    table, dt = log.table, 0.1
+    assert len(table) == len(log.predicted)
+    x, v, a = (table[list(columns)].to_numpy() for columns in (("x", "y"), ("vx", "vy"), ("ax", "ay")))
+    assert table["t"].to_numpy() == pytest.approx(np.arange(len(table)) * dt)
+    assert x[1:] == pytest.approx(x[:-1] + dt * v[:-1] + dt**2 / 2 * a[:-1], abs=1e-12)
+    assert v[1:] == pytest.approx(v[:-1] + dt * a[:-1], abs=1e-12)
+    assert log.predicted[:-1, 1] == pytest.approx(np.c_[x, v][1:], abs=1e-9)
+    assert table["person_0_x"].to_numpy() == pytest.approx(4 - 0.5 * table["t"].to_numpy())
+    for i in (0, 57, len(table) - 1):
+        person = log.scenario.people[0].after(table["t"][i])
+        expected = log.controller.barriers(x[i], [person])
+        found = table.loc[i, ["h_person_0", *(f"h_wall_{j}" for j in range(4))]].to_numpy(float)
+        assert found == pytest.approx(expected, abs=1e-9)
+        robot = shapely.Point(x[i])
+        gaps = [robot.distance(shapely.LineString(wall)) for wall in log.scenario.walls]
+        gaps.append(robot.distance(shapely.Point(person.position)) - BODY_RADIUS)
+        assert table["clearance"][i] == pytest.approx(min(gaps) - 0.5)
+
+
+def test_the_metrics_of_a_walk_without_company():
+    scenario = szlib.Scenario("alone", (0.0, 0.0, 0.0, 0.0), (3.0, 4.0))
+    metrics = run(scenario).metrics()
+    assert metrics["success"] and metrics["passing_side"] == "none"
+    assert metrics["path_length"] == pytest.approx(5, abs=0.11)
+    assert np.isnan(metrics["min_h"]) and np.isnan(metrics["min_clearance"])
+    assert metrics["time_stopped"] == metrics["time_yielding"] == 0
+    assert metrics["min_speed"] > 0.9
+
+
+def test_a_run_that_is_given_up_is_no_success():
+    scenario = szlib.SCENARIOS["waiting"]
+    log = szlib.simulate(scenario, szlib.MPCCBF(ZONE, walls=scenario.walls), max_time=5)
+    assert not log.success and np.isnan(log.metrics()["time_to_goal"])
+    assert log.table["t"].iloc[-1] == 5
+    assert log.metrics()["passing_side"] == "none"
+
+
+def test_a_robot_that_is_boxed_in_stands_without_yielding_and_one_that_is_held_yields():
+    box = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    walls = np.stack([box, np.roll(box, -1, axis=0)], axis=1)
+    boxed = szlib.Scenario("boxed", (0.0, 0.0, 0.0, 0.0), (5.0, 0.0), walls=walls, duration=20)
+    metrics = run(boxed).metrics()
+    assert metrics["time_stopped"] > 8 and metrics["time_yielding"] == 0
+    # walls too close for a way around: the person who stands there holds the robot
+    lane = [((-6, y), (6, y)) for y in (1.0, -1.0)]
+    standing = szlib.Person((0.0, 0.0), heading=np.pi)
+    held = szlib.Scenario("held", (-4.0, 0, 0, 0), (4.0, 0), (standing,), lane, duration=20)
+    metrics = run(held).metrics()
+    assert metrics["time_yielding"] > 5 and metrics["min_h"] >= 0 and not metrics["success"]
+
+
+def test_steps_that_had_to_be_relaxed_are_counted_and_the_robot_recovers():
+    close = szlib.Person((0.0, 0.0), (-0.5, 0.0))
+    log = run(szlib.Scenario("close", (-1.9, 0.0, 0.0, 0.0), (4.0, 0.0), (close,)))
+    relaxed = log.table["status"] != "optimal"
+    assert 0 < log.metrics()["infeasible_steps"] == relaxed.sum() < 20
+    assert (log.table["slack"][relaxed] > 0).all()
+    assert log.success
+
+
+def test_several_people_with_own_zones_and_velocities_among_several_walls():
+    people = (
+        szlib.Person((0.0, 1.0), (-0.5, 0.0)),
+        szlib.Person((2.0, -1.5), (-0.2, 0.3), zone=szlib.Ellipse((0.2, 0.0), (0.8, 0.6))),
+        szlib.Person((5.0, -3.0), heading=2.0, zone=szlib.Ellipse((0.0, 0.0), (1.3, 0.9))),
+    )
+    walls = [((-8, 5), (8, 5)), ((-8, -5), (8, -5))]
+    log = run(szlib.Scenario("busy", (-5.0, 0, 0, 0), (6.0, 1.0), people, walls))
+    assert log.success and log.min_h().min() >= -1e-6
+    assert list(log.min_h().index) == [*(f"h_person_{i}" for i in range(3)), "h_wall_0", "h_wall_1"]
+
+
+def passing_log(y, x=(-2.0, -1.0, 0.5, 2.0)):
+    """A made-up run past a person at the origin, who is only looked at."""
+    scenario = szlib.Scenario("made", (-2.0, 0, 0, 0), (2.0, 0), (szlib.Person((0, 0), heading=0.0),))
+    table = pd.DataFrame({"x": x, "y": y, "person_0_x": 0.0, "person_0_y": 0.0, "h_person_0": 1.0})
+    return SimulationLog(scenario, szlib.MPCCBF(ZONE), table, np.zeros((4, 9, 4)), True)
+
+
+def test_the_passing_side_is_where_the_person_is_not():
+    assert szlib.simulation.closed_loop.passing_side(passing_log(y=-1.0)) == "right"
+    assert szlib.simulation.closed_loop.passing_side(passing_log(y=1.0)) == "left"
+    assert szlib.simulation.closed_loop.passing_side(passing_log(y=1.0, x=(-2, -1.5, -1, -1))) == "none"
+
+
+def test_avoidance_starts_where_the_line_is_left():
+    distance, h = avoidance_start(passing_log(y=[0.0, -0.05, -0.2, 0.0]))  # 0.1 m beside it at x = -0.5 m
+    assert distance == pytest.approx(np.hypot(0.5, 0.1)) and h == 1.0
+    assert np.isnan(avoidance_start(passing_log(y=0.0))).all()
+
+
+def test_turning_everybody_around_turns_only_the_headings():
+    scenario = szlib.SCENARIOS["corridor"]
+    turned = scenario.turned().people[0]
+    assert np.cos(turned.heading) == pytest.approx(1)
+    assert (turned.position, turned.velocity) == (scenario.people[0].position, scenario.people[0].velocity)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"start": (-1.2, 0, 0, 0)}, r"'passing' starts in violation: h = -0\.\d+ m for person 0"),
+        ({"start": (-4, 0, 1.2, 0)}, "starts at 1.200 m/s; the limit is 1.0 m/s"),
+        ({"goal": (0.3, 0.0)}, "cannot be reached"),
+        ({"walls": [((-5, 0.3), (5, 0.3))]}, "starts in violation: .* for wall 0"),
+    ],
+)
+def test_a_scenario_that_cannot_be_run_is_refused(change, message):
+    with pytest.raises(szlib.SolverError, match=message):
+        run(replace(szlib.SCENARIOS["passing"], **change))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"start": (0, 0)}, "start must have shape"),
+        ({"goal": (np.nan, 0)}, "goal must be finite"),
+        ({"walls": [((1, 1), (1, 1))]}, "two different end points"),
+        ({"duration": -1}, "duration must be a positive"),
+    ],
+)
+def test_a_scenario_without_a_meaning_cannot_be_made(change, message):
+    with pytest.raises(szlib.SolverError, match=message):
+        replace(szlib.SCENARIOS["passing"], **change)
+
+
+def test_a_controller_that_knows_other_walls_is_refused():
+    with pytest.raises(szlib.SolverError, match="knows 0 walls, and not the 2 of 'corridor'"):
+        szlib.simulate(szlib.SCENARIOS["corridor"], szlib.MPCCBF(ZONE))
+
+
+def test_scenarios_cannot_be_changed_by_accident():
+    with pytest.raises(ValueError, match="read-only"):
+        szlib.SCENARIOS["corridor"].walls[0] = 0

@@ -1,0 +1,143 @@
+"""The loader contract, held by every reader here; groups; PedPy, there and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import make_crowd, make_tracks, make_walk, real_data
+from test_readers import WRITERS, samples
+
+import szlib
+from szlib.tracks import funnels
+from szlib.tracks.clock import COLUMNS, to_clock
+from szlib.tracks.interop import check_tracks, from_pedpy, read_groups, to_pedpy, without_companions
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_every_reader_keeps_the_contract(tmp_path: Path, name: str) -> None:
+    (tmp_path / "recording.csv").write_text(WRITERS[name](samples()))
+    check_tracks(szlib.read_tracks(tmp_path / "recording.csv"))
+
+
+def good_tracks() -> pd.DataFrame:
+    raw = make_crowd(1)[["day", "id", "t", "x", "y"]].reset_index(drop=True)
+    raw.attrs[funnels.KEY] = [funnels.stage("read by hand", len(raw), len(raw), {})]
+    return to_clock(raw)
+
+
+def test_a_table_that_keeps_the_contract_is_left_alone() -> None:
+    tracks = good_tracks()
+    before = tracks.copy(deep=True)
+    check_tracks(tracks)
+    pd.testing.assert_frame_equal(tracks, before)
+
+
+BROKEN = {
+    "missing": lambda t: t.drop(columns="vx"),
+    "out of order": lambda t: t.iloc[::-1],
+    "multiple of 0.1 s": lambda t: t.assign(t=t["t"] + 0.03),
+    "two rows at": lambda t: pd.concat([t, t.tail(1)]),
+    "whole numbers": lambda t: t.assign(id=t["id"].astype(str)),
+    "expected a day": lambda t: t.assign(x=np.where(t.index == 7, np.nan, t["x"])),
+    "from positions": lambda t: t.assign(vx=t["vx"] + 0.1),
+    "never bridge a gap": lambda t: t.drop(index=t.index[15]),
+    "in this order": lambda t: t[COLUMNS[::-1]],
+}
+
+
+@pytest.mark.parametrize(("told", "spoil"), BROKEN.items(), ids=BROKEN)
+def test_a_loader_that_breaks_the_contract_is_told_how(told: str, spoil: object) -> None:
+    tracks = good_tracks()
+    with pytest.raises(szlib.DataError, match=told):
+        check_tracks(spoil(tracks))  # type: ignore[operator]
+
+
+def test_a_loader_must_count() -> None:
+    tracks = good_tracks()
+    tracks.attrs.clear()
+    with pytest.raises(szlib.DataError, match="no funnel"):
+        check_tracks(tracks)
+    tracks.attrs[funnels.KEY] = [{"stage": "read", "entered": 9, "kept": 7, "set_aside": {"bad": 1}}]
+    with pytest.raises(szlib.SzlibError, match="does not add up"):
+        check_tracks(tracks)
+
+
+def test_groups_of_the_eth_sequence() -> None:
+    folder = real_data("eth")
+    with pytest.warns(szlib.DataWarning, match="line 37, 38"):  # 238 is in lines 36 and 37, 241 in 37 and 38
+        groups = read_groups(folder / "seq_eth_groups.txt")
+    assert groups.loc[groups["id"] == 241, "group"].item() == groups.loc[groups["id"] == 240, "group"].item()
+    people = set(szlib.read_tracks(folder / "seq_eth_obsmat.txt")["id"])
+    assert groups.groupby("group").size().min() == 2
+    assert groups["id"].is_unique
+    assert set(groups["id"]) <= people
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("1 2\n3 x\n", "line 2: '3 x' is no group"),
+        ("1 2\n\n3\n", "line 3: '3' is no group"),
+        ("1 2\n3 3\n", "line 2: '3 3' is no group"),
+        ("1 2\n3 4.5\n", "line 2"),
+    ],
+)
+def test_groups_that_are_none(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "groups.txt").write_text(text)
+    with pytest.raises(szlib.DataError, match=told):
+        read_groups(tmp_path / "groups.txt")
+    with pytest.raises(szlib.DataError, match="cannot be read as groups"):
+        read_groups(tmp_path)
+
+
+def test_blank_lines_part_no_groups(tmp_path: Path) -> None:
+    (tmp_path / "groups.txt").write_text(" 5 4\n\n 6 3 2 \n")
+    groups = read_groups(tmp_path / "groups.txt")
+    assert groups.to_numpy().tolist() == [[0, 5], [0, 4], [1, 6], [1, 3], [1, 2]]
+
+
+def test_lines_that_share_people_make_one_group(tmp_path: Path) -> None:
+    (tmp_path / "groups.txt").write_text("1 2\n3 4\n5 6\n4 2 7\n")
+    with pytest.warns(szlib.DataWarning, match="line 4"):
+        groups = read_groups(tmp_path / "groups.txt")
+    assert groups.groupby("group")["id"].apply(set).tolist() == [{1, 2, 3, 4, 7}, {5, 6}]
+
+
+def test_companions_are_set_aside_and_counted() -> None:
+    together, strangers = [(1, 2), (2, 1), (3, 4)], [(1, 3), (9, 8), (8, 1), (4, 2)]
+    samples = pd.DataFrame([*together, *strangers], columns=["ref_id", "other_id"])
+    groups = pd.DataFrame({"group": [0, 0, 1, 1], "id": [1, 2, 3, 4]})
+    kept = without_companions(samples, groups)
+    assert kept[["ref_id", "other_id"]].to_numpy().tolist() == [list(pair) for pair in strangers]
+    assert funnels.of(kept)[-1]["set_aside"] == {"walk together": 3}
+
+
+def test_to_pedpy_and_back() -> None:
+    pytest.importorskip("pedpy")
+    tracks = good_tracks()
+    trajectory = to_pedpy(tracks)
+    assert trajectory.frame_rate == 10
+    assert trajectory.number_pedestrians == tracks["id"].nunique()
+    back = from_pedpy(trajectory, day=tracks["day"].iloc[0])
+    check_tracks(back)
+    pd.testing.assert_frame_equal(back, tracks, check_categorical=False, rtol=0, atol=1e-9)
+
+
+def test_pedpy_at_another_rate_comes_to_the_clock() -> None:
+    pedpy = pytest.importorskip("pedpy")
+    frames = np.arange(50)
+    data = pd.DataFrame({"id": 3, "frame": frames, "x": 1.2 * frames / 25, "y": 0.5})
+    tracks = from_pedpy(pedpy.TrajectoryData(data=data, frame_rate=25.0))
+    check_tracks(tracks)
+    np.testing.assert_allclose(tracks["x"], 1.2 * tracks["t"])
+    np.testing.assert_allclose(tracks["vx"], 1.2)
+
+
+def test_pedpy_knows_no_days() -> None:
+    pytest.importorskip("pedpy")
+    both = make_tracks(make_walk((0, 0), (1, 0)), make_walk((0, 0), (1, 0), day="2012-10-28"))
+    with pytest.raises(szlib.DataError, match="PedPy knows no days, and the table has 2"):
+        to_pedpy(both)

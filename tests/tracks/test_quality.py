@@ -1,0 +1,68 @@
+"""The quality of a file is measured right where it is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from test_readers import as_1hz, as_tidy
+
+from szlib.tracks import quality
+
+BEGIN = 1351040400.0  # 10:00 in Japan
+LINE = "{:.3f},{},{},{},1650.0,{},0.1,0.1\n"
+
+
+@pytest.fixture
+def day(tmp_path: Path) -> Path:
+    """Person 1 walks at 1 m/s for 10 s, person 2 stands for 10 s an hour later, seen again after 3 s."""
+    walk = [(BEGIN + k / 25, 1, round(40 * k), 0, 1000) for k in range(250)]
+    stand = [(BEGIN + 3600 + k / 25, 2, 0, 0, 570) for k in range(250)]
+    back = [(BEGIN + 3613 + k / 25, 2, 0, 0, 570) for k in range(25)]
+    path = tmp_path / "atc-20121024.csv"
+    path.write_text("".join(LINE.format(*row) for row in [*walk, *stand, *back]) + "rubbish\n")
+    return path
+
+
+def test_speed_is_said_and_moved(day: Path) -> None:
+    rows = quality.seconds(day)
+    walker, stander = rows[rows["id"] == 1], rows[rows["id"] == 2]
+    np.testing.assert_allclose(walker["moved"].dropna(), 1.0)
+    np.testing.assert_allclose(walker["said"], 1.0)
+    np.testing.assert_allclose(stander["moved"].dropna(), 0.0)
+    np.testing.assert_allclose(stander["said"], 0.57)
+    assert list(walker["moved"].isna()) == [False] * 9 + [True]
+    assert stander["moved"].isna().sum() == 2, "nobody is followed across a gap"
+    assert rows["rows"].sum() == 525
+
+
+def test_visits_and_standing_people_by_hour(day: Path) -> None:
+    table = quality.by_hour(quality.seconds(day))
+    assert table[["day", "hour", "visits"]].to_numpy().tolist() == [
+        ["2012-10-24", 10, 1],
+        ["2012-10-24", 11, 1],
+    ]
+    np.testing.assert_allclose(table["standing"], [0.0, 9 / 11])
+
+
+def test_frames_gaps_and_lengths(day: Path) -> None:
+    intervals = quality.frame_intervals(day)
+    assert np.isclose(np.median(intervals), 0.04, atol=1e-6)
+    assert len(intervals) == 524
+    found = quality.people(day)
+    assert found["id"].tolist() == [1, 2]
+    np.testing.assert_allclose(found["longest_gap"], [0.04, 3.04], atol=1e-5)
+    np.testing.assert_allclose(found["ended"] - found["begun"], [9.96, 13.96], atol=1e-5)
+    assert found["rows"].tolist() == [250, 275]
+
+
+def test_files_without_a_speed_have_none(tmp_path: Path) -> None:
+    rows = pd.DataFrame({"t": BEGIN + np.arange(5.0), "id": 1, "x": np.arange(5.0), "y": 0.0})
+    (tmp_path / "a.csv").write_text(as_tidy(rows))
+    (tmp_path / "b.csv").write_text(as_1hz(rows))
+    tidy, hourly = quality.seconds(tmp_path / "a.csv"), quality.seconds(tmp_path / "b.csv")
+    assert tidy["said"].isna().all()
+    np.testing.assert_allclose(hourly["said"], 1.2)
+    np.testing.assert_allclose(tidy["moved"], hourly["moved"])

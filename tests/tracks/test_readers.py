@@ -1,0 +1,518 @@
+"""Readers: every format tells the same story, and whatever is wrong with a file is told."""
+
+from __future__ import annotations
+
+import gzip
+import random
+import warnings
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import real_data
+
+import szlib
+from szlib.tracks import funnels
+from szlib.tracks.formats import FORMATS
+from szlib.tracks.readers import read_raw
+
+BEGIN = 1_351_040_400  # 2012-10-24 10:00 in Tokyo
+
+
+def samples(people: int = 3, count: int = 20, begin: float = BEGIN) -> pd.DataFrame:
+    """People seen every 0.4 s: multiples of 1/15 s and of 1 ms, as every format can hold them."""
+    rng = np.random.default_rng(4)
+    rows = [
+        (begin + round(0.4 * k, 3), 7 + person, *(5 + person + 0.4 * k + rng.normal(0, 0.01, 2)).round(6))
+        for k in range(count)
+        for person in range(people)
+    ]
+    return pd.DataFrame(rows, columns=["t", "id", "x", "y"])
+
+
+def scaled(factor: float) -> pd.DataFrame:
+    """The same in other units of position."""
+    return samples().assign(x=lambda rows: rows["x"] * factor, y=lambda rows: rows["y"] * factor)
+
+
+def as_raw(rows: pd.DataFrame) -> str:
+    return "".join(
+        f"{r.t:.3f},{r.id},{r.x * 1e3:.6f},{r.y * 1e3:.6f},1650.5,1210.3,0.78,-0.1\n"
+        for r in rows.itertuples()
+    )
+
+
+def as_1hz(rows: pd.DataFrame) -> str:
+    return "".join(f"{r.t:.3f},{r.id},{r.x:.6f},{r.y:.6f},1.2,0.78\n" for r in rows.itertuples())
+
+
+def as_ewap(rows: pd.DataFrame) -> str:
+    return "".join(
+        f"  {round(r.t * 15):.12e}  {r.id:.7e}   {r.x:.9e}  0.0000000e+00  {r.y:.9e} 1.0 0.0 1.0\n"
+        for r in rows.itertuples()
+    )
+
+
+def as_tidy(rows: pd.DataFrame) -> str:
+    return rows.to_csv(index=False)
+
+
+WRITERS: dict[str, Callable[[pd.DataFrame], str]] = {
+    "atc-raw": as_raw, "atc-1hz": as_1hz, "ewap": as_ewap, "tidy": as_tidy,
+}  # fmt: skip
+
+
+def write(path: Path, content: str | bytes) -> Path:
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def read_quietly(path: Path, **options: object) -> tuple[pd.DataFrame, str]:
+    """The table, and the warnings about rows set aside; any other warning is an error."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("error")
+        warnings.simplefilter("always", szlib.DataWarning)
+        frame = read_raw(path, **options)
+    return frame, "\n".join(str(w.message) for w in told)
+
+
+def stage_of(frame: pd.DataFrame, name: str) -> dict:
+    return next(s for s in funnels.of(frame) if s["stage"].startswith(name))
+
+
+def without_day(frame: pd.DataFrame) -> pd.DataFrame:
+    return frame[["id", "t", "x", "y"]]
+
+
+# --- every format ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize("packed", [False, True], ids=["plain", "gz"])
+def test_every_format_gives_the_same_table(tmp_path: Path, name: str, packed: bool) -> None:
+    rows = samples()
+    content = WRITERS[name](rows).encode()
+    path = write(tmp_path / ("rec.txt" + ".gz" * packed), gzip.compress(content) if packed else content)
+    frame = read_raw(path)
+    expected = rows.sort_values(["id", "t"], ignore_index=True)
+    pd.testing.assert_frame_equal(without_day(frame), expected[["id", "t", "x", "y"]], rtol=0, atol=1e-6)
+    assert list(frame["day"].unique()) == (["rec"] if name == "ewap" else ["2012-10-24"])
+    assert stage_of(frame, "read")["entered"] == len(rows) == stage_of(frame, "merge")["kept"]
+    assert FORMATS[name].max_gap == frame.attrs["max_gap"]
+
+
+def test_parquet_gives_the_same_table_as_csv(tmp_path: Path) -> None:
+    samples().to_parquet(tmp_path / "a.parquet")
+    write(tmp_path / "a.parquet.gz", gzip.compress((tmp_path / "a.parquet").read_bytes()))
+    from_csv = read_raw(write(tmp_path / "a.csv", as_tidy(samples())))
+    for name in ("a.parquet", "a.parquet.gz"):
+        pd.testing.assert_frame_equal(read_raw(tmp_path / name), from_csv)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_tidy_columns_come_in_any_order_and_among_others(tmp_path: Path, seed: int) -> None:
+    rows = samples().assign(day="2013-01-06", note="", vx=1.0, vy=np.nan)
+    plain = read_raw(write(tmp_path / "plain.csv", as_tidy(rows[["day", "t", "id", "x", "y"]])))
+    order = list(rows.columns)
+    random.Random(seed).shuffle(order)
+    rows[order].to_parquet(tmp_path / "mixed.parquet")
+    pd.testing.assert_frame_equal(read_raw(write(tmp_path / "mixed.csv", as_tidy(rows[order]))), plain)
+    pd.testing.assert_frame_equal(read_raw(tmp_path / "mixed.parquet"), plain)
+    assert list(plain["day"].unique()) == ["2013-01-06"]
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_an_own_track_table_is_read_back(tmp_path: Path, suffix: str) -> None:
+    tracks = szlib.read_tracks(write(tmp_path / "a.csv", as_1hz(samples())))
+    alone = tracks.iloc[:1].assign(id=99, vx=np.nan, vy=np.nan)  # a single tick has no velocity
+    tracks = pd.concat([tracks, alone], ignore_index=True)
+    path = tmp_path / f"tracks.{suffix}"
+    tracks.to_csv(path, index=False) if suffix == "csv" else tracks.to_parquet(path)
+    pd.testing.assert_frame_equal(szlib.read_tracks(path), tracks, check_categorical=False, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda b: b.replace(b"\n", b"\r\n"),
+        lambda b: b"\xef\xbb\xbf" + b,
+        lambda b: b.removesuffix(b"\n"),
+        lambda b: b"\xef\xbb\xbf" + b.replace(b"\n", b"\r\n").removesuffix(b"\r\n"),
+    ],
+    ids=["CRLF", "BOM", "no newline at the end", "all of it"],
+)
+def test_line_ends_and_byte_order_mark_change_nothing(tmp_path: Path, name: str, change: Callable) -> None:
+    content = WRITERS[name](samples()).encode()
+    (tmp_path / "a").mkdir()
+    plain = read_raw(write(tmp_path / "rec.csv", content))
+    pd.testing.assert_frame_equal(read_raw(write(tmp_path / "a" / "rec.csv", change(content))), plain)
+
+
+# --- days and files ----------------------------------------------------------------------------------
+
+
+def test_the_pieces_of_a_day_make_one_day(tmp_path: Path) -> None:
+    rows = samples(count=30)
+    whole = read_raw(write(tmp_path / "whole.csv", as_raw(rows)))
+    pieces = [write(tmp_path / f"{k}.csv", as_raw(rows.iloc[k::3])) for k in (2, 0, 1)]
+    together = read_raw(pieces)
+    pd.testing.assert_frame_equal(together, whole)
+    assert [s["entered"] for s in funnels.of(together)] == [30, 30, 30, 90]
+
+
+def test_the_day_is_that_of_the_calendar_in_tokyo(tmp_path: Path) -> None:
+    midnight = pd.Timestamp("2012-10-25", tz="Asia/Tokyo").timestamp()
+    path = write(tmp_path / "atc-20200101.csv", as_1hz(samples(people=1, count=4, begin=midnight - 0.8)))
+    frame = read_raw(path)
+    assert frame["day"].astype(str).tolist() == ["2012-10-24"] * 2 + ["2012-10-25"] * 2
+    assert set(read_raw(path, tz="UTC")["day"]) == {"2012-10-24"}
+    with pytest.raises(szlib.DataError, match="unknown time zone 'Mars/Olympus'"):
+        read_raw(path, tz="Mars/Olympus")
+
+
+def test_excluded_days_are_counted(tmp_path: Path) -> None:
+    first, second = samples(), samples(count=5, begin=BEGIN + 86_400)
+    path = write(tmp_path / "two.csv", as_1hz(pd.concat([first, second])))
+    for exclude in (["2012-10-24"], "2012-10-24", iter([pd.Timestamp("2012-10-24").date()])):
+        frame = read_raw(path, exclude=exclude)
+        assert set(frame["day"]) == {"2012-10-25"}
+        assert stage_of(frame, "merge")["set_aside"] == {"excluded day": len(first)}
+    with pytest.raises(szlib.DataError, match=r"excluded days .*2012-10-24.*2012-10-25"):
+        read_raw(path, exclude=["2012-10-25", "2012-10-24"])
+
+
+def test_recordings_without_a_date_are_not_mixed(tmp_path: Path) -> None:
+    paths = []
+    for name in ("eth", "hotel"):
+        (tmp_path / name).mkdir()
+        paths.append(write(tmp_path / name / "obsmat.txt", as_ewap(samples())))
+    with pytest.raises(szlib.DataError, match="several EWAP files are called obsmat"):
+        read_raw(paths)
+    assert set(read_raw([paths[0], write(tmp_path / "hotel.txt", as_ewap(samples()))])["day"]) == {
+        "obsmat",
+        "hotel",
+    }
+
+
+# --- rows that are set aside -------------------------------------------------------------------------
+
+GOOD = as_1hz(samples(people=1, count=8)).splitlines()
+BAD_ROWS = {
+    "1351040400.4,7,5,5,1.2": "missing or extra fields",
+    "1351040400.4,7,5,5,1.2,0.1,9": "missing or extra fields",
+    "": "missing or extra fields",
+    "   ": "missing or extra fields",
+    "1351040400.4,7,abc,5,1.2,0.1": "missing or not a number",
+    "1351040400.4,7,,5,1.2,0.1": "missing or not a number",
+    "one hour,7,5,5,1.2,0.1": "missing or not a number",
+    "1351040400.4,7,nan,5,1.2,0.1": "not finite",
+    "1351040400.4,7,5,NaN,1.2,0.1": "not finite",
+    "1351040400.4,7,inf,5,1.2,0.1": "not finite",
+    "1351040400.4,7,5,-1e400,1.2,0.1": "not finite",
+    "1351040400.4,7.5,5,5,1.2,0.1": "id not a whole number",
+    "1351040400.4,1e300,5,5,1.2,0.1": "id not a whole number",
+    "1351040400400,7,5,5,1.2,0.1": "time not in seconds since 1970",
+    "1e308,7,5,5,1.2,0.1": "time not in seconds since 1970",
+    "1351040400.4,7,1e300,5,1.2,0.1": "position not on Earth",
+    "\x00\x01\x02": "missing or extra fields",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("bad", "reason"), BAD_ROWS.items(), ids=[repr(row) for row in BAD_ROWS])
+def test_a_bad_row_is_set_aside_and_told_with_its_line(tmp_path: Path, bad: str, reason: str) -> None:
+    content = "\n".join([*GOOD[:3], bad, *GOOD[3:], bad])
+    frame, told = read_quietly(write(tmp_path / "a.csv", content + "\n"))
+    assert told == f"a.csv, first at line 4: rows set aside: 2 x {reason}"
+    assert stage_of(frame, "read") == {
+        "stage": "read a.csv",
+        "entered": len(GOOD) + 2,
+        "kept": len(GOOD),
+        "set_aside": {reason: 2},
+    }
+    pd.testing.assert_frame_equal(frame, read_raw(write(tmp_path / "a.csv", "\n".join(GOOD))))
+
+
+@pytest.mark.parametrize(("name", "line"), [("atc-raw", 2), ("ewap", 2), ("tidy", 3)])
+def test_every_format_counts_its_lines(tmp_path: Path, name: str, line: int) -> None:
+    rows = WRITERS[name](samples(count=9)).splitlines()
+    _, told = read_quietly(write(tmp_path / "a.csv", "\n".join([*rows[: line - 1], "x", *rows[line - 1 :]])))
+    assert told.startswith(f"a.csv, first at line {line}: rows set aside: 1 x missing or")
+
+
+def test_a_file_of_mostly_bad_rows_is_refused(tmp_path: Path) -> None:
+    frame, told = read_quietly(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z"])))
+    assert (len(frame), told) == (3, "a.csv, first at line 4: rows set aside: 3 x missing or extra fields")
+    with pytest.raises(
+        szlib.DataError, match=r"a\.csv, line 4: missing or extra fields; 4 of 7 rows cannot be"
+    ):
+        read_raw(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z", "x"])))
+
+
+def test_rows_without_a_day_are_set_aside(tmp_path: Path) -> None:
+    rows = samples().assign(day="2013-01-06")
+    rows.loc[[3, 4], "day"] = None
+    _, told = read_quietly(write(tmp_path / "a.csv", as_tidy(rows)))
+    assert told == "a.csv, first at line 5: rows set aside: 2 x no day"
+
+
+def test_duplicate_rows_are_counted_and_the_first_one_stays(tmp_path: Path) -> None:
+    rows = samples()
+    again = rows.assign(x=rows["x"] + 1).iloc[:4]
+    frame, told = read_quietly(write(tmp_path / "a.csv", as_1hz(pd.concat([rows, again]))))
+    assert told == "all files: rows set aside: 4 x duplicate (day, id, t)"
+    assert stage_of(frame, "merge")["set_aside"] == {"duplicate (day, id, t)": 4}
+    alone = read_raw(write(tmp_path / "a.csv", as_1hz(rows)))
+    pd.testing.assert_frame_equal(frame, alone)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_unsorted_rows_are_sorted(tmp_path: Path, name: str) -> None:
+    rows = samples()
+    expected = read_raw(write(tmp_path / "rec.csv", WRITERS[name](rows)))
+    shuffled = rows.sample(frac=1, random_state=3)
+    pd.testing.assert_frame_equal(read_raw(write(tmp_path / "rec.csv", WRITERS[name](shuffled))), expected)
+
+
+# --- files that cannot be used -----------------------------------------------------------------------
+
+TIDY_ROWS = "1351040400.0,7,5.0,5.0\n1351040400.4,7,5.4,5.0\n"
+PNG = (
+    b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x00\x00\x00\x01\x00\x00\x00\x01\x08\x06\x00\x00\x00\x1f\x15\xc4\x89"
+)
+UNUSABLE: dict[str, tuple[str | bytes, str]] = {
+    "empty": ("", "line 1: the file is empty"),
+    "only blank lines": ("\n\n\n", "line 1: the file is empty or begins with a blank line"),
+    "blank first line": ("\n" + as_raw(samples()), "line 1: the file is empty or begins with a blank line"),
+    "only a header": ("t,id,x,y\n", "holds no row"),
+    "missing columns": ("t,id,x\n1,2,3\n", "line 1: 't,id,x' has no column y"),
+    "other columns": ("time,person,east,north\n1,2,3,4\n", "has no column t, id, x, y"),
+    "a column twice": ("t,id,x,y,x\n1,2,3,4,5\n", "names x twice"),
+    "no header": (TIDY_ROWS, "has no column t, id, x, y"),
+    "semicolons": (as_1hz(samples()).replace(",", ";"), "line 1"),
+    "milliseconds": (as_1hz(samples()).replace(".", ""), "line 1: time not in seconds since 1970"),
+    "milliseconds, tidy": ("t,id,x,y\n1351040400000,7,5,5\n", "line 2: time not in seconds since 1970"),
+    "ids as names": ("t,id,x,y\n1.0,anna,5,5\n1.0,bob,5,6\n", "line 2: missing or not a number"),
+    "metres in a raw file": (as_raw(scaled(1e-3)), "unit='m'"),
+    "millimetres, 1 Hz": (as_1hz(scaled(1e3)), "unit='mm'"),
+    "millimetres, EWAP": (as_ewap(scaled(1e3)), "unit='mm'"),
+    "millimetres, tidy": (as_tidy(scaled(1e3)), "unit='mm'"),
+    "PNG": (PNG + bytes(range(256)) * 9, "line 1"),
+    "HTML": ("<!doctype html>\n<html><body>404</body></html>\n", "line 1"),
+    "JSON": ('{"t": 1, "id": 2, "x": 3, "y": 4}\n', "line 1"),
+    "zeros": (bytes(5000), "line 1"),
+    "random bytes": (random.Random(1).randbytes(5000), "line 1"),
+    "UTF-16": (as_tidy(samples()).encode("utf-16"), "line 1"),
+    "one endless line": (b"1," * 300_000, "line 1"),
+    "a truncated .gz": (gzip.compress(as_raw(samples()).encode())[:-30], "could be unpacked up to byte"),
+    "a corrupt .gz": (gzip.compress(b"1,2\n" * 99)[:-8] + b"\x00" * 8, "damaged .gz"),
+    "rubbish behind a .gz": (gzip.compress(as_raw(samples()).encode()) + b"rubbish", "damaged .gz"),
+    "a .gz of nothing": (gzip.compress(b""), "line 1: the file is empty"),
+    "a .gz of a .gz": (gzip.compress(gzip.compress(as_raw(samples()).encode())), "line 1"),
+    "only the magic of .gz": (b"\x1f\x8b", "damaged .gz"),
+    "damaged Parquet": (b"PAR1" + bytes(64) + b"PAR1", "damaged Parquet"),
+    "only the magic of Parquet": (b"PAR1", "damaged Parquet"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "told"), UNUSABLE.values(), ids=UNUSABLE)
+def test_a_file_that_cannot_be_used_is_told_by_name(tmp_path: Path, content: str | bytes, told: str) -> None:
+    path = write(tmp_path / "given.csv", content)
+    with pytest.raises(szlib.DataError) as error:
+        szlib.read_tracks(path)
+    assert str(path) in str(error.value)
+    assert told in str(error.value)
+    assert len(str(error.value)) < 1000
+
+
+def test_a_zip_is_told_by_name(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("a.csv", as_raw(samples()))
+    with pytest.raises(szlib.DataError, match=r"a\.zip, line 1"):
+        read_raw(tmp_path / "a.zip")
+
+
+@pytest.mark.parametrize("cut", [0.2, 0.6, 0.95])
+def test_truncated_parquet_is_told_by_name(tmp_path: Path, cut: float) -> None:
+    samples(count=300).to_parquet(tmp_path / "a.parquet")
+    content = (tmp_path / "a.parquet").read_bytes()
+    with pytest.raises(szlib.DataError, match=r"a\.parquet: damaged Parquet"):
+        read_raw(write(tmp_path / "a.parquet", content[: int(len(content) * cut)]))
+
+
+def test_parquet_columns_of_other_types_are_told(tmp_path: Path) -> None:
+    rows = samples()
+    for change, told in {
+        "no column y": rows.drop(columns="y"),
+        "time not in seconds": rows.assign(t=pd.to_datetime(rows["t"], unit="s")),
+        "not a number": rows.assign(id="p" + rows["id"].astype(str)),
+        "cannot be read as tidy": rows.assign(x=[[1.0, 2.0]] * len(rows)),
+    }.items():
+        told.to_parquet(tmp_path / "a.parquet")
+        with pytest.raises(szlib.DataError, match=rf"a\.parquet.*{change}"):
+            read_raw(tmp_path / "a.parquet")
+
+
+def test_paths_that_are_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(szlib.DataError, match="no such file"):
+        read_raw(tmp_path / "missing.csv")
+    with pytest.raises(szlib.DataError, match="is a folder; pass the files in it"):
+        read_raw(tmp_path)
+    with pytest.raises(szlib.DataError, match="no track file was given"):
+        read_raw([])
+    path = write(tmp_path / "locked.csv", as_raw(samples()))
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(szlib.DataError, match=r"locked\.csv: cannot be opened .*Permission denied"):
+        read_raw(path)
+
+
+def test_options_without_a_meaning(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", as_raw(samples()))
+    with pytest.raises(szlib.DataError, match="unknown file_format 'csv'"):
+        read_raw(path, file_format="csv")
+    with pytest.raises(szlib.DataError, match="unit must be 'm' or 'mm'; got 'cm'"):
+        read_raw(path, unit="cm")
+    with pytest.raises(szlib.DataError, match=r"a\.csv, line 1: missing or extra fields; 60 of 60 rows"):
+        read_raw(path, file_format="atc-1hz")
+
+
+def test_the_unit_can_be_given(tmp_path: Path) -> None:
+    rows = samples()
+    millimetres = read_raw(write(tmp_path / "a.csv", as_raw(rows)))
+    in_metres = read_raw(write(tmp_path / "a.csv", as_raw(scaled(1e-3))), unit="m")
+    pd.testing.assert_frame_equal(in_metres, millimetres, rtol=0, atol=2e-6)
+    wide = read_raw(write(tmp_path / "a.csv", as_1hz(scaled(1e3))), unit="mm")
+    pd.testing.assert_frame_equal(wide, millimetres, rtol=0, atol=2e-6)
+
+
+# --- whatever may come -------------------------------------------------------------------------------
+
+TOKENS = [
+    b"", b"\n", b"\n\n", b"\r", b"\r\n", b",", b",,", b" ", b"\t", b'"', b"'", b"#", b"-", b"nan", b"inf",
+    b"1e308", b"-1e308", b"99999999999999999999", b"1e-320", b"1_000", b"0x1F", b"\xd9\xa1", b".", b"e", b"0",
+    b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\x0c", b"\x85", b"\xe2\x80\xa8", b"\x1a", b"t,id,x,y", b"PAR1",
+]  # fmt: skip
+
+
+def mutate(content: bytes, rng: random.Random) -> bytes:
+    """One to four small accidents."""
+    for _ in range(rng.randint(1, 4)):
+        i, j = sorted(rng.randrange(len(content) + 1) for _ in range(2))
+        j = min(j, i + rng.choice([0, 1, 5, 40, 400]))
+        lines = content.split(b"\n")
+        content = rng.choice(
+            [
+                content[:i] + rng.choice(TOKENS) + content[j:],
+                content[:i] + content[i:j] * 2 + content[j:],
+                content[:i] + rng.randbytes(j - i) + content[j:],
+                content[: max(i, 1)],
+                b"\n".join(rng.sample(lines, len(lines))),
+                b"\n".join(rng.choice([line, line[: rng.randrange(len(line) + 1)]]) for line in lines),
+                content.replace(
+                    rng.choice([b",", b".", b"1", b" "]), rng.choice(TOKENS), rng.choice([1, 3, -1])
+                ),
+            ]
+        )
+    return content
+
+
+def lines_of(path: Path) -> int:
+    content = path.read_bytes()
+    content = gzip.decompress(content) if content[:2] == b"\x1f\x8b" else content
+    return content.count(b"\n") + (not content.endswith(b"\n"))
+
+
+def read_or_refuse(path: Path) -> pd.DataFrame | None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", szlib.DataWarning)
+        try:
+            return szlib.read_tracks(path)
+        except szlib.SzlibError as error:
+            assert path.name in str(error) or "person" in str(error)
+            return None
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("packed", [False, True], ids=["plain", "gz"])
+@pytest.mark.parametrize("name", WRITERS)
+def test_any_accident_is_read_with_a_funnel_or_refused(
+    tmp_path: Path, name: str, packed: bool, seed: int
+) -> None:
+    rng = random.Random(f"{name} {packed} {seed}")
+    content = WRITERS[name](samples(count=12)).encode()
+    usable = 0
+    for turn in range(25):
+        path = tmp_path / f"m{turn}.csv"
+        if packed and rng.random() < 0.3:
+            path.write_bytes(mutate(gzip.compress(content), rng))
+        else:
+            path.write_bytes(gzip.compress(mutate(content, rng)) if packed else mutate(content, rng))
+        tracks = read_or_refuse(path)
+        if tracks is None:
+            continue
+        usable += 1
+        read, merged, clock = funnels.of(tracks)
+        assert read["entered"] == lines_of(path) - (name == "tidy")
+        assert (read["kept"], merged["kept"]) == (merged["entered"], clock["entered"])
+        assert np.isfinite(tracks[["t", "x", "y"]].to_numpy()).all()
+        assert not tracks.duplicated(["day", "id", "t"]).any()
+    assert usable > 0
+
+
+def test_any_accident_to_parquet_is_read_or_refused(tmp_path: Path) -> None:
+    samples(count=30).to_parquet(tmp_path / "a.parquet")
+    content, rng = (tmp_path / "a.parquet").read_bytes(), random.Random(5)
+    for turn in range(120):
+        broken = bytearray(content)
+        for _ in range(rng.randint(1, 4)):
+            broken[rng.randrange(len(broken))] = rng.randrange(256)
+        read_or_refuse(write(tmp_path / f"m{turn}.parquet", bytes(broken)))
+
+
+# --- the real thing ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def real_day() -> pd.DataFrame:
+    return read_raw(sorted(real_data("atc-1hz").glob("*.csv")))
+
+
+def test_the_real_day_is_read_whole(real_day: pd.DataFrame) -> None:
+    assert len(real_day) == 624_951
+    assert real_day["id"].nunique() == 15_066
+    assert list(real_day["day"].cat.categories) == ["2012-10-24"]
+    *files, merged = funnels.of(real_day)
+    assert len(files) == 23
+    assert sum(f["entered"] for f in files) == sum(f["kept"] for f in files) == merged["kept"] == 624_951
+    opened, closed = (pd.Timestamp(t, unit="s", tz="Asia/Tokyo") for t in real_day["t"].agg(["min", "max"]))
+    assert (opened.hour, closed.hour) == (9, 20)
+
+
+def test_the_velocity_column_is_inflated_on_the_real_day(real_day: pd.DataFrame) -> None:
+    """Why speed comes from positions: who has moved less than 0.1 m in 1 s is said to walk 0.57 m/s."""
+    names = ["t", "id", "x", "y", "speed", "angle"]
+    files = sorted(real_data("atc-1hz").glob("*.csv"))
+    raw = pd.concat([pd.read_csv(file, names=names) for file in files]).sort_values(["id", "t"])
+    step = raw.groupby("id")[["t", "x", "y"]].diff()
+    moved = np.hypot(step["x"], step["y"]) / step["t"]
+    said = raw.loc[(moved < 0.1) & (step["t"] < 1.2), "speed"].median()
+    assert said == pytest.approx(0.57, abs=0.02)
+    assert len(raw) == len(real_day)
+
+
+def test_the_eth_sequence_is_read_whole() -> None:
+    path = real_data("eth") / "seq_eth_obsmat.txt"
+    frame = read_raw(path)
+    assert (len(frame), frame["id"].nunique()) == (8908, 360)
+    assert list(frame["day"].cat.categories) == ["seq_eth_obsmat"]
+    given = pd.DataFrame(np.loadtxt(path)[:, [0, 1, 2, 4]], columns=["t", "id", "x", "y"])
+    given = given.assign(t=given["t"] / 15, id=given["id"].astype(int)).sort_values(["id", "t"])
+    pd.testing.assert_frame_equal(without_day(frame), given[["id", "t", "x", "y"]].reset_index(drop=True))

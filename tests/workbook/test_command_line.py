@@ -1,0 +1,60 @@
+"""What the commands print, and how they end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import szlib
+from szlib import parallel as jobs
+from szlib.plaza.people import make_plaza
+from szlib.plaza.truth import PlazaSettings
+from szlib.workbook.command_line import main
+
+
+@pytest.fixture(scope="module")
+def day(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("day") / "atc-20121024.csv"
+    return make_plaza(path, settings=PlazaSettings(encounters=40))
+
+
+def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    spoilt = day.with_name("spoilt.csv")
+    spoilt.write_text(day.read_text() + "1,2\n")
+    assert main(["inspect", str(spoilt)]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    counts = [int(line[-1].replace(",", "")) for line in lines]
+    assert lines[0][:3] == ["read", "spoilt.csv", "entered"]
+    assert counts[0] == len(spoilt.read_text().splitlines())
+    assert lines[1][:-1] == ["-", "missing", "or", "extra", "fields"]
+    assert counts[:3] == [counts[0], 1, counts[0] - 1]
+    assert lines[-1][0] == "kept"
+
+
+def test_extract_prints_the_table(day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["extract", str(day), "--out", str(tmp_path / "out")]) == 0
+    assert "1 done" in capsys.readouterr().out
+    (tmp_path / "bad.csv").write_text("rubbish\n")
+    both = [str(day), str(tmp_path / "bad.csv")]
+    assert main(["extract", *both, "--out", str(tmp_path / "out"), "--jobs", "2"]) == 1
+    assert "1 failed, 1 kept" in capsys.readouterr().out
+
+
+def test_what_cannot_be_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(tmp_path / "missing.csv")]) == 2
+    assert "no such file" in capsys.readouterr().err
+
+
+def test_nobody_answers_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError("Timed out trying to connect")
+
+    monkeypatch.setattr(distributed, "Client", refuse)
+    told = r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"
+    with pytest.raises(szlib.SzlibError, match=told), jobs.cluster("tcp://127.0.0.1:9"):
+        pass
+    with jobs.cluster(None) as client:
+        assert client is None

@@ -1,0 +1,131 @@
+"""Figures: every one labels its axes with units, keeps metres square, and leaves its input alone."""
+
+import io
+
+import matplotlib
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+import szlib
+from szlib.workbook.figures import simulation as scenes
+from szlib.workbook.figures import tracks as plotting
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def log():
+    scenario = szlib.SCENARIOS["corridor"]
+    return szlib.simulate(scenario, szlib.MPCCBF(ZONE, walls=scenario.walls), max_time=3.0)
+
+
+@pytest.fixture(scope="module")
+def samples():
+    rng = np.random.default_rng(0)
+    n = 31 * 40
+    return pd.DataFrame(
+        {
+            "encounter": np.repeat(np.arange(40), 31),
+            "los_angle": rng.uniform(-np.pi, np.pi, n),
+            "distance": rng.uniform(0.9, 2.5, n),
+            "speed": rng.uniform(0.4, 1.6, n),
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def zone(samples):
+    return szlib.SocialZone.fit(samples, speeds=(0.9, 1.1))
+
+
+@pytest.fixture(scope="module")
+def tracks():
+    t = np.arange(50) / 10
+    return pd.DataFrame({"day": "d", "id": 1, "t": t, "x": -13 + t, "y": 0 * t, "vx": 1.0, "vy": 0.0})
+
+
+def in_metres(ax) -> bool:
+    return "[m]" in ax.get_xlabel() and "[m]" in ax.get_ylabel() and ax.get_aspect() == 1
+
+
+def paths():
+    t = np.arange(31) / 10
+    rows = [(k, s, s, 0, 5 - s, 0.1 * k) for k in range(5) for s in t]
+    return pd.DataFrame(rows, columns=["encounter", "t", "ref_x", "ref_y", "other_x", "other_y"])
+
+
+MAPS = {
+    "map": lambda f: plotting.plot_map(f("tracks"), szlib.ATC_SQUARE),
+    "space": lambda f: plotting.plot_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE, (-13, 0, 1.0)),
+    "paths": lambda f: plotting.plot_paths(paths(), count=3),
+    "los": lambda f: plotting.plot_los(f("samples")),
+    "outliers": lambda f: plotting.plot_outliers(np.eye(2).repeat(3, axis=0), np.arange(6) < 1),
+    "zone": lambda f: plotting.plot_zone(f("zone"), 1.1, truth=ZONE),
+    "zones": lambda f: plotting.plot_zones(f("zone").ellipses),
+    "ellipse": lambda f: scenes.plot_distance(ZONE),
+    "segment": lambda f: scenes.plot_distance((np.array([-1.0, 0]), np.array([1.0, 0]))),
+    "scenario": lambda f: scenes.plot_scenario(f("log")),
+    "robot paths": lambda f: scenes.plot_paths([("a", f("log")), ("b", f("log"))], title="two"),
+}
+GRAPHS = {
+    "speeds": lambda f: plotting.plot_speeds(np.ones(9), np.zeros(9)),
+    "los-distance": lambda f: plotting.plot_los_distance(f("samples")),
+    "hull": lambda f: plotting.plot_hull(f("zone"), (0.9, 1.1)),
+}
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_maps_are_square_and_in_metres(name, request):
+    ax = MAPS[name](request.getfixturevalue)
+    assert in_metres(ax)
+    assert ax.get_title()
+    ax.figure.savefig(io.BytesIO())
+
+
+@pytest.mark.parametrize("name", GRAPHS)
+def test_graphs_name_units(name, request):
+    ax = GRAPHS[name](request.getfixturevalue)
+    assert "[" in ax.get_xlabel() + ax.get_ylabel()
+    assert ax.get_title()
+    ax.figure.savefig(io.BytesIO())
+
+
+def test_a_figure_given_is_drawn_into(zone):
+    _, ax = plt.subplots()
+    assert plotting.plot_zone(zone, 1.1, ax=ax) is ax
+
+
+def test_a_path_count_limits_what_is_drawn():
+    ax = plotting.plot_paths(paths(), count=3)
+    assert all(len(c.get_segments()) == 3 for c in ax.collections)
+
+
+def test_the_zone_is_drawn_where_the_ellipse_is(zone):
+    ax = plotting.plot_zone(zone, 1.1)
+    drawn = ax.lines[0].get_xydata()
+    assert np.abs(zone.ellipse(1.1).level(drawn) - 1).max() < 1e-9
+
+
+def test_a_run_shows_speed_and_every_h(log):
+    figure = scenes.plot_run(log, title="run")
+    speed, h = figure.axes
+    assert "[m/s]" in speed.get_ylabel()
+    assert "[m]" in h.get_ylabel()
+    assert len(h.lines) == 1 + log.table.columns.str.startswith("h_").sum()
+
+
+def test_an_animation_has_a_frame_for_every_time_asked(log):
+    with Image.open(io.BytesIO(scenes.animate(log, every=1.0, width=3.0))) as movie:
+        assert movie.format == "GIF"
+        assert movie.n_frames == int(np.floor(log.table["t"].iloc[-1] + 1e-9)) + 1

@@ -1,0 +1,53 @@
+"""Zones from many samples: shares are exact, copies do no harm, the order of days does not matter.
+
+The paper's full size (half a million samples) runs in `make bench`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from bench_data import paper_samples
+from sklearn.neighbors import LocalOutlierFactor
+
+import szlib
+from szlib.zones import outliers
+
+MANY = 40_000
+
+
+def test_outliers_are_those_of_scikit_learn() -> None:
+    samples = paper_samples(MANY)
+    points = outliers.complementary_points(samples)
+    theirs = LocalOutlierFactor(n_neighbors=20, contamination=0.002).fit_predict(points) == -1
+    assert (outliers.is_outlier(samples) == theirs).all()
+    assert theirs.sum() == 0.002 * MANY
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_many_copies_do_not_make_lof_explode(share: float) -> None:
+    """As a person who stands still for hours would give; their copies are no outliers, nor make others so."""
+    samples = paper_samples(MANY)
+    copies = np.arange(MANY) < share * MANY
+    samples.loc[copies, ["los_angle", "distance", "speed"]] = [0.3, 1.2, 1.0]
+    with pytest.warns(szlib.DataWarning, match="samples coincide"):
+        outlier = outliers.is_outlier(samples)
+    assert outlier.sum() == pytest.approx(0.002 * MANY, abs=1)
+    with pytest.warns(szlib.DataWarning, match="samples coincide"):
+        zone = szlib.SocialZone.fit(samples, speeds=(1.1,))
+    plain = szlib.SocialZone.fit(samples[~copies], speeds=(1.1,))
+    assert zone.ellipse(1.1).area == pytest.approx(plain.ellipse(1.1).area, rel=0.15)
+
+
+def test_the_zone_does_not_depend_on_the_order_of_samples() -> None:
+    samples = paper_samples(MANY)
+    shuffled = samples.sample(frac=1, random_state=1)
+    zones = [szlib.SocialZone.fit(table, speeds=(0.9, 1.1)) for table in (samples, shuffled)]
+    for speed in (0.9, 1.1):
+        one, other = (zone.ellipse(speed) for zone in zones)
+        np.testing.assert_allclose(
+            [*one.center, *one.semi_axes], [*other.center, *other.semi_axes], rtol=1e-9
+        )
+    kept = [outliers.remove_outliers(table).sort_index() for table in (samples, shuffled)]
+    pd.testing.assert_frame_equal(kept[0], kept[1])
