@@ -25,14 +25,11 @@
 
 # %%
 import numpy as np
-import pandas as pd
 
 import szlib
-from szlib.encounters import search as encounters
-from szlib.tracks import clock as tracks
-from szlib.tracks import funnels, readers
-from szlib.workbook.figures import tracks as plotting
-from szlib.workbook.record import ASSUMED, MEASURED, Page, parameters
+from szlib.tracks import clock, funnels, readers
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -40,13 +37,13 @@ seed = 0
 results = "../results"
 
 # %%
-page = Page("01_tracks", data=data, results=results, seed=seed)
+record = NotebookRecord("01_tracks", data=data, results=results, seed=seed)
 parameters(
     [
         ("clock", "0.1 s", ASSUMED, "two people's samples must coincide; the paper's control step"),
         (
             "velocity span",
-            f"+-{tracks.VELOCITY_SPAN} s",
+            f"+-{clock.VELOCITY_SPAN} s",
             ASSUMED,
             "a step is about 0.5 s: shorter spans see the sway",
         ),
@@ -74,7 +71,7 @@ parameters(
 # and counted.
 
 # %%
-files = page.files()
+files = record.files()
 raw = readers.read_raw(files)
 print(f"{len(files)} file(s), {len(raw):,} rows, {raw.groupby('day')['id'].nunique().sum():,} people")
 raw.head(3)
@@ -84,46 +81,22 @@ raw.head(3)
 #
 # Sensors see people at irregular times. `to_clock` interpolates to multiples of 0.1 s *within*
 # gap-free pieces - a person who vanishes behind somebody and comes back is not bridged - and
-# takes velocity from the displacement over one second.
+# takes velocity from the displacement over one second. It never reads the velocity column of a file:
+# notebook 14 shows what noise does to it.
 
 # %%
-people = tracks.to_clock(raw)
+people = clock.to_clock(raw)
 people.head(3)
 
 # %%
 speed = np.hypot(people["vx"], people["vy"])
 walking = speed[speed > 0.4]
 print(f"{len(people) / 36000:,.0f} person-hours; walkers' median speed {walking.median():.2f} m/s")
-page.key |= {
+record.key |= {
     "rows": len(raw),
     "people": int(raw.groupby("day")["id"].nunique().sum()),
     "median speed": float(walking.median()),
 }
-
-# %% [markdown]
-# ## Never trust the velocity column
-#
-# ATC files carry a speed for each row. Beside the speed from displacement it shows what noise
-# does to a derivative: people who stand still seem to stroll. (Tables without such a column skip
-# this.)
-
-# %%
-column = {"synthetic": (5, 1e-3), "atc-1hz": (4, 1.0)}.get(str(data))
-if column:
-    recorded = pd.concat(
-        pd.read_csv(f, header=None, usecols=[0, 1, column[0]], nrows=300_000) for f in files[-2:]
-    )
-    recorded.columns = ["t", "id", "recorded"]
-    recorded["t"] = (recorded["t"] * 10).round() / 10
-    both = recorded.merge(people.assign(speed=speed), on=["id", "t"])
-    ax = plotting.plot_speeds(both["recorded"] * column[1], both["speed"])
-    page.figure(ax.figure, "speeds")
-    standing = both.loc[both["speed"] < 0.1, "recorded"].median() * column[1]
-    page.check(
-        "the velocity column is inflated where people stand",
-        standing > 0.2,
-        f"{standing:.2f} m/s at < 0.1 m/s",
-    )
 
 # %% [markdown]
 # ## The square
@@ -133,15 +106,15 @@ if column:
 # plaza everybody is in the square; the paper's fig. 1 is this map of the real day.)
 
 # %%
-ax = plotting.plot_map(people, szlib.ATC_SQUARE)
-page.figure(ax.figure, "map")
+ax = figures.plot_map(people, szlib.ATC_SQUARE)
+record.figure(ax.figure, "map")
 
 # %%
 inside = szlib.ATC_SQUARE.contains(people["x"], people["y"])
 print(f"{inside.mean():.1%} of all person-time is spent in the square")
-page.check("people walk through the square", inside.sum() > 1000, int(inside.sum()))
-ax = plotting.plot_space(encounters.AttentionalSpace(), szlib.ATC_SQUARE, at=(-13.0, -4.0, np.pi / 3))
-page.figure(ax.figure, "space")
+record.check("people walk through the square", inside.sum() > 1000, int(inside.sum()))
+ax = figures.plot_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE, at=(-13.0, -4.0, np.pi / 3))
+record.figure(ax.figure, "space")
 
 # %% [markdown]
 # ## Nothing is lost
@@ -152,7 +125,7 @@ page.figure(ax.figure, "space")
 # %%
 stages = funnels.of(people)
 lost = {reason: n for s in stages for reason, n in s["set_aside"].items()}
-page.check(
+record.check(
     "the funnel adds up",
     all(s["entered"] == s["kept"] + sum(s["set_aside"].values()) for s in stages),
     lost or "no row set aside",
@@ -164,4 +137,4 @@ funnels.table(stages).tail(5)
 # and an open square to watch them in. Next: who meets whom?
 
 # %%
-page.close()
+record.close()

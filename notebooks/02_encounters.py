@@ -26,10 +26,10 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.encounters import search as encounters
+from szlib.encounters.search import reference_frame
 from szlib.tracks import funnels
-from szlib.workbook.figures import tracks as plotting
-from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -38,7 +38,7 @@ results = "../results"
 examples = 200  # paths drawn, as in the paper's fig. 2
 
 # %%
-page = Page("02_encounters", data=data, results=results, seed=seed)
+record = NotebookRecord("02_encounters", data=data, results=results, seed=seed)
 space = szlib.AttentionalSpace()
 parameters(
     [
@@ -59,27 +59,27 @@ parameters(
 # away, (4) the reference pedestrian walks at 0.4 m/s or more.
 
 # %%
-tracks = page.tracks()
+tracks = record.tracks()
 samples = szlib.find_encounters(tracks, square=szlib.ATC_SQUARE, space=space)
-page.keep_encounters(samples)
+record.keep_encounters(samples)
 count = samples["encounter"].nunique()
 per_day = count / max(tracks["day"].nunique(), 1)
 print(f"{count} encounters, {len(samples):,} samples; {per_day:.0f} a day")
 samples.head(3)
 
 # %%
-page.key |= {"encounters": count, "samples": len(samples)}
-page.check("each encounter has 31 samples", (samples.groupby("encounter").size() == 31).all())
+record.key |= {"encounters": count, "samples": len(samples)}
+record.check("each encounter has 31 samples", (samples.groupby("encounter").size() == 31).all())
 first = samples.groupby("encounter").first()
-page.check(
+record.check(
     "at the opening the other person is at least 1 m away",
     first["distance"].min() >= 1,
     float(first["distance"].min()),
 )
 x, y = (first["distance"] * part(first["los_angle"]) for part in (np.cos, np.sin))
 there = (x > -1e-9) & (x < space.length + 1e-9) & (y.abs() < space.width / 2 + 1e-9)
-page.check("and inside the space ahead", there.all())
-page.check(
+record.check("and inside the space ahead", there.all())
+record.check(
     "the reference pedestrian walks throughout", samples["speed"].min() >= 0.4, float(samples["speed"].min())
 )
 
@@ -90,7 +90,7 @@ page.check(
 
 # %%
 if data == "atc-1hz":
-    page.claim(
+    record.claim(
         "as many encounters a day as in the paper (176), within a factor of two",
         0.5 < per_day / 176 < 2,
         f"{per_day:.0f} a day",
@@ -103,9 +103,9 @@ if data == "atc-1hz":
 # window opened: x ahead, y to the left.
 
 # %%
-paths = encounters.reference_frame(tracks, samples)
-ax = plotting.plot_paths(paths, count=examples)
-page.figure(ax.figure, "paths")
+paths = reference_frame(tracks, samples)
+ax = figures.plot_encounter_paths(paths, count=examples)
+record.figure(ax.figure, "paths")
 
 # %% [markdown]
 # ## Distance and line of sight
@@ -114,12 +114,12 @@ page.figure(ax.figure, "paths")
 # frame, at every moment of the window.
 
 # %%
-ax = plotting.plot_los(samples)
-page.figure(ax.figure, "los")
+ax = figures.plot_los(samples)
+record.figure(ax.figure, "los")
 
 # %%
-ax = plotting.plot_los_distance(samples)
-page.figure(ax.figure, "los-distance")
+ax = figures.plot_los_distance(samples)
+record.figure(ax.figure, "los-distance")
 
 # %% [markdown]
 # ## Two readings of one sentence
@@ -149,8 +149,8 @@ compared
 
 # %%
 strict = compared.loc["ahead, inside throughout"]
-page.check("the strict reading sees nobody behind the person", strict["of these behind"] == 0)
-page.check(
+record.check("the strict reading sees nobody behind the person", strict["of these behind"] == 0)
+record.check(
     "the chosen reading does",
     compared.iloc[0]["of these behind"] > 0,
     int(compared.iloc[0]["of these behind"]),
@@ -165,7 +165,7 @@ page.check(
 
 # %%
 stages = funnels.of(samples)
-page.check(
+record.check(
     "the funnel adds up", all(s["entered"] == s["kept"] + sum(s["set_aside"].values()) for s in stages)
 )
 funnels.table(stages).tail(15)
@@ -175,4 +175,4 @@ funnels.table(stages).tail(15)
 # scatter. But a few samples lie far inside it: the next notebook asks which of them to believe.
 
 # %%
-page.close()
+record.close()

@@ -27,8 +27,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib.workbook.figures import tracks as plotting
-from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 from szlib.zones import outliers
 
 # %% tags=["parameters"]
@@ -39,7 +39,7 @@ fraction = 0.002
 r_max = 2.0
 
 # %%
-page = Page("03_outliers", data=data, results=results, seed=seed)
+record = NotebookRecord("03_outliers", data=data, results=results, seed=seed)
 parameters(
     [
         ("r_max", f"{r_max:g} m", PAPER, "sec. 2"),
@@ -63,22 +63,22 @@ parameters(
 # $$(x', y') = (r_{max} - r)\,(\cos\theta_{LOS}, \sin\theta_{LOS})$$
 
 # %%
-samples = page.encounters()
+samples = record.encounters()
 close = samples[samples["distance"] <= r_max]
 points = outliers.complementary_points(close, r_max=r_max)
 print(f"{len(close):,} of {len(samples):,} samples are within {r_max:g} m")
 
 # %%
 outlier = outliers.is_outlier(close, fraction=fraction, r_max=r_max)
-ax = plotting.plot_outliers(points, outlier, r_max=r_max)
-page.figure(ax.figure, "outliers")
+ax = figures.plot_outliers(points, outlier, r_max=r_max)
+record.figure(ax.figure, "outliers")
 
 # %%
 inliers = szlib.remove_outliers(samples, fraction=fraction, r_max=r_max)
 removed = int(outlier.sum())
-page.check("the quota is met", abs(removed - fraction * len(close)) <= 1, f"{removed} of {len(close)}")
-page.check("remove_outliers keeps the others", len(inliers) == len(close) - removed)
-page.key |= {"close samples": len(close), "outliers": removed}
+record.check("the quota is met", abs(removed - fraction * len(close)) <= 1, f"{removed} of {len(close)}")
+record.check("remove_outliers keeps the others", len(inliers) == len(close) - removed)
+record.key |= {"close samples": len(close), "outliers": removed}
 
 # %% [markdown]
 # ## Why inside out?
@@ -97,15 +97,15 @@ plain_outlier = (
 )
 fig, both = plt.subplots(1, 2, figsize=(10, 4.5), layout="constrained", sharex=True, sharey=True)
 for ax, mask, title in zip(both, (outlier, plain_outlier), ("complementary", "plain"), strict=True):
-    ax.plot(*plain[~mask].T, ".", color=plotting.GREY, markersize=2)
-    ax.plot(*plain[mask].T, "x", color=plotting.RED, markersize=7, mew=1.8)
-    plotting.metres(ax, f"LOF on {title} coordinates", person=True)
-page.figure(fig, "plain")
+    ax.plot(*plain[~mask].T, ".", color=figures.GREY, markersize=2)
+    ax.plot(*plain[mask].T, "x", color=figures.RED, markersize=7, mew=1.8)
+    figures.metres(ax, f"LOF on {title} coordinates", person=True)
+record.figure(fig, "plain")
 
 # %%
 distance = close["distance"].to_numpy()
 rim, rim_plain = (distance[outlier] < 1).sum(), (distance[plain_outlier] < 1).sum()
-page.claim(
+record.claim(
     "complementary coordinates spare the edge (fewer outliers nearer than 1 m)",
     rim < rim_plain,
     f"{rim} of {removed}, plain {rim_plain}",
@@ -133,4 +133,4 @@ for share in (0.0, fraction, 10 * fraction):
 # LOF may leave the nearest samples in.
 
 # %%
-page.close()
+record.close()

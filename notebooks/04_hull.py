@@ -26,8 +26,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib.workbook.figures import tracks as plotting
-from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 from szlib.zones import hulls, outliers
 
 # %% tags=["parameters"]
@@ -37,7 +37,7 @@ results = "../results"
 speeds = [0.7, 0.9, 1.1, 1.3]
 
 # %%
-page = Page("04_hull", data=data, results=results, seed=seed)
+record = NotebookRecord("04_hull", data=data, results=results, seed=seed)
 parameters(
     [
         ("hull over", "x', y', speed", PAPER, "sec. 2, fig. 4b"),
@@ -48,21 +48,21 @@ parameters(
 )
 
 # %%
-samples = page.encounters()
+samples = record.encounters()
 inliers = szlib.remove_outliers(samples)
 points = np.column_stack([outliers.complementary_points(inliers), inliers["speed"]])
 vertices = hulls.hull_vertices(points)
 print(f"{len(points):,} inliers, {len(vertices)} of them vertices of the hull")
-page.key |= {"inliers": len(points), "vertices": len(vertices)}
+record.key |= {"inliers": len(points), "vertices": len(vertices)}
 
 # %% [markdown]
 # ## The hull in three dimensions
 
 # %%
 zone = szlib.SocialZone.fit(samples)
-ax = plotting.plot_hull(zone, speeds)
-page.figure(ax.figure, "hull")
-page.check("SocialZone.fit finds the same vertices", np.array_equal(zone.vertices, vertices), len(vertices))
+ax = figures.plot_hull(zone, speeds)
+record.figure(ax.figure, "hull")
+record.check("SocialZone.fit finds the same vertices", np.array_equal(zone.vertices, vertices), len(vertices))
 
 # %% [markdown]
 # ## A slice, and the zone it leaves free
@@ -79,14 +79,14 @@ section = hulls.slice_hull(vertices, 1.1, r_max=2.0)
 theta = np.linspace(-np.pi, np.pi, 721)
 rim = section.reach(theta)[:, None] * np.column_stack([np.cos(theta), np.sin(theta)])
 fig, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained")
-left.fill(*section.polygon.T, facecolor=plotting.BLUE, alpha=0.3)
-left.plot(*rim.T, color=plotting.BLUE)
-plotting.metres(left, "The slice at 1.1 m/s")
+left.fill(*section.polygon.T, facecolor=figures.BLUE, alpha=0.3)
+left.plot(*rim.T, color=figures.BLUE)
+figures.metres(left, "The slice at 1.1 m/s")
 left.set(xlabel="x' [m]", ylabel="y' [m]")
-right.fill(*section.boundary(theta).T, facecolor=plotting.ORANGE, alpha=0.4)
-right.plot(0, 0, marker=(3, 0, -90), color=plotting.BLACK, markersize=10)
-plotting.metres(right, "The zone it leaves free", person=True)
-page.figure(fig, "slice")
+right.fill(*section.boundary(theta).T, facecolor=figures.ORANGE, alpha=0.4)
+right.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
+figures.metres(right, "The zone it leaves free", person=True)
+record.figure(fig, "slice")
 
 # %% [markdown]
 # The zone must be empty: each inlier lies outside, or just on the edge of, the zone of its own
@@ -99,7 +99,7 @@ low, high = zone.speed_range
 some = some[some["speed"].between(low, high, inclusive="neither")]
 room = [2.0 - zone.slice(v).reach(angle) for v, angle in zip(some["speed"], some["los_angle"], strict=True)]
 margin = float((some["distance"] - room).min())
-page.check("no inlier is inside the zone of its own speed", margin > -1e-9, margin)
+record.check("no inlier is inside the zone of its own speed", margin > -1e-9, margin)
 
 # %% [markdown]
 # ## What the hull does to speed
@@ -119,20 +119,20 @@ for v in grid:
         )
     except szlib.ZoneError:
         area.append(np.nan)
-ax = plotting.axes(None)
-ax.plot(grid, area, color=plotting.BLUE)
+ax = figures.axes(None)
+ax.plot(grid, area, color=figures.BLUE)
 ax.set(
     xlabel="speed [m/s]",
     ylabel="area of the zone [m$^2$]",
     title=f"The zone is smallest at {grid[np.nanargmin(area)]:.2f} m/s",
 )
-page.figure(ax.figure, "area")
+record.figure(ax.figure, "area")
 
 # %%
 area = np.array(area)
 smallest = float(grid[np.nanargmin(area)])
-page.key["smallest zone at"] = smallest
-page.claim(
+record.key["smallest zone at"] = smallest
+record.claim(
     "the zone grows with speed between 0.7 and 1.3 m/s (part of any growth is the hull's own)",
     np.all(np.diff(area[(grid >= 0.7) & (grid <= 1.3)]) > 0),
     f"smallest at {smallest:.2f} m/s",
@@ -143,4 +143,4 @@ page.claim(
 # they say more about how few people walk so slowly or so fast than about the room they are given.
 
 # %%
-page.close()
+record.close()

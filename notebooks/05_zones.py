@@ -28,8 +28,8 @@ import pandas as pd
 
 import szlib
 from szlib.plaza.truth import PlazaSettings
-from szlib.workbook.figures import tracks as plotting
-from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -38,7 +38,7 @@ results = "../results"
 interactive = False  # True: a slider for the speed
 
 # %%
-page = Page("05_zones", data=data, results=results, seed=seed)
+record = NotebookRecord("05_zones", data=data, results=results, seed=seed)
 parameters(
     [
         ("ellipse", "smallest area", PAPER, "sec. 2"),
@@ -52,21 +52,21 @@ parameters(
 # ## The whole chain in one call
 
 # %%
-zone = page.keep_zone(szlib.SocialZone.fit(page.encounters()))
+zone = record.keep_zone(szlib.SocialZone.fit(record.encounters()))
 zone.table().round(3)
 
 # %%
 settings = PlazaSettings()
-truth = {v: settings.true_zone(v) for v in zone.ellipses} if page.synthetic else {}
-ax = plotting.plot_zone(zone, 1.1, truth=truth.get(1.1))
-page.figure(ax.figure, "zone")
+truth = {v: settings.true_zone(v) for v in zone.ellipses} if record.synthetic else {}
+ax = figures.plot_zone(zone, 1.1, truth=truth.get(1.1))
+record.figure(ax.figure, "zone")
 
 # %%
 ellipse = zone.ellipse(1.1)
-page.key |= {"a(1.1)": ellipse.semi_axes[0], "b(1.1)": ellipse.semi_axes[1], "x(1.1)": ellipse.center[0]}
+record.key |= {"a(1.1)": ellipse.semi_axes[0], "b(1.1)": ellipse.semi_axes[1], "x(1.1)": ellipse.center[0]}
 inside = {v: float(e.level(zone.boundary(v, 5000)).max()) for v, e in zone.ellipses.items()}
-page.check("each ellipse encloses its zone", max(inside.values()) <= 1 + 1e-9, max(inside.values()))
-page.check(
+record.check("each ellipse encloses its zone", max(inside.values()) <= 1 + 1e-9, max(inside.values()))
+record.check(
     "with three to five points of support", all(3 <= len(e.support) <= 5 for e in zone.ellipses.values())
 )
 
@@ -76,18 +76,18 @@ page.check(
 
 # %%
 again = szlib.minimum_enclosing_ellipse(ellipse.support)
-page.check("the support alone determines it", np.allclose(again.semi_axes, ellipse.semi_axes, rtol=1e-6))
+record.check("the support alone determines it", np.allclose(again.semi_axes, ellipse.semi_axes, rtol=1e-6))
 if len(ellipse.support) > 3:
     without = [np.delete(ellipse.support, i, axis=0) for i in range(len(ellipse.support))]
     largest = max(szlib.minimum_enclosing_ellipse(points).area for points in without)
-    page.check("and it shrinks without any one of them", largest < ellipse.area, largest / ellipse.area)
+    record.check("and it shrinks without any one of them", largest < ellipse.area, largest / ellipse.area)
 
 # %% [markdown]
 # ## By speed
 
 # %%
-ax = plotting.plot_zones({v: zone.ellipses[v] for v in (0.7, 1.1, 1.5) if v in zone.ellipses})
-page.figure(ax.figure, "zones")
+ax = figures.plot_zones({v: zone.ellipses[v] for v in (0.7, 1.1, 1.5) if v in zone.ellipses})
+record.figure(ax.figure, "zones")
 
 # %% [markdown]
 # ## Is it true?
@@ -96,12 +96,12 @@ page.figure(ax.figure, "zones")
 # sensor noise, gaps, clock, conditions, outliers, hull, ellipse - must find it again.
 
 # %%
-if page.synthetic:
+if record.synthetic:
     for v in (0.7, 0.9, 1.1, 1.3):
         found, true = zone.ellipse(v), truth[v]
         off = np.abs([*np.subtract(found.center, true.center), *np.subtract(found.semi_axes, true.semi_axes)])
         turn = abs(np.degrees(np.angle(np.exp(2j * (found.angle - true.angle))) / 2))
-        page.check(
+        record.check(
             f"true zone found at {v} m/s (5 cm, 10 deg)",
             off.max() < 0.05 and turn < 10,
             f"{off.max():.3f} m, {turn:.1f} deg",
@@ -114,7 +114,7 @@ if page.synthetic:
 # large for lack of data, not out of respect. So count before you believe.
 
 # %%
-near = page.encounters().query("distance <= 2")
+near = record.encounters().query("distance <= 2")
 sector = pd.cut(np.degrees(near["los_angle"]), range(-180, 181, 45))
 seen = near.groupby(sector, observed=False).agg(
     samples=("t", "size"), encounters=("encounter", "nunique"), nearest=("distance", "min")
@@ -125,8 +125,8 @@ seen.round(2)
 behind, _, ahead, _, _ = (float(r) for r in np.hypot(*zone.boundary(1.1, 5).T))
 few = int(seen["encounters"].iloc[[0, -1]].sum())
 value = f"{ahead:.2f} m ahead; {behind:.2f} m behind, where {few} encounters were in view"
-page.claim("the zone at 1.1 m/s reaches farther ahead than behind", ahead > behind, value)
-page.claim(
+record.claim("the zone at 1.1 m/s reaches farther ahead than behind", ahead > behind, value)
+record.claim(
     "the ellipse is centred ahead of the person", ellipse.center[0] > 0, f"centre {ellipse.center[0]:+.2f} m"
 )
 
@@ -139,7 +139,7 @@ page.claim(
 # %%
 theta = np.linspace(-np.pi, np.pi, 361)
 fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
-for v, colour in zip((0.7, 1.1, 1.5), plotting.colours((0.7, 1.1, 1.5)), strict=True):
+for v, colour in zip((0.7, 1.1, 1.5), figures.colours((0.7, 1.1, 1.5)), strict=True):
     if v in zone.ellipses:
         ax.plot(np.degrees(theta), np.hypot(*zone.boundary(v).T), color=colour, label=f"{v:g} m/s")
 ax.set(
@@ -147,7 +147,7 @@ ax.set(
 )
 ax.set(title="How far the zone reaches in each direction", ylim=(0, None))
 ax.legend()
-page.figure(fig, "reach")
+record.figure(fig, "reach")
 
 # %%
 if interactive:
@@ -155,7 +155,7 @@ if interactive:
 
     low, high = (round(v, 2) for v in zone.speed_range)
     interact(
-        lambda speed: plotting.plot_zone(zone, speed),
+        lambda speed: figures.plot_zone(zone, speed),
         speed=FloatSlider(1.1, min=low + 0.1, max=high - 0.1, step=0.05),
     )
 
@@ -165,4 +165,4 @@ if interactive:
 # needs.
 
 # %%
-page.close()
+record.close()

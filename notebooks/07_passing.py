@@ -23,13 +23,14 @@
 # %%
 from dataclasses import replace
 
+import matplotlib.pyplot as plt
 import pandas as pd
 from IPython.display import Image
 
 import szlib
-from szlib.simulation.closed_loop import avoidance_start
-from szlib.workbook.figures import simulation as scenes
-from szlib.workbook.record import Page, settings_table
+from szlib.simulation.metrics import avoidance_start
+from szlib.workbook import figures
+from szlib.workbook.record import NotebookRecord, settings_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -39,7 +40,7 @@ gamma = 0.05
 interactive = False  # True: a slider for gamma
 
 # %%
-page = Page("07_passing", data=data, results=results, seed=seed)
+record = NotebookRecord("07_passing", data=data, results=results, seed=seed)
 settings = szlib.MPCSettings(gamma=gamma)
 settings_table(settings)
 
@@ -65,7 +66,7 @@ settings_table(settings)
 # solved again with penalised slack, flagged and counted.
 
 # %%
-zone = page.zone().ellipse(settings.zone_speed)
+zone = record.zone().ellipse(settings.zone_speed)
 scenario = szlib.SCENARIOS["passing"]
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
 step = controller.step(scenario.start, scenario.goal, scenario.people)
@@ -77,30 +78,31 @@ metrics = log.metrics()
 pd.Series(metrics).to_frame("value")
 
 # %%
-ax = scenes.plot_scenario(log)
-page.figure(ax.figure, "scenario")
+ax = log.plot()
+record.figure(ax.figure, "scenario")
 
 # %%
-page.animation(movie := scenes.animate(log), "run")
+record.animation(movie := log.animate(), "run")
 Image(movie)
 
 # %% [markdown]
 # ## Did it keep its promises?
 
 # %%
-page.check("the goal is reached", metrics["success"])
-page.check("h >= 0 at every step", metrics["min_h"] >= 0, metrics["min_h"])
-page.check("no infeasible step", metrics["infeasible_steps"] == 0, metrics["infeasible_steps"])
-page.check("nothing is touched (Euclidean)", metrics["min_clearance"] > 0, metrics["min_clearance"])
-page.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metrics["max_speed"])
-page.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_clearance", "min_speed")}
+record.check("the goal is reached", metrics["success"])
+record.check("h >= 0 at every step", metrics["min_h"] >= 0, metrics["min_h"])
+record.check("no infeasible step", metrics["infeasible_steps"] == 0, metrics["infeasible_steps"])
+record.check("nothing is touched (Euclidean)", metrics["min_clearance"] > 0, metrics["min_clearance"])
+record.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metrics["max_speed"])
+record.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_clearance", "min_speed")}
 for claim in scenario.claims:
-    page.claim(claim.text, *claim.check(log))
+    record.claim(claim.text, *claim.check(log))
 
 # %%
-figure = scenes.plot_run(log, title="The robot hardly slows down: there is room")
-page.figure(figure, "run")
-figure
+fig, (upper, lower) = plt.subplots(2, 1, figsize=(8, 4.5), sharex=True, layout="constrained")
+figures.plot_speed(log, ax=upper).set(title="The robot hardly slows down: there is room", xlabel="")
+figures.plot_barriers(log, ax=lower)
+record.figure(fig, "run")
 
 # %% [markdown]
 # ## From the front, from behind
@@ -114,10 +116,9 @@ starts = {name: avoidance_start(run) for name, run in (("head-on", log), ("from 
 pd.DataFrame(starts, index=["distance to the person [m]", "h [m]"]).round(3)
 
 # %%
-ax = scenes.plot_paths(
-    [("head-on", log), ("from behind", behind)], title="Nearly the same path, begun a little earlier or later"
-)
-page.figure(ax.figure, "head-on-or-behind")
+ax = figures.plot_robot_paths({"head-on": log, "from behind": behind})
+ax.set_title("Nearly the same path, begun a little earlier or later")
+record.figure(ax.figure, "head-on-or-behind")
 
 # %% [markdown]
 # ## Left or right
@@ -132,15 +133,16 @@ sides = {}
 for side in ("right", "left"):
     other = szlib.MPCCBF(zone, walls=scenario.walls, settings=replace(settings, pass_side=side))
     sides[side] = szlib.simulate(scenario, other)
-    page.check(f"asked for {side}, passes on the {side}", sides[side].metrics()["passing_side"] == side)
-ax = scenes.plot_paths(list(sides.items()), title="pass_side decides")
-page.figure(ax.figure, "sides")
+    record.check(f"asked for {side}, passes on the {side}", sides[side].metrics()["passing_side"] == side)
+ax = figures.plot_robot_paths(sides)
+ax.set_title("pass_side decides")
+record.figure(ax.figure, "sides")
 
 
 # %%
 def run_with(gamma: float) -> None:
     other = szlib.MPCCBF(zone, walls=scenario.walls, settings=replace(settings, gamma=gamma))
-    scenes.plot_scenario(szlib.simulate(scenario, other))
+    szlib.simulate(scenario, other).plot()
 
 
 if interactive:
@@ -154,4 +156,4 @@ if interactive:
 # difference of centimetres, for the zone is that much longer at one end: nobody would see it.
 
 # %%
-page.close()
+record.close()

@@ -21,12 +21,13 @@
 # the zone the barrier leaves little speed.
 
 # %%
+import matplotlib.pyplot as plt
 import pandas as pd
 from IPython.display import Image
 
 import szlib
-from szlib.workbook.figures import simulation as scenes
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, Page, parameters
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -35,7 +36,7 @@ results = "../results"
 gamma = 0.05
 
 # %%
-page = Page("08_corridor", data=data, results=results, seed=seed)
+record = NotebookRecord("08_corridor", data=data, results=results, seed=seed)
 settings = szlib.MPCSettings(gamma=gamma)
 scenario = szlib.SCENARIOS["corridor"]
 person = scenario.people[0]
@@ -55,18 +56,18 @@ parameters(
 )
 
 # %%
-zone = page.zone().ellipse(settings.zone_speed)
+zone = record.zone().ellipse(settings.zone_speed)
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
 log = szlib.simulate(scenario, controller)
 metrics = log.metrics()
 pd.Series(metrics).to_frame("value")
 
 # %%
-ax = scenes.plot_scenario(log)
-page.figure(ax.figure, "scenario")
+ax = log.plot()
+record.figure(ax.figure, "scenario")
 
 # %%
-page.animation(movie := scenes.animate(log), "run")
+record.animation(movie := log.animate(), "run")
 Image(movie)
 
 # %% [markdown]
@@ -76,24 +77,27 @@ Image(movie)
 # every step for every person and wall, no step without a solution, no speeding.
 
 # %%
-page.check("the goal is reached", metrics["success"])
-page.check("h >= 0 at every step", metrics["min_h"] >= 0, metrics["min_h"])
-page.check("no infeasible step", metrics["infeasible_steps"] == 0, metrics["infeasible_steps"])
-page.check("nothing is touched (Euclidean)", metrics["min_clearance"] > 0, metrics["min_clearance"])
-page.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metrics["max_speed"])
-page.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_speed", "time_yielding")}
+record.check("the goal is reached", metrics["success"])
+record.check("h >= 0 at every step", metrics["min_h"] >= 0, metrics["min_h"])
+record.check("no infeasible step", metrics["infeasible_steps"] == 0, metrics["infeasible_steps"])
+record.check("nothing is touched (Euclidean)", metrics["min_clearance"] > 0, metrics["min_clearance"])
+record.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metrics["max_speed"])
+record.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_speed", "time_yielding")}
 
 # %% [markdown]
 # ## As the paper says?
 
 # %%
 for claim in scenario.claims:
-    page.claim(claim.text, *claim.check(log))
+    record.claim(claim.text, *claim.check(log))
 
 # %%
-figure = scenes.plot_run(log, title="The robot slows down before the person, and speeds up beside them")
-page.figure(figure, "run")
-figure
+fig, (upper, lower) = plt.subplots(2, 1, figsize=(8, 4.5), sharex=True, layout="constrained")
+figures.plot_speed(log, ax=upper).set(
+    title="The robot slows down before the person, and speeds up beside them", xlabel=""
+)
+figures.plot_barriers(log, ax=lower)
+record.figure(fig, "run")
 
 # %%
 log.min_h().to_frame("smallest h [m]").round(3)
@@ -104,4 +108,4 @@ log.min_h().to_frame("smallest h [m]").round(3)
 # like courtesy is the mathematics of keeping a distance.
 
 # %%
-page.close()
+record.close()

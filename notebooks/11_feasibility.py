@@ -30,12 +30,10 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.simulation.closed_loop import advance
-from szlib.simulation.runs import drive
-from szlib.simulation.worlds import ONE_PERSON, Worlds
-from szlib.workbook.figures import control as charts
-from szlib.workbook.figures import tracks as plotting
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, Page, parameters
+from szlib.simulation.closed_loop import advance, drive
+from szlib.simulation.worlds import ONE_PERSON, Worlds, world
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -48,7 +46,7 @@ limits = [0.5, 1.0]  # a_max
 n_jobs = 1
 
 # %%
-page = Page("11_feasibility", data=data, results=results, seed=seed)
+record = NotebookRecord("11_feasibility", data=data, results=results, seed=seed)
 crowd = Worlds(people=(2, 4), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=0.3)
 parameters(
     [
@@ -71,11 +69,15 @@ cells = []
 for gamma, N_h, a_max in product(gammas, horizons, limits):
     settings = szlib.MPCSettings(gamma=gamma, N_h=N_h, a_max=a_max)
     rows = szlib.rollouts(worlds, seed=seed, settings=settings, worlds=crowd, n_jobs=n_jobs, progress=False)
-    numbers = (rows["infeasible"].mean(), rows["min_h"].min(), rows["silent"].sum())
+    numbers = (rows["infeasible_steps"].mean(), rows["min_h"].min(), rows["unflagged_violations"].sum())
     cells.append((gamma, N_h, a_max, worlds, *numbers))
-mine = pd.DataFrame(cells, columns=["gamma", "N_h", "a_max", "worlds", "infeasible", "min_h", "silent"])
-mine.to_csv(page.out / "11_feasibility.csv", index=False)
-page.check("no step that called itself safe led to h < 0", (mine["silent"] == 0).all(), len(mine))
+mine = pd.DataFrame(
+    cells, columns=["gamma", "N_h", "a_max", "worlds", "infeasible_steps", "min_h", "unflagged_violations"]
+)
+mine.to_csv(record.out / "11_feasibility.csv", index=False)
+record.check(
+    "no step that called itself safe led to h < 0", (mine["unflagged_violations"] == 0).all(), len(mine)
+)
 mine.round(3)
 
 # %% [markdown]
@@ -84,26 +86,26 @@ mine.round(3)
 
 # %%
 full = pd.read_csv("tables/11_feasibility.csv")
-shown = {"infeasible": ("infeasible steps a world", 8.0), "min_h": ("smallest h [m]", -0.5)}
+shown = {"infeasible_steps": ("infeasible steps a world", 8.0), "min_h": ("smallest h [m]", -0.5)}
 fig, grid = plt.subplots(2, 3, figsize=(12, 6.5), layout="constrained")
 for column, (a_max, part) in enumerate(full.groupby("a_max")):
     for row, (what, (label, worst)) in enumerate(shown.items()):
         table = part.pivot(index="N_h", columns="gamma", values=what)
         title = f"{label}, a_max = {a_max:g}"
-        charts.plot_sweep(table, title=title, worst=worst, ax=grid[row, column])
-page.figure(fig, "map")
+        figures.plot_sweep(table, worst=worst, ax=grid[row, column]).set_title(title)
+record.figure(fig, "map")
 
 # %%
 paper = full[(full["N_h"] == 2) & (full["a_max"] == 1)].set_index("gamma")
 whole = full[(full["N_h"] == 8) & (full["a_max"] == 1)].set_index("gamma")
-page.check(
+record.check(
     "gamma = 0.05 keeps h >= 0 with N_h = 2", paper.loc[0.05, "min_h"] >= -1e-6, paper.loc[0.05, "min_h"]
 )
-page.claim("so does any gamma (sec. 4)", (paper["min_h"] >= -1e-6).all(), paper["min_h"].to_dict())
-page.claim(
+record.claim("so does any gamma (sec. 4)", (paper["min_h"] >= -1e-6).all(), paper["min_h"].to_dict())
+record.claim(
     "so does any gamma on the whole horizon", (whole["min_h"] >= -1e-6).all(), whole["min_h"].to_dict()
 )
-page.key["h at worst, N_h = 2, gamma = 0.8 [m]"] = float(paper.loc[0.8, "min_h"])
+record.key["h at worst, N_h = 2, gamma = 0.8 [m]"] = float(paper.loc[0.8, "min_h"])
 
 # %% [markdown]
 # ## One infeasible step, three answers
@@ -135,32 +137,32 @@ def follow(answer: str, settings: szlib.MPCSettings) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["t", "x", "y", "vx", "vy", "h", "feasible"])
 
 
-zone = page.zone().ellipse(1.1)
+zone = record.zone().ellipse(1.1)
 hasty = szlib.MPCSettings(gamma=0.8)
 answers = {answer: follow(answer, hasty) for answer in ("dropped", "relaxed", "braking")}
 
 # %%
 fig, (left, right) = plt.subplots(1, 2, figsize=(12, 4), layout="constrained")
-shades = ((plotting.RED, "-"), (plotting.BLUE, "--"), (plotting.GREEN, ":"))
+shades = ((figures.RED, "-"), (figures.BLUE, "--"), (figures.GREEN, ":"))
 for (answer, run), (shade, line) in zip(answers.items(), shades, strict=True):
     left.plot(run["t"], run["h"], line, color=shade, label=f"{answer}: min h {run['h'].min():+.2f} m")
     right.plot(run["x"], run["y"], line, color=shade, label=answer)
     broken = run[~run["feasible"]]
     left.plot(broken["t"], broken["h"], "|", color=shade, markersize=9)
-left.axhline(0, color=plotting.GREY)
+left.axhline(0, color=figures.GREY)
 left.set(xlabel="time [s]", ylabel="h [m]", title="Ticks: infeasible steps")
 left.legend(loc="upper center", fontsize=8)
 around = szlib.SCENARIOS["passing"].people[0]
-right.plot(*zone.placed(around.position, around.heading).curve().T, color=plotting.BLACK, label="zone")
-plotting.metres(right, "Paths").legend(fontsize=8)
-page.figure(fig, "answers")
+right.plot(*zone.placed(around.position, around.heading).curve().T, color=figures.BLACK, label="zone")
+figures.metres(right, "Paths").legend(fontsize=8)
+record.figure(fig, "answers")
 
 # %%
 lowest = {answer: float(run["h"].min()) for answer, run in answers.items()}
-page.check("every infeasible step was flagged", all((~run["feasible"]).any() for run in answers.values()))
-page.check("dropping the barrier is the worst answer", lowest["dropped"] <= min(lowest.values()), lowest)
+record.check("every infeasible step was flagged", all((~run["feasible"]).any() for run in answers.values()))
+record.check("dropping the barrier is the worst answer", lowest["dropped"] <= min(lowest.values()), lowest)
 steady = follow("relaxed", replace(hasty, N_h=hasty.N))
-page.claim("the whole horizon needs none of them", steady["h"].min() >= -1e-6 and steady["feasible"].all())
+record.claim("the whole horizon needs none of them", steady["h"].min() >= -1e-6 and steady["feasible"].all())
 
 # %% [markdown]
 # ## A promise for ever
@@ -191,10 +193,11 @@ kept = szlib.rollouts(
     progress=False,
 )
 steps = 150 * len(kept)
-page.check(
-    f"not one infeasible step in {steps} among walls and people who stand", kept["infeasible"].sum() == 0
+record.check(
+    f"not one infeasible step in {steps} among walls and people who stand",
+    kept["infeasible_steps"].sum() == 0,
 )
-page.check("and h >= 0 throughout", kept["min_h"].min() >= -1e-6, kept["min_h"].min())
+record.check("and h >= 0 throughout", kept["min_h"].min() >= -1e-6, kept["min_h"].min())
 
 # %% [markdown]
 # **People who walk.** Then the appended row may fail, as they come closer while the robot rests. But
@@ -207,19 +210,19 @@ page.check("and h >= 0 throughout", kept["min_h"].min() >= -1e-6, kept["min_h"].
 meeting = replace(ONE_PERSON, standing=0.0)
 start_only = True
 for each in range(seed, seed + 4 * worlds):
-    scenario = szlib.simulation.worlds.world(each, meeting)
-    run = drive(scenario, szlib.MPCSettings(terminal="person"))
-    feasible = run.slack <= 1e-6
+    controller = szlib.MPCCBF(zone, settings=szlib.MPCSettings(terminal="person"))
+    log = drive(world(each, meeting), controller, until_arrival=False)
+    feasible = log.slack <= 1e-6
     start_only &= bool(feasible[feasible.argmax() :].all())
-page.check("once there is a solution there always is one", start_only, 4 * worlds)
+record.check("once there is a solution there always is one", start_only, 4 * worlds)
 
 # %% [markdown]
 # ## Ten thousand worlds
 #
 # `szlib.rollouts(10_000, ...)`, 150 steps each: 1-5 people who walk or stand, walls in half of the
 # worlds, any start, heading and goal; and one person in open space with a robot that starts at rest,
-# $h \ge 0.3$ m. The table is saved beside the notebooks. *Silent* counts steps that called
-# themselves safe and led to $h < 0$.
+# $h \ge 0.3$ m. The table is saved beside the notebooks. *Unflagged
+# violations* are steps that called themselves safe and led to $h < 0$.
 #
 # With one person the few infeasible steps are first ones: somebody who walks up at 0.5 m/s takes
 # 5 cm of $h$ in a step where the condition allows $\gamma h = 1.5$ cm, and a robot at rest cannot yet
@@ -229,13 +232,13 @@ page.check("once there is a solution there always is one", start_only, 4 * world
 
 # %%
 thousands = pd.read_csv("tables/11_rollouts.csv")
-page.check("no step with h < 0 that was not flagged before", (thousands["silent"] == 0).all())
+record.check("no step with h < 0 that was not flagged before", (thousands["unflagged_violations"] == 0).all())
 alone = thousands[thousands["set"] == "one person"].set_index("formulation")
 long = alone.loc[["whole horizon", "rest"], "min_h"]
-page.check("one person, long horizons: h >= 0 in every world", long.min() >= -1e-6, long.to_dict())
+record.check("one person, long horizons: h >= 0 in every world", long.min() >= -1e-6, long.to_dict())
 lost = alone.filter(like="paper", axis=0)["share h < 0"]
-page.claim("one person, N_h = 2: h >= 0 in every world, for any gamma", lost.max() == 0, lost.to_dict())
-page.key |= {"worlds driven": int(thousands["worlds"].sum())}
+record.claim("one person, N_h = 2: h >= 0 in every world, for any gamma", lost.max() == 0, lost.to_dict())
+record.key |= {"worlds driven": int(thousands["worlds"].sum())}
 thousands.set_index(["set", "formulation"]).T
 
 # %% [markdown]
@@ -245,7 +248,7 @@ thousands.set_index(["set", "formulation"]).T
 # %%
 rows = szlib.rollouts(20, seed=seed, n_jobs=n_jobs, progress=False)
 failed = rows[rows["outcome"] != "arrived"]
-failed[["seed", "people", "walls", "outcome", "min_h", "flagged"]]
+failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]]
 
 # %% [markdown]
 # **What it means.** A small $\gamma$ hides a short horizon, at the price of a slow robot. A plan
@@ -253,4 +256,4 @@ failed[["seed", "people", "walls", "outcome", "min_h", "flagged"]]
 # they walk, the robot is never the one who drives in.
 
 # %%
-page.close()
+record.close()

@@ -29,9 +29,9 @@ import pandas as pd
 
 import szlib
 from szlib.control import distances
-from szlib.simulation.runs import drive
-from szlib.workbook.figures import control as charts
-from szlib.workbook.record import ASSUMED, PAPER, Page, parameters
+from szlib.simulation.closed_loop import drive
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -41,7 +41,7 @@ lengths = [0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 8.0, 13.0]  # of walls [m]
 eccentricities = [0.0, 0.3, 0.5, 0.65, 0.8, 0.9, 0.99]  # of ellipses as long as the learned one
 
 # %%
-page = Page("12_distances", data=data, results=results, seed=seed)
+record = NotebookRecord("12_distances", data=data, results=results, seed=seed)
 settings = szlib.MPCSettings()
 r, eps = settings.r_robot, settings.eps
 parameters(
@@ -57,16 +57,18 @@ parameters(
 # ## An exact reference
 #
 # The distance to a segment is a projection, clamped; that to an ellipse the one root of a function
-# of one angle, found by bisection (`szlib.distances`; the tests hold both against a geometry
+# of one angle, found by bisection (`szlib.control.distances`; the tests hold both against a geometry
 # library). Red below: $d$ is longer than the truth.
 
 # %%
-zone = page.zone().ellipse(settings.zone_speed)
+zone = record.zone().ellipse(settings.zone_speed)
 fig, sides = plt.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
-charts.plot_overestimate(zone, r_robot=r, eps=eps, ax=sides[0]).set_title("Around the learned zone")
+figures.plot_overestimate(zone, r_robot=r, eps=eps, ax=sides[0]).set_title("Around the learned zone")
 short = np.array([(-0.5, 0.0), (0.5, 0.0)])
-charts.plot_overestimate(short, r_robot=r, eps=eps, extent=1.3, ax=sides[1]).set_title("Around a wall of 1 m")
-page.figure(fig, "maps")
+figures.plot_overestimate(short, r_robot=r, eps=eps, extent=1.3, ax=sides[1]).set_title(
+    "Around a wall of 1 m"
+)
+record.figure(fig, "maps")
 
 # %% [markdown]
 # ## Around a zone: never too long
@@ -85,7 +87,7 @@ page.figure(fig, "maps")
 points = np.random.default_rng(seed).uniform(-4, 4, (100_000, 2))
 true = distances.euclidean_to_ellipse(points, zone)
 over = distances.overestimate(points, zone)[true > 0]
-page.check("the focal distance never over-estimates", over.max() <= 1e-9, 100 * float(over.max()))
+record.check("the focal distance never over-estimates", over.max() <= 1e-9, 100 * float(over.max()))
 
 # %%
 a = zone.semi_axes[0]
@@ -100,9 +102,9 @@ zones
 # %%
 learned = distances.audit(zone, r_robot=r, eps=eps)
 beside = learned.farthest - eps
-page.claim("eps covers the error around the learned zone", learned.required <= eps, learned.required)
-page.check("the gap left around it is at least eps", learned.nearest >= eps - 1e-6, learned.nearest)
-page.key["room given away beside the zone [cm]"] = 100 * beside
+record.claim("eps covers the error around the learned zone", learned.required <= eps, learned.required)
+record.check("the gap left around it is at least eps", learned.nearest >= eps - 1e-6, learned.nearest)
+record.key["room given away beside the zone [cm]"] = 100 * beside
 print(f"beside the learned zone the robot keeps {100 * beside:.1f} cm more than it has to")
 
 # %% [markdown]
@@ -110,7 +112,7 @@ print(f"beside the learned zone the robot keeps {100 * beside:.1f} cm more than 
 #
 # Straight ahead of an end, at the true distance $s$, the trimming term is $-t = s + s^2/L$, and
 # $d$ is just that. The robot's disc touches the end at $s = r$, where $d = r + r^2/L$; nowhere else
-# on the outline at distance $r$ is $d$ longer (proof in `szlib.distances`). So
+# on the outline at distance $r$ is $d$ longer (proof in `szlib.control.distances`). So
 #
 # $$\epsilon_{required} = \frac{r^2}{L},$$
 #
@@ -125,10 +127,10 @@ table
 
 # %%
 for length, found in walls.items():
-    page.claim(f"eps covers the error of a wall of {length:g} m", found.nearest >= -1e-9, found.nearest)
+    record.claim(f"eps covers the error of a wall of {length:g} m", found.nearest >= -1e-9, found.nearest)
     enough = max(eps, found.required)
     mended = distances.audit([(0, 0), (length, 0)], r_robot=r, eps=enough)
-    page.check(f"r^2/L is enough for it: eps = {100 * enough:.1f} cm", mended.nearest >= -1e-9)
+    record.check(f"r^2/L is enough for it: eps = {100 * enough:.1f} cm", mended.nearest >= -1e-9)
 
 # %%
 fig, ax = plt.subplots(figsize=(7, 3.8), layout="constrained")
@@ -140,7 +142,7 @@ ax.set(xlabel="length of the wall [m]", ylabel="margin [cm]", xscale="log", ylim
 ax.set_xticks([0.5, 1, 2, 5, 10], ["0.5", "1", "2", "5", "10"])
 ax.set_title("A short wall needs a large margin")
 ax.legend()
-page.figure(fig, "margin")
+record.figure(fig, "margin")
 
 # %% [markdown]
 # ## The controller with enough margin
@@ -152,11 +154,11 @@ page.figure(fig, "margin")
 wall = np.array([[(0.0, -1.0), (0.0, 0.0)]])
 start, goal = np.array([-2.0, 3.0, 0.0, 0.0]), np.array([0.0, 0.4])
 scenario = szlib.Scenario("end", start, goal, walls=wall, title="To the end of a wall of 1 m")
-run = drive(scenario, settings)
-nearest, lowest = float(run.clearance.min()), float(run.h.min())
+log = drive(scenario, szlib.MPCCBF(zone, walls=wall, settings=settings), until_arrival=False)
+nearest, lowest = float(log.clearance.min()), float(log.h.min())
 print(f"eps {eps:.2f} m: min h {100 * lowest:+.1f} cm, true gap {100 * nearest:+.1f} cm")
-page.check("the paper's barrier holds all the way", lowest >= -1e-6, lowest)
-page.claim("and keeps the robot off the wall", nearest >= 0, nearest)
+record.check("the paper's barrier holds all the way", lowest >= -1e-6, lowest)
+record.claim("and keeps the robot off the wall", nearest >= 0, nearest)
 
 # %%
 used = distances.with_margin(settings, wall)
@@ -166,13 +168,14 @@ try:
 except szlib.SolverError as error:
     refusal = str(error)
     print(f"eps {used.eps:.2f} m: {refusal}")
-page.check("with the required margin that goal is refused", "cannot be reached" in refusal)
+record.check("with the required margin that goal is refused", "cannot be reached" in refusal)
 
 # %%
 past = szlib.Scenario("past", start, np.array([1.0, -3.0]), walls=wall, title="Around the end of a wall")
-gap = float(drive(past, used).clearance.min())
-page.check("and on the way around the end nothing is touched", gap >= 0, gap)
-page.key["wall of 1 m, paper's eps: gap [cm]"] = 100 * nearest
+log = drive(past, szlib.MPCCBF(zone, walls=wall, settings=used), until_arrival=False)
+gap = float(log.clearance.min())
+record.check("and on the way around the end nothing is touched", gap >= 0, gap)
+record.key["wall of 1 m, paper's eps: gap [cm]"] = 100 * nearest
 
 # %% [markdown]
 # **What it means.** Around people the margin is not needed, and the approximation is polite: it
@@ -181,4 +184,4 @@ page.key["wall of 1 m, paper's eps: gap [cm]"] = 100 * nearest
 # short pieces as one.
 
 # %%
-page.close()
+record.close()

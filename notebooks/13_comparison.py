@@ -30,9 +30,8 @@ import pandas as pd
 
 from szlib.simulation import comparisons
 from szlib.simulation.comparisons import BEHAVIOURS, FORMULATIONS, WORLDS, ZONES
-from szlib.workbook.figures import control as charts
-from szlib.workbook.figures import tracks as plotting
-from szlib.workbook.record import ASSUMED, Page, parameters
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -42,7 +41,7 @@ worlds = 4  # worlds for each method; 100 for the table that is saved
 n_jobs = 1
 
 # %%
-page = Page("13_comparison", data=data, results=results, seed=seed)
+record = NotebookRecord("13_comparison", data=data, results=results, seed=seed)
 full_table = Path("tables/13_comparison.csv")  # of worlds = 100
 parameters(
     [
@@ -67,15 +66,15 @@ parameters(
 #   this family, of random size, tilt and offset.
 
 # %%
-zone = page.zone().ellipse(1.1)
-ax = plotting.axes(None, size=(5.5, 5))
-shades = (plotting.GREY, plotting.GREEN, plotting.ORANGE, plotting.RED, plotting.BLUE)
+zone = record.zone().ellipse(1.1)
+ax = figures.axes(None, size=(5.5, 5))
+shades = (figures.GREY, figures.GREEN, figures.ORANGE, figures.RED, figures.BLUE)
 for (name, make), shade in zip(ZONES.items(), shades, strict=True):
     ax.plot(*make(zone).curve().T, color=shade, linewidth=2, label=name)
-ax.plot(0, 0, marker=(3, 0, -90), color=plotting.BLACK, markersize=10)
+ax.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
 ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=5, fontsize=8)
-plotting.metres(ax, "Five zones of one person", person=True)
-page.figure(ax.figure, "zones")
+figures.metres(ax, "Five zones of one person", person=True)
+record.figure(ax.figure, "zones")
 
 # %% [markdown]
 # ## Identical worlds
@@ -90,19 +89,19 @@ surprises = [name for name in BEHAVIOURS if name != "as expected"]
 wrong = comparisons.compare(
     worlds, seed=seed, zones=["fitted"], behaviours=surprises, n_jobs=n_jobs, progress=False
 )
-page.check("nothing is missing", not rows["path_length"].isna().any(), len(rows) + len(wrong))
-page.check("no step that called itself safe led to h < 0", (rows["silent"] == 0).all())
+record.check("nothing is missing", not rows["path_length"].isna().any(), len(rows) + len(wrong))
+record.check("no step that called itself safe led to h < 0", (rows["unflagged_violations"] == 0).all())
 
 
 # %%
-def told(table: pd.DataFrame) -> pd.DataFrame:
+def formatted(table: pd.DataFrame) -> pd.DataFrame:
     """Mean [low, high] of each metric, one row a method."""
     text = [f"{m:.2f} [{a:.2f}, {b:.2f}]" for m, a, b in table[["mean", "low", "high"]].to_numpy()]
     wide = table.assign(text=text).pivot(index=["behaviour", "formulation", "zone"], columns="metric")
     return wide["text"][list(comparisons.METRICS)]
 
 
-told(comparisons.summarise(rows)).T
+formatted(comparisons.summarise(rows)).T
 
 # %% [markdown]
 # ## The full run
@@ -112,11 +111,11 @@ told(comparisons.summarise(rows)).T
 
 # %%
 mine = comparisons.summarise(pd.concat([rows, wrong]))
-mine.round(4).to_csv(page.out / "13_comparison.csv", index=False)
+mine.round(4).to_csv(record.out / "13_comparison.csv", index=False)
 full = pd.read_csv(full_table)
 expected = full[full["behaviour"] == "as expected"]
-page.key["worlds in the saved table"] = int(full["n"].max())
-told(expected).T
+record.key["worlds in the saved table"] = int(full["n"].max())
+formatted(expected).T
 
 # %%
 labels = {
@@ -128,19 +127,21 @@ labels = {
     "jerk": "mean squared jerk [m$^2$/s$^6$]",
 }
 fig, grid = plt.subplots(2, 3, figsize=(13, 6.5), layout="constrained", sharey=True)
-charts.plot_grid(expected, labels, rows="zone", colour="formulation", into=list(grid.ravel()))
+for ax, (metric, label) in zip(grid.flat, labels.items(), strict=True):
+    figures.plot_intervals(expected, metric, rows="zone", colour="formulation", label=label, ax=ax)
+figures.legend_below(grid.flat)
 fig.suptitle("Identical worlds, people as expected")
-page.figure(fig, "zones-and-formulations")
+record.figure(fig, "zones-and-formulations")
 
 # %%
 mean = full.set_index(["behaviour", "formulation", "metric", "zone"])["mean"]
 usual = mean["as expected"]["paper"]
-page.claim(
+record.claim(
     "the fitted zone lets the robot arrive sooner than Hall's",
     usual["time_to_goal"]["fitted"] < usual["time_to_goal"]["Hall"],
     {name: usual["time_to_goal"][name] for name in ZONES},
 )
-page.claim(
+record.claim(
     "without a zone the robot drives through the zone that people keep",
     usual["inside fitted"]["none"] > usual["inside fitted"]["fitted"],
     {name: usual["inside fitted"][name] for name in ZONES},
@@ -159,26 +160,28 @@ labels = {
     "inside fitted": "inside fitted zones [s]",
     "min_clearance": "least gap to body or wall [m]",
     "time_to_goal": "time to goal [s]",
-    "flagged": "flagged steps",
+    "flagged_steps": "flagged steps",
     "jerk": "mean squared jerk [m$^2$/s$^6$]",
 }
 fig, grid = plt.subplots(2, 3, figsize=(13, 6.5), layout="constrained", sharey=True)
-charts.plot_grid(surprised, labels, rows="behaviour", colour="formulation", into=list(grid.ravel()))
+for ax, (metric, label) in zip(grid.flat, labels.items(), strict=True):
+    figures.plot_intervals(surprised, metric, rows="behaviour", colour="formulation", label=label, ax=ax)
+figures.legend_below(grid.flat)
 fig.suptitle("The fitted zone, people not as expected")
-page.figure(fig, "surprises")
+record.figure(fig, "surprises")
 
 # %%
 inside = surprised[surprised["metric"] == "inside fitted"].set_index(["behaviour", "formulation"])
 table = inside["mean"].unstack()[list(FORMULATIONS)].loc[list(BEHAVIOURS)]
 print(table.round(3))
 worse = {name: float(table.loc[name, "paper"] - table.loc["as expected", "paper"]) for name in BEHAVIOURS}
-page.claim(
+record.claim(
     "wrong predictions matter little: at most 0.1 s more inside zones in 15 s",
     max(worse.values()) <= 0.1,
     worse,
 )
 longer = {name: float(table.loc[name, "whole horizon"] - table.loc[name, "paper"]) for name in BEHAVIOURS}
-page.claim("and less to a myopic barrier (N_h = 2) than to a long one", min(longer.values()) >= 0, longer)
+record.claim("and less to a myopic barrier (N_h = 2) than to a long one", min(longer.values()) >= 0, longer)
 
 # %% [markdown]
 # **What it means.** Without a zone the robot spends seconds where people let nobody come; a circle
@@ -189,4 +192,4 @@ page.claim("and less to a myopic barrier (N_h = 2) than to a long one", min(long
 # worlds do not tell the methods apart.
 
 # %%
-page.close()
+record.close()

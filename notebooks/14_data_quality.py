@@ -30,8 +30,8 @@ import szlib
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.tracks import funnels, quality
-from szlib.workbook.figures import tracks as plotting
-from szlib.workbook.record import ASSUMED, MEASURED, Page, parameters
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -40,7 +40,7 @@ results = "../results"
 exclude = []
 
 # %%
-page = Page("14_data_quality", data=data, results=results, seed=seed)
+record = NotebookRecord("14_data_quality", data=data, results=results, seed=seed)
 parameters(
     [
         ("standing", f"< {quality.STANDING:g} m in 1 s", MEASURED, "the sensor's noise stays below it"),
@@ -54,10 +54,10 @@ parameters(
 # The plaza has one day; here it gets three more, the last one with more people, as on an event day.
 
 # %%
-files = page.files()
-if page.synthetic:
+files = record.files()
+if record.synthetic:
     for day, encounters in enumerate((300, 300, 900)):
-        file = page.out / f"plaza-day{day + 2}-{seed}.csv"
+        file = record.out / f"plaza-day{day + 2}-{seed}.csv"
         settings = PlazaSettings(encounters=encounters, date=f"2000-01-{3 + day:02}")
         files.append(make_plaza(file, seed=seed + day + 1, settings=settings))
 seconds = pd.concat([quality.seconds(file).assign(file=file.name) for file in files])
@@ -69,13 +69,13 @@ print(f"{len(files)} files, {seconds['rows'].sum():,} rows, {len(seconds):,} per
 # Speed from displacement over 1 s, against the file's own column for the same person and second.
 
 # %%
-told = seconds.dropna(subset=["said", "moved"])
-if len(told):
-    ax = plotting.plot_speeds(told["said"].to_numpy(), told["moved"].to_numpy())
-    page.figure(ax.figure, "speeds")
-    slow = told.loc[told["moved"] < quality.STANDING, "said"].median()
-    page.key["said of who stands [m/s]"] = round(float(slow), 3)
-    page.claim("the velocity column is inflated for who stands", slow > 0.3, f"{slow:.2f} m/s")
+both = seconds.dropna(subset=["sensor_speed", "moved"])
+if len(both):
+    ax = figures.plot_speeds(both["sensor_speed"].to_numpy(), both["moved"].to_numpy())
+    record.figure(ax.figure, "speeds")
+    slow = both.loc[both["moved"] < quality.STANDING, "sensor_speed"].median()
+    record.key["sensor speed of who stands [m/s]"] = round(float(slow), 3)
+    record.claim("the velocity column is inflated for who stands", slow > 0.3, f"{slow:.2f} m/s")
 
 # %% [markdown]
 # ## Frames, gaps, lengths of tracks, ids
@@ -83,13 +83,13 @@ if len(told):
 # %%
 intervals = np.concatenate([quality.frame_intervals(file) for file in files])
 found = pd.concat([quality.people(file).assign(file=file.name) for file in files])
-table = found.assign(length=found["ended"] - found["begun"]).groupby("file", as_index=False)
+table = found.assign(length=found["last_seen"] - found["first_seen"]).groupby("file", as_index=False)
 table = table.agg(
     people=("id", "nunique"),
     lowest_id=("id", "min"),
     highest_id=("id", "max"),
-    opens=("begun", "min"),
-    closes=("ended", "max"),
+    opens=("first_seen", "min"),
+    closes=("last_seen", "max"),
     median_length=("length", "median"),
 )
 for name in ("opens", "closes"):
@@ -99,25 +99,25 @@ table
 
 # %%
 usual = float(np.median(intervals[intervals < 5]))
-page.key["median frame interval [s]"] = round(usual, 4)
-ax = plotting.axes(None)
-ax.hist(1e3 * intervals[intervals < 3 * usual], bins=60, color=plotting.BLUE)
+record.key["median frame interval [s]"] = round(usual, 4)
+ax = figures.axes(None)
+ax.hist(1e3 * intervals[intervals < 3 * usual], bins=60, color=figures.BLUE)
 ax.set(xlabel="from one frame to the next [ms]", ylabel="frames", title="Frames come irregularly")
-page.figure(ax.figure, "intervals")
+record.figure(ax.figure, "intervals")
 
 # %%
-ax = plotting.axes(None)
+ax = figures.axes(None)
 gaps = found["longest_gap"].dropna().to_numpy()
-lengths = (found["ended"] - found["begun"]).to_numpy()
+lengths = (found["last_seen"] - found["first_seen"]).to_numpy()
 bins = np.geomspace(0.02, 2000, 31).tolist()
 for values, name, colour, line in (
-    (gaps, "longest gap", plotting.RED, "--"),
-    (lengths, "length of track", plotting.BLUE, "-"),
+    (gaps, "longest gap", figures.RED, "--"),
+    (lengths, "length of track", figures.BLUE, "-"),
 ):
     ax.hist(values, bins=bins, histtype="step", color=colour, linestyle=line, linewidth=1.6, label=name)
 ax.set(xscale="log", xlabel="time [s]", ylabel="people", title="How long people are seen, and lost")
 ax.legend()
-page.figure(ax.figure, "tracks")
+record.figure(ax.figure, "tracks")
 
 # %% [markdown]
 # ## Visits and standing people, to choose event days
@@ -128,13 +128,13 @@ page.figure(ax.figure, "tracks")
 hours = quality.by_hour(seconds)
 days = hours.groupby("day", as_index=False).agg(visits=("visits", "sum"), standing=("standing", "mean"))
 figure, panels = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
-for (day, rows), colour in zip(hours.groupby("day"), plotting.colours(days["day"]), strict=True):
+for (day, rows), colour in zip(hours.groupby("day"), figures.colours(days["day"]), strict=True):
     for ax, column in zip(panels, ("visits", "standing"), strict=True):
         ax.plot(rows["hour"], rows[column], "o-", color=colour, label=day)
 for ax, title in zip(panels, ("Visits", "People who stand, mean"), strict=True):
     ax.set(xlabel="hour of the day", ylabel="people", title=title, xticks=range(9, 22), ylim=(0, None))
 panels[0].legend()
-page.figure(figure, "hours")
+record.figure(figure, "hours")
 days
 
 # %% [markdown]
@@ -143,23 +143,23 @@ days
 # The same as `szlib inspect FILE` prints; over all days, each stage added up.
 
 # %%
-extraction = szlib.extract_days(files, out=page.out / "days", exclude=exclude, progress=False)
+extraction = szlib.extract_days(files, out=record.out / "days", exclude=exclude, progress=False)
 extraction.table.drop(columns="seconds")
 
 # %%
 samples = extraction.samples()
 stages = funnels.of(samples)
-ax = plotting.plot_funnel(funnels.table(stages))
+ax = figures.plot_funnel(funnels.table(stages))
 ax.set_title("From rows of files to encounters")
-page.figure(ax.figure, "funnel")
+record.figure(ax.figure, "funnel")
 
 # %%
 read = [stage for stage in stages if stage["stage"].startswith("read ")]
 unusable = sum(sum(stage["set_aside"].values()) for stage in read)
-page.key |= {"rows": sum(stage["entered"] for stage in read), "encounters": samples["encounter"].nunique()}
-page.check("every file was read", len(extraction.failed) == 0, len(extraction.table))
-page.check("each row is used or counted", all(s["entered"] >= s["kept"] for s in stages), unusable)
-page.check("frames are at most 1 s apart (median)", usual <= 1.0, f"{usual:.3f} s")
+record.key |= {"rows": sum(stage["entered"] for stage in read), "encounters": samples["encounter"].nunique()}
+record.check("every file was read", len(extraction.failed) == 0, len(extraction.table))
+record.check("each row is used or counted", all(s["entered"] >= s["kept"] for s in stages), unusable)
+record.check("frames are at most 1 s apart (median)", usual <= 1.0, f"{usual:.3f} s")
 
 # %% [markdown]
 # **What it means.** Speed must come from positions. Gaps and irregular frames are ordinary: everything
@@ -168,4 +168,4 @@ page.check("frames are at most 1 s apart (median)", usual <= 1.0, f"{usual:.3f} 
 # cost.
 
 # %%
-page.close()
+record.close()

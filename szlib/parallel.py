@@ -1,4 +1,4 @@
-"""The door through which work is handed out: processes here, or a cluster, whatever joblib has been told.
+"""Work in parallel: processes here, or a Dask cluster, whatever joblib is configured for.
 
 A laptop needs nothing: ``n_jobs=2``.  Inside ``joblib.parallel_config("dask")``, with a
 ``distributed.Client`` open, the same calls go to a Dask cluster; `cluster` opens both for an address.

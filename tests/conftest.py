@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,6 +14,9 @@ import pytest
 import szlib
 
 DAY = "2012-10-24"
+
+hypothesis.settings.register_profile("szlib", deadline=None)  # tests are never timed
+hypothesis.settings.load_profile("szlib")
 
 
 def make_walk(

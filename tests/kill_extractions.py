@@ -1,4 +1,4 @@
-"""The long form of "killed at random moments": `python tests/endure.py 20`."""
+"""The long form of "killed at random moments": `python tests/kill_extractions.py 20`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mutated files, many: `python tests/fuzz.py 20000`.
+"""Mutated files, many: `python tests/mutate_files.py 20000`.
 
 Every one must read with a funnel that adds up, streamed as well as whole, or be refused with an error of
 szlib that names it; nothing may hang, nor take more than 1 GB.

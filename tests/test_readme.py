@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import szlib
-from szlib.workbook import runner as workbook
+from szlib.workbook import command_line
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -38,6 +38,6 @@ def test_make_verbs_exist():
 
 def test_options_exist():
     with pytest.raises(SystemExit):
-        workbook.main(["run", "--help"])
+        command_line.main(["run", "--help"])
     for line in re.findall(r"^szlib run.*?(?=\s+#|$)", TEXT, flags=re.MULTILINE):
-        workbook._parser().parse_args(line.split()[1:])
+        command_line._parser().parse_args(line.split()[1:])

@@ -1,4 +1,4 @@
-"""IPOPT behind the problem of `szlib.problem`, as in the paper."""
+"""IPOPT behind the problem of `szlib.control.problem`, as in the paper."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Ipopt:
 def _solvers(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any, int]:
     p = build_problem(settings, n_people, n_walls)
     options: dict[str, Any] = {"expand": True, "print_time": False, "calc_lam_p": False}
-    options["show_eval_warnings"] = False  # a failure is told by `Step.status`
+    options["show_eval_warnings"] = False  # a failure shows in `Step.status`
     options |= {f"ipopt.{name}": value for name, value in _OPTIONS.items()}
     options["ipopt.max_iter"] = settings.max_iterations
     # Slack counted by its penalty, in the unit of the cost: IPOPT would scale the rest away.

@@ -1,6 +1,6 @@
 """The controller: model predictive control with barriers around people and walls (MPC-CBF).
 
-The problem stands in `szlib.problem`; it is solved by `szlib.sqp` or `szlib.ipopt`. Each step climbs
+The problem stands in `problem`; it is solved by `sqp` or `ipopt`. Each step climbs
 down a ladder until a rung holds:
 
     warm      the problem, from the last plan, shifted
@@ -38,7 +38,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Literal, Protocol, cast, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,11 +49,9 @@ from .barriers import Array, barrier, check_wall, finite, segment_formula
 from .head_on import subgoal
 from .ipopt import Ipopt
 from .people import Person, PlacedZone, SpeedZone, as_ellipse, place
-from .problem import TOLERANCE, Evaluator, Numbers
+from .problem import TOLERANCE, Numbers, ProblemSolver
 from .settings import MPCSettings
 from .sqp import Sqp
-
-__all__ = ["MPCCBF", "TOLERANCE", "MPCSettings", "Person", "Step"]
 
 Rung = Literal["warm", "cold", "kept", "relaxed", "braking"]
 RUNGS: tuple[Rung, ...] = get_args(Rung)
@@ -70,7 +68,7 @@ class Step:
     ----------
     control : acceleration (ax, ay) to apply now, within its bounds, shape (2,) [m/s2].
     predicted : states x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s].
-    rung : the rung of the ladder that gave the plan; see `szlib.mpc`.
+    rung : the rung of the ladder that gave the plan; see `szlib.control.mpc`.
     slack : largest violation of a hard row by the plan, 0 if none [m for barriers, m2/s2 for speed,
         m/s for the terminal velocity].
     residual : h_{k+1} - (1-gamma) h_k, people before walls, shape (people + walls, N_h) [m].
@@ -94,7 +92,7 @@ class Step:
     @property
     def status(self) -> Status:
         """ "optimal": a solver converged and every hard row holds; else the rung."""
-        return "optimal" if self.rung in ("warm", "cold") else cast(Status, self.rung)
+        return status_of(self.rung)
 
     @property
     def feasible(self) -> bool:
@@ -107,14 +105,9 @@ class Step:
         return self.feasible and bool((self.h >= -TOLERANCE).all())
 
 
-class Solver(Protocol):
-    """What `Ipopt` and `Sqp` have in common; inputs have shape (2N,) [m/s2]."""
-
-    evaluate: Evaluator
-
-    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
-    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
-    def reset(self) -> None: ...
+def status_of(rung: Rung) -> Status:
+    """What a rung says of its plan: see `Step.status`."""
+    return "optimal" if rung in ("warm", "cold") else cast(Status, rung)
 
 
 class MPCCBF:
@@ -127,7 +120,7 @@ class MPCCBF:
     walls : segments, shape (n, 2, 2): end points [m].
     settings : every other parameter.
     max_people : how many people to build for now. More make the controller grow once, which takes
-        a moment and is told by the logger "szlib" (at level INFO).
+        a moment and is logged by "szlib" (at level INFO).
 
     Raises
     ------
@@ -152,7 +145,7 @@ class MPCCBF:
         if not isinstance(max_people, int) or max_people < 0:
             raise SolverError(f"max_people must be a whole number >= 0; got {max_people!r}")
         self._segments = [tuple(wall) for wall in self.walls.reshape(-1, 4).tolist()]
-        self._solvers: list[Solver] = []
+        self._solvers: list[ProblemSolver] = []
         self._build(max_people)
         self.reset()
 
@@ -191,7 +184,7 @@ class MPCCBF:
             self._check_goal((gx, gy), people)
             self._goal = (gx, gy)
         solver = self._solver(len(people))
-        placed = [place(person, self._zone_of(person)) for person in people]
+        placed = [place(person, self.zone_of(person)) for person in people]
         target = subgoal((float(x[0]), float(x[1])), (gx, gy), placed, self.walls, self.settings)
         parameters = self._parameters(x, target, placed)
 
@@ -209,7 +202,7 @@ class MPCCBF:
             solve_time=perf_counter() - began,
         )
 
-    def _solver(self, n_people: int) -> Solver:
+    def _solver(self, n_people: int) -> ProblemSolver:
         built = len(self._solvers) - 1
         if n_people > built:
             if self.settings.terminal == "person" and n_people > 1:
@@ -228,7 +221,7 @@ class MPCCBF:
             numbers += segment
         return np.array(numbers)
 
-    def _solve_with_fallbacks(self, solver: Solver, parameters: Array) -> tuple[Rung, Array, Numbers]:
+    def _solve_with_fallbacks(self, solver: ProblemSolver, parameters: Array) -> tuple[Rung, Array, Numbers]:
         """The first rung that holds, its plan, and the plan's numbers."""
         ends = self.settings.terminal != "none"
         shifted = np.concatenate([self._plan[2:], (0.0, 0.0)])
@@ -264,17 +257,18 @@ class MPCCBF:
             vx, vy = vx - s.dt * vx / time, vy - s.dt * vy / time
         return np.array(plan)
 
-    def _zone_of(self, person: Person) -> Ellipse:
+    def zone_of(self, person: Person) -> Ellipse:
+        """The zone that is kept for a person: their own, or the controller's; in the person's frame."""
         return self.zone if person.zone is None else as_ellipse(person.zone, self.settings.zone_speed)
 
     def placed_zones(self, people: Sequence[Person]) -> list[Ellipse]:
         """The zone of each person, in the world frame."""
-        return [self._zone_of(p).placed(p.position, cast(float, p.heading)) for p in people]
+        return [self.zone_of(p).placed(p.position, cast(float, p.heading)) for p in people]
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h of every person and then of every wall at a position, shape (people + walls,) [m]."""
         x, y = finite("position", position, (2,)).tolist()
-        distances = [place(person, self._zone_of(person)).distance(x, y) for person in people]
+        distances = [place(person, self.zone_of(person)).distance(x, y) for person in people]
         distances += [segment_formula(x, y, *segment) for segment in self._segments]
         return np.asarray(barrier(np.array(distances, float), self.settings.r_robot, self.settings.eps))
 

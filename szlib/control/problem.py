@@ -10,7 +10,7 @@
         (vx, vy)_N = w                                                if there is a terminal condition
 
 (paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., k) takes person i at constant
-velocity, k steps ahead. `g` is the goal at rest, but for meetings head-on (`meetings.subgoal`); w is 0
+velocity, k steps ahead. `g` is the goal at rest, but for people met head-on (`head_on.subgoal`); w is 0
 or the velocity of a person. The states are eliminated: 2 N unknowns remain. The *relaxed* problem
 adds a slack s >= 0 to each barrier row, and to the speed rows if the robot is already too fast, and
 penalises their sum: exactly, so wherever the hard problem has a solution near by, both have the
@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import hypot
-from typing import Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -159,3 +159,13 @@ def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any
     slack = ca.mmax(ca.vertcat(0, -p.rows, ca.fabs(p.terminal)))
     outputs = [ca.vertcat(p.cost, slack), p.rows, p.states, p.h.T]
     return p.function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
+
+
+class ProblemSolver(Protocol):
+    """What the solvers of this problem have in common; inputs have shape (2N,) [m/s2]."""
+
+    evaluate: Evaluator
+
+    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
+    def reset(self) -> None: ...

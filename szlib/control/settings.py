@@ -38,10 +38,10 @@ class MPCSettings:
     zone_speed : walking speed whose social zone is kept, where a zone depends on speed [m/s].
     pass_side : the robot's own hand on which it passes a person whom it meets head-on.
     tie : a meeting is head-on while the goal lies within this share of the half-angle under which the
-        robot sees the person's zone; see `meetings.subgoal`. At most 0.5.
+        robot sees the person's zone; see `head_on.subgoal`. At most 0.5.
     terminal : what the plan ends in: "none", as in the paper; "rest", zero velocity; "person", the
-        velocity of the one person there is, in open space. See the proof in `szlib.mpc`.
-    solver : "sqp", the condensed SQP of `szlib.sqp`, or "ipopt", as in the paper.
+        velocity of the one person there is, in open space. See the proof in `szlib.control.mpc`.
+    solver : "sqp", the condensed SQP of `szlib.control.sqp`, or "ipopt", as in the paper.
     slack_weight : penalty of slack [cost per m, and per m of distance to the goal (at least 1 m)],
         to which the multipliers of the barriers are in proportion.
     max_iterations : iterations that a solver may take before the next rung of the ladder.

@@ -1,4 +1,4 @@
-"""A condensed sequential quadratic program on the DAQP active-set solver, for the problem of `szlib.problem`.
+"""A condensed sequential quadratic program on the DAQP active-set solver, for the problem of `problem`.
 
 The unknowns are the 2 N inputs. Each iteration solves
 

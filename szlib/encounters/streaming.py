@@ -16,7 +16,7 @@ for bit, that they make from the whole day.  Why that is so, with g the longest 
    tracked, and the other person is sampled), and g further to interpolate.  All cells that this reaches
    from cells that may have a tick inside are kept.
 
-Cells are told apart by a hash: those that share a slot are kept if one of them is, which keeps whole cells,
+Cells are found by a hash: those that share a slot are kept if one of them is, which keeps whole cells,
 and more of them, so that 1 to 3 hold.  Files sorted by time, as ATC's are, need one pass, for what comes
 more than a few cells later cannot matter any more; others need two.
 """
@@ -186,15 +186,15 @@ class Blocks:
 
     def __iter__(self) -> Iterator[Rows]:
         self.good, self.reach, self.reasons, self.first = 0, 0.0, Counter(), None
-        told = self.metres, self.seconds, False
-        usable = ~pl.any_horizontal(faults(*told).values())
+        layout = self.metres, self.seconds, False
+        usable = ~pl.any_horizontal(faults(*layout).values())
         marked = self.scan.with_columns(usable=usable.fill_null(False))
         for block in marked.collect_batches(
             chunk_size=_ROWS_AT_ONCE, maintain_order=True, engine="streaming"
         ):
             rows = Rows(*(block[name].to_numpy() for name in Rows._fields))
             if not block["usable"].all():
-                bad = block.filter(~pl.col("usable")).with_columns(reason=fault(*told))
+                bad = block.filter(~pl.col("usable")).with_columns(reason=fault(*layout))
                 self.first = self.first or bad.select("line", "reason").row(0)
                 self.reasons.update(dict(bad.group_by("reason", maintain_order=True).len().iter_rows()))
                 rows = rows.where(block["usable"].to_numpy())

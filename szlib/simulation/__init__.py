@@ -1,9 +1,11 @@
 """What happens then: the robot among people, in the paper's scenarios and in random worlds.
 
-closed_loop  the closed loop and its log: `simulate`
+scenario     a scene, what is claimed of it, and what people do: `Scenario`
+metrics      one dictionary of metrics, and how a run ended
+log          the log of a run: its table, metrics, pictures, file: `SimulationLog`
+closed_loop  the robot among people, step by step: `simulate`
 scenarios    the four scenarios of the paper: `SCENARIOS`
 worlds       random worlds, each from its seed
-runs         a drive through a world in arrays
 rollouts     thousands of them, in parallel: `rollouts`
 comparisons  zones, formulations and behaviours on identical worlds
 """
@@ -12,5 +14,14 @@ import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
-    submodules=["closed_loop", "scenarios", "worlds", "runs", "rollouts", "comparisons"],
+    submodules=[
+        "scenario",
+        "metrics",
+        "log",
+        "closed_loop",
+        "scenarios",
+        "worlds",
+        "rollouts",
+        "comparisons",
+    ],
 )

@@ -23,13 +23,15 @@ import pandas as pd
 
 from ..control.barriers import Array
 from ..control.distances import euclidean_to_ellipse
+from ..control.people import as_ellipse
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
-from .closed_loop import BODY_RADIUS
+from .closed_loop import Zones
+from .log import SimulationLog
 from .rollouts import rollouts
-from .runs import Run, Zones, own_ellipse
-from .worlds import Behaviour, Worlds
+from .scenario import BODY_RADIUS, Behaviour
+from .worlds import Worlds
 
 HALL_PERSONAL = 1.2
 """Far end of the personal distance [m] (Hall 1966)."""
@@ -118,26 +120,29 @@ METRICS = (
     "jerk",
     "min_clearance",
     *(f"inside {name}" for name in ZONES),
-    "flagged",
-    "silent",
+    "flagged_steps",
+    "unflagged_violations",
 )
 """Columns that are compared; seconds, metres, m2/s6, steps."""
 
 
-def time_inside(run: Run) -> dict[str, float]:
+def time_inside(log: SimulationLog) -> dict[str, float]:
     """Seconds for which the robot's disc overlapped anybody's zone of each kind, Euclidean.
 
     The fitted zones are those of the world, whatever the controller kept.
     """
-    fitted = [own_ellipse(person, run.settings) for person in run.scenario.people]
+    fitted = [
+        as_ellipse(person.zone or zone, log.settings.zone_speed)
+        for person, zone in zip(log.scenario.people, log.zones, strict=True)
+    ]
     inside = {}
     for name, zone in ZONES.items():
         gaps = [
-            euclidean_to_ellipse(run.relative[:, i], zone(each)) - run.settings.r_robot
+            euclidean_to_ellipse(log.relative[:, i], zone(each)) - log.settings.r_robot
             for i, each in enumerate(fitted)
         ]
         overlaps = np.array(gaps).min(axis=0, initial=np.inf) < 0
-        inside[f"inside {name}"] = run.settings.dt * float(overlaps.sum())
+        inside[f"inside {name}"] = log.settings.dt * float(overlaps.sum())
     return inside
 
 

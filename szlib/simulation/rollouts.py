@@ -1,7 +1,7 @@
 """Monte Carlo: thousands of random worlds, each driven through, measured, and classified if it failed.
 
     table = szlib.rollouts(10_000, settings=szlib.MPCSettings(), out="results/rollouts")
-    run = replay(4711)                     # the world of a row, once more, with every state
+    log = replay(4711)                     # the world of a row, once more, with every state
 
 Worlds run in parallel; each chunk of them is a Parquet file, written as a whole or not at all, in a
 folder named after the parameters: an interrupted call goes on where it stopped, a larger `n` adds.
@@ -22,17 +22,25 @@ from tqdm import tqdm
 
 from .. import __version__
 from ..control.distances import with_margin
+from ..control.mpc import MPCCBF
 from ..control.problem import TOLERANCE
 from ..control.settings import MPCSettings
 from ..errors import SolverError, SzlibError
 from ..parallel import run_tasks
-from .runs import Outcome, Run, Zones, drive, metrics
-from .worlds import Behaviour, Worlds, world
+from ..zones.ellipses import Ellipse
+from .closed_loop import Zones, drive
+from .log import SimulationLog
+from .metrics import Outcome
+from .scenario import Behaviour
+from .worlds import Worlds, world
 
 CHUNK = 50
 """Worlds in one file and in one task: about a second of work."""
 
-Measure = Callable[[Run], dict[str, float]]
+_UNUSED = Ellipse((0.0, 0.0), (1.0, 1.0))
+"""The controller's zone; in random worlds everybody has one of their own."""
+
+Measure = Callable[[SimulationLog], dict[str, float]]
 """Further columns of a row; must be a function of a module."""
 
 
@@ -66,7 +74,7 @@ def rollouts(
 
     Returns
     -------
-    The columns of `metrics`, sorted by seed.
+    The columns of `metrics.metrics`, sorted by seed.
 
     Raises
     ------
@@ -80,7 +88,7 @@ def rollouts(
     folder = None if out is None else Path(out) / setup.key()
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "parameters.txt").write_text(setup.told() + "\n", encoding="utf-8")
+        (folder / "parameters.txt").write_text(setup.describe() + "\n", encoding="utf-8")
     chunks = [range(first, min(first + CHUNK, seed + n)) for first in range(seed, seed + n, CHUNK)]
     tasks = [delayed(_chunk)(setup, chunk, folder) for chunk in chunks]
     tables: list[pd.DataFrame] = []
@@ -102,21 +110,29 @@ class Setup:
     measure: Measure | None
     margin: bool
 
-    def told(self) -> str:
-        """The parameters in words."""
+    def describe(self) -> str:
+        """Every parameter, as text."""
         names = [f"{f.__module__}.{f.__qualname__}" if f else "default" for f in (self.zones, self.measure)]
         return repr((__version__, self.settings, self.worlds, self.behaviour, *names, self.margin))
 
     def key(self) -> str:
         """A short name for these parameters."""
-        return hashlib.sha256(self.told().encode()).hexdigest()[:12]
+        return hashlib.sha256(self.describe().encode()).hexdigest()[:12]
 
-    def run(self, seed: int) -> Run:
+    def run(self, seed: int) -> SimulationLog:
         """Drive through one world."""
         scenario = world(seed, self.worlds)
         settings = with_margin(self.settings, scenario.walls) if self.margin else self.settings
+        controller = MPCCBF(_UNUSED, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
         try:
-            return drive(scenario, settings, self.behaviour, seed, self.zones)
+            return drive(
+                scenario,
+                controller,
+                behaviour=self.behaviour,
+                seed=seed,
+                zones=self.zones,
+                until_arrival=False,
+            )
         except SzlibError as error:
             raise SolverError(
                 f"world {seed} broke the controller: {error}; see worlds.world({seed})"
@@ -126,7 +142,9 @@ class Setup:
 def tally(rows: pd.DataFrame) -> pd.Series[Any]:
     """Rows of `rollouts` in one: worlds, share of each outcome, steps by what they say, least h [m]."""
     numbers: dict[str, Any] = {"worlds": len(rows)}
-    numbers |= {name: int(rows[name].sum()) for name in ("infeasible", "flagged", "silent")}
+    numbers |= {
+        name: int(rows[name].sum()) for name in ("infeasible_steps", "flagged_steps", "unflagged_violations")
+    }
     numbers |= {
         "share h < 0": float((rows["min_h"] < -TOLERANCE).mean()),
         "min_h": float(rows["min_h"].min()),
@@ -135,7 +153,7 @@ def tally(rows: pd.DataFrame) -> pd.Series[Any]:
     return pd.Series(numbers)
 
 
-def replay(seed: int, **parameters: Any) -> Run:
+def replay(seed: int, **parameters: Any) -> SimulationLog:
     """One world again, with every state; parameters as of `rollouts` (settings, worlds, ...)."""
     given = {"settings": MPCSettings(), "worlds": Worlds(), "behaviour": Behaviour()}
     given |= {"zones": None, "measure": None, "margin": False}
@@ -149,9 +167,9 @@ def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
         return pd.read_parquet(file)
     rows = []
     for seed in seeds:
-        run = setup.run(seed)
-        more = {} if setup.measure is None else setup.measure(run)
-        rows.append({"seed": seed, **metrics(run), **more})
+        log = setup.run(seed)
+        more = {} if setup.measure is None else setup.measure(log)
+        rows.append({"seed": seed, **log.metrics(), **more})
     table = pd.DataFrame(rows)
     if file is not None:
         unfinished = file.with_name(f".{file.name}.{os.getpid()}")

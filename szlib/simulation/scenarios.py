@@ -1,4 +1,4 @@
-"""The four meetings of the paper (fig. 7) as data, with what the paper claims of each as a check.
+"""The four scenarios of the paper (fig. 6) as data, with what the paper claims of each as a check.
 
 The paper gives no coordinates. They are assumed, so as to show a person who stands or walks at
 0.5 m/s (sec. 4) in the way of a robot that starts at rest. World frame, metres and seconds.
@@ -10,19 +10,12 @@ from math import pi
 
 import numpy as np
 
+from ..control.mpc import MPCCBF
 from ..control.people import Person
-from .closed_loop import (
-    GOAL_RADIUS,
-    Claim,
-    Scenario,
-    SimulationLog,
-    avoidance_start,
-    passing_side,
-    relative,
-    simulate,
-)
-
-__all__ = ["SCENARIOS", "Claim", "Scenario", "SimulationLog", "avoidance_start", "simulate"]
+from .closed_loop import simulate
+from .log import SimulationLog
+from .metrics import along_course, avoidance_start, passing_side
+from .scenario import GOAL_RADIUS, Claim, Scenario
 
 WELL_BEFORE = 0.5
 """Avoidance that starts at this h starts well before the zone [m] (assumed)."""
@@ -47,7 +40,8 @@ _PATHWAY = np.array(
 def _avoids_earlier_head_on(log: SimulationLog) -> tuple[bool, float]:
     """How much farther away [m]."""
     head_on = avoidance_start(log)[0]
-    from_behind = avoidance_start(simulate(log.scenario.turned(), log.controller))[0]
+    controller = MPCCBF(log.zones[0], walls=log.scenario.walls, settings=log.settings)
+    from_behind = avoidance_start(simulate(log.scenario.turned(), controller))[0]
     return head_on > from_behind, head_on - from_behind
 
 
@@ -59,14 +53,14 @@ def _avoids_well_before(log: SimulationLog) -> tuple[bool, float]:
 
 def _passes_on_chosen_side(log: SimulationLog) -> tuple[bool, float]:
     """How far to the robot's left the person is when abeam [m]."""
-    ahead, left = relative(log, 0)
-    return passing_side(log) == log.controller.settings.pass_side, float(left[np.abs(ahead).argmin()])
+    ahead, left = along_course(log, 0)
+    return passing_side(log) == log.settings.pass_side, float(left[np.abs(ahead).argmin()])
 
 
 def _slows_while_passing(log: SimulationLog) -> tuple[bool, float]:
     """Least speed beside the person, as a share of the greatest speed."""
     speed = log.table["speed"].to_numpy()
-    beside = np.abs(relative(log, 0)[0]) <= BESIDE
+    beside = np.abs(along_course(log, 0)[0]) <= BESIDE
     share = float(speed[beside].min() / speed.max()) if beside.any() else np.nan
     return share < SLOWED, share
 

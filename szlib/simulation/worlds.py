@@ -1,13 +1,11 @@
 """Random worlds: people who stand or walk, walls, a robot with somewhere to go - each from its seed.
 
-A world is a `Scenario` like the paper's four; what people do in it is a `Behaviour`: to walk on as the
-controller expects, or not. World frame, metres and seconds.
+A world is a `Scenario` like the paper's four. World frame, metres and seconds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import cos, pi, sin
 
 import numpy as np
@@ -18,7 +16,7 @@ from ..control.people import Person
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .closed_loop import BODY_RADIUS, Scenario
+from .scenario import BODY_RADIUS, Scenario
 
 _TRIES = 5_000
 """Draws after which a world is given up as impossible; a usual one takes fewer than a hundred."""
@@ -160,58 +158,3 @@ def _placed(person: Person) -> Ellipse:
     if not isinstance(person.zone, Ellipse):
         raise SolverError(f"a person of a random world needs an Ellipse as zone; got {person.zone!r}")
     return person.zone.placed(person.position, person.heading or 0.0)
-
-
-@dataclass(frozen=True)
-class Behaviour:
-    """What walkers do against the controller's expectation, and how well it sees (all assumed).
-
-    Parameters
-    ----------
-    pace : factor of a walker's speed once they change their mind; 0 stops them.
-    turn : by how much they turn then, to either side [rad].
-    noise : standard deviation of the position that the controller is told, each coordinate [m].
-    between : first and last time at which a walker changes their mind [s].
-
-    Raises
-    ------
-    SolverError : a number is negative or not finite.
-    """
-
-    pace: float = 1.0
-    turn: float = 0.0
-    noise: float = 0.0
-    between: tuple[float, float] = (1.0, 6.0)
-
-    def __post_init__(self) -> None:
-        for each in fields(self):
-            value = np.asarray(getattr(self, each.name))
-            if not (np.isfinite(value) & (value >= 0)).all():
-                raise SolverError(f"{each.name} must be finite and >= 0; got {getattr(self, each.name)}")
-
-    def paths(
-        self, people: tuple[Person, ...], times: Sequence[float], seed: int
-    ) -> list[tuple[Person, ...]]:
-        """Everybody as they truly are at each time."""
-        rng = np.random.default_rng([seed, 1])
-        plans = [(p, rng.uniform(*self.between), self.turn * rng.choice([-1, 1])) for p in people]
-        return [tuple(self._at(t, *plan) for plan in plans) for t in times]
-
-    def _at(self, t: float, person: Person, when: float, turn: float) -> Person:
-        if t <= when or person.stands:
-            return person.after(t)
-        (vx, vy), heading = person.velocity, (person.heading or 0.0) + turn
-        speed = self.pace * float(np.hypot(vx, vy))
-        changed = (speed * cos(heading), speed * sin(heading))
-        here = person.after(when).position
-        return Person(here, changed, heading, person.zone).after(t - when)
-
-    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
-        """Everybody as the controller is told."""
-        if self.noise == 0:
-            return people
-        off = rng.normal(0.0, self.noise, (len(people), 2)).tolist()
-        return tuple(
-            Person((p.position[0] + dx, p.position[1] + dy), p.velocity, p.heading, p.zone)
-            for p, (dx, dy) in zip(people, off, strict=True)
-        )

@@ -75,7 +75,7 @@ def read_groups(path: str | Path) -> pd.DataFrame:
     """Who walks together, from an EWAP ``groups.txt``: the ids of one group a line, parted by blanks.
 
     Returns a table with columns group (numbered from 0) and id, in the order of the file.  Whoever is in
-    no line walks alone.  Lines that share a person make one group, told in a DataWarning: the ETH sequence
+    no line walks alone.  Lines that share a person make one group, with a DataWarning: the ETH sequence
     has such lines.  Raises DataError, with the line, for what is no id and for a group of one.
     """
     path = Path(path)
@@ -104,9 +104,11 @@ def read_groups(path: str | Path) -> pd.DataFrame:
         else:
             groups.append(group)
     if joined:
-        told = ", ".join(map(str, joined))
+        where = ", ".join(map(str, joined))
         warnings.warn(
-            f"{path.name}: joined to earlier groups that share people: line {told}", DataWarning, stacklevel=2
+            f"{path.name}: joined to earlier groups that share people: line {where}",
+            DataWarning,
+            stacklevel=2,
         )
     rows = [(number, person) for number, group in enumerate(groups) for person in group]
     return pd.DataFrame(rows, columns=["group", "id"]).astype("int64")

@@ -16,22 +16,22 @@ from .readers import fault
 
 STANDING = 0.1
 """Who moves less than that within a second is standing [m] (measured: sensor noise stays below it)."""
-_SAID = {"atc-raw": ("f5", 1e-3), "atc-1hz": ("f4", 1.0)}
+_SENSOR_SPEED = {"atc-raw": ("f5", 1e-3), "atc-1hz": ("f4", 1.0)}
 """Field of the file's own speed, and what one unit of it is [m/s]."""
 
 
 def seconds(path: str | Path) -> pd.DataFrame:
-    """One row a person and second: id, second [s], x, y [m] when first seen in it, rows, said [m/s].
+    """One row a person and second: id, second [s], x, y [m] when first seen in it, rows, sensor_speed, moved.
 
-    `said` is the mean of the file's own speed (NaN where it has none), `moved` [m] the displacement until
-    the next second (NaN where the person is not seen then).  Unusable rows are left out.
+    `sensor_speed` [m/s] is the mean of the file's own speed (NaN where it has none), `moved` [m] the
+    displacement until the next second (NaN where the person is not seen then).  Unusable rows are left out.
 
     Raises DataError as `szlib.read_tracks`.
     """
     path = Path(path)
     with plain_file(path) as plain:
         layout, scan = recognise(plain, path, None)
-        said = _said(plain, layout.name)
+        recording = _sensor_speed(plain, layout.name)
         usable = scan.filter(fault(layout.metres, layout.seconds, "day" in scan.collect_schema()).is_null())
         time = pl.col("t") * layout.seconds
         grouped = usable.group_by(pl.col("id").cast(pl.Int64), second=time.floor()).agg(
@@ -39,18 +39,22 @@ def seconds(path: str | Path) -> pd.DataFrame:
         )
         with readable(path, layout):
             rows = grouped.sort("id", "second").collect(engine="streaming").to_pandas()
-            spoken = None if said is None else said.collect(engine="streaming").to_pandas()
-    rows = rows.assign(said=np.nan) if spoken is None else rows.merge(spoken, how="left", on=["id", "second"])
+            recorded = None if recording is None else recording.collect(engine="streaming").to_pandas()
+    rows = (
+        rows.assign(sensor_speed=np.nan)
+        if recorded is None
+        else rows.merge(recorded, how="left", on=["id", "second"])
+    )
     step = rows[["id", "second", "x", "y"]].diff()
     followed = ((step["id"] == 0) & (step["second"] == 1)).to_numpy()
     moved = np.where(followed, np.hypot(step["x"], step["y"]), np.nan)
     return rows.assign(moved=np.r_[moved[1:], np.nan])
 
 
-def _said(plain: Path, name: str) -> pl.LazyFrame | None:
-    if name not in _SAID:
+def _sensor_speed(plain: Path, name: str) -> pl.LazyFrame | None:
+    if name not in _SENSOR_SPEED:
         return None
-    column, unit = _SAID[name]
+    column, unit = _SENSOR_SPEED[name]
     names = [f"f{i}" for i in range(FORMATS[name].fields)]
     scan = pl.scan_csv(
         plain, schema=dict.fromkeys(names, pl.Float64), has_header=False, ignore_errors=True,
@@ -58,7 +62,7 @@ def _said(plain: Path, name: str) -> pl.LazyFrame | None:
     )  # fmt: skip
     whole = pl.col("f1").is_not_null() & (pl.col("f1") % 1 == 0) & pl.col("f0").is_finite()
     keys = [pl.col("f1").cast(pl.Int64).alias("id"), pl.col("f0").floor().alias("second")]
-    return scan.filter(whole).group_by(keys).agg(said=pl.col(column).mean() * unit)
+    return scan.filter(whole).group_by(keys).agg(sensor_speed=pl.col(column).mean() * unit)
 
 
 def frame_intervals(path: str | Path) -> np.ndarray:
@@ -72,14 +76,14 @@ def frame_intervals(path: str | Path) -> np.ndarray:
 
 
 def people(path: str | Path) -> pd.DataFrame:
-    """One row a person: id, begun, ended, longest_gap [s], rows."""
+    """One row a person: id, first_seen, last_seen, longest_gap [s], rows."""
     path = Path(path)
     with plain_file(path) as plain:
         layout, scan = recognise(plain, path, None)
         usable = scan.filter(fault(layout.metres, layout.seconds, "day" in scan.collect_schema()).is_null())
         time = pl.col("t") * layout.seconds
         grouped = usable.group_by(pl.col("id").cast(pl.Int64)).agg(
-            begun=time.min(), ended=time.max(), longest_gap=time.sort().diff().max(), rows=pl.len()
+            first_seen=time.min(), last_seen=time.max(), longest_gap=time.sort().diff().max(), rows=pl.len()
         )
         with readable(path, layout):
             return grouped.sort("id").collect(engine="streaming").to_pandas()

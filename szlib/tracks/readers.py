@@ -1,6 +1,6 @@
 """Files of tracks as they are: one sorted table day, id, t, x, y in seconds and metres.
 
-Rows that cannot be used are set aside, counted by reason in the funnel of each file, and told in a
+Rows that cannot be used are set aside, counted by reason in the funnel of each file, and in a
 DataWarning; a file that cannot be used raises a DataError that names the file and the line.
 """
 
@@ -200,6 +200,6 @@ def _calendar_day(tz: str) -> pl.Expr:
 
 
 def _warn(where: str, reasons: dict[str, int]) -> None:
-    told = ", ".join(f"{count} x {reason}" for reason, count in reasons.items() if count)
-    if told:
-        warnings.warn(f"{where}: rows set aside: {told}", DataWarning, stacklevel=2)
+    counts = ", ".join(f"{count} x {reason}" for reason, count in reasons.items() if count)
+    if counts:
+        warnings.warn(f"{where}: rows set aside: {counts}", DataWarning, stacklevel=2)

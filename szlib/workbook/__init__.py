@@ -1,7 +1,7 @@
-"""How is it told: figures, the records of notebooks, their headless execution, the command line.
+"""How is it presented: figures, the records of notebooks, their headless execution, the command line.
 
 figures       every figure, one file a room
-record        what a notebook writes down: checks, claims, figures, artefacts
+record        what a notebook records: checks, claims, figures, artefacts
 runner        the notebooks executed by papermill
 command_line  `szlib run | inspect | extract`
 """

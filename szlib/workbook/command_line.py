@@ -2,7 +2,7 @@
 
 Nothing heavy is imported before a command needs it, so that `--version`, `--help` and a typo answer at once.
 Exit codes: 0; 1 where a check does not hold or a day failed; 2 where something was asked that cannot be
-done, told in one line; 130 after Ctrl-C.
+done, explained in one line; 130 after Ctrl-C.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         return int(options.command(options))
-    except SzlibError as error:
+    except (SzlibError, OSError) as error:
         print(f"szlib: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -89,16 +90,12 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _check_workbook() -> None:
-    """Raise SzlibError where the notebooks or the packages that execute them are missing."""
-    from importlib.util import find_spec
-
+    """Raise SzlibError where packages are missing that execute the notebooks."""
     missing = [name for name in WORKBOOK_PACKAGES if find_spec(name) is None]
-    notebooks = Path(__file__).resolve().parents[2] / "notebooks"
-    if missing or not notebooks.is_dir():
-        found = f"packages missing: {', '.join(missing)}" if missing else f"no notebooks in {notebooks}"
+    if missing:
         raise SzlibError(
-            f"{found}; the notebooks come with the repository, not with the package: get a copy of it, and "
-            "there `make run`, or pip install -e '.[workbook]' and `szlib run`"
+            f"`szlib run` needs {', '.join(missing)}: pip install 'szlib[workbook]'; and it needs the "
+            "notebooks, which come with the repository: get a copy of it, and there `make run`"
         )
 
 

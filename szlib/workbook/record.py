@@ -1,7 +1,7 @@
 """What a notebook writes down: its checks, its figures, its key numbers, its artefacts.
 
 A *check* must hold, or the run fails.  A *claim* of the paper is measured: where the data does not
-support it the page says "not supported here", with the numbers, and the run goes on.
+support it the record says "not supported here", with the numbers, and the run goes on.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
 
 
 @dataclass
-class Page:
+class NotebookRecord:
     """The record of one notebook.
 
     Parameters
@@ -56,7 +56,7 @@ class Page:
     key: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        (self.out / "pages").mkdir(parents=True, exist_ok=True)
+        (self.out / "records").mkdir(parents=True, exist_ok=True)
 
     @property
     def out(self) -> Path:
@@ -135,7 +135,7 @@ class Page:
         self.figures.append(file.name)
 
     def close(self) -> Styler:
-        """Write the page down for the summary; returns its checks and claims to read."""
+        """Write the record for the summary; returns its checks and claims to read."""
         record = {
             "notebook": self.name,
             "checks": self.checks,
@@ -144,15 +144,15 @@ class Page:
         }
         text = json.dumps(record, indent=1, default=_plain)
         _replace(
-            self.out / "pages" / f"{self.name}.json", lambda file: file.write_text(text, encoding="utf-8")
+            self.out / "records" / f"{self.name}.json", lambda file: file.write_text(text, encoding="utf-8")
         )
-        rows = [(c["kind"], c["name"], c["result"], _told(c["value"])) for c in self.checks]
+        rows = [(c["kind"], c["name"], c["result"], _as_text(c["value"])) for c in self.checks]
         return _whole(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
 
     def _record(self, kind: str, name: str, passed: bool, value: object, result: str) -> None:
         value = _plain(value)
         self.checks.append({"kind": kind, "name": name, "passed": passed, "value": value, "result": result})
-        print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({_told(value)})"))
+        print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({_as_text(value)})"))
 
     def _source(self) -> dict[str, Any]:
         files = [[file.name, file.stat().st_size] for file in self.files()]
@@ -180,19 +180,21 @@ def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
 
 def settings_table(settings: MPCSettings) -> Styler:
     """The controller's parameters as such a table; what each one is stands in the docstring of its class."""
-    told: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     names: list[str] = []
     for line in (inspect.getdoc(type(settings)) or "").splitlines():
         entry = re.fullmatch(r"([A-Za-z_]\w*(?:, \w+)*) : (.*)", line)
         if entry:
             names = entry[1].split(", ")
-            told |= dict.fromkeys(names, entry[2])
+            descriptions |= dict.fromkeys(names, entry[2])
         elif line.startswith("    ") and names:
-            told |= {name: f"{told[name]} {line.strip()}" for name in names}
+            descriptions |= {name: f"{descriptions[name]} {line.strip()}" for name in names}
         else:
             names = []
     badges = settings.badges()
-    return parameters([(name, getattr(settings, name), badge, told[name]) for name, badge in badges.items()])
+    return parameters(
+        [(name, getattr(settings, name), badge, descriptions[name]) for name, badge in badges.items()]
+    )
 
 
 def _whole(table: pd.DataFrame) -> Styler:
@@ -212,11 +214,11 @@ def _plain(value: Any) -> Any:
     return round(value, 6) if isinstance(value, float) else value
 
 
-def _told(value: Any) -> str:
+def _as_text(value: Any) -> str:
     if value is None:
         return ""
     if isinstance(value, dict):
-        return ", ".join(f"{k}: {_told(v)}" for k, v in value.items())
+        return ", ".join(f"{k}: {_as_text(v)}" for k, v in value.items())
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 

@@ -1,11 +1,12 @@
 """The whole workbook, headless, from tracks to a robot that yields.
 
-Each notebook is executed by papermill from its percent script, and leaves a page with its checks
+Each notebook is executed by papermill from its percent script, and leaves a record of its checks
 and key figures; the run gathers them in summary.json and ends with a table.
 """
 
 from __future__ import annotations
 
+import ast
 import json
 import tempfile
 import time
@@ -62,19 +63,19 @@ def run(
     """
     sources = _chosen(only)
     given = dict(parameters or {})
-    _known(given, sources)
-    seed = int(given.get("seed", 0))
+    _check_parameters(given, sources)
+    seed = given.get("seed", 0)
     results = Path(out).resolve()
     home = results / datasets.label(data)
     files = data_files(data, folder=home, seed=seed)
     if data not in (datasets.SYNTHETIC, datasets.ATC_1HZ):
         data = [str(file.resolve()) for file in files]
     given |= {"data": data, "results": str(results)}
-    (home / "pages").mkdir(parents=True, exist_ok=True)
+    (home / "records").mkdir(parents=True, exist_ok=True)
     for source in sources:
-        (home / "pages" / f"{source.stem}.json").unlink(missing_ok=True)
+        (home / "records" / f"{source.stem}.json").unlink(missing_ok=True)
 
-    told: dict[str, dict[str, Any]] = {}
+    outcomes: dict[str, dict[str, Any]] = {}
     with tqdm(total=len(sources), unit="notebook", desc=datasets.label(data)) as bar:
         first = [source for source in sources if source.stem[:2] <= LAST_PRODUCER]
         rest = sources[len(first) :]
@@ -83,13 +84,13 @@ def run(
                 for batch in [*([source] for source in first), rest]:
                     for future in as_completed(_submit(pool, batch, given, home)):
                         name, outcome = future.result()
-                        told[name] = outcome
+                        outcomes[name] = outcome
                         bar.update()
                         bar.set_postfix_str(f"{name} {outcome['status']}")
             except KeyboardInterrupt:
                 pool.shutdown(wait=False, **({} if client else {"cancel_futures": True}))
                 raise
-    notebooks = {source.stem: told[source.stem] for source in sources}
+    notebooks = {source.stem: outcomes[source.stem] for source in sources}
     passed = all(
         n["status"] == "done" and all(c["passed"] for c in n["checks"] if c["kind"] == "check")
         for n in notebooks.values()
@@ -109,22 +110,22 @@ def render(summary: Mapping[str, Any]) -> str:
     """The table that ends a run: notebook, time, checks passed, key figures; then what did not hold."""
     lines = [f"{'notebook':<20} {'seconds':>7} {'checks':>7}  key figures"]
     notes = []
-    for name, page in summary["notebooks"].items():
-        checks = [c for c in page["checks"] if c["kind"] == "check"]
+    for name, record in summary["notebooks"].items():
+        checks = [c for c in record["checks"] if c["kind"] == "check"]
         held = (
             f"{sum(c['passed'] for c in checks)}/{len(checks)}"
-            if page["status"] == "done"
-            else page["status"]
+            if record["status"] == "done"
+            else record["status"]
         )
         key = ", ".join(
-            f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in page["key_figures"].items()
+            f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in record["key_figures"].items()
         )
-        lines.append(f"{name:<20} {page['seconds']:>7.1f} {held:>7}  {key}")
+        lines.append(f"{name:<20} {record['seconds']:>7.1f} {held:>7}  {key}")
         notes += [
-            f"{name}: {c['name']}: {c['result']} ({c['value']})" for c in page["checks"] if not c["passed"]
+            f"{name}: {c['name']}: {c['result']} ({c['value']})" for c in record["checks"] if not c["passed"]
         ]
-        if page.get("error"):
-            notes.append(f"{name}: {page['error']}")
+        if record.get("error"):
+            notes.append(f"{name}: {record['error']}")
     return "\n".join([*lines, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
 
 
@@ -163,24 +164,27 @@ def _execute(source: str, given: dict[str, Any], home: str) -> tuple[str, dict[s
         except papermill.PapermillExecutionError as error:
             outcome = {"status": "error", "error": f"{error.ename}: {error.evalue}"}
     outcome["seconds"] = round(time.perf_counter() - begun, 2)
-    page = folder / "pages" / f"{script.stem}.json"
-    left = json.loads(page.read_text(encoding="utf-8")) if page.exists() else {}
+    record = folder / "records" / f"{script.stem}.json"
+    left = json.loads(record.read_text(encoding="utf-8")) if record.exists() else {}
     if outcome["status"] == "done" and not left:
         outcome = {
             **outcome,
             "status": "error",
-            "error": "the notebook left no page; does it end with page.close()?",
+            "error": "the notebook left no record; does it end with record.close()?",
         }
-    return script.stem, outcome | {name: left.get(name, default) for name, default in _EMPTY_PAGE.items()}
+    return script.stem, outcome | {name: left.get(name, default) for name, default in _EMPTY_RECORD.items()}
 
 
-_EMPTY_PAGE: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
+_EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
 
 
 def _chosen(only: Iterable[str]) -> list[Path]:
     sources = sorted(NOTEBOOKS.glob("[0-9][0-9]_*.py"))
     if not sources:
-        raise DataError(f"{NOTEBOOKS}: no notebooks; run from a clone, installed by pip install -e .")
+        raise DataError(
+            f"{NOTEBOOKS}: no notebooks; they come with the repository, not with the package: get a copy of "
+            "it, and there `make run`, or pip install -e '.[workbook]' and `szlib run`"
+        )
     wanted = list(only)
     unknown = [name for name in wanted if not any(source.stem.startswith(name) for source in sources)]
     if unknown:
@@ -192,19 +196,25 @@ def _chosen(only: Iterable[str]) -> list[Path]:
     ]
 
 
-def _known(given: Mapping[str, Any], sources: Sequence[Path]) -> None:
-    """Every parameter must be one of at least one notebook to be run."""
-    names: set[str] = set()
+def _check_parameters(given: Mapping[str, Any], sources: Sequence[Path]) -> None:
+    """Each parameter must be one of a notebook to be run, and of the type of its default there."""
+    defaults: dict[str, Any] = {}
     for source in sources:
         for cell in jupytext.read(source).cells:
             if "parameters" in cell.metadata.get("tags", []):
-                names |= {
-                    line.split("=")[0].strip()
-                    for line in cell.source.splitlines()
-                    if "=" in line.split("#")[0]
+                defaults |= {
+                    node.targets[0].id: ast.literal_eval(node.value)
+                    for node in ast.parse(cell.source).body
+                    if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
                 }
-    unknown = set(given) - names
+    unknown = set(given) - set(defaults)
     if unknown:
-        raise DataError(
-            f"unknown parameter {', '.join(sorted(unknown))}; the notebooks know {', '.join(sorted(names))}"
-        )
+        known = ", ".join(sorted(defaults))
+        raise DataError(f"unknown parameter {', '.join(sorted(unknown))}; the notebooks know {known}")
+    for name, value in given.items():
+        default = defaults[name]
+        number = isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool)
+        if not number and type(value) is not type(default):
+            raise DataError(
+                f"parameter {name}: expected {type(default).__name__}, such as {default!r}; got {value!r}"
+            )

@@ -73,7 +73,7 @@ class SocialZone:
         """Fit the zones to samples as from `szlib.find_encounters`.
 
         Parameters are those of `szlib.remove_outliers`, and `speeds` [m/s] are the slices to fit.
-        A speed without a zone is told in a DataWarning and kept in `undefined`.
+        A speed without a zone gives a DataWarning and is kept in `undefined`.
 
         Raises
         ------

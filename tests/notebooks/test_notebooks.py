@@ -9,9 +9,9 @@ import jupytext
 import nbformat
 import pytest
 
-from szlib.workbook import runner as workbook
+from szlib.workbook import runner
 
-SOURCES = sorted(workbook.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
+SOURCES = sorted(runner.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
 MAX_LINES = 25
 
 
@@ -26,15 +26,15 @@ def code_lines(cell: nbformat.NotebookNode) -> int:
 def test_there_are_ten_and_no_stray_copies():
     assert [s.stem[:2] for s in SOURCES] == [f"{n:02d}" for n in range(1, len(SOURCES) + 1)]
     assert len(SOURCES) >= 10
-    assert [p.stem for p in sorted(workbook.NOTEBOOKS.glob("*.ipynb"))] == [s.stem for s in SOURCES]
+    assert [p.stem for p in sorted(runner.NOTEBOOKS.glob("*.ipynb"))] == [s.stem for s in SOURCES]
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.stem)
 class TestEach:
     def test_the_pair_holds_together(self, source):
         executed = nbformat.read(source.with_suffix(".ipynb"), as_version=4)
-        told = [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in executed.cells]
-        assert told == [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in cells(source)]
+        found = [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in executed.cells]
+        assert found == [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in cells(source)]
 
     def test_every_cell_was_executed_in_order_without_error(self, source):
         code = [
@@ -56,7 +56,7 @@ class TestEach:
         assert "**Question.**" in all_cells[0].source
         assert "**Expectation.**" in all_cells[0].source
         assert "**What it means.**" in all_cells[-2].source
-        assert all_cells[-1].source == "page.close()"
+        assert all_cells[-1].source == "record.close()"
         assert sum("parameters" in c.metadata.get("tags", []) for c in all_cells) == 1
         assert max(code_lines(c) for c in all_cells if c.cell_type == "code") <= MAX_LINES
 
@@ -68,22 +68,22 @@ class TestEach:
 
 
 def proven(summary: dict, home: Path) -> None:
-    assert summary["passed"], workbook.render(summary)
+    assert summary["passed"], runner.render(summary)
     assert json.loads((home / "summary.json").read_text(encoding="utf-8"))["passed"]
     assert list(summary["notebooks"]) == [s.stem for s in SOURCES]
-    for name, page in summary["notebooks"].items():
-        assert page["seconds"] > 0
-        assert page["checks"], name
-        assert all({"name", "passed", "value"} <= set(c) for c in page["checks"])
-        assert all((home / "figures" / figure).stat().st_size > 1000 for figure in page["figures"])
+    for name, record in summary["notebooks"].items():
+        assert record["seconds"] > 0
+        assert record["checks"], name
+        assert all({"name", "passed", "value"} <= set(c) for c in record["checks"])
+        assert all((home / "figures" / figure).stat().st_size > 1000 for figure in record["figures"])
     for artefact in ("encounters.parquet", "zone.json"):
         assert (home / artefact).exists()
 
 
 def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
-    summary = workbook.run(out=tmp_path, jobs=2)
+    summary = runner.run(out=tmp_path, jobs=2)
     proven(summary, tmp_path / "synthetic")
-    claims = [c for page in summary["notebooks"].values() for c in page["checks"] if c["kind"] == "claim"]
+    claims = [c for record in summary["notebooks"].values() for c in record["checks"] if c["kind"] == "claim"]
     assert sum(c["passed"] for c in claims) > len(claims) / 2
     assert any("true zone found" in c["name"] for c in summary["notebooks"]["05_zones"]["checks"])
 
@@ -92,8 +92,8 @@ def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
     not os.environ.get("SZLIB_DATA_DIR"), reason="SZLIB_DATA_DIR names no folder with real data"
 )
 def test_the_workbook_completes_on_the_real_day(tmp_path):
-    summary = workbook.run("atc-1hz", out=tmp_path, jobs=2)
+    summary = runner.run("atc-1hz", out=tmp_path, jobs=2)
     proven(summary, tmp_path / "atc-1hz")
     assert summary["notebooks"]["01_tracks"]["key_figures"]["rows"] == 624_951
-    told = {c["name"]: c["result"] for page in summary["notebooks"].values() for c in page["checks"]}
-    assert told["the zone at 1.1 m/s reaches farther ahead than behind"] == "not supported here"
+    results = {c["name"]: c["result"] for record in summary["notebooks"].values() for c in record["checks"]}
+    assert results["the zone at 1.1 m/s reaches farther ahead than behind"] == "not supported here"

@@ -51,9 +51,9 @@ def test_nobody_begins_inside_any_zone(seed):
 
 
 def test_time_inside_counts_the_worlds_own_zone_whatever_is_kept():
-    run = replay(0, worlds=WORLDS, zones=ZONES["none"])
-    inside = time_inside(run)
-    bodies = run.clearance[:, : len(run.scenario.people)]
+    log = replay(0, worlds=WORLDS, zones=ZONES["none"])
+    inside = time_inside(log)
+    bodies = log.clearance[:, : len(log.scenario.people)]
     assert inside["inside none"] == pytest.approx(0.1 * (bodies.min(axis=1) < 0).sum())
     assert inside["inside none"] <= inside["inside equal circle"] <= inside["inside Hall"]
 
@@ -63,8 +63,8 @@ def test_compare_is_paired():
     assert len(rows) == 4
     assert rows.groupby("zone")["seed"].apply(list).tolist() == [[0, 1], [0, 1]]
     assert rows["people"].tolist()[:2] == rows["people"].tolist()[2:]
-    told = summarise(rows, against={"zone": "fitted"}).set_index(["zone", "metric"])
-    assert (told.loc["fitted"][["mean", "low", "high"]] == 0).all(axis=None)
+    found = summarise(rows, against={"zone": "fitted"}).set_index(["zone", "metric"])
+    assert (found.loc["fitted"][["mean", "low", "high"]] == 0).all(axis=None)
     with pytest.raises(szlib.SolverError, match="unknown: Hull; there are none, equal circle"):
         compare(1, zones=("Hull",))
 
@@ -91,9 +91,9 @@ def test_intervals_cover_the_mean_and_pairs_sharpen_them():
 
 def test_what_a_world_lacks_is_left_out():
     rows = table(x=np.where(np.arange(400) % 2, np.nan, 3.0))
-    told = summarise(rows, ["zone"], ["x"])
-    assert told[["mean", "low", "high"]].to_numpy() == pytest.approx(3.0)
-    assert told["n"].tolist() == [100, 100]
+    found = summarise(rows, ["zone"], ["x"])
+    assert found[["mean", "low", "high"]].to_numpy() == pytest.approx(3.0)
+    assert found["n"].tolist() == [100, 100]
 
 
 def test_names():

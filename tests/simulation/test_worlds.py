@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 import szlib
 from szlib.control.distances import euclidean_to_segment
-from szlib.simulation.worlds import ONE_PERSON, Behaviour, Worlds, world
+from szlib.simulation.scenario import Behaviour
+from szlib.simulation.worlds import ONE_PERSON, Worlds, world
 
 seeds = st.integers(0, 2**32)
 
@@ -76,7 +77,8 @@ STANDING = szlib.Person((3.0, 0.0), heading=1.0)
     ],
 )
 def test_walkers_change_their_mind_and_never_jump(behaviour, pace, turn):
-    paths = behaviour.paths((WALKER, STANDING), np.linspace(0, 10, 101).tolist(), seed=1)
+    crowd = behaviour.crowd((WALKER, STANDING), seed=1)
+    paths = [crowd(t, np.zeros(4)) for t in np.linspace(0, 10, 101).tolist()]
     walker, standing = zip(*paths, strict=True)
     assert set(standing) == {STANDING}
     assert walker[0] == WALKER
@@ -90,4 +92,4 @@ def test_noise_is_what_it_says_and_moves_nobody():
     rng = np.random.default_rng(0)
     seen = [Behaviour(noise=0.1).seen((WALKER,), rng)[0].position for _ in range(2000)]
     assert np.std(seen, axis=0) == pytest.approx([0.1, 0.1], rel=0.1)
-    assert Behaviour(noise=0.1).paths((WALKER,), [2.0], 0)[0][0] == WALKER.after(2.0)
+    assert Behaviour(noise=0.1).crowd((WALKER,), 0)(2.0, np.zeros(4)) == (WALKER.after(2.0),)

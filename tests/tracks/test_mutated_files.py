@@ -1,4 +1,4 @@
-"""The short form of `python tests/fuzz.py 20000`."""
+"""The short form of `python tests/mutate_files.py 20000`."""
 
 from pathlib import Path
 

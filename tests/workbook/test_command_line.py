@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import szlib
-from szlib import parallel as jobs
+from szlib import parallel
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.workbook.command_line import main
@@ -41,7 +41,7 @@ def test_extract_prints_the_table(day: Path, tmp_path: Path, capsys: pytest.Capt
     assert "1 failed, 1 kept" in capsys.readouterr().out
 
 
-def test_what_cannot_be_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["inspect", str(tmp_path / "missing.csv")]) == 2
     assert "no such file" in capsys.readouterr().err
 
@@ -53,8 +53,8 @@ def test_nobody_answers_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
         raise OSError("Timed out trying to connect")
 
     monkeypatch.setattr(distributed, "Client", refuse)
-    told = r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"
-    with pytest.raises(szlib.SzlibError, match=told), jobs.cluster("tcp://127.0.0.1:9"):
+    message = r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"
+    with pytest.raises(szlib.SzlibError, match=message), parallel.cluster("tcp://127.0.0.1:9"):
         pass
-    with jobs.cluster(None) as client:
+    with parallel.cluster(None) as client:
         assert client is None

@@ -1,6 +1,9 @@
 """Figures: every one labels its axes with units, keeps metres square, and leaves its input alone."""
 
+import inspect
 import io
+import re
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -9,8 +12,7 @@ import pytest
 from PIL import Image
 
 import szlib
-from szlib.workbook.figures import simulation as scenes
-from szlib.workbook.figures import tracks as plotting
+from szlib.workbook import figures
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -66,22 +68,22 @@ def paths():
 
 
 MAPS = {
-    "map": lambda f: plotting.plot_map(f("tracks"), szlib.ATC_SQUARE),
-    "space": lambda f: plotting.plot_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE, (-13, 0, 1.0)),
-    "paths": lambda f: plotting.plot_paths(paths(), count=3),
-    "los": lambda f: plotting.plot_los(f("samples")),
-    "outliers": lambda f: plotting.plot_outliers(np.eye(2).repeat(3, axis=0), np.arange(6) < 1),
-    "zone": lambda f: plotting.plot_zone(f("zone"), 1.1, truth=ZONE),
-    "zones": lambda f: plotting.plot_zones(f("zone").ellipses),
-    "ellipse": lambda f: scenes.plot_distance(ZONE),
-    "segment": lambda f: scenes.plot_distance((np.array([-1.0, 0]), np.array([1.0, 0]))),
-    "scenario": lambda f: scenes.plot_scenario(f("log")),
-    "robot paths": lambda f: scenes.plot_paths([("a", f("log")), ("b", f("log"))], title="two"),
+    "map": lambda f: figures.plot_map(f("tracks"), szlib.ATC_SQUARE),
+    "space": lambda f: figures.plot_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE, (-13, 0, 1.0)),
+    "paths": lambda f: figures.plot_encounter_paths(paths(), count=3),
+    "los": lambda f: figures.plot_los(f("samples")),
+    "outliers": lambda f: figures.plot_outliers(np.eye(2).repeat(3, axis=0), np.arange(6) < 1),
+    "zone": lambda f: figures.plot_zone(f("zone"), 1.1, truth=ZONE),
+    "zones": lambda f: figures.plot_zones(f("zone").ellipses),
+    "ellipse": lambda f: figures.plot_distance(ZONE),
+    "segment": lambda f: figures.plot_distance((np.array([-1.0, 0]), np.array([1.0, 0]))),
+    "scenario": lambda f: figures.plot_scenario(f("log")),
+    "robot paths": lambda f: figures.plot_robot_paths({"a": f("log"), "b": f("log")}),
 }
 GRAPHS = {
-    "speeds": lambda f: plotting.plot_speeds(np.ones(9), np.zeros(9)),
-    "los-distance": lambda f: plotting.plot_los_distance(f("samples")),
-    "hull": lambda f: plotting.plot_hull(f("zone"), (0.9, 1.1)),
+    "speeds": lambda f: figures.plot_speeds(np.ones(9), np.zeros(9)),
+    "los-distance": lambda f: figures.plot_los_distance(f("samples")),
+    "hull": lambda f: figures.plot_hull(f("zone"), (0.9, 1.1)),
 }
 
 
@@ -103,29 +105,62 @@ def test_graphs_name_units(name, request):
 
 def test_a_figure_given_is_drawn_into(zone):
     _, ax = plt.subplots()
-    assert plotting.plot_zone(zone, 1.1, ax=ax) is ax
+    assert figures.plot_zone(zone, 1.1, ax=ax) is ax
 
 
 def test_a_path_count_limits_what_is_drawn():
-    ax = plotting.plot_paths(paths(), count=3)
+    ax = figures.plot_encounter_paths(paths(), count=3)
     assert all(len(c.get_segments()) == 3 for c in ax.collections)
 
 
 def test_the_zone_is_drawn_where_the_ellipse_is(zone):
-    ax = plotting.plot_zone(zone, 1.1)
+    ax = figures.plot_zone(zone, 1.1)
     drawn = ax.lines[0].get_xydata()
     assert np.abs(zone.ellipse(1.1).level(drawn) - 1).max() < 1e-9
 
 
-def test_a_run_shows_speed_and_every_h(log):
-    figure = scenes.plot_run(log, title="run")
-    speed, h = figure.axes
-    assert "[m/s]" in speed.get_ylabel()
-    assert "[m]" in h.get_ylabel()
-    assert len(h.lines) == 1 + log.table.columns.str.startswith("h_").sum()
+def test_a_run_shows_speed_and_every_h_to_its_greatest(log):
+    speed, h = figures.plot_speed(log), figures.plot_barriers(log)
+    assert "[m/s]" in speed.get_ylabel() and "[m]" in h.get_ylabel()
+    assert len(h.lines) == 1 + log.h.shape[1]
+    assert h.get_ylim()[0] <= log.h.min() and h.get_ylim()[1] >= log.h.max()
+
+
+def test_nothing_is_clipped_that_is_drawn_later(log):
+    ax = figures.plot_scenario(log, every=1.0)
+    limits = np.array([ax.get_xlim(), ax.get_ylim()])
+    drawn = [
+        patch.get_path().vertices @ patch.get_patch_transform().get_matrix()[:2, :2].T
+        + patch.get_patch_transform().get_matrix()[:2, 2]
+        for patch in ax.patches
+    ]
+    everything = np.vstack([*drawn, log.states[:, :2]])
+    assert (everything.min(axis=0) >= limits[:, 0] - 1e-9).all()
+    assert (everything.max(axis=0) <= limits[:, 1] + 1e-9).all()
+
+
+PLOTS = [name for name in dir(figures) if name.startswith("plot_")]
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_every_plot_takes_axes_or_makes_them_and_needs_no_title(name):
+    parameters = inspect.signature(getattr(figures, name)).parameters
+    assert parameters["ax"].default is None
+    assert "title" not in parameters
+
+
+def test_every_plot_is_offered():
+    folder = Path(figures.__file__).parent
+    defined = {d for f in folder.glob("*.py") for d in re.findall(r"^def (plot_\w+)", f.read_text(), re.M)}
+    assert defined == set(PLOTS)
+
+
+def test_a_log_draws_itself(log):
+    assert in_metres(log.plot())
+    assert log.animate(every=2.0, width=2.0).startswith(b"GIF8")
 
 
 def test_an_animation_has_a_frame_for_every_time_asked(log):
-    with Image.open(io.BytesIO(scenes.animate(log, every=1.0, width=3.0))) as movie:
+    with Image.open(io.BytesIO(figures.animate(log, every=1.0, width=3.0))) as movie:
         assert movie.format == "GIF"
         assert movie.n_frames == int(np.floor(log.table["t"].iloc[-1] + 1e-9)) + 1

@@ -5,12 +5,13 @@ import json
 import pytest
 
 from szlib.errors import DataError
-from szlib.workbook import runner as workbook
+from szlib.workbook import command_line, runner
+from szlib.workbook.command_line import main
 
 HEADER = """# %%
 import pathlib
 
-from szlib.workbook.record import Page
+from szlib.workbook.record import NotebookRecord
 
 # %% tags=["parameters"]
 data = "synthetic"
@@ -18,8 +19,8 @@ seed = 0
 results = "../results"
 
 # %%
-page = Page("{name}", data=data, results=results, seed=seed)
-page.key["seed"] = seed
+record = NotebookRecord("{name}", data=data, results=results, seed=seed)
+record.key["seed"] = seed
 """
 
 
@@ -28,20 +29,20 @@ def notebooks(tmp_path, monkeypatch):
     """A workbook of one's own: `notebooks(name=code)` writes them; its data is a file of two rows."""
     folder = tmp_path / "notebooks"
     folder.mkdir()
-    monkeypatch.setattr(workbook, "NOTEBOOKS", folder)
+    monkeypatch.setattr(runner, "NOTEBOOKS", folder)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.csv").write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n")
 
     def write(**codes):
         for name, code in codes.items():
-            text = HEADER.format(name=f"{name[1:]}") + code + "\n\n# %%\npage.close()\n"
+            text = HEADER.format(name=f"{name[1:]}") + code + "\n\n# %%\nrecord.close()\n"
             (folder / f"{name[1:]}.py").write_text(text)
 
     return write
 
 
 def run(*arguments):
-    return workbook.main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1", *arguments])
+    return main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1", *arguments])
 
 
 def summary(tmp_path):
@@ -49,11 +50,11 @@ def summary(tmp_path):
 
 
 def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp_path, capsys):
-    notebooks(_01_good='page.check("sum", 1 + 1 == 2, 2)\npage.claim("paper", False, 0.25)')
+    notebooks(_01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)')
     assert run("-p", "seed=3") == 0
-    page = summary(tmp_path)["notebooks"]["01_good"]
-    assert page["key_figures"] == {"seed": 3}
-    assert [(c["name"], c["passed"], c["value"]) for c in page["checks"]] == [
+    record = summary(tmp_path)["notebooks"]["01_good"]
+    assert record["key_figures"] == {"seed": 3}
+    assert [(c["name"], c["passed"], c["value"]) for c in record["checks"]] == [
         ("sum", True, 2),
         ("paper", False, 0.25),
     ]
@@ -64,49 +65,74 @@ def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp
 
 
 def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, tmp_path, capsys):
-    notebooks(_01_bad='page.check("sum", False, 3)', _02_crash="1 / 0", _03_fine='page.check("ok", True)')
+    notebooks(_01_bad='record.check("sum", False, 3)', _02_crash="1 / 0", _03_fine='record.check("ok", True)')
     assert run() == 1
-    told = summary(tmp_path)
-    assert not told["passed"]
-    assert {name: page["status"] for name, page in told["notebooks"].items()} == {
+    found = summary(tmp_path)
+    assert not found["passed"]
+    assert {name: record["status"] for name, record in found["notebooks"].items()} == {
         "01_bad": "done", "02_crash": "error", "03_fine": "done",
     }  # fmt: skip
-    assert "ZeroDivisionError" in told["notebooks"]["02_crash"]["error"]
+    assert "ZeroDivisionError" in found["notebooks"]["02_crash"]["error"]
     printed = capsys.readouterr().out
     assert "FAILED" in printed
     assert "NOT ALL CHECKS HOLD" in printed
 
 
 def test_only_runs_what_is_asked_for(notebooks, tmp_path):
-    notebooks(_01_one='page.check("ok", True)', _07_two='page.check("ok", True)')
+    notebooks(_01_one='record.check("ok", True)', _07_two='record.check("ok", True)')
     assert run("--only", "07") == 0
     assert list(summary(tmp_path)["notebooks"]) == ["07_two"]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["-p", "sed=1"], "unknown parameter sed; the notebooks know data, results, seed"),
         (["-p", "seed"], "must be NAME=VALUE"),
+        (["-p", "seed=abc"], "parameter seed: expected int, such as 0; got 'abc'"),
+        (["-p", "seed=1.5"], "parameter seed: expected int"),
+        (["-p", "seed=true"], "parameter seed: expected int"),
         (["--only", "99"], "no notebook 99; there are 01_one"),
         (["--data", "nowhere.csv"], "nowhere.csv: no such file"),
     ],
 )
-def test_what_cannot_be_run_exits_with_2_and_says_why(notebooks, capsys, arguments, told):
+def test_what_cannot_be_run_exits_with_2_and_says_why(notebooks, capsys, arguments, message):
     notebooks(_01_one="")
     assert run(*arguments) == 2
-    assert told in capsys.readouterr().err
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("place", ["taken", "taken/inside"])
+def test_results_that_cannot_be_written_exit_with_2(notebooks, tmp_path, capsys, place):
+    notebooks(_01_one="")
+    (tmp_path / "taken").write_text("a file")
+    assert run("--out", str(tmp_path / place)) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("jobs", ["0", "-1", "two", "1.5", "²"])
+def test_a_number_of_jobs_that_is_none_is_refused_at_once(jobs, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["run", "--jobs", jobs])
+    assert stop.value.code == 2
+    assert "expected a whole number >= 1" in capsys.readouterr().err
+
+
+def test_without_the_workbooks_packages_it_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setattr(command_line, "WORKBOOK_PACKAGES", ("papermill", "no_such_package"))
+    assert main(["run"]) == 2
+    assert "needs no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
 
 
 def test_without_notebooks_it_says_where_to_find_them(notebooks):
-    with pytest.raises(DataError, match="run from a clone"):
-        workbook.run()
+    with pytest.raises(DataError, match="they come with the repository"):
+        runner.run()
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["--version"]])
 def test_help(arguments, capsys):
     with pytest.raises(SystemExit) as stop:
-        workbook.main(arguments)
+        main(arguments)
     assert stop.value.code == 0
     assert "szlib" in capsys.readouterr().out
 
@@ -116,6 +142,6 @@ def test_ctrl_c_exits_with_130(notebooks, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     notebooks(_01_one="")
-    monkeypatch.setattr(workbook, "as_completed", interrupted)
+    monkeypatch.setattr(runner, "as_completed", interrupted)
     assert run() == 130
     assert "stopped" in capsys.readouterr().err

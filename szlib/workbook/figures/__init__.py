@@ -11,5 +11,23 @@ simulation  runs of the robot, animations, sweeps and comparisons
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["style", "tracks", "encounters", "zones", "control", "simulation"]
+    __name__,
+    submodules=["style", "tracks", "encounters", "zones", "control", "simulation"],
+    submod_attrs={
+        "tracks": ["plot_map", "plot_speeds", "plot_funnel"],
+        "encounters": ["plot_space", "plot_encounter_paths", "plot_los", "plot_los_distance"],
+        "zones": ["plot_outliers", "plot_hull", "plot_zone", "plot_zones"],
+        "control": ["plot_distance", "plot_overestimate"],
+        "simulation": [
+            "plot_scenario",
+            "plot_speed",
+            "plot_barriers",
+            "plot_robot_paths",
+            "animate",
+            "plot_sweep",
+            "plot_intervals",
+            "legend_below",
+        ],
+        "style": ["BLUE", "ORANGE", "GREEN", "RED", "GREY", "BLACK", "SEQUENCE", "axes", "metres", "colours"],
+    },
 )

@@ -39,7 +39,7 @@ def plot_space(
     return metres(ax, "The space stays inside the square")
 
 
-def plot_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | None = None) -> Axes:
+def plot_encounter_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | None = None) -> Axes:
     """Paths of the other person in the reference pedestrian's frame at the opening (paper, fig. 2).
 
     `paths` as from `szlib.encounters.search.reference_frame`; `count` encounters, evenly spread, are drawn.

@@ -19,10 +19,11 @@ def axes(ax: Axes | None, *, size: tuple[float, float] = (6.0, 4.5)) -> Axes:
     return plt.subplots(figsize=size, layout="constrained")[1] if ax is None else ax
 
 
-def metres(ax: Axes, title: str, *, person: bool = False) -> Axes:
+def metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
     """Label both axes in metres with equal aspect; of the world, or of a person who walks to the right."""
     ax.set(xlabel="x, ahead [m]" if person else "x [m]", ylabel="y, to the left [m]" if person else "y [m]")
-    ax.set_title(title)
+    if title:
+        ax.set_title(title)
     ax.set_aspect("equal")
     return ax
 

@@ -1,0 +1,233 @@
+"""The log of a closed loop: light arrays, and from them its table, its metrics, its pictures, its file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..control.barriers import Array, barrier, ellipse_distance, segment_distance
+from ..control.distances import euclidean_to_segment
+from ..control.mpc import status_of
+from ..control.people import Person
+from ..control.settings import MPCSettings
+from ..errors import DataError
+from ..zones.ellipses import Ellipse
+from .metrics import metrics
+from .scenario import BODY_RADIUS, Scenario
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_FORMAT, _VERSION = "szlib.SimulationLog", 1
+_ARRAYS = ("states", "controls", "people", "predicted", "residual", "rung", "safe", "slack", "solve_time")
+_SHOWN = ("success", "outcome", "time_to_goal", "min_h", "min_clearance", "infeasible_steps")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulationLog:
+    """One run in n states, dt apart, each with the step that the controller decided there.
+
+    Attributes
+    ----------
+    scenario : what was run, its people with their own zones.
+    settings : of the controller.
+    zones : the zone of each person that the controller kept, in the person's frame; h is about these.
+    states : (x, y, vx, vy), shape (n, 4) [m, m/s].
+    controls : (ax, ay), shape (n, 2) [m/s2]; that of the last state was not applied any more.
+    people : (x, y, heading) of everybody as they truly were, shape (n, P, 3) [m, rad].
+    predicted : the plan of each step, shape (n, N+1, 4).
+    residual : `Step.residual`, people before walls, shape (n, P+W, N_h) [m].
+    rung : `Step.rung`, shape (n,).
+    safe : `Step.safe`, shape (n,): False is a flag.
+    slack : largest violation of a hard row by each plan, shape (n,).
+    solve_time : of each step, shape (n,) [s].
+    arrived : index of the first state at rest at the goal; None if there is none.
+    """
+
+    scenario: Scenario
+    settings: MPCSettings
+    zones: tuple[Ellipse, ...]
+    states: Array
+    controls: Array
+    people: Array
+    predicted: Array
+    residual: Array
+    rung: NDArray[np.str_]
+    safe: NDArray[np.bool_]
+    slack: Array
+    solve_time: Array
+    arrived: int | None
+
+    @property
+    def success(self) -> bool:
+        """The robot came to rest at the goal."""
+        return self.arrived is not None
+
+    @cached_property
+    def time(self) -> Array:
+        """Time of each state, shape (n,) [s]."""
+        return np.round(np.arange(len(self.states)) * self.settings.dt, 9)
+
+    @cached_property
+    def speed(self) -> Array:
+        """Of the robot, shape (n,) [m/s]."""
+        return np.asarray(np.hypot(self.states[:, 2], self.states[:, 3]))
+
+    @cached_property
+    def relative(self) -> Array:
+        """The robot in each person's frame, shape (n, P, 2) [m]."""
+        offset = self.states[:, None, :2] - self.people[:, :, :2]
+        cos, sin = np.cos(self.people[:, :, 2]), np.sin(self.people[:, :, 2])
+        ahead = offset[..., 0] * cos + offset[..., 1] * sin
+        return np.stack([ahead, offset[..., 1] * cos - offset[..., 0] * sin], axis=-1)
+
+    @cached_property
+    def h(self) -> Array:
+        """Barriers with people as they truly were, people before walls, shape (n, P+W) [m]."""
+        d = [ellipse_distance(self.relative[:, i], zone) for i, zone in enumerate(self.zones)]
+        d += [segment_distance(self.states[:, :2], *wall) for wall in self.scenario.walls]
+        distances = np.reshape(d, (len(d), len(self.states))).T
+        return np.asarray(barrier(distances, self.settings.r_robot, self.settings.eps))
+
+    @cached_property
+    def clearance(self) -> Array:
+        """Euclidean gaps from the robot's disc to bodies (of `BODY_RADIUS`) and walls, (n, P+W) [m]."""
+        to_people = np.hypot(self.relative[..., 0], self.relative[..., 1]) - BODY_RADIUS
+        to_walls = [euclidean_to_segment(self.states[:, :2], *wall) for wall in self.scenario.walls]
+        gaps = [*to_people.T, *to_walls]
+        return np.reshape(gaps, (len(gaps), len(self.states))).T - self.settings.r_robot
+
+    @cached_property
+    def cbf_people(self) -> Array:
+        """Smallest residual of a person's barrier condition, shape (n,) [m]; inf without people."""
+        of_people = self.residual[:, : len(self.scenario.people)]
+        return np.asarray(of_people.min(axis=(1, 2), initial=np.inf))
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """One row a step: the state at its time and the control decided there.
+
+        Columns: t [s], x, y [m], vx, vy, speed [m/s], ax, ay [m/s2], status, rung, slack, solve_time
+        [s], cbf_people [m], clearance (the least) [m], and for each person i and wall j: person_i_x,
+        person_i_y [m], person_i_heading [rad], h_person_i, h_wall_j [m].
+        """
+        n, columns = len(self.scenario.people), {"t": self.time}
+        columns |= dict(zip(("x", "y", "vx", "vy"), self.states.T, strict=True)) | {"speed": self.speed}
+        columns |= dict(zip(("ax", "ay"), self.controls.T, strict=True))
+        words = {"status": [status_of(rung) for rung in self.rung.tolist()], "rung": self.rung}
+        numbers = {"slack": self.slack, "solve_time": self.solve_time, "cbf_people": self.cbf_people}
+        numbers["clearance"] = self.clearance.min(axis=1, initial=np.inf)
+        for i in range(n):
+            x, y, heading = self.people[:, i].T
+            numbers |= {f"person_{i}_x": x, f"person_{i}_y": y, f"person_{i}_heading": heading}
+            numbers[f"h_person_{i}"] = self.h[:, i]
+        numbers |= {f"h_wall_{j}": self.h[:, n + j] for j in range(len(self.scenario.walls))}
+        return pd.DataFrame({**columns, **words, **numbers})
+
+    def min_h(self) -> pd.Series[float]:
+        """Smallest h of each person and wall over the run [m]."""
+        return self.table.filter(regex="^h_").min()
+
+    def metrics(self) -> dict[str, Any]:
+        """The run in numbers; `szlib.simulation.metrics.metrics` says what each is."""
+        return metrics(self)
+
+    def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Draw the run (paper, fig. 6); `options` of `workbook.figures.simulation.plot_scenario`."""
+        from ..workbook.figures.simulation import plot_scenario
+
+        return plot_scenario(self, ax=ax, **options)
+
+    def animate(self, **options: Any) -> bytes:
+        """The run as an animated GIF; `options` of `workbook.figures.simulation.animate`."""
+        from ..workbook.figures.simulation import animate
+
+        return animate(self, **options)
+
+    def __repr__(self) -> str:
+        shown = self.metrics()
+        numbers = ", ".join(f"{name} {_short(shown[name])}" for name in _SHOWN)
+        return (
+            f"SimulationLog of {self.scenario.name!r}: {len(self.states)} states in {self.time[-1]:g} s, "
+            f"{len(self.scenario.people)} people, {len(self.scenario.walls)} walls\n  {numbers}"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = pd.Series({name: _short(value) for name, value in self.metrics().items()})
+        title = self.scenario.title or self.scenario.name
+        return f"<p><b>{title}</b></p>" + rows.to_frame(f"{self.time[-1]:g} s").to_html()
+
+    def save(self, path: str | Path) -> None:
+        """Write the run as ``<path>.parquet``, its arrays, and then ``<path>.json``, all else.
+
+        A suffix of `path` is left out.  Claims are functions and are not saved.  Raises DataError where
+        a file cannot be written.
+        """
+        stem, rows = Path(path).with_suffix(""), len(self.states)
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        flat = {name: list(a.reshape(rows, -1)) if a.ndim > 1 else a for name, a in arrays.items()}
+        scenario, people = self.scenario, self.scenario.people
+        content = {
+            "format": _FORMAT,
+            "version": _VERSION,
+            "szlib": __version__,
+            "units": "m, s, rad; world frame, zones in the frame of their person",
+            "arrived": self.arrived,
+            "settings": asdict(self.settings),
+            "zones": [_plain(zone) for zone in self.zones],
+            "scenario": {name: getattr(scenario, name) for name in ("name", "title", "duration")}
+            | {name: getattr(scenario, name).tolist() for name in ("start", "goal", "walls")},
+            "people": [
+                {"position": p.position, "velocity": p.velocity, "heading": p.heading} for p in people
+            ],
+        }
+        try:
+            pd.DataFrame(flat).to_parquet(stem.with_suffix(".parquet"))
+            stem.with_suffix(".json").write_text(json.dumps(content, indent=1), encoding="utf-8")
+        except OSError as error:
+            raise DataError(f"{stem}: the run cannot be written ({error}); choose another folder") from error
+
+    @classmethod
+    def load(cls, path: str | Path) -> SimulationLog:
+        """Read a run written by `save`, its people with the zones that were kept.
+
+        Raises DataError where there is none, or it is damaged or of a newer szlib.
+        """
+        stem = Path(path).with_suffix("")
+        try:
+            content = json.loads(stem.with_suffix(".json").read_text(encoding="utf-8"))
+            if (content["format"], content["version"]) != (_FORMAT, _VERSION):
+                raise ValueError(f"format {content['format']} {content['version']}, expected {_FORMAT} 1")
+            rows = pd.read_parquet(stem.with_suffix(".parquet"))
+            arrays = {name: np.array(rows[name].tolist()) for name in _ARRAYS}
+            zones = tuple(Ellipse(z["center"], z["semi_axes"], z["angle"]) for z in content["zones"])
+            people = tuple(
+                Person(**person, zone=zone) for person, zone in zip(content["people"], zones, strict=True)
+            )
+            settings = MPCSettings(**content["settings"])
+            scenario = Scenario(**content["scenario"], people=people)
+            n, p, w = len(rows), len(people), len(scenario.walls)
+            shapes = {"people": (n, p, 3), "predicted": (n, -1, 4), "residual": (n, p + w, settings.N_h)}
+            arrays |= {name: arrays[name].reshape(shape) for name, shape in shapes.items()}
+            return cls(scenario, settings, zones, **arrays, arrived=content["arrived"])
+        except (OSError, KeyError, TypeError, ValueError) as error:
+            raise DataError(
+                f"{stem}: cannot be read as a run ({error!r}); expected the two files of SimulationLog.save"
+            ) from error
+
+
+def _plain(zone: Ellipse) -> Mapping[str, Any]:
+    return {"center": zone.center, "semi_axes": zone.semi_axes, "angle": zone.angle}
+
+
+def _short(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
