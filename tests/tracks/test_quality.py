@@ -26,13 +26,13 @@ def day(tmp_path: Path) -> Path:
     return path
 
 
-def test_speed_is_said_and_moved(day: Path) -> None:
+def test_speed_by_the_sensor_and_by_displacement(day: Path) -> None:
     rows = quality.seconds(day)
     walker, stander = rows[rows["id"] == 1], rows[rows["id"] == 2]
     np.testing.assert_allclose(walker["moved"].dropna(), 1.0)
-    np.testing.assert_allclose(walker["said"], 1.0)
+    np.testing.assert_allclose(walker["sensor_speed"], 1.0)
     np.testing.assert_allclose(stander["moved"].dropna(), 0.0)
-    np.testing.assert_allclose(stander["said"], 0.57)
+    np.testing.assert_allclose(stander["sensor_speed"], 0.57)
     assert list(walker["moved"].isna()) == [False] * 9 + [True]
     assert stander["moved"].isna().sum() == 2, "nobody is followed across a gap"
     assert rows["rows"].sum() == 525
@@ -54,7 +54,7 @@ def test_frames_gaps_and_lengths(day: Path) -> None:
     found = quality.people(day)
     assert found["id"].tolist() == [1, 2]
     np.testing.assert_allclose(found["longest_gap"], [0.04, 3.04], atol=1e-5)
-    np.testing.assert_allclose(found["ended"] - found["begun"], [9.96, 13.96], atol=1e-5)
+    np.testing.assert_allclose(found["last_seen"] - found["first_seen"], [9.96, 13.96], atol=1e-5)
     assert found["rows"].tolist() == [250, 275]
 
 
@@ -63,6 +63,6 @@ def test_files_without_a_speed_have_none(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(as_tidy(rows))
     (tmp_path / "b.csv").write_text(as_1hz(rows))
     tidy, hourly = quality.seconds(tmp_path / "a.csv"), quality.seconds(tmp_path / "b.csv")
-    assert tidy["said"].isna().all()
-    np.testing.assert_allclose(hourly["said"], 1.2)
+    assert tidy["sensor_speed"].isna().all()
+    np.testing.assert_allclose(hourly["sensor_speed"], 1.2)
     np.testing.assert_allclose(tidy["moved"], hourly["moved"])
