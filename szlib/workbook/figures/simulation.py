@@ -22,6 +22,8 @@ from ...zones.ellipses import Ellipse
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, axes, metres
 
 _ROBOT = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
+_PADDING = 0.2
+"""Room left around what is drawn [m]."""
 _PERSON = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
 
 
@@ -55,14 +57,17 @@ def plot_speed(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_barriers(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
-    """h of every person and wall over time: safe where it is not negative."""
+    """h of every person and wall over time: safe where it is not negative; logarithmic above 0.5 m."""
     ax = axes(ax, size=(8, 2.5))
     n = len(log.scenario.people)
     for i, h in enumerate(log.h.T):
         kind, colour, line = ("person", RED, "-") if i < n else ("wall", BLACK, ":")
         ax.plot(log.time, h, color=colour, linestyle=line, label=kind if i in (0, n) else None)
     ax.axhline(0, color=GREY, linewidth=1)
-    ax.set(xlabel="time [s]", ylabel="h [m]")
+    ax.set_yscale("symlog", linthresh=0.5, linscale=1.5)
+    ax.set_yticks([0, 0.25, 0.5, 1, 2, 5, 10], ["0", "0.25", "0.5", "1", "2", "5", "10"])
+    low, high = log.h.min(initial=0.0), log.h.max(initial=0.5)
+    ax.set(xlabel="time [s]", ylabel="h [m]", ylim=(1.2 * low - 0.05, 1.3 * high))
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
     return ax
 
@@ -185,7 +190,7 @@ def _frame(ax: Axes, shown: Sequence[tuple[SimulationLog, Any]]) -> None:
         points += [log.states[:, :2] + radius, log.states[:, :2] - radius]
         points += [zone.curve(25) for row in rows.tolist() for zone in _zones(log, row)]
     everything = np.vstack(points)
-    low, high = everything.min(axis=0), everything.max(axis=0)
+    low, high = everything.min(axis=0) - _PADDING, everything.max(axis=0) + _PADDING
     if len(first.scenario.walls):
         y = first.scenario.walls[:, :, 1]
         low[1], high[1] = min(low[1], max(y.min() - 0.2, -3.5)), max(high[1], min(y.max() + 0.2, 3.5))
