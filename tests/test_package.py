@@ -17,7 +17,7 @@ PACKAGE = Path(szlib.__file__).parent
 GROUND = ["errors", "parallel"]
 ROOMS = {
     "tracks": ["funnels", "formats", "readers", "clock", "quality", "interop", "datasets"],
-    "encounters": ["geometry", "search", "streaming", "pipeline", "records", "days"],
+    "encounters": ["geometry", "kinds", "search", "streaming", "pipeline", "records", "days"],
     "zones": ["ellipses", "hulls", "outliers", "social_zone"],
     "plaza": ["truth", "people"],
     "control": [

@@ -17,6 +17,7 @@ from ..tracks.clock import to_clock
 from ..tracks.formats import FORMATS
 from ..tracks.readers import read_raw
 from .geometry import ATC_SQUARE, PAPER_SPACE, AttentionalSpace, Square
+from .kinds import KINDS
 from .search import SAMPLE_COLUMNS, find_encounters
 from .streaming import read_near_square
 
@@ -80,4 +81,5 @@ def no_samples() -> pd.DataFrame:
     columns: Mapping[str, Any] = dict.fromkeys(SAMPLE_COLUMNS, numbers) | dict.fromkeys(
         ("encounter", "ref_id", "other_id"), integers
     )
-    return pd.DataFrame({**columns, "day": pd.Categorical([])})[SAMPLE_COLUMNS]
+    samples = pd.DataFrame({**columns, "day": pd.Categorical([])})[SAMPLE_COLUMNS]
+    return samples.assign(kind=pd.Categorical([], categories=list(KINDS)))
