@@ -104,7 +104,7 @@ def extract_days(
     exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
     progress : whether to show a bar over the days.
     parameters : of `szlib.read_tracks` and `szlib.find_encounters`: square, space, duration, min_distance,
-        min_speed, throughout, file_format, unit, max_gap, tz.
+        min_speed, throughout, file_format, unit, frame_rate, max_gap, tz.
 
     Returns
     -------

@@ -34,6 +34,7 @@ class Chain:
     throughout: bool = False
     file_format: str | None = None
     unit: str | None = None
+    frame_rate: float | None = None
     max_gap: float | None = None
     tz: str = "Asia/Tokyo"
 
@@ -56,11 +57,18 @@ class Chain:
                 duration=self.duration,
                 file_format=self.file_format,
                 unit=self.unit,
+                frame_rate=self.frame_rate,
                 max_gap=self.max_gap,
                 tz=self.tz,
             )
         else:
-            raw = read_raw(files, file_format=self.file_format, unit=self.unit, tz=self.tz)
+            raw = read_raw(
+                files,
+                file_format=self.file_format,
+                unit=self.unit,
+                frame_rate=self.frame_rate,
+                tz=self.tz,
+            )
         tracks = to_clock(raw, max_gap=self.max_gap) if len(raw) else raw
         if len(tracks) == 0:
             return funnels.carry(no_samples(), funnels.of(tracks))

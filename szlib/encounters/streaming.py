@@ -111,6 +111,7 @@ def read_near_square(
     duration: float,
     file_format: str | None = None,
     unit: str | None = None,
+    frame_rate: float | None = None,
     max_gap: float | None = None,
     tz: str = "Asia/Tokyo",
 ) -> pd.DataFrame:
@@ -127,12 +128,12 @@ def read_near_square(
     path = Path(path)
     if path.is_file():
         with plain_file(path) as plain:
-            layout, scan = recognise(plain, path, file_format)
+            layout, scan = recognise(plain, path, file_format, frame_rate)
             if layout.name == "atc-raw":
                 metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
                 cells = Cells(square.grown(REACH), duration, max_gap or layout.max_gap or 0.0, metres)
                 return _read(scan, path, layout, cells, unit=unit, tz=tz)
-    return read_raw(path, file_format=file_format, unit=unit, tz=tz)
+    return read_raw(path, file_format=file_format, unit=unit, frame_rate=frame_rate, tz=tz)
 
 
 def _read(
