@@ -26,7 +26,7 @@ from tqdm import tqdm
 from ..errors import DataError, DataWarning, SzlibError
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.formats import LONGEST_LINE, layout_of
+from ..tracks.formats import LONGEST_LINE, layout_of, start_of_day
 from .pipeline import Chain
 from .records import day_key, finished_record, write_record
 
@@ -177,7 +177,7 @@ def _day_of(file: Path, chain: Chain) -> str:
         layout = layout_of(first, chain.file_format)
         if layout.name not in ("atc-raw", "atc-1hz"):
             return name
-        begun = float(first.split(layout.separator)[layout.columns["t"]])
+        begun = float(first.split(layout.separator)[layout.columns["t"]]) + start_of_day(file, layout, first)
         return datetime.fromtimestamp(begun, ZoneInfo(chain.tz)).strftime("%Y-%m-%d")
     except (OSError, EOFError, zlib.error, ValueError, OverflowError):  # reading the day will tell why
         return name

@@ -5,19 +5,20 @@ from __future__ import annotations
 import gzip
 import shutil
 import tempfile
-import warnings
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
-import numpy as np
 import polars as pl
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
-from ..errors import DataError, DataWarning
+from ..errors import DataError
+from .frame_rates import frame_clock
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,9 @@ class Format:
     """How a file of tracks is laid out.
 
     `columns` says in which field t, id, x, y (and day) stand, `fields` how many a row has, `metres`
-    and `seconds` what one unit of position and time is, `max_gap` [s] which silence ends a track.  Frames
-    are counted in EWAP files: `recognise` says how long one is, and how long a gap.
+    and `seconds` what one unit of position and time is, `max_gap` [s] which silence ends a track.  EWAP
+    files count frames: `recognise` says how long one is, and how long a gap.  `start` [s since 1970] is when
+    the clock of a file begins: 0, or midnight where it counts from the start of its day.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Format:
     max_gap: float | None = None
     separator: str = ","
     header: bool = False
+    start: float = 0.0
 
 
 _TIXY = {"t": 0, "id": 1, "x": 2, "y": 3}
@@ -55,18 +58,7 @@ EXPECTED = (
 )
 
 LONGEST_LINE = 100_000
-
-_EWAP_GAP = 2.25
-"""Intervals between samples after which an EWAP track ends: 0.9 s where they are 0.4 s apart."""
-_RATES, _USUAL_RATES = (1.0, 240.0), (15.0, 25.0)
-"""Frames a second that a video can have, and those that EWAP's have: ETH 15; hotel, zara and students 25."""
-_FEWEST_STEPS, _SPREAD, _WHOLE = 10, 0.1, 0.01
-"""A rate is told by so many steps at least, the quartiles of their rates apart by at most this share of the
-median; it is a whole number if it is within 1 % of one."""
-_FARTHEST_NUMBER = 1e12
-"""Larger numbers are damage."""
-_STEP = 0.02
-"""Shorter steps [m] tell nothing of a velocity."""
+_DAY, _JAPAN = 86_400.0, ZoneInfo("Asia/Tokyo")
 
 
 @contextmanager
@@ -132,73 +124,11 @@ def recognise(
     if frame_rate is not None and layout.name != "ewap":
         raise DataError(f"{path}: is {layout.name}, whose times are in seconds; leave frame_rate out")
     if layout.name != "ewap":
+        layout = replace(layout, start=start_of_day(path, layout, first))
         return layout, _scan_csv(plain, layout)
     rows = _scan_lines(plain, layout).collect()
-    return _in_frames(rows, layout, path, frame_rate), rows.lazy()
-
-
-def _in_frames(rows: pl.DataFrame, layout: Format, path: Path, given: float | None) -> Format:
-    """The layout with the length of a frame, and with the longest gap of its sampling interval."""
-    if given is not None and not _RATES[0] <= given <= _RATES[1]:
-        raise DataError(
-            f"frame_rate must be frames a second from {_RATES[0]:g} to {_RATES[1]:g}; got {given}"
-        )
-    told, why = _told_rate(rows)
-    rate = told if given is None else float(given)
-    if rate is None:
-        raise DataError(
-            f"{path}: the frame rate cannot be told from the file's velocities ({why}); pass frame_rate=15 "
-            "(ETH) or 25 (hotel, zara, students), or what the video has"
-        )
-    if given is not None and told is not None and abs(given - told) > _SPREAD * told:
-        warnings.warn(
-            f"{path.name}: read at {rate:g} frames/s as asked; its velocities tell {told:.4g}",
-            DataWarning, stacklevel=2,
-        )  # fmt: skip
-    elif given is None and rate not in _USUAL_RATES:
-        warnings.warn(
-            f"{path.name}: {rate:.4g} frames/s by its velocities, EWAP files have 15 or 25; if that is "
-            "wrong, pass frame_rate", DataWarning, stacklevel=2,
-        )  # fmt: skip
-    frames = rows.sort("id", "t").select(pl.col("t").diff().over("id"))["t"].drop_nulls()
-    interval = frames.filter(frames > 0).median()
-    gap = _EWAP_GAP * float(interval) / rate if isinstance(interval, float | int) else None
-    return replace(layout, seconds=1 / rate, max_gap=gap)
-
-
-def _told_rate(rows: pl.DataFrame) -> tuple[float | None, str]:
-    """Frames a second as velocities tell: displacement per frame against velocity; None, and why, if not.
-
-    A row's velocity may be that to the next sample, from the last, or over both (each of the public
-    files has its own habit): that which agrees best with itself counts.
-    """
-    sane = pl.all_horizontal(
-        pl.col("t", "id", "x", "y", "vx", "vy").abs() < _FARTHEST_NUMBER
-    )  # not NaN, no null
-    whole = rows.filter(sane).sort("id", "t")
-    person, frame = whole["id"].to_numpy(), whole["t"].to_numpy()
-    position, velocity = whole.select("x", "y").to_numpy(), whole.select("vx", "vy").to_numpy()
-    here = np.arange(len(whole))
-    habits = [
-        (here[:-1], here[1:], here[:-1]),
-        (here[:-1], here[1:], here[1:]),
-        (here[:-2], here[2:], here[1:-1]),
-    ]
-    found = []
-    for before, after, at in habits:
-        frames, step = frame[after] - frame[before], position[after] - position[before]
-        length = np.einsum("ij,ij->i", step, step)
-        tells = (person[after] == person[before]) & (frames > 0) & (length >= _STEP**2)
-        rates = np.einsum("ij,ij->i", velocity[at], step)[tells] * frames[tells] / length[tells]
-        if len(rates) >= _FEWEST_STEPS:
-            low, rate, high = np.quantile(rates, [0.25, 0.5, 0.75])
-            found.append(((high - low) / abs(rate) if rate else np.inf, rate))
-    if not found:
-        return None, f"fewer than {_FEWEST_STEPS} steps with a velocity"
-    spread, rate = min(found)
-    if not (spread <= _SPREAD and _RATES[0] <= rate <= _RATES[1]):
-        return None, f"they give {rate:.3g} frames/s, with quartiles {spread:.0%} apart"
-    return (float(np.rint(rate)) if abs(rate - np.rint(rate)) <= _WHOLE * rate else float(rate)), ""
+    second, gap = frame_clock(rows, path, frame_rate)
+    return replace(layout, seconds=second, max_gap=gap), rows.lazy()
 
 
 def layout_of(first: str, name: str | None) -> Format:
@@ -208,6 +138,21 @@ def layout_of(first: str, name: str | None) -> Format:
         if name
         else next(filter(lambda f: _looks_like(first, f), FORMATS.values()), FORMATS["tidy"])
     )
+
+
+def start_of_day(path: Path, layout: Format, first: str) -> float:
+    """When the clock of a file begins [s since 1970]: 0, or midnight of the day in the file's name.
+
+    The ATC days of LaCE-LHMP, ``MMDD.csv`` of 2012, may count from the start of the day, in Japan.
+    """
+    if layout.name != "atc-1hz":
+        return 0.0
+    try:
+        day = datetime.strptime(f"2012{path.name.split('.')[0]}", "%Y%m%d").replace(tzinfo=_JAPAN)
+        since = float(first.split(layout.separator)[layout.columns["t"]])
+    except ValueError:  # named otherwise, or the first row is damaged
+        return 0.0
+    return day.timestamp() if 0 <= since < _DAY else 0.0
 
 
 def _looks_like(first: str, layout: Format) -> bool:
@@ -238,6 +183,8 @@ def _scan_csv(plain: Path, layout: Format) -> pl.LazyFrame:
     named = {name: pl.col(f"f{index}") for name, index in layout.columns.items()}
     if "day" in named:
         named["day"] = named["day"].str.strip_chars(' "')
+    if layout.start:
+        named["t"] = named["t"] + layout.start
     return scan.select("line", ragged=ragged, **named)
 
 

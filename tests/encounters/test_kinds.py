@@ -12,7 +12,7 @@ from conftest import DAY, make_crowd, make_tracks, make_walk, real_data
 import szlib
 from szlib.encounters.kinds import COMPANIONS, KINDS, REACH, encounter_kinds, of_kind
 from szlib.encounters.search import find_encounters
-from szlib.tracks import funnels
+from szlib.tracks import funnels, sites
 from szlib.tracks.interop import read_groups
 
 ROOM = szlib.Square(x=(-20, 20), y=(-20, 20))
@@ -198,6 +198,13 @@ def test_the_groups_of_the_eth_sequence() -> None:
     assert (pairs, true) == (2044, 177)
     assert right / found >= 0.75, "precision; most of the others walk side by side, but are in no line"
     assert right / true >= 0.65, "recall; those missed are the outer pairs of large groups"
+
+
+def test_the_groups_of_thor_magni() -> None:
+    file = real_data("magni") / "A.csv"
+    pairs, true, found, right = confusion(sites.read_magni(file), sites.magni_groups(file))
+    assert (pairs, true) == (198, 24)
+    assert (found, right) == (23, 23), "the one missed is of three who walk in a line"
 
 
 def test_the_kinds_of_the_real_day(real_tracks: pd.DataFrame, real_samples: pd.DataFrame) -> None:
