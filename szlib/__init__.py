@@ -24,6 +24,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "control.settings": ["MPCSettings"],
         "encounters.days": ["Extraction", "extract_days"],
         "encounters.geometry": ["ATC_SQUARE", "AttentionalSpace", "Square"],
+        "encounters.kinds": ["encounter_kinds", "of_kind"],
         "encounters.search": ["find_encounters"],
         "errors": ["DataError", "DataWarning", "SolverError", "SzlibError", "ZoneError"],
         "plaza.people": ["make_plaza"],

@@ -16,8 +16,10 @@ import szlib
 PACKAGE = Path(szlib.__file__).parent
 GROUND = ["errors", "parallel"]
 ROOMS = {
-    "tracks": ["funnels", "formats", "readers", "clock", "quality", "interop", "datasets"],
-    "encounters": ["geometry", "search", "streaming", "pipeline", "records", "days"],
+    "tracks": [
+        "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
+    ],
+    "encounters": ["geometry", "kinds", "search", "streaming", "pipeline", "records", "days"],
     "zones": ["ellipses", "hulls", "outliers", "social_zone"],
     "plaza": ["truth", "people"],
     "control": [

@@ -15,7 +15,7 @@ window is one encounter of 31 samples.  Everything is vectorised over rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pandas as pd
@@ -24,8 +24,10 @@ from ..errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, check_columns, clock_index, nearest_tick
 from .geometry import ATC_SQUARE, PAPER_SPACE, AttentionalSpace, Square, wrap_angle
+from .kinds import REACH, kinds_of_pairs, number_people, of_kind
 
 SAMPLE_COLUMNS = ["encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed"]
+"""What is measured; the column kind follows them."""
 
 _PAIRS_AT_ONCE = 4_000_000
 """Pairs of people held in memory at a time."""
@@ -43,6 +45,7 @@ def find_encounters(
     min_distance: float = 1.0,
     min_speed: float = 0.4,
     throughout: bool = False,
+    kinds: str | Iterable[str] | None = None,
 ) -> pd.DataFrame:
     """Find the encounters of two people, and sample each at 10 Hz.
 
@@ -56,13 +59,15 @@ def find_encounters(
     min_speed : of the reference pedestrian, throughout [m/s] (paper: 0.4).
     throughout : also require that the other person stays inside the space for the whole window.
         That reading of the paper never sees two people pass each other (assumed: False).
+    kinds : None keeps all (paper); "strangers" all but companions; else one or several of
+        `szlib.encounters.kinds.KINDS`.  Encounters keep the numbers that they have among all.
 
     Returns
     -------
     One row a sample: encounter (number), day, ref_id, other_id, t [s], los_angle [rad] (bearing of
     the other person in the reference pedestrian's frame, in (-pi, pi]), distance [m], speed of the
-    reference pedestrian [m/s].  Empty where nobody met.  ``.attrs["funnel"]`` says why every other
-    tick opened no encounter.
+    reference pedestrian [m/s], kind (category, see `szlib.encounters.kinds`).  Empty where nobody met.
+    ``.attrs["funnel"]`` says why every other tick opened no encounter.
 
     Raises
     ------
@@ -126,12 +131,17 @@ def find_encounters(
     kept, tried = _sift(np.arange(len(openings)), conditions)
 
     samples = _sampled(tracks, order, openings[kept], partner[kept], steps)
+    number, _ = number_people(days, person)
+    met = number[openings[kept]], number[partner[kept]]
+    near = square.grown(REACH).contains(x, y)
+    kind = kinds_of_pairs(*met, number, tick, np.column_stack([x, y]), np.column_stack([vx, vy]), near)
+    samples["kind"] = kind.repeat(steps + 1)
     stages = [
         *funnels.of(tracks),
         funnels.stage("encounters: ticks that open a window", len(x), len(openings), opened),
         funnels.stage("encounters: windows", len(openings), len(kept), tried),
     ]
-    return funnels.carry(samples, stages)
+    return of_kind(funnels.carry(samples, stages), kinds)
 
 
 def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame:
