@@ -25,7 +25,9 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "encounters.days": ["Extraction", "extract_days"],
         "encounters.geometry": ["ATC_SQUARE", "AttentionalSpace", "Square"],
         "encounters.kinds": ["encounter_kinds", "of_kind"],
+        "encounters.null": ["NullEncounters", "null_encounters"],
         "encounters.search": ["find_encounters"],
+        "encounters.shifting": ["time_shifted"],
         "errors": ["DataError", "DataWarning", "SolverError", "SzlibError", "ZoneError"],
         "plaza.people": ["make_plaza"],
         "plaza.truth": ["PlazaSettings"],
@@ -37,6 +39,8 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "tracks.clock": ["read_tracks"],
         "zones.ellipses": ["Ellipse", "minimum_enclosing_ellipse"],
         "zones.outliers": ["remove_outliers"],
+        "zones.respect": ["Presence", "Respect", "fit_respect", "respect_boundary", "respect_radius"],
+        "zones.significance": ["NullTest", "PairCorrelation", "null_test", "pair_correlation"],
         "zones.social_zone": ["SocialZone"],
     },
 )

@@ -19,8 +19,10 @@ ROOMS = {
     "tracks": [
         "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
-    "encounters": ["geometry", "kinds", "search", "streaming", "pipeline", "records", "days"],
-    "zones": ["ellipses", "hulls", "outliers", "social_zone"],
+    "encounters": [
+        "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
+    ],
+    "zones": ["ellipses", "hulls", "outliers", "respect", "significance", "social_zone"],
     "plaza": ["truth", "people"],
     "control": [
         "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
