@@ -39,8 +39,9 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "tracks.clock": ["read_tracks"],
         "zones.ellipses": ["Ellipse", "minimum_enclosing_ellipse"],
         "zones.outliers": ["remove_outliers"],
-        "zones.respect": ["Presence", "Respect", "fit_respect", "respect_boundary", "respect_radius"],
-        "zones.significance": ["NullTest", "PairCorrelation", "null_test", "pair_correlation"],
+        "zones.respect.boundary": ["Respect", "fit_respect", "respect_boundary", "respect_radius"],
+        "zones.respect.presence": ["PairCorrelation", "Presence", "pair_correlation"],
+        "zones.respect.significance": ["NullTest", "null_test"],
         "zones.social_zone": ["SocialZone"],
     },
 )

@@ -22,7 +22,8 @@ ROOMS = {
     "encounters": [
         "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
     ],
-    "zones": ["ellipses", "hulls", "outliers", "respect", "significance", "social_zone"],
+    "zones": ["ellipses", "hulls", "outliers", "respect", "social_zone"],
+    "zones.respect": ["presence", "boundary", "significance"],
     "plaza": ["truth", "people"],
     "control": [
         "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
@@ -58,7 +59,7 @@ def _order() -> list[str]:
     """Every module, from the ground up."""
     files = list(GROUND)
     for room, names in ROOMS.items():
-        if room == "workbook.figures":
+        if "." in room:
             continue
         for name in names:
             inner = ROOMS.get(f"{room}.{name}")

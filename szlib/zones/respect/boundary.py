@@ -27,64 +27,22 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.special import expit, logit
 
-from ..encounters.null import NullEncounters
-from ..errors import ZoneError
-from ..tracks.clock import check_columns
-
-Array = NDArray[np.float64]
+from ...encounters.null import NullEncounters
+from ...errors import ZoneError
+from .presence import Array, Presence
 
 SPEED_WIDTH = 0.2
 """Standard deviation of the Gaussian that weighs samples of other speeds than the one asked for [m/s]."""
 ORDER = 2
 """Harmonics of rho(theta): an ellipse, off-centre and turned, needs two."""
 
-_DISTANCES, _DIRECTIONS = 80, 36
-_SPEED_STEP, _SPEEDS = 0.1, 40  # [m/s]; faster samples count as of the last bin
 _STARTS = (0.15, 0.35, 0.55, 0.75)  # of rho, in r_max: the likelihood may have several peaks
 _SOFT = (0.01, 0.15)  # bounds of w, in r_max
 _CARELESS = 6.0  # bound of |logit f|
-
-
-@dataclass(frozen=True, eq=False)
-class Presence:
-    """How often people were where: weights of samples by speed, direction and distance.
-
-    Parameters
-    ----------
-    counts : shape (speeds, directions, distances), from 0 m/s, from 0 rad counter-clockwise, from 0 m.
-    r_max : the farthest distance [m].
-    """
-
-    counts: Array
-    r_max: float
-
-    @classmethod
-    def of(cls, samples: pd.DataFrame, *, r_max: float, weights: ArrayLike | None = None) -> Presence:
-        """Count samples within r_max, each once or with its weight (n,), as resampling gives them."""
-        check_columns(samples, ["los_angle", "distance", "speed"])
-        distance = samples["distance"].to_numpy(float)
-        close = distance < r_max
-        turn = np.mod(samples["los_angle"].to_numpy(float)[close] / (2 * np.pi), 1.0)
-        cells = [
-            np.minimum(samples["speed"].to_numpy(float)[close] / _SPEED_STEP, _SPEEDS - 1),
-            np.minimum(turn * _DIRECTIONS, _DIRECTIONS - 1),
-            distance[close] / r_max * _DISTANCES,
-        ]
-        shape = (_SPEEDS, _DIRECTIONS, _DISTANCES)
-        at = np.ravel_multi_index([cell.astype(int) for cell in cells], shape)
-        weight = None if weights is None else np.asarray(weights, float)[close]
-        return cls(np.bincount(at, weight, minlength=int(np.prod(shape))).reshape(shape).astype(float), r_max)
-
-    def at(self, speed: float | None, width: float) -> Array:
-        """By direction and distance: all speeds alike (None), or weighed by nearness to one [m/s]."""
-        if speed is None:
-            return np.asarray(self.counts.sum(axis=0))
-        middle = (np.arange(_SPEEDS) + 0.5) * _SPEED_STEP
-        return np.asarray(np.tensordot(np.exp(-(((middle - speed) / width) ** 2) / 2), self.counts, axes=1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Is it respect at all?  Data tested against its null model, and the pair correlation between the two.
+"""Is it respect at all?  The data tested against its null model.
 
 Under the null hypothesis, that nobody minds anybody, the data is one more time-shifted day.  So a statistic
 of the data has any rank among those of the shifts, and
@@ -21,15 +21,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 from scipy.special import xlogy
 
-from ..encounters.null import NullEncounters
-from ..errors import DataWarning, ZoneError
-from ..tracks.clock import check_columns
-from .respect import Presence, respect_radius
-
-Array = NDArray[np.float64]
+from ...encounters.null import NullEncounters
+from ...errors import DataWarning, ZoneError
+from ...tracks.clock import check_columns
+from .boundary import respect_radius
+from .presence import Presence
 
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
 """Within which too few may come [m]; none of them needs to be the zone's."""
@@ -37,8 +35,6 @@ SIGNIFICANT = 0.05
 
 _EXPECTED = 10
 """A kind of encounter expected that often, and never seen, was filtered out on one side only."""
-_BLUR = (15.0, 0.1)
-"""Standard deviations of the Gaussians that smooth the map of g [deg, m]."""
 
 
 @dataclass(frozen=True)
@@ -136,44 +132,7 @@ def null_test(samples: pd.DataFrame, null: NullEncounters, *, beyond: float = 0.
     )
 
 
-@dataclass(frozen=True, eq=False)
-class PairCorrelation:
-    """How often people were where, over how often the null model was: a smooth map to look at.
-
-    Parameters
-    ----------
-    distance, direction : middles of the cells [m], (n,), and [rad], (m,).
-    g : shape (m, n); NaN where the null model never was.  1: as often as nobody minds.
-    """
-
-    distance: Array
-    direction: Array
-    g: Array
-
-
-def pair_correlation(samples: pd.DataFrame, null: NullEncounters) -> PairCorrelation:
-    """The map of g within r_max, per encounter, smoothed over 15 deg and 0.1 m; errors as the test."""
-    check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
-    if len(null.encounters) == 0:
-        raise ZoneError("the null model has no encounter: nothing to compare; more shifts are needed")
-    real, model = (
-        Presence.of(each, r_max=null.r_max).at(None, 1.0) / encounters
-        for each, encounters in (
-            (samples, samples["encounter"].nunique()),
-            (null.samples, len(null.encounters)),
-        )
-    )
-    directions, distances = real.shape
-    cell = (360 / directions, null.r_max / distances)
-    real, model = (
-        gaussian_filter(each, np.divide(_BLUR, cell), mode=("wrap", "nearest")) for each in (real, model)
-    )
-    g = np.divide(real, model, out=np.full(real.shape, np.nan), where=model > 0)
-    turn = (np.arange(directions) + 0.5) / directions
-    return PairCorrelation((np.arange(distances) + 0.5) * cell[1], 2 * np.pi * turn, g)
-
-
-def _too_few(k: NDArray[Any], n: NDArray[Any]) -> Array:
+def _too_few(k: NDArray[Any], n: NDArray[Any]) -> NDArray[np.float64]:
     """Largest signed root of the likelihood ratio, by row: k (rows, radii) of n (rows,) came within each."""
     expected = k.sum(axis=0) / n.sum()
     share = k / np.maximum(n, 1)[:, None]
