@@ -29,6 +29,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "encounters.search": ["find_encounters"],
         "encounters.shifting": ["time_shifted"],
         "errors": ["DataError", "DataWarning", "SolverError", "SzlibError", "ZoneError"],
+        "plaza.indifferent": ["indifferent_crowd"],
         "plaza.people": ["make_plaza"],
         "plaza.truth": ["PlazaSettings"],
         "simulation.closed_loop": ["simulate"],

@@ -24,7 +24,7 @@ ROOMS = {
     ],
     "zones": ["ellipses", "hulls", "outliers", "respect", "social_zone"],
     "zones.respect": ["presence", "boundary", "significance"],
-    "plaza": ["truth", "people"],
+    "plaza": ["truth", "people", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
     ],

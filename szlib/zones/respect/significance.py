@@ -23,6 +23,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import xlogy
 
+from ...encounters.kinds import COMPANIONS
 from ...encounters.null import NullEncounters
 from ...errors import DataWarning, ZoneError
 from ...tracks.clock import check_columns
@@ -158,7 +159,7 @@ def _null_radii(null: NullEncounters) -> tuple[float, ...]:
 
 
 def _warn_of_kinds(samples: pd.DataFrame, null: NullEncounters) -> None:
-    """Warn where a kind of encounter was left out on one side only."""
+    """Warn where a kind of encounter was left out on one side only; companions, the null model may lack."""
     if "kind" not in samples or "kind" not in null.encounters:
         return
     data = samples.drop_duplicates("encounter")["kind"].value_counts()
@@ -166,7 +167,7 @@ def _warn_of_kinds(samples: pd.DataFrame, null: NullEncounters) -> None:
     for here, there, name in ((data, model, "the data has"), (model, data, "the null model has")):
         expected = there * here.sum() / max(there.sum(), 1)
         for kind in expected.index[expected > _EXPECTED]:
-            if here.get(kind, 0) == 0:
+            if here.get(kind, 0) == 0 and (here is data or kind != COMPANIONS):
                 warnings.warn(
                     f"{name} no encounter of the kind {kind!r}, {expected[kind]:.0f} were expected; treat "
                     "both alike: szlib.of_kind(samples, kinds) and null.of_kind(kinds)",
