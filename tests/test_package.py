@@ -19,9 +19,12 @@ ROOMS = {
     "tracks": [
         "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
-    "encounters": ["geometry", "kinds", "search", "streaming", "pipeline", "records", "days"],
-    "zones": ["ellipses", "hulls", "outliers", "social_zone"],
-    "plaza": ["truth", "people"],
+    "encounters": [
+        "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
+    ],
+    "zones": ["ellipses", "hulls", "outliers", "respect", "social_zone"],
+    "zones.respect": ["presence", "boundary", "significance"],
+    "plaza": ["truth", "people", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
     ],
@@ -56,7 +59,7 @@ def _order() -> list[str]:
     """Every module, from the ground up."""
     files = list(GROUND)
     for room, names in ROOMS.items():
-        if room == "workbook.figures":
+        if "." in room:
             continue
         for name in names:
             inner = ROOMS.get(f"{room}.{name}")

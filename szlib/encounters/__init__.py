@@ -7,10 +7,23 @@ streaming  of a raw day only the rows near the square
 pipeline   every parameter from the files of a day to its encounters
 records    the stored encounters of a day, and what they were made of
 days       many days, resumable, on one machine or many: `extract_days`
+shifting   the same people, each moved in time alone: `time_shifted`
+null       the null model, encounters where nobody minds anybody: `null_encounters`
 """
 
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["geometry", "kinds", "search", "streaming", "pipeline", "records", "days"]
+    __name__,
+    submodules=[
+        "geometry",
+        "kinds",
+        "search",
+        "streaming",
+        "pipeline",
+        "records",
+        "days",
+        "shifting",
+        "null",
+    ],
 )

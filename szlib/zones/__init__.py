@@ -3,11 +3,12 @@
 ellipses     ellipses, and the smallest one around points or a curve
 hulls        the convex hull over (x', y', speed) and its slices
 outliers     local outlier factor on complementary coordinates: `remove_outliers`
+respect      people against the null model: the contour of half presence, and whether it is respect
 social_zone  all of it behind one name, by speed, saved as JSON: `SocialZone`
 """
 
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["ellipses", "hulls", "outliers", "social_zone"]
+    __name__, submodules=["ellipses", "hulls", "outliers", "respect", "social_zone"]
 )
