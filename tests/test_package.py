@@ -18,7 +18,9 @@ GROUND = ["errors", "parallel"]
 ROOMS = {
     "tracks": ["funnels", "formats", "readers", "clock", "quality", "interop", "datasets"],
     "encounters": ["geometry", "search", "streaming", "pipeline", "records", "days"],
-    "zones": ["ellipses", "hulls", "outliers", "social_zone"],
+    "zones": [
+        "ellipses", "radii", "outliers", "quantile", "hulls", "uncertainty", "zone_file", "social_zone",
+    ],
     "plaza": ["truth", "people"],
     "control": [
         "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",

@@ -58,9 +58,11 @@ def encounter_numbers(samples: pd.DataFrame) -> tuple[NDArray[np.intp], pd.DataF
     Encounters are told apart by `encounter` and, where there is one, `day`; without either, each sample
     counts as one.
     """
-    keys = [name for name in ("day", "encounter") if name in samples and "encounter" in samples]
-    groups = samples.groupby(keys, sort=False, observed=True, dropna=False)
-    number = np.asarray(groups.ngroup() if keys else np.arange(len(samples)), np.intp)
+    number: NDArray[np.intp] = np.arange(len(samples))
+    if "encounter" in samples:
+        keys = [name for name in ("day", "encounter") if name in samples]
+        groups = samples.groupby(keys, sort=False, observed=True, dropna=False)
+        number = np.asarray(groups.ngroup(), np.intp)
     return number, samples.iloc[np.unique(number, return_index=True)[1]]
 
 
