@@ -1,6 +1,6 @@
 """Long studies of the estimators on plazas; each prints its table as CSV, kept in notebooks/tables.
 
-    python tests/zone_studies.py coverage 200 > notebooks/tables/16_coverage.csv        (n plazas; 1 h)
+    python tests/zone_studies.py coverage 200 centred default > notebooks/tables/16_coverage.csv  (n plazas)
     python tests/zone_studies.py errors 5     > notebooks/tables/16_estimators.csv      (n plazas a case)
     python tests/zone_studies.py flat 8       > notebooks/tables/16_sizes.csv           (n plazas pooled)
     python tests/zone_studies.py two_sided 6  > notebooks/tables/16_two_sided.csv       (n plazas a truth)
@@ -28,8 +28,11 @@ from szlib.zones.quantile import smoothed
 from szlib.zones.uncertainty import QUANTITIES
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
-CENTRED = {"slow": Ellipse((0.0, 0.0), (0.88, 0.68)), "fast": Ellipse((0.0, 0.0), (1.0, 0.78))}
-"""The default plaza's zones, as long behind as ahead: what one-sided fits can find."""
+TRUTHS: dict[str, dict[str, Any]] = {
+    "centred": {"slow": Ellipse((0.0, 0.0), (0.88, 0.68)), "fast": Ellipse((0.0, 0.0), (1.0, 0.78))},
+    "default": {},
+}
+"""Truths: the default plaza's is 5 cm longer ahead than behind, which no one-sided fit can tell."""
 CASES: dict[str, dict[str, Any]] = {
     "default": {},
     "2 % intruders": {"intruders": 0.02},
@@ -68,14 +71,14 @@ def error(zone: szlib.SocialZone, known: PlazaSettings) -> float:
     return max(float(np.abs(np.subtract(*pair)).max()) for pair in pairs)
 
 
-def coverage(plazas: int) -> pd.DataFrame:
+def coverage(plazas: int, *truths: str) -> pd.DataFrame:
     """Share of plazas whose interval holds the truth, and the limit, by truth, method, speed, quantity."""
     tables = []
-    for truth, settings in (("centred", CENTRED), ("default", {})):
+    for truth in truths:
         zones: dict[str, list[szlib.SocialZone]] = {"quantile": [], "hull": []}
         everybody = []
         for seed in range(plazas):
-            samples, _, known = people(seed, encounters=600, **settings)
+            samples, _, known = people(seed, encounters=600, **TRUTHS[truth])
             everybody.append(samples)
             for method, found in zones.items():
                 found.append(szlib.SocialZone.fit(samples, method=method, speeds=SPEEDS))
@@ -135,7 +138,7 @@ def flat(plazas: int) -> pd.DataFrame:
 # and over both people, distance of the one to the other's zone.  The zone sought is the one into which, in
 # every direction and speed band in which pairs are nearest to a zone at all, a share q of pairs enter.
 
-TRUTHS = {0.1: (0.68, 0.78), 0.2: (0.74, 0.84), -0.1: (0.68, 0.78)}
+SHIFTED = {0.1: (0.68, 0.78), 0.2: (0.74, 0.84), -0.1: (0.68, 0.78)}
 """Centre ahead [m], and the semi-axes across at 0.5 and 1.5 m/s [m] (+0.2 m: rounder, else not convex)."""
 _Q, _SECTOR, _ROUNDS, _DAMPED = 0.05, np.radians(10), 40, 0.3
 _BANDS, _AROUND = (0.6, 0.8, 1.0, 1.2, 1.4), np.radians(np.arange(-180, 180, 10))
@@ -145,7 +148,7 @@ _TOUCHED = 0.4  # of the pairs in the fullest sector: directions with fewer are 
 def two_sided(plazas: int) -> pd.DataFrame:
     """What one- and two-sided fits make of a zone shifted ahead, from two starts."""
     rows = []
-    for ahead, (slow, fast) in TRUTHS.items():
+    for ahead, (slow, fast) in SHIFTED.items():
         settings = {"slow": Ellipse((ahead, 0), (0.88, slow)), "fast": Ellipse((ahead, 0), (1.0, fast))}
         for seed in range(plazas):
             samples, tracks, known = people(seed, **settings)
@@ -234,5 +237,5 @@ def _ellipse(row: np.ndarray) -> Ellipse:
 if __name__ == "__main__":
     warnings.simplefilter("ignore", szlib.DataWarning)
     studies = {"coverage": coverage, "errors": errors, "flat": flat, "two_sided": two_sided}
-    table = studies[sys.argv[1]](int(sys.argv[2]))
+    table = studies[sys.argv[1]](int(sys.argv[2]), *sys.argv[3:])
     sys.stdout.write(table.to_csv(index=False, float_format="%.4g", lineterminator="\n"))

@@ -37,19 +37,34 @@ _DEEPEST = 50  # encounters that are left out one by one
 
 @dataclass(frozen=True, eq=False)
 class Approaches:
-    """How near each encounter came, by direction.
+    """Where people were within r_max, on smoothed paths.
 
     Parameters
     ----------
-    nearest : nearest approach of each encounter around each of `DIRECTIONS`, shape (n, 72) [m]; inf where
-        nobody was seen there within r_max.
-    speed : mean speed of the reference pedestrian while the other was within r_max, shape (n,) [m/s].
-    encounters : the first of each one's samples within r_max, n rows.
+    encounter : which of `encounters` each sample belongs to, shape (n,).
+    direction : which of `DIRECTIONS` it is nearest to, shape (n,).
+    distance : of the other person [m], shape (n,).
+    speed : of the reference pedestrian [m/s], shape (n,).
+    encounters : the first of each encounter's samples.
     """
 
-    nearest: Array
+    encounter: NDArray[np.intp]
+    direction: NDArray[np.intp]
+    distance: Array
     speed: Array
     encounters: pd.DataFrame
+
+    def nearest(self, speed: float) -> tuple[NDArray[np.intp], Array]:
+        """The encounters (k,) of a speed [m/s] (+-`BAND`), and how near each came around every direction.
+
+        Nearest approaches (k, 72) [m] are over `SECTOR` directions; inf where nobody was seen.
+        """
+        band = np.abs(self.speed - speed) <= BAND
+        encounters, row = np.unique(self.encounter[band], return_inverse=True)
+        here = np.full((len(encounters), len(DIRECTIONS)), np.inf)
+        np.minimum.at(here, (row, self.direction[band]), self.distance[band])
+        turns = range(-(SECTOR // 2), SECTOR // 2 + 1)
+        return encounters, np.minimum.reduce([np.roll(here, turn, axis=1) for turn in turns])
 
 
 def encounter_numbers(samples: pd.DataFrame) -> tuple[NDArray[np.intp], pd.DataFrame]:
@@ -90,11 +105,11 @@ def smoothed(samples: pd.DataFrame) -> tuple[Array, Array]:
 
 
 def approaches(samples: pd.DataFrame, *, r_max: float) -> Approaches:
-    """Nearest approaches by encounter and direction, within r_max [m].
+    """Approaches within r_max [m] of samples as from `szlib.find_encounters`.
 
     Raises DataError where columns are missing, a value is not finite, or nobody was within r_max.
     """
-    check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
+    check_columns(samples, ["los_angle", "distance", "speed"])
     values = samples[["los_angle", "distance", "speed"]].to_numpy(float)
     if not np.isfinite(values).all():
         row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
@@ -108,15 +123,10 @@ def approaches(samples: pd.DataFrame, *, r_max: float) -> Approaches:
             f"none of {len(samples)} samples is within r_max = {r_max} m (nearest: {distance.min():.2f} m); "
             "are distances in metres?"
         )
-    number, encounters = encounter_numbers(samples[close])
     step = 2 * np.pi / len(DIRECTIONS)
-    column = np.rint((angle[close] - DIRECTIONS[0]) / step).astype(int) % len(DIRECTIONS)
-    here = np.full((len(encounters), len(DIRECTIONS)), np.inf)
-    np.minimum.at(here, (number, column), distance[close])
-    turns = range(-(SECTOR // 2), SECTOR // 2 + 1)
-    nearest = np.minimum.reduce([np.roll(here, turn, axis=1) for turn in turns])
-    speed = np.bincount(number, values[close, 2]) / np.bincount(number)
-    return Approaches(nearest, speed, encounters)
+    direction = np.rint((angle[close] - DIRECTIONS[0]) / step).astype(int) % len(DIRECTIONS)
+    number, encounters = encounter_numbers(samples[close])
+    return Approaches(number, direction, distance[close], values[close, 2], encounters)
 
 
 def quantile_radii(known: Approaches, speed: float, q: float, weights: Array | None = None) -> Array:
@@ -124,9 +134,8 @@ def quantile_radii(known: Approaches, speed: float, q: float, weights: Array | N
 
     `weights` (k, n) weigh the encounters, each row giving one line of radii; None: one line, all alike.
     """
-    band = np.abs(known.speed - speed) <= BAND
-    nearest = known.nearest[band]
-    weights = np.ones((1, len(nearest))) if weights is None else weights[:, band]
+    who, nearest = known.nearest(speed)
+    weights = np.ones((1, len(who))) if weights is None else weights[:, who]
     radii = np.full((len(weights), len(DIRECTIONS)), np.nan)
     order = np.argsort(nearest, axis=0, kind="stable")
     for d, seen in enumerate(np.isfinite(nearest).sum(axis=0)):
@@ -190,10 +199,10 @@ class QuantileZones:
 
     def without_each(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
         """The encounters that enter the zones most (k,), and the ellipses (k, s, 5) without each of them."""
-        depth = np.zeros(len(self.known.speed))
+        depth = np.zeros(len(self.encounters))
         for speed in speeds:
-            inside = self.known.nearest <= quantile_radii(self.known, speed, self.q)[0]
-            depth += inside.sum(axis=1) * (np.abs(self.known.speed - speed) <= BAND)
+            who, nearest = self.known.nearest(speed)
+            depth[who] += (nearest <= quantile_radii(self.known, speed, self.q)[0]).sum(axis=1)
         deepest = np.argsort(-depth, kind="stable")[:_DEEPEST]
         weights = np.ones((len(deepest), len(depth)))
         weights[np.arange(len(deepest)), deepest] = 0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,17 @@ from .. import __version__
 from ..errors import ZoneError
 from .ellipses import Ellipse
 from .radii import Radii
-from .uncertainty import Uncertainty
+from .uncertainty import SECTORS, Uncertainty
 
 FORMAT, VERSION = "szlib.SocialZone", 2
 UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
 
-_TABLES = ("intervals", "bands", "influence")
+_TABLES = {
+    "intervals": ("speed", "quantity", "low", "high"),
+    "bands": ("speed", "direction", "low", "high"),
+    "influence": ("speed", "encounter", "metres"),
+}
+_SEEN = ("speed", "encounters", *SECTORS)
 
 
 def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
@@ -96,7 +101,7 @@ def zone_fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "provenance": dict(content["provenance"]),
         "method": str(content["method"]),
         "radii": None if radii is None else Radii(**{k: np.array(v, float) for k, v in radii.items()}),
-        "seen": None if seen is None else pd.DataFrame(seen).astype({"speed": float}),
+        "seen": None if seen is None else _table(seen, _SEEN),
         "uncertainty": None if uncertainty is None else _uncertainty(uncertainty),
     }
 
@@ -107,11 +112,14 @@ def _record(uncertainty: Uncertainty) -> dict[str, Any]:
 
 
 def _uncertainty(record: Mapping[str, Any]) -> Uncertainty:
-    fields = {**record, **{name: pd.DataFrame(record[name]) for name in _TABLES}}
-    for name in _TABLES:
-        numbers = [column for column in fields[name] if column not in ("quantity", "encounter")]
-        fields[name] = fields[name].astype(dict.fromkeys(numbers, float))
-    return Uncertainty(**fields)
+    tables = {name: _table(record[name], columns) for name, columns in _TABLES.items()}
+    return Uncertainty(**{**record, **tables})
+
+
+def _table(content: Mapping[str, Any], columns: Sequence[str]) -> pd.DataFrame:
+    table = pd.DataFrame({name: content[name] for name in columns})
+    numbers = [name for name in columns if name in ("speed", "direction", "low", "high", "metres")]
+    return table.astype(dict.fromkeys(numbers, float))
 
 
 def _columns(table: pd.DataFrame) -> dict[str, list[Any]]:
