@@ -16,12 +16,18 @@ import szlib
 PACKAGE = Path(szlib.__file__).parent
 GROUND = ["errors", "parallel"]
 ROOMS = {
-    "tracks": ["funnels", "formats", "readers", "clock", "quality", "interop", "datasets"],
-    "encounters": ["geometry", "search", "streaming", "pipeline", "records", "days"],
-    "zones": [
-        "ellipses", "radii", "outliers", "quantile", "hulls", "uncertainty", "zone_file", "social_zone",
+    "tracks": [
+        "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
-    "plaza": ["truth", "people"],
+    "encounters": [
+        "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
+    ],
+    "zones": [
+        "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
+        "social_zone",
+    ],
+    "zones.respect": ["presence", "boundary", "significance", "estimate"],
+    "plaza": ["truth", "people", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
     ],
@@ -56,7 +62,7 @@ def _order() -> list[str]:
     """Every module, from the ground up."""
     files = list(GROUND)
     for room, names in ROOMS.items():
-        if room == "workbook.figures":
+        if "." in room:
             continue
         for name in names:
             inner = ROOMS.get(f"{room}.{name}")

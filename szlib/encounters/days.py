@@ -26,7 +26,7 @@ from tqdm import tqdm
 from ..errors import DataError, DataWarning, SzlibError
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.formats import LONGEST_LINE, layout_of
+from ..tracks.formats import LONGEST_LINE, layout_of, start_of_day
 from .pipeline import Chain
 from .records import day_key, finished_record, write_record
 
@@ -104,7 +104,7 @@ def extract_days(
     exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
     progress : whether to show a bar over the days.
     parameters : of `szlib.read_tracks` and `szlib.find_encounters`: square, space, duration, min_distance,
-        min_speed, throughout, file_format, unit, max_gap, tz.
+        min_speed, throughout, file_format, unit, frame_rate, max_gap, tz.
 
     Returns
     -------
@@ -177,7 +177,7 @@ def _day_of(file: Path, chain: Chain) -> str:
         layout = layout_of(first, chain.file_format)
         if layout.name not in ("atc-raw", "atc-1hz"):
             return name
-        begun = float(first.split(layout.separator)[layout.columns["t"]])
+        begun = float(first.split(layout.separator)[layout.columns["t"]]) + start_of_day(file, layout, first)
         return datetime.fromtimestamp(begun, ZoneInfo(chain.tz)).strftime("%Y-%m-%d")
     except (OSError, EOFError, zlib.error, ValueError, OverflowError):  # reading the day will tell why
         return name

@@ -20,7 +20,7 @@ from ..errors import DataError
 from ..tracks import funnels
 from .pipeline import Chain
 
-_FORMAT, _VERSION = "szlib.extraction", 1
+_FORMAT, _VERSION = "szlib.extraction", 2
 
 _BLOCK = 1 << 20
 """Bytes of a file whose checksum is taken at a time."""

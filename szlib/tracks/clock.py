@@ -47,6 +47,7 @@ def read_tracks(
     *,
     file_format: str | None = None,
     unit: str | None = None,
+    frame_rate: float | None = None,
     max_gap: float | None = None,
     tz: str = "Asia/Tokyo",
     exclude: Iterable[str] = (),
@@ -58,8 +59,11 @@ def read_tracks(
     paths : a file, or several: ATC raw, ATC 1 Hz, EWAP obsmat, tidy CSV or Parquet; plain or .gz.
     file_format : "atc-raw", "atc-1hz", "ewap" or "tidy"; None looks at the content.
     unit : unit of the positions, "m" or "mm"; None takes the format's and checks that it is plausible.
-    max_gap : a longer silence ends a track [s], more than 0.1; None takes the format's (0.5 raw,
-        1.6 at 1 Hz, 0.9 EWAP; tidy: 4 sampling intervals, at least 0.5 and at most 5).
+    frame_rate : frames a second of EWAP files; None determines it from their velocities (the ETH sequence
+        has 15, hotel, zara and students 25), says so in the funnel, warns of any other, and refuses
+        where they do not tell.
+    max_gap : a longer silence ends a track [s], more than 0.1; None takes the format's (0.5 raw, 1.6 at 1 Hz;
+        EWAP: 2.25 sampling intervals, 0.9 for its 0.4; tidy: 4 of them, at least 0.5 and at most 5).
     tz : time zone whose calendar says which day a time stamp belongs to (ATC: Japan).
     exclude : days "YYYY-MM-DD" to leave out, as event days were left out in the paper (sec. 2).
 
@@ -71,7 +75,7 @@ def read_tracks(
     ------
     DataError : names the file and line, what was found, what was expected and what to do.
     """
-    raw = read_raw(paths, file_format=file_format, unit=unit, tz=tz, exclude=exclude)
+    raw = read_raw(paths, file_format=file_format, unit=unit, frame_rate=frame_rate, tz=tz, exclude=exclude)
     return to_clock(raw, max_gap=max_gap)
 
 

@@ -8,14 +8,17 @@ import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import polars as pl
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from ..errors import DataError
+from .frame_rates import frame_clock
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,9 @@ class Format:
     """How a file of tracks is laid out.
 
     `columns` says in which field t, id, x, y (and day) stand, `fields` how many a row has, `metres`
-    and `seconds` what one unit of position and time is, `max_gap` [s] which silence ends a track.
+    and `seconds` what one unit of position and time is, `max_gap` [s] which silence ends a track.  EWAP
+    files count frames: `recognise` says how long one is, and how long a gap.  `start` [s since 1970] is when
+    the clock of a file begins: 0, or midnight where it counts from the start of its day.
     """
 
     name: str
@@ -34,6 +39,7 @@ class Format:
     max_gap: float | None = None
     separator: str = ","
     header: bool = False
+    start: float = 0.0
 
 
 _TIXY = {"t": 0, "id": 1, "x": 2, "y": 3}
@@ -41,8 +47,8 @@ _TIXY = {"t": 0, "id": 1, "x": 2, "y": 3}
 FORMATS = {
     "atc-raw": Format("atc-raw", fields=8, columns=_TIXY, metres=1e-3, max_gap=0.5),
     "atc-1hz": Format("atc-1hz", fields=6, columns=_TIXY, max_gap=1.6),
-    # obsmat counts the frames of a 15 Hz video; its z is the height, its third position is y
-    "ewap": Format("ewap", 8, {"t": 0, "id": 1, "x": 2, "y": 4}, seconds=1 / 15, max_gap=0.9, separator=" "),
+    # obsmat counts frames, of 15 or 25 a second; its z is the height, its third position is y
+    "ewap": Format("ewap", 8, {"t": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}, separator=" "),
     "tidy": Format("tidy", header=True),
 }
 
@@ -52,6 +58,7 @@ EXPECTED = (
 )
 
 LONGEST_LINE = 100_000
+_DAY, _JAPAN = 86_400.0, ZoneInfo("Asia/Tokyo")
 
 
 @contextmanager
@@ -87,8 +94,14 @@ def readable(path: Path, layout: Format) -> Iterator[None]:
         raise DataError(f"{path}: cannot be read as {layout.name} ({error}); {EXPECTED}") from error
 
 
-def recognise(plain: Path, path: Path, name: str | None) -> tuple[Format, pl.LazyFrame]:
-    """Recognise the layout by the first line; a scan gives line, t, id, x, y (, day) and `ragged`."""
+def recognise(
+    plain: Path, path: Path, name: str | None, frame_rate: float | None = None
+) -> tuple[Format, pl.LazyFrame]:
+    """Recognise the layout by the first line; a scan gives line, t, id, x, y (, day) and `ragged`.
+
+    Where frames are counted (EWAP) the layout says how long one is: 1 / `frame_rate`, or as the file's own
+    velocities tell.  Raises DataError where they do not, and for a rate where no frames are counted.
+    """
     with plain.open("rb") as stream:
         head = stream.readline(LONGEST_LINE)
     if head[:4] == b"PAR1":
@@ -108,7 +121,14 @@ def recognise(plain: Path, path: Path, name: str | None) -> tuple[Format, pl.Laz
             raise DataError(f"{path}, line 1: {shown!r} names {', '.join(doubled)} twice; rename one of them")
         columns = {column: names.index(column) for column in (*_TIXY, "day") if column in names}
         layout = Format("tidy", len(names), columns, header=True)
-    return layout, _scan_lines(plain, layout) if layout.separator == " " else _scan_csv(plain, layout)
+    if frame_rate is not None and layout.name != "ewap":
+        raise DataError(f"{path}: is {layout.name}, whose times are in seconds; leave frame_rate out")
+    if layout.name != "ewap":
+        layout = replace(layout, start=start_of_day(path, layout, first))
+        return layout, _scan_csv(plain, layout)
+    rows = _scan_lines(plain, layout).collect()
+    second, gap = frame_clock(rows, path, frame_rate)
+    return replace(layout, seconds=second, max_gap=gap), rows.lazy()
 
 
 def layout_of(first: str, name: str | None) -> Format:
@@ -118,6 +138,21 @@ def layout_of(first: str, name: str | None) -> Format:
         if name
         else next(filter(lambda f: _looks_like(first, f), FORMATS.values()), FORMATS["tidy"])
     )
+
+
+def start_of_day(path: Path, layout: Format, first: str) -> float:
+    """When the clock of a file begins [s since 1970]: 0, or midnight of the day in the file's name.
+
+    The ATC days of LaCE-LHMP, ``MMDD.csv`` of 2012, may count from the start of the day, in Japan.
+    """
+    if layout.name != "atc-1hz":
+        return 0.0
+    try:
+        day = datetime.strptime(f"2012{path.name.split('.')[0]}", "%Y%m%d").replace(tzinfo=_JAPAN)
+        since = float(first.split(layout.separator)[layout.columns["t"]])
+    except ValueError:  # named otherwise, or the first row is damaged
+        return 0.0
+    return day.timestamp() if 0 <= since < _DAY else 0.0
 
 
 def _looks_like(first: str, layout: Format) -> bool:
@@ -148,6 +183,8 @@ def _scan_csv(plain: Path, layout: Format) -> pl.LazyFrame:
     named = {name: pl.col(f"f{index}") for name, index in layout.columns.items()}
     if "day" in named:
         named["day"] = named["day"].str.strip_chars(' "')
+    if layout.start:
+        named["t"] = named["t"] + layout.start
     return scan.select("line", ragged=ragged, **named)
 
 

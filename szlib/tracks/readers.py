@@ -34,13 +34,15 @@ def read_raw(
     *,
     file_format: str | None = None,
     unit: str | None = None,
+    frame_rate: float | None = None,
     tz: str = "Asia/Tokyo",
     exclude: Iterable[str] = (),
 ) -> pd.DataFrame:
     """Read files as they are: day, id, t [s], x, y [m], sorted, without duplicates.
 
     Parameters and errors are those of `szlib.read_tracks`.  ``.attrs["max_gap"]`` keeps the format's
-    longest gap [s] for `to_clock`, ``.attrs["funnel"]`` counts every row.
+    longest gap [s] for `to_clock`, ``.attrs["funnel"]`` counts every row, and says at how many frames a
+    second an EWAP file was read.
     """
     files = [Path(paths)] if isinstance(paths, str | Path) else [Path(p) for p in paths]
     excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
@@ -50,7 +52,9 @@ def read_raw(
         raise DataError(f"unit must be 'm' or 'mm'; got {unit!r}")
     if file_format is not None and file_format not in FORMATS:
         raise DataError(f"unknown file_format {file_format!r}; expected one of {list(FORMATS)}")
-    parts, stages, layouts = zip(*(_read_file(file, file_format, unit, tz) for file in files), strict=True)
+    parts, stages, layouts = zip(
+        *(_read_file(file, file_format, unit, frame_rate, tz) for file in files), strict=True
+    )
     _check_sequences([_stem(f) for f, layout in zip(files, layouts, strict=True) if layout.name == "ewap"])
     return merge(parts, stages, layouts, excluded)
 
@@ -85,7 +89,7 @@ def merge(
 
 
 def _read_file(
-    path: Path, name: str | None, unit: str | None, tz: str
+    path: Path, name: str | None, unit: str | None, frame_rate: float | None, tz: str
 ) -> tuple[pl.DataFrame, dict[str, Any], Format]:
     """One file: its usable rows (day, id, t, x, y), its funnel stage, its layout."""
     if not path.is_file():
@@ -93,7 +97,7 @@ def _read_file(
             f"{path}: " + ("is a folder; pass the files in it" if path.is_dir() else "no such file")
         )
     with plain_file(path) as plain:
-        layout, scan = recognise(plain, path, name)
+        layout, scan = recognise(plain, path, name, frame_rate)
         with readable(path, layout):
             rows = scan.collect()
     metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
@@ -124,7 +128,8 @@ def read_stage(
         raise DataError(f"{path}: holds no row; {EXPECTED}")
     if first:
         _warn(f"{path.name}, first at line {first[0]}", reasons)
-    return funnels.stage(f"read {path.name}", good + bad, good, reasons)
+    rate = f" at {1 / layout.seconds:g} frames/s" if layout.name == "ewap" else ""
+    return funnels.stage(f"read {path.name}{rate}", good + bad, good, reasons)
 
 
 def in_metres(good: pl.DataFrame, path: Path, layout: Format, metres: float, tz: str) -> pl.DataFrame:

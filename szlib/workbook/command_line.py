@@ -126,7 +126,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="execute the notebooks, headless, and check their results")
     run.add_argument(
         "--data", nargs="+", default=["synthetic"], metavar="DATA",
-        help="synthetic (default), atc-1hz, or files, folders or globs of tracks",
+        help="synthetic (default), atc-1hz, atc-10-days, or files, folders or globs of tracks",
     )  # fmt: skip
     run.add_argument("--out", default="results", metavar="FOLDER", help="where results go (default: results)")
     run.add_argument(

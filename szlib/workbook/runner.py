@@ -68,7 +68,7 @@ def run(
     results = Path(out).resolve()
     home = results / datasets.label(data)
     files = data_files(data, folder=home, seed=seed)
-    if data not in (datasets.SYNTHETIC, datasets.ATC_1HZ):
+    if data not in datasets.NAMES:
         data = [str(file.resolve()) for file in files]
     given |= {"data": data, "results": str(results)}
     (home / "records").mkdir(parents=True, exist_ok=True)

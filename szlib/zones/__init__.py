@@ -5,6 +5,7 @@ radii        a zone told by direction, and the ellipse fitted to it
 outliers     local outlier factor on complementary coordinates: `remove_outliers`
 quantile     where all but a share of encounters keep out
 hulls        the convex hull over (x', y', speed), its slices, and its way to zones
+respect      people against the null model: the contour of half presence, and whether it is respect
 uncertainty  who was seen on which side; intervals from other draws of the same people
 zone_file    versioned JSON
 social_zone  all of it behind one name, by speed, saved as JSON: `SocialZone`
@@ -20,6 +21,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "outliers",
         "quantile",
         "hulls",
+        "respect",
         "uncertainty",
         "zone_file",
         "social_zone",

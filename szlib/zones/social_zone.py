@@ -21,6 +21,7 @@ import numpy as np
 import pandas as pd
 
 from .. import __version__
+from ..encounters.null import NullEncounters
 from ..errors import DataWarning, ZoneError
 from ..tracks.clock import check_columns
 from .ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
@@ -28,6 +29,8 @@ from .hulls import HullZones, Slice, hull_vertices, slice_hull
 from .outliers import R_MAX
 from .quantile import QuantileZones
 from .radii import Radii
+from .respect.estimate import RespectZones
+from .respect.significance import NullTest, null_test
 from .uncertainty import (
     QUANTITIES,
     RESAMPLES,
@@ -45,6 +48,7 @@ SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 METHODS: dict[str, tuple[Callable[..., Estimate], tuple[str, ...]]] = {
     "hull": (HullZones.of, ("outlier_fraction", "neighbours", "speed_scale")),
     "quantile": (QuantileZones.of, ("q",)),
+    "respect": (RespectZones.of, ("speed_width",)),
 }
 """Ways to a zone, and the keywords of `SocialZone.fit` that belong to each."""
 
@@ -64,6 +68,7 @@ class SocialZone:
     radii : by speed and direction, of a zone that is not a hull's.
     seen : encounters by speed and side (see `szlib.zones.uncertainty.count_seen`); None: not known.
     uncertainty : intervals; None: not known.
+    null_test : whether it is respect at all; None: not tested.
 
     Raises
     ------
@@ -79,6 +84,7 @@ class SocialZone:
     radii: Radii | None = None
     seen: pd.DataFrame | None = None
     uncertainty: Uncertainty | None = None
+    null_test: NullTest | None = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -102,6 +108,8 @@ class SocialZone:
         neighbours: int | None = None,
         speed_scale: float | None = None,
         q: float | None = None,
+        null: NullEncounters | None = None,
+        speed_width: float | None = None,
         resamples: int = RESAMPLES,
         seed: int = 0,
     ) -> SocialZone:
@@ -111,11 +119,14 @@ class SocialZone:
         ----------
         samples : a table with los_angle [rad], distance [m], speed [m/s], encounter; with ref_id and
             other_id people are drawn anew, not encounters; with t paths can be smoothed.
-        method : "hull" or "quantile".
+        method : "hull", "quantile" or "respect".
         r_max : distance within which people count [m].
         speeds : whose zones are fitted [m/s].
         outlier_fraction, neighbours, speed_scale : of the hull, as in `szlib.remove_outliers`.
         q : of the quantile, the share of encounters that may enter (0.05).
+        speed_width : of respect, over how wide a range speeds are taken together (0.2) [m/s]; inf: all.
+        null : the null model, from `szlib.null_encounters`, that respect needs, and that a zone of any
+            method is tested against (`null_test`).
         resamples : zones estimated anew for the intervals; 0: no intervals.
         seed : of the resampling.
 
@@ -131,12 +142,15 @@ class SocialZone:
             "neighbours": neighbours,
             "speed_scale": speed_scale,
             "q": q,
+            "speed_width": speed_width,
         }
         options = _options_of(method, given)
         check_columns(samples, ["los_angle", "distance", "speed"])
         asked = sorted({float(speed) for speed in speeds})
         if not asked:
             raise ZoneError("no speed has a zone: none was asked for")
+        if method == "respect":
+            options["null"] = null
         estimate = METHODS[method][0](samples, r_max=r_max, **options)
         provenance = {
             "szlib": __version__,
@@ -154,7 +168,8 @@ class SocialZone:
                 undefined[speed] = str(error)
         if not ellipses:
             raise ZoneError(f"no speed has a zone: {'; '.join(undefined.values())}")
-        zone = replace(zone, ellipses=ellipses, undefined=undefined)
+        tested = None if null is None else null_test(samples, null)
+        zone = replace(zone, ellipses=ellipses, undefined=undefined, null_test=tested)
         if "encounter" in samples:
             zone = replace(zone, seen=count_seen(samples, asked, r_max=r_max))
             if resamples:

@@ -19,6 +19,7 @@ from .. import __version__
 from ..errors import ZoneError
 from .ellipses import Ellipse
 from .radii import Radii
+from .respect.significance import NullTest
 from .uncertainty import SECTORS, Uncertainty
 
 FORMAT, VERSION = "szlib.SocialZone", 2
@@ -49,6 +50,7 @@ def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
         "provenance": fields["provenance"],
         "seen": None if seen is None else _columns(seen),
         "uncertainty": None if uncertainty is None else _record(uncertainty),
+        "null_test": None if fields["null_test"] is None else fields["null_test"].record(),
         "radii": None if radii is None else {name: _plain(value) for name, value in vars(radii).items()},
         "hull_vertices": None if fields["vertices"] is None else fields["vertices"].tolist(),
     }
@@ -83,7 +85,8 @@ def read_zone(path: Path) -> dict[str, Any]:
             f"1 to {VERSION}; install a newer szlib or fit the zone again"
         )
     if content["version"] == 1:
-        content = {"method": "hull", "seen": None, "uncertainty": None, "radii": None, **content}
+        unknown = dict.fromkeys(("seen", "uncertainty", "null_test", "radii"))
+        content = {"method": "hull", **unknown, **content}
     return content
 
 
@@ -103,6 +106,7 @@ def zone_fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "radii": None if radii is None else Radii(**{k: np.array(v, float) for k, v in radii.items()}),
         "seen": None if seen is None else _table(seen, _SEEN),
         "uncertainty": None if uncertainty is None else _uncertainty(uncertainty),
+        "null_test": None if content["null_test"] is None else NullTest.from_record(content["null_test"]),
     }
 
 
