@@ -22,8 +22,11 @@ ROOMS = {
     "encounters": [
         "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
     ],
-    "zones": ["ellipses", "hulls", "outliers", "respect", "social_zone"],
-    "zones.respect": ["presence", "boundary", "significance"],
+    "zones": [
+        "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
+        "social_zone",
+    ],
+    "zones.respect": ["presence", "boundary", "significance", "estimate"],
     "plaza": ["truth", "people", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
