@@ -158,12 +158,12 @@ def _interval(zone: SocialZone, speed: float, quantity: str) -> tuple[float, flo
     table = zone.table().set_index("speed")
     if speed not in table.index or zone.uncertainty is None:
         raise ZoneError(f"no interval at {speed:g} m/s; fit with speeds that hold it, and with resamples > 0")
-    row = table.loc[speed]
-    return float(row[quantity]), float(row[f"{quantity}_low"]), float(row[f"{quantity}_high"])
+    value, low, high = (table[f"{quantity}{end}"].to_dict()[speed] for end in ("", "_low", "_high"))
+    return float(value), float(low), float(high)
 
 
 def _encounters(zone: SocialZone, speed: float) -> int:
-    return 0 if zone.seen is None else int(zone.seen.set_index("speed").loc[speed, "encounters"])
+    return 0 if zone.seen is None else int(zone.seen.set_index("speed")["encounters"].to_dict()[speed])
 
 
 def _share(claim: str, hits: int, of: int) -> Finding:

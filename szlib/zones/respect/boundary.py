@@ -31,6 +31,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.special import expit, logit
+from threadpoolctl import threadpool_limits
 
 from ...encounters.null import NullEncounters
 from ...errors import ZoneError
@@ -154,7 +155,8 @@ def _fit(real: Array, null: Array, r_max: float) -> Respect:
     bounds = [(-r_max / 4, 5 * r_max / 4)] + [(-1.0, 1.0)] * (size - 1)
     bounds += [tuple(np.log(np.multiply(_SOFT, r_max))), (-_CARELESS, _CARELESS)]
     begins = [np.r_[share * r_max, np.zeros(size - 1), np.log(0.05 * r_max), -4.0] for share in _STARTS]
-    tries = [minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds) for begin in begins]
+    with threadpool_limits(limits=1):  # many small products: on several threads they take ten times as long
+        tries = [minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds) for begin in begins]
     p = min(tries, key=lambda found: float(found.fun)).x
     return Respect(np.asarray(p[:size]), float(np.exp(p[size])), float(expit(p[size + 1])), r_max)
 
