@@ -27,7 +27,7 @@ ROOMS = {
         "social_zone",
     ],
     "zones.respect": ["presence", "boundary", "significance", "estimate"],
-    "plaza": ["truth", "people", "indifferent"],
+    "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
     ],

@@ -433,6 +433,7 @@ def test_a_quantile_has_no_hull_and_ends_at_its_speeds(samples: pd.DataFrame) ->
 # --- what is not adequate ----------------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore:6 encounters are too few to tell an outlier")
 def test_six_encounters_are_no_zone_to_rely_on(samples: pd.DataFrame, tmp_path: Path) -> None:
     six = samples[samples["encounter"] < 6]
     for method in ("hull", "quantile"):
