@@ -2,7 +2,7 @@
 
 ellipses     ellipses, and the smallest one around points or a curve
 hulls        the convex hull over (x', y', speed) and its slices
-outliers     local outlier factor on complementary coordinates: `remove_outliers`
+outliers     encounters, or samples, that lie apart (local outlier factor): `remove_outliers`
 social_zone  all of it behind one name, by speed, saved as JSON: `SocialZone`
 """
 

@@ -23,7 +23,7 @@ from ..tracks import funnels
 from ..tracks.clock import check_columns
 from .ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
 from .hulls import Slice, hull_vertices, slice_hull
-from .outliers import FRACTION, NEIGHBOURS, R_MAX, complementary_points, remove_outliers
+from .outliers import R_MAX, complementary_points, remove_outliers
 
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Speeds of the reference pedestrian whose zones are fitted [m/s] (assumed; the paper shows a range)."""
@@ -65,14 +65,15 @@ class SocialZone:
         samples: pd.DataFrame,
         *,
         r_max: float = R_MAX,
-        outlier_fraction: float = FRACTION,
+        outlier_fraction: float | None = None,
         speeds: Iterable[float] = SPEEDS,
-        neighbours: int = NEIGHBOURS,
+        neighbours: int | None = None,
         speed_scale: float | None = None,
     ) -> SocialZone:
         """Fit the zones to samples as from `szlib.find_encounters`.
 
-        Parameters are those of `szlib.remove_outliers`, and `speeds` [m/s] are the slices to fit.
+        Parameters are those of `szlib.remove_outliers` (`outlier_fraction=0.002` is the paper's way, None
+        judges whole encounters), and `speeds` [m/s] are the slices to fit.
         A speed without a zone gives a DataWarning and is kept in `undefined`.
 
         Raises
@@ -105,8 +106,8 @@ class SocialZone:
             "encounters": int(samples["encounter"].nunique()) if "encounter" in samples else None,
             "parameters": {
                 "r_max": float(r_max),
-                "outlier_fraction": float(outlier_fraction),
-                "neighbours": int(neighbours),
+                "outlier_fraction": None if outlier_fraction is None else float(outlier_fraction),
+                "neighbours": None if neighbours is None else int(neighbours),
                 "speed_scale": None if speed_scale is None else float(speed_scale),
             },
             "funnel": [*funnels.of(inliers), funnels.stage("hull", len(points), len(vertices), inside)],
