@@ -34,7 +34,7 @@ ROOMS = {
     "simulation": [
         "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
     ],
-    "workbook": ["figures", "record", "runner", "command_line"],
+    "workbook": ["figures", "claims", "sensitivity", "record", "runner", "command_line"],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation",
     ],

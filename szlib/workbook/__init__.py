@@ -1,6 +1,8 @@
 """How is it presented: figures, the records of notebooks, their headless execution, the command line.
 
 figures       every figure, one file a room
+claims        what data says of the paper's claims: effects, intervals, verdicts
+sensitivity   what moves a zone most
 record        what a notebook records: checks, claims, figures, artefacts
 runner        the notebooks executed by papermill
 command_line  `szlib run | inspect | extract`
@@ -9,5 +11,5 @@ command_line  `szlib run | inspect | extract`
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["figures", "record", "runner", "command_line"]
+    __name__, submodules=["figures", "claims", "sensitivity", "record", "runner", "command_line"]
 )

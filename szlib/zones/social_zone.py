@@ -31,15 +31,7 @@ from .quantile import QuantileZones
 from .radii import Radii
 from .respect.estimate import RespectZones
 from .respect.significance import NullTest, null_test
-from .uncertainty import (
-    QUANTITIES,
-    RESAMPLES,
-    Estimate,
-    Uncertainty,
-    count_seen,
-    measure,
-    missing_sides,
-)
+from .uncertainty import QUANTITIES, RESAMPLES, Estimate, Uncertainty, count_seen, measure, missing_sides
 from .zone_file import read_zone, write_zone, zone_fields
 
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)

@@ -122,7 +122,7 @@ def test_no_rate_where_no_frames_are_counted(tmp_path: Path) -> None:
 def test_every_way_to_a_file_knows_its_clock(tmp_path: Path) -> None:
     file = ewap(tmp_path, rate=25)
     assert np.median(quality.frame_intervals(file)) == pytest.approx(0.4)
-    assert quality.people(file).eval("ended - begun").to_numpy() == pytest.approx(29 * 0.4)
+    assert quality.people(file).eval("last_seen - first_seen").to_numpy() == pytest.approx(29 * 0.4)
     square = szlib.Square(x=(-50, 50), y=(-50, 50))
     given = {"square": square, "min_distance": 0.0}
     whole = szlib.find_encounters(szlib.read_tracks(file), **given)

@@ -1,4 +1,4 @@
-"""Figures of zones: outliers, the hull and its slices, ellipses by speed."""
+"""Figures of zones: outliers, the hull and its slices, ellipses by speed, respect, what moves a zone."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ from scipy.spatial import ConvexHull
 
 from ...errors import DataWarning, ZoneError
 from ...zones.ellipses import Ellipse
+from ...zones.respect.presence import PairCorrelation
 from ...zones.social_zone import SocialZone
-from .style import BLACK, BLUE, GREY, ORANGE, RED, axes, colours, metres
+from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, axes, colours, metres
 
 
 def plot_outliers(
@@ -115,6 +116,92 @@ def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None =
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     bands = " and their 95 % intervals" if getattr(zones, "uncertainty", None) else ""
     return metres(ax, f"Minimum social zones by speed{bands}", person=True)
+
+
+def plot_pair_correlation(
+    correlation: PairCorrelation, *, radius: float | None = None, ax: Axes | None = None
+) -> Axes:
+    """How often people were where, over how often the null model was; `radius` [m] of the respect zone."""
+    ax = axes(ax, size=(6, 4.8))
+    turn = np.r_[correlation.direction, correlation.direction[0] + 2 * np.pi]
+    g = np.vstack([correlation.g, correlation.g[:1]])
+    x, y = (correlation.distance * part(turn)[:, None] for part in (np.cos, np.sin))
+    image = ax.pcolormesh(x, y, g, cmap="PuOr", vmin=0, vmax=2, shading="gouraud", rasterized=True)
+    ax.figure.colorbar(image, ax=ax, label="g: as often as nobody minds = 1")
+    ax.contour(x, y, np.nan_to_num(g, nan=1.0), levels=[0.5], colors=[BLACK], linewidths=1.5)
+    ax.plot([], [], color=BLACK, linewidth=1.5, label="g = 1/2")
+    if radius is not None:
+        circle = Circle((0, 0), radius, fill=False, linestyle="--", color=BLUE, linewidth=2)
+        ax.add_patch(circle)
+        ax.plot([], [], "--", color=BLUE, label=f"all bearings: {radius:.2f} m")
+    ax.plot(0, 0, marker=(3, 0, -90), color=RED, markersize=10)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, fontsize=8)
+    return metres(ax, person=True)
+
+
+def plot_by_number(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes | None = None) -> Axes:
+    """Sizes of zones by the number of encounters, with bands; `columns`: name in `table` -> label.
+
+    `table` has encounters, and for each name its mean, <name>_low and <name>_high [m].
+    """
+    ax = axes(ax, size=(6, 4))
+    styles = zip(("-", "--", ":", "-."), ("o", "s", "^", "D"), (RED, BLUE, GREY, GREEN), strict=True)
+    for (name, label), (line, marker, colour) in zip(columns.items(), styles, strict=False):
+        n = table["encounters"]
+        ax.fill_between(n, table[f"{name}_low"], table[f"{name}_high"], color=colour, alpha=0.18, linewidth=0)
+        ax.plot(n, table[name], line, marker=marker, color=colour, markersize=4, label=label)
+    ax.set(xscale="log", xlabel="encounters", ylabel="size of the zone [m]", ylim=(0, None))
+    ax.legend(fontsize=8)
+    return ax
+
+
+def plot_tornado(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+    """How far each parameter moves the zone's area; `table` as from `workbook.sensitivity.sensitivity`."""
+    ax = axes(ax, size=(8, 4.5))
+    usual = float(table["area"].iloc[0])
+    varied = table.iloc[1:].dropna(subset=["area"])
+    spans = varied.groupby("parameter", sort=False)["area"].agg(
+        low=lambda v: min(v.min(), usual), high=lambda v: max(v.max(), usual)
+    )
+    spans = spans.loc[(spans["high"] - spans["low"]).sort_values().index]
+    at = np.arange(len(spans))
+    ax.barh(at, spans["high"] - spans["low"], left=spans["low"], color=BLUE, alpha=0.35, height=0.6)
+    row = dict(zip(spans.index, at.tolist(), strict=True))
+    for name, value, area in varied[["parameter", "value", "area"]].itertuples(index=False):
+        ax.plot(area, row[name], "o", color=BLUE, markersize=4)
+        ax.annotate(
+            str(value), (area, row[name]), (0, 6), textcoords="offset points", ha="center", fontsize=7
+        )
+    ax.axvline(usual, color=BLACK, linewidth=1.2, label=f"defaults: {usual:.2f} m$^2$")
+    ax.set_yticks(at, list(spans.index))
+    ax.set(xlabel="area of the zone [m$^2$]", ylim=(-0.6, len(spans) - 0.2))
+    ax.legend(loc="lower right", fontsize=8)
+    return ax
+
+
+def plot_findings(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+    """Effects with their intervals, one row a finding; `table` as from `workbook.claims.findings_table`.
+
+    Each is shown as a share of its own largest end, so that metres and shares stand side by side.
+    """
+    ax = axes(ax, size=(9, 0.45 * len(table) + 1.2))
+    styles = {"supported": (GREEN, "o"), "contradicted": (RED, "X"), "not": (GREY, "s")}
+    for at, (effect, low, high, verdict) in enumerate(
+        table[["effect", "low", "high", "verdict"]].itertuples(index=False)
+    ):
+        scale = max(abs(low), abs(high), 1e-9)
+        colour, marker = styles[verdict.split()[0]]
+        ax.hlines(at, low / scale, high / scale, color=colour, linewidth=2)
+        ax.plot(effect / scale, at, marker, color=colour)
+    ax.axvline(0, color=BLACK, linewidth=1)
+    names = table["claim"] + (" (" + table["method"] + ")" if "method" in table else "")
+    ax.set_yticks(range(len(table)), list(names), fontsize=8)
+    ax.invert_yaxis()
+    for name, (colour, marker) in styles.items():
+        ax.plot([], [], marker, color=colour, label="not decidable" if name == "not" else name)
+    ax.set(xlabel="against the paper < 0 < as the paper says (each scaled to its interval)", xlim=(-1.1, 1.1))
+    ax.legend(loc="upper center", bbox_to_anchor=(0.3, -0.15), ncols=3, fontsize=8)
+    return ax
 
 
 def _ellipse(zone: SocialZone, speed: float) -> Ellipse:
