@@ -23,7 +23,7 @@ is an extreme, and 0 where people are not kept out: f of 1/2 or more, or no edge
 
 Of few people nobody can tell the shape, so it is held back towards the round: the log likelihood is less by
 30 (q1^2 + ... + q4^2), nothing to ten thousands of samples.  (Measured on 72 encounters of Grand Central,
-drawn 30 times: the radius ahead scatters by 0.20 m about 0.86 m, without it by 0.31 m; all 4,176 give 0.86 m.)
+drawn 30 times: the radius ahead scatters by 0.20 m about 0.86 m, without it by 0.31 m; all 4,176 give it.)
 """
 
 from __future__ import annotations
