@@ -25,7 +25,7 @@ SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
 )
 """Values of `szlib.find_encounters`, beside its defaults."""
 FIT: Mapping[str, Sequence[Any]] = MappingProxyType(
-    {"r_max": (1.5, 2.5), "outlier_fraction": (0.0, 0.01), "neighbours": (20, 500)}
+    {"r_max": (1.5, 2.5), "outlier_fraction": (0.0, 0.002, 0.01), "neighbours": (10, 50)}
 )
 """Values of `szlib.SocialZone.fit`, beside its defaults."""
 SPEEDS = (0.9, 1.3)
