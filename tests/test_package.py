@@ -22,16 +22,21 @@ ROOMS = {
     "encounters": [
         "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
     ],
-    "zones": ["ellipses", "hulls", "outliers", "respect", "social_zone"],
-    "zones.respect": ["presence", "boundary", "significance"],
-    "plaza": ["truth", "people", "indifferent"],
+    "zones": [
+        "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
+        "social_zone",
+    ],
+    "zones.respect": ["presence", "boundary", "significance", "estimate"],
+    "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
     ],
     "simulation": [
         "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
     ],
-    "workbook": ["figures", "places", "record", "parameters", "runner", "command_line"],
+    "workbook": [
+        "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
+    ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation",
     ],

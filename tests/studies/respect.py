@@ -73,7 +73,8 @@ def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
     null = szlib.null_encounters(tracks, shifts=39, seed=seed, progress=False)
     rows = []
     for name in ("all", "opposite, crossing"):
-        test = szlib.null_test(szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name]))
+        data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
+        test = szlib.null_test(data, against, radii=False)
         told = {"p_value": test.p_value, "encounters": test.encounters, "radius": test.radius}
         rows.append({"bunch": bunch, "kinds": name, "seed": seed, "shifts": null.shifts} | told)
     return rows
@@ -116,7 +117,7 @@ def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
             for name, kinds in SETS.items():
                 data, against = szlib.of_kind(samples, kinds), null.of_kind(kinds)
                 test = szlib.null_test(data, against)
-                bodies = szlib.null_test(data, against, beyond=0.5)
+                bodies = szlib.null_test(data, against, beyond=0.5, radii=False)
                 fit = szlib.fit_respect(data, against)
                 radii = [np.r_[test.radius, fit.radii(theta)], *resampled(data, against, theta)]
                 low, high = np.percentile(radii[1:], [2.5, 97.5], axis=0)

@@ -9,16 +9,21 @@ up to a factor.  Its contour g = 1/2 bounds the zone: emptiness is in N as it is
 respect.  g is fitted, not binned (a contour of bins hangs on the bins, and on luck where samples are few):
 
     g(r, theta) = c(theta) [f + (1 - f) s((r - rho(theta)) / w)],      s(z) = 1 / (1 + exp(-z))
-    rho(theta) = q0 + q1 cos theta + q2 sin theta + q3 cos 2 theta + q4 sin 2 theta
+    rho(theta) = q0 / sqrt(1 + q1 cos theta + q2 sin theta + q3 cos 2 theta + q4 sin 2 theta)
 
-with the plateau c far out, the share f of those who do not care (intruders, companions in step), and the
-softness w of the edge.  Maximum likelihood of each sample's distance, given its direction:
+(an ellipse around the person exactly, one off its centre nearly) with the plateau c far out, the share f of
+those who do not care (intruders, companions in step), and the softness w of the edge.  Maximum likelihood of
+each sample's distance, given its direction:
 
     p(r | theta) = N(r, theta) g(r, theta) / sum over r of N g
 
 so that c cancels: neither the number of encounters nor their mix of directions matters, only how far people
 kept within each.  The contour is where g = c / 2.  It is flat in the number of encounters, since no parameter
 is an extreme, and 0 where people are not kept out: f of 1/2 or more, or no edge.
+
+Of few people nobody can tell the shape, so it is held back towards the round: the log likelihood is less by
+30 (q1^2 + ... + q4^2), nothing to ten thousands of samples.  (Measured on 72 encounters of Grand Central,
+drawn 30 times: the radius ahead scatters by 0.20 m about 0.86 m, without it by 0.31 m; all 4,176 give it.)
 """
 
 from __future__ import annotations
@@ -30,6 +35,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.special import expit, logit
+from threadpoolctl import threadpool_limits
 
 from ...encounters.null import NullEncounters
 from ...errors import ZoneError
@@ -37,11 +43,12 @@ from .presence import Array, Presence
 
 SPEED_WIDTH = 0.2
 """Standard deviation of the Gaussian that weighs samples of other speeds than the one asked for [m/s]."""
-ORDER = 2
-"""Harmonics of rho(theta): an ellipse, off-centre and turned, needs two."""
 
+_WAVES = 4  # cos theta, sin theta, cos 2 theta, sin 2 theta
+_THINNEST = 0.1  # of the sum under the root: no direction reaches farther than 3 q0
+_ROUND = 30.0  # weight of q1^2 + .. + q4^2, in samples
 _STARTS = (0.15, 0.35, 0.55, 0.75)  # of rho, in r_max: the likelihood may have several peaks
-_SOFT = (0.01, 0.15)  # bounds of w, in r_max
+_SOFT = (0.005, 0.15)  # bounds of w, in r_max
 _CARELESS = 6.0  # bound of |logit f|
 
 
@@ -51,7 +58,7 @@ class Respect:
 
     Parameters
     ----------
-    edge : q0 .. q4, coefficients of rho(theta) [m]; q0 alone for all directions together.
+    edge : q0 [m], and q1 .. q4 of rho(theta); q0 alone for all directions together.
     softness : w [m].
     careless : f, the share of those who do not care.
     r_max : the zone ends there at the latest [m].
@@ -71,7 +78,7 @@ class Respect:
         if self.careless >= 0.5:
             return np.zeros(theta.shape)
         half = self.softness * logit((0.5 - self.careless) / (1 - self.careless))
-        return np.asarray(np.clip(_harmonics(theta, len(self.edge)) @ self.edge + half, 0.0, self.r_max))
+        return np.asarray(np.clip(_edge(theta, self.edge)[0] + half, 0.0, self.r_max))
 
 
 def fit_respect(
@@ -132,33 +139,41 @@ def respect_radius(samples: pd.DataFrame | Presence, null: NullEncounters | Pres
 def _fit(real: Array, null: Array, r_max: float) -> Respect:
     """Maximum likelihood of the distances, given the directions; both (directions, distances)."""
     directions, distances = real.shape
-    size = 2 * ORDER + 1 if directions > 1 else 1
-    basis = _harmonics((np.arange(directions) + 0.5) * 2 * np.pi / directions, size)
+    theta = (np.arange(directions) + 0.5) * 2 * np.pi / directions
     r = (np.arange(distances) + 0.5) * r_max / distances
+    size = 1 + (_WAVES if directions > 1 else 0)
     model = null + null.sum(axis=0) / null.sum()  # one sample of any direction: no direction is without
     model /= model.sum(axis=1, keepdims=True)
     seen, n = real.sum(axis=1), real.sum()
 
     def cost(p: Array) -> tuple[float, Array]:
-        rho, w, f = basis @ p[:size], np.exp(p[size]), expit(p[size + 1])
+        (rho, by_q), w, f = _edge(theta, p[:size]), np.exp(p[size]), expit(p[size + 1])
         z = (r - rho[:, None]) / w
         s = expit(z)
         g = f + (1 - f) * s
         total = (model * g).sum(axis=1)
         by_g = seen[:, None] * model / total[:, None] - real / g
         by_z = by_g * (1 - f) * s * (1 - s)
-        slope = [basis.T @ -by_z.sum(axis=1) / w, [-(by_z * z).sum()], [(by_g * (1 - s)).sum() * f * (1 - f)]]
-        return float(seen @ np.log(total) - (real * np.log(g)).sum()) / n, np.concatenate(slope) / n
+        slope = [by_q.T @ -by_z.sum(axis=1) / w, [-(by_z * z).sum()], [(by_g * (1 - s)).sum() * f * (1 - f)]]
+        slope[0][1:] += 2 * _ROUND * p[1:size]
+        likelihood = (real * np.log(g)).sum() - seen @ np.log(total)
+        return float(_ROUND * (p[1:size] ** 2).sum() - likelihood) / n, np.concatenate(slope) / n
 
-    bounds = [(-r_max / 4, 5 * r_max / 4)] + [(-r_max / 2, r_max / 2)] * (size - 1)
+    bounds = [(-r_max / 4, 5 * r_max / 4)] + [(-1.0, 1.0)] * (size - 1)
     bounds += [tuple(np.log(np.multiply(_SOFT, r_max))), (-_CARELESS, _CARELESS)]
     begins = [np.r_[share * r_max, np.zeros(size - 1), np.log(0.05 * r_max), -4.0] for share in _STARTS]
-    tries = [minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds) for begin in begins]
+    with threadpool_limits(limits=1):  # many small products: on several threads they take ten times as long
+        tries = [minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds) for begin in begins]
     p = min(tries, key=lambda found: float(found.fun)).x
     return Respect(np.asarray(p[:size]), float(np.exp(p[size])), float(expit(p[size + 1])), r_max)
 
 
-def _harmonics(theta: Array, size: int) -> Array:
-    """1, cos theta, sin theta, cos 2 theta, ... up to `size` of them; shape (..., size)."""
-    waves = [wave(k * theta) for k in range(1, size // 2 + 1) for wave in (np.cos, np.sin)]
-    return np.stack([np.ones_like(theta), *waves], axis=-1)
+def _edge(theta: Array, q: Array) -> tuple[Array, Array]:
+    """rho(theta) (...) [m], and its derivatives by q (..., len(q))."""
+    turns = [wave(k * theta) for k in range(1, (len(q) - 1) // 2 + 1) for wave in (np.cos, np.sin)]
+    waves = np.stack([np.zeros_like(theta), *turns], axis=-1)
+    under = 1 + waves @ np.r_[0.0, q[1:]]
+    shape = np.maximum(under, _THINNEST) ** -0.5
+    by_q = np.where(under > _THINNEST, -q[0] / 2 * shape**3, 0.0)[..., None] * waves
+    by_q[..., 0] = shape
+    return q[0] * shape, by_q

@@ -47,7 +47,8 @@ class NullTest:
     p_value : of the one-sided test (see the module).
     statistic, null_statistics : of the data, and of each shift.
     encounters : of the data, within r_max.
-    radius, null_radii : respect zone of the data, and of each shift against all others, all bearings [m].
+    radius, null_radii : respect zone of the data, and of each shift against all others (or none was asked
+        for), all bearings [m].
     beyond : encounters nearer than that were left out [m].
     """
 
@@ -87,7 +88,9 @@ class NullTest:
         return f"{found}: p = {self.p_value:.3g} ({self.shifts} shifts, {self.encounters} encounters)"
 
 
-def null_test(samples: pd.DataFrame, null: NullEncounters, *, beyond: float = 0.0) -> NullTest:
+def null_test(
+    samples: pd.DataFrame, null: NullEncounters, *, beyond: float = 0.0, radii: bool = True
+) -> NullTest:
     """Test whether people keep out of each other's way, one-sided (see the module).
 
     Leave out companions, and best also those who walk in the same direction
@@ -100,6 +103,7 @@ def null_test(samples: pd.DataFrame, null: NullEncounters, *, beyond: float = 0.
     null : of the same tracks, found with the same parameters, of the same kinds.
     beyond : leave out encounters that came nearer than that [m]: 0.5 asks for more than that two bodies
         cannot be in one place.
+    radii : whether to fit the zone of each shift as well, which takes longest.
 
     Raises
     ------
@@ -121,14 +125,13 @@ def null_test(samples: pd.DataFrame, null: NullEncounters, *, beyond: float = 0.
     n = np.bincount(shift, minlength=1 + null.shifts)
     k = np.stack([np.bincount(shift, column, minlength=1 + null.shifts) for column in within.T], axis=1)
     statistics = _too_few(k, n)
-    radii = _null_radii(null)
     return NullTest(
         p_value=float((1 + (statistics[1:] >= statistics[0]).sum()) / (1 + null.shifts)),
         statistic=float(statistics[0]),
         null_statistics=tuple(map(float, statistics[1:])),
         encounters=int(n[0]),
         radius=respect_radius(samples, null),
-        null_radii=radii,
+        null_radii=_null_radii(null) if radii else (),
         beyond=float(beyond),
     )
 
