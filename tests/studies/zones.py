@@ -232,7 +232,7 @@ def _gap(p: np.ndarray, points: np.ndarray) -> np.ndarray:
 def _two_sided_fit(
     points: np.ndarray, starts: np.ndarray, shift: float
 ) -> tuple[dict[float, Ellipse], float]:
-    """Ellipses by speed, and the mean gap [m]: of two zones that as many enter, the truer leaves less room."""
+    """Ellipses by speed, and the mean gap [m]: of two zones that as many enter, the truer leaves less."""
     p = np.array([shift, 0, 1 / 0.95, 0, 1 / 0.75, 0, 0, 0, 0, 0])
     pair = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(points))))
     for _ in range(_ROUNDS):
