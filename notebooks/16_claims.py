@@ -25,9 +25,9 @@ from functools import partial
 
 import matplotlib.pyplot as plt
 import pandas as pd
-from szlib.plaza.scores import true_kinds
 
 import szlib
+from szlib.plaza.scores import true_kinds
 from szlib.workbook import claims, figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 from szlib.workbook.sensitivity import sensitivity

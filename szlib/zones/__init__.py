@@ -2,7 +2,7 @@
 
 ellipses     ellipses, and the smallest one around points or a curve
 radii        a zone told by direction, and the ellipse fitted to it
-outliers     local outlier factor on complementary coordinates: `remove_outliers`
+outliers     encounters, or samples, that lie apart (local outlier factor): `remove_outliers`
 quantile     where all but a share of encounters keep out
 hulls        the convex hull over (x', y', speed), its slices, and its way to zones
 respect      people against the null model: the contour of half presence, and whether it is respect

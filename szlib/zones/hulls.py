@@ -25,7 +25,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ..errors import ZoneError
 from ..tracks import funnels
 from .ellipses import minimum_enclosing_ellipse
-from .outliers import FRACTION, NEIGHBOURS, complementary_points, remove_outliers
+from .outliers import complementary_points, remove_outliers
 from .quantile import encounter_numbers
 from .radii import DIRECTIONS
 
@@ -172,8 +172,8 @@ class HullZones:
         samples: pd.DataFrame,
         *,
         r_max: float,
-        outlier_fraction: float = FRACTION,
-        neighbours: int = NEIGHBOURS,
+        outlier_fraction: float | None = None,
+        neighbours: int | None = None,
         speed_scale: float | None = None,
     ) -> HullZones:
         """From samples; parameters and errors as in `szlib.remove_outliers`."""
@@ -184,8 +184,8 @@ class HullZones:
         points = np.column_stack([complementary_points(inliers, r_max=r_max), speed])
         count = len(hull_vertices(points))
         parameters = {
-            "outlier_fraction": float(outlier_fraction),
-            "neighbours": int(neighbours),
+            "outlier_fraction": None if outlier_fraction is None else float(outlier_fraction),
+            "neighbours": None if neighbours is None else int(neighbours),
             "speed_scale": None if speed_scale is None else float(speed_scale),
         }
         inside = {"inside the hull": len(points) - count}

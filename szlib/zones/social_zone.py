@@ -114,7 +114,8 @@ class SocialZone:
         method : "hull", "quantile" or "respect".
         r_max : distance within which people count [m].
         speeds : whose zones are fitted [m/s].
-        outlier_fraction, neighbours, speed_scale : of the hull, as in `szlib.remove_outliers`.
+        outlier_fraction, neighbours, speed_scale : of the hull, as in `szlib.remove_outliers`:
+            outlier_fraction=0.002 is the paper's way, None judges whole encounters.
         q : of the quantile, the share of encounters that may enter (0.05).
         speed_width : of respect, over how wide a range speeds are taken together (0.2) [m/s]; inf: all.
         null : the null model, from `szlib.null_encounters`, that respect needs, and that a zone of any

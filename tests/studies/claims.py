@@ -17,9 +17,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pandas as pd
-from szlib.plaza.scores import true_kinds
 
 import szlib
+from szlib.plaza.scores import true_kinds
 from szlib.tracks import sites
 from szlib.workbook import claims
 from szlib.workbook.sensitivity import FIT, sensitivity
