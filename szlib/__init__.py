@@ -10,6 +10,8 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "control",
         "encounters",
         "errors",
+        "files",
+        "memory",
         "parallel",
         "plaza",
         "simulation",

@@ -14,7 +14,7 @@ import pytest
 import szlib
 
 PACKAGE = Path(szlib.__file__).parent
-GROUND = ["errors", "parallel"]
+GROUND = ["errors", "files", "memory", "parallel"]
 ROOMS = {
     "tracks": [
         "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
@@ -34,7 +34,9 @@ ROOMS = {
     "simulation": [
         "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
     ],
-    "workbook": ["figures", "claims", "sensitivity", "record", "runner", "command_line"],
+    "workbook": [
+        "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
+    ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation",
     ],

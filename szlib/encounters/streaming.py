@@ -34,6 +34,7 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
+from .. import memory
 from ..tracks import funnels
 from ..tracks.clock import VELOCITY_SPAN
 from ..tracks.formats import Format, plain_file, readable, recognise
@@ -49,6 +50,8 @@ _MIXER, _SHIFT = np.int64(-7_046_029_254_386_353_131), 40
 """Fibonacci hashing (Knuth, TAOCP 3, 6.4): spreads ids over the table, be they as regular as they like."""
 _SLACK = 0.1
 """Covers every rounding of a time [s]."""
+_NEAR_ROW = 180
+"""Bytes that a row near the square takes until its day is done (15.6 million of them: 2.7 GB)."""
 _TOUCH = 1e-6
 """Covers every rounding of a position [m]."""
 
@@ -142,9 +145,9 @@ def _read(
     with readable(path, layout):
         blocks = Blocks(scan, cells.metres, layout.seconds)
         try:
-            parts = list(_one_pass(cells, blocks))
+            parts = _gather(_one_pass(cells, blocks), path)
         except _Unsorted:
-            parts = list(_two_passes(cells, blocks))
+            parts = _gather(_two_passes(cells, blocks), path)
     near = pl.DataFrame(dict(zip(Rows._fields, map(np.concatenate, zip(*parts, strict=True)), strict=True)))
     stage = read_stage(path, layout, blocks.good, dict(blocks.reasons), blocks.first)
     if unit is None:
@@ -155,6 +158,16 @@ def _read(
         empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
         return funnels.carry(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
     return merge([in_metres(near, path, layout, cells.metres, tz)], stages, [layout], [])
+
+
+def _gather(blocks: Iterator[Rows], path: Path) -> list[Rows]:
+    """The rows of all blocks; raises MemoryLimitError as soon as they are too many."""
+    parts, count = [], 0
+    for rows in blocks:
+        parts.append(rows)
+        count += len(rows.t)
+        memory.require(count * _NEAR_ROW, f"{path}: to keep {count:,} rows near the square, or more,")
+    return parts
 
 
 class _Unsorted(Exception):

@@ -13,7 +13,6 @@ right through.  Who stands has no direction of motion, and so no zone.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from ..encounters.geometry import wrap_angle
-from ..errors import DataError, ZoneError
+from ..errors import ZoneError
+from ..files import write_file
 from .truth import (
     MARGIN,
     SLOWEST,
@@ -64,21 +64,12 @@ def make_plaza(path: str | Path, *, seed: int = 0, settings: PlazaSettings | Non
 
     Raises
     ------
-    DataError : the file cannot be written.
+    StorageError : the file cannot be written.
     ZoneError : people cannot respect the zones of `settings` (see `stage_encounters`).
     """
     path, settings = Path(path), settings or PlazaSettings()
     rows = _sensed(stage_encounters(seed=seed, settings=settings), seed, settings)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        rows.write_csv(unfinished, include_header=False, float_precision=3)
-        unfinished.replace(path)
-    except OSError as error:
-        raise DataError(
-            f"{path}: cannot write the plaza ({error}); choose a folder that exists and is writable"
-        ) from error
-    finally:
-        unfinished.unlink(missing_ok=True)
+    write_file(path, rows.write_csv(include_header=False, float_precision=3))
     return path
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from .. import memory
 from ..errors import DataError
 from . import funnels
 from .readers import read_raw
@@ -38,6 +39,9 @@ _ROUNDING = 1e-6
 
 _LAST_SECOND = 1e11
 """Later times [s] are no times of people; up to here ticks are exact."""
+
+_TICK = 160
+"""Bytes that a tick takes while a table is brought to the clock (measured: 147 to 153)."""
 
 COLUMNS = ["day", "id", "t", "x", "y", "vx", "vy"]
 
@@ -101,7 +105,10 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
         max_gap = _usual_gap(step[same], raw.attrs.get("max_gap"))
     if not max_gap > 1 / TICKS_PER_SECOND:
         raise DataError(f"max_gap must be a time in seconds, longer than the clock's 0.1 s; got {max_gap}")
-    piece = np.cumsum(~(same & (step <= max_gap + _ROUNDING))) - 1
+    within = same & (step <= max_gap + _ROUNDING)
+    ticks = float(step[within].sum()) * TICKS_PER_SECOND
+    memory.require(ticks * _TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows")
+    piece = np.cumsum(~within) - 1
     row, tick = _ticks(t, piece)
     after = np.where(np.r_[piece[1:] == piece[:-1], False][row], row + 1, row)
     span = np.where(after > row, t[after] - t[row], 1.0)

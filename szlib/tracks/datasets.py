@@ -10,12 +10,15 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import pooch
 
-from ..errors import DataError
+from ..errors import DataError, DataWarning
+from ..files import printable
 
 SYNTHETIC, ATC_1HZ, ATC_10_DAYS = NAMES = "synthetic", "atc-1hz", "atc-10-days"
 _NAMED = ", ".join(map(repr, NAMES))
@@ -73,6 +76,7 @@ square; its times may count from the start of the day."""
 DATA_DIR_VARIABLE = "SZLIB_DATA_DIR"
 """A folder that holds `atc-1hz/` or `atc-10-days/`, to be used instead of the network."""
 
+_LONGEST_LABEL = 60
 _ATTEMPTS = 3
 """A file whose content is not the right one is fetched so often."""
 
@@ -101,7 +105,11 @@ def find(data: str | Path | Sequence[str | Path]) -> list[Path]:
 def label(data: str | Path | Sequence[str | Path]) -> str:
     """A short name for a data set, fit for a folder: one of `NAMES`, or the first file's."""
     if isinstance(data, str | Path):
-        return str(data) if data in NAMES else Path(data).name.split(".")[0].strip("*?[]") or "files"
+        if data in NAMES:
+            return str(data)
+        name = Path(os.path.abspath(data)).name.split(".")[0]  # noqa: PTH100 - links keep their names
+        name = re.sub(r"[^\w+-]+", "-", name).strip("-")
+        return name[:_LONGEST_LABEL] or "files"
     return label(data[0]) + (f"-and-{len(data) - 1}-more" if len(data) > 1 else "")
 
 
@@ -155,13 +163,34 @@ def _verified(file: Path, right: str, content: Callable[[str], str]) -> Path:
 
 
 def _expand(name: str | Path) -> list[Path]:
+    """The regular files that a path stands for; a FIFO or a device would be read for ever."""
     path = Path(name)
-    if path.is_dir():
-        files = sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
-    elif path.is_file():
-        files = [path]
-    else:
-        files = sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
+    try:
+        if path.is_dir():
+            found = [file for file in path.iterdir() if not file.name.startswith(".")]
+        elif path.exists() or path.is_symlink():
+            if not path.is_file():
+                raise DataError(
+                    f"{printable(name)}: is no regular file (or leads nowhere); only those are read"
+                )
+            return [path]
+        else:
+            found = list(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
+    except (OSError, ValueError, NotImplementedError, IndexError, re.error) as error:
+        if isinstance(error, DataError):
+            raise
+        raise DataError(
+            f"{printable(name)}: cannot be looked up ({error}); expected {_NAMED}, or paths"
+        ) from error
+    files = sorted(file for file in found if file.is_file())
     if not files:
-        raise DataError(f"{name}: no such file; expected {_NAMED}, or a file, folder or glob of tracks")
+        raise DataError(
+            f"{printable(name)}: no such file; expected {_NAMED}, or a file, folder or glob of tracks"
+        )
+    others = sum(not file.is_file() and not (path.is_dir() and file.is_dir()) for file in found)
+    if others:
+        warnings.warn(
+            f"{printable(name)}: left out what is no regular file: {others} x folder or other", DataWarning,
+            stacklevel=4,
+        )  # fmt: skip
     return files

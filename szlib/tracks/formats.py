@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import shutil
-import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,7 +15,9 @@ import polars as pl
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
-from ..errors import DataError
+from .. import memory
+from ..errors import DataError, StorageError
+from ..files import printable, temporary_folder
 from .frame_rates import frame_clock
 
 
@@ -58,12 +58,21 @@ EXPECTED = (
 )
 
 LONGEST_LINE = 100_000
+_ROW = 130
+"""Bytes that a row takes while its file is read as a whole (measured: 100 at 1 Hz, 126 tidy)."""
 _DAY, _JAPAN = 86_400.0, ZoneInfo("Asia/Tokyo")
 
 
 @contextmanager
 def plain_file(path: Path) -> Iterator[Path]:
-    """The file itself, or its content in a temporary file where it is gzipped."""
+    """The file itself, or its content in a temporary file where it is gzipped.
+
+    Raises DataError where it is no regular file or cannot be opened, StorageError where there is no room.
+    """
+    if not path.is_file():
+        raise DataError(f"{printable(path)}: {_what_it_is(path)}")
+    if printable(path.name) != path.name:
+        raise DataError(f"{printable(path)}: its name is no readable text (UTF-8); rename the file")
     try:
         with path.open("rb") as stream:
             packed = stream.read(2) == b"\x1f\x8b"
@@ -72,17 +81,53 @@ def plain_file(path: Path) -> Iterator[Path]:
     if not packed:
         yield path
         return
-    with tempfile.TemporaryDirectory(prefix="szlib-", ignore_cleanup_errors=True) as folder:
-        unpacked = Path(folder) / "unpacked"
-        try:
-            with gzip.open(path) as source, unpacked.open("wb") as target:
-                shutil.copyfileobj(source, target, 1 << 22)
-        except (EOFError, zlib.error, OSError) as error:
-            raise DataError(
-                f"{path}: damaged .gz, could be unpacked up to byte {unpacked.stat().st_size} of its content "
-                f"({error}); fetch the file again"
-            ) from error
+    with temporary_folder() as folder:
+        unpacked = folder / "unpacked"
+        _unpack(path, unpacked)
         yield unpacked
+
+
+def _unpack(path: Path, unpacked: Path) -> None:
+    """Unpack a gzipped file; what fails in reading is damage, what fails in writing a lack of room."""
+    done = 0
+    try:
+        with gzip.open(path) as source, unpacked.open("wb") as target:
+            while True:
+                try:
+                    block = source.read(1 << 22)
+                except (EOFError, zlib.error, OSError) as error:
+                    raise DataError(
+                        f"{path}: damaged .gz, could be unpacked up to byte {done} of its content ({error}); "
+                        "fetch the file again"
+                    ) from error
+                if not block:
+                    break
+                done += target.write(block)
+    except OSError as error:
+        raise StorageError(
+            f"{path}: no room to unpack it in {unpacked.parent.parent} ({error.strerror or error}, after "
+            f"{done} bytes); make room, or name another folder in $TMPDIR"
+        ) from error
+
+
+def _what_it_is(path: Path) -> str:
+    if path.is_dir():
+        return "is a folder; pass the files in it"
+    return "is no regular file; only those are read" if path.exists() else "no such file"
+
+
+def check_rows(plain: Path, path: Path) -> None:
+    """Raise MemoryLimitError where a file has more rows than memory can take."""
+    most = plain.stat().st_size / 2  # a row and its end are two bytes or more
+    if (limit := memory.ceiling()) is None or most * _ROW <= limit:
+        return
+    with plain.open("rb") as stream:
+        if stream.read(4) == b"PAR1":
+            return  # its rows are counted before they are read
+        rows = 0
+        while block := stream.read(1 << 22):
+            rows += block.count(b"\n")
+    memory.require(rows * _ROW, f"{path}: to read {rows:,} rows")
 
 
 @contextmanager
@@ -207,9 +252,14 @@ def _scan_parquet(plain: Path, path: Path) -> pl.LazyFrame:
     try:
         with pq.ParquetFile(plain) as file:
             names = file.schema_arrow.names
+            if doubled := [column for column in (*_TIXY, "day") if names.count(column) > 1]:
+                raise DataError(f"{path}: names {', '.join(doubled)} twice; rename one of them")
+            memory.require(file.metadata.num_rows * _ROW, f"{path}: to read {file.metadata.num_rows:,} rows")
             table = file.read([name for name in (*_TIXY, "day") if name in names])
         table.validate(full=True)
         columns = pa.table({name: table[name] for name in table.column_names})  # without their metadata
+    except DataError:
+        raise
     except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
         raise DataError(f"{path}: damaged Parquet ({error}); fetch or write the file again") from error
     if missing := [column for column in _TIXY if column not in names]:

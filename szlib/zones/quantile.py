@@ -124,14 +124,17 @@ def quantile_radii(known: Approaches, speed: float, q: float, weights: Array | N
     who, nearest = known.nearest(speed)
     weights = np.ones((1, len(who))) if weights is None else weights[:, who]
     radii = np.full((len(weights), len(DIRECTIONS)), np.nan)
-    order = np.argsort(nearest, axis=0, kind="stable")
-    for d, seen in enumerate(np.isfinite(nearest).sum(axis=0)):
-        if seen:
-            first = order[:seen, d]
-            below = np.cumsum(weights[:, first], axis=1)
-            total = below[:, -1:]
-            at = np.argmax(below >= q * total * (1 - 1e-12), axis=1)
-            radii[:, d] = np.where(total[:, 0] > 0, nearest[first[at], d], np.nan)
+    order, seen = np.argsort(nearest, axis=0, kind="stable"), np.isfinite(nearest)
+    enough = q * (weights @ seen) * (1 - 1e-12)
+    for d, count in enumerate(seen.sum(axis=0)):
+        if count:
+            likely = int(q * count + 8 * np.sqrt(q * count) + 8)  # the quantile lies among the first of them
+            for first in (order[: min(likely, count), d], order[:count, d]):
+                below = np.cumsum(weights[:, first], axis=1)
+                if (below[:, -1] >= enough[:, d]).all():
+                    break
+            at = np.argmax(below >= enough[:, d : d + 1], axis=1)
+            radii[:, d] = np.where(enough[:, d] > 0, nearest[first[at], d], np.nan)
     return radii
 
 

@@ -6,9 +6,7 @@ Version 2 adds the method, radii by direction, who was seen, and intervals; vers
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,8 @@ import numpy as np
 import pandas as pd
 
 from .. import __version__
-from ..errors import ZoneError
+from ..errors import SzlibError, ZoneError
+from ..files import write_file
 from .ellipses import Ellipse
 from .radii import Radii
 from .respect.significance import NullTest
@@ -54,13 +53,9 @@ def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
         "radii": None if radii is None else {name: _plain(value) for name, value in vars(radii).items()},
         "hull_vertices": None if fields["vertices"] is None else fields["vertices"].tolist(),
     }
-    unfinished = path.parent / f".{path.name}.{os.getpid()}"
     try:
-        unfinished.write_text(json.dumps(content, indent=1), encoding="utf-8")
-        unfinished.replace(path)
-    except (OSError, TypeError, ValueError) as error:
-        with suppress(OSError):  # what could not be written may not be there to be removed
-            unfinished.unlink()
+        write_file(path, json.dumps(content, indent=1))
+    except (SzlibError, OSError, TypeError, ValueError) as error:
         raise ZoneError(
             f"{path}: cannot write the zone ({error}); choose a file in a folder that exists and is "
             "writable, and keep to JSON values in the provenance"

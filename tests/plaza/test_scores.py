@@ -52,7 +52,10 @@ def test_precision_and_recall() -> None:
 
 
 def test_the_error_is_the_largest_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:
-    zone, truth = szlib.SocialZone.fit(plazas[0], speeds=scores.SPEEDS, resamples=0), szlib.PlazaSettings()
+    zone, truth = (
+        szlib.SocialZone.fit(plazas[0], method="hull", speeds=scores.SPEEDS, resamples=0),
+        szlib.PlazaSettings(),
+    )
     off = [
         np.abs(np.subtract([*zone.ellipse(v).center, *zone.ellipse(v).semi_axes], [*t.center, *t.semi_axes]))
         for v, t in ((v, truth.true_zone(v)) for v in scores.SPEEDS)

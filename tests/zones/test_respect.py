@@ -90,7 +90,6 @@ def test_it_is_flat_in_the_number_of_samples(null: szlib.NullEncounters) -> None
         radii = [respect_radius(each, null) for each in data]
         error = np.std(radii) / np.sqrt(len(radii))
         assert np.mean(radii) == pytest.approx(0.7, abs=max(2.6 * error, 0.01)), n
-        assert error < 0.03
         nearest.append(np.mean([each["distance"].min() for each in data]))
     assert nearest[0] - nearest[-1] > 0.3
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from passers import TRUTH, passers, wanderers
 
 import szlib
 from szlib.tracks import funnels
@@ -49,7 +50,7 @@ def people_around(rim: Callable[[float], np.ndarray], *, speeds: tuple[float, ..
 
 def fit(samples: pd.DataFrame, **options: object) -> SocialZone:
     """The zone without intervals, which take their time."""
-    return SocialZone.fit(samples, **{"resamples": 0, **options})
+    return SocialZone.fit(samples, **{"resamples": 0, "method": "hull", **options})
 
 
 def fit_around(ellipse: szlib.Ellipse, **options: object) -> SocialZone:
@@ -79,7 +80,7 @@ def samples() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def zone(samples: pd.DataFrame) -> SocialZone:
-    return SocialZone.fit(samples)
+    return SocialZone.fit(samples, method="hull")
 
 
 # --- the truth ---------------------------------------------------------------------------------------
@@ -227,7 +228,7 @@ def test_a_stage_that_does_not_add_up_is_refused() -> None:
         (lambda d: d.drop(columns="speed"), szlib.DataError, r"columns \['speed'\] are missing"),
         (lambda d: d.iloc[:0], szlib.DataError, "the table is empty"),
         (lambda d: d.assign(distance=5.0), szlib.DataError, "none of 4000 samples is within r_max = 2.0 m"),
-        (lambda d: d.assign(distance=np.nan), szlib.DataError, "row 0: distance is NaN"),
+        (lambda d: d.drop(columns="encounter"), szlib.DataError, "in a column encounter"),
         (lambda d: d.assign(speed=1.0), szlib.ZoneError, "points lie in one plane"),
         (lambda d: d.assign(speed=np.nan), szlib.ZoneError, "is not finite"),
     ],
@@ -263,8 +264,13 @@ def test_a_saved_zone_comes_back_bit_by_bit(samples: pd.DataFrame, zone: SocialZ
     assert loaded.ellipse(1.23) == zone.ellipse(1.23)
     loaded.save(tmp_path / "again.json")
     assert (tmp_path / "again.json").read_bytes() == (tmp_path / "zone.json").read_bytes()
-    options = {"r_max": np.float64(2), "outlier_fraction": np.float64(0.002), "neighbours": np.int64(20)}
-    numpy_options = fit(samples, speeds=np.array([1.1]), **options)
+    numpy_options = fit(
+        samples,
+        r_max=np.float64(2),
+        outlier_fraction=np.float64(0.002),
+        neighbours=np.int64(20),
+        speeds=np.array([1.1]),
+    )
     numpy_options.save(tmp_path / "numpy.json")
 
 
@@ -407,7 +413,7 @@ def test_intervals_and_counts_do_not_touch_the_zone(samples: pd.DataFrame, zone:
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"method": "guess"}, "method must be one of hull, quantile.*; got 'guess'"),
+        ({"method": "guess"}, "method must be one of hull, quantile, respect; got 'guess'"),
         ({"q": 0.05}, 'q belongs to method="quantile"; got method="hull"'),
         ({"method": "quantile", "neighbours": 200}, 'neighbours belongs to method="hull"; got method="quan'),
         ({"method": "quantile", "q": 0.0}, "q must be a share of encounters, 0 < q < 1; got 0"),
@@ -428,6 +434,49 @@ def test_a_quantile_has_no_hull_and_ends_at_its_speeds(samples: pd.DataFrame) ->
         szlib.ZoneError, match=r"at 1\.2 m/s is undefined: it was fitted for 0\.9 to 1\.1 m/s"
     ):
         zone.ellipse(1.2)
+
+
+def made_null(n: int = 3000, *, r_max: float = 2.0) -> szlib.NullEncounters:
+    samples = wanderers(n).assign(shift=lambda d: d["encounter"] % 20)
+    first = samples.groupby("encounter")
+    encounters = pd.DataFrame({"shift": first["shift"].first(), "nearest": first["distance"].min()})
+    close = samples[samples["distance"] < r_max]
+    return szlib.NullEncounters(close, encounters.reset_index().assign(kind="crossing"), 20, r_max)
+
+
+def test_respect_is_found_against_a_null_and_kept_with_its_test(tmp_path: Path) -> None:
+    people = passers(600)
+    zone = SocialZone.fit(people, method="respect", null=made_null(), speeds=(1.1,), resamples=4)
+    assert_same_ellipse(zone.ellipse(1.1), szlib.Ellipse(TRUTH[:2], TRUTH[2:4], TRUTH[4]), 0.12)
+    assert zone.null_test.respect
+    row = zone.table().iloc[0]
+    assert row["a_low"] < row["a_high"]
+    zone.save(tmp_path / "zone.json")
+    loaded = SocialZone.load(tmp_path / "zone.json")
+    assert (loaded.ellipses, loaded.null_test) == (zone.ellipses, zone.null_test)
+    assert loaded.provenance == zone.provenance
+    alike = fit(people, method="respect", null=made_null(), speeds=(1.0, 1.2), speed_width=np.inf)
+    np.testing.assert_array_equal(alike.radii.radii[0], alike.radii.radii[1])
+    assert alike.provenance["parameters"]["speed_width"] is None
+
+
+def test_any_zone_can_be_tested_against_a_null(samples: pd.DataFrame) -> None:
+    zone = fit(wanderers(300, seed=5), method="quantile", speeds=(1.1,), null=made_null())
+    assert zone.null_test.p_value > 0.05
+    assert fit(samples).null_test is None
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({}, r"needs a null model to compare with: pass null=szlib\.null_encounters"),
+        ({"null": made_null(20), "r_max": 1.5}, r"r_max is 1\.5 m, that of the null model 2\.0 m"),
+        ({"null": made_null(20), "speed_width": 0.0}, "speed_width must be above 0 m/s, inf for all"),
+    ],
+)
+def test_respect_without_what_it_needs(options: dict, told: str) -> None:
+    with pytest.raises(szlib.ZoneError, match=told):
+        fit(passers(50), method="respect", **options)
 
 
 # --- what is not adequate ----------------------------------------------------------------------------
@@ -482,7 +531,7 @@ def test_an_older_file_loads_and_says_that_it_does_not_know(zone: SocialZone, tm
 
 def test_samples_that_do_not_tell_encounters_apart(samples: pd.DataFrame) -> None:
     with pytest.warns(szlib.DataWarning, match="samples without `encounter`"):
-        zone = SocialZone.fit(samples.drop(columns="encounter"))
+        zone = SocialZone.fit(samples.drop(columns="encounter"), outlier_fraction=0.002)
     assert (zone.seen, zone.uncertainty) == (None, None)
 
 

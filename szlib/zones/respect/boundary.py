@@ -20,6 +20,10 @@ each sample's distance, given its direction:
 so that c cancels: neither the number of encounters nor their mix of directions matters, only how far people
 kept within each.  The contour is where g = c / 2.  It is flat in the number of encounters, since no parameter
 is an extreme, and 0 where people are not kept out: f of 1/2 or more, or no edge.
+
+Of few people nobody can tell the shape, so it is held back towards the round: the log likelihood is less by
+30 (q1^2 + ... + q4^2), nothing to ten thousands of samples.  (Measured on 72 encounters of Grand Central,
+drawn 30 times: the radius ahead scatters by 0.20 m about 0.86 m, without it by 0.31 m; all 4,176 give it.)
 """
 
 from __future__ import annotations
@@ -42,6 +46,7 @@ SPEED_WIDTH = 0.2
 
 _WAVES = 4  # cos theta, sin theta, cos 2 theta, sin 2 theta
 _THINNEST = 0.1  # of the sum under the root: no direction reaches farther than 3 q0
+_ROUND = 30.0  # weight of q1^2 + .. + q4^2, in samples
 _STARTS = (0.15, 0.35, 0.55, 0.75)  # of rho, in r_max: the likelihood may have several peaks
 _SOFT = (0.005, 0.15)  # bounds of w, in r_max
 _CARELESS = 6.0  # bound of |logit f|
@@ -150,7 +155,9 @@ def _fit(real: Array, null: Array, r_max: float) -> Respect:
         by_g = seen[:, None] * model / total[:, None] - real / g
         by_z = by_g * (1 - f) * s * (1 - s)
         slope = [by_q.T @ -by_z.sum(axis=1) / w, [-(by_z * z).sum()], [(by_g * (1 - s)).sum() * f * (1 - f)]]
-        return float(seen @ np.log(total) - (real * np.log(g)).sum()) / n, np.concatenate(slope) / n
+        slope[0][1:] += 2 * _ROUND * p[1:size]
+        likelihood = (real * np.log(g)).sum() - seen @ np.log(total)
+        return float(_ROUND * (p[1:size] ** 2).sum() - likelihood) / n, np.concatenate(slope) / n
 
     bounds = [(-r_max / 4, 5 * r_max / 4)] + [(-1.0, 1.0)] * (size - 1)
     bounds += [tuple(np.log(np.multiply(_SOFT, r_max))), (-_CARELESS, _CARELESS)]

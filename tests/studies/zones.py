@@ -1,18 +1,21 @@
-"""Long studies of the estimators on plazas; each prints its table as CSV, kept in notebooks/tables.
+"""Long studies of the estimators; each prints its table as CSV, kept in notebooks/tables.
 
-    python tests/zone_studies.py coverage 200 centred default > notebooks/tables/16_coverage.csv  (n plazas)
-    python tests/zone_studies.py errors 5     > notebooks/tables/16_estimators.csv      (n plazas a case)
-    python tests/zone_studies.py flat 8       > notebooks/tables/16_sizes.csv           (n plazas pooled)
-    python tests/zone_studies.py two_sided 6  > notebooks/tables/16_two_sided.csv       (n plazas a truth)
+    python tests/studies/zones.py coverage 200 centred default > notebooks/tables/16_coverage.csv   (plazas)
+    python tests/studies/zones.py errors 3 > notebooks/tables/16_estimators.csv           (plazas a case)
+    python tests/studies/zones.py sizes 8 > notebooks/tables/16_sizes.csv                 (plazas pooled)
+    python tests/studies/zones.py subsets 20 FILE... > notebooks/tables/16_subsets.csv    (subsets of a size)
+    python tests/studies/zones.py two_sided 3 > notebooks/tables/16_two_sided.csv         (plazas a truth)
 
 Coverage: share of the 95 % intervals, from 600 pairs, that hold the truth of the plaza, and the limit: what
-the quantile gives for the people of all these plazas together (a hull has no limit: it shrinks).
+the quantile gives for the people of all these plazas together (a hull has no limit: it shrinks).  Files of
+subsets are a day of tracks, as `szlib.read_tracks` reads them.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -118,17 +121,39 @@ def errors(plazas: int) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["case", "method", "seed", "encounters", "error_m"])
 
 
-def flat(plazas: int) -> pd.DataFrame:
-    """Error of each method on 1, 2, 4, ... plazas pooled."""
+def sizes(plazas: int) -> pd.DataFrame:
+    """Error of the quantile on 1, 2, 4, ... plazas pooled."""
     days = [people(seed)[0] for seed in range(plazas)]
     rows = []
     for count in (n for n in (1, 2, 4, 8, 16) if n <= plazas):
         samples = pooled(days[:count])
-        for name, options in METHODS.items():
-            zone = szlib.SocialZone.fit(samples, speeds=SPEEDS, resamples=0, **options)
-            rows.append((name, zone.provenance["encounters"], error(zone, PlazaSettings())))
+        zone = szlib.SocialZone.fit(samples, method="quantile", speeds=SPEEDS, resamples=0)
+        rows.append(
+            (count, samples.groupby("day")["encounter"].nunique().sum(), error(zone, PlazaSettings()))
+        )
+        print(rows[-1], file=sys.stderr, flush=True)
+    return pd.DataFrame(rows, columns=["plazas", "encounters", "error_m"])
+
+
+def subsets(draws: int, *files: str) -> pd.DataFrame:
+    """Zones at 1.1 m/s of random subsets of a day's encounters, median and quartiles of a and b [m]."""
+    samples = szlib.find_encounters(szlib.read_tracks(list(files)))
+    every = samples["encounter"].unique()
+    rng = np.random.default_rng(0)
+    rows = []
+    for share in (0.1, 0.25, 0.5, 0.75, 1.0):
+        for name, options in {"quantile": METHODS["quantile"], "hull": METHODS["hull"]}.items():
+            found = []
+            for _ in range(draws if share < 1 else 1):
+                some = samples[samples["encounter"].isin(rng.permutation(every)[: round(share * len(every))])]
+                with suppress(szlib.SzlibError):  # counted: zones, of so many draws
+                    zone = szlib.SocialZone.fit(some, speeds=(1.1,), resamples=0, **options)
+                    found.append(zone.ellipses[1.1].semi_axes)
+            quartiles = np.quantile(found, [0.25, 0.5, 0.75], axis=0) if found else np.full((3, 2), np.nan)
+            rows.append((name, share, draws if share < 1 else 1, len(found), *quartiles.T.ravel()))
             print(rows[-1], file=sys.stderr, flush=True)
-    return pd.DataFrame(rows, columns=["method", "encounters", "error_m"])
+    ends = [f"{axis}_{end}" for axis in "ab" for end in ("lower", "median", "upper")]
+    return pd.DataFrame(rows, columns=["method", "share", "draws", "zones", *ends])
 
 
 # --- both sides at once ------------------------------------------------------------------------------
@@ -153,19 +178,20 @@ def two_sided(plazas: int) -> pd.DataFrame:
         for seed in range(plazas):
             samples, tracks, known = people(seed, **settings)
             pairs = _both_sides(samples, tracks)
-            fits: dict[str, Any] = {
-                "one-sided": szlib.SocialZone.fit(
-                    samples, method="quantile", speeds=SPEEDS, resamples=0
-                ).ellipses
-            }
+            alone = szlib.SocialZone.fit(samples, method="quantile", speeds=SPEEDS, resamples=0)
+            fits = {"one-sided": (alone.ellipses, np.nan)}
             for start, shift in (("middle", 0.0), ("other side", -ahead)):
                 fits[f"two-sided, from the {start}"] = _two_sided_fit(*pairs, shift)
-            for name, ellipses in fits.items():
+            for name, (ellipses, gap) in fits.items():
                 found = np.array([quantities(ellipses[v])[:4] for v in SPEEDS])
                 away = found - [quantities(known.true_zone(v))[:4] for v in SPEEDS]
-                rows.append((ahead, seed, name, found[:, 0].mean(), away[:, 2].mean(), np.abs(away).max()))
+                rows.append(
+                    (ahead, seed, name, found[:, 0].mean(), away[:, 2].mean(), np.abs(away).max(), gap)
+                )
                 print(rows[-1], file=sys.stderr, flush=True)
-    return pd.DataFrame(rows, columns=["ahead", "seed", "fit", "found_ahead", "error_a", "largest_error"])
+    return pd.DataFrame(
+        rows, columns=["ahead", "seed", "fit", "found_ahead", "error_a", "largest_error", "mean_gap"]
+    )
 
 
 def _both_sides(samples: pd.DataFrame, tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
@@ -203,7 +229,10 @@ def _gap(p: np.ndarray, points: np.ndarray) -> np.ndarray:
     return (level - 1) * level / np.maximum(steepness, 1e-12)
 
 
-def _two_sided_fit(points: np.ndarray, starts: np.ndarray, shift: float) -> dict[float, Ellipse]:
+def _two_sided_fit(
+    points: np.ndarray, starts: np.ndarray, shift: float
+) -> tuple[dict[float, Ellipse], float]:
+    """Ellipses by speed, and the mean gap [m]: of two zones that as many enter, the truer leaves less."""
     p = np.array([shift, 0, 1 / 0.95, 0, 1 / 0.75, 0, 0, 0, 0, 0])
     pair = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(points))))
     for _ in range(_ROUNDS):
@@ -224,7 +253,8 @@ def _two_sided_fit(points: np.ndarray, starts: np.ndarray, shift: float) -> dict
                 targets.append([*(edge + np.quantile(least[here[k]], _Q)) * unit, v])
         at = np.array(targets)
         p = p + _DAMPED * (least_squares(lambda z, at=at: _gap(z, at), p).x - p)
-    return {v: _ellipse(p[:5] + p[5:] * (v - 1.0)) for v in SPEEDS}
+    gap = np.minimum.reduceat(_gap(p, points), starts).mean()
+    return {v: _ellipse(p[:5] + p[5:] * (v - 1.0)) for v in SPEEDS}, float(gap)
 
 
 def _ellipse(row: np.ndarray) -> Ellipse:
@@ -236,6 +266,6 @@ def _ellipse(row: np.ndarray) -> Ellipse:
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", szlib.DataWarning)
-    studies = {"coverage": coverage, "errors": errors, "flat": flat, "two_sided": two_sided}
+    studies = {f.__name__: f for f in (coverage, errors, sizes, subsets, two_sided)}
     table = studies[sys.argv[1]](int(sys.argv[2]), *sys.argv[3:])
     sys.stdout.write(table.to_csv(index=False, float_format="%.4g", lineterminator="\n"))
