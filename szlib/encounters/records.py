@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,7 @@ from ..files import file_content, write_file
 from ..tracks import funnels
 from .pipeline import Chain
 
-_FORMAT, _VERSION = "szlib.extraction", 2
-_TOLD = {"rows", "unusable", "encounters", "samples"}
+_FORMAT, _VERSION = "szlib.extraction", 3
 
 
 def day_key(files: Sequence[str], chain: Chain) -> str:
@@ -35,7 +34,7 @@ def finished_record(folder: Path, day: str, key: str) -> dict[str, Any] | None:
         samples = (folder / f"{day}.parquet").read_bytes()
     except (OSError, ValueError):  # not there, or not whole
         return None
-    whole = isinstance(record, dict) and record.get("key") == key and set(record) >= _TOLD
+    whole = isinstance(record, dict) and record.get("key") == key and record.get("seal") == _seal(record)
     return record if whole and record.get("sha256") == hashlib.sha256(samples).hexdigest() else None
 
 
@@ -62,6 +61,13 @@ def write_record(
         "sha256": hashlib.sha256(content.getvalue()).hexdigest(),
         "funnel": stages,
     }
+    record["seal"] = _seal(record)
     write_file(folder / f"{day}.parquet", content.getvalue())
     write_file(folder / f"{day}.json", json.dumps(record, indent=1))
     return record
+
+
+def _seal(record: Mapping[str, Any]) -> str:
+    """SHA-256 of all else in a record."""
+    rest = {name: value for name, value in record.items() if name != "seal"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()

@@ -102,18 +102,18 @@ class NotebookRecord:
         file = self.out / "zone.json"
         if file.exists():
             try:
-                zone = SocialZone.load(file)
+                if kept(file, self._source()) is not None:
+                    return SocialZone.load(file)
+                print("fitting the zone again: that in zone.json is of other data, or damaged")
             except ZoneError as error:
                 print(f"fitting the zone again: {error}")
-            else:
-                if zone.provenance.get("source") == self._source():
-                    return zone
         return self.keep_zone(SocialZone.fit(self.encounters()))
 
     def keep_zone(self, zone: SocialZone) -> SocialZone:
         """Leave the zone for the notebooks to come."""
         zone = replace(zone, provenance={**zone.provenance, "source": self._source()})
         zone.save(self.out / "zone.json")
+        sign(self.out / "zone.json", (self.out / "zone.json").read_bytes(), self._source())
         return zone
 
     def check(self, what: str, passed: object, value: object = None) -> None:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..errors import DataError, ZoneError
 from ..tracks import funnels
 from ..tracks.clock import check_columns
+from .outliers import encounter_numbers
 from .radii import DIRECTIONS, Array, Radii, closed, fit_ellipses
 
 SHARE = 0.05
@@ -65,20 +66,6 @@ class Approaches:
         np.minimum.at(here, (row, self.direction[band]), self.distance[band])
         turns = range(-(SECTOR // 2), SECTOR // 2 + 1)
         return encounters, np.minimum.reduce([np.roll(here, turn, axis=1) for turn in turns])
-
-
-def encounter_numbers(samples: pd.DataFrame) -> tuple[NDArray[np.intp], pd.DataFrame]:
-    """Which encounter each sample belongs to (n,), and the first sample of each, in order of appearance.
-
-    Encounters are told apart by `encounter` and, where there is one, `day`; without either, each sample
-    counts as one.
-    """
-    number: NDArray[np.intp] = np.arange(len(samples))
-    if "encounter" in samples:
-        keys = [name for name in ("day", "encounter") if name in samples]
-        groups = samples.groupby(keys, sort=False, observed=True, dropna=False)
-        number = np.asarray(groups.ngroup(), np.intp)
-    return number, samples.iloc[np.unique(number, return_index=True)[1]]
 
 
 def smoothed(samples: pd.DataFrame) -> tuple[Array, Array]:

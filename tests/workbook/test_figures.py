@@ -48,7 +48,7 @@ def samples():
 
 @pytest.fixture(scope="module")
 def zone(samples):
-    return szlib.SocialZone.fit(samples, speeds=(0.9, 1.1))
+    return szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1))
 
 
 @pytest.fixture(scope="module")

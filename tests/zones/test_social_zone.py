@@ -50,7 +50,7 @@ def people_around(rim: Callable[[float], np.ndarray], *, speeds: tuple[float, ..
 
 def fit(samples: pd.DataFrame, **options: object) -> SocialZone:
     """The zone without intervals, which take their time."""
-    return SocialZone.fit(samples, **{"resamples": 0, **options})
+    return SocialZone.fit(samples, **{"resamples": 0, "method": "hull", **options})
 
 
 def fit_around(ellipse: szlib.Ellipse, **options: object) -> SocialZone:
@@ -80,7 +80,7 @@ def samples() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def zone(samples: pd.DataFrame) -> SocialZone:
-    return SocialZone.fit(samples)
+    return SocialZone.fit(samples, method="hull")
 
 
 # --- the truth ---------------------------------------------------------------------------------------

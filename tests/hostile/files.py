@@ -1,0 +1,197 @@
+"""A disk that is full at each write in turn, damage, clocks that jump: only what is whole is ever taken.
+
+The fault is put in at the one door through which every file goes, `szlib.files`: half of the bytes are
+written, then there is no room.  Afterwards what was finished is intact, and the same call makes the same
+bytes (but for the times that steps took).
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import random
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from contextlib import redirect_stdout, suppress
+from pathlib import Path
+
+import pandas as pd
+
+import szlib
+from szlib import files
+from szlib.errors import DataError, StorageError
+from szlib.plaza.people import make_plaza
+from szlib.plaza.truth import PlazaSettings
+from szlib.simulation.rollouts import rollouts
+from szlib.simulation.worlds import Worlds
+from szlib.workbook.record import NotebookRecord
+
+DAMAGES = {False: 15, True: 300}
+JUMPS = {False: 3, True: 40}
+
+
+class Disk:
+    """A disk that is full at write number `full`, counted from 0; None never."""
+
+    def __init__(self, full: int | None) -> None:
+        self.full, self.writes, self.real = full, 0, files._fill
+
+    def __call__(self, unfinished: Path, content: bytes, lasting: bool) -> None:
+        self.writes += 1
+        if self.writes - 1 == self.full:
+            self.real(unfinished, content[: len(content) // 2], False)
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        self.real(unfinished, content, lasting)
+
+    def __enter__(self) -> Disk:
+        files._fill = self
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        files._fill = self.real
+
+
+def attack(long: bool, seed: int = 0) -> dict[str, int]:
+    """What was tried, and how often a result was lost, half-written, or another one."""
+    tally = Counter({"broken after a full disk": 0, "broken after damage": 0, "broken by a clock": 0})
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+        warnings.simplefilter("ignore", szlib.DataWarning)  # so few encounters make no good zone
+        place = Path(folder)
+        (place / "data").mkdir()
+        for number, date in enumerate(("2012-10-24", "2012-10-28")):
+            settings = PlazaSettings(encounters=30, date=date)
+            make_plaza(place / "data" / f"day{number}.csv", seed=number, settings=settings)
+        for name, work in WORKS.items():
+            reference = _reference(work, place, name)
+            fill_disks(name, work, place, reference, tally)
+            damage(name, work, place, reference, random.Random(seed), DAMAGES[long], tally)
+        jump(place, _reference(_extract, place, "jumps"), random.Random(seed), JUMPS[long], tally)
+    return dict(tally)
+
+
+def fill_disks(
+    name: str,
+    work: Callable[[Path, Path], None],
+    place: Path,
+    reference: dict[str, bytes],
+    tally: Counter[str],
+) -> None:
+    """Let the disk be full at each write in turn."""
+    full = 0
+    while True:
+        out = place / f"{name}-full-{full}"
+        with Disk(full) as disk:
+            try:
+                work(place / "data", out)
+                refused = False
+            except StorageError:
+                refused = True
+        if disk.writes <= full:
+            break
+        found = _contents(out)
+        whole = all(reference.get(file) == content for file, content in found.items())
+        work(place / "data", out)
+        if not (refused and whole and _contents(out) == reference):
+            print(f"{name}, full at write {full}: refused {refused}, whole {whole}", file=sys.stderr)
+            tally["broken after a full disk"] += 1
+        tally["disks full at a write"] += 1
+        full += 1
+
+
+def damage(
+    name: str, work: Callable[[Path, Path], None], place: Path, reference: dict[str, bytes],
+    rng: random.Random, count: int, tally: Counter[str],
+) -> None:  # fmt: skip
+    """Damage a file of the results: the next call heals it."""
+    out = place / f"{name}-damaged"
+    work(place / "data", out)
+    for _ in range(count):
+        file = out / rng.choice(sorted(file for file in reference if not file.endswith(files.MARKER)))
+        content = bytearray(file.read_bytes())
+        kind = rng.choice(["cut", "flip", "gone", "garbage"])
+        if kind == "cut":
+            file.write_bytes(content[: rng.randrange(len(content))])
+        elif kind == "flip":
+            content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
+            file.write_bytes(content)
+        elif kind == "gone":
+            file.unlink()
+        else:
+            file.write_bytes(rng.randbytes(50))
+        work(place / "data", out)
+        if _contents(out) != reference:
+            print(f"{name}: {file.name}: {kind} is not healed", file=sys.stderr)
+            tally["broken after damage"] += 1
+        tally["results damaged"] += 1
+
+
+def jump(
+    place: Path, reference: dict[str, bytes], rng: random.Random, count: int, tally: Counter[str]
+) -> None:
+    """Clocks that jump, backwards too, and files from the future: time stamps decide nothing."""
+    real = time.time
+    for number in range(count):
+        time.time = lambda: real() + rng.uniform(-1e9, 1e9)
+        out = place / f"jump-{number % 2}"
+        try:
+            for file in [*(place / "data").iterdir(), *(out.iterdir() if out.exists() else [])]:
+                moment = rng.uniform(0, 4e9)
+                os.utime(file, (moment, moment))
+            _extract(place / "data", out)
+        finally:
+            time.time = real
+        tally["broken by a clock"] += _contents(out) != reference
+        tally["clocks that jumped"] += 1
+
+
+def _extract(data: Path, out: Path) -> None:
+    done = szlib.extract_days(data, out=out, progress=False)
+    if len(done.failed):
+        why = done.failed["why"].iloc[0]
+        raise (StorageError if "cannot be written" in why else DataError)(why)
+
+
+def _rollouts(_: Path, out: Path) -> None:
+    rollouts(2, worlds=Worlds(duration=0.5), out=out, progress=False)
+
+
+def _notebook(data: Path, out: Path) -> None:
+    record = NotebookRecord("05_attack", data=[str(data / "day0.csv")], results=out)
+    record.check("encounters", len(record.encounters()) > 0)
+    record.zone()
+    record.table(pd.DataFrame({"a": [1, 2]}), "table")
+    record.animation(b"GIF89a", "movie")
+    record.close()
+
+
+def _plaza(_: Path, out: Path) -> None:
+    out.mkdir(exist_ok=True)
+    make_plaza(out / "plaza.csv", settings=PlazaSettings(encounters=5))
+
+
+WORKS = {"days": _extract, "worlds": _rollouts, "notebook": _notebook, "plaza": _plaza}
+
+
+def _reference(work: Callable[[Path, Path], None], place: Path, name: str) -> dict[str, bytes]:
+    work(place / "data", place / f"{name}-reference")
+    return _contents(place / f"{name}-reference")
+
+
+def _contents(out: Path) -> dict[str, bytes]:
+    """Every file of the results; of worlds, without the times that steps took and what depends on them."""
+    found = {str(file.relative_to(out)): file.read_bytes() for file in out.rglob("*") if file.is_file()}
+    for name, content in list(found.items()):
+        if not Path(name).name.startswith("seeds-"):
+            continue
+        if name.endswith(".json"):
+            found[name] = b"made_of" if b'"made_of"' in content and b'"sha256"' in content else content
+            continue
+        with suppress(ValueError, OSError):  # damaged
+            table = pd.read_parquet(io.BytesIO(content))
+            found[name] = table.drop(columns=[c for c in table if "time_" in c]).to_csv().encode()
+    return found

@@ -1,0 +1,20 @@
+"""The short forms of the attacks on files, commands and processes, each in an interpreter of its own."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import szlib
+
+
+@pytest.mark.parametrize("attack", ["commands", "files", "processes"])
+def test_nothing_breaks(attack, tmp_path):
+    done = subprocess.run(
+        [sys.executable, str(Path(__file__).parent), attack],
+        cwd=tmp_path, capture_output=True, text=True,
+        env=os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
