@@ -28,8 +28,8 @@ SECTOR = 7
 """Directions, 5 deg apart, over which the nearest approach is taken: 35 deg (assumed; 25-45 do as well)."""
 BAND = 0.2
 """Encounters of reference pedestrians up to so much slower or faster are taken together [m/s] (assumed)."""
-SMOOTHING = 0.5
-"""Paths are smoothed over so much time before and after [s] (assumed: as the velocity is)."""
+SMOOTHING = 0.7
+"""Paths are smoothed over so much time before and after [s] (measured: 0.5 leaves 5 cm of noise felt)."""
 
 _DEGREE = 2  # of the polynomial that smooths
 _TICK = 0.1  # from one sample to the next [s]

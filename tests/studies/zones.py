@@ -1,6 +1,7 @@
 """Long studies of the estimators; each prints its table as CSV, kept in notebooks/tables.
 
-    python tests/studies/zones.py coverage 200 centred default > notebooks/tables/16_coverage.csv   (plazas)
+    python tests/studies/zones.py coverage 200 quantile centred default > notebooks/tables/16_coverage.csv
+    python tests/studies/zones.py coverage 200 hull centred > notebooks/tables/16_coverage_hull.csv  (plazas)
     python tests/studies/zones.py errors 3 > notebooks/tables/16_estimators.csv           (plazas a case)
     python tests/studies/zones.py sizes 8 > notebooks/tables/16_sizes.csv                 (plazas pooled)
     python tests/studies/zones.py subsets 20 FILE... > notebooks/tables/16_subsets.csv    (subsets of a size)
@@ -74,28 +75,25 @@ def error(zone: szlib.SocialZone, known: PlazaSettings) -> float:
     return max(float(np.abs(np.subtract(*pair)).max()) for pair in pairs)
 
 
-def coverage(plazas: int, *truths: str) -> pd.DataFrame:
-    """Share of plazas whose interval holds the truth, and the limit, by truth, method, speed, quantity."""
+def coverage(plazas: int, method: str, *truths: str) -> pd.DataFrame:
+    """Share of plazas whose interval holds the truth, and the limit, by truth, quantity and speed."""
     tables = []
     for truth in truths:
-        zones: dict[str, list[szlib.SocialZone]] = {"quantile": [], "hull": []}
-        everybody = []
+        zones, everybody = [], []
         for seed in range(plazas):
             samples, _, known = people(seed, encounters=600, **TRUTHS[truth])
             everybody.append(samples)
-            for method, found in zones.items():
-                found.append(szlib.SocialZone.fit(samples, method=method, speeds=SPEEDS))
+            zones.append(szlib.SocialZone.fit(samples, speeds=SPEEDS, **METHODS[method]))
             print(truth, seed, file=sys.stderr, flush=True)
-        for method, found in zones.items():
-            intervals = pd.concat([zone.uncertainty.intervals for zone in found])
-            intervals["truth"] = _holds(intervals, {v: known.true_zone(v) for v in SPEEDS})
-            intervals["limit"] = np.nan
-            if method == "quantile":  # a hull has none: it shrinks
-                everyone = szlib.SocialZone.fit(pooled(everybody), method=method, speeds=SPEEDS, resamples=0)
-                intervals["limit"] = _holds(intervals, everyone.ellipses)
-            intervals["half_width"] = (intervals["high"] - intervals["low"]) / 2
-            table = intervals.groupby(["quantity", "speed"])[["truth", "limit", "half_width"]].mean()
-            tables.append(table.reset_index().assign(plaza=truth, method=method, plazas=plazas))
+        intervals = pd.concat([zone.uncertainty.intervals for zone in zones])
+        intervals["truth"] = _holds(intervals, {v: known.true_zone(v) for v in SPEEDS})
+        intervals["limit"] = np.nan
+        if method == "quantile":  # a hull has none: it shrinks
+            everyone = szlib.SocialZone.fit(pooled(everybody), method=method, speeds=SPEEDS, resamples=0)
+            intervals["limit"] = _holds(intervals, everyone.ellipses)
+        intervals["half_width"] = (intervals["high"] - intervals["low"]) / 2
+        table = intervals.groupby(["quantity", "speed"])[["truth", "limit", "half_width"]].mean()
+        tables.append(table.reset_index().assign(plaza=truth, method=method, plazas=plazas))
     return pd.concat(tables)[
         ["plaza", "method", "quantity", "speed", "truth", "limit", "half_width", "plazas"]
     ]
