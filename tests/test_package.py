@@ -21,7 +21,7 @@ ROOMS = {
     "zones": ["ellipses", "hulls", "outliers", "social_zone"],
     "plaza": ["truth", "people"],
     "control": [
-        "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
+        "barriers", "settings", "distances", "people", "problem", "ipopt", "sqp", "step", "mpc",
     ],
     "simulation": [
         "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
