@@ -1,9 +1,8 @@
 """The table of random worlds, with intervals: `python tests/rollout_table.py [--blocks 4] [--worlds 2000]`.
 
-Writes notebooks/tables/11_rollouts.csv: a row for each set of worlds and formulation, over blocks of seeds far
-apart, each share with its 95 % Clopper-Pearson interval, and the shares of the single blocks.  Finished worlds
-are kept in results/rollouts, so a run that was stopped goes on; the committed table took about an hour of one
-core.
+Writes notebooks/tables/11_rollouts.csv: a row for each set of worlds and formulation, over blocks of seeds
+far apart, each share with its 95 % Clopper-Pearson interval, and the counts of the single blocks. Finished
+worlds are kept in results/rollouts, so that a run that was stopped goes on.
 """
 
 import argparse

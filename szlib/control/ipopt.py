@@ -127,8 +127,7 @@ def _solvers(settings: MPCSettings, n_people: int, n_walls: int) -> _Solvers:
         "g": ca.vertcat(p.rows + penalty / weight, p.terminal),
     }
     solvers = []
-    # The hard problem is asked twice, warm and cold.
-    for name, nlp, share in (("hard", hard, HARD_SHARE / 2), ("relaxed", relaxed, 1 - HARD_SHARE)):
-        limit = {"ipopt.max_cpu_time": share * settings.time_limit} if settings.time_limit < inf else {}
+    limit = {"ipopt.max_cpu_time": HARD_SHARE * settings.time_limit} if settings.time_limit < inf else {}
+    for name, nlp in (("hard", hard), ("relaxed", relaxed)):
         solvers.append(ca.nlpsol(name, "ipopt", nlp, options | limit))
     return solvers[0], solvers[1], p.terminal.numel()

@@ -159,7 +159,7 @@ class MPCCBF:
             target=parameters[4:6],
             cost=numbers.cost,
             solve_time=perf_counter() - began,
-            goal_blocked=self._blocks(placed, gx, gy),
+            goal_blocked=any(zone.blocks((gx, gy), self.settings) for zone in placed),
             terminal=self._terminal(len(placed)),
             timed_out=timed_out,
             scene=Scene(tuple(people), self._segments, self.settings),
@@ -191,7 +191,8 @@ class MPCCBF:
         late = False
         rung: Rung
         for rung in ("warm", "cold"):
-            if late and self._budget.spent(HARD_SHARE):
+            if rung == "cold" and self._budget.spent(HARD_SHARE / 2):
+                late = True
                 break
             guess = shifted if rung == "warm" else self._brake(parameters[2:4])
             plan, converged = solver.hard(guess, parameters)
@@ -252,11 +253,7 @@ class MPCCBF:
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person]) -> bool:
         """True if somebody who stands has the goal in their zone: h < 0 there."""
         x, y = finite("goal", goal, (2,)).tolist()
-        return self._blocks([place(person, self.zone_of(person)) for person in people], x, y)
-
-    def _blocks(self, placed: Sequence[PlacedZone], x: float, y: float) -> bool:
-        room = self.settings.r_robot + self.settings.eps
-        return any(zone.stands and zone.distance(x, y) < room for zone in placed)
+        return any(place(who, self.zone_of(who)).blocks((x, y), self.settings) for who in people)
 
     def _check_goal(self, goal: tuple[float, float]) -> None:
         h = self.barriers(goal)

@@ -50,7 +50,8 @@ class Person:
 
     Raises
     ------
-    SolverError : a number is not finite, or a standing person has no heading.
+    SolverError : a number is not usable, or a standing person has no heading.
+    ZoneError : the zone reaches beyond `LARGEST`.
     """
 
     position: tuple[float, float]
@@ -67,6 +68,8 @@ class Person:
             raise SolverError(f"a person who stands needs a heading; got none for the one at {(x, y)}")
         heading = atan2(vy, vx) if self.heading is None else self.heading
         object.__setattr__(self, "heading", float(finite("a person's heading", heading, ())))
+        if isinstance(self.zone, Ellipse):
+            as_ellipse(self.zone, 0.0)
 
     @property
     def stands(self) -> bool:
@@ -94,10 +97,9 @@ class PlacedZone(NamedTuple):
         """Approximate distance of (x, y) to the zone now [m]."""
         return float(ellipse_formula(x, y, *self[:5]))
 
-    @property
-    def stands(self) -> bool:
-        """True if the velocity is zero."""
-        return self.vx == self.vy == 0
+    def blocks(self, goal: tuple[float, float], s: MPCSettings) -> bool:
+        """True if somebody stands here with the goal in their zone: h < 0 there."""
+        return self.vx == self.vy == 0 and barrier(self.distance(*goal), s.r_robot, s.eps) < 0
 
 
 def place(person: Person, zone: Ellipse) -> PlacedZone:
@@ -129,7 +131,8 @@ def subgoal(
     there is no room at all the goal stays the goal: then the robot yields.
 
     Only where the barrier can be felt yet, h <= closing speed * dt / gamma, and for people who do
-    not walk across the way: those open it by themselves. The nearest such person counts.
+    not walk across the way: those open it by themselves. Nor for who stands on the goal: there is nothing
+    behind them to go to. The nearest such person counts.
     """
     (x, y), way = position, (goal[0] - position[0], goal[1] - position[1])
     distance = hypot(*way)
@@ -144,7 +147,7 @@ def subgoal(
         to_a, to_b = (zone.xa - x, zone.ya - y), (zone.xb - x, zone.yb - y)
         ra, rb = hypot(*to_a), hypot(*to_b)
         across = abs(_cross(way, (zone.vx, zone.vy))) > s.tie * pace * distance
-        if across or ra * rb == 0:
+        if across or ra * rb == 0 or zone.blocks(goal, s):
             continue
         inward = (to_a[0] / ra + to_b[0] / rb, to_a[1] / ra + to_b[1] / rb)
         reach = zone.a + s.r_robot + s.eps

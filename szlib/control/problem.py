@@ -35,8 +35,9 @@ from .settings import MPCSettings
 
 TOLERANCE = 1e-6
 """Largest violation of a hard row, in its own unit, that still counts as satisfied."""
-HARD_SHARE = 0.5
-"""Share of a step's time after which the hard problem is given up: the rest is for the relaxed one."""
+HARD_SHARE = 0.4
+"""Share of a step's time for the hard problem. Its second try begins within half of that, or not at all, so
+that as much again is left for the relaxed problem."""
 BUILDING = RLock()
 """Held while anything of CasADi is written down, compiled or given away: its symbols count their users, and
 not safely for threads. Compiled functions may run at the same time, each in memory of its own."""
