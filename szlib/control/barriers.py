@@ -130,7 +130,7 @@ def finite(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     if not fits:
         raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
     array = array.astype(float)
-    if not (np.abs(array) <= LARGEST).all():
+    if not np.abs(array).max(initial=0.0) <= LARGEST:
         if not np.isfinite(array).all():
             raise SolverError(f"{name} must be finite; got {array.tolist()}")
         raise SolverError(f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin")

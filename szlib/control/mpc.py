@@ -53,9 +53,9 @@ from .distances import wall_margin
 from .ipopt import Ipopt
 from .people import Person, PlacedZone, SpeedZone, as_ellipse, place, subgoal
 from .problem import HARD_SHARE, TOLERANCE, Budget, Numbers, ProblemSolver
-from .settings import MPCSettings, Terminal
+from .settings import MPCSettings
 from .sqp import Sqp
-from .step import Rung, Scene, Step
+from .step import Rung, Scene, Step, terminal_of
 
 _log = logging.getLogger("szlib")
 
@@ -96,8 +96,10 @@ class MPCCBF:
             raise SolverError(f"terminal='person' is for open space; got {len(ends)} walls; use 'rest'")
         if not isinstance(max_people, int) or max_people < 0:
             raise SolverError(f"max_people must be a whole number >= 0; got {max_people!r}")
-        self._segments = tuple(tuple(wall) for wall in self.walls.reshape(-1, 4).tolist())
+        self._segments: list[list[float]] = self.walls.reshape(-1, 4).tolist()
         self._margins = [wall_margin(wall, self.settings) for wall in self.walls]
+        pairs = zip(self._segments, self._margins, strict=True)
+        self._wall_numbers = [number for segment, margin in pairs for number in (*segment, margin)]
         self._solvers: list[ProblemSolver] = []
         self._budget, self._thread = Budget(self.settings.time_limit), dict[str, int]()
         self._build(max_people)
@@ -159,10 +161,8 @@ class MPCCBF:
             target=parameters[4:6],
             cost=numbers.cost,
             solve_time=perf_counter() - began,
-            goal_blocked=any(zone.blocks((gx, gy), self.settings) for zone in placed),
-            terminal=self._terminal(len(placed)),
             timed_out=timed_out,
-            scene=Scene(tuple(people), self._segments, self.settings),
+            scene=Scene((gx, gy), tuple(people), placed, self._segments, self.settings),
         )
 
     def _solver(self, n_people: int) -> ProblemSolver:
@@ -174,13 +174,11 @@ class MPCCBF:
 
     def _parameters(self, x: Array, target: tuple[float, float], placed: Sequence[PlacedZone]) -> Array:
         """The numbers of `Problem.parameters`."""
-        pace = placed[0][5:] if self._terminal(len(placed)) == "person" else (0.0, 0.0)
+        pace = placed[0][5:] if terminal_of(self.settings, len(placed)) == "person" else (0.0, 0.0)
         numbers = [*x.tolist(), *target, *pace]
         for zone in placed:
             numbers += zone
-        for segment, margin in zip(self._segments, self._margins, strict=True):
-            numbers += (*segment, margin)
-        return np.array(numbers)
+        return np.array(numbers + self._wall_numbers)
 
     def _solve_with_fallbacks(
         self, solver: ProblemSolver, parameters: Array
@@ -219,10 +217,6 @@ class MPCCBF:
         if safe_end:
             return "kept", shifted, kept, late
         return "braking", brake, braking, late
-
-    def _terminal(self, n_people: int) -> Terminal:
-        """What a plan ends in: at the velocity of "person" only where there is exactly one."""
-        return "rest" if self.settings.terminal == "person" and n_people != 1 else self.settings.terminal
 
     def _brake(self, velocity: Array) -> Array:
         """The inputs that bring the robot to rest soonest along its path, shape (2N,) [m/s2]."""

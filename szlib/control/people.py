@@ -147,7 +147,7 @@ def subgoal(
         to_a, to_b = (zone.xa - x, zone.ya - y), (zone.xb - x, zone.yb - y)
         ra, rb = hypot(*to_a), hypot(*to_b)
         across = abs(_cross(way, (zone.vx, zone.vy))) > s.tie * pace * distance
-        if across or ra * rb == 0 or zone.blocks(goal, s):
+        if across or ra * rb == 0:
             continue
         inward = (to_a[0] / ra + to_b[0] / rb, to_a[1] / ra + to_b[1] / rb)
         reach = zone.a + s.r_robot + s.eps
@@ -159,7 +159,7 @@ def subgoal(
             continue
         for left in (s.pass_side == "left", s.pass_side != "left"):
             lead = (b if left else -b) / (s.tie * w)
-            if -1 <= lead < 2 and _has_room(zone, reach, way, left, walls, s):
+            if -1 <= lead < 2 and _has_room(zone, reach, way, left, walls, s) and not zone.blocks(goal, s):
                 turn = ((w if left else -w) - b) * min(1.0, 2 - lead)
                 c, d = cos(turn), sin(turn)
                 target = (x + c * way[0] - d * way[1], y + d * way[0] + c * way[1])

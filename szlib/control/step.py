@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot
-from typing import Literal, cast, get_args
+from typing import Literal, NamedTuple, cast, get_args
 
 import numpy as np
 
 from .barriers import Array, euclidean_segment_formula
-from .people import BODY_RADIUS, Person
+from .people import BODY_RADIUS, Person, PlacedZone
 from .problem import TOLERANCE
 from .settings import MPCSettings, Terminal
 
@@ -18,12 +19,13 @@ RUNGS: tuple[Rung, ...] = get_args(Rung)
 Status = Literal["optimal", "kept", "relaxed", "braking"]
 
 
-@dataclass(frozen=True)
-class Scene:
-    """Who and what was around: everybody as they were given, the walls (n, 4), and the robot's settings."""
+class Scene(NamedTuple):
+    """What was asked: the goal, everybody as they were given and their zones, the walls, and the settings."""
 
+    goal: tuple[float, float]
     people: tuple[Person, ...]
-    walls: tuple[tuple[float, ...], ...]
+    zones: Sequence[PlacedZone]
+    walls: Sequence[Sequence[float]]
     settings: MPCSettings
 
     def gaps(self, x: float, y: float, seconds: float) -> list[float]:
@@ -53,12 +55,8 @@ class Step:
     target : where the plan is drawn to: the goal, but for a meeting head-on, shape (2,) [m].
     cost : the cost of the plan, without any penalty.
     solve_time : wall-clock time of the whole step [s].
-    goal_blocked : somebody who stands has the goal in their zone (h < 0 there): the robot goes as near as
-        it may, and waits.
-    terminal : what the plan ends in: that of the settings, but "rest" for "person" while there is not
-        exactly one.
     timed_out : a rung was cut short or left out because the time was up (`MPCSettings.time_limit`).
-    scene : who and what was around.
+    scene : what was asked.
     """
 
     control: Array
@@ -70,8 +68,6 @@ class Step:
     target: Array
     cost: float
     solve_time: float
-    goal_blocked: bool
-    terminal: Terminal
     timed_out: bool
     scene: Scene = field(repr=False)
 
@@ -84,6 +80,16 @@ class Step:
     def feasible(self) -> bool:
         """True if the plan satisfies the hard problem, whatever rung it comes from; else see `slack`."""
         return self.slack <= TOLERANCE
+
+    @property
+    def goal_blocked(self) -> bool:
+        """True if somebody who stands has the goal in their zone (h < 0 there): the robot waits beside it."""
+        return any(zone.blocks(self.scene.goal, self.scene.settings) for zone in self.scene.zones)
+
+    @property
+    def terminal(self) -> Terminal:
+        """What the plan ends in: see `terminal_of`."""
+        return terminal_of(self.scene.settings, len(self.scene.people))
 
     @property
     def clearance(self) -> Array:
@@ -111,6 +117,11 @@ class Step:
     def _gaps(self, k: int) -> list[float]:
         x, y = self.predicted[k, :2].tolist()
         return self.scene.gaps(x, y, k * self.scene.settings.dt)
+
+
+def terminal_of(settings: MPCSettings, n_people: int) -> Terminal:
+    """What a plan ends in: as in the settings, but at rest for "person" while there is not exactly one."""
+    return "rest" if settings.terminal == "person" and n_people != 1 else settings.terminal
 
 
 def status_of(rung: Rung) -> Status:

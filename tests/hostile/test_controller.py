@@ -44,7 +44,7 @@ STATE, GOAL = np.array([-3.0, 0.4, 0.5, 0.0]), (4.0, 0.0)
         ({"control": np.array([0.3, 0.0])}, "plan is no motion"),
         ({"h": np.array([9.0, 9.0])}, "h or residual"),
         ({"slack": 0.5}, "slack"),
-        ({"goal_blocked": False}, "goal_blocked"),
+        ({"predicted": np.zeros((9, 4))}, "plan is no motion"),
     ],
 )
 def test_the_judge_notices_a_step_that_was_tampered_with(change, fault):
