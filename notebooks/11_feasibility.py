@@ -74,7 +74,7 @@ for gamma, N_h, a_max in product(gammas, horizons, limits):
 mine = pd.DataFrame(
     cells, columns=["gamma", "N_h", "a_max", "worlds", "infeasible_steps", "min_h", "unflagged_violations"]
 )
-mine.to_csv(record.out / "11_feasibility.csv", index=False)
+record.table(mine, "11_feasibility")
 record.check(
     "no step that called itself safe led to h < 0", (mine["unflagged_violations"] == 0).all(), len(mine)
 )

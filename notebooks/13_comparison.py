@@ -111,7 +111,7 @@ formatted(comparisons.summarise(rows)).T
 
 # %%
 mine = comparisons.summarise(pd.concat([rows, wrong]))
-mine.round(4).to_csv(record.out / "13_comparison.csv", index=False)
+record.table(mine.round(4), "13_comparison")
 full = pd.read_csv(full_table)
 expected = full[full["behaviour"] == "as expected"]
 record.key["worlds in the saved table"] = int(full["n"].max())

@@ -9,6 +9,14 @@ class DataError(SzlibError, ValueError):
     """Input data cannot be used: a file, a table, a row, or a value in it."""
 
 
+class StorageError(DataError):
+    """A file or a folder cannot be written: no room, no permission, or it is not szlib's to replace."""
+
+
+class MemoryLimitError(DataError):
+    """Data needs more memory than there is, or than was granted."""
+
+
 class ZoneError(SzlibError, ValueError):
     """A social zone or an ellipse is undefined for what was given."""
 

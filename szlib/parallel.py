@@ -6,35 +6,95 @@ A laptop needs nothing: ``n_jobs=2``.  Inside ``joblib.parallel_config("dask")``
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import os
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from typing import Any
 
 import joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+from . import memory
 from .errors import SzlibError
 
 _PATIENCE = 10
 """So long a scheduler may take to answer [s]."""
+_PER_CORE = 4
+"""More processes than that for each core only get into each other's way."""
+_HEARTBEAT = 0.5
+"""So often a process looks whether its parent still lives [s]."""
 
 
 def run_tasks(tasks: Sequence[Any], *, n_jobs: int | None = None) -> Iterator[Any]:
     """Results of ``joblib.delayed`` calls, each as soon as it is there, in any order.
 
-    `n_jobs` is a number of processes; None takes what ``joblib.parallel_config`` says, or one.
+    `n_jobs` is a number of processes, -1 for every core; None takes what ``joblib.parallel_config`` says, or
+    one.  There are never more than tasks, nor, with a RuntimeWarning, than four for each core.  Processes
+    end with this one, however it ends, and share the memory that it may use.
     Raises SzlibError where a process here is killed; a cluster computes again what a worker took with it.
     """
-    done = 0
+    done, parent, n_jobs = 0, os.getpid(), bounded(n_jobs, len(tasks))
+    share = _share(n_jobs)
+    guarded = [joblib.delayed(_guarded)(parent, share, task) for task in tasks]
     try:
-        for result in joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks):
-            done += 1
-            yield result
+        with closing(joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(guarded)) as results:
+            for result in results:
+                done += 1
+                yield result
     except TerminatedWorkerError as error:
         raise SzlibError(
             f"a worker process was killed after {done} of {len(tasks)} tasks, perhaps for lack of memory "
-            f"({error}); what was finished is kept: run again, with fewer processes"
+            f"({' '.join(str(error).split())}); what was finished is kept: run again, with fewer processes"
         ) from error
+
+
+def bounded(n_jobs: int | None, tasks: int) -> int | None:
+    """A number of processes that makes sense for so many tasks on this machine."""
+    if n_jobs == 0:
+        raise SzlibError("n_jobs must be a number of processes, or -1 for every core; got 0")
+    if n_jobs is None or n_jobs < 0:
+        return n_jobs
+    most = _PER_CORE * (os.cpu_count() or 1)
+    if n_jobs > most:
+        warnings.warn(
+            f"of {n_jobs} processes {min(most, max(tasks, 1))} are used: at most one for each task, and "
+            f"{_PER_CORE} for each core",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    return min(n_jobs, most, max(tasks, 1))
+
+
+def end_with(parent: int) -> None:
+    """End this process as soon as `parent`, if it is its parent, has ended, even by SIGKILL."""
+    if os.getppid() == parent and not any(t.name == _WATCH for t in threading.enumerate()):
+        threading.Thread(target=_watch, args=(parent,), name=_WATCH, daemon=True).start()
+
+
+_WATCH = "szlib: ends with its parent"
+
+
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_HEARTBEAT)
+    os._exit(1)
+
+
+def _guarded(parent: int, share: int | None, task: tuple[Callable[..., Any], Any, Any]) -> Any:
+    """One task, in a process that ends with its parent and keeps to its share of memory."""
+    end_with(parent)
+    function, positional, named = task
+    with memory.granted(share if os.getppid() == parent or os.getpid() == parent else None):
+        return function(*positional, **named)
+
+
+def _share(n_jobs: int | None) -> int | None:
+    """The memory of one of these processes: None for workers elsewhere, who have their own."""
+    limit = memory.ceiling()
+    return None if limit is None else limit // max(1, joblib.effective_n_jobs(n_jobs))
 
 
 @contextmanager

@@ -14,19 +14,29 @@ import pytest
 import szlib
 
 PACKAGE = Path(szlib.__file__).parent
-GROUND = ["errors", "parallel"]
+GROUND = ["errors", "files", "memory", "parallel"]
 ROOMS = {
-    "tracks": ["funnels", "formats", "readers", "clock", "quality", "interop", "datasets"],
-    "encounters": ["geometry", "search", "streaming", "pipeline", "records", "days"],
-    "zones": ["ellipses", "hulls", "outliers", "social_zone"],
-    "plaza": ["truth", "people"],
+    "tracks": [
+        "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
+    ],
+    "encounters": [
+        "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
+    ],
+    "zones": [
+        "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
+        "social_zone",
+    ],
+    "zones.respect": ["presence", "boundary", "significance", "estimate"],
+    "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "problem", "ipopt", "sqp", "step", "mpc",
     ],
     "simulation": [
         "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
     ],
-    "workbook": ["figures", "record", "runner", "command_line"],
+    "workbook": [
+        "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
+    ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation",
     ],
@@ -54,7 +64,7 @@ def _order() -> list[str]:
     """Every module, from the ground up."""
     files = list(GROUND)
     for room, names in ROOMS.items():
-        if room == "workbook.figures":
+        if "." in room:
             continue
         for name in names:
             inner = ROOMS.get(f"{room}.{name}")

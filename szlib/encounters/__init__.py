@@ -1,15 +1,29 @@
 """Who met whom, alone: windows in which two people share the attentional space.
 
 geometry   the square and the attentional space
+kinds      companions, same direction, opposite, crossing, standing: on the whole common track
 search     the four conditions of the paper: `find_encounters`
 streaming  of a raw day only the rows near the square
 pipeline   every parameter from the files of a day to its encounters
 records    the stored encounters of a day, and what they were made of
 days       many days, resumable, on one machine or many: `extract_days`
+shifting   the same people, each moved in time alone: `time_shifted`
+null       the null model, encounters where nobody minds anybody: `null_encounters`
 """
 
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["geometry", "search", "streaming", "pipeline", "records", "days"]
+    __name__,
+    submodules=[
+        "geometry",
+        "kinds",
+        "search",
+        "streaming",
+        "pipeline",
+        "records",
+        "days",
+        "shifting",
+        "null",
+    ],
 )

@@ -12,8 +12,9 @@ import gzip
 import time
 import warnings
 import zlib
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -24,12 +25,16 @@ import pandas as pd
 from tqdm import tqdm
 
 from ..errors import DataError, DataWarning, SzlibError
+from ..files import own_folder, printable
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.formats import LONGEST_LINE, layout_of
+from ..tracks.formats import LONGEST_LINE, layout_of, start_of_day
+from ..tracks.readers import CALENDAR_BEGINS, recording_names
 from .pipeline import Chain
 from .records import day_key, finished_record, write_record
 
+PURPOSE = "encounters by day"
+"""What the folder of an extraction is marked as."""
 _READ = "read all files"
 """The first stage of the funnel of many days."""
 
@@ -44,11 +49,13 @@ class Extraction:
     table : one row a day: day, status ("done" now, "kept" from before, "excluded", "failed"), files, rows
         read, unusable rows among them, encounters, samples, seconds, and why a day failed.
     exclude : days that were left out.
+    keys : of each finished day, the name of its result: content, parameters and version.
     """
 
     out: Path
     table: pd.DataFrame
     exclude: tuple[str, ...] = ()
+    keys: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def failed(self) -> pd.DataFrame:
@@ -59,22 +66,33 @@ class Extraction:
         """Samples of all finished days, as from `szlib.find_encounters`, by day, encounters numbered anew.
 
         The funnels of all days are added up, stage by stage.
-        Independent of the order of the files, of what was kept, and of who computed it.  Raises DataError
-        where no day was finished.
+        Independent of the order of the files, of what was kept, and of who computed it.  Where recordings
+        of several files have one day in common, their names tell them apart.  Raises DataError where no day
+        was finished, or another run has since left something else in the folder.
         """
         days = self.table.loc[self.table["status"].isin(["done", "kept"]), "day"]
         if len(days) == 0:
             raise DataError(f"no day was finished in {self.out}; see the table: {self}")
         parts, stages, count = [], [], 0
         for day in sorted(days):
+            if finished_record(self.out, day, self.keys.get(day, "")) is None:
+                raise DataError(
+                    f"{self.out / day}.parquet: is no longer what this extraction has left there (another "
+                    "run, other data or parameters, or damage); extract again, into a folder of its own"
+                )
             part = pd.read_parquet(self.out / f"{day}.parquet")
             stages.append(
                 [s | {"stage": _READ} if s["stage"].startswith("read ") else s for s in funnels.of(part)]
             )
             part = part[~part["day"].isin(self.exclude)]
             numbers, found = pd.factorize(part["encounter"])
-            parts.append(part.assign(encounter=numbers + count, day=part["day"].astype(str)))
+            parts.append(part.assign(encounter=numbers + count, day=part["day"].astype(str), file=day))
             count += len(found)
+        shared = Counter(name for part in parts for name in part["day"].unique())
+        for k, part in enumerate(parts):
+            twice = part["day"].map(shared) > 1
+            parts[k] = part.assign(day=part["day"].where(~twice, part["day"] + " (" + part["file"] + ")"))
+        parts = [part.drop(columns="file") for part in parts]
         samples = pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
         return funnels.carry(samples.astype({"day": "category"}), funnels.add(stages))
 
@@ -98,13 +116,14 @@ def extract_days(
     Parameters
     ----------
     paths : files, folders or globs.  Files that begin on the same calendar day make one day (the pieces
-        of the 1 Hz day); a recording that counts frames or has its own days is one by its name.
-    out : folder of the results; made if it is missing.  Only one run at a time may write into it.
+        of the 1 Hz day); a recording that counts frames, has its own days, or whose clock does not count from
+        1970, is one by its file's name (and folder's, where two are called the same).
+    out : folder of the results, its own; made if it is missing.
     n_jobs : processes; None takes what ``joblib.parallel_config`` says, such as a Dask cluster, or one.
     exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
     progress : whether to show a bar over the days.
     parameters : of `szlib.read_tracks` and `szlib.find_encounters`: square, space, duration, min_distance,
-        min_speed, throughout, file_format, unit, max_gap, tz.
+        min_speed, throughout, file_format, unit, frame_rate, max_gap, tz.
 
     Returns
     -------
@@ -112,7 +131,8 @@ def extract_days(
 
     Raises
     ------
-    DataError : there is no such file or parameter, or the folder cannot be made.
+    DataError : there is no such file or parameter.
+    StorageError : the folder cannot be made, holds what szlib did not write, or data that is to be read.
     """
     unknown = sorted(set(parameters) - set(Chain.__dataclass_fields__))
     if unknown:
@@ -120,12 +140,10 @@ def extract_days(
     chain, folder = Chain(**parameters), Path(out)
     excluded = (exclude,) if isinstance(exclude, str) else tuple(sorted(map(str, exclude)))
     days: dict[str, list[str]] = {}
-    for file in sorted({file.resolve() for file in datasets.find(paths)}):
-        days.setdefault(_day_of(file, chain), []).append(str(file))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DataError(f"{folder}: cannot be made ({error}); choose another folder") from error
+    files = sorted({file.resolve() for file in datasets.find(paths)})
+    own_folder(folder, PURPOSE, inputs=files)
+    for file, name in zip(files, recording_names(files), strict=True):
+        days.setdefault(_day_of(file, chain) or printable(name), []).append(str(file))
     rows = [_row(day, files, status="excluded") for day, files in days.items() if day in excluded]
     tasks = [
         joblib.delayed(extract_day)(day, files, str(folder.resolve()), chain)
@@ -137,8 +155,9 @@ def extract_days(
             rows.append(row)
             bar.update()
             bar.set_postfix_str(f"{row['day']} {row['status']}")
+    keys = {row["day"]: row.pop("key") for row in rows}
     table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
-    return Extraction(folder, table, excluded)
+    return Extraction(folder, table, excluded, keys)
 
 
 def extract_day(day: str, files: Sequence[str], out: str, chain: Chain) -> dict[str, Any]:
@@ -154,21 +173,22 @@ def extract_day(day: str, files: Sequence[str], out: str, chain: Chain) -> dict[
                 warnings.simplefilter("ignore", DataWarning)
                 samples = chain.encounters([Path(file) for file in files])
             record = write_record(folder, day, key, samples, files, chain)
-        row |= {name: record[name] for name in ("rows", "unusable", "encounters", "samples")}
+        row |= {name: record[name] for name in ("key", "rows", "unusable", "encounters", "samples")}
         row["status"] = status
-    except (SzlibError, OSError, MemoryError) as error:
-        row["why"] = str(error) or type(error).__name__
+    except SzlibError as error:
+        row["why"] = printable(error)
+    except Exception as error:  # whatever is wrong with one day, the others go on
+        row["why"] = printable(f"{type(error).__name__}: {error}")
     return row | {"seconds": time.perf_counter() - begun}
 
 
 def _row(day: str, files: Sequence[str], status: str) -> dict[str, Any]:
     counts = dict.fromkeys(("rows", "unusable", "encounters", "samples"), 0)
-    return {"day": day, "status": status, "files": len(files), **counts, "seconds": 0.0, "why": ""}
+    return {"day": day, "status": status, "files": len(files), **counts, "seconds": 0.0, "why": "", "key": ""}
 
 
-def _day_of(file: Path, chain: Chain) -> str:
-    """The calendar day on which a file begins; its name where it has no time of day."""
-    name = file.name.split(".")[0]
+def _day_of(file: Path, chain: Chain) -> str | None:
+    """The calendar day on which a file begins; None where it tells none."""
     try:
         with file.open("rb") as stream:
             packed = stream.read(2) == b"\x1f\x8b"
@@ -176,8 +196,10 @@ def _day_of(file: Path, chain: Chain) -> str:
             first = stream.readline(LONGEST_LINE).decode("utf-8", errors="replace").lstrip("\ufeff").strip()
         layout = layout_of(first, chain.file_format)
         if layout.name not in ("atc-raw", "atc-1hz"):
-            return name
-        begun = float(first.split(layout.separator)[layout.columns["t"]])
+            return None
+        begun = float(first.split(layout.separator)[layout.columns["t"]]) + start_of_day(file, layout, first)
+        if not begun >= CALENDAR_BEGINS:
+            return None
         return datetime.fromtimestamp(begun, ZoneInfo(chain.tz)).strftime("%Y-%m-%d")
     except (OSError, EOFError, zlib.error, ValueError, OverflowError):  # reading the day will tell why
-        return name
+        return None

@@ -26,6 +26,10 @@ class Square:
         """Which points (any shape, the same for x and y) lie inside or on the border."""
         return np.asarray((x >= self.x[0]) & (x <= self.x[1]) & (y >= self.y[0]) & (y <= self.y[1]))
 
+    def grown(self, by: float) -> Square:
+        """The square with `by` metres more on each side."""
+        return Square((self.x[0] - by, self.x[1] + by), (self.y[0] - by, self.y[1] + by))
+
 
 ATC_SQUARE = Square(x=(-18.5, -7.5), y=(-10.0, 8.0))
 """The central square of the ATC mall (assumed; free of pillars, walls and queues on the real day)."""

@@ -17,6 +17,7 @@ from ..tracks.clock import to_clock
 from ..tracks.formats import FORMATS
 from ..tracks.readers import read_raw
 from .geometry import ATC_SQUARE, PAPER_SPACE, AttentionalSpace, Square
+from .kinds import KINDS
 from .search import SAMPLE_COLUMNS, find_encounters
 from .streaming import read_near_square
 
@@ -33,6 +34,7 @@ class Chain:
     throughout: bool = False
     file_format: str | None = None
     unit: str | None = None
+    frame_rate: float | None = None
     max_gap: float | None = None
     tz: str = "Asia/Tokyo"
 
@@ -55,11 +57,18 @@ class Chain:
                 duration=self.duration,
                 file_format=self.file_format,
                 unit=self.unit,
+                frame_rate=self.frame_rate,
                 max_gap=self.max_gap,
                 tz=self.tz,
             )
         else:
-            raw = read_raw(files, file_format=self.file_format, unit=self.unit, tz=self.tz)
+            raw = read_raw(
+                files,
+                file_format=self.file_format,
+                unit=self.unit,
+                frame_rate=self.frame_rate,
+                tz=self.tz,
+            )
         tracks = to_clock(raw, max_gap=self.max_gap) if len(raw) else raw
         if len(tracks) == 0:
             return funnels.carry(no_samples(), funnels.of(tracks))
@@ -80,4 +89,5 @@ def no_samples() -> pd.DataFrame:
     columns: Mapping[str, Any] = dict.fromkeys(SAMPLE_COLUMNS, numbers) | dict.fromkeys(
         ("encounter", "ref_id", "other_id"), integers
     )
-    return pd.DataFrame({**columns, "day": pd.Categorical([])})[SAMPLE_COLUMNS]
+    samples = pd.DataFrame({**columns, "day": pd.Categorical([])})[SAMPLE_COLUMNS]
+    return samples.assign(kind=pd.Categorical([], categories=list(KINDS)))

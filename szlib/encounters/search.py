@@ -15,7 +15,7 @@ window is one encounter of 31 samples.  Everything is vectorised over rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pandas as pd
@@ -24,11 +24,16 @@ from ..errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, check_columns, clock_index, nearest_tick
 from .geometry import ATC_SQUARE, PAPER_SPACE, AttentionalSpace, Square, wrap_angle
+from .kinds import REACH, kinds_of_pairs, number_people, of_kind
 
 SAMPLE_COLUMNS = ["encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed"]
+"""What is measured; the column kind follows them."""
 
 _PAIRS_AT_ONCE = 4_000_000
 """Pairs of people held in memory at a time."""
+
+_TOUCH = 1e-3
+"""Covers every rounding of a position, however many ticks there are [m]."""
 
 _LONGEST_WINDOW = 3600.0
 """No two people are watched for an hour [s]."""
@@ -43,6 +48,7 @@ def find_encounters(
     min_distance: float = 1.0,
     min_speed: float = 0.4,
     throughout: bool = False,
+    kinds: str | Iterable[str] | None = None,
 ) -> pd.DataFrame:
     """Find the encounters of two people, and sample each at 10 Hz.
 
@@ -56,13 +62,15 @@ def find_encounters(
     min_speed : of the reference pedestrian, throughout [m/s] (paper: 0.4).
     throughout : also require that the other person stays inside the space for the whole window.
         That reading of the paper never sees two people pass each other (assumed: False).
+    kinds : None keeps all (paper); "strangers" all but companions; else one or several of
+        `szlib.encounters.kinds.KINDS`.  Encounters keep the numbers that they have among all.
 
     Returns
     -------
     One row a sample: encounter (number), day, ref_id, other_id, t [s], los_angle [rad] (bearing of
     the other person in the reference pedestrian's frame, in (-pi, pi]), distance [m], speed of the
-    reference pedestrian [m/s].  Empty where nobody met.  ``.attrs["funnel"]`` says why every other
-    tick opened no encounter.
+    reference pedestrian [m/s], kind (category, see `szlib.encounters.kinds`).  Empty where nobody met.
+    ``.attrs["funnel"]`` says why every other tick opened no encounter.
 
     Raises
     ------
@@ -126,12 +134,17 @@ def find_encounters(
     kept, tried = _sift(np.arange(len(openings)), conditions)
 
     samples = _sampled(tracks, order, openings[kept], partner[kept], steps)
+    number, _ = number_people(days, person)
+    met = number[openings[kept]], number[partner[kept]]
+    near = square.grown(REACH).contains(x, y)
+    kind = kinds_of_pairs(*met, number, tick, np.column_stack([x, y]), np.column_stack([vx, vy]), near)
+    samples["kind"] = kind.repeat(steps + 1)
     stages = [
         *funnels.of(tracks),
         funnels.stage("encounters: ticks that open a window", len(x), len(openings), opened),
         funnels.stage("encounters: windows", len(openings), len(kept), tried),
     ]
-    return funnels.carry(samples, stages)
+    return of_kind(funnels.carry(samples, stages), kinds)
 
 
 def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame:
@@ -210,7 +223,8 @@ def _occupants(
     The space lies inside the square, so only the rows `inside` the square can be in it.
     """
     people, other = np.zeros(len(x), np.int64), np.full(len(x), -1)
-    for ref, oth in _simultaneous(inside, ready, days, tick):
+    reach = float(np.hypot(*space.corners.T).max())
+    for ref, oth in _simultaneous(inside, ready, days, tick, y, reach):
         dx, dy = x[oth] - x[ref], y[oth] - y[ref]
         cos, sin = np.cos(heading[ref]), np.sin(heading[ref])
         seen = space.contains(cos * dx + sin * dy, cos * dy - sin * dx) & (ref != oth)
@@ -220,23 +234,28 @@ def _occupants(
 
 
 def _simultaneous(
-    inside: np.ndarray, ready: np.ndarray, days: np.ndarray, tick: np.ndarray
+    inside: np.ndarray, ready: np.ndarray, days: np.ndarray, tick: np.ndarray, y: np.ndarray, reach: float
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Blocks of pairs (ready row, row inside the square) that share a tick, itself included."""
+    """Blocks of pairs (ready row, row inside the square) that share a tick, itself included.
+
+    Pairs farther apart than `reach` along y [m] are left out; in a hall that saves most of them.
+    """
     if len(inside) == 0:
         return
-    rows = inside[np.lexsort((tick[inside], days[inside]))]
+    rows = inside[np.lexsort((y[inside], tick[inside], days[inside]))]
     fresh = np.r_[True, (np.diff(tick[rows]) != 0) | (np.diff(days[rows]) != 0)]
-    group = np.cumsum(fresh) - 1
-    starts, sizes = np.flatnonzero(fresh), np.bincount(group)
+    beyond = reach + _TOUCH
+    place = y[rows] - y[rows].min()
+    place += (np.cumsum(fresh) - 1) * (place.max() + 2 * beyond)  # nobody is within reach of another tick
     of_ready = np.flatnonzero(ready[rows])
-    count = sizes[group[of_ready]]
+    first = np.searchsorted(place, place[of_ready] - beyond)
+    count = np.searchsorted(place, place[of_ready] + beyond, side="right") - first
     block = np.cumsum(count) // _PAIRS_AT_ONCE
     for b in range(int(block[-1]) + 1 if len(block) else 0):
-        mine = of_ready[block == b]
-        size = sizes[group[mine]]
+        mine = block == b
+        size = count[mine]
         offset = np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
-        yield np.repeat(rows[mine], size), rows[np.repeat(starts[group[mine]], size) + offset]
+        yield np.repeat(rows[of_ready[mine]], size), rows[np.repeat(first[mine], size) + offset]
 
 
 def _changes_of_occupant(

@@ -1,8 +1,8 @@
 """A raw day, streamed: of millions of rows only those that encounters in the square can depend on.
 
 `read_near_square` gives a table from which `to_clock` and `find_encounters` make the very encounters, bit
-for bit, that they make from the whole day.  Why that is so, with g the longest gap [s] within a track, and
-0.1 s the clock:
+for bit, that they make from the whole day.  Why that is so, with g the longest gap [s] within a track, 0.1 s
+the clock, and "the square" the one asked for, grown by the 5 m in which kinds of encounter are decided:
 
 1. Cut time into cells of w > g seconds for each person.  Rows leave the scan by whole cells.  Of two
    kept rows, consecutive among the kept ones and at most g apart, no dropped row can lie between: a
@@ -14,7 +14,7 @@ for bit, that they make from the whole day.  Why that is so, with g the longest 
 3. `find_encounters` uses of rows outside the square only these: those of a person who is inside, from
    0.5 s before (velocity of the reference pedestrian) to the end of the window of 3 s after (both are
    tracked, and the other person is sampled), and g further to interpolate.  All cells that this reaches
-   from cells that may have a tick inside are kept.
+   from cells that may have a tick inside are kept.  (Kinds need ticks inside and their velocities only.)
 
 Cells are found by a hash: those that share a slot are kept if one of them is, which keeps whole cells,
 and more of them, so that 1 to 3 hold.  Files sorted by time, as ATC's are, need one pass, for what comes
@@ -34,11 +34,13 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
+from .. import memory
 from ..tracks import funnels
 from ..tracks.clock import VELOCITY_SPAN
 from ..tracks.formats import Format, plain_file, readable, recognise
 from ..tracks.readers import check_unit, fault, faults, in_metres, merge, read_raw, read_stage
 from .geometry import Square
+from .kinds import REACH
 
 _ROWS_AT_ONCE = 1 << 17
 """Rows of one block [about 5 minutes of a raw day]."""
@@ -48,6 +50,8 @@ _MIXER, _SHIFT = np.int64(-7_046_029_254_386_353_131), 40
 """Fibonacci hashing (Knuth, TAOCP 3, 6.4): spreads ids over the table, be they as regular as they like."""
 _SLACK = 0.1
 """Covers every rounding of a time [s]."""
+_NEAR_ROW = 180
+"""Bytes that a row near the square takes until its day is done (15.6 million of them: 2.7 GB)."""
 _TOUCH = 1e-6
 """Covers every rounding of a position [m]."""
 
@@ -110,6 +114,7 @@ def read_near_square(
     duration: float,
     file_format: str | None = None,
     unit: str | None = None,
+    frame_rate: float | None = None,
     max_gap: float | None = None,
     tz: str = "Asia/Tokyo",
 ) -> pd.DataFrame:
@@ -126,12 +131,12 @@ def read_near_square(
     path = Path(path)
     if path.is_file():
         with plain_file(path) as plain:
-            layout, scan = recognise(plain, path, file_format)
+            layout, scan = recognise(plain, path, file_format, frame_rate)
             if layout.name == "atc-raw":
                 metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
-                cells = Cells(square, duration, max_gap or layout.max_gap or 0.0, metres)
+                cells = Cells(square.grown(REACH), duration, max_gap or layout.max_gap or 0.0, metres)
                 return _read(scan, path, layout, cells, unit=unit, tz=tz)
-    return read_raw(path, file_format=file_format, unit=unit, tz=tz)
+    return read_raw(path, file_format=file_format, unit=unit, frame_rate=frame_rate, tz=tz)
 
 
 def _read(
@@ -140,9 +145,9 @@ def _read(
     with readable(path, layout):
         blocks = Blocks(scan, cells.metres, layout.seconds)
         try:
-            parts = list(_one_pass(cells, blocks))
+            parts = _gather(_one_pass(cells, blocks), path)
         except _Unsorted:
-            parts = list(_two_passes(cells, blocks))
+            parts = _gather(_two_passes(cells, blocks), path)
     near = pl.DataFrame(dict(zip(Rows._fields, map(np.concatenate, zip(*parts, strict=True)), strict=True)))
     stage = read_stage(path, layout, blocks.good, dict(blocks.reasons), blocks.first)
     if unit is None:
@@ -153,6 +158,16 @@ def _read(
         empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
         return funnels.carry(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
     return merge([in_metres(near, path, layout, cells.metres, tz)], stages, [layout], [])
+
+
+def _gather(blocks: Iterator[Rows], path: Path) -> list[Rows]:
+    """The rows of all blocks; raises MemoryLimitError as soon as they are too many."""
+    parts, count = [], 0
+    for rows in blocks:
+        parts.append(rows)
+        count += len(rows.t)
+        memory.require(count * _NEAR_ROW, f"{path}: to keep {count:,} rows near the square, or more,")
+    return parts
 
 
 class _Unsorted(Exception):

@@ -1,9 +1,11 @@
 """Is it true: a synthetic square whose people keep a known social zone.
 
-truth   the settings of the plaza and the zone that its people keep: `PlazaSettings`
-people  who walks there, and what a sensor records of them: `make_plaza`
+truth        the settings of the plaza and the zone that its people keep: `PlazaSettings`
+people       who walks there, and what a sensor records of them: `make_plaza`
+scores       whom a rule for outliers found, and how far a zone is off
+indifferent  a plaza on which nobody minds anybody: `indifferent_crowd`
 """
 
 import lazy_loader as lazy
 
-__getattr__, __dir__, __all__ = lazy.attach(__name__, submodules=["truth", "people"])
+__getattr__, __dir__, __all__ = lazy.attach(__name__, submodules=["truth", "people", "scores", "indifferent"])

@@ -13,7 +13,6 @@ right through.  Who stands has no direction of motion, and so no zone.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from ..encounters.geometry import wrap_angle
-from ..errors import DataError, ZoneError
+from ..errors import ZoneError
+from ..files import write_file
 from .truth import (
     MARGIN,
     SLOWEST,
@@ -40,18 +40,18 @@ from .truth import (
 
 KINDS = ("overtaking", "head-on", "crossing", "together", "standing", "intruder")
 """Kinds of encounter; the first three by the angle between the directions of motion when closest."""
+FIRST_ID, ID_STEP = 9_190_600, 100
+"""Of people's ids, as on the first day of ATC; the two of a pair follow each other."""
 
 _VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")  # of staged encounters, each with x and y
 _TRACKED = 3.4  # a pair is tracked for the window of 3 s, wherever the ticks of the clock fall [s]
 _PAUSE = 1.0  # between a pair's end and the start of the next [s]
 _BEFORE = (0.5, 2.5)  # from a pair's start until the two are closest [s]
 _TOGETHER = 0.25  # who walk together drift apart slower than that [m/s]
-_HASTE = 1.5  # intruders rush past faster than that [m/s]: LOF cannot tell many near samples from a habit
 _BEND = 1.2  # sharpest curvature of a path in the walker's frame [1/m]
 _MOMENTS = np.linspace(0, _TRACKED, 52)  # at which a path is checked [s]
 _ROUNDS, _SHIFT, _PATIENCE = 5000, 0.001, 200  # draws; each keeps 1 mm more clear; new bearing after so many
 _FRAMES = (33, 50)  # from one frame to the next [ms]
-_FIRST_ID, _ID_STEP = 9_190_600, 100  # ids as on the first day of ATC
 _SHORT_GAP, _LONG_GAP = (0.1, 0.4), (0.6, 1.0)  # a track ends after 0.5 s of silence [s]
 _HEIGHT = (1.5, 1.8)  # of people [m]
 _VELOCITY_NOISE, _FACING_NOISE = 0.45, 0.3  # of the sensor's own velocity [m/s] and facing angle [rad]
@@ -64,21 +64,12 @@ def make_plaza(path: str | Path, *, seed: int = 0, settings: PlazaSettings | Non
 
     Raises
     ------
-    DataError : the file cannot be written.
+    StorageError : the file cannot be written.
     ZoneError : people cannot respect the zones of `settings` (see `stage_encounters`).
     """
     path, settings = Path(path), settings or PlazaSettings()
     rows = _sensed(stage_encounters(seed=seed, settings=settings), seed, settings)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        rows.write_csv(unfinished, include_header=False, float_precision=3)
-        unfinished.replace(path)
-    except OSError as error:
-        raise DataError(
-            f"{path}: cannot write the plaza ({error}); choose a folder that exists and is writable"
-        ) from error
-    finally:
-        unfinished.unlink(missing_ok=True)
+    write_file(path, rows.write_csv(include_header=False, float_precision=3))
     return path
 
 
@@ -187,7 +178,9 @@ def _draw(
     normal = -to_left(tangent)
     intrusion = rng.uniform(*settings.intrusion, n)
     offset = np.where(intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal)
-    pace = rng.uniform(np.where(intruder, _HASTE, _TOGETHER), 2 * settings.fastest)
+    slowest = np.where(intruder, settings.pace[0], _TOGETHER)
+    quickest = np.where(intruder, min(settings.pace[1], 2 * settings.fastest), 2 * settings.fastest)
+    pace = rng.uniform(slowest, quickest)
     pace = np.where(plan == "together", rng.uniform(0, _TOGETHER, n), np.where(standing, speed, pace))
     side = np.where(standing, -np.sign(tangent[:, 0]), rng.choice([-1.0, 1.0], n))
     passing = (side * pace)[:, None] * tangent
@@ -252,7 +245,7 @@ def _sensed(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     }
     columns = {
         "time": np.broadcast_to(frames[:, None], there.shape),
-        "id": _FIRST_ID + _ID_STEP * (2 * pair[:, None] + np.arange(2)),
+        "id": FIRST_ID + ID_STEP * (2 * pair[:, None] + np.arange(2)),
         **mm,
         "motion_angle": np.arctan2(felt[..., 1], felt[..., 0]),
         "facing_angle": wrap_angle(facing),

@@ -20,12 +20,15 @@ SLOWEST = 0.45
 SPACE = AttentionalSpace()
 MARGIN = 0.15
 """What must be inside stays so in spite of the noise [m]."""
+RUSHING, SLOW = (1.5, np.inf), (0.25, 1.0)
+"""Paces of intruders, relative to the walker, (slowest, fastest) [m/s]."""
 
 _SLOW, _FAST = 0.5, 1.5  # speeds at which the settings give the zone [m/s]
 _ZONE_SLOW, _ZONE_FAST = Ellipse((0.04, 0.0), (0.88, 0.68)), Ellipse((0.06, 0.0), (1.0, 0.78))
 _JAPAN = timezone(timedelta(hours=9))
 _FIRST_HOUR = 10  # of the day, when the first pair comes
 _LOOKED_AT = 3.15  # the window of 3 s begins at the first tick or, at the latest, the next [s]
+_PACE = 0.5  # who is slower does not come close within the window [m/s]
 _BULGE = 0.003  # of the hull out of the free space that still counts as convex [m]
 
 
@@ -44,6 +47,8 @@ class PlazaSettings:
     standing, together, intruders : shares of encounters with a person who stands, of two who walk
         together, and with one who walks right through the walker's zone.
     intrusion : how close intruders come, (nearest, farthest) [m].
+    pace : of intruders, relative to the walker, (slowest, fastest) [m/s].  `RUSHING` ones, the default,
+        leave a few samples within the zone; `SLOW` ones leave many, which look like a habit.
     noise : standard deviation of each coordinate measured [m].
     gaps, losses : shares of tracks interrupted for 0.1-0.4 s, and for 0.6-1 s, which ends a track.
     square : where people meet [m].
@@ -71,6 +76,7 @@ class PlazaSettings:
     together: float = 0.12
     intruders: float = 0.0025
     intrusion: tuple[float, float] = (0.2, 0.4)
+    pace: tuple[float, float] = RUSHING
     noise: float = 0.01
     gaps: float = 0.05
     losses: float = 0.01
@@ -95,6 +101,11 @@ class PlazaSettings:
             )
         if not 0 < self.intrusion[0] <= self.intrusion[1] < np.inf:
             raise DataError(f"expected 0 < nearest <= farthest intrusion; got {self.intrusion} m")
+        if not (0 < self.pace[0] <= self.pace[1] >= _PACE and self.pace[0] < 2 * self.fastest):
+            raise DataError(
+                f"expected 0 < slowest <= fastest pace, the slowest below {2 * self.fastest} m/s (two people "
+                f"at their fastest), the fastest {_PACE} m/s or more (from 1 m away); got {self.pace}"
+            )
         needed = np.hypot(swept_length(self.speeds[1]), SPACE.width) + 2 * MARGIN
         given = min(np.ptp(self.square.x), np.ptp(self.square.y))
         if given < needed:

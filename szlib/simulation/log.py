@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -20,6 +21,7 @@ from ..control.people import BODY_RADIUS, Person
 from ..control.settings import MPCSettings
 from ..control.step import status_of
 from ..errors import DataError
+from ..files import write_file
 from ..zones.ellipses import Ellipse
 from .metrics import metrics
 from .scenario import Scenario
@@ -191,11 +193,10 @@ class SimulationLog:
                 {"position": p.position, "velocity": p.velocity, "heading": p.heading} for p in people
             ],
         }
-        try:
-            pd.DataFrame(flat).to_parquet(stem.with_suffix(".parquet"))
-            stem.with_suffix(".json").write_text(json.dumps(content, indent=1), encoding="utf-8")
-        except OSError as error:
-            raise DataError(f"{stem}: the run cannot be written ({error}); choose another folder") from error
+        buffer = io.BytesIO()
+        pd.DataFrame(flat).to_parquet(buffer)
+        write_file(stem.with_suffix(".parquet"), buffer.getvalue())
+        write_file(stem.with_suffix(".json"), json.dumps(content, indent=1))
 
     @classmethod
     def load(cls, path: str | Path) -> SimulationLog:

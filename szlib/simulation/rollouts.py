@@ -10,7 +10,7 @@ folder named after the parameters: an interrupted call goes on where it stopped,
 from __future__ import annotations
 
 import hashlib
-import os
+import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +25,7 @@ from ..control.mpc import MPCCBF
 from ..control.problem import TOLERANCE
 from ..control.settings import MPCSettings
 from ..errors import SolverError, SzlibError
+from ..files import keep, kept, own_folder, write_file
 from ..parallel import run_tasks
 from ..zones.ellipses import Ellipse
 from .closed_loop import Zones, drive
@@ -32,6 +33,9 @@ from .log import SimulationLog
 from .metrics import Outcome
 from .scenario import Behaviour
 from .worlds import Worlds, world
+
+PURPOSE = "rollouts"
+"""What the folder of finished chunks is marked as."""
 
 CHUNK = 50
 """Worlds in one file and in one task: about a second of work."""
@@ -82,8 +86,9 @@ def rollouts(
     setup = Setup(settings or MPCSettings(), worlds or Worlds(), behaviour or Behaviour(), zones, measure)
     folder = None if out is None else Path(out) / setup.key()
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "parameters.txt").write_text(setup.describe() + "\n", encoding="utf-8")
+        own_folder(folder.parent, PURPOSE)
+        own_folder(folder, f"{PURPOSE} {setup.key()}")
+        write_file(folder / "parameters.txt", setup.describe() + "\n")
     chunks = [range(first, min(first + CHUNK, seed + n)) for first in range(seed, seed + n, CHUNK)]
     tasks = [delayed(_chunk)(setup, chunk, folder) for chunk in chunks]
     tables: list[pd.DataFrame] = []
@@ -163,8 +168,9 @@ def replay(seed: int, **parameters: Any) -> SimulationLog:
 def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
     """The rows of these seeds: read where they are finished, else driven, and kept."""
     file = None if folder is None else folder / f"seeds-{seeds.start:07d}-{seeds.stop - 1:07d}.parquet"
-    if file is not None and file.exists():
-        return pd.read_parquet(file)
+    made = {"rollouts": setup.describe(), "seeds": [seeds.start, seeds.stop]}
+    if file is not None and (content := kept(file, made)) is not None:
+        return pd.read_parquet(io.BytesIO(content))
     rows = []
     for seed in seeds:
         log = setup.run(seed)
@@ -172,7 +178,7 @@ def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
         rows.append({"seed": seed, **log.metrics(), **more})
     table = pd.DataFrame(rows)
     if file is not None:
-        unfinished = file.with_name(f".{file.name}.{os.getpid()}")
-        table.to_parquet(unfinished)
-        unfinished.replace(file)
+        buffer = io.BytesIO()
+        table.to_parquet(buffer)
+        keep(file, buffer.getvalue(), made)
     return table

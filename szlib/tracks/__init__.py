@@ -1,16 +1,29 @@
 """Who was where, when: files of any format to one table of tracks on one clock.
 
 funnels    how many rows entered each stage, and why others were set aside
+frame_rates how long a frame is, where frames are counted
 formats    the layouts of files, and how they are recognised
 readers    rows of files as they are
 clock      rows brought to multiples of 0.1 s, with velocities: `read_tracks`
 quality    what a file is like before it is used
 interop    the contract of a loader, groups, PedPy
+sites      Grand Central, Edinburgh's Informatics Forum, THOR-MAGNI
 datasets   named data and paths, downloads verified by hash
 """
 
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["funnels", "formats", "readers", "clock", "quality", "interop", "datasets"]
+    __name__,
+    submodules=[
+        "funnels",
+        "frame_rates",
+        "formats",
+        "readers",
+        "clock",
+        "quality",
+        "interop",
+        "sites",
+        "datasets",
+    ],
 )

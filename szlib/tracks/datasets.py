@@ -1,21 +1,27 @@
-"""Named data and paths: a real day of the ATC mall, or anybody's own files.
+"""Named data and paths: a real day of the ATC mall, ten days of its middle, or anybody's own files.
 
 The real day is the public 1 Hz version of 2012-10-24, pinned to a commit and to the SHA-256 of each
-file.  The ATC data are free for research; cite Brscic, Kanda, Ikeda, Miyashita, "Person tracking in
-large public spaces using 3-D range sensors", IEEE Trans. Human-Machine Systems 43(6), 2013.
+file; the ten days (2012-10-24 to 2012-11-25) are those of LaCE-LHMP, pinned to the git blob id of each.
+The ATC data are free for research; cite Brscic, Kanda, Ikeda, Miyashita, "Person tracking in large public
+spaces using 3-D range sensors", IEEE Trans. Human-Machine Systems 43(6), 2013.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
-from collections.abc import Sequence
+import re
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import pooch
 
-from ..errors import DataError
+from ..errors import DataError, DataWarning
+from ..files import printable
 
-SYNTHETIC, ATC_1HZ = "synthetic", "atc-1hz"
+SYNTHETIC, ATC_1HZ, ATC_10_DAYS = NAMES = "synthetic", "atc-1hz", "atc-10-days"
+_NAMED = ", ".join(map(repr, NAMES))
 
 ATC_1HZ_URL = (
     "https://raw.githubusercontent.com/test-bai-cpu/online-mod/"
@@ -46,10 +52,33 @@ ATC_1HZ_FILES = {
     "atc-1024-9_test.csv": "7e65413f58199c25a29c2e2e6663e9393ee9d0e1a3a221af9caddbd388738bf2",
     "atc-1024-9_train.csv": "f829bae787cfc0ed5db420e61ba7d58e797ddc3fe02404ac4b6d1d2eadce0b4d",
 }
-"""SHA-256 by file name; hour 12 is public in part only (10 % of the people)."""
+"""SHA-256 by file name; of hour 12 it holds one file of two (10 % of the people)."""
+
+ATC_10_DAYS_URL = (
+    "https://raw.githubusercontent.com/test-bai-cpu/LaCE-LHMP/"
+    "ef93d1265ab26cb0a3084dc2e267579b11614607/atc_data/middle_area/"
+)
+ATC_10_DAYS_FILES = {
+    "1024.csv": "0c7f0c52acc32fc37123141de8ce0b0bbb38100d",
+    "1028.csv": "9134485ddbbfe33cecc15ce270f2701b775518eb",
+    "1031.csv": "0ce3bb618010b42b3fd76dc304a565935da14dfc",
+    "1104.csv": "f0fd4ed646eaf0b7a7a3dea00ab67cff93c15bbd",
+    "1107.csv": "3344339024435db3af087f241f276cc1f92f41cf",
+    "1111.csv": "e10ba2d846173e656f72063445523db8c49a06f0",
+    "1114.csv": "85c35753fb305aceb260594164f54812219bc1ce",
+    "1118.csv": "0ecf1a76874e0302d3dcf3b25b83434c12d61597",
+    "1121.csv": "86379d439702e42f65084c01e59c4700123cd18d",
+    "1125.csv": "f7e867b909e23b87e5850b328856be3ddf521fcd",
+}
+"""Git blob id by file name, month and day of 2012; x from -25 to 0 m and y from -10 to 15 m, which holds the
+square; its times may count from the start of the day."""
 
 DATA_DIR_VARIABLE = "SZLIB_DATA_DIR"
-"""A folder that holds `atc-1hz/`, to be used instead of the network."""
+"""A folder that holds `atc-1hz/` or `atc-10-days/`, to be used instead of the network."""
+
+_LONGEST_LABEL = 60
+_ATTEMPTS = 3
+"""A file whose content is not the right one is fetched so often."""
 
 
 def find(data: str | Path | Sequence[str | Path]) -> list[Path]:
@@ -57,73 +86,111 @@ def find(data: str | Path | Sequence[str | Path]) -> list[Path]:
 
     Parameters
     ----------
-    data : "atc-1hz" (from $SZLIB_DATA_DIR, or downloaded once into the user's cache), or paths: files,
-        folders of track files, or globs.
+    data : "atc-1hz" or "atc-10-days" (from $SZLIB_DATA_DIR, or downloaded once into the user's cache), or
+        paths: files, folders of track files, or globs.
 
     Raises DataError where there is no such file, a download fails, or a hash does not match.
     """
     if data == ATC_1HZ:
-        return _atc_1hz()
+        return _named(ATC_1HZ, ATC_1HZ_URL, ATC_1HZ_FILES, pooch.file_hash)
+    if data == ATC_10_DAYS:
+        return _named(ATC_10_DAYS, ATC_10_DAYS_URL, ATC_10_DAYS_FILES, git_blob_id)
     names = [data] if isinstance(data, str | Path) else list(data)
     files = [file for name in names for file in _expand(name)]
     if not files:
-        raise DataError("no data was named; expected 'synthetic', 'atc-1hz', or paths of track files")
+        raise DataError(f"no data was named; expected {_NAMED}, or paths of track files")
     return files
 
 
 def label(data: str | Path | Sequence[str | Path]) -> str:
-    """A short name for a data set, fit for a folder: "synthetic", "atc-1hz", or the first file's."""
+    """A short name for a data set, fit for a folder: one of `NAMES`, or the first file's."""
     if isinstance(data, str | Path):
-        return (
-            str(data)
-            if data in (SYNTHETIC, ATC_1HZ)
-            else Path(data).name.split(".")[0].strip("*?[]") or "files"
-        )
+        if data in NAMES:
+            return str(data)
+        name = Path(os.path.abspath(data)).name.split(".")[0]  # noqa: PTH100 - links keep their names
+        name = re.sub(r"[^\w+-]+", "-", name).strip("-")
+        return name[:_LONGEST_LABEL] or "files"
     return label(data[0]) + (f"-and-{len(data) - 1}-more" if len(data) > 1 else "")
 
 
-def _atc_1hz() -> list[Path]:
+def git_blob_id(file: str | Path) -> str:
+    """The name that git gives to a file's content: SHA-1 of "blob", its size, a zero byte, and itself."""
+    digest = hashlib.sha1(f"blob {Path(file).stat().st_size}\0".encode(), usedforsecurity=False)
+    with Path(file).open("rb") as stream:
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def _named(name: str, url: str, files: Mapping[str, str], content: Callable[[str], str]) -> list[Path]:
+    """The files of a named data set, each with the right hash of its content."""
     folder = os.environ.get(DATA_DIR_VARIABLE)
     if folder:
-        return [_verified(Path(folder) / ATC_1HZ / name, sha256) for name, sha256 in ATC_1HZ_FILES.items()]
-    store = pooch.create(
-        path=pooch.os_cache("szlib") / ATC_1HZ,
-        base_url=ATC_1HZ_URL,
-        registry={name: f"sha256:{sha256}" for name, sha256 in ATC_1HZ_FILES.items()},
-        retry_if_failed=2,
-    )
+        return [_verified(Path(folder) / name / file, right, content) for file, right in files.items()]
+    home = pooch.os_cache("szlib") / name
+    store = pooch.create(path=home, base_url=url, registry=dict.fromkeys(files), retry_if_failed=2)
     try:
-        return [Path(store.fetch(name, progressbar=True)) for name in ATC_1HZ_FILES]
-    except (OSError, ValueError) as error:  # requests' errors are OSErrors; ValueError: wrong hash
+        return [_fetched(store, file, right, content) for file, right in files.items()]
+    except OSError as error:  # requests' errors are OSErrors
         raise DataError(
-            f"the ATC day could not be downloaded from {ATC_1HZ_URL} ({error}); go online, or put its "
-            f"files into a folder {ATC_1HZ}/ and name its parent in ${DATA_DIR_VARIABLE}"
+            f"{name} could not be downloaded from {url} ({error}); go online, or put its files into a "
+            f"folder {name}/ and name its parent in ${DATA_DIR_VARIABLE}"
         ) from error
 
 
-def _verified(file: Path, sha256: str) -> Path:
+def _fetched(store: pooch.Pooch, name: str, right: str, content: Callable[[str], str]) -> Path:
+    """A file from the cache, or downloaded into it; what is not right does not stay there."""
+    for _ in range(_ATTEMPTS):
+        file = Path(store.fetch(name, progressbar=True))
+        if (found := content(str(file))) == right:
+            return file
+        file.unlink()
+    raise OSError(f"{name}: its hash is {found}, expected {right}")
+
+
+def _verified(file: Path, right: str, content: Callable[[str], str]) -> Path:
     if not file.is_file():
         raise DataError(
-            f"{file}: no such file; ${DATA_DIR_VARIABLE} must name a folder with {ATC_1HZ}/ in it"
+            f"{file}: no such file; ${DATA_DIR_VARIABLE} must name a folder with {file.parent.name}/ in it"
         )
-    found = pooch.file_hash(str(file))
-    if found != sha256:
+    found = content(str(file))
+    if found != right:
+        kind = "git blob id" if content is git_blob_id else "SHA-256"
         raise DataError(
-            f"{file}: SHA-256 is {found}, expected {sha256}; the file is damaged or another version"
+            f"{file}: {kind} is {found}, expected {right}; the file is damaged or another version"
         )
     return file
 
 
 def _expand(name: str | Path) -> list[Path]:
+    """The regular files that a path stands for; a FIFO or a device would be read for ever."""
     path = Path(name)
-    if path.is_dir():
-        files = sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
-    elif path.is_file():
-        files = [path]
-    else:
-        files = sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
+    try:
+        if path.is_dir():
+            found = [file for file in path.iterdir() if not file.name.startswith(".")]
+        elif path.exists() or path.is_symlink():
+            if not path.is_file():
+                raise DataError(
+                    f"{printable(name)}: is no regular file (or leads nowhere); only those are read"
+                )
+            return [path]
+        else:
+            found = list(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
+    except (OSError, ValueError, NotImplementedError, IndexError, re.error) as error:
+        if isinstance(error, DataError):
+            raise
+        raise DataError(
+            f"{printable(name)}: cannot be looked up ({error}); expected {_NAMED}, or paths"
+        ) from error
+    files = sorted(file for file in found if file.is_file())
     if not files:
         raise DataError(
-            f"{name}: no such file; expected 'synthetic', 'atc-1hz', or a file, folder or glob of tracks"
+            f"{printable(name)}: no such file; expected {_NAMED}, or a file, folder or glob of tracks"
         )
+    others = sum(not file.is_file() and not (path.is_dir() and file.is_dir()) for file in found)
+    if others:
+        warnings.warn(
+            f"{printable(name)}: left out what is no regular file: {others} x folder or other", DataWarning,
+            stacklevel=4,
+        )  # fmt: skip
     return files

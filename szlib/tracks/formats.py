@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import gzip
-import shutil
-import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import polars as pl
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
-from ..errors import DataError
+from .. import memory
+from ..errors import DataError, StorageError
+from ..files import printable, temporary_folder
+from .frame_rates import frame_clock
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,9 @@ class Format:
     """How a file of tracks is laid out.
 
     `columns` says in which field t, id, x, y (and day) stand, `fields` how many a row has, `metres`
-    and `seconds` what one unit of position and time is, `max_gap` [s] which silence ends a track.
+    and `seconds` what one unit of position and time is, `max_gap` [s] which silence ends a track.  EWAP
+    files count frames: `recognise` says how long one is, and how long a gap.  `start` [s since 1970] is when
+    the clock of a file begins: 0, or midnight where it counts from the start of its day.
     """
 
     name: str
@@ -34,6 +39,7 @@ class Format:
     max_gap: float | None = None
     separator: str = ","
     header: bool = False
+    start: float = 0.0
 
 
 _TIXY = {"t": 0, "id": 1, "x": 2, "y": 3}
@@ -41,8 +47,8 @@ _TIXY = {"t": 0, "id": 1, "x": 2, "y": 3}
 FORMATS = {
     "atc-raw": Format("atc-raw", fields=8, columns=_TIXY, metres=1e-3, max_gap=0.5),
     "atc-1hz": Format("atc-1hz", fields=6, columns=_TIXY, max_gap=1.6),
-    # obsmat counts the frames of a 15 Hz video; its z is the height, its third position is y
-    "ewap": Format("ewap", 8, {"t": 0, "id": 1, "x": 2, "y": 4}, seconds=1 / 15, max_gap=0.9, separator=" "),
+    # obsmat counts frames, of 15 or 25 a second; its z is the height, its third position is y
+    "ewap": Format("ewap", 8, {"t": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}, separator=" "),
     "tidy": Format("tidy", header=True),
 }
 
@@ -52,11 +58,21 @@ EXPECTED = (
 )
 
 LONGEST_LINE = 100_000
+_ROW = 130
+"""Bytes that a row takes while its file is read as a whole (measured: 100 at 1 Hz, 126 tidy)."""
+_DAY, _JAPAN = 86_400.0, ZoneInfo("Asia/Tokyo")
 
 
 @contextmanager
 def plain_file(path: Path) -> Iterator[Path]:
-    """The file itself, or its content in a temporary file where it is gzipped."""
+    """The file itself, or its content in a temporary file where it is gzipped.
+
+    Raises DataError where it is no regular file or cannot be opened, StorageError where there is no room.
+    """
+    if not path.is_file():
+        raise DataError(f"{printable(path)}: {_what_it_is(path)}")
+    if printable(path.name) != path.name:
+        raise DataError(f"{printable(path)}: its name is no readable text (UTF-8); rename the file")
     try:
         with path.open("rb") as stream:
             packed = stream.read(2) == b"\x1f\x8b"
@@ -65,17 +81,53 @@ def plain_file(path: Path) -> Iterator[Path]:
     if not packed:
         yield path
         return
-    with tempfile.TemporaryDirectory(prefix="szlib-", ignore_cleanup_errors=True) as folder:
-        unpacked = Path(folder) / "unpacked"
-        try:
-            with gzip.open(path) as source, unpacked.open("wb") as target:
-                shutil.copyfileobj(source, target, 1 << 22)
-        except (EOFError, zlib.error, OSError) as error:
-            raise DataError(
-                f"{path}: damaged .gz, could be unpacked up to byte {unpacked.stat().st_size} of its content "
-                f"({error}); fetch the file again"
-            ) from error
+    with temporary_folder() as folder:
+        unpacked = folder / "unpacked"
+        _unpack(path, unpacked)
         yield unpacked
+
+
+def _unpack(path: Path, unpacked: Path) -> None:
+    """Unpack a gzipped file; what fails in reading is damage, what fails in writing a lack of room."""
+    done = 0
+    try:
+        with gzip.open(path) as source, unpacked.open("wb") as target:
+            while True:
+                try:
+                    block = source.read(1 << 22)
+                except (EOFError, zlib.error, OSError) as error:
+                    raise DataError(
+                        f"{path}: damaged .gz, could be unpacked up to byte {done} of its content ({error}); "
+                        "fetch the file again"
+                    ) from error
+                if not block:
+                    break
+                done += target.write(block)
+    except OSError as error:
+        raise StorageError(
+            f"{path}: no room to unpack it in {unpacked.parent.parent} ({error.strerror or error}, after "
+            f"{done} bytes); make room, or name another folder in $TMPDIR"
+        ) from error
+
+
+def _what_it_is(path: Path) -> str:
+    if path.is_dir():
+        return "is a folder; pass the files in it"
+    return "is no regular file; only those are read" if path.exists() else "no such file"
+
+
+def check_rows(plain: Path, path: Path) -> None:
+    """Raise MemoryLimitError where a file has more rows than memory can take."""
+    most = plain.stat().st_size / 2  # a row and its end are two bytes or more
+    if (limit := memory.ceiling()) is None or most * _ROW <= limit:
+        return
+    with plain.open("rb") as stream:
+        if stream.read(4) == b"PAR1":
+            return  # its rows are counted before they are read
+        rows = 0
+        while block := stream.read(1 << 22):
+            rows += block.count(b"\n")
+    memory.require(rows * _ROW, f"{path}: to read {rows:,} rows")
 
 
 @contextmanager
@@ -87,8 +139,14 @@ def readable(path: Path, layout: Format) -> Iterator[None]:
         raise DataError(f"{path}: cannot be read as {layout.name} ({error}); {EXPECTED}") from error
 
 
-def recognise(plain: Path, path: Path, name: str | None) -> tuple[Format, pl.LazyFrame]:
-    """Recognise the layout by the first line; a scan gives line, t, id, x, y (, day) and `ragged`."""
+def recognise(
+    plain: Path, path: Path, name: str | None, frame_rate: float | None = None
+) -> tuple[Format, pl.LazyFrame]:
+    """Recognise the layout by the first line; a scan gives line, t, id, x, y (, day) and `ragged`.
+
+    Where frames are counted (EWAP) the layout says how long one is: 1 / `frame_rate`, or as the file's own
+    velocities tell.  Raises DataError where they do not, and for a rate where no frames are counted.
+    """
     with plain.open("rb") as stream:
         head = stream.readline(LONGEST_LINE)
     if head[:4] == b"PAR1":
@@ -108,7 +166,14 @@ def recognise(plain: Path, path: Path, name: str | None) -> tuple[Format, pl.Laz
             raise DataError(f"{path}, line 1: {shown!r} names {', '.join(doubled)} twice; rename one of them")
         columns = {column: names.index(column) for column in (*_TIXY, "day") if column in names}
         layout = Format("tidy", len(names), columns, header=True)
-    return layout, _scan_lines(plain, layout) if layout.separator == " " else _scan_csv(plain, layout)
+    if frame_rate is not None and layout.name != "ewap":
+        raise DataError(f"{path}: is {layout.name}, whose times are in seconds; leave frame_rate out")
+    if layout.name != "ewap":
+        layout = replace(layout, start=start_of_day(path, layout, first))
+        return layout, _scan_csv(plain, layout)
+    rows = _scan_lines(plain, layout).collect()
+    second, gap = frame_clock(rows, path, frame_rate)
+    return replace(layout, seconds=second, max_gap=gap), rows.lazy()
 
 
 def layout_of(first: str, name: str | None) -> Format:
@@ -118,6 +183,21 @@ def layout_of(first: str, name: str | None) -> Format:
         if name
         else next(filter(lambda f: _looks_like(first, f), FORMATS.values()), FORMATS["tidy"])
     )
+
+
+def start_of_day(path: Path, layout: Format, first: str) -> float:
+    """When the clock of a file begins [s since 1970]: 0, or midnight of the day in the file's name.
+
+    The ATC days of LaCE-LHMP, ``MMDD.csv`` of 2012, may count from the start of the day, in Japan.
+    """
+    if layout.name != "atc-1hz":
+        return 0.0
+    try:
+        day = datetime.strptime(f"2012{path.name.split('.')[0]}", "%Y%m%d").replace(tzinfo=_JAPAN)
+        since = float(first.split(layout.separator)[layout.columns["t"]])
+    except ValueError:  # named otherwise, or the first row is damaged
+        return 0.0
+    return day.timestamp() if 0 <= since < _DAY else 0.0
 
 
 def _looks_like(first: str, layout: Format) -> bool:
@@ -148,6 +228,8 @@ def _scan_csv(plain: Path, layout: Format) -> pl.LazyFrame:
     named = {name: pl.col(f"f{index}") for name, index in layout.columns.items()}
     if "day" in named:
         named["day"] = named["day"].str.strip_chars(' "')
+    if layout.start:
+        named["t"] = named["t"] + layout.start
     return scan.select("line", ragged=ragged, **named)
 
 
@@ -170,9 +252,14 @@ def _scan_parquet(plain: Path, path: Path) -> pl.LazyFrame:
     try:
         with pq.ParquetFile(plain) as file:
             names = file.schema_arrow.names
+            if doubled := [column for column in (*_TIXY, "day") if names.count(column) > 1]:
+                raise DataError(f"{path}: names {', '.join(doubled)} twice; rename one of them")
+            memory.require(file.metadata.num_rows * _ROW, f"{path}: to read {file.metadata.num_rows:,} rows")
             table = file.read([name for name in (*_TIXY, "day") if name in names])
         table.validate(full=True)
         columns = pa.table({name: table[name] for name in table.column_names})  # without their metadata
+    except DataError:
+        raise
     except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
         raise DataError(f"{path}: damaged Parquet ({error}); fetch or write the file again") from error
     if missing := [column for column in _TIXY if column not in names]:

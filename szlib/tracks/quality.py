@@ -11,7 +11,9 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
-from .formats import FORMATS, plain_file, readable, recognise
+from ..errors import DataError
+from .clock import TICKS_PER_SECOND, clock_index, nearest_tick, to_clock
+from .formats import Format, plain_file, readable, recognise
 from .readers import fault
 
 STANDING = 0.1
@@ -31,7 +33,7 @@ def seconds(path: str | Path) -> pd.DataFrame:
     path = Path(path)
     with plain_file(path) as plain:
         layout, scan = recognise(plain, path, None)
-        recording = _sensor_speed(plain, layout.name)
+        recording = _sensor_speed(plain, layout)
         usable = scan.filter(fault(layout.metres, layout.seconds, "day" in scan.collect_schema()).is_null())
         time = pl.col("t") * layout.seconds
         grouped = usable.group_by(pl.col("id").cast(pl.Int64), second=time.floor()).agg(
@@ -51,17 +53,17 @@ def seconds(path: str | Path) -> pd.DataFrame:
     return rows.assign(moved=np.r_[moved[1:], np.nan])
 
 
-def _sensor_speed(plain: Path, name: str) -> pl.LazyFrame | None:
-    if name not in _SENSOR_SPEED:
+def _sensor_speed(plain: Path, layout: Format) -> pl.LazyFrame | None:
+    if layout.name not in _SENSOR_SPEED:
         return None
-    column, unit = _SENSOR_SPEED[name]
-    names = [f"f{i}" for i in range(FORMATS[name].fields)]
+    column, unit = _SENSOR_SPEED[layout.name]
+    names = [f"f{i}" for i in range(layout.fields)]
     scan = pl.scan_csv(
         plain, schema=dict.fromkeys(names, pl.Float64), has_header=False, ignore_errors=True,
         truncate_ragged_lines=True, missing_columns="insert", glob=False,
     )  # fmt: skip
     whole = pl.col("f1").is_not_null() & (pl.col("f1") % 1 == 0) & pl.col("f0").is_finite()
-    keys = [pl.col("f1").cast(pl.Int64).alias("id"), pl.col("f0").floor().alias("second")]
+    keys = [pl.col("f1").cast(pl.Int64).alias("id"), (pl.col("f0") + layout.start).floor().alias("second")]
     return scan.filter(whole).group_by(keys).agg(sensor_speed=pl.col(column).mean() * unit)
 
 
@@ -98,3 +100,31 @@ def by_hour(rows: pd.DataFrame, *, tz: str = "Asia/Tokyo") -> pd.DataFrame:
     grouped = keyed.groupby(["day", "hour"], as_index=False)
     table = grouped.agg(visits=("id", "nunique"), standing=("stands", "sum"), seconds=("second", "nunique"))
     return table.assign(standing=table["standing"] / table["seconds"]).drop(columns="seconds")
+
+
+def thinning_error(tracks: pd.DataFrame, *, every: float = 1.0) -> tuple[float, float]:
+    """What reading samples so many seconds apart at 10 Hz costs: RMS and 95 % quantile of the error [m].
+
+    Each gap-free piece of a track table is thinned to one tick in `every` seconds and brought back to the
+    clock by straight lines, as `to_clock` does.  Measured at 1 s: THOR-MAGNI 5.3 and 9.5 cm, the ETH sequence
+    5.6 and 11.6 cm (both are sampled every 0.4 s, so a little more in truth), the plaza 2.9 and 3.6 cm.
+
+    Raises DataError where `every` is no multiple of 0.1 s, or no piece is that long.
+    """
+    step = round(every * TICKS_PER_SECOND)
+    if step < 2 or abs(every * TICKS_PER_SECOND - step) > 1e-6:
+        raise DataError(f"every must be a multiple of 0.1 s, at least 0.2 s; got {every}")
+    order, tick, piece = clock_index(tracks)
+    begin = np.searchsorted(piece, piece)
+    known = pd.DataFrame({"day": "", "id": piece, "t": tick / TICKS_PER_SECOND})
+    known[["x", "y"]] = tracks[["x", "y"]].to_numpy(float)[order]
+    thinned = to_clock(known[(tick - tick[begin]) % step == 0], max_gap=every)
+    both = known.assign(tick=tick).merge(
+        thinned.assign(tick=nearest_tick(thinned["t"].to_numpy())), on=["id", "tick"], suffixes=("", "_thin")
+    )
+    if both["id"].duplicated().sum() == 0:
+        raise DataError(
+            f"no piece of these tracks is longer than {every} s; expected some that can be thinned"
+        )
+    error = np.hypot(*(both[[name, f"{name}_thin"]].diff(axis=1).to_numpy()[:, 1] for name in "xy"))
+    return float(np.sqrt((error**2).mean())), float(np.quantile(error, 0.95))

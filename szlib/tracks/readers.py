@@ -16,8 +16,9 @@ import pandas as pd
 import polars as pl
 
 from ..errors import DataError, DataWarning
+from ..files import printable
 from . import funnels
-from .formats import EXPECTED, FORMATS, Format, plain_file, readable, recognise
+from .formats import EXPECTED, FORMATS, Format, check_rows, plain_file, readable, recognise
 
 _MAX_SITE = 1000.0
 """A site wider than this [m] means that millimetres were read as metres."""
@@ -27,6 +28,11 @@ _LAST_SECOND = 4_102_444_800.0
 """2100-01-01; later time stamps are not seconds since 1970."""
 _FARTHEST = 2e7
 """Farther [m] from the origin of any grid is no place on Earth."""
+CALENDAR_BEGINS = 1e8
+"""A clock that has not come so far (1973) does not count from 1970: it tells no calendar day."""
+_FASTEST, _BLUR, _SOON = 5.0, 0.5, 5.0
+"""Who is in two files walks from the one's place to the other's at most so fast [m/s], up to so much [m];
+rows farther apart than that [s] tell nothing."""
 
 
 def read_raw(
@@ -34,13 +40,15 @@ def read_raw(
     *,
     file_format: str | None = None,
     unit: str | None = None,
+    frame_rate: float | None = None,
     tz: str = "Asia/Tokyo",
     exclude: Iterable[str] = (),
 ) -> pd.DataFrame:
     """Read files as they are: day, id, t [s], x, y [m], sorted, without duplicates.
 
     Parameters and errors are those of `szlib.read_tracks`.  ``.attrs["max_gap"]`` keeps the format's
-    longest gap [s] for `to_clock`, ``.attrs["funnel"]`` counts every row.
+    longest gap [s] for `to_clock`, ``.attrs["funnel"]`` counts every row, and says at how many frames a
+    second an EWAP file was read.
     """
     files = [Path(paths)] if isinstance(paths, str | Path) else [Path(p) for p in paths]
     excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
@@ -50,9 +58,11 @@ def read_raw(
         raise DataError(f"unit must be 'm' or 'mm'; got {unit!r}")
     if file_format is not None and file_format not in FORMATS:
         raise DataError(f"unknown file_format {file_format!r}; expected one of {list(FORMATS)}")
-    parts, stages, layouts = zip(*(_read_file(file, file_format, unit, tz) for file in files), strict=True)
+    parts, stages, layouts = zip(
+        *(_read_file(file, file_format, unit, frame_rate, tz) for file in files), strict=True
+    )
     _check_sequences([_stem(f) for f, layout in zip(files, layouts, strict=True) if layout.name == "ewap"])
-    return merge(parts, stages, layouts, excluded)
+    return merge(told_apart(files, parts, layouts), stages, layouts, excluded)
 
 
 def merge(
@@ -85,15 +95,12 @@ def merge(
 
 
 def _read_file(
-    path: Path, name: str | None, unit: str | None, tz: str
+    path: Path, name: str | None, unit: str | None, frame_rate: float | None, tz: str
 ) -> tuple[pl.DataFrame, dict[str, Any], Format]:
     """One file: its usable rows (day, id, t, x, y), its funnel stage, its layout."""
-    if not path.is_file():
-        raise DataError(
-            f"{path}: " + ("is a folder; pass the files in it" if path.is_dir() else "no such file")
-        )
     with plain_file(path) as plain:
-        layout, scan = recognise(plain, path, name)
+        check_rows(plain, path)
+        layout, scan = recognise(plain, path, name, frame_rate)
         with readable(path, layout):
             rows = scan.collect()
     metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
@@ -124,15 +131,18 @@ def read_stage(
         raise DataError(f"{path}: holds no row; {EXPECTED}")
     if first:
         _warn(f"{path.name}, first at line {first[0]}", reasons)
-    return funnels.stage(f"read {path.name}", good + bad, good, reasons)
+    rate = f" at {1 / layout.seconds:g} frames/s" if layout.name == "ewap" else ""
+    return funnels.stage(f"read {path.name}{rate}", good + bad, good, reasons)
 
 
 def in_metres(good: pl.DataFrame, path: Path, layout: Format, metres: float, tz: str) -> pl.DataFrame:
     """Usable rows as day, id, t [s], x, y [m]."""
     if "day" not in good.columns:
-        # the name stands for the day where frames are counted, not time of day
+        # the name stands for the day where frames are counted, or seconds since some other moment than 1970
+        last = good["t"].max()
+        named = layout.name == "ewap" or (isinstance(last, float) and last < CALENDAR_BEGINS)
         try:
-            good = good.with_columns(day=pl.lit(_stem(path)) if layout.name == "ewap" else _calendar_day(tz))
+            good = good.with_columns(day=pl.lit(_stem(path)) if named else _calendar_day(tz))
         except pl.exceptions.PolarsError as error:
             raise DataError(f"unknown time zone {tz!r} ({error}); expected one like 'Asia/Tokyo'") from error
     return good.select(
@@ -185,6 +195,80 @@ def _stem(path: Path) -> str:
     return path.name.split(".")[0]
 
 
+def told_apart(
+    files: Sequence[Path], parts: Sequence[pl.DataFrame], layouts: Sequence[Format]
+) -> list[pl.DataFrame]:
+    """Rows of several files, those of other recordings under another `day`: nobody is in two of them.
+
+    Files without a calendar (see `in_metres`) are recordings of their own, called by their names, unless
+    people go on from one to the other, as in pieces of one recording (EWAP has none).  Files of a calendar
+    day are its pieces.  Where most of the people whom two of them share are in two places at once, they are
+    other recordings after all, and a DataWarning says so; where some are, a DataError does.
+    """
+    if len(parts) < 2:
+        return list(parts)
+    texts = [part["day"].dtype == pl.String for part in parts]
+    named = [
+        text and part["day"].unique().to_list() == [_stem(f)]
+        for f, part, text in zip(files, parts, texts, strict=True)
+    ]
+    kept, names = list(parts), recording_names(files)
+    own = [
+        part.with_columns(day=pl.lit("")) if name and layout.name != "ewap" else part.head(0)
+        for part, name, layout in zip(parts, named, layouts, strict=True)
+    ]
+    joined = {(j, k) for j, k, _, apart, _ in _shared(own) if not apart}
+    for k in (k for k, name in enumerate(named) if name):
+        of = next((j for j in range(k) if (j, k) in joined), None)
+        kept[k] = parts[k].with_columns(day=pl.lit(names[k] if of is None else kept[of]["day"][0]))
+    for j, k, together, apart, example in _shared(kept):
+        where = f"{printable(files[j].name)} and {printable(files[k].name)}"
+        if apart and (apart <= together or texts[k]):
+            raise DataError(
+                f"{where}: person {example} is in two places at once ({apart} of {together + apart} people "
+                "who are in both are); read these files one by one, or correct them"
+            )
+        if apart:
+            _announce(f"{where}: {apart} people are in two places at once; read as two recordings")
+            day = pl.format("{} {}", pl.col("day").cast(pl.String), pl.lit(names[k]))
+            kept[k] = parts[k].with_columns(day=day)
+    return kept
+
+
+def _shared(parts: Sequence[pl.DataFrame]) -> list[tuple[int, int, int, int, int]]:
+    """For two files that share people: their numbers, how many go on from the one to the other, how many are
+    in two places at once, and one of those."""
+    keys = [pl.col("day").cast(pl.String), pl.col("id", "t", "x", "y")]
+    rows = pl.concat([part.select(*keys, file=pl.lit(k, pl.Int32)) for k, part in enumerate(parts)])
+    rows = rows.filter((pl.col("file").min() != pl.col("file").max()).over("day", "id"))
+    rows = rows.sort("day", "id", "t", "file")
+    step = [pl.col(name).diff().over("day", "id").alias(f"d{name}") for name in ("t", "x", "y", "file")]
+    steps = rows.with_columns(step).filter((pl.col("dfile") != 0) & (pl.col("dt") <= _SOON))
+    before = pl.col("file") - pl.col("dfile")
+    steps = steps.with_columns(
+        j=pl.min_horizontal("file", before),
+        k=pl.max_horizontal("file", before),
+        apart=(pl.col("dx") ** 2 + pl.col("dy") ** 2).sqrt() > _BLUR + _FASTEST * pl.col("dt"),
+    )
+    people = (
+        steps.group_by("j", "k", "day", "id").agg(pl.col("apart").any()).sort("j", "k", "apart", "day", "id")
+    )
+    found = people.group_by("j", "k", maintain_order=True).agg(
+        (~pl.col("apart")).sum().alias("together"), pl.col("apart").sum(), pl.col("id").last()
+    )
+    return list(found.iter_rows())
+
+
+def recording_names(files: Sequence[Path]) -> list[str]:
+    """A name for each file: without its ending, with its folder's where two are called the same."""
+    names = [_stem(file) for file in files]
+    names = [
+        f"{file.parent.name}-{name}" if names.count(name) > 1 else name
+        for file, name in zip(files, names, strict=True)
+    ]
+    return [f"{n} ({names[:k].count(n) + 1})" if n in names[:k] else n for k, n in enumerate(names)]
+
+
 def _check_sequences(names: list[str]) -> None:
     """Raise DataError where two EWAP files of one name would be taken for one day."""
     if doubled := sorted({name for name in names if names.count(name) > 1}):
@@ -202,4 +286,8 @@ def _calendar_day(tz: str) -> pl.Expr:
 def _warn(where: str, reasons: dict[str, int]) -> None:
     counts = ", ".join(f"{count} x {reason}" for reason, count in reasons.items() if count)
     if counts:
-        warnings.warn(f"{where}: rows set aside: {counts}", DataWarning, stacklevel=2)
+        _announce(f"{where}: rows set aside: {counts}")
+
+
+def _announce(what: str) -> None:
+    warnings.warn(what, DataWarning, stacklevel=3)

@@ -1,7 +1,11 @@
 """How is it presented: figures, the records of notebooks, their headless execution, the command line.
 
 figures       every figure, one file a room
+claims        what data says of the paper's claims: effects, intervals, verdicts
+sensitivity   what moves a zone most
+places        the folder of results that belongs to a data set
 record        what a notebook records: checks, claims, figures, artefacts
+parameters    known, of the right type and in range, before a notebook starts
 runner        the notebooks executed by papermill
 command_line  `szlib run | inspect | extract`
 """
@@ -9,5 +13,15 @@ command_line  `szlib run | inspect | extract`
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["figures", "record", "runner", "command_line"]
+    __name__,
+    submodules=[
+        "figures",
+        "claims",
+        "sensitivity",
+        "places",
+        "record",
+        "parameters",
+        "runner",
+        "command_line",
+    ],
 )

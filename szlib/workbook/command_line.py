@@ -2,7 +2,8 @@
 
 Nothing heavy is imported before a command needs it, so that `--version`, `--help` and a typo answer at once.
 Exit codes: 0; 1 where a check does not hold or a day failed; 2 where something was asked that cannot be
-done, explained in one line; 130 after Ctrl-C.
+done, explained in one line (SZLIB_TRACEBACK=1 shows where); 130 after Ctrl-C, 143 after SIGTERM, 129 where
+the terminal was closed: all three end the same way.
 """
 
 from __future__ import annotations
@@ -10,15 +11,19 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import signal
 import sys
+import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
+from .. import __version__, memory
 from ..errors import DataError, DataWarning, SzlibError
+from ..files import printable
 
 WORKBOOK_PACKAGES = ("ipykernel", "jupytext", "papermill")
 """What `szlib run` needs beside the library: the extra `workbook`."""
@@ -26,15 +31,61 @@ WORKBOOK_PACKAGES = ("ipykernel", "jupytext", "papermill")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line `szlib`; returns the exit code."""
+    for stream in (sys.stdout, sys.stderr):  # a terminal that knows no umlauts gets them spelled out
+        with suppress(AttributeError, ValueError, OSError):
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     options = _parser().parse_args(arguments)
     try:
-        return int(options.command(options))
-    except (SzlibError, OSError) as error:
-        print(f"szlib: {error}", file=sys.stderr)
+        with _endings(), memory.granted(options.memory), warnings.catch_warnings():
+            warnings.showwarning = _show_warning  # type: ignore[assignment]
+            code = int(options.command(options))
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        return code
+    except KeyboardInterrupt as stop:
+        _complain("stopped; what was finished stays in the results")
+        return int(stop.args[0]) if stop.args else 130
+    except Exception as error:
+        if os.environ.get("SZLIB_TRACEBACK"):
+            raise
+        expected = isinstance(error, SzlibError | OSError)
+        _complain(str(error) if expected and str(error) else f"{type(error).__name__}: {error}")
         return 2
-    except KeyboardInterrupt:
-        print("\nszlib: stopped; what was finished stays in the results", file=sys.stderr)
-        return 130
+
+
+@contextmanager
+def _endings() -> Iterator[None]:
+    """SIGTERM, and SIGHUP unless it is ignored, end a command as Ctrl-C does."""
+
+    def stop(number: int, _frame: object) -> None:
+        raise KeyboardInterrupt(128 + number)
+
+    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    here = threading.current_thread() is threading.main_thread()
+    numbers = [getattr(signal, name) for name in names] if here else []
+    before = {n: signal.signal(n, stop) for n in numbers if signal.getsignal(n) is not signal.SIG_IGN}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _complain(what: str) -> None:
+    """One line on standard error, and nothing left for a standard output that takes no more."""
+    with suppress(OSError, ValueError, AttributeError):
+        print(f"szlib: {printable(' '.join(what.split()))}", file=sys.stderr, flush=True)
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError, AttributeError):
+        with suppress(OSError, ValueError, AttributeError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+
+
+def _show_warning(message: Warning | str, *_: object) -> None:
+    with suppress(OSError, ValueError, AttributeError):
+        print(f"szlib: {printable(message)}", file=sys.stderr)
 
 
 def inspect(file: str | Path) -> str:
@@ -86,6 +137,10 @@ def _run(options: argparse.Namespace) -> int:
         scheduler=options.scheduler,
     )
     print(render(summary))
+    refused = [name for name, record in summary["notebooks"].items() if record["status"] == "refused"]
+    if refused:
+        error = summary["notebooks"][refused[0]]["error"]
+        raise SzlibError(f"{', '.join(refused)}: could not be run: {error}; what was finished stays")
     return 0 if summary["passed"] else 1
 
 
@@ -107,13 +162,23 @@ def _assignment(text: str) -> tuple[str, Any]:
         return name, json.loads(value)
     except json.JSONDecodeError:
         return name, value
+    except (ValueError, RecursionError) as error:  # a number of too many digits, too many brackets
+        raise DataError(f"parameter {name}: cannot be read ({error})") from error
 
 
 def _jobs(text: str) -> int:
     """A number of processes of a command line, at least 1."""
-    if not text.isascii() or not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number >= 1; got {text!r}")
+    if not text.isascii() or not text.isdigit() or len(text) > 9 or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number >= 1; got {text[:40]!a}")
     return int(text)
+
+
+def _memory(text: str) -> int:
+    """An amount of memory of a command line."""
+    try:
+        return memory.parse(text)
+    except SzlibError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -126,7 +191,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="execute the notebooks, headless, and check their results")
     run.add_argument(
         "--data", nargs="+", default=["synthetic"], metavar="DATA",
-        help="synthetic (default), atc-1hz, or files, folders or globs of tracks",
+        help="synthetic (default), atc-1hz, atc-10-days, or files, folders or globs of tracks",
     )  # fmt: skip
     run.add_argument("--out", default="results", metavar="FOLDER", help="where results go (default: results)")
     run.add_argument(
@@ -157,4 +222,9 @@ def _parser() -> argparse.ArgumentParser:
 
     for command in (run, extract):
         command.add_argument("--scheduler", metavar="ADDRESS", help="hand the work to a Dask cluster")
+    for command in (run, inspect, extract):
+        command.add_argument(
+            "--memory", type=_memory, metavar="SIZE",
+            help="what may be used, such as 4GB (default: 80 %% of what the machine has left)",
+        )  # fmt: skip
     return parser

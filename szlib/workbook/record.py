@@ -7,10 +7,12 @@ support it the record says "not supported here", with the numbers, and the run g
 from __future__ import annotations
 
 import inspect
+import io
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,12 +21,16 @@ import pandas as pd
 from pandas.io.formats.style import Styler
 
 from .. import __version__
+from ..encounters.pipeline import Chain
 from ..encounters.search import find_encounters
-from ..errors import ZoneError
+from ..errors import DataError, ZoneError
+from ..files import file_content, keep, kept, sign, write_file
 from ..plaza.people import make_plaza
+from ..plaza.truth import PlazaSettings
 from ..tracks import datasets
 from ..tracks.clock import read_tracks
 from ..zones.social_zone import SocialZone
+from . import places
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,12 +62,13 @@ class NotebookRecord:
     key: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        (self.out / "records").mkdir(parents=True, exist_ok=True)
+        for name in ("records", "figures"):
+            (self.out / name).mkdir(exist_ok=True)
 
-    @property
+    @cached_property
     def out(self) -> Path:
-        """Where this data set's results go."""
-        return Path(self.results) / datasets.label(self.data)
+        """Where this data set's results go: a folder of its own, see `places.home`."""
+        return places.home(self.results, self.data)
 
     @property
     def synthetic(self) -> bool:
@@ -78,17 +85,16 @@ class NotebookRecord:
 
     def encounters(self) -> pd.DataFrame:
         """The encounters that notebook 02 left, or found now where there are none of this data and seed."""
-        file = self.out / "encounters.parquet"
-        if file.exists():
-            samples = pd.read_parquet(file)
-            if samples.attrs.get("source") == self._source():
-                return samples
+        content = kept(self.out / "encounters.parquet", self._source())
+        if content is not None:
+            return pd.read_parquet(io.BytesIO(content))
         return self.keep_encounters(find_encounters(self.tracks()))
 
     def keep_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
         """Leave the encounters for the notebooks to come."""
-        samples.attrs["source"] = self._source()
-        _replace(self.out / "encounters.parquet", samples.to_parquet)
+        content = io.BytesIO()
+        samples.to_parquet(content)
+        keep(self.out / "encounters.parquet", content.getvalue(), self._source())
         return samples
 
     def zone(self) -> SocialZone:
@@ -122,17 +128,17 @@ class NotebookRecord:
 
     def figure(self, figure: Figure, name: str) -> None:
         """Save a figure among the results as NN_topic-name.png."""
-        file = self.out / "figures" / f"{self.name}-{name}.png"
-        file.parent.mkdir(exist_ok=True)
-        figure.savefig(file, dpi=150, bbox_inches="tight")
-        self.figures.append(file.name)
+        content = io.BytesIO()
+        figure.savefig(content, dpi=150, bbox_inches="tight")
+        self._picture(content.getvalue(), f"{self.name}-{name}.png")
 
     def animation(self, content: bytes, name: str) -> None:
         """Save an animated picture among the results as NN_topic-name.gif."""
-        file = self.out / "figures" / f"{self.name}-{name}.gif"
-        file.parent.mkdir(exist_ok=True)
-        file.write_bytes(content)
-        self.figures.append(file.name)
+        self._picture(content, f"{self.name}-{name}.gif")
+
+    def table(self, table: pd.DataFrame, name: str) -> None:
+        """Save a table among the results as name.csv."""
+        write_file(self.out / f"{name}.csv", table.to_csv(index=False))
 
     def close(self) -> Styler:
         """Write the record for the summary; returns its checks and claims to read."""
@@ -143,9 +149,7 @@ class NotebookRecord:
             "figures": self.figures,
         }
         text = json.dumps(record, indent=1, default=_plain)
-        _replace(
-            self.out / "records" / f"{self.name}.json", lambda file: file.write_text(text, encoding="utf-8")
-        )
+        write_file(self.out / "records" / f"{self.name}.json", text)
         rows = [(c["kind"], c["name"], c["result"], _as_text(c["value"])) for c in self.checks]
         return _whole(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
 
@@ -154,19 +158,33 @@ class NotebookRecord:
         self.checks.append({"kind": kind, "name": name, "passed": passed, "value": value, "result": result})
         print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({_as_text(value)})"))
 
+    def _picture(self, content: bytes, name: str) -> None:
+        write_file(self.out / "figures" / name, content, lasting=False)
+        self.figures.append(name)
+
     def _source(self) -> dict[str, Any]:
-        files = [[file.name, file.stat().st_size] for file in self.files()]
-        return {"data": datasets.label(self.data), "seed": self.seed, "files": files, "szlib": __version__}
+        """What the artefacts are made of: the content of the files, every parameter, this version."""
+        files = [[file.name, *file_content(file)] for file in self.files()]
+        made = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "szlib": __version__}
+        return json.loads(json.dumps(made | {"parameters": asdict(Chain())}))  # type: ignore[no-any-return]
 
 
 def data_files(data: str | Sequence[str], *, folder: Path, seed: int) -> list[Path]:
-    """The files of a data set; those of the plaza of this seed are written into `folder` if missing."""
+    """The files of a data set; those of the plaza of this seed are written into `folder` if missing.
+
+    A file of that name that is not this plaza's is made anew: it is known by its content.
+    """
     if data != datasets.SYNTHETIC:
         return datasets.find(data)
     file = folder / f"plaza-{seed}.csv"
-    if not file.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        make_plaza(file, seed=seed)
+    made = {"plaza": repr(PlazaSettings()), "seed": seed, "szlib": __version__}
+    if kept(file, made) is None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            make_plaza(file, seed=seed)
+            sign(file, file.read_bytes(), made)
+        except OSError as error:
+            raise DataError(f"{file}: the plaza cannot be made ({error}); choose another folder") from error
     return [file]
 
 
@@ -220,10 +238,3 @@ def _as_text(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{k}: {_as_text(v)}" for k, v in value.items())
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _replace(file: Path, write: Any) -> None:
-    """Write a file as a whole or not at all."""
-    unfinished = file.with_name(f".{file.name}")
-    write(unfinished)
-    unfinished.replace(file)

@@ -6,13 +6,14 @@ and key figures; the run gathers them in summary.json and ends with a table.
 
 from __future__ import annotations
 
-import ast
 import json
-import tempfile
+import os
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +21,25 @@ import jupytext
 import papermill
 from tqdm import tqdm
 
-from .. import __version__
-from ..errors import DataError
-from ..parallel import cluster
+from .. import __version__, memory
+from ..errors import DataError, SzlibError
+from ..files import printable, sweep_temporary, temporary_folder, write_file
+from ..parallel import bounded, cluster, end_with
 from ..tracks import datasets
+from . import places
+from .parameters import check_parameters
 from .record import data_files
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
 """The workbook's home: beside the package in the repository."""
 LAST_PRODUCER = "05"
 """Up to here each notebook needs the artefact of the one before; later ones can run side by side."""
+REFUSED = {
+    "DataError", "StorageError", "MemoryLimitError", "ZoneError", "SolverError", "SzlibError", "MemoryError",
+    "OSError", "PermissionError", "FileNotFoundError", "IsADirectoryError", "NotADirectoryError",
+    "DeadKernelError",
+}  # fmt: skip
+"""Errors that tell of the data, of the disk or of memory, and not of a notebook."""
 
 
 def run(
@@ -55,41 +65,41 @@ def run(
     Returns
     -------
     The summary, also written to ``<out>/<data>/summary.json``: passed, and for each notebook its
-    status, seconds, checks (name, passed, value) and key figures.
+    status ("done"; "error": the notebook broke off; "refused": data, disk or memory do not allow it),
+    seconds, checks (name, passed, value) and key figures.  What it replaces is withdrawn first.
 
     Raises
     ------
-    DataError : no such data, notebook or parameter.
+    DataError : no such data, notebook or parameter, or a parameter out of its range.
+    StorageError : results cannot be written there.
     """
     sources = _chosen(only)
     given = dict(parameters or {})
-    _check_parameters(given, sources)
+    check_parameters(given, sources)
     seed = given.get("seed", 0)
+    asked = places.absolute(data)
+    files = [] if asked == datasets.SYNTHETIC else datasets.find(asked)
     results = Path(out).resolve()
-    home = results / datasets.label(data)
-    files = data_files(data, folder=home, seed=seed)
-    if data not in (datasets.SYNTHETIC, datasets.ATC_1HZ):
-        data = [str(file.resolve()) for file in files]
-    given |= {"data": data, "results": str(results)}
-    (home / "records").mkdir(parents=True, exist_ok=True)
-    for source in sources:
-        (home / "records" / f"{source.stem}.json").unlink(missing_ok=True)
+    home = places.home(results, asked, inputs=files)
+    places.withdraw(home, [source.stem for source in sources])
+    if asked == datasets.SYNTHETIC:
+        data_files(asked, folder=home, seed=seed)
+    given |= {"data": asked, "results": str(results)}
+    jobs = bounded(jobs, len(sources)) or 1
+    limit = None if scheduler else memory.ceiling()
+    share = None if limit is None else limit // max(jobs, 1)
 
     outcomes: dict[str, dict[str, Any]] = {}
-    with tqdm(total=len(sources), unit="notebook", desc=datasets.label(data)) as bar:
+    with tqdm(total=len(sources), unit="notebook", desc=datasets.label(asked)) as bar:
         first = [source for source in sources if source.stem[:2] <= LAST_PRODUCER]
         rest = sources[len(first) :]
         with cluster(scheduler) as client, _pool(client, jobs) as pool:
-            try:
-                for batch in [*([source] for source in first), rest]:
-                    for future in as_completed(_submit(pool, batch, given, home)):
-                        name, outcome = future.result()
-                        outcomes[name] = outcome
-                        bar.update()
-                        bar.set_postfix_str(f"{name} {outcome['status']}")
-            except KeyboardInterrupt:
-                pool.shutdown(wait=False, **({} if client else {"cancel_futures": True}))
-                raise
+            for batch in [*([source] for source in first), rest]:
+                for future in as_completed(_submit(pool, batch, given, home, share)):
+                    name, outcome = future.result()
+                    outcomes[name] = outcome
+                    bar.update()
+                    bar.set_postfix_str(f"{name} {outcome['status']}")
     notebooks = {source.stem: outcomes[source.stem] for source in sources}
     passed = all(
         n["status"] == "done" and all(c["passed"] for c in n["checks"] if c["kind"] == "check")
@@ -102,7 +112,7 @@ def run(
         "passed": passed,
         "notebooks": notebooks,
     }
-    (home / "summary.json").write_text(json.dumps(summary, indent=1), encoding="utf-8")
+    write_file(home / "summary.json", json.dumps(summary, indent=1))
     return summary
 
 
@@ -129,43 +139,61 @@ def render(summary: Mapping[str, Any]) -> str:
     return "\n".join([*lines, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
 
 
-def _pool(client: Any, jobs: int) -> Executor:
-    """The workers of a Dask cluster, or processes here."""
+@contextmanager
+def _pool(client: Any, jobs: int) -> Iterator[Executor]:
+    """The workers of a Dask cluster, or processes here, which end at once where this one is interrupted."""
     if client is not None:
-        executor: Executor = client.get_executor(pure=False)
-        return executor
-    return ProcessPoolExecutor(max(jobs, 1), mp_context=get_context("spawn"))
+        with client.get_executor(pure=False) as executor:
+            yield executor
+        return
+    others = set(active_children())
+    pool = ProcessPoolExecutor(
+        max(jobs, 1), mp_context=get_context("spawn"), initializer=end_with, initargs=(os.getpid(),)
+    )
+    try:
+        yield pool
+    except BaseException as error:
+        for child in set(active_children()) - others:
+            child.terminate()  # kernels end with their parents
+        pool.shutdown(wait=True, cancel_futures=True)
+        sweep_temporary()
+        if isinstance(error, BrokenProcessPool):
+            raise SzlibError(
+                "a process that executed notebooks was killed, perhaps for lack of memory; what was finished "
+                "is kept: run again, with fewer --jobs"
+            ) from error
+        raise
+    pool.shutdown()
 
 
-def _submit(pool: Executor, sources: Iterable[Path], given: dict[str, Any], home: Path) -> list[Future[Any]]:
-    return [pool.submit(_execute, str(source), given, str(home)) for source in sources]
+def _submit(
+    pool: Executor, sources: Iterable[Path], given: dict[str, Any], home: Path, share: int | None
+) -> list[Future[Any]]:
+    return [pool.submit(_execute, str(source), given, str(home), share) for source in sources]
 
 
-def _execute(source: str, given: dict[str, Any], home: str) -> tuple[str, dict[str, Any]]:
-    """Run one notebook in a kernel of its own; its name, and what it left."""
+def _execute(source: str, given: dict[str, Any], home: str, share: int | None) -> tuple[str, dict[str, Any]]:
+    """Run one notebook in a kernel of its own, with its share of memory; its name, and what it left."""
     script, folder = Path(source), Path(home)
-    notebook = jupytext.read(script)
     begun = time.perf_counter()
     outcome: dict[str, Any] = {"status": "done"}
-    with tempfile.TemporaryDirectory() as temporary:
-        plain = Path(temporary) / f"{script.stem}.ipynb"
-        jupytext.write(notebook, plain, fmt="ipynb")
-        try:
-            papermill.execute_notebook(
-                plain,
-                folder / plain.name,
-                given,
-                kernel_name="python3",
-                language="python",
-                cwd=script.parent,
-                progress_bar=False,
-                extra_arguments=["--log-level=CRITICAL"],  # the kernel's remarks on its own transport
-            )
-        except papermill.PapermillExecutionError as error:
-            outcome = {"status": "error", "error": f"{error.ename}: {error.evalue}"}
+    try:
+        with temporary_folder() as temporary:
+            runtime = {"JUPYTER_RUNTIME_DIR": str(temporary / "runtime")}  # gone with the folder, always
+            with _environment(runtime | ({memory.VARIABLE: str(share)} if share else {})):
+                outcome |= _execute_in(temporary, script, folder, given)
+    except (SzlibError, OSError, MemoryError) as error:
+        outcome = {"status": "refused", "error": f"{type(error).__name__}: {error}"}
+    except Exception as error:  # of papermill, nbclient or the kernel
+        status = "refused" if type(error).__name__ in REFUSED else "error"
+        outcome = {"status": status, "error": f"{type(error).__name__}: {error}"}
+    if "error" in outcome:
+        outcome["error"] = printable(" ".join(outcome["error"].split()))
     outcome["seconds"] = round(time.perf_counter() - begun, 2)
-    record = folder / "records" / f"{script.stem}.json"
-    left = json.loads(record.read_text(encoding="utf-8")) if record.exists() else {}
+    try:
+        left = json.loads((folder / "records" / f"{script.stem}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        left = {}
     if outcome["status"] == "done" and not left:
         outcome = {
             **outcome,
@@ -173,6 +201,44 @@ def _execute(source: str, given: dict[str, Any], home: str) -> tuple[str, dict[s
             "error": "the notebook left no record; does it end with record.close()?",
         }
     return script.stem, outcome | {name: left.get(name, default) for name, default in _EMPTY_RECORD.items()}
+
+
+def _execute_in(temporary: Path, script: Path, folder: Path, given: dict[str, Any]) -> dict[str, Any]:
+    """Execute a notebook in a temporary folder, and put the executed copy among the results."""
+    plain, executed = temporary / f"{script.stem}.ipynb", temporary / "executed.ipynb"
+    jupytext.write(jupytext.read(script), plain, fmt="ipynb")
+    outcome: dict[str, Any] = {}
+    try:
+        papermill.execute_notebook(
+            plain,
+            executed,
+            given,
+            kernel_name="python3",
+            language="python",
+            cwd=script.parent,
+            progress_bar=False,
+            extra_arguments=["--log-level=CRITICAL"],  # the kernel's remarks on its own transport
+        )
+    except papermill.PapermillExecutionError as error:
+        status = "refused" if error.ename in REFUSED else "error"
+        outcome = {"status": status, "error": f"{error.ename}: {error.evalue}"}
+    if executed.exists():
+        write_file(folder / plain.name, executed.read_bytes())
+    return outcome
+
+
+@contextmanager
+def _environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """Environment variables for what is started inside."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name, None)
+            if value is not None:
+                os.environ[name] = value
 
 
 _EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
@@ -194,27 +260,3 @@ def _chosen(only: Iterable[str]) -> list[Path]:
     return [
         source for source in sources if not wanted or any(source.stem.startswith(name) for name in wanted)
     ]
-
-
-def _check_parameters(given: Mapping[str, Any], sources: Sequence[Path]) -> None:
-    """Each parameter must be one of a notebook to be run, and of the type of its default there."""
-    defaults: dict[str, Any] = {}
-    for source in sources:
-        for cell in jupytext.read(source).cells:
-            if "parameters" in cell.metadata.get("tags", []):
-                defaults |= {
-                    node.targets[0].id: ast.literal_eval(node.value)
-                    for node in ast.parse(cell.source).body
-                    if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
-                }
-    unknown = set(given) - set(defaults)
-    if unknown:
-        known = ", ".join(sorted(defaults))
-        raise DataError(f"unknown parameter {', '.join(sorted(unknown))}; the notebooks know {known}")
-    for name, value in given.items():
-        default = defaults[name]
-        number = isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool)
-        if not number and type(value) is not type(default):
-            raise DataError(
-                f"parameter {name}: expected {type(default).__name__}, such as {default!r}; got {value!r}"
-            )

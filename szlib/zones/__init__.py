@@ -1,13 +1,29 @@
-"""How near is too near: from samples of encounters to the minimum social zone.
+"""How near is too near, and how sure are we: from samples of encounters to the minimum social zone.
 
 ellipses     ellipses, and the smallest one around points or a curve
-hulls        the convex hull over (x', y', speed) and its slices
-outliers     local outlier factor on complementary coordinates: `remove_outliers`
+radii        a zone told by direction, and the ellipse fitted to it
+outliers     encounters, or samples, that lie apart (local outlier factor): `remove_outliers`
+quantile     where all but a share of encounters keep out
+hulls        the convex hull over (x', y', speed), its slices, and its way to zones
+respect      people against the null model: the contour of half presence, and whether it is respect
+uncertainty  who was seen on which side; intervals from other draws of the same people
+zone_file    versioned JSON
 social_zone  all of it behind one name, by speed, saved as JSON: `SocialZone`
 """
 
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["ellipses", "hulls", "outliers", "social_zone"]
+    __name__,
+    submodules=[
+        "ellipses",
+        "radii",
+        "outliers",
+        "quantile",
+        "hulls",
+        "respect",
+        "uncertainty",
+        "zone_file",
+        "social_zone",
+    ],
 )

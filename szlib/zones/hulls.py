@@ -12,13 +12,22 @@ is not a zone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import ZoneError
+from ..tracks import funnels
+from .ellipses import minimum_enclosing_ellipse
+from .outliers import complementary_points, remove_outliers
+from .quantile import encounter_numbers
+from .radii import DIRECTIONS
 
 
 def hull_vertices(points: ArrayLike) -> np.ndarray:
@@ -134,3 +143,107 @@ def slice_hull(points: ArrayLike, speed: float, *, r_max: float) -> Slice:
             f"the zone at {speed:g} m/s is undefined: the hull has no extent there; add data"
         ) from error
     return Slice(section[outline.vertices], float(speed), float(r_max))
+
+
+@dataclass(frozen=True, eq=False)
+class HullZones:
+    """The paper's way to zones: outliers, hull, slices, smallest ellipses; to go again with other people.
+
+    Parameters
+    ----------
+    points : inliers (x', y', speed), shape (n, 3) [m, m, m/s].
+    encounter : which of `encounters` each belongs to, shape (n,).
+    encounters : the first of each encounter's inliers.
+    r_max : distance that the complement is taken from [m].
+    parameters, funnel : for the provenance.
+    """
+
+    points: np.ndarray
+    encounter: NDArray[np.intp]
+    encounters: pd.DataFrame
+    r_max: float
+    parameters: dict[str, Any]
+    funnel: list[dict[str, Any]]
+    extreme = True
+
+    @classmethod
+    def of(
+        cls,
+        samples: pd.DataFrame,
+        *,
+        r_max: float,
+        outlier_fraction: float | None = None,
+        neighbours: int | None = None,
+        speed_scale: float | None = None,
+    ) -> HullZones:
+        """From samples; parameters and errors as in `szlib.remove_outliers`."""
+        inliers = remove_outliers(
+            samples, outlier_fraction, r_max, neighbours=neighbours, speed_scale=speed_scale
+        )
+        speed = inliers["speed"].to_numpy(float)
+        points = np.column_stack([complementary_points(inliers, r_max=r_max), speed])
+        count = len(hull_vertices(points))
+        parameters = {
+            "outlier_fraction": None if outlier_fraction is None else float(outlier_fraction),
+            "neighbours": None if neighbours is None else int(neighbours),
+            "speed_scale": None if speed_scale is None else float(speed_scale),
+        }
+        inside = {"inside the hull": len(points) - count}
+        funnel = [*funnels.of(inliers), funnels.stage("hull", len(points), count, inside)]
+        return cls(points, *encounter_numbers(inliers), float(r_max), parameters, funnel)
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Of the hull, shape (k, 3) [m, m, m/s]."""
+        return hull_vertices(self.points)
+
+    def radii(self, speeds: Sequence[float]) -> None:
+        """None: the vertices tell all."""
+
+    def others(self, weights: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
+        """Ellipses (k, s, 5) of the encounters whose weights (k, n) are above 0; NaN: no zone.
+
+        Straight from the hull's faces, around the boundary in 72 directions.
+        """
+        ellipses = np.full((len(weights), len(speeds), 5), np.nan)
+        unit = np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+        start: dict[int, list[int]] = {}
+        for i, weight in enumerate(weights):
+            with suppress(ZoneError):
+                reach = _reach(_hull(self.points[weight[self.encounter] > 0]), unit, speeds)
+                for j in map(int, np.flatnonzero(np.isfinite(reach).all(axis=1))):
+                    boundary = (self.r_max - reach[j])[:, None] * unit
+                    ellipse = minimum_enclosing_ellipse(boundary, start=start.get(j, []))
+                    ellipses[i, j] = [*ellipse.center, *ellipse.semi_axes, ellipse.angle]
+                    on = (boundary[:, None] == ellipse.support).all(axis=-1).any(axis=1)
+                    start[j] = np.flatnonzero(on).tolist()
+        return ellipses
+
+    def without_each(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], np.ndarray]:
+        """The encounters that the hull rests on (k,), and the ellipses (k, s, 5) without each of them.
+
+        A new vertex is a point of these encounters, or a vertex of the hull of all others.
+        """
+        on = np.unique(self.encounter[_hull(self.points).vertices])
+        theirs = np.isin(self.encounter, on)
+        kept = np.flatnonzero(theirs)
+        with suppress(ZoneError):
+            rest = np.flatnonzero(~theirs)
+            kept = np.union1d(kept, rest[_hull(self.points[rest]).vertices])
+        shell = replace(self, points=self.points[kept], encounter=self.encounter[kept])
+        weights = np.ones((len(on), len(self.encounters)))
+        weights[np.arange(len(on)), on] = 0
+        return on, shell.others(weights, speeds)
+
+
+def _reach(hull: ConvexHull, unit: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
+    """R' (s, k) of the hull at speeds along unit vectors (k, 2) [m]; NaN where the zone is undefined."""
+    along = hull.equations[:, :2] @ unit.T
+    v = hull.points[hull.vertices, 2]
+    reach = np.full((len(speeds), len(unit)), np.nan)
+    for i, speed in enumerate(speeds):
+        offset = -(hull.equations[:, 3] + hull.equations[:, 2] * speed)
+        if v.min() < speed < v.max() and (offset > 0).all():
+            with np.errstate(divide="ignore", invalid="ignore"):
+                reach[i] = np.min(np.where(along > 0, offset[:, None] / along, np.inf), axis=0)
+    return reach

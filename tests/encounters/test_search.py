@@ -123,7 +123,8 @@ def search(
 
 
 def assert_same_samples(samples: pd.DataFrame, expected: pd.DataFrame) -> None:
-    assert list(samples.columns) == SAMPLE_COLUMNS == list(expected.columns)
+    assert list(samples.columns) == [*SAMPLE_COLUMNS, "kind"]
+    assert list(expected.columns[: len(SAMPLE_COLUMNS)]) == SAMPLE_COLUMNS
     labels = SAMPLE_COLUMNS[:4]
     assert samples[labels].astype(str).to_numpy().tolist() == expected[labels].astype(str).to_numpy().tolist()
     for name in ("t", "distance", "speed"):
@@ -182,7 +183,7 @@ def test_labels_are_only_labels(crowd: pd.DataFrame, known: pd.DataFrame) -> Non
     assert_same_samples(renamed, expected)
     backwards = find_encounters(crowd.assign(id=-crowd["id"]), square=ROOM)
     back = backwards.assign(ref_id=-backwards["ref_id"], other_id=-backwards["other_id"])
-    columns = SAMPLE_COLUMNS[1:]
+    columns = [*SAMPLE_COLUMNS[1:], "kind"]
     pd.testing.assert_frame_equal(
         back.sort_values(["ref_id", "t"], ignore_index=True)[columns],
         known.sort_values(["ref_id", "t"], ignore_index=True)[columns],

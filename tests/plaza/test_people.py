@@ -11,7 +11,7 @@ import pytest
 
 import szlib
 from szlib.plaza.people import KINDS, make_plaza, positions, stage_encounters
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.truth import RUSHING, SLOW, PlazaSettings
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
 DEFAULT = PlazaSettings()
@@ -166,6 +166,22 @@ def test_shares_are_as_set() -> None:
     assert (counts["standing"], counts["together"], counts["intruder"]) == (40, 80, 20)
 
 
+def test_intruders_have_a_pace(tmp_path: Path) -> None:
+    """Slow ones leave many samples deep within the zone, rushing ones a few; both pass as near."""
+    inside, nearest = {}, {}
+    for pace in (RUSHING, SLOW):
+        settings = PlazaSettings(encounters=300, intruders=0.3, pace=pace)
+        staged = stage_encounters(settings=settings).query("kind == 'intruder'")
+        relative = np.hypot(
+            staged["other_vx"] - staged["walker_vx"], staged["other_vy"] - staged["walker_vy"]
+        )
+        assert relative.between(*pace).all()
+        distance = in_frame(staged)[2][..., 0]
+        inside[pace], nearest[pace] = (distance < 0.6).mean(), distance.min(axis=1).mean()
+    assert inside[SLOW] > 2 * inside[RUSHING]
+    assert nearest[SLOW] == pytest.approx(nearest[RUSHING], abs=0.05)
+
+
 def test_most_pairs_are_seen_as_the_encounter_they_are(tmp_path: Path, staged: pd.DataFrame) -> None:
     samples = samples_of(tmp_path, 3, DEFAULT)
     refs = set(samples["ref_id"])
@@ -243,6 +259,9 @@ def test_the_truth_is_linear_in_speed_and_turns_the_shorter_way() -> None:
         {"speeds": (1.2, 0.6)},
         {"fastest": 1.0},
         {"intrusion": (0.4, 0.2)},
+        {"pace": (0.1, 0.3)},
+        {"pace": (1.0, 0.5)},
+        {"pace": (5.0, 6.0)},
         {"date": "02.01.2000"},
         {"square": szlib.Square(x=(0, 8), y=(0, 20))},
     ],

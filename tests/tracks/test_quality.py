@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import make_tracks, make_walk, real_data
 from test_readers import as_1hz, as_tidy
 
+import szlib
 from szlib.tracks import quality
 
 BEGIN = 1351040400.0  # 10:00 in Japan
@@ -66,3 +68,32 @@ def test_files_without_a_speed_have_none(tmp_path: Path) -> None:
     assert tidy["sensor_speed"].isna().all()
     np.testing.assert_allclose(hourly["sensor_speed"], 1.2)
     np.testing.assert_allclose(tidy["moved"], hourly["moved"])
+
+
+def test_what_thinning_costs_is_known_for_a_bend() -> None:
+    turn = 2.0 * np.arange(0, 12.01, 0.1) / 5.0  # 2 m/s on a circle of 5 m
+    walk = make_walk((0, 0), (1, 0), duration=12.0)
+    walk[["x", "y"]] = 5 * np.column_stack([np.cos(turn), np.sin(turn)])
+    sagitta = 5 * (1 - np.cos(0.2))  # between samples 1 s apart the chord is so far from the bend
+    rms, high = quality.thinning_error(make_tracks(walk))
+    assert rms == pytest.approx(sagitta * np.sqrt(8 / 15), rel=0.05), "the RMS of a parabola over its chord"
+    assert sagitta * 0.9 < high < sagitta * 1.01
+    straight = make_tracks(make_walk((0, 0), (1, 0.5), duration=12.0))
+    assert quality.thinning_error(straight)[0] < 1e-9
+    rough = quality.thinning_error(make_tracks(walk), every=2.0)[0]
+    assert rough == pytest.approx(4 * rms, rel=0.05), "an error of second order"
+
+
+def test_what_cannot_be_thinned_is_refused() -> None:
+    tracks = make_tracks(make_walk((0, 0), (1, 0), duration=0.5))
+    with pytest.raises(szlib.DataError, match=r"no piece of these tracks is longer than 1\.0 s"):
+        quality.thinning_error(tracks)
+    for every in (0.1, 0.25, -1.0):
+        with pytest.raises(szlib.DataError, match="every must be a multiple"):
+            quality.thinning_error(tracks, every=every)
+
+
+def test_what_thinning_costs_people() -> None:
+    rms, high = quality.thinning_error(szlib.read_tracks(real_data("eth") / "seq_eth_obsmat.txt"))
+    assert 0.04 < rms < 0.06
+    assert high < 0.13

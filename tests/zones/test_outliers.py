@@ -1,4 +1,4 @@
-"""Outliers: the complementary plane turns distances inside out, and LOF keeps to its quota."""
+"""Outliers: the plane inside out, whole encounters by default, and the paper's quota of samples."""
 
 from __future__ import annotations
 
@@ -12,7 +12,18 @@ from sklearn.neighbors import LocalOutlierFactor
 
 import szlib
 from szlib.tracks import funnels
-from szlib.zones.outliers import JITTER, complementary_points, is_outlier, remove_outliers
+from szlib.zones.outliers import (
+    FACTOR,
+    FRACTION,
+    JITTER,
+    NEIGHBOURS,
+    SHARE,
+    complementary_points,
+    is_outlier,
+    local_outlier_factors,
+    nearest_approaches,
+    remove_outliers,
+)
 
 
 def make_samples(
@@ -40,6 +51,29 @@ def with_intruders(samples: pd.DataFrame, count: int = 5) -> pd.DataFrame:
         {"los_angle": np.linspace(-3, 2.5, count), "distance": rng.uniform(0.05, 0.2, count), "speed": 1.0}
     )
     return pd.concat([samples, intruders], ignore_index=True)
+
+
+def make_encounters(
+    n: int = 600, *, seed: int = 0, edge: float = 0.9, intruders: int = 0, pace: float = 1.5
+) -> pd.DataFrame:
+    """Straight walks past a person, 31 samples each, none nearer than `edge` but for the first few.
+
+    The intruders come as near as 0.2 to 0.4 m, from all sides.
+    """
+    rng = np.random.default_rng(seed)
+    intrudes = np.arange(n) < intruders
+    nearest = np.where(intrudes, rng.uniform(0.2, 0.4, n), edge + rng.exponential(0.15, n))
+    bearing = np.where(intrudes, 2 * np.pi * np.arange(n) / max(intruders, 1), rng.uniform(0, 2 * np.pi, n))
+    along = np.where(intrudes, pace, 1.0)[:, None] * np.arange(-1.5, 1.55, 0.1)
+    speed = rng.uniform(0.4, 1.6, n)
+    return pd.DataFrame(
+        {
+            "encounter": np.repeat(np.arange(n), 31),
+            "los_angle": (bearing[:, None] + np.arctan2(along, nearest[:, None])).ravel(),
+            "distance": np.hypot(along, nearest[:, None]).ravel(),
+            "speed": np.repeat(speed, 31),
+        }
+    )
 
 
 # --- complementary coordinates -----------------------------------------------------------------------
@@ -80,7 +114,158 @@ def test_samples_that_have_no_complement(change: dict[str, float]) -> None:
         complementary_points(samples)
 
 
-# --- LOF ---------------------------------------------------------------------------------------------
+# --- whole encounters -------------------------------------------------------------------------------
+
+
+def removed_encounters(samples: pd.DataFrame, **options: object) -> set[int]:
+    """Those that lost a sample within 2 m: all of them, or the test fails."""
+    near = close(samples)
+    outlier = is_outlier(near, **options)
+    lost = near.loc[outlier, "encounter"]
+    assert near["encounter"].isin(lost)[~outlier].sum() == 0
+    return set(lost)
+
+
+def brute_force_factors(points: np.ndarray, k: int) -> np.ndarray:
+    """The local outlier factor as Breunig et al. define it, pair by pair."""
+    distance = np.linalg.norm(points[:, None] - points, axis=-1)
+    np.fill_diagonal(distance, np.inf)
+    nearest = np.argsort(distance, axis=1)[:, :k]
+    reach = np.sort(distance, axis=1)[:, k - 1]
+    reachability = np.maximum(np.take_along_axis(distance, nearest, axis=1), reach[nearest])
+    density = 1 / reachability.mean(axis=1)
+    return density[nearest].mean(axis=1) / density
+
+
+@pytest.mark.parametrize("k", [5, 20, 60])
+def test_the_factor_is_that_of_its_definition(k: int) -> None:
+    points = complementary_points(nearest_approaches(close(make_encounters(300, intruders=5))))
+    np.testing.assert_allclose(local_outlier_factors(points, k), brute_force_factors(points, k), rtol=1e-6)
+
+
+def test_an_encounter_stands_for_its_nearest_sample() -> None:
+    samples = close(make_encounters()).sample(frac=1, random_state=0)
+    nearest = nearest_approaches(samples)
+    expected = samples.loc[samples.groupby("encounter")["distance"].idxmin()]
+    pd.testing.assert_frame_equal(nearest, expected)
+
+
+@pytest.mark.parametrize("pace", [0.2, 3.0])
+@pytest.mark.parametrize("intruders", [0, 1, 6, 12, 30])
+@pytest.mark.parametrize("seed", range(3))
+def test_intruders_are_found_whatever_their_number_and_pace(seed: int, intruders: int, pace: float) -> None:
+    """Up to 5 % of the encounters; and nobody else, who keep to the edge that the quota eats."""
+    samples = make_encounters(seed=seed, intruders=intruders, pace=pace)
+    assert removed_encounters(samples) == set(range(intruders))
+
+
+def test_a_slow_intruder_hides_from_the_quota_among_their_own_samples() -> None:
+    samples = make_encounters(intruders=6, pace=0.2)
+    near = close(samples)
+    by_quota = is_outlier(near, fraction=6 * 31 / len(near))  # the very number, were they known
+    assert by_quota[near["encounter"] < 6].mean() < 0.5
+    assert is_outlier(near)[near["encounter"] < 6].all()
+
+
+def test_the_middle_of_a_crowd_is_found_in_a_later_round() -> None:
+    """A hundred who rest upon each other in two places, of 2,000: one round alone sees their fringe."""
+    samples = make_encounters(2000, intruders=100)
+    samples.loc[samples["encounter"] < 100, "los_angle"] *= 0.25
+    nearest = nearest_approaches(close(samples))
+    once = local_outlier_factors(complementary_points(nearest), 40)[:100] > FACTOR
+    assert not once.all()
+    assert set(range(100)) <= removed_encounters(samples)
+
+
+def test_who_keeps_away_more_than_most_is_no_outlier() -> None:
+    ring = make_samples(300, nearest=0.9, farthest=1.1)
+    two = pd.DataFrame({"los_angle": [1.0, 1.0], "distance": [0.2, 1.95], "speed": 1.0})
+    samples = pd.concat([ring, two], ignore_index=True).assign(encounter=range(302))
+    factors = local_outlier_factors(complementary_points(samples), NEIGHBOURS)
+    assert (factors[-2:] > FACTOR).all()
+    assert removed_encounters(samples) == {300}
+
+
+def test_the_neighbours_are_a_share_of_the_encounters() -> None:
+    samples = make_encounters(2000, intruders=40)
+    expected = math.ceil(SHARE * samples["encounter"].nunique())
+    assert expected > NEIGHBOURS
+    assert removed_encounters(samples) == removed_encounters(samples, neighbours=expected)
+    few = make_encounters(300, intruders=5)
+    assert removed_encounters(few) == removed_encounters(few, neighbours=NEIGHBOURS)
+
+
+def test_numbers_order_and_direction_of_encounters_change_nothing() -> None:
+    samples = make_encounters(intruders=9)
+    kept = remove_outliers(samples)
+    assert len(kept) < len(close(samples))
+    shuffled = remove_outliers(samples.sample(frac=1, random_state=1))
+    pd.testing.assert_frame_equal(shuffled.sort_index(), kept)
+    others = np.random.default_rng(3).permutation(600)
+    renumbered = samples.assign(encounter=others[samples["encounter"]])
+    assert remove_outliers(renumbered).index.equals(kept.index)
+    named = samples.assign(encounter=samples["encounter"].map("pair {:04}".format).astype("category"))
+    assert remove_outliers(named).index.equals(kept.index)
+    turned = remove_outliers(samples.assign(los_angle=samples["los_angle"] + 1.1))
+    assert turned.index.equals(kept.index)
+    mirrored = remove_outliers(samples.assign(los_angle=-samples["los_angle"]))
+    assert mirrored.index.equals(kept.index)
+
+
+def test_a_speed_that_nobody_else_walks_at_sets_apart_where_speed_counts() -> None:
+    samples = make_encounters()
+    near = samples["encounter"] == samples["encounter"][samples["distance"].idxmin()]
+    samples.loc[near, "speed"] = 6.0
+    assert removed_encounters(samples) == set()
+    assert removed_encounters(samples, speed_scale=1.0) == set(samples.loc[near, "encounter"])
+
+
+def test_the_funnel_counts_the_samples_of_outlying_encounters() -> None:
+    samples = make_encounters(intruders=4)
+    kept = remove_outliers(samples)
+    *_, inliers = funnels.of(kept)
+    gone = close(samples)["encounter"].isin(removed_encounters(samples)).sum()
+    assert inliers["set_aside"] == {"of an outlying encounter (LOF)": gone}
+    pd.testing.assert_frame_equal(kept, samples.loc[kept.index])
+
+
+def test_a_few_encounters_are_told_and_kept() -> None:
+    few = make_encounters(NEIGHBOURS, intruders=1)
+    with pytest.warns(szlib.DataWarning, match=r"20 encounters are too few to tell an outlier .* add data"):
+        kept = remove_outliers(few)
+    assert len(kept) == len(close(few))
+    remove_outliers(few, neighbours=5)  # asked for, so without a warning
+
+
+def test_copies_of_an_encounter_count_once() -> None:
+    """Or a denser place than any other would make outliers of all around it."""
+    samples = make_encounters(intruders=5)
+    copies = pd.concat([samples.query("encounter == 77").assign(encounter=1000 + k) for k in range(200)])
+    both = pd.concat([samples, copies], ignore_index=True)
+    assert removed_encounters(both) == removed_encounters(samples) >= set(range(5))
+
+
+def test_samples_must_tell_their_encounter() -> None:
+    samples = make_encounters()
+    for unknown in (
+        samples.drop(columns="encounter"),
+        samples.assign(encounter=samples["encounter"].where(samples["encounter"] != 3)),
+    ):
+        with pytest.raises(
+            szlib.DataError, match=r"in a column encounter, .* or judge samples with fraction="
+        ):
+            remove_outliers(unknown)
+        remove_outliers(unknown, FRACTION)
+    with pytest.raises(szlib.DataError, match=r"more samples \(or encounters\) than .* got 600 neigh"):
+        remove_outliers(samples, neighbours=600)
+
+
+def test_nobody_is_taken_from_the_real_day(real_samples: pd.DataFrame) -> None:
+    """169 encounters within 2 m say too little: even the nearest, at 0.48 m, has company."""
+    assert len(remove_outliers(real_samples)) == (real_samples["distance"] <= 2).sum()
+
+
+# --- the paper's quota of samples --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("speed_scale", [None, 0.5])
@@ -128,7 +313,7 @@ def test_rows_come_as_they_are_and_the_input_stays() -> None:
     samples = make_samples().assign(note="x")
     funnels.carry(samples, [funnels.stage("before", 1000, 1000, {})])
     before = samples.copy(deep=True)
-    kept = remove_outliers(samples)
+    kept = remove_outliers(samples, FRACTION)
     pd.testing.assert_frame_equal(samples, before)
     pd.testing.assert_frame_equal(kept, samples.loc[kept.index])
     first, near, inliers = funnels.of(kept)
@@ -156,7 +341,7 @@ def test_a_few_identical_samples_need_no_noise() -> None:
     samples = close(make_samples())
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        remove_outliers(pd.concat([samples, samples]))
+        remove_outliers(pd.concat([samples, samples]), FRACTION)
 
 
 # --- nonsense ----------------------------------------------------------------------------------------
@@ -165,7 +350,7 @@ def test_a_few_identical_samples_need_no_noise() -> None:
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"fraction": -0.1}, r"fraction must be within \[0, 0.5\]; got -0.1"),
+        ({"fraction": -0.1}, r"fraction must be within \[0, 0.5\], or None .*; got -0.1"),
         ({"fraction": 0.6}, "got 0.6"),
         ({"fraction": np.nan}, "got nan"),
         ({"r_max": 0}, "r_max must be a positive distance"),
@@ -181,7 +366,7 @@ def test_a_few_identical_samples_need_no_noise() -> None:
 )
 def test_parameters_without_a_meaning(options: dict, told: str) -> None:
     with pytest.raises(szlib.DataError, match=told):
-        remove_outliers(make_samples(), **options)
+        remove_outliers(make_samples(), **{"fraction": FRACTION, **options})
 
 
 def test_samples_that_cannot_be_used() -> None:
@@ -193,12 +378,12 @@ def test_samples_that_cannot_be_used() -> None:
     with pytest.raises(szlib.DataError, match="row 4: distance is NaN"):
         remove_outliers(samples.assign(distance=samples["distance"].where(samples.index != 4)))
     with pytest.raises(szlib.DataError, match=r"row \d+: speed is nan"):
-        remove_outliers(samples.assign(speed=np.nan), speed_scale=1.0)
+        remove_outliers(samples.assign(speed=np.nan), FRACTION, speed_scale=1.0)
     with pytest.raises(szlib.DataError, match=r"columns \['speed'\] are missing"):
-        remove_outliers(samples.drop(columns="speed"), speed_scale=1.0)
+        remove_outliers(samples.drop(columns="speed"), FRACTION, speed_scale=1.0)
 
 
 def test_the_real_day_keeps_its_quota(real_samples: pd.DataFrame) -> None:
-    kept = remove_outliers(real_samples)
+    kept = remove_outliers(real_samples, FRACTION)
     *_, near, inliers = funnels.of(kept)
     assert inliers["set_aside"]["outlier (LOF)"] == math.ceil(0.002 * (near["kept"] - 1))

@@ -5,6 +5,8 @@ The paper's full size (half a million samples) runs in `make bench`.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -21,33 +23,37 @@ def test_outliers_are_those_of_scikit_learn() -> None:
     samples = paper_samples(MANY)
     points = outliers.complementary_points(samples)
     theirs = LocalOutlierFactor(n_neighbors=20, contamination=0.002).fit_predict(points) == -1
-    assert (outliers.is_outlier(samples) == theirs).all()
+    assert (outliers.is_outlier(samples, fraction=outliers.FRACTION) == theirs).all()
     assert theirs.sum() == 0.002 * MANY
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_many_copies_do_not_make_lof_explode(share: float) -> None:
+@pytest.mark.parametrize("fraction", [None, 0.002])
+def test_many_copies_do_not_make_lof_explode(share: float, fraction: float | None) -> None:
     """As a person who stands still for hours would give; their copies are no outliers, nor make others so."""
     samples = paper_samples(MANY)
     copies = np.arange(MANY) < share * MANY
     samples.loc[copies, ["los_angle", "distance", "speed"]] = [0.3, 1.2, 1.0]
-    with pytest.warns(szlib.DataWarning, match="samples coincide"):
-        outlier = outliers.is_outlier(samples)
-    assert outlier.sum() == pytest.approx(0.002 * MANY, abs=1)
-    with pytest.warns(szlib.DataWarning, match="samples coincide"):
-        zone = szlib.SocialZone.fit(samples, speeds=(1.1,))
-    plain = szlib.SocialZone.fit(samples[~copies], speeds=(1.1,))
+    told = pytest.warns(szlib.DataWarning, match="samples coincide") if fraction else nullcontext()
+    with told:
+        outlier = outliers.is_outlier(samples, fraction=fraction)
+    with told:
+        zone = szlib.SocialZone.fit(samples, speeds=(1.1,), outlier_fraction=fraction)
+    assert outlier.sum() == (pytest.approx(fraction * MANY, abs=1) if fraction else 0)
+    plain = szlib.SocialZone.fit(samples[~copies], speeds=(1.1,), outlier_fraction=fraction)
     assert zone.ellipse(1.1).area == pytest.approx(plain.ellipse(1.1).area, rel=0.15)
 
 
-def test_the_zone_does_not_depend_on_the_order_of_samples() -> None:
+@pytest.mark.parametrize("fraction", [None, 0.002])
+def test_the_zone_does_not_depend_on_the_order_of_samples(fraction: float | None) -> None:
     samples = paper_samples(MANY)
     shuffled = samples.sample(frac=1, random_state=1)
-    zones = [szlib.SocialZone.fit(table, speeds=(0.9, 1.1)) for table in (samples, shuffled)]
+    options = {"speeds": (0.9, 1.1), "outlier_fraction": fraction}
+    zones = [szlib.SocialZone.fit(table, **options) for table in (samples, shuffled)]
     for speed in (0.9, 1.1):
         one, other = (zone.ellipse(speed) for zone in zones)
         np.testing.assert_allclose(
             [*one.center, *one.semi_axes], [*other.center, *other.semi_axes], rtol=1e-9
         )
-    kept = [outliers.remove_outliers(table).sort_index() for table in (samples, shuffled)]
+    kept = [outliers.remove_outliers(table, fraction).sort_index() for table in (samples, shuffled)]
     pd.testing.assert_frame_equal(kept[0], kept[1])

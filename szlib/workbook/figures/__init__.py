@@ -16,7 +16,16 @@ __getattr__, __dir__, __all__ = lazy.attach(
     submod_attrs={
         "tracks": ["plot_map", "plot_speeds", "plot_funnel"],
         "encounters": ["plot_space", "plot_encounter_paths", "plot_los", "plot_los_distance"],
-        "zones": ["plot_outliers", "plot_hull", "plot_zone", "plot_zones"],
+        "zones": [
+            "plot_outliers",
+            "plot_hull",
+            "plot_zone",
+            "plot_zones",
+            "plot_pair_correlation",
+            "plot_by_number",
+            "plot_tornado",
+            "plot_findings",
+        ],
         "control": ["plot_distance", "plot_overestimate"],
         "simulation": [
             "plot_scenario",

@@ -1,0 +1,247 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 15 - Respect or emptiness?
+#
+# **Question.** Around a walking person there is a place where nobody is. Do people keep out of it, or
+# is it only rare that two of them are anywhere near each other?
+#
+# **Expectation.** If it is respect, people must be there less often than they would be by chance. So we
+# need to know what chance gives: the same people on the same paths who take no notice of each other.
+
+# %%
+import warnings
+
+import matplotlib.pyplot as plt
+import pandas as pd
+
+import szlib
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
+
+# %% tags=["parameters"]
+data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+seed = 0
+results = "../results"
+shifts = 20  # null models; the saved tables have 100
+resamples = 100  # for the intervals
+
+# %%
+record = NotebookRecord("15_respect", data=data, results=results, seed=seed)
+parameters(
+    [
+        (
+            "shift of each person",
+            "1 to 10 min, either way",
+            ASSUMED,
+            "longer than a meeting, shorter than the day's changes",
+        ),
+        ("null models", shifts, ASSUMED, f"the smallest p-value is 1/{shifts + 1}"),
+        (
+            "companions",
+            "5 s together within 2 m, at equal velocity",
+            MEASURED,
+            "on people whose groups are known",
+        ),
+        ("quantile zone", "q = 5 %", ASSUMED, "the share of encounters that may enter it"),
+        ("respect zone", "g = 1/2", ASSUMED, "people were there half as often as by chance"),
+    ]
+)
+
+# %% [markdown]
+# ## Who meets whom
+#
+# Not every encounter is a meeting of strangers. Two people who walk together keep a distance as well,
+# but another one, for another reason. The *kind* of an encounter is decided on the whole common track
+# of the two people (`szlib.encounters.kinds`).
+
+# %%
+tracks = record.tracks()
+samples = szlib.find_encounters(tracks)
+pairs = samples.drop_duplicates("encounter")
+counts = pairs["kind"].value_counts()
+record.key |= {"encounters": len(pairs), "companions": int(counts["companions"])}
+counts.to_frame("encounters")
+
+# %% [markdown]
+# ## The null model
+#
+# `szlib.null_encounters` moves each person in time alone, by minutes. Every path, every speed and the
+# density of the crowd stay; that two people take notice of each other is lost. Companions are taken
+# apart. Whatever is found now is what emptiness looks like.
+
+# %%
+null = szlib.null_encounters(tracks, shifts=shifts, seed=seed, progress=False)
+by_chance = null.encounters.drop_duplicates("encounter")["kind"].value_counts() / shifts
+compared = pd.DataFrame({"seen": counts, "by chance": by_chance.round(1)})
+print(f"{len(pairs)} encounters seen, {len(null.encounters) / shifts:.0f} by chance")
+compared
+
+# %% [markdown]
+# On the plaza pairs come one after the other: by chance they would hardly ever meet. In a mall they
+# would, and those who meet by chance do not walk side by side.
+
+# %%
+fig, ax = plt.subplots(figsize=(7, 3), layout="constrained")
+compared.loc[counts.index].plot.barh(ax=ax, color=[figures.BLUE, figures.GREY], width=0.75)
+ax.set(xlabel="encounters", ylabel="", title="Who meets whom, and who would by chance")
+record.figure(fig, "kinds")
+
+# %% [markdown]
+# ## Where people are, and where they would be
+#
+# $g(r, \theta)$ is how often people were there, over how often they are in the null model: 1 where nobody
+# minds, below 1 where people keep out. The *respect zone* ends where $g = 1/2$. Strangers only, seen by
+# all bearings together: the dashed circle.
+
+# %%
+strangers, others = szlib.of_kind(samples, "strangers"), null.of_kind("strangers")
+radius = szlib.respect_radius(strangers, others)
+ax = figures.plot_pair_correlation(szlib.pair_correlation(strangers, others), radius=radius)
+ax.set_title(f"Strangers keep out of {radius:.2f} m")
+record.figure(ax.figure, "g")
+record.key["respect radius, strangers [m]"] = radius
+
+# %% [markdown]
+# ## Is it respect at all?
+#
+# If nobody minded anybody, the data would be just one more shifted day: its rank among the null models is
+# a p-value, whatever is measured. What is measured: do too few of those who come near come very near?
+
+# %%
+tests = {
+    name: szlib.null_test(szlib.of_kind(samples, kinds), null.of_kind(kinds))
+    for name, kinds in (("everybody", None), ("strangers", "strangers"))
+}
+for name, test in tests.items():
+    print(f"{name}: {test}")
+    record.key[f"p-value, {name}"] = test.p_value
+found = tests["strangers"].respect
+record.claim("people keep out of each other's way more than by chance", found, str(tests["strangers"]))
+
+# %%
+fig, ax = plt.subplots(figsize=(7, 3), layout="constrained")
+ax.hist(tests["strangers"].null_statistics, bins=15, color=figures.GREY, label=f"{shifts} null models")
+ax.axvline(tests["strangers"].statistic, color=figures.RED, linewidth=2, label="the data")
+ax.set(xlabel="signed root of the likelihood ratio: too few come near", ylabel="null models")
+ax.set_title("Respect is " + ("shown" if found else "not shown") + " here")
+ax.legend()
+record.figure(fig, "test")
+
+# %% [markdown]
+# A test is only worth something if it stays silent where there is nothing. So it was run on crowds in
+# which nobody minds anybody, straight across at a speed of their own, singly or in bunches of ten as from
+# a train (`python tests/studies/respect.py nobody`):
+
+# %%
+nobody = pd.read_csv("tables/15_nobody.csv")
+alarms = (
+    nobody.assign(alarm=nobody["p_value"] <= 0.05).groupby(["bunch", "kinds"])["alarm"].agg(["sum", "size"])
+)
+record.check(
+    "the test stays silent where nobody minds: at most 5 % false alarms for opposite and crossing",
+    (alarms.xs("opposite, crossing", level="kinds")["sum"] <= 0.05 * alarms["size"].max()).all(),
+    alarms["sum"].to_dict().__repr__(),
+)
+alarms.rename(columns={"sum": "false alarms", "size": "crowds"})
+
+# %% [markdown]
+# ## Three zones of the same people
+#
+# - **hull**: where (nearly) nobody ever was: the paper's;
+# - **quantile**: where all but 5 % of encounters keep out;
+# - **respect**: where people are half as often as by chance.
+#
+# Each with its interval, from pairs of people drawn anew, for everybody and for strangers.
+
+
+# %%
+def zone_at(people: pd.DataFrame, model: szlib.NullEncounters, method: str) -> pd.Series:
+    """The row of the table at 1.1 m/s."""
+    more = {"null": model} if method == "respect" else {}
+    zone = szlib.SocialZone.fit(people, method=method, speeds=(1.1,), resamples=resamples, **more)
+    return zone.table().iloc[0]
+
+
+rows = {}
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore", szlib.DataWarning)  # the column adequate says it
+    for name, people, model in (("everybody", samples, null), ("strangers", strangers, others)):
+        for method in ("hull", "quantile", "respect"):
+            rows[method, name] = zone_at(people, model, method)
+zones = pd.DataFrame(rows).T[["a", "a_low", "a_high", "b", "center_x", "area", "influence", "adequate"]]
+zones.to_csv(record.out / "15_zones.csv")
+zones
+
+# %%
+fig, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
+for at, (row, shade, marker) in enumerate(
+    zip(zones.index, [figures.RED, figures.BLUE, figures.GREEN] * 2, "os^" * 2, strict=True)
+):
+    line = zones.loc[row]
+    ax.hlines(at, line["a_low"], line["a_high"], color=shade, linewidth=2)
+    ax.plot(line["a"], at, marker, color=shade, fillstyle="full" if line["adequate"] else "none")
+ax.set_yticks(range(len(zones)), [f"{method}, {who}" for method, who in zones.index])
+ax.invert_yaxis()
+ax.set(xlabel="semi-major axis at 1.1 m/s [m], 95 %; hollow: too few people on some side")
+ax.set_title("Three zones of the same people")
+record.figure(fig, "zones")
+for (method, who), line in zones.iterrows():
+    record.key[f"a, {method}, {who}"] = float(line["a"])
+
+# %% [markdown]
+# ## By the number of encounters
+#
+# Take fewer encounters of the same place at random, and estimate again. An extreme shrinks with every
+# person added, until one careless passer-by sets it; a share of encounters does not. The real ATC day and
+# Grand Central, New York (`python tests/studies/respect.py n-curve`):
+
+# %%
+curves = pd.read_csv("tables/15_n_curve.csv")
+curves = curves[curves["kinds"] == "strangers"]
+fig, panels = plt.subplots(1, 2, figsize=(11, 4), layout="constrained", sharey=True)
+shown = {
+    "hull_a": "hull: semi-major axis",
+    "respect": "respect: radius",
+    "null_respect": "respect, of the null model",
+}
+for ax, (site, part) in zip(panels, curves.groupby("site"), strict=True):
+    figures.plot_by_number(part, shown, ax=ax).set_title(f"{site}, strangers")
+record.figure(fig, "n-curve")
+
+# %%
+sites = pd.read_csv("tables/15_sites.csv")
+sites = sites[(sites["min_distance"] == 1) & sites["kinds"].isin(["all", "strangers", "opposite, crossing"])]
+sites[
+    [
+        "site",
+        "kinds",
+        "encounters",
+        "radius",
+        "radius_low",
+        "radius_high",
+        "null_radius_high",
+        "p_value",
+        "hull_a",
+        "null_hull_a",
+    ]
+].round(3)
+
+# %% [markdown]
+# **What it means.** Emptiness alone makes a zone, and a method that looks for the nearest person cannot
+# tell. Held against people who take no notice of each other, a distance remains that is kept, and it is the
+# same however long one watches. Companions have to be told apart first: they are near by choice.
+
+# %%
+record.close()

@@ -1,0 +1,195 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 16 - What is true?
+#
+# **Question.** What does the paper claim, and what of it does the data at hand support?
+#
+# **Expectation.** A claim that rests on 92 days may be undecidable on one. So each becomes an effect with
+# its interval, and the verdict may be "not decidable".
+
+# %%
+import warnings
+from functools import partial
+
+import matplotlib.pyplot as plt
+import pandas as pd
+
+import szlib
+from szlib.plaza.scores import true_kinds
+from szlib.workbook import claims, figures
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
+from szlib.workbook.sensitivity import sensitivity
+from szlib.zones.outliers import is_outlier
+
+# %% tags=["parameters"]
+data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+seed = 0
+results = "../results"
+resamples = 200  # for the intervals
+
+# %%
+record = NotebookRecord("16_claims", data=data, results=results, seed=seed)
+parameters(
+    [
+        (
+            "intervals",
+            f"95 %, {resamples} resamples of pairs of people",
+            ASSUMED,
+            "one pair is one piece of evidence",
+        ),
+        (
+            "verdict",
+            "the interval lies above, below or around 0",
+            ASSUMED,
+            "an effect above 0 is as the paper says",
+        ),
+        ("speed of the zone", "1.1 m/s", PAPER, "sec. 4"),
+        ("slow and fast", "0.7 and 1.3 m/s", ASSUMED, "well inside the data"),
+    ]
+)
+
+# %% [markdown]
+# ## The claims, on this data
+#
+# Everything about zones twice: with the paper's hull, and with the quantile zone, which does not depend on
+# how many people were seen.
+
+# %%
+samples = record.encounters()
+speeds = (0.7, 1.1, 1.3)
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore", szlib.DataWarning)  # what is not adequate cannot decide, and says so
+    fit = partial(szlib.SocialZone.fit, samples, speeds=speeds, resamples=resamples, seed=seed)
+    zones = {"hull": fit(), "quantile": fit(method="quantile")}
+
+# %%
+found = [
+    claims.passes_on_the_right(samples),
+    claims.as_many_a_day(len(samples) // 31, samples["day"].nunique()),
+]
+for zone in zones.values():
+    found += [claims.larger_ahead(zone), claims.grows_with_speed(zone)]
+methods = ["-", "-", "hull", "hull", "quantile", "quantile"]
+table = claims.findings_table(found, data=record.out.name).assign(method=methods)
+table.to_csv(record.out / "16_claims.csv", index=False)
+for each, method in zip(found, methods, strict=True):
+    record.claim(f"{each.claim} ({method})", each.low > 0, str(each))
+
+# %%
+if record.synthetic:
+    settings = szlib.PlazaSettings()
+    close = samples[samples["distance"] <= 2.0]
+    intruder = true_kinds(close, seed=seed) == "intruder"
+    removed = is_outlier(close, fraction=0.002, neighbours=20)
+    lof = claims.outliers_are_intruders(int((removed & intruder).sum()), int(removed.sum()))
+    record.claim(f"{lof.claim} (20 neighbours, 0.2 %)", lof.low > 0, str(lof))
+
+# %%
+ax = figures.plot_findings(table)
+ax.set_title(f"{(table['verdict'] == 'supported').sum()} of {len(table)} claims are supported here")
+record.figure(ax.figure, "claims")
+
+# %% [markdown]
+# ## The same on every data set at hand
+#
+# The plaza, the real ATC day, Grand Central, THOR-MAGNI, and the ETH sequence
+# (`python tests/studies/claims.py`). A site without enough people on every side decides nothing about
+# zones, and says so.
+
+# %%
+everywhere = pd.read_csv("tables/16_claims.csv")
+wide = everywhere.assign(cell=everywhere.agg(claims.as_cell, axis=1)).pivot(
+    index=["claim", "method"], columns="data", values="cell"
+)
+record.key["claims decided"] = int((~everywhere["verdict"].str.startswith("not")).sum())
+record.key["cells"] = len(everywhere)
+wide[list(dict.fromkeys(everywhere["data"]))]
+
+# %% [markdown]
+# ## What moves the zone most
+#
+# Each parameter of the method alone, the others at their defaults: on this data with the paper's hull, and
+# on the real day with both estimators (`python tests/studies/claims.py`).
+
+# %%
+tracks = record.tracks()
+moved = sensitivity(tracks, square=szlib.ATC_SQUARE)
+moved.to_csv(record.out / "16_sensitivity.csv", index=False)
+most = moved.iloc[1:].assign(change=lambda t: (t["area"] / moved["area"].iloc[0] - 1).abs())
+strongest = most.loc[most["change"].idxmax()]
+record.key |= {"moves the zone most": strongest["parameter"], "by": f"{100 * strongest['change']:.0f} %"}
+moved.round(2)
+
+# %%
+saved = pd.read_csv("tables/16_sensitivity.csv")
+fig, panels = plt.subplots(1, 3, figsize=(15, 4.6), layout="constrained")
+figures.plot_tornado(moved, ax=panels[0]).set_title("This data, hull")
+for ax, (method, part) in zip(panels[1:], saved.groupby("method"), strict=True):
+    figures.plot_tornado(part, ax=ax).set_title(f"ATC day, {method}")
+record.figure(fig, "tornado")
+
+# %% [markdown]
+# ## What it means for the robot
+#
+# A zone is known up to its interval. The four scenarios with its low, its middle and its high end: what
+# does the uncertainty about people cost the robot?
+
+# %%
+zone = zones["quantile"]
+line = zone.table().set_index("speed").loc[1.1]
+size = {"low": (line["a_low"] / line["a"]), "middle": 1.0, "high": (line["a_high"] / line["a"])}
+rows = []
+for name in szlib.SCENARIOS:
+    for end, scale in size.items():
+        metrics = claims.run_with(name, claims.scaled(zone.ellipses[1.1], scale))
+        rows.append(
+            (
+                name,
+                end,
+                line["a"] * scale,
+                metrics["time_to_goal"],
+                metrics["time_yielding"],
+                metrics["outcome"],
+            )
+        )
+driven = pd.DataFrame(
+    rows, columns=["scenario", "zone", "a [m]", "time to goal [s]", "yields [s]", "outcome"]
+)
+driven.pivot(index="scenario", columns="zone", values=["time to goal [s]", "yields [s]"]).round(1)
+
+# %%
+trade = claims.size_trades_efficiency(zone.ellipses[1.1])
+record.claim(trade.claim, trade.low > 0, str(trade))
+fig, ax = plt.subplots(figsize=(7, 3.5), layout="constrained")
+for (name, part), (shade, line) in zip(
+    driven.groupby("scenario", sort=False),
+    ((figures.BLUE, "-"), (figures.ORANGE, "--"), (figures.GREEN, "-."), (figures.RED, ":")),
+    strict=True,
+):
+    ax.plot(part["a [m]"], part["time to goal [s]"], "o" + line, color=shade, label=name)
+ax.set(xlabel="semi-major axis of the zone [m]", ylabel="time to goal [s]")
+ax.set_title(
+    "A larger zone makes the robot later" if trade.low > 0 else "A larger zone does not always make it later"
+)
+ax.legend(fontsize=8)
+record.figure(fig, "robot")
+
+# %% [markdown]
+# **What it means.** The method's own parameters move a zone more than people do: above all the distance
+# that two people must have when they are first looked at. A zone without its interval, its kinds of
+# encounter and its null model is a number, not knowledge.
+
+# %%
+record.close()

@@ -1,0 +1,257 @@
+"""Other sites than the ATC mall: Grand Central, Edinburgh's Informatics Forum, THOR-MAGNI.
+
+Each reader gives a track table that keeps the contract of `szlib.tracks.interop`.  EWAP files (ETH, hotel,
+zara, students) are read by `szlib.read_tracks`.  No data comes with szlib: these were issued without a
+licence, or with one of their own.
+
+    site            sampled every   max_gap   what else to know
+    Grand Central   0.8 s           0.9 s     marked by hand, 7-16 cm off; its scale is uncertain
+    Edinburgh       1/9 s           0.5 s     about 9 frames/s; the centres of blobs, not of people
+    THOR-MAGNI      0.4 s           0.9 s     a laboratory of 18 m by 7 m, where people were given goals
+    EWAP            0.4 s           0.9 s     ETH at 15 frames/s, the others at 25
+    ATC 1 Hz        1.0 s           1.6 s
+
+Nobody is carried across a longer silence; within it positions are interpolated, which cuts the corners of a
+path: reading 1 Hz at 10 Hz costs 3 to 6 cm RMS (95 % within 4 to 12 cm; see `quality.thinning_error`).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+import zlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..errors import DataError
+from . import funnels
+from .clock import check_columns, to_clock
+
+GRAND_CENTRAL_RATE = 25.0
+"""Frames a second of the video of Grand Central; every 20th is annotated."""
+GRAND_CENTRAL_SCALE = 0.8
+"""Metres in one unit of its homography (OpenTraj)."""
+EDINBURGH_RATE = 9.0
+"""About so many frames a second reach Edinburgh's files; the rate varies over short times."""
+EDINBURGH_PIXEL, EDINBURGH_ROWS = 0.0247, 480
+"""Metres in a pixel on the floor, and rows of an image."""
+_SESSION = 0.2
+"""Samples of THOR-MAGNI nearer than this [s] belong to two sessions (0.01 s between them, 0.4 within)."""
+_MAGNI = ["Time", "ag_id", "x", "y", "data_label"]
+_TRACK = re.compile(r"TRACK\.R(\d+)\s*=\s*\[(.*?)\]\s*;\s*$", flags=re.MULTILINE)
+
+
+def read_grand_central(
+    path: str | Path, *, homography: str | Path | None = None, max_gap: float = 0.9
+) -> pd.DataFrame:
+    """Grand Central Station, New York (Zhou et al., CVPR 2011; annotated by Yi et al., CVPR 2015).
+
+    Parameters
+    ----------
+    path : ``Annotation.zip``, or the folder of its files, one a person: column [px], row [px], frame, ...
+    homography : ``H.json``, which maps (row, column, 1) to the floor; None looks beside `path`, then in it.
+    max_gap : a longer silence ends a track [s]; people are annotated every 0.8 s.
+
+    Returns
+    -------
+    A track table of the one recording "grand-central"; id is the number in the file's name, t counts from the
+    beginning of the video, x points to the left and y towards the viewer of the image [m].
+
+    Raises
+    ------
+    DataError : archive or homography is missing or damaged, or a file does not hold triples of numbers.
+    """
+    path = Path(path)
+    matrix = _homography(path, homography)
+    ids, parts = [], []
+    for name, text in _annotations(path).items():
+        fields = text.split()
+        try:
+            rows = np.array(fields, float).reshape(-1, 3)
+            person = int(name.split(".")[0])
+        except ValueError as error:
+            raise DataError(
+                f"{path}, {name}: expected column, row, frame, ... in a file named by a number ({error})"
+            ) from error
+        ids.append(np.full(len(rows), person))
+        parts.append(rows)
+    column, row, frame = np.concatenate(parts).T
+    floor = np.column_stack([row, column, np.ones(len(row))]) @ matrix.T
+    raw = pd.DataFrame({"day": "grand-central", "id": np.concatenate(ids), "t": frame / GRAND_CENTRAL_RATE})
+    raw[["x", "y"]] = GRAND_CENTRAL_SCALE * floor[:, :2] / floor[:, 2:]
+    return _on_the_clock(raw, path.name, max_gap, {})
+
+
+def read_edinburgh(
+    paths: str | Path | Iterable[str | Path], *, frame_rate: float = EDINBURGH_RATE, max_gap: float = 0.5
+) -> pd.DataFrame:
+    """The Edinburgh Informatics Forum (Majecka, 2009): files of ``TRACK.Rn=[[x y frame];[x y frame];...];``.
+
+    Parameters
+    ----------
+    paths : a file, or several, each a recording called by its name ("tracks.Aug24").
+    frame_rate : frames a second; about 9, the files do not say more.
+    max_gap : a longer silence ends a track [s].
+
+    Returns
+    -------
+    A track table; id is the number of the track, x [m] points to the right of the image and y up.  A blob
+    that the tracker gave to several tracks stays with the first: the others are its ghosts.
+
+    Raises
+    ------
+    DataError : there is no such file, it has no track, or a track does not hold triples of numbers.
+    """
+    files = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
+    if not files:
+        raise DataError("no file of Edinburgh was given; pass at least one path")
+    if not 1 <= frame_rate <= 240:
+        raise DataError(f"frame_rate must be frames a second from 1 to 240; got {frame_rate}")
+    if doubled := sorted({file.stem for file in files if [each.stem for each in files].count(file.stem) > 1}):
+        raise DataError(f"several files are called {', '.join(doubled)}: their people would be mixed")
+    parts, ghosts = zip(*(_edinburgh(file, frame_rate) for file in files), strict=True)
+    name = files[0].name if len(files) == 1 else f"{len(files)} files"
+    reasons = {"a blob of an earlier track": sum(ghosts)}
+    return _on_the_clock(pd.concat(parts, ignore_index=True), name, max_gap, reasons)
+
+
+def read_magni(path: str | Path, *, max_gap: float = 0.9) -> pd.DataFrame:
+    """THOR-MAGNI (Schreiter et al., 2024), as CSV with Time [s], ag_id, x, y [m], data_label.
+
+    A helmet (`ag_id`) goes from head to head: a person is one helmet under one label (`data_label`) in one
+    session of about four minutes; id = 100 * session + helmet, both from 1.  Sessions begin where the clock
+    does not go on at its pace of 0.4 s.  The recording is called by the file's name.
+
+    Raises DataError where the file cannot be read, a column is missing or a helmet has no number.
+    """
+    rows = _magni(Path(path))
+    return _on_the_clock(rows[["day", "id", "t", "x", "y"]], Path(path).name, max_gap, {})
+
+
+def magni_groups(path: str | Path) -> pd.DataFrame:
+    """Who belongs together in a file of THOR-MAGNI: columns group (from 0) and id, as from `read_groups`.
+
+    The label says how large a group is ("Visitors-Group 3"), the session who was there.  Where two groups of
+    one size were there at once, people go with those nearest to them (median; in the file at hand 0.7 to
+    1.3 m, and 5.9 m or more to the other group).  Whoever is in no row was alone.
+
+    Raises DataError as `read_magni`, and where people do not make whole groups.
+    """
+    rows, found = _magni(Path(path)), 0
+    members: list[tuple[int, int]] = []
+    for (session, label), people in rows.groupby(["session", "label"]):
+        said = re.search(r"Group (\d+)", str(label))
+        if not said:
+            continue
+        size, left = int(said[1]), sorted(people["id"].unique())
+        if len(left) % size:
+            raise DataError(f"{path}: {len(left)} people are labelled {label!r} in session {session}")
+        at = people.pivot_table(index="t", columns="id", values=["x", "y"])
+        while left:
+            one = left.pop(0)
+            apart = {
+                who: np.hypot(at["x"][one] - at["x"][who], at["y"][one] - at["y"][who]).median()
+                for who in left
+            }
+            near = sorted(left, key=lambda who: apart[who])[: size - 1]
+            members += [(found, int(who)) for who in (one, *near)]
+            left = [who for who in left if who not in near]
+            found += 1
+    return pd.DataFrame(members, columns=["group", "id"]).astype("int64")
+
+
+def _homography(path: Path, homography: str | Path | None) -> np.ndarray:
+    """The matrix of Grand Central, shape (3, 3)."""
+    places = [Path(homography)] if homography else [path.parent / "H.json", path / "H.json"]
+    file = next((place for place in places if place.is_file()), None)
+    if file is None:
+        told = " or ".join(map(str, places))
+        raise DataError(f"{told}: no such file; expected the homography of Grand Central, pass homography=")
+    try:
+        matrix = np.array(json.loads(file.read_text(encoding="utf-8"))["homog"], float)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{file}: cannot be read as a homography ({error}); expected homog, 3 x 3") from error
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+        raise DataError(f"{file}: homog has shape {matrix.shape}; expected 3 x 3 finite numbers")
+    return matrix
+
+
+def _annotations(path: Path) -> dict[str, bytes]:
+    """Content of each file of Grand Central, by name."""
+    try:
+        if path.is_dir():
+            found = {file.name: file.read_bytes() for file in sorted(path.glob("*.txt"))}
+        else:
+            with zipfile.ZipFile(path) as packed:
+                names = sorted(name for name in packed.namelist() if name.endswith(".txt"))
+                found = {name.rsplit("/", 1)[-1]: packed.read(name) for name in names}
+    except (OSError, zipfile.BadZipFile, zlib.error) as error:
+        raise DataError(f"{path}: cannot be read ({error}); expected Annotation.zip or its folder") from error
+    if not found:
+        raise DataError(f"{path}: holds no file *.txt; expected Annotation.zip or the folder of its files")
+    return found
+
+
+def _edinburgh(path: Path, frame_rate: float) -> tuple[pd.DataFrame, int]:
+    """Detections of one file without its ghosts, and how many these are."""
+    try:
+        tracks = _TRACK.findall(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataError(f"{path}: cannot be read ({error}); expected a file of Edinburgh's tracks") from error
+    if not tracks:
+        raise DataError(
+            f"{path}: holds no track; expected lines like TRACK.R1=[[601 23 4471];[595 24 4472]];"
+        )
+    parts = []
+    for number, points in tracks:
+        try:
+            rows = np.array(re.sub(r"[\[\];,]", " ", points).split(), float).reshape(-1, 3)
+        except ValueError as error:
+            raise DataError(f"{path}, TRACK.R{number}: expected triples of x, y, frame ({error})") from error
+        parts.append(np.column_stack([np.full(len(rows), int(number)), rows]))
+    columns = np.concatenate(parts).T
+    blobs = pd.DataFrame(dict(zip(("id", "column", "row", "frame"), columns, strict=True)))
+    ghosts = blobs.duplicated(["column", "row", "frame"]) & ~blobs.duplicated()
+    blobs = blobs[~ghosts]
+    raw = pd.DataFrame({"day": path.stem, "id": blobs["id"].astype(int), "t": blobs["frame"] / frame_rate})
+    raw["x"] = EDINBURGH_PIXEL * blobs["column"]
+    raw["y"] = EDINBURGH_PIXEL * (EDINBURGH_ROWS - blobs["row"])
+    return raw, int(ghosts.sum())
+
+
+def _magni(path: Path) -> pd.DataFrame:
+    """Rows of THOR-MAGNI as day, t, x, y, session, label, id."""
+    try:
+        rows = pd.read_csv(path)
+    except (OSError, ValueError) as error:  # pandas' own errors are ValueErrors
+        raise DataError(f"{path}: cannot be read as CSV ({error}); expected a file of THOR-MAGNI") from error
+    check_columns(rows, _MAGNI)
+    times = np.unique(rows["Time"])
+    session = np.searchsorted(times[1:][np.diff(times) < _SESSION], rows["Time"], side="right")
+    helmet = rows["ag_id"].astype(str).str.extract(r"(\d+)$")[0]
+    if helmet.isna().any():
+        name = rows.loc[helmet.isna(), "ag_id"].iloc[0]
+        raise DataError(f"{path}: ag_id {name!r} ends in no number; expected one like Helmet_4")
+    people = pd.DataFrame({"day": path.name.split(".")[0], "t": rows["Time"], "session": session})
+    people[["x", "y", "label"]] = rows[["x", "y", "data_label"]]
+    return people.assign(id=100 * (session + 1) + helmet.astype(int))
+
+
+def _on_the_clock(raw: pd.DataFrame, name: str, max_gap: float, set_aside: Mapping[str, int]) -> pd.DataFrame:
+    """Rows as read, less some that were set aside before, to a track table."""
+    finite = np.isfinite(raw[["t", "x", "y"]].to_numpy(float)).all(axis=1)
+    doubled = raw.duplicated(["day", "id", "t"]).to_numpy() & finite
+    kept = raw[finite & ~doubled].reset_index(drop=True)
+    if len(kept) == 0:
+        raise DataError(f"{name}: holds no row that can be used")
+    reasons = {
+        **set_aside,
+        "not finite": int((~finite).sum()),
+        "second position at a time": int(doubled.sum()),
+    }
+    stage = funnels.stage(f"read {name}", len(raw) + sum(set_aside.values()), len(kept), reasons)
+    return to_clock(funnels.carry(kept, [stage]), max_gap=max_gap)

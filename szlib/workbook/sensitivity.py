@@ -1,0 +1,90 @@
+"""What moves a zone most: each parameter of the method varied alone, the others at their defaults."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..encounters.geometry import Square
+from ..encounters.search import find_encounters
+from ..errors import DataError, DataWarning, ZoneError
+from ..zones.social_zone import SocialZone
+
+SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
+    {
+        "min_distance": (0.0, 0.5, 2.0),
+        "min_speed": (0.2, 0.6),
+        "duration": (2.0, 4.0),
+        "kinds": ("strangers", ("opposite", "crossing")),
+    }
+)
+"""Values of `szlib.find_encounters`, beside its defaults."""
+FIT: Mapping[str, Sequence[Any]] = MappingProxyType(
+    {"r_max": (1.5, 2.5), "outlier_fraction": (0.0, 0.01), "neighbours": (20, 500)}
+)
+"""Values of `szlib.SocialZone.fit`, beside its defaults."""
+SPEEDS = (0.9, 1.3)
+"""Speeds, beside the one looked at [m/s]."""
+NARROWER = 1.0
+"""By so much the square is made narrower on each side [m]."""
+
+
+def sensitivity(
+    tracks: pd.DataFrame,
+    *,
+    square: Square,
+    speed: float = 1.1,
+    fit: Mapping[str, Sequence[Any]] = FIT,
+    **options: Any,
+) -> pd.DataFrame:
+    """The zone at a speed [m/s] with each parameter varied alone.
+
+    Parameters
+    ----------
+    tracks, square : as for `szlib.find_encounters`.
+    fit : keywords of `SocialZone.fit` to vary, and their values; those of the search are `SEARCH`.
+    options : of every fit, such as method="quantile".
+
+    Returns
+    -------
+    One row a variation, the first with every default: parameter, value, encounters, a, b [m], area [m2]
+    (NaN where there is no zone).
+
+    Raises
+    ------
+    ZoneError : there is no zone with the defaults.
+    """
+    rows: list[tuple[str, str, int, float, float, float]] = []
+
+    def add(parameter: str, value: Any, samples: pd.DataFrame, at: float = speed, **keywords: Any) -> None:
+        count, sizes = int(samples["encounter"].nunique()), (np.nan, np.nan, np.nan)
+        try:
+            with warnings.catch_warnings():  # few encounters, told by their number here
+                warnings.simplefilter("ignore", DataWarning)
+                zone = SocialZone.fit(samples, speeds=(at,), resamples=0, **{**options, **keywords})
+            ellipse = zone.ellipses[at]
+            sizes = (*ellipse.semi_axes, ellipse.area)
+        except (ZoneError, DataError):
+            if not rows:
+                raise
+        rows.append((parameter, str(value), count, *sizes))
+
+    usual = find_encounters(tracks, square=square)
+    add("default", "", usual)
+    for name, values in SEARCH.items():
+        for value in values:
+            add(name, value, find_encounters(tracks, square=square, **{name: value}))
+    (x0, x1), (y0, y1) = square.x, square.y
+    smaller = Square((x0 + NARROWER, x1 - NARROWER), (y0 + NARROWER, y1 - NARROWER))
+    add("square", f"{NARROWER:g} m narrower", find_encounters(tracks, square=smaller))
+    for name, values in fit.items():
+        for value in values:
+            add(name, value, usual, **{name: value})
+    for value in SPEEDS:
+        add("speed", value, usual, at=value)
+    return pd.DataFrame(rows, columns=["parameter", "value", "encounters", "a", "b", "area"])

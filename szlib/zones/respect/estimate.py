@@ -1,0 +1,114 @@
+"""The way to respect zones by speed, to go again with other people (see `szlib.zones.uncertainty`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ...encounters.null import NullEncounters
+from ...errors import ZoneError
+from ...tracks import funnels
+from ..quantile import encounter_numbers
+from ..radii import DIRECTIONS, Array, Radii, fit_ellipses
+from .boundary import SPEED_WIDTH, respect_boundary
+from .presence import Presence
+
+_NEAREST = 20  # encounters that are left out one by one
+
+
+@dataclass(frozen=True, eq=False)
+class RespectZones:
+    """Respect zones of samples, all within r_max, against their null model.
+
+    Parameters
+    ----------
+    samples : within r_max of the null model.
+    encounter : which of `encounters` each belongs to, shape (n,).
+    encounters : the first of each encounter's samples.
+    null : how often the null model was where.
+    speed_width : standard deviation of the weight of other speeds [m/s]; inf: all speeds alike.
+    parameters, funnel : for the provenance.
+    """
+
+    samples: pd.DataFrame
+    encounter: NDArray[np.intp]
+    encounters: pd.DataFrame
+    null: Presence
+    speed_width: float
+    parameters: dict[str, Any]
+    funnel: list[dict[str, Any]]
+    extreme = False
+    vertices = None
+
+    @classmethod
+    def of(
+        cls,
+        samples: pd.DataFrame,
+        *,
+        r_max: float,
+        null: NullEncounters | None = None,
+        speed_width: float = SPEED_WIDTH,
+    ) -> RespectZones:
+        """From samples; ZoneError without a null model of the same r_max, or a width above 0 m/s."""
+        if null is None:
+            raise ZoneError(
+                'method="respect" needs a null model to compare with: pass null=szlib.null_encounters(tracks)'
+            )
+        if null.r_max != r_max:
+            raise ZoneError(
+                f"r_max is {r_max} m, that of the null model {null.r_max} m; pass the same to both"
+            )
+        if not speed_width > 0:
+            raise ZoneError(f"speed_width must be above 0 m/s, inf for all speeds alike; got {speed_width}")
+        close = samples[samples["distance"] < r_max]
+        far = {f"farther than {r_max} m": len(samples) - len(close)}
+        parameters = {
+            "speed_width": None if np.isinf(speed_width) else float(speed_width),
+            "shifts": null.shifts,
+            "null": null.parameters,
+        }
+        return cls(
+            close,
+            *encounter_numbers(close),
+            Presence.of(null.samples, r_max=r_max),
+            float(speed_width),
+            parameters,
+            [*funnels.of(samples), funnels.stage("samples: close", len(samples), len(close), far)],
+        )
+
+    def radii(self, speeds: Sequence[float]) -> Radii:
+        """Radii at speeds, ascending [m/s]; ZoneError where there is nothing to compare."""
+        return Radii(np.array(speeds), DIRECTIONS, self._lines(None, speeds))
+
+    def others(self, weights: Array, speeds: Sequence[float]) -> Array:
+        """Ellipses (k, s, 5) for weights (k, n) of the encounters; NaN: no zone."""
+        lines = np.full((len(weights), len(speeds), len(DIRECTIONS)), np.nan)
+        for i, weight in enumerate(weights):
+            with suppress(ZoneError):
+                lines[i] = self._lines(weight[self.encounter], speeds)
+        return fit_ellipses(lines.reshape(-1, len(DIRECTIONS))).reshape(*lines.shape[:2], 5)
+
+    def without_each(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
+        """The encounters that came nearest (k,), and the ellipses (k, s, 5) without each of them."""
+        near = np.full(len(self.encounters), np.inf)
+        np.minimum.at(near, self.encounter, self.samples["distance"].to_numpy(float))
+        nearest = np.argsort(near, kind="stable")[:_NEAREST]
+        weights = np.ones((len(nearest), len(near)))
+        weights[np.arange(len(nearest)), nearest] = 0
+        return nearest, self.others(weights, speeds)
+
+    def _lines(self, weights: Array | None, speeds: Sequence[float]) -> Array:
+        """Radii (s, 72) [m] for weights (n,) of the samples."""
+        data = Presence.of(self.samples, r_max=self.null.r_max, weights=weights)
+        asked = speeds[:1] if np.isinf(self.speed_width) else speeds
+        lines = [
+            respect_boundary(data, self.null, DIRECTIONS, speed=v, speed_width=self.speed_width)
+            for v in asked
+        ]
+        return np.broadcast_to(lines, (len(speeds), len(DIRECTIONS)))

@@ -1,0 +1,99 @@
+"""The null model: the encounters of many time-shifted days, the same as if each had been searched whole."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import make_tracks, make_walk
+
+import szlib
+from szlib.errors import DataError
+from szlib.tracks import funnels
+
+ASKED = {"minutes": (1.0, 5.0), "min_distance": 0.5}
+
+
+@pytest.fixture(scope="module")
+def tracks() -> pd.DataFrame:
+    return szlib.indifferent_crowd(seed=5, people=500, minutes=15)
+
+
+@pytest.fixture(scope="module")
+def null(tracks: pd.DataFrame) -> szlib.NullEncounters:
+    return szlib.null_encounters(tracks, shifts=7, seed=4, progress=False, **ASKED)
+
+
+def test_a_shift_has_the_encounters_of_the_whole_shifted_day(
+    tracks: pd.DataFrame, null: szlib.NullEncounters
+) -> None:
+    for shift in (0, 3, 6):
+        day = szlib.time_shifted(tracks, seed=(4, shift), minutes=ASKED["minutes"])
+        whole = szlib.find_encounters(day, min_distance=0.5)
+        own = null.encounters[null.encounters["shift"] == shift]
+        nearest = whole.groupby("encounter")["distance"].min()
+        np.testing.assert_array_equal(own["nearest"], nearest)
+        np.testing.assert_array_equal(own["kind"], whole.groupby("encounter")["kind"].first())
+        expected = whole[whole["distance"] <= null.r_max].drop(columns="encounter").reset_index(drop=True)
+        found = null.one(shift).drop(columns=["encounter", "shift"]).reset_index(drop=True)
+        pd.testing.assert_frame_equal(found, expected)
+
+
+def test_numbers_are_unique_and_the_funnel_adds_up(null: szlib.NullEncounters) -> None:
+    assert null.encounters["encounter"].is_unique
+    assert (null.samples.groupby("encounter")["shift"].nunique() == 1).all()
+    assert set(null.samples["encounter"]) <= set(null.encounters["encounter"])
+    stages = funnels.of(null.samples)
+    for before, after in zip(stages, stages[1:], strict=False):
+        if "windows" not in before["stage"]:  # of a window, 31 samples
+            assert before["kept"] == after["entered"]
+    assert stages[-1]["kept"] == len(null.samples)
+    json.dumps(null.parameters)
+
+
+def test_processes_change_nothing(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
+    other = szlib.null_encounters(tracks, shifts=7, seed=4, n_jobs=2, progress=False, **ASKED)
+    pd.testing.assert_frame_equal(other.samples, null.samples)
+    pd.testing.assert_frame_equal(other.encounters, null.encounters)
+
+
+def test_more_shifts_begin_with_the_same(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
+    fewer = szlib.null_encounters(tracks, shifts=2, seed=4, progress=False, **ASKED)
+    pd.testing.assert_frame_equal(fewer.encounters, null.encounters[null.encounters["shift"] < 2])
+
+
+def test_kinds_are_chosen_as_in_the_data(null: szlib.NullEncounters) -> None:
+    some = null.of_kind(["opposite", "crossing"])
+    assert set(some.encounters["kind"]) == set(some.samples["kind"]) == {"opposite", "crossing"}
+    assert len(some.encounters) == null.encounters["kind"].isin(["opposite", "crossing"]).sum()
+    assert null.of_kind(None).encounters is null.encounters
+    with pytest.raises(DataError, match="unknown kinds"):
+        null.of_kind("friends")
+
+
+def test_where_nobody_meets() -> None:
+    tracks = make_tracks(make_walk((-12, 0), (1, 0)), make_walk((-12, 0), (1, 0), person=2, begin=1800))
+    null = szlib.null_encounters(tracks, shifts=3, progress=False)
+    assert len(null.samples) == len(null.encounters) == 0
+    assert null.shifts == 3
+    assert len(null.one(2)) == 0
+
+
+def test_errors(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
+    with pytest.raises(DataError, match="shifts >= 1"):
+        szlib.null_encounters(tracks, shifts=0)
+    with pytest.raises(DataError, match="too short"):
+        szlib.null_encounters(tracks, progress=False, minutes=(1, 30))
+    with pytest.raises(DataError, match="from 0 to 6; got 7"):
+        null.one(7)
+    with pytest.raises(TypeError, match="min_distanse"):
+        szlib.null_encounters(tracks, shifts=1, progress=False, min_distanse=1.0)
+
+
+def test_the_real_day(real_tracks: pd.DataFrame) -> None:
+    null = szlib.null_encounters(real_tracks, shifts=1, seed=2, progress=False)
+    whole = szlib.find_encounters(szlib.time_shifted(real_tracks, seed=(2, 0)))
+    np.testing.assert_array_equal(null.encounters["nearest"], whole.groupby("encounter")["distance"].min())
+    np.testing.assert_array_equal(null.encounters["kind"], whole.groupby("encounter")["kind"].first())

@@ -1,0 +1,213 @@
+"""Respect or emptiness: the tables of notebook 15.
+
+python tests/studies/respect.py nobody      15_nobody.csv     the test where nobody minds anybody, 100 seeds
+python tests/studies/respect.py sites       15_sites.csv      radii, intervals and p-values on the real data
+python tests/studies/respect.py n-curve     15_n_curve.csv    hull and respect zone by number of encounters
+
+They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/ and gc/).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import joblib
+import numpy as np
+import pandas as pd
+
+import szlib
+from szlib.parallel import run_tasks
+from szlib.zones.ellipses import minimum_enclosing_ellipse_of_curve
+from szlib.zones.hulls import hull_vertices, slice_hull
+from szlib.zones.outliers import complementary_points
+
+TABLES = Path(__file__).parents[2] / "notebooks" / "tables"
+GRAND_CENTRAL = szlib.Square(x=(10.0, 40.0), y=(10.0, 50.0))
+"""The hall without its walls (measured)."""
+SETS = {
+    "all": None,
+    "strangers": "strangers",
+    "opposite, crossing": ("opposite", "crossing"),
+    "opposite": "opposite",
+    "crossing": "crossing",
+    "same direction": "same direction",
+}
+SPEED = 1.1
+"""At which the hull's zone is told [m/s]."""
+RESAMPLES, DRAWS = 200, 30
+SIZES = (36, 72, 150, 300, 600, 1200, 2400, 4800)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("study", choices=["nobody", "sites", "n-curve"])
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--sites", nargs="+", default=["atc-1hz", "grand-central"])
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--cache", type=Path, default=Path("results/null"), help="where null models are kept")
+    asked = parser.parse_args()
+    study = {"nobody": nobody, "sites": sites, "n-curve": n_curve}[asked.study]
+    table = pd.DataFrame(study(asked))
+    TABLES.mkdir(exist_ok=True)
+    table.to_csv(TABLES / f"15_{asked.study.replace('-', '_')}.csv", index=False, float_format="%.4g")
+    print(table.to_string())
+
+
+# --- nobody minds anybody ----------------------------------------------------------------------------
+
+
+def nobody(asked: argparse.Namespace) -> list[dict[str, object]]:
+    """One row a seed, a size of bunches, a set of kinds."""
+    tasks = [joblib.delayed(one_crowd)(seed, bunch) for bunch in (1, 10) for seed in range(asked.seeds)]
+    rows = [row for part in run_tasks(tasks, n_jobs=asked.jobs) for row in part]
+    return sorted(rows, key=lambda row: (row["bunch"], row["kinds"], row["seed"]))
+
+
+def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
+    tracks = szlib.indifferent_crowd(seed=seed, bunch=bunch)
+    samples = szlib.find_encounters(tracks)
+    null = szlib.null_encounters(tracks, shifts=39, seed=seed, progress=False)
+    rows = []
+    for name in ("all", "opposite, crossing"):
+        data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
+        test = szlib.null_test(data, against, radii=False)
+        told = {"p_value": test.p_value, "encounters": test.encounters, "radius": test.radius}
+        rows.append({"bunch": bunch, "kinds": name, "seed": seed, "shifts": null.shifts} | told)
+    return rows
+
+
+# --- real sites --------------------------------------------------------------------------------------
+
+
+def load(site: str) -> tuple[pd.DataFrame, szlib.Square, int]:
+    """Tracks, square and number of shifts of a site."""
+    root = Path(os.environ.get("SZLIB_DATA_DIR", "."))
+    if site == "atc-1hz":
+        return szlib.read_tracks(sorted((root / "atc-1hz").glob("*.csv"))), szlib.ATC_SQUARE, 100
+    from szlib.tracks.sites import read_grand_central
+
+    return read_grand_central(root / "gc" / "Annotation.zip"), GRAND_CENTRAL, 20
+
+
+def data_and_null(
+    site: str, min_distance: float, asked: argparse.Namespace
+) -> tuple[pd.DataFrame, szlib.NullEncounters]:
+    """Samples of a site and its null model, kept between studies."""
+    kept = asked.cache / f"{site}-{min_distance:g}.joblib"
+    if not kept.exists():
+        tracks, square, shifts = load(site)
+        found = {"square": square, "min_distance": min_distance}
+        samples = szlib.find_encounters(tracks, **found)
+        null = szlib.null_encounters(tracks, shifts=shifts, n_jobs=asked.jobs, **found)
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        joblib.dump((samples, null), kept)
+    return joblib.load(kept)
+
+
+def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
+    """One row a site, a min_distance, a set of kinds; intervals from resampled pairs of people."""
+    theta = np.radians([0.0, 90.0, 180.0, 270.0])
+    for site in asked.sites:
+        for min_distance in (1.0, 0.0):
+            samples, null = data_and_null(site, min_distance, asked)
+            for name, kinds in SETS.items():
+                data, against = szlib.of_kind(samples, kinds), null.of_kind(kinds)
+                test = szlib.null_test(data, against)
+                bodies = szlib.null_test(data, against, beyond=0.5, radii=False)
+                fit = szlib.fit_respect(data, against)
+                radii = [np.r_[test.radius, fit.radii(theta)], *resampled(data, against, theta)]
+                low, high = np.percentile(radii[1:], [2.5, 97.5], axis=0)
+                row = {"site": site, "min_distance": min_distance, "kinds": name}
+                row |= {"encounters": data["encounter"].nunique(), "within_2m": test.encounters}
+                row |= {"null_encounters": len(against.encounters) / null.shifts, "shifts": null.shifts}
+                for i, where in enumerate(("radius", "ahead", "left", "behind", "right")):
+                    row |= {where: radii[0][i], f"{where}_low": low[i], f"{where}_high": high[i]}
+                row |= {"null_radius_high": np.nanpercentile(test.null_radii, 97.5)}
+                row |= {"softness": fit.softness, "careless": fit.careless}
+                row |= {"p_value": test.p_value, "p_value_beyond_0.5m": bodies.p_value}
+                row |= {"hull_a": hull_a(data)}
+                hulls = [hull_a(against.one(k)) for k in range(null.shifts)]
+                row |= {"null_hull_a": np.nanmedian(hulls) if np.isfinite(hulls).any() else np.nan}
+                print(row, file=sys.stderr, flush=True)
+                yield row
+
+
+def resampled(samples: pd.DataFrame, null: szlib.NullEncounters, theta: np.ndarray) -> Iterator[np.ndarray]:
+    """Radius of all bearings, and radii in directions theta, of resampled pairs of people."""
+    pair = pairs(samples)
+    against = szlib.Presence.of(null.samples, r_max=null.r_max)
+    rng = np.random.default_rng(0)
+    for _ in range(RESAMPLES):
+        drawn = np.bincount(rng.integers(pair.max() + 1, size=pair.max() + 1), minlength=pair.max() + 1)
+        data = szlib.Presence.of(samples, r_max=null.r_max, weights=drawn[pair])
+        if data.counts.any():
+            yield np.r_[szlib.respect_radius(data, against), szlib.respect_boundary(data, against, theta)]
+
+
+def pairs(samples: pd.DataFrame) -> np.ndarray:
+    """Number of the pair of people, whoever is the reference, of each sample."""
+    people = samples[["ref_id", "other_id"]].to_numpy()
+    keys = pd.DataFrame(np.sort(people, axis=1)).assign(day=samples["day"].astype(str).to_numpy())
+    return keys.groupby([0, 1, "day"], sort=False).ngroup().to_numpy()
+
+
+def hull_a(samples: pd.DataFrame) -> float:
+    """Semi-major axis of the paper's zone at 1.1 m/s [m]; NaN where it is undefined."""
+    try:
+        kept = szlib.remove_outliers(samples, fraction=0.002, r_max=2.0, neighbours=20)
+        points = np.column_stack([complementary_points(kept, r_max=2.0), kept["speed"]])
+        section = slice_hull(hull_vertices(points), SPEED, r_max=2.0)
+        return minimum_enclosing_ellipse_of_curve(section.boundary, section.corner_angles).semi_axes[0]
+    except szlib.SzlibError:
+        return np.nan
+
+
+# --- by the number of encounters ---------------------------------------------------------------------
+
+
+def n_curve(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
+    """One row a site, a set of kinds, a number of encounters drawn without replacement."""
+    for site in asked.sites:
+        samples, null = data_and_null(site, 1.0, asked)
+        for name in ("all", "strangers", "opposite, crossing"):
+            data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
+            others = szlib.Presence.of(against.samples, r_max=null.r_max)
+            total = data["encounter"].nunique()
+            for n in sorted({*(size for size in SIZES if size < total), total}):
+                drawn = pd.DataFrame(draws(data, against, others, n, DRAWS if n < total else 1))
+                row = {"site": site, "kinds": name, "encounters": n, "draws": len(drawn)}
+                for column in drawn:
+                    row[column] = drawn[column].mean()
+                    row |= {f"{column}_low": drawn[column].quantile(0.025)}
+                    row |= {f"{column}_high": drawn[column].quantile(0.975)}
+                print(row, file=sys.stderr, flush=True)
+                yield row
+
+
+def draws(
+    data: pd.DataFrame, null: szlib.NullEncounters, against: szlib.Presence, n: int, times: int
+) -> Iterator[dict[str, float]]:
+    """Hull and respect radius of n encounters of the data, and of n of one shift of the null model."""
+    rng = np.random.default_rng(n)
+    numbers = data["encounter"].unique()
+    for k in range(times):
+        part = data[data["encounter"].isin(rng.choice(numbers, n, replace=False))]
+        shift = k % null.shifts
+        own = null.encounters.loc[null.encounters["shift"] == shift, "encounter"].to_numpy()
+        model = null.one(shift)
+        chosen = model[model["encounter"].isin(rng.choice(own, min(n, len(own)), replace=False))]
+        whole = szlib.Presence.of(model, r_max=null.r_max)
+        rest = szlib.Presence(against.counts - whole.counts, null.r_max)
+        yield {
+            "hull_a": hull_a(part),
+            "respect": szlib.respect_radius(part, against),
+            "null_respect": szlib.respect_radius(chosen, rest) if len(chosen) else np.nan,
+        }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,245 @@
+"""Readers of other sites: made files whose people are known, the contract, refusals, and the real files."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import real_data
+
+import szlib
+from szlib.tracks import funnels, sites
+from szlib.tracks.interop import check_tracks
+
+# --- Grand Central -----------------------------------------------------------------------------------
+
+TILTED = np.array([[0.04, -0.03, 70.0], [0.14, -0.003, 8.0], [1.2e-3, -5e-5, 1.0]])
+"""From (row, column, 1) to the floor, in units of 0.8 m."""
+
+
+def pixels(floor: np.ndarray) -> np.ndarray:
+    """Column and row at which the camera sees points of the floor [m], shape (n, 2)."""
+    row, column, one = np.linalg.inv(TILTED) @ np.column_stack([floor / 0.8, np.ones(len(floor))]).T
+    return np.column_stack([column / one, row / one])
+
+
+def grand_central(folder: Path, people: dict[int, np.ndarray], *, first: int = 0) -> Path:
+    """An archive of people (paths (n, 2) [m]) annotated every 20th frame, and its homography."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "H.json").write_text(json.dumps({"homog": TILTED.tolist()}))
+    with zipfile.ZipFile(folder / "Annotation.zip", "w") as packed:
+        for person, path in people.items():
+            lines = [
+                f"{column:.9f}\n{row:.9f}\n{first + 20 * at}\n"
+                for at, (column, row) in enumerate(pixels(path))
+            ]
+            packed.writestr(f"Annotation/{person:06d}.txt", "".join(lines))
+    return folder / "Annotation.zip"
+
+
+def straight(start: tuple[float, float], velocity: tuple[float, float], count: int = 12) -> np.ndarray:
+    return np.asarray(start) + 0.8 * np.arange(count)[:, None] * np.asarray(velocity)
+
+
+def test_grand_central_comes_back_to_the_floor(tmp_path: Path) -> None:
+    archive = grand_central(tmp_path, {7: straight((10, 20), (1.0, 0.5)), 12: straight((30, 45), (0, -1.5))})
+    tracks = sites.read_grand_central(archive)
+    check_tracks(tracks)
+    assert tracks["id"].unique().tolist() == [7, 12]
+    one = tracks[tracks["id"] == 7]
+    np.testing.assert_allclose(one["t"], np.arange(89) / 10, atol=1e-9)
+    np.testing.assert_allclose(one["x"], 10 + one["t"], atol=1e-5)
+    np.testing.assert_allclose(one["vy"], 0.5, atol=1e-5)
+    with zipfile.ZipFile(archive) as packed:
+        packed.extractall(tmp_path / "unpacked")
+    folder = tmp_path / "unpacked" / "Annotation"
+    unpacked = sites.read_grand_central(folder, homography=tmp_path / "H.json")
+    pd.testing.assert_frame_equal(unpacked, tracks)
+
+
+def test_nobody_at_grand_central_is_carried_across_a_gap(tmp_path: Path) -> None:
+    archive = grand_central(tmp_path, {1: straight((10, 20), (1, 0))})
+    with zipfile.ZipFile(archive) as packed:
+        rows = packed.read("Annotation/000001.txt").decode().split()
+    with zipfile.ZipFile(archive, "w") as packed:
+        packed.writestr("Annotation/000001.txt", " ".join(rows[:12] + rows[15:]))
+    tracks = sites.read_grand_central(archive)
+    assert not tracks["t"].between(2.45, 3.95).any()
+    assert sites.read_grand_central(archive, max_gap=2.0)["t"].between(2.45, 3.95).any()
+
+
+def test_grand_central_that_is_not_is_refused(tmp_path: Path) -> None:
+    archive = grand_central(tmp_path / "a", {1: straight((10, 20), (1, 0))})
+    with pytest.raises(szlib.DataError, match=r"H\.json: no such file; expected the homography"):
+        sites.read_grand_central(archive, homography=tmp_path / "H.json")
+    (tmp_path / "a" / "H.json").write_text('{"homog": [[1, 2], [3, 4]]}')
+    with pytest.raises(szlib.DataError, match="expected 3 x 3"):
+        sites.read_grand_central(archive)
+    (tmp_path / "a" / "H.json").write_text("no json")
+    with pytest.raises(szlib.DataError, match="cannot be read as a homography"):
+        sites.read_grand_central(archive)
+    archive = grand_central(tmp_path / "a", {1: straight((10, 20), (1, 0))})
+    with zipfile.ZipFile(archive, "a") as packed:
+        packed.writestr("Annotation/000002.txt", "1 2 3 4")
+    with pytest.raises(szlib.DataError, match=r"000002\.txt: expected column, row, frame"):
+        sites.read_grand_central(archive)
+    archive.write_bytes(archive.read_bytes()[:100])
+    with pytest.raises(szlib.DataError, match=r"Annotation\.zip: cannot be read"):
+        sites.read_grand_central(archive)
+    (tmp_path / "a" / "empty").mkdir()
+    with pytest.raises(szlib.DataError, match=r"holds no file \*\.txt"):
+        sites.read_grand_central(tmp_path / "a" / "empty")
+
+
+# --- Edinburgh ---------------------------------------------------------------------------------------
+
+
+def edinburgh(path: Path, tracks: dict[int, list[tuple[int, int, int]]]) -> Path:
+    """A file in the form of Edinburgh's: histograms shortened, everything else as it is there."""
+    lines = [f"% Total number of trajectories in file are  {len(tracks)} \n"]
+    for number, points in tracks.items():
+        told = ";".join(f"[{x} {y} {frame}]" for x, y, frame in points)
+        lines.append(
+            f"Properties.R{number}=[{len(points)} {points[0][2]} {points[-1][2]} 454.92 24.49 29.25 ];"
+        )
+        lines.append(f" TRACK.R{number}=[{told}];")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_edinburgh_is_nine_frames_a_second_and_its_rows_point_down(tmp_path: Path) -> None:
+    walk = [(100 + 6 * k, 400 - 3 * k, 4471 + k) for k in range(45)]
+    tracks = sites.read_edinburgh(edinburgh(tmp_path / "tracks.Aug01.txt", {1: walk}))
+    check_tracks(tracks)
+    assert tracks["day"].unique().tolist() == ["tracks.Aug01"]
+    assert tracks["t"].iloc[[0, -1]].tolist() == pytest.approx([4471 / 9, 4515 / 9], abs=0.1)
+    np.testing.assert_allclose(tracks["vx"], 6 * 0.0247 * 9, rtol=1e-6)
+    np.testing.assert_allclose(tracks["vy"], 3 * 0.0247 * 9, rtol=1e-6)
+    assert tracks["y"].iloc[0] == pytest.approx(0.0247 * 80, abs=0.1)
+    slow = sites.read_edinburgh(tmp_path / "tracks.Aug01.txt", frame_rate=8.5)
+    np.testing.assert_allclose(slow["vx"], 6 * 0.0247 * 8.5, rtol=1e-6)
+
+
+def test_blobs_of_several_tracks_stay_with_the_first(tmp_path: Path) -> None:
+    walk = [(100 + 6 * k, 200, k) for k in range(30)]
+    ghost = [(100 + 6 * k, 260 - 4 * k if k < 15 else 200, k) for k in range(30)]
+    twice = [*[(300, 50 + k, k) for k in range(20)], (310, 69, 19)]
+    tracks = sites.read_edinburgh(edinburgh(tmp_path / "tracks.Aug02.txt", {1: walk, 2: ghost, 5: twice}))
+    stage = funnels.of(tracks)[0]
+    assert stage["set_aside"] == {"a blob of an earlier track": 15, "second position at a time": 1}
+    assert stage["entered"] == 81
+    assert tracks.groupby("id")["t"].max().round(1).to_dict() == {1: 3.2, 2: 1.5, 5: 2.1}
+    np.testing.assert_allclose(tracks[tracks["id"] == 5]["x"], 300 * 0.0247, err_msg="the first one counts")
+
+
+def test_recordings_of_edinburgh_stay_apart(tmp_path: Path) -> None:
+    walk = [(100 + 6 * k, 200, k) for k in range(30)]
+    files = [edinburgh(tmp_path / f"tracks.Aug0{day}.txt", {1: walk}) for day in (1, 2)]
+    tracks = sites.read_edinburgh(files)
+    check_tracks(tracks)
+    assert tracks["day"].unique().tolist() == ["tracks.Aug01", "tracks.Aug02"]
+    assert funnels.of(tracks)[0]["set_aside"] == {}, "the same blob on another day is another one"
+    with pytest.raises(szlib.DataError, match="several files are called"):
+        sites.read_edinburgh([files[0], files[0]])
+
+
+def test_edinburgh_that_is_not_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "tracks.txt"
+    with pytest.raises(szlib.DataError, match="cannot be read"):
+        sites.read_edinburgh(file)
+    file.write_text("% nothing\nProperties.R1=[1 2 3];\n")
+    with pytest.raises(szlib.DataError, match="holds no track; expected lines like TRACK"):
+        sites.read_edinburgh(file)
+    file.write_text("TRACK.R3=[[1 2 3];[4 5]];\n")
+    with pytest.raises(szlib.DataError, match=r"TRACK\.R3: expected triples"):
+        sites.read_edinburgh(file)
+    with pytest.raises(szlib.DataError, match="frame_rate must be"):
+        sites.read_edinburgh(file, frame_rate=0)
+    with pytest.raises(szlib.DataError, match="pass at least one path"):
+        sites.read_edinburgh([])
+
+
+# --- THOR-MAGNI --------------------------------------------------------------------------------------
+
+
+def magni(path: Path, sessions: list[dict[int, str]]) -> Path:
+    """Sessions of 20 s, 0.01 s apart; who has the same label walks side by side, 6 m from the next pair."""
+    rows, begin = [], 0.01
+    for labels in sessions:
+        times = begin + 0.4 * np.arange(50)
+        for place, (helmet, label) in enumerate(labels.items()):
+            member = place % int(label[-1]) if "Group" in label else 0
+            for t in times:
+                told = (round(t, 2), f"Helmet_{helmet}", t - begin, 6 * (place - member) + member)
+                rows.append((*told, 0, 0, 0, 0, f"Visitors-{label}"))
+        begin = times[-1] + 0.01
+    names = ["Time", "ag_id", "x", "y", "speed", "x_speed", "y_speed", "theta_delta", "data_label"]
+    pd.DataFrame(rows, columns=names).sort_values("Time").to_csv(path, index=False)
+    return path
+
+
+MADE = [
+    {1: "Alone", 2: "Group 2", 10: "Group 2", 3: "Group 3", 4: "Group 3", 5: "Group 3"},
+    {1: "Alone", 2: "Group 2", 3: "Group 2", 4: "Group 2", 5: "Group 2"},
+]
+
+
+def test_a_helmet_goes_from_head_to_head(tmp_path: Path) -> None:
+    file = magni(tmp_path / "A.csv", MADE)
+    tracks = sites.read_magni(file)
+    check_tracks(tracks)
+    assert tracks["id"].unique().tolist() == [101, 102, 103, 104, 105, 110, 201, 202, 203, 204, 205]
+    assert tracks.groupby("id")["t"].agg(lambda t: t.max() - t.min()).between(19.4, 19.7).all()
+    np.testing.assert_allclose(tracks["vx"], 1.0, atol=1e-6)
+
+
+def test_who_belongs_together_at_magni(tmp_path: Path) -> None:
+    groups = sites.magni_groups(magni(tmp_path / "A.csv", MADE))
+    found = {frozenset(people) for people in groups.groupby("group")["id"].apply(set)}
+    assert found == {frozenset(g) for g in ((102, 110), (103, 104, 105), (202, 203), (204, 205))}
+    file = magni(tmp_path / "B.csv", [{1: "Alone", 2: "Group 2"}])
+    with pytest.raises(szlib.DataError, match="1 people are labelled 'Visitors-Group 2' in session 0"):
+        sites.magni_groups(file)
+
+
+def test_magni_that_is_not_is_refused(tmp_path: Path) -> None:
+    file = magni(tmp_path / "A.csv", MADE)
+    rows = pd.read_csv(file)
+    rows.drop(columns="data_label").to_csv(file, index=False)
+    with pytest.raises(szlib.DataError, match="data_label"):
+        sites.read_magni(file)
+    rows.assign(ag_id="Helmet").to_csv(file, index=False)
+    with pytest.raises(szlib.DataError, match="ag_id 'Helmet' ends in no number"):
+        sites.read_magni(file)
+    with pytest.raises(szlib.DataError, match="cannot be read as CSV"):
+        sites.read_magni(tmp_path / "missing.csv")
+    bad = rows.index % 100 == 3
+    rows.assign(x=np.where(bad, np.nan, rows["x"])).to_csv(file, index=False)
+    assert funnels.of(sites.read_magni(file))[0]["set_aside"] == {"not finite": bad.sum()}
+
+
+# --- the real files ----------------------------------------------------------------------------------
+
+
+def test_the_real_grand_central() -> None:
+    tracks = sites.read_grand_central(real_data("gc") / "Annotation.zip")
+    check_tracks(tracks)
+    assert tracks["id"].nunique() == 12_684
+    assert funnels.of(tracks)[0]["entered"] == 456_410
+    assert tracks["t"].max() == pytest.approx(80 * 60, abs=10)
+    pace = np.hypot(tracks["vx"], tracks["vy"]).dropna()
+    assert 1.0 < pace.median() < 1.3, "swapped, row and column would give absurd speeds"
+    assert pace.quantile(0.99) < 2.5
+
+
+def test_the_real_magni() -> None:
+    file = real_data("magni") / "A.csv"
+    tracks, groups = sites.read_magni(file), sites.magni_groups(file)
+    check_tracks(tracks)
+    assert tracks["id"].nunique() == 60
+    assert groups.groupby("group").size().value_counts().to_dict() == {2: 12, 3: 4}
+    assert set(groups["id"]) < set(tracks["id"])

@@ -1,0 +1,180 @@
+"""The quantile zone: shares are exact, it moves with the frame, noise is smoothed, size is nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from passers import TRUTH, passers
+
+import szlib
+from szlib.zones.quantile import BAND, approaches, encounter_numbers, quantile_radii, smoothed
+from szlib.zones.radii import DIRECTIONS, ellipse_reach
+
+
+def ellipse(samples: pd.DataFrame, **options: object) -> np.ndarray:
+    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), resamples=0, **options)
+    found = zone.ellipses[1.1]
+    return np.array([*found.center, *found.semi_axes, found.angle])
+
+
+@pytest.fixture(scope="module")
+def samples() -> pd.DataFrame:
+    return passers(2500)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_known_zone_is_recovered_whatever_the_number_of_people(seed: int) -> None:
+    few, many = (ellipse(passers(n, seed=seed)) for n in (600, 6000))
+    np.testing.assert_allclose(few[:4], TRUTH[:4], atol=0.03)
+    np.testing.assert_allclose(many[:4], TRUTH[:4], atol=0.02)
+
+
+def test_noise_does_not_bring_people_nearer() -> None:
+    still, noisy = ellipse(passers(2500)), ellipse(passers(2500, noise=0.05))
+    np.testing.assert_allclose(noisy[:4], still[:4], atol=0.02)
+
+
+def test_a_few_who_walk_right_through_change_little(samples: pd.DataFrame) -> None:
+    through = samples["encounter"] % 50 == 0  # 2 %
+    intruders = samples.assign(distance=np.where(through, samples["distance"] / 3, samples["distance"]))
+    np.testing.assert_allclose(ellipse(intruders)[:4], ellipse(samples)[:4], atol=0.03)
+
+
+def test_at_most_a_share_q_of_encounters_is_nearer(samples: pd.DataFrame) -> None:
+    known = approaches(samples, r_max=2.0)
+    who, nearest = known.nearest(1.1)
+    assert (np.abs(samples.groupby("encounter")["speed"].mean()[who] - 1.1) <= BAND).all()
+    for q in (0.01, 0.05, 0.3):
+        radii = quantile_radii(known, 1.1, q)[0]
+        seen = np.isfinite(nearest).sum(axis=0)
+        assert ((nearest < radii).sum(axis=0) < q * seen).all()
+        assert ((nearest <= radii).sum(axis=0) >= q * seen).all()
+
+
+def test_more_may_enter_a_larger_zone(samples: pd.DataFrame) -> None:
+    known = approaches(samples, r_max=2.0)
+    lines = [quantile_radii(known, 1.1, q)[0] for q in (0.005, 0.02, 0.05, 0.2, 0.9)]
+    assert (np.diff(lines, axis=0) >= 0).all()
+    areas = [np.prod(ellipse(samples, q=q)[2:4]) for q in (0.01, 0.05, 0.2)]
+    assert areas == sorted(areas)
+
+
+@pytest.mark.parametrize("turn", [np.pi / 2, np.radians(35), 1.0])
+def test_turned_people_turn_the_zone(samples: pd.DataFrame, turn: float) -> None:
+    """Exactly by multiples of 5 deg, which the directions are apart; else nearly."""
+    m, n, a, b, angle = ellipse(samples)
+    cos, sin = np.cos(turn), np.sin(turn)
+    expected = [m * cos - n * sin, m * sin + n * cos, a, b]
+    found = ellipse(samples.assign(los_angle=samples["los_angle"] + turn))
+    np.testing.assert_allclose(found[:4], expected, atol=0.005 if turn == 1.0 else 1e-6)
+    assert abs((found[4] - angle - turn + np.pi / 2) % np.pi - np.pi / 2) < (0.02 if turn == 1.0 else 1e-5)
+
+
+def test_mirrored_people_mirror_the_zone_and_larger_people_enlarge_it(samples: pd.DataFrame) -> None:
+    m, n, a, b, angle = ellipse(samples)
+    mirrored = ellipse(samples.assign(los_angle=-samples["los_angle"]))
+    np.testing.assert_allclose(mirrored, [m, -n, a, b, -angle], atol=1e-6)
+    twice = ellipse(samples.assign(distance=2 * samples["distance"]), r_max=4.0)
+    np.testing.assert_allclose(twice, [2 * m, 2 * n, 2 * a, 2 * b, angle], atol=1e-6)
+
+
+def test_neither_order_nor_numbers_of_encounters_matter(samples: pd.DataFrame) -> None:
+    before = samples.copy(deep=True)
+    expected = ellipse(samples)
+    pd.testing.assert_frame_equal(samples, before)
+    shuffled = samples.sample(frac=1, random_state=0).assign(encounter=lambda d: 7 * d["encounter"] + 3)
+    np.testing.assert_allclose(ellipse(shuffled), expected, atol=1e-9)
+    days = samples.assign(day=np.where(samples["encounter"] < 1000, "a", "b"))
+    days["encounter"] = np.where(days["day"] == "a", days["encounter"], days["encounter"] - 1000)
+    np.testing.assert_allclose(ellipse(days), expected, atol=1e-9)
+
+
+def test_weights_are_copies(samples: pd.DataFrame) -> None:
+    known = approaches(samples, r_max=2.0)
+    weights = np.random.default_rng(0).integers(0, 4, (3, len(known.encounters))).astype(float)
+    lines = quantile_radii(known, 1.1, 0.05, weights)
+    for weight, line in zip(weights, lines, strict=True):
+        first = known.encounters["encounter"].to_numpy()
+        copies = pd.concat(
+            [
+                samples[samples["encounter"].isin(first[weight > k])].assign(day=str(k))
+                for k in range(int(weight.max()))
+            ]
+        )
+        np.testing.assert_array_equal(quantile_radii(approaches(copies, r_max=2.0), 1.1, 0.05)[0], line)
+    nobody = quantile_radii(known, 1.1, 0.05, np.zeros((1, len(known.encounters))))
+    assert np.isnan(nobody).all()
+
+
+# --- smoothing ---------------------------------------------------------------------------------------
+
+
+def test_straight_and_evenly_bent_paths_stay_as_they_are() -> None:
+    t = np.arange(31) / 10
+    x, y = 3 - 1.5 * t + 0.2 * t**2, 0.7 + 0.1 * t - 0.05 * t**2
+    path = pd.DataFrame({"encounter": 0, "t": t, "los_angle": np.arctan2(y, x), "distance": np.hypot(x, y)})
+    angle, distance = smoothed(path)
+    np.testing.assert_allclose(angle, path["los_angle"], atol=1e-12)
+    np.testing.assert_allclose(distance, path["distance"], atol=1e-12)
+
+
+def test_smoothing_stops_at_gaps_and_at_other_encounters(samples: pd.DataFrame) -> None:
+    some = samples[samples["encounter"] < 3].reset_index(drop=True)
+    gap = some[(some["encounter"] != 1) | ((some["t"] - 10).abs() > 0.25)]
+    together = smoothed(gap)
+    parts = [gap[gap["encounter"] == 0], gap[(gap["encounter"] == 1) & (gap["t"] < 10)]]
+    parts += [gap[(gap["encounter"] == 1) & (gap["t"] > 10)], gap[gap["encounter"] == 2]]
+    for k in (0, 1):
+        np.testing.assert_allclose(np.concatenate([smoothed(p)[k] for p in parts]), together[k], atol=1e-12)
+    untimed = smoothed(some.drop(columns="t"))
+    np.testing.assert_array_equal(untimed[1], some["distance"])
+
+
+def test_smoothing_takes_noise_away() -> None:
+    still, noisy = passers(200), passers(200, noise=0.05)
+    error = smoothed(noisy)[1] - still["distance"]
+    assert error.std() < 0.6 * (noisy["distance"] - still["distance"]).std()
+
+
+# --- what cannot be used -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "told"),
+    [
+        ({"speed": np.nan}, szlib.DataError, "row 0: los_angle, distance, speed must be finite; got"),
+        (
+            {"distance": 5.0},
+            szlib.DataError,
+            "none of 77500 samples is within r_max = 2.0 m",
+        ),
+        ({"speed": 3.0}, szlib.ZoneError, r"at 1\.1 m/s is undefined: nobody was seen"),
+        ({"los_angle": 0.3}, szlib.ZoneError, r"from 35 counter-clockwise to 360 deg|no speed has a zone"),
+    ],
+)
+def test_samples_without_a_quantile(
+    samples: pd.DataFrame, change: dict, error: type[Exception], told: str
+) -> None:
+    with pytest.raises(error, match=told):
+        ellipse(samples.assign(**change))
+    with pytest.raises(szlib.DataError, match=r"columns \['distance'\] are missing"):
+        ellipse(samples.drop(columns="distance"))
+
+
+def test_encounters_are_numbered_in_order_of_appearance() -> None:
+    table = pd.DataFrame({"encounter": [5, 5, 2, 5], "day": ["a", "a", "a", "b"]})
+    number, first = encounter_numbers(table)
+    assert number.tolist() == [0, 0, 1, 2]
+    assert first.index.tolist() == [0, 2, 3]
+    assert encounter_numbers(table.drop(columns="encounter"))[0].tolist() == [0, 1, 2, 3]
+
+
+def test_radii_are_those_of_the_truth_within_a_sector() -> None:
+    """Who touches a nearer part of the rim within 17.5 deg counts as well: so much too small they may be."""
+    radii = quantile_radii(approaches(passers(4000, clearance=1e-6), r_max=2.0), 1.1, 0.02)[0]
+    truth = ellipse_reach(TRUTH)
+    around = np.min([np.roll(truth, turn) for turn in range(-4, 5)], axis=0)
+    assert (around - 0.005 < radii).all()
+    assert (radii < truth + 0.02).all()
+    assert radii.shape == DIRECTIONS.shape

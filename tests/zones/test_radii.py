@@ -1,0 +1,115 @@
+"""Radii by direction: the ellipse they are of is found, gaps are told, nonsense is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import szlib
+from szlib.zones.radii import DIRECTIONS, Radii, closed, ellipse_reach, fit_ellipses
+
+KNOWN = np.array(
+    [
+        [0.08, -0.05, 0.95, 0.75, 0.4],
+        [-0.15, 0.0, 0.8, 0.7, np.pi / 2],
+        [0.0, 0.0, 0.9, 0.9, 0.0],
+        [0.3, 0.2, 1.2, 0.6, -0.7],
+    ]
+)
+
+
+def same(found: np.ndarray, expected: np.ndarray, metres: float) -> None:
+    """Centre and axes, and the angle where the axes tell it."""
+    np.testing.assert_allclose(found[..., :4], expected[..., :4], rtol=0, atol=metres)
+    turn = (found[..., 4] - expected[..., 4] + np.pi / 2) % np.pi - np.pi / 2
+    long = expected[..., 2] - expected[..., 3] > 0.01
+    np.testing.assert_allclose(turn[long], 0, atol=10 * metres)
+
+
+def test_the_reach_of_an_ellipse_ends_on_it() -> None:
+    for row, reach in zip(KNOWN, ellipse_reach(KNOWN), strict=True):
+        ellipse = szlib.Ellipse(row[:2], row[2:4], row[4])
+        points = reach[:, None] * np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+        np.testing.assert_allclose(ellipse.level(points), 1, rtol=1e-12)
+    assert np.isnan(ellipse_reach(np.array([2.0, 0.0, 1.0, 0.5, 0.0]))).all()  # the person is outside
+
+
+def test_radii_of_an_ellipse_give_it_back() -> None:
+    same(fit_ellipses(ellipse_reach(KNOWN)), KNOWN, 1e-8)
+
+
+def test_no_ellipse_is_nearer_to_noisy_radii() -> None:
+    rng = np.random.default_rng(0)
+    radii = ellipse_reach(KNOWN[:1]) + rng.normal(0, 0.05, (1, len(DIRECTIONS)))
+    found = fit_ellipses(radii)
+    least = np.sum((ellipse_reach(found) - radii) ** 2)
+    for _ in range(200):
+        other = found + rng.normal(0, 10.0 ** rng.uniform(-5, -1), 5)
+        assert np.sum((ellipse_reach(other) - radii) ** 2) >= least * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("turn", [1, 18, 36, -25])
+def test_turned_mirrored_and_scaled_radii_give_turned_mirrored_and_scaled_ellipses(turn: int) -> None:
+    rng = np.random.default_rng(0)
+    radii = ellipse_reach(KNOWN[:1]) * rng.uniform(0.9, 1.1, (1, len(DIRECTIONS)))
+    m, n, a, b, angle = fit_ellipses(radii)[0]
+    theta = np.radians(5 * turn)
+    cos, sin = np.cos(theta), np.sin(theta)
+    turned = np.array([[m * cos - n * sin, m * sin + n * cos, a, b, angle + theta]])
+    same(fit_ellipses(np.roll(radii, turn, axis=1)), turned, 1e-8)
+    same(fit_ellipses(np.roll(radii[:, ::-1], 1, axis=1)), np.array([[m, -n, a, b, -angle]]), 1e-8)
+    same(fit_ellipses(3 * radii), np.array([[3 * m, 3 * n, 3 * a, 3 * b, angle]]), 1e-7)
+
+
+def test_gaps_are_closed_up_to_half_of_all_directions() -> None:
+    radii = ellipse_reach(KNOWN[:1])
+    radii[0, 3:9] = np.nan
+    radii[0, -1] = np.nan  # across the seam
+    whole = closed(radii)
+    assert np.isfinite(whole).all()
+    seen = np.isfinite(radii)
+    np.testing.assert_array_equal(whole[seen], radii[seen])
+    assert min(radii[0, 2], radii[0, 9]) <= whole[0, 5] <= max(radii[0, 2], radii[0, 9])
+    radii[0, :36] = np.nan
+    assert np.isnan(closed(radii)).all()
+
+
+def test_a_half_circle_is_no_zone_and_the_error_names_it() -> None:
+    radii = ellipse_reach(KNOWN[:1])
+    radii[0, 10:50] = np.nan
+    zone = Radii(np.array([1.1]), DIRECTIONS, radii)
+    with pytest.raises(szlib.ZoneError, match=r"at 1\.1 m/s .* from -135 counter-clockwise to 70 deg"):
+        zone.ellipse(1.1)
+    assert np.isnan(zone.boundary(1.1, np.radians([0.0]))).all()
+    assert np.isfinite(zone.boundary(1.1, np.radians([100.0]))).all()
+    nobody = Radii(np.array([1.1]), DIRECTIONS, np.full((1, 72), np.nan))
+    with pytest.raises(szlib.ZoneError, match="nobody was seen"):
+        nobody.ellipse(1.1)
+    with pytest.raises(szlib.ZoneError, match="of no ellipse around the person"):
+        Radii(np.array([1.1]), DIRECTIONS, np.zeros((1, 72))).ellipse(1.1)
+
+
+def test_between_speeds_radii_are_linear() -> None:
+    zone = Radii(np.array([0.5, 1.5]), DIRECTIONS, np.array([np.full(72, 0.8), np.full(72, 1.0)]))
+    np.testing.assert_allclose(zone.at(1.0), 0.9)
+    np.testing.assert_array_equal(zone.at(1.5), 1.0)
+    np.testing.assert_allclose(np.hypot(*zone.boundary(0.75, DIRECTIONS).T), 0.85)
+    for speed in (0.4, 1.6, np.nan):
+        with pytest.raises(szlib.ZoneError, match=r"undefined: it was fitted for 0\.5 to 1\.5 m/s"):
+            zone.at(speed)
+
+
+@pytest.mark.parametrize(
+    ("speeds", "directions", "radii", "told"),
+    [
+        ([1.0], [0.0, 1.0], [[1.0]], "must have shape"),
+        ([], [0.0], [], "must have shape"),
+        ([1.0, 0.9], [0.0], [[1.0], [1.0]], "must ascend"),
+        ([1.0], [1.0, 0.0], [[1.0, 1.0]], "must ascend"),
+        ([np.inf], [0.0], [[1.0]], "must be finite"),
+        ([1.0], [0.0], [[-1.0]], "must not be negative; got -1"),
+    ],
+)
+def test_radii_without_meaning(speeds: list, directions: list, radii: list, told: str) -> None:
+    with pytest.raises(szlib.ZoneError, match=told):
+        Radii(np.array(speeds), np.array(directions), np.array(radii))

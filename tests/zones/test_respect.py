@@ -1,0 +1,221 @@
+"""The respect zone: known contours come back, flat in the number of samples, nothing where nobody minds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import szlib
+from szlib.errors import ZoneError
+from szlib.zones.respect.boundary import fit_respect, respect_boundary, respect_radius
+from szlib.zones.respect.presence import Presence, pair_correlation
+
+R_MAX = 2.0
+THETA = np.linspace(-np.pi, np.pi, 24, endpoint=False)
+ZONE = szlib.Ellipse((0.1, 0.05), (1.1, 0.7), 0.3)
+
+
+def scattered(seed: int, n: int) -> pd.DataFrame:
+    """Samples of people who mind nobody: even over a disc, more of them ahead."""
+    rng = np.random.default_rng(seed)
+    ahead = rng.normal(0, 1.2, n)
+    angle = np.where(rng.random(n) < 0.5, ahead, rng.uniform(-np.pi, np.pi, n))
+    table = pd.DataFrame({"encounter": np.arange(n), "shift": np.arange(n) % 10})
+    table["los_angle"] = np.pi - np.mod(np.pi - angle, 2 * np.pi)
+    table["distance"], table["speed"] = R_MAX * np.sqrt(rng.random(n)), rng.uniform(0.5, 1.5, n)
+    return table
+
+
+def null_of(samples: pd.DataFrame) -> szlib.NullEncounters:
+    encounters = samples[["shift", "encounter"]].assign(nearest=samples["distance"])
+    return szlib.NullEncounters(samples, encounters, 10, R_MAX)
+
+
+def kept_out(
+    samples: pd.DataFrame, zone: szlib.Ellipse, careless: float = 0.0, seed: int = 0
+) -> pd.DataFrame:
+    """Those outside of a zone, and a share of those inside of it."""
+    angle, distance = samples["los_angle"], samples["distance"]
+    points = distance.to_numpy()[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    cares = np.random.default_rng(seed).random(len(samples)) >= careless
+    return samples[(zone.level(points) >= 1) | ~cares]
+
+
+def softly_kept_out(samples: pd.DataFrame, radius: float, seed: int, softness: float = 0.1) -> pd.DataFrame:
+    """The nearer, the fewer: half of them at the radius."""
+    draw = np.random.default_rng(seed).random(len(samples))
+    return samples[draw < 1 / (1 + np.exp(-(samples["distance"] - radius) / softness))]
+
+
+def reach(zone: szlib.Ellipse, theta: np.ndarray) -> np.ndarray:
+    """Distance to the zone's edge along each direction, by bisection [m]."""
+    low, high = np.zeros(len(theta)), np.full(len(theta), 5.0)
+    for _ in range(50):
+        middle = (low + high) / 2
+        inside = zone.level(middle[:, None] * np.column_stack([np.cos(theta), np.sin(theta)])) < 1
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    return low
+
+
+@pytest.fixture(scope="module")
+def null() -> szlib.NullEncounters:
+    return null_of(scattered(0, 200_000))
+
+
+# --- truth -------------------------------------------------------------------------------------------
+
+
+def test_a_known_ellipse_comes_back(null: szlib.NullEncounters) -> None:
+    data = kept_out(scattered(1, 50_000), ZONE)
+    assert respect_boundary(data, null, THETA) == pytest.approx(reach(ZONE, THETA), abs=0.05)
+
+
+@pytest.mark.parametrize("radius", [0.4, 0.8, 1.2])
+def test_a_known_circle_comes_back_from_all_bearings(null: szlib.NullEncounters, radius: float) -> None:
+    data = kept_out(scattered(2, 5_000), szlib.Ellipse((0, 0), (radius, radius)))
+    assert respect_radius(data, null) == pytest.approx(radius, abs=0.02)
+    assert respect_boundary(data, null, THETA) == pytest.approx(radius, abs=0.04)
+
+
+def test_it_is_flat_in_the_number_of_samples(null: szlib.NullEncounters) -> None:
+    """With an edge as soft as at real sites; what a hull finds shrinks by half a metre meanwhile."""
+    nearest = []
+    for n in (100, 1_000, 10_000, 100_000):
+        data = [
+            softly_kept_out(scattered(seed, n), 0.7, seed) for seed in range(10, 40 if n < 10_000 else 14)
+        ]
+        radii = [respect_radius(each, null) for each in data]
+        error = np.std(radii) / np.sqrt(len(radii))
+        assert np.mean(radii) == pytest.approx(0.7, abs=max(2.6 * error, 0.01)), n
+        nearest.append(np.mean([each["distance"].min() for each in data]))
+    assert nearest[0] - nearest[-1] > 0.3
+
+
+@pytest.mark.parametrize("careless", [0.05, 0.2, 0.4])
+def test_some_who_do_not_care_change_little(null: szlib.NullEncounters, careless: float) -> None:
+    data = kept_out(scattered(3, 50_000), ZONE, careless)
+    fit = fit_respect(data, null)
+    assert fit.careless == pytest.approx(careless, abs=0.03)
+    assert fit.radii(THETA) == pytest.approx(reach(ZONE, THETA), abs=0.06)
+
+
+def test_half_who_do_not_care_leave_no_zone(null: szlib.NullEncounters) -> None:
+    data = kept_out(scattered(4, 50_000), ZONE, 0.7)
+    assert respect_radius(data, null) == 0
+    assert (respect_boundary(data, null, THETA) == 0).all()
+
+
+def test_where_nobody_minds_there_is_no_zone(null: szlib.NullEncounters) -> None:
+    radii = [respect_radius(scattered(seed, 1_000), null) for seed in range(5, 25)]
+    assert np.median(radii) < 0.05
+    assert max(radii) < 0.3
+
+
+def test_the_contour_is_where_counts_are_half(null: szlib.NullEncounters) -> None:
+    """An independent reading: bins of the ratio, with a soft edge."""
+    data = softly_kept_out(scattered(6, 400_000), 0.9, 0)
+    edges = np.arange(0, R_MAX + 0.01, 0.02)
+    ratio = np.histogram(data["distance"], edges)[0] / np.histogram(null.samples["distance"], edges)[0]
+    half = np.interp(0.5, ratio[20:60] / ratio[80:].mean(), edges[20:60] + 0.01)
+    assert respect_radius(data, null) == pytest.approx(half, abs=0.02)
+    assert fit_respect(data, null).softness == pytest.approx(0.1, abs=0.01)
+
+
+def test_zones_by_speed(null: szlib.NullEncounters) -> None:
+    data = scattered(7, 60_000)
+    data = data[data["distance"] > 0.4 + 0.4 * data["speed"]]
+    for speed in (0.7, 1.0, 1.3):
+        found = respect_boundary(data, null, THETA, speed=speed, speed_width=0.1)
+        assert found == pytest.approx(0.4 + 0.4 * speed, abs=0.06)
+
+
+# --- invariances -------------------------------------------------------------------------------------
+
+
+def test_the_mix_of_directions_and_the_numbers_do_not_matter(null: szlib.NullEncounters) -> None:
+    data = kept_out(scattered(8, 40_000), ZONE)
+    ahead = np.abs(data["los_angle"]) < np.pi / 2
+    fewer = pd.concat([data[ahead], data[~ahead].iloc[::4]])
+    assert respect_boundary(fewer, null, THETA) == pytest.approx(
+        respect_boundary(data, null, THETA), abs=0.04
+    )
+
+
+def test_a_mirrored_world_has_a_mirrored_zone(null: szlib.NullEncounters) -> None:
+    data = kept_out(scattered(9, 20_000), ZONE)
+    other = null_of(null.samples.assign(los_angle=-null.samples["los_angle"]))
+    found = respect_boundary(data.assign(los_angle=-data["los_angle"]), other, -THETA)
+    assert found == pytest.approx(respect_boundary(data, null, THETA), abs=1e-3)
+
+
+def test_weights_are_copies(null: szlib.NullEncounters) -> None:
+    data = kept_out(scattered(10, 2_000), ZONE)
+    weights = np.random.default_rng(0).integers(0, 4, len(data))
+    weighed = Presence.of(data, r_max=R_MAX, weights=weights)
+    copies = Presence.of(data.loc[data.index.repeat(weights)], r_max=R_MAX)
+    np.testing.assert_array_equal(weighed.counts, copies.counts)
+    against = Presence.of(null.samples, r_max=R_MAX)
+    assert respect_radius(weighed, against) == respect_radius(data.loc[data.index.repeat(weights)], null)
+
+
+def test_what_is_far_does_not_matter(null: szlib.NullEncounters) -> None:
+    data = kept_out(scattered(11, 2_000), ZONE)
+    far = data.assign(distance=data["distance"] + 2.0)
+    found = respect_boundary(pd.concat([data, far]), null, THETA)
+    np.testing.assert_array_equal(found, respect_boundary(data, null, THETA))
+
+
+def test_shapes(null: szlib.NullEncounters) -> None:
+    fit = fit_respect(kept_out(scattered(12, 2_000), ZONE), null)
+    assert fit.radii(0.0).shape == ()
+    assert fit.radii(np.zeros((2, 3))).shape == (2, 3)
+    assert fit.radii(np.pi) == pytest.approx(fit.radii(-np.pi))
+
+
+def test_nothing_to_compare(null: szlib.NullEncounters) -> None:
+    data = scattered(13, 100)
+    with pytest.raises(ZoneError, match=r"0 samples of the data.*nothing to compare"):
+        respect_radius(data.assign(distance=3.0), null)
+    with pytest.raises(ZoneError, match="at about 50 m/s"):
+        fit_respect(data, null, speed=50.0)
+    with pytest.raises(ZoneError, match="same r_max"):
+        respect_radius(Presence.of(data, r_max=1.5), null)
+
+
+# --- the map -----------------------------------------------------------------------------------------
+
+
+def test_the_map_of_g(null: szlib.NullEncounters) -> None:
+    same = pair_correlation(null.samples, null)
+    assert same.g == pytest.approx(1.0)
+    data = kept_out(scattered(14, 100_000), szlib.Ellipse((0, 0), (1, 1)))
+    g = pair_correlation(data, null).g
+    assert g.shape == (len(same.direction), len(same.distance))
+    assert g[:, same.distance < 0.7].max() < 0.05
+    assert g[:, same.distance > 1.3].min() > 1.0, (
+        "who is not inside is outside: more than with nobody minding"
+    )
+
+
+def test_the_map_needs_a_null(null: szlib.NullEncounters) -> None:
+    with pytest.raises(ZoneError, match="no encounter"):
+        pair_correlation(scattered(0, 10), null_of(scattered(0, 0)))
+
+
+# --- the plaza ---------------------------------------------------------------------------------------
+
+
+def test_the_plaza_truth_comes_back(tmp_path: Path) -> None:
+    """Staged encounters are no sample of an hour: far more pass close by than chance would bring."""
+    settings = szlib.PlazaSettings(intruders=0.01)
+    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=0, settings=settings))
+    samples = szlib.find_encounters(tracks)
+    null = szlib.null_encounters(tracks, shifts=30, progress=False)
+    for speed in (0.7, 1.1):
+        found = respect_boundary(samples, null, THETA, speed=speed)
+        assert found == pytest.approx(reach(settings.true_zone(speed), THETA), abs=0.08)
+        assert found.mean() == pytest.approx(reach(settings.true_zone(speed), THETA).mean(), abs=0.03)
+    assert szlib.null_test(samples, null).respect

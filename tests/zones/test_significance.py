@@ -1,0 +1,133 @@
+"""Is it respect at all: valid p-values where nobody minds, small ones where people do."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import szlib
+from szlib.errors import DataError, DataWarning, ZoneError
+from szlib.zones.respect.significance import NullTest, null_test
+
+KINDS = ("opposite", "crossing")
+SHIFTS = 39
+
+
+def encounters(seed: int, shift: int, *, n: int = 40, away: float = 0.0) -> pd.DataFrame:
+    """Single samples, their nearest approach even between `away` and 3 m."""
+    rng = np.random.default_rng([seed, shift])
+    table = pd.DataFrame({"encounter": 1000 * (shift + 1) + np.arange(n), "shift": shift})
+    table["los_angle"], table["distance"] = rng.uniform(-3, 3, n), rng.uniform(away, 3, n)
+    return table.assign(speed=1.0)
+
+
+def null_of(seed: int, shifts: int = SHIFTS) -> szlib.NullEncounters:
+    rows = pd.concat([encounters(seed, k) for k in range(shifts)])
+    found = rows[["shift", "encounter"]].assign(nearest=rows["distance"])
+    return szlib.NullEncounters(rows[rows["distance"] <= 2], found, shifts, 2.0)
+
+
+# --- nobody minds ------------------------------------------------------------------------------------
+
+
+def test_p_values_are_even_where_nobody_minds() -> None:
+    tests = [null_test(encounters(seed, SHIFTS), null_of(seed), radii=False) for seed in range(200)]
+    p = np.array([test.p_value for test in tests])
+    assert (p <= 0.05).mean() <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / 200)
+    share = np.searchsorted(np.sort(p), [0.25, 0.5, 0.75], side="right") / len(p)
+    assert share == pytest.approx([0.25, 0.5, 0.75], abs=0.1)
+
+
+def test_a_crowd_that_minds_nobody_is_found_out() -> None:
+    """100 seeds stand in notebooks/tables/15_nobody.csv."""
+    p = []
+    for seed in range(12):
+        tracks = szlib.indifferent_crowd(seed=seed, people=600, minutes=40)
+        null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
+        p.append(null_test(szlib.find_encounters(tracks), null, radii=False).p_value)
+    assert np.sum(np.array(p) <= 0.05) <= 3  # 3 and more of 12: 2 %
+    assert np.median(p) > 0.15
+
+
+def test_people_drawn_to_each_other_show_no_respect(tmp_path: Path) -> None:
+    """A plaza without clearance whose zones are tiny: everybody walks right at everybody."""
+    tiny = szlib.Ellipse((0, 0), (0.15, 0.15))
+    settings = szlib.PlazaSettings(encounters=250, clearance=0, slow=tiny, fast=tiny, intruders=0, together=0)
+    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", settings=settings))
+    null = szlib.null_encounters(tracks, shifts=39, minutes=(1, 6), progress=False)
+    test = null_test(szlib.find_encounters(tracks), null)
+    assert test.p_value > 0.5
+    assert test.radius == 0
+    assert not test.respect
+
+
+# --- people mind -------------------------------------------------------------------------------------
+
+
+def test_who_keeps_away_is_seen_to() -> None:
+    null = null_of(0)
+    test = null_test(encounters(1, SHIFTS, away=0.5), null)
+    assert test.p_value == 1 / (1 + SHIFTS)
+    assert test.statistic > max(test.null_statistics)
+    assert test.respect
+    assert test.radius == pytest.approx(0.5, abs=0.15)
+    assert np.nanmedian(test.null_radii) < 0.2
+    assert "respect: p = 0.025 (39 shifts" in str(test)
+
+
+def test_who_comes_near_is_no_respect() -> None:
+    near = encounters(1, SHIFTS)
+    near["distance"] /= 3
+    assert null_test(near, null_of(0)).p_value == 1
+
+
+def test_more_than_bodies() -> None:
+    """0.5 m that no two bodies can be within: no respect in that alone."""
+    null = null_of(0)
+    assert null_test(encounters(1, SHIFTS, n=200, away=0.5), null).respect
+    assert not null_test(encounters(1, SHIFTS, n=200, away=0.5), null, beyond=0.55).respect
+    assert null_test(encounters(1, SHIFTS, n=200, away=1.0), null, beyond=0.55).respect
+
+
+def test_the_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.DataFrame) -> None:
+    null = szlib.null_encounters(real_tracks, shifts=20, progress=False)
+    for kinds in ("strangers", KINDS):
+        test = null_test(szlib.of_kind(real_samples, kinds), null.of_kind(kinds), beyond=0.5)
+        assert test.p_value == pytest.approx(1 / 21)
+        assert 0.78 < test.radius < 1.27  # 0.98 m (0.78-1.27) for strangers
+        assert np.nanpercentile(test.null_radii, 95) < 0.5
+
+
+# --- the object, and errors --------------------------------------------------------------------------
+
+
+def test_it_survives_json() -> None:
+    test = null_test(encounters(1, SHIFTS), null_of(0))
+    assert NullTest.from_record(json.loads(json.dumps(test.record()))) == test
+    with pytest.raises(ZoneError, match="test it again"):
+        NullTest.from_record({"p_value": 0.1})
+
+
+def test_kinds_on_one_side_only() -> None:
+    null, data = null_of(0), encounters(1, SHIFTS, n=60)
+    kind = np.where(np.arange(len(null.encounters)) % 2, "crossing", "opposite")
+    null = szlib.NullEncounters(null.samples, null.encounters.assign(kind=kind), SHIFTS, 2.0)
+    with pytest.warns(DataWarning, match="the data has no encounter of the kind 'opposite'"):
+        null_test(data.assign(kind="crossing"), null)
+    mixed = np.where(data["encounter"] % 3 == 0, "standing", np.where(data["encounter"] % 2, *KINDS))
+    with pytest.warns(DataWarning, match="the null model has no encounter of the kind 'standing'"):
+        null_test(data.assign(kind=mixed), null)
+
+
+def test_errors() -> None:
+    data, null = encounters(1, SHIFTS), null_of(0)
+    with pytest.raises(ZoneError, match="nothing to test"):
+        null_test(data.assign(distance=2.5), null)
+    with pytest.raises(ZoneError, match="nothing to test"):
+        null_test(data, null, beyond=2.0)
+    with pytest.raises(DataError, match="columns"):
+        null_test(data[["distance"]], null)

@@ -1,0 +1,152 @@
+"""How sure: counts by side, who is drawn, intervals that hold what they should, what one encounter moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from passers import passers
+
+import szlib
+from szlib.zones.quantile import QuantileZones
+from szlib.zones.uncertainty import (
+    DAYS_NEEDED,
+    NEEDED,
+    QUANTITIES,
+    SECTORS,
+    count_seen,
+    measure,
+    missing_sides,
+    resampling_units,
+)
+
+SPEEDS = (1.1,)
+
+
+def fit(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
+    return szlib.SocialZone.fit(samples, speeds=SPEEDS, **{"method": "quantile", **options})
+
+
+@pytest.fixture(scope="module")
+def samples() -> pd.DataFrame:
+    return passers(300)
+
+
+def test_each_side_counts_encounters_not_samples() -> None:
+    rows = [
+        (0, 0.0, 1.0, 1.0), (0, 0.1, 1.0, 1.0),  # one, ahead
+        (1, np.pi, 1.0, 1.15), (2, -np.pi, 1.0, 0.85),  # two, behind
+        (3, np.pi / 2, 1.0, 1.0), (3, -np.pi / 2, 1.0, 1.0),  # one that passes from left to right
+        (4, np.pi / 4, 3.0, 1.0), (5, np.pi / 4, 1.0, 1.5),  # too far, too fast
+    ]  # fmt: skip
+    table = pd.DataFrame(rows, columns=["encounter", "los_angle", "distance", "speed"])
+    seen = count_seen(table, (1.0, 1.5), r_max=2.0)
+    assert seen["encounters"].tolist() == [4, 1]
+    one = {"ahead": 1, "behind": 2, "left": 1, "right": 1}
+    assert seen.loc[0, list(SECTORS)].to_dict() == {side: one.get(side, 0) for side in SECTORS}
+    assert seen.loc[1, list(SECTORS)].sum() == seen.loc[1, "ahead left"] == 1
+
+
+def test_what_is_missing_is_named_side_by_side() -> None:
+    seen = pd.DataFrame([[1.0, 99, *[NEEDED] * 8], [1.2, 99, *[NEEDED] * 7, NEEDED - 1]])
+    seen.columns = ["speed", "encounters", *SECTORS]
+    assert missing_sides(seen, 1.0) == ""
+    for speed in (1.1, 1.2):  # between, the poorer neighbour counts
+        told = f"at {speed:g} m/s fewer than 20 encounters were seen ahead right (19)"
+        assert missing_sides(seen, speed) == told
+    assert missing_sides(seen, 1.3) == "at 1.3 m/s nobody was counted (only at 1 to 1.2 m/s)"
+
+
+def test_pairs_of_people_are_drawn_and_days_where_there_are_many() -> None:
+    table = pd.DataFrame({"day": ["a", "a", "a", "b"], "ref_id": [1, 2, 1, 1], "other_id": [2, 1, 3, 2]})
+    unit, member = resampling_units(table)
+    assert unit == "pairs"
+    assert member[0] == member[1]  # whoever looks at whom
+    assert len(set(member)) == 3
+    unit, member = resampling_units(table.drop(columns=["ref_id"]))
+    assert (unit, member.tolist()) == ("encounters", [0, 1, 2, 3])
+    days = pd.DataFrame({"day": np.arange(2 * DAYS_NEEDED) // 2, "ref_id": 1, "other_id": 2})
+    unit, member = resampling_units(days)
+    assert (unit, member.tolist()) == ("days", days["day"].tolist())
+
+
+def test_intervals_are_the_same_for_the_same_seed_only(samples: pd.DataFrame) -> None:
+    one, same, other = (fit(samples, resamples=30, seed=seed).uncertainty for seed in (0, 0, 1))
+    pd.testing.assert_frame_equal(one.intervals, same.intervals)
+    assert not one.intervals.equals(other.intervals)
+    assert one.intervals["quantity"].tolist() == list(QUANTITIES)
+    assert (one.intervals["low"] < one.intervals["high"]).all()
+    assert (one.bands["low"] < one.bands["high"]).all()
+    assert (one.unit, one.level, one.resamples) == ("pairs", 0.95, 30)
+
+
+def test_more_people_make_narrower_intervals() -> None:
+    few, many = (fit(passers(n), resamples=60).uncertainty.intervals for n in (150, 2400))
+    ratio = (many["high"] - many["low"]) / (few["high"] - few["low"])
+    assert ratio.median() == pytest.approx(1 / 4, abs=0.12)
+
+
+@pytest.mark.parametrize("method", ["quantile", "hull"])
+def test_a_pair_seen_twice_is_no_new_evidence(samples: pd.DataFrame, method: str) -> None:
+    """The other person's view of the same encounter makes the interval no narrower."""
+    twice = pd.concat([samples, samples.assign(encounter=samples["encounter"] + 1000, t=samples["t"] + 0.01)])
+    options = {"method": method, "resamples": 60}
+    if method == "hull":
+        options |= {"outlier_fraction": 0.0}
+    one, two = (fit(table, **options).uncertainty for table in (samples, twice))
+    assert f"of {samples['encounter'].nunique()} pairs" in one.how
+    assert one.how == two.how
+    np.testing.assert_allclose(one.intervals[["low", "high"]], two.intervals[["low", "high"]], atol=1e-9)
+
+
+def test_the_hull_is_taken_back_behind_its_nearest_people() -> None:
+    """People keep out of a zone that no sample shows whole: the interval reaches farther in than the hull."""
+    samples = passers(300)
+    zone = fit(samples, method="hull", outlier_fraction=0.0, resamples=60)
+    area = zone.table().iloc[0]
+    assert area["area_low"] < area["area_high"] < area["area"]
+    assert "subsampling: 75 of 300 pairs" in zone.uncertainty.how
+    truth = np.pi * 0.95 * 0.75
+    assert area["area_low"] < truth < area["area"]
+
+
+def test_intervals_hold_the_limit() -> None:
+    """In short: 25 data sets of 200 pairs; 200 plazas are in notebooks/tables/16_coverage.csv."""
+    limit = fit(passers(20_000, seed=99), resamples=0).table().iloc[0]
+    held = []
+    for seed in range(25):
+        known = fit(passers(200, seed=seed), resamples=60).uncertainty.intervals.set_index("quantity")
+        held.append([known.loc[q, "low"] <= limit[q] <= known.loc[q, "high"] for q in QUANTITIES])
+    assert np.mean(held) >= 0.85  # 95 %, less four standard errors of 25 x 6 that are not independent
+
+
+def test_influence_is_what_leaving_one_out_does(samples: pd.DataFrame) -> None:
+    for method, options in (("quantile", {}), ("hull", {"outlier_fraction": 0.0})):
+        zone = fit(samples, method=method, resamples=2, **options)
+        told = zone.uncertainty.influence.iloc[0]
+        without = fit(
+            samples[samples["encounter"] != told["encounter"]], method=method, resamples=0, **options
+        )
+        before, after = zone.table().iloc[0], without.table().iloc[0]
+        moved = max(abs(before[q] - after[q]) for q in QUANTITIES[:4])
+        assert moved == pytest.approx(told["metres"], abs=2e-3)  # the hull's, around 72 directions
+        some = np.random.default_rng(0).choice(samples["encounter"].unique(), 8, replace=False)
+        for encounter in some:
+            rest = fit(samples[samples["encounter"] != encounter], method=method, resamples=0, **options)
+            other = max(abs(before[q] - rest.table().iloc[0][q]) for q in QUANTITIES[:4])
+            assert other <= told["metres"] + 2e-3
+
+
+def test_resamples_without_a_zone_leave_no_interval() -> None:
+    """Three people seen around more than half of the circle: without one of them there is no zone."""
+    three = passers(3, seed=4)
+    with pytest.warns(szlib.DataWarning, match="fewer than 20"):
+        zone = fit(three, resamples=40)
+    assert zone.table().filter(regex="_low$|_high$").isna().all(axis=None)
+    assert zone.uncertainty.influence["metres"].tolist() == [np.inf]
+
+
+@pytest.mark.parametrize("resamples", [1, -3, 2.5])
+def test_resamples_without_meaning(samples: pd.DataFrame, resamples: float) -> None:
+    with pytest.raises(szlib.DataError, match="resamples must be a whole number"):
+        measure(QuantileZones.of(samples, r_max=2.0), SPEEDS, resamples=resamples, seed=0)
