@@ -198,7 +198,8 @@ record.figure(fig, "found")
 # %%
 errors = {}
 for rule, mask in rules.items():
-    zone = szlib.SocialZone.fit(people[~mask], outlier_fraction=0, speeds=scores.SPEEDS, resamples=0)
+    options = {"method": "hull", "outlier_fraction": 0, "speeds": scores.SPEEDS, "resamples": 0}
+    zone = szlib.SocialZone.fit(people[~mask], **options)
     errors[rule] = scores.largest_error(zone, settings)
     print(f"{rule}: centre or axes of the zone off by up to {errors[rule]:.3f} m")
 precision, recall = scores.precision_and_recall(whole, intruder)
