@@ -59,7 +59,7 @@ record.key |= {"inliers": len(points), "vertices": len(vertices)}
 # ## The hull in three dimensions
 
 # %%
-zone = szlib.SocialZone.fit(samples)
+zone = szlib.SocialZone.fit(samples, method="hull", resamples=0)
 ax = figures.plot_hull(zone, speeds)
 record.figure(ax.figure, "hull")
 record.check("SocialZone.fit finds the same vertices", np.array_equal(zone.vertices, vertices), len(vertices))

@@ -2,7 +2,7 @@
 
 truth        the settings of the plaza and the zone that its people keep: `PlazaSettings`
 people       who walks there, and what a sensor records of them: `make_plaza`
-scores       whom a rule for outliers found, and how far a zone is off
+scores       how near to the truth: whom a rule for outliers found, how far a zone is off
 indifferent  a plaza on which nobody minds anybody: `indifferent_crowd`
 """
 

@@ -25,7 +25,7 @@ SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
 )
 """Values of `szlib.find_encounters`, beside its defaults."""
 FIT: Mapping[str, Sequence[Any]] = MappingProxyType(
-    {"r_max": (1.5, 2.5), "outlier_fraction": (0.0, 0.01), "neighbours": (20, 500)}
+    {"r_max": (1.5, 2.5), "outlier_fraction": (0.0, 0.002, 0.01), "neighbours": (10, 50)}
 )
 """Values of `szlib.SocialZone.fit`, beside its defaults."""
 SPEEDS = (0.9, 1.3)
@@ -39,8 +39,8 @@ def sensitivity(
     *,
     square: Square,
     speed: float = 1.1,
+    method: str = "hull",
     fit: Mapping[str, Sequence[Any]] = FIT,
-    **options: Any,
 ) -> pd.DataFrame:
     """The zone at a speed [m/s] with each parameter varied alone.
 
@@ -48,7 +48,7 @@ def sensitivity(
     ----------
     tracks, square : as for `szlib.find_encounters`.
     fit : keywords of `SocialZone.fit` to vary, and their values; those of the search are `SEARCH`.
-    options : of every fit, such as method="quantile".
+    method : of every fit.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def sensitivity(
         try:
             with warnings.catch_warnings():  # few encounters, told by their number here
                 warnings.simplefilter("ignore", DataWarning)
-                zone = SocialZone.fit(samples, speeds=(at,), resamples=0, **{**options, **keywords})
+                zone = SocialZone.fit(samples, speeds=(at,), method=method, resamples=0, **keywords)
             ellipse = zone.ellipses[at]
             sizes = (*ellipse.semi_axes, ellipse.area)
         except (ZoneError, DataError):

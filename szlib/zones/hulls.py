@@ -25,8 +25,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ..errors import ZoneError
 from ..tracks import funnels
 from .ellipses import minimum_enclosing_ellipse
-from .outliers import complementary_points, remove_outliers
-from .quantile import encounter_numbers
+from .outliers import complementary_points, encounter_numbers, remove_outliers
 from .radii import DIRECTIONS
 
 

@@ -17,6 +17,7 @@ import warnings
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ..errors import DataError, DataWarning
 from ..tracks import funnels
@@ -53,19 +54,24 @@ def complementary_points(samples: pd.DataFrame, *, r_max: float = R_MAX) -> np.n
     return np.asarray((r_max - distance)[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
 
 
-def nearest_approaches(samples: pd.DataFrame) -> pd.DataFrame:
-    """The nearest sample of each encounter, one row an encounter, in the order of their numbers.
+def encounter_numbers(samples: pd.DataFrame) -> tuple[NDArray[np.intp], pd.DataFrame]:
+    """Which encounter each sample belongs to (n,), and the first sample of each, in order of appearance.
 
-    Numbers must differ between encounters: keep those of several days, or plazas, apart.
-    Raises DataError where a sample does not say which encounter it belongs to.
+    Encounters are told apart by `encounter` and, where there is one, `day`; without either, each sample
+    counts as one.
     """
+    number: NDArray[np.intp] = np.arange(len(samples))
+    if "encounter" in samples:
+        keys = [name for name in ("day", "encounter") if name in samples]
+        groups = samples.groupby(keys, sort=False, observed=True, dropna=False)
+        number = np.asarray(groups.ngroup(), np.intp)
+    return number, samples.iloc[np.unique(number, return_index=True)[1]]
+
+
+def nearest_approaches(samples: pd.DataFrame) -> pd.DataFrame:
+    """The nearest sample of each encounter, as `encounter_numbers` tells them apart, one row an encounter."""
     check_columns(samples, ["los_angle", "distance"])
-    if "encounter" not in samples or samples["encounter"].isna().any():
-        raise DataError(
-            "whole encounters can be judged only where each sample says, in a column encounter, to which it "
-            f"belongs; number them, or judge samples with fraction={FRACTION}, as in the paper"
-        )
-    number = pd.factorize(samples["encounter"], sort=True)[0]
+    number = encounter_numbers(samples)[0]
     order = np.lexsort((samples["los_angle"].to_numpy(), samples["distance"].to_numpy(), number))
     return samples.iloc[order[np.r_[True, np.diff(number[order]) > 0]]]
 
@@ -98,7 +104,7 @@ def is_outlier(
 
     Parameters
     ----------
-    samples : a table with los_angle [rad], distance [m] (encounter, and speed [m/s]).
+    samples : a table with los_angle [rad], distance [m] (encounter and day, and speed [m/s]).
     fraction : None judges encounters.  A number is the paper's way (`FRACTION`, with `NEIGHBOURS`): that
         share of samples, whatever the data: a quota, not a detection; 0 calls none an outlier.
     r_max : longest distance [m].
@@ -111,8 +117,7 @@ def is_outlier(
 
     Raises
     ------
-    DataError : a parameter has no meaning, samples do not tell their encounter, or there are too few
-        for the neighbours.
+    DataError : a parameter has no meaning, or there are too few samples for the neighbours.
     """
     from sklearn.neighbors import LocalOutlierFactor
 
@@ -121,7 +126,7 @@ def is_outlier(
         nearest = nearest_approaches(samples)
         places, place = np.unique(_features(nearest, r_max, speed_scale), axis=0, return_inverse=True)
         far = _far(places, neighbours)[place.ravel()]
-        return np.asarray(samples["encounter"].isin(nearest["encounter"][far]))
+        return np.asarray(far[encounter_numbers(samples)[0]])
     if not 0 <= fraction <= 0.5:
         raise DataError(
             f"fraction must be within [0, 0.5], or None to judge whole encounters; got {fraction}"

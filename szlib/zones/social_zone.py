@@ -32,7 +32,7 @@ from .radii import Radii
 from .respect.estimate import RespectZones
 from .respect.significance import NullTest, null_test
 from .uncertainty import QUANTITIES, RESAMPLES, Estimate, Uncertainty, count_seen, measure, missing_sides
-from .zone_file import read_zone, write_zone, zone_fields
+from .zone_file import check_whole, read_zone, write_zone, zone_fields
 
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Speeds of the reference pedestrian whose zones are fitted [m/s] (assumed; the paper shows a range)."""
@@ -93,7 +93,7 @@ class SocialZone:
         cls,
         samples: pd.DataFrame,
         *,
-        method: str = "hull",
+        method: str | None = None,
         r_max: float = R_MAX,
         speeds: Iterable[float] = SPEEDS,
         outlier_fraction: float | None = None,
@@ -111,7 +111,8 @@ class SocialZone:
         ----------
         samples : a table with los_angle [rad], distance [m], speed [m/s], encounter; with ref_id and
             other_id people are drawn anew, not encounters; with t paths can be smoothed.
-        method : "hull", "quantile" or "respect".
+        method : "quantile", "hull" (the paper's) or "respect".  None takes the quantile, which does not
+            shrink as people are added, or the hull where one of its keywords is given.
         r_max : distance within which people count [m].
         speeds : whose zones are fitted [m/s].
         outlier_fraction, neighbours, speed_scale : of the hull, as in `szlib.remove_outliers`:
@@ -137,7 +138,7 @@ class SocialZone:
             "q": q,
             "speed_width": speed_width,
         }
-        options = _options_of(method, given)
+        method, options = _options_of(method, given)
         check_columns(samples, ["los_angle", "distance", "speed"])
         asked = sorted({float(speed) for speed in speeds})
         if not asked:
@@ -249,11 +250,13 @@ class SocialZone:
         """Read a zone written by `save`; raises ZoneError where the file is none, or of a newer szlib."""
         content = read_zone(Path(path))
         try:
-            return cls(**zone_fields(content))
+            zone = cls(**zone_fields(content))
         except (KeyError, TypeError, IndexError, ValueError, OverflowError, AttributeError) as error:
             raise ZoneError(
                 f"{path}: the zone in it is damaged ({error!r}); fit and save it again"
             ) from error
+        check_whole(content, Path(path))
+        return zone
 
     def _hull(self) -> np.ndarray:
         if self.vertices is None:
@@ -267,13 +270,15 @@ class SocialZone:
         return minimum_enclosing_ellipse_of_curve(section.boundary, section.corner_angles)
 
 
-def _options_of(method: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The keywords given that belong to the method; ZoneError for an unknown method or a stray keyword."""
+def _options_of(method: str | None, given: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    """The method, and the keywords given, all its own; ZoneError for an unknown one or a stray keyword."""
+    options = {name: value for name, value in given.items() if value is not None}
+    if method is None:
+        method = "hull" if options.keys() & set(METHODS["hull"][1]) else "quantile"
     if method not in METHODS:
         raise ZoneError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
-    options = {name: value for name, value in given.items() if value is not None}
     for name in options:
         if name not in METHODS[method][1]:
             home = next(m for m, (_, names) in METHODS.items() if name in names)
             raise ZoneError(f'{name} belongs to method="{home}"; got method="{method}": drop one of them')
-    return options
+    return method, options

@@ -24,7 +24,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import DataError
-from .quantile import BAND, encounter_numbers
+from .outliers import encounter_numbers
+from .quantile import BAND
 from .radii import DIRECTIONS, Array, Radii, ellipse_reach
 
 SECTORS = (

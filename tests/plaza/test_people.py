@@ -23,6 +23,11 @@ NAMES = ["time", "id", "x", "y", "z", "velocity", "motion_angle", "facing_angle"
 FEW = PlazaSettings(encounters=150)
 
 
+def hull_of(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
+    """The hull's zone, without its intervals."""
+    return szlib.SocialZone.fit(samples, method="hull", resamples=0, **options)
+
+
 def samples_of(folder: Path, seed: int, settings: PlazaSettings) -> pd.DataFrame:
     return szlib.find_encounters(
         szlib.read_tracks(make_plaza(folder / "plaza.csv", seed=seed, settings=settings))
@@ -80,14 +85,14 @@ def raw(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pl.DataFrame]:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_the_pipeline_finds_the_true_zone(tmp_path: Path, seed: int) -> None:
-    metres, degrees = errors(szlib.SocialZone.fit(samples_of(tmp_path, seed, DEFAULT)), DEFAULT)
+    metres, degrees = errors(hull_of(samples_of(tmp_path, seed, DEFAULT)), DEFAULT)
     assert metres < 0.05
     assert degrees < 10
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_another_truth_is_found_as_well(tmp_path: Path, seed: int) -> None:
-    zone = szlib.SocialZone.fit(samples_of(tmp_path, seed, ASIDE))
+    zone = hull_of(samples_of(tmp_path, seed, ASIDE))
     metres, degrees = errors(zone, ASIDE)
     assert metres < 0.05
     assert degrees < 10
@@ -98,16 +103,16 @@ def test_without_intruders_it_is_found_too_and_without_outlier_removal(tmp_path:
     polite = PlazaSettings(intruders=0.0)
     samples = samples_of(tmp_path, 2, polite)
     for fraction in (0.002, 0.0):
-        metres, degrees = errors(szlib.SocialZone.fit(samples, outlier_fraction=fraction), polite)
+        metres, degrees = errors(hull_of(samples, outlier_fraction=fraction), polite)
         assert metres < 0.05
         assert degrees < 10
 
 
 def test_intruders_spoil_the_zone_unless_outliers_are_removed(tmp_path: Path) -> None:
     samples = samples_of(tmp_path, 2, DEFAULT)
-    assert errors(szlib.SocialZone.fit(samples), DEFAULT)[0] < 0.05
+    assert errors(hull_of(samples), DEFAULT)[0] < 0.05
     try:
-        metres = errors(szlib.SocialZone.fit(samples, outlier_fraction=0.0), DEFAULT)[0]
+        metres = errors(hull_of(samples, outlier_fraction=0.0), DEFAULT)[0]
     except szlib.ZoneError:  # intruders so near that nothing is left of the zone
         return
     assert metres > 0.15
@@ -118,7 +123,7 @@ def test_a_reader_that_swaps_x_and_y_is_found_out(tmp_path: Path) -> None:
     swapped = tracks.rename(columns={"x": "y", "y": "x", "vx": "vy", "vy": "vx"})
     assert len(szlib.find_encounters(swapped)) < len(szlib.find_encounters(tracks)) / 2
     square = szlib.Square(x=szlib.ATC_SQUARE.y, y=szlib.ATC_SQUARE.x)
-    zone = szlib.SocialZone.fit(szlib.find_encounters(swapped, square=square))
+    zone = hull_of(szlib.find_encounters(swapped, square=square))
     assert errors(zone, ASIDE)[1] > 10
 
 
@@ -126,7 +131,7 @@ def test_a_clock_that_is_late_for_some_is_found_out(tmp_path: Path) -> None:
     polite = PlazaSettings(intruders=0.0)
     tracks = szlib.read_tracks(make_plaza(tmp_path / "plaza.csv", seed=4, settings=polite))
     tracks.loc[tracks["id"] % 200 == 0, "t"] += 0.2
-    assert errors(szlib.SocialZone.fit(szlib.find_encounters(tracks)), polite)[0] > 0.1
+    assert errors(hull_of(szlib.find_encounters(tracks)), polite)[0] > 0.1
 
 
 def test_everybody_but_the_intruders_respects_both_zones(staged: pd.DataFrame) -> None:

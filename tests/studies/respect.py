@@ -38,7 +38,9 @@ SETS = {
 }
 SPEED = 1.1
 """At which the hull's zone is told [m/s]."""
-RESAMPLES, DRAWS = 200, 30
+RESAMPLES, DRAWS = 100, 30
+HULLS = 100_000
+"""Samples of the null model whose hulls are found, at most: LOF is slow."""
 SIZES = (36, 72, 150, 300, 600, 1200, 2400, 4800)
 
 
@@ -62,15 +64,15 @@ def main() -> None:
 
 def nobody(asked: argparse.Namespace) -> list[dict[str, object]]:
     """One row a seed, a size of bunches, a set of kinds."""
-    tasks = [joblib.delayed(one_crowd)(seed, bunch) for bunch in (1, 10) for seed in range(asked.seeds)]
+    tasks = [joblib.delayed(one_crowd)(seed, bunch) for seed in range(asked.seeds) for bunch in (1, 10)]
     rows = [row for part in run_tasks(tasks, n_jobs=asked.jobs) for row in part]
     return sorted(rows, key=lambda row: (row["bunch"], row["kinds"], row["seed"]))
 
 
 def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
-    tracks = szlib.indifferent_crowd(seed=seed, bunch=bunch)
+    tracks = szlib.indifferent_crowd(seed=seed, people=500, minutes=30, bunch=bunch)
     samples = szlib.find_encounters(tracks)
-    null = szlib.null_encounters(tracks, shifts=39, seed=seed, progress=False)
+    null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
     rows = []
     for name in ("all", "opposite, crossing"):
         data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
@@ -130,7 +132,8 @@ def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
                 row |= {"softness": fit.softness, "careless": fit.careless}
                 row |= {"p_value": test.p_value, "p_value_beyond_0.5m": bodies.p_value}
                 row |= {"hull_a": hull_a(data)}
-                hulls = [hull_a(against.one(k)) for k in range(null.shifts)]
+                few = max(1, min(null.shifts, HULLS * null.shifts // max(len(against.samples), 1)))
+                hulls = [hull_a(against.one(k)) for k in range(few)]
                 row |= {"null_hull_a": np.nanmedian(hulls) if np.isfinite(hulls).any() else np.nan}
                 print(row, file=sys.stderr, flush=True)
                 yield row

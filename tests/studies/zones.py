@@ -1,6 +1,7 @@
 """Long studies of the estimators; each prints its table as CSV, kept in notebooks/tables.
 
-    python tests/studies/zones.py coverage 200 centred default > notebooks/tables/16_coverage.csv   (plazas)
+    python tests/studies/zones.py coverage 200 quantile centred default > notebooks/tables/16_coverage.csv
+    python tests/studies/zones.py coverage 200 hull centred > notebooks/tables/16_coverage_hull.csv  (plazas)
     python tests/studies/zones.py errors 3 > notebooks/tables/16_estimators.csv           (plazas a case)
     python tests/studies/zones.py sizes 8 > notebooks/tables/16_sizes.csv                 (plazas pooled)
     python tests/studies/zones.py subsets 20 FILE... > notebooks/tables/16_subsets.csv    (subsets of a size)
@@ -74,28 +75,25 @@ def error(zone: szlib.SocialZone, known: PlazaSettings) -> float:
     return max(float(np.abs(np.subtract(*pair)).max()) for pair in pairs)
 
 
-def coverage(plazas: int, *truths: str) -> pd.DataFrame:
-    """Share of plazas whose interval holds the truth, and the limit, by truth, method, speed, quantity."""
+def coverage(plazas: int, method: str, *truths: str) -> pd.DataFrame:
+    """Share of plazas whose interval holds the truth, and the limit, by truth, quantity and speed."""
     tables = []
     for truth in truths:
-        zones: dict[str, list[szlib.SocialZone]] = {"quantile": [], "hull": []}
-        everybody = []
+        zones, everybody = [], []
         for seed in range(plazas):
             samples, _, known = people(seed, encounters=600, **TRUTHS[truth])
             everybody.append(samples)
-            for method, found in zones.items():
-                found.append(szlib.SocialZone.fit(samples, method=method, speeds=SPEEDS))
+            zones.append(szlib.SocialZone.fit(samples, speeds=SPEEDS, **METHODS[method]))
             print(truth, seed, file=sys.stderr, flush=True)
-        for method, found in zones.items():
-            intervals = pd.concat([zone.uncertainty.intervals for zone in found])
-            intervals["truth"] = _holds(intervals, {v: known.true_zone(v) for v in SPEEDS})
-            intervals["limit"] = np.nan
-            if method == "quantile":  # a hull has none: it shrinks
-                everyone = szlib.SocialZone.fit(pooled(everybody), method=method, speeds=SPEEDS, resamples=0)
-                intervals["limit"] = _holds(intervals, everyone.ellipses)
-            intervals["half_width"] = (intervals["high"] - intervals["low"]) / 2
-            table = intervals.groupby(["quantity", "speed"])[["truth", "limit", "half_width"]].mean()
-            tables.append(table.reset_index().assign(plaza=truth, method=method, plazas=plazas))
+        intervals = pd.concat([zone.uncertainty.intervals for zone in zones])
+        intervals["truth"] = _holds(intervals, {v: known.true_zone(v) for v in SPEEDS})
+        intervals["limit"] = np.nan
+        if method == "quantile":  # a hull has none: it shrinks
+            everyone = szlib.SocialZone.fit(pooled(everybody), method=method, speeds=SPEEDS, resamples=0)
+            intervals["limit"] = _holds(intervals, everyone.ellipses)
+        intervals["half_width"] = (intervals["high"] - intervals["low"]) / 2
+        table = intervals.groupby(["quantity", "speed"])[["truth", "limit", "half_width"]].mean()
+        tables.append(table.reset_index().assign(plaza=truth, method=method, plazas=plazas))
     return pd.concat(tables)[
         ["plaza", "method", "quantity", "speed", "truth", "limit", "half_width", "plazas"]
     ]
@@ -178,19 +176,20 @@ def two_sided(plazas: int) -> pd.DataFrame:
         for seed in range(plazas):
             samples, tracks, known = people(seed, **settings)
             pairs = _both_sides(samples, tracks)
-            fits: dict[str, Any] = {
-                "one-sided": szlib.SocialZone.fit(
-                    samples, method="quantile", speeds=SPEEDS, resamples=0
-                ).ellipses
-            }
+            alone = szlib.SocialZone.fit(samples, method="quantile", speeds=SPEEDS, resamples=0)
+            fits = {"one-sided": (alone.ellipses, np.nan)}
             for start, shift in (("middle", 0.0), ("other side", -ahead)):
                 fits[f"two-sided, from the {start}"] = _two_sided_fit(*pairs, shift)
-            for name, ellipses in fits.items():
+            for name, (ellipses, gap) in fits.items():
                 found = np.array([quantities(ellipses[v])[:4] for v in SPEEDS])
                 away = found - [quantities(known.true_zone(v))[:4] for v in SPEEDS]
-                rows.append((ahead, seed, name, found[:, 0].mean(), away[:, 2].mean(), np.abs(away).max()))
+                rows.append(
+                    (ahead, seed, name, found[:, 0].mean(), away[:, 2].mean(), np.abs(away).max(), gap)
+                )
                 print(rows[-1], file=sys.stderr, flush=True)
-    return pd.DataFrame(rows, columns=["ahead", "seed", "fit", "found_ahead", "error_a", "largest_error"])
+    return pd.DataFrame(
+        rows, columns=["ahead", "seed", "fit", "found_ahead", "error_a", "largest_error", "mean_gap"]
+    )
 
 
 def _both_sides(samples: pd.DataFrame, tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
@@ -228,7 +227,10 @@ def _gap(p: np.ndarray, points: np.ndarray) -> np.ndarray:
     return (level - 1) * level / np.maximum(steepness, 1e-12)
 
 
-def _two_sided_fit(points: np.ndarray, starts: np.ndarray, shift: float) -> dict[float, Ellipse]:
+def _two_sided_fit(
+    points: np.ndarray, starts: np.ndarray, shift: float
+) -> tuple[dict[float, Ellipse], float]:
+    """Ellipses by speed, and the mean gap [m]: of two zones that as many enter, the truer leaves less."""
     p = np.array([shift, 0, 1 / 0.95, 0, 1 / 0.75, 0, 0, 0, 0, 0])
     pair = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(points))))
     for _ in range(_ROUNDS):
@@ -249,7 +251,8 @@ def _two_sided_fit(points: np.ndarray, starts: np.ndarray, shift: float) -> dict
                 targets.append([*(edge + np.quantile(least[here[k]], _Q)) * unit, v])
         at = np.array(targets)
         p = p + _DAMPED * (least_squares(lambda z, at=at: _gap(z, at), p).x - p)
-    return {v: _ellipse(p[:5] + p[5:] * (v - 1.0)) for v in SPEEDS}
+    gap = np.minimum.reduceat(_gap(p, points), starts).mean()
+    return {v: _ellipse(p[:5] + p[5:] * (v - 1.0)) for v in SPEEDS}, float(gap)
 
 
 def _ellipse(row: np.ndarray) -> Ellipse:

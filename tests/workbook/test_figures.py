@@ -48,7 +48,7 @@ def samples():
 
 @pytest.fixture(scope="module")
 def zone(samples):
-    return szlib.SocialZone.fit(samples, speeds=(0.9, 1.1))
+    return szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1))
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +117,42 @@ def test_the_zone_is_drawn_where_the_ellipse_is(zone):
     ax = figures.plot_zone(zone, 1.1)
     drawn = ax.lines[0].get_xydata()
     assert np.abs(zone.ellipse(1.1).level(drawn) - 1).max() < 1e-9
+
+
+def few(samples):
+    with pytest.warns(szlib.DataWarning, match="fewer than 20"):
+        return szlib.SocialZone.fit(
+            samples[samples["encounter"] < 15], method="quantile", speeds=(0.9, 1.1), resamples=20
+        )
+
+
+def test_what_is_not_adequate_is_dashed_and_what_is_has_a_whole_line(zone, samples):
+    for known, line in ((zone, "-"), (few(samples), "--")):
+        ellipse = figures.plot_zone(known, 1.1).lines[known.method != "hull"]
+        assert ellipse.get_linestyle() == line
+        ax = figures.plot_zones(known)
+        assert [each.get_linestyle() for each in ax.lines[:2]] == [line] * 2
+        told = [text.get_text() for text in ax.get_legend().get_texts()]
+        assert all(("not adequate" in label) == (line == "--") for label in told)
+
+
+def test_the_band_is_the_interval_and_there_is_none_without(zone, samples):
+    band = figures.plot_zone(zone, 1.1).collections[0]
+    reach = np.hypot(*np.concatenate([path.vertices for path in band.get_paths()]).T)
+    known = zone.uncertainty.bands.query("speed == 1.1")
+    assert reach.min() == pytest.approx(known["low"].min())
+    assert reach.max() == pytest.approx(known["high"].max())
+    plain = szlib.SocialZone.fit(samples, speeds=(1.1,), resamples=0)
+    assert not figures.plot_zone(plain, 1.1).collections
+    assert "interval" not in figures.plot_zones(plain).get_title()
+
+
+def test_a_zone_of_another_method_has_its_radii_but_no_hull(samples):
+    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), resamples=0)
+    labels = [text.get_text() for text in figures.plot_zone(zone, 1.1).get_legend().get_texts()]
+    assert labels == ["radius by direction (quantile)", "fitted ellipse"]
+    with pytest.raises(szlib.ZoneError, match="'quantile' has no hull to draw"):
+        figures.plot_hull(zone)
 
 
 def test_a_run_shows_speed_and_every_h_to_its_greatest(log):

@@ -38,9 +38,13 @@ def test_many_copies_do_not_make_lof_explode(share: float, fraction: float | Non
     with told:
         outlier = outliers.is_outlier(samples, fraction=fraction)
     with told:
-        zone = szlib.SocialZone.fit(samples, speeds=(1.1,), outlier_fraction=fraction)
+        zone = szlib.SocialZone.fit(
+            samples, method="hull", resamples=0, speeds=(1.1,), outlier_fraction=fraction
+        )
     assert outlier.sum() == (pytest.approx(fraction * MANY, abs=1) if fraction else 0)
-    plain = szlib.SocialZone.fit(samples[~copies], speeds=(1.1,), outlier_fraction=fraction)
+    plain = szlib.SocialZone.fit(
+        samples[~copies], method="hull", resamples=0, speeds=(1.1,), outlier_fraction=fraction
+    )
     assert zone.ellipse(1.1).area == pytest.approx(plain.ellipse(1.1).area, rel=0.15)
 
 
@@ -49,7 +53,9 @@ def test_the_zone_does_not_depend_on_the_order_of_samples(fraction: float | None
     samples = paper_samples(MANY)
     shuffled = samples.sample(frac=1, random_state=1)
     options = {"speeds": (0.9, 1.1), "outlier_fraction": fraction}
-    zones = [szlib.SocialZone.fit(table, **options) for table in (samples, shuffled)]
+    zones = [
+        szlib.SocialZone.fit(table, method="hull", resamples=0, **options) for table in (samples, shuffled)
+    ]
     for speed in (0.9, 1.1):
         one, other = (zone.ellipse(speed) for zone in zones)
         np.testing.assert_allclose(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...encounters.null import NullEncounters
 from ...errors import ZoneError
 from ...tracks import funnels
-from ..quantile import encounter_numbers
+from ..outliers import encounter_numbers
 from ..radii import DIRECTIONS, Array, Radii, fit_ellipses
 from .boundary import SPEED_WIDTH, respect_boundary
 from .presence import Presence

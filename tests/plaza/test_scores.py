@@ -1,0 +1,106 @@
+"""How near to the truth: outliers against known intruders, zones against known zones, at the paper's size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from pooled_plazas import PACES, TABLE, judged, plaza_samples, pooled
+
+import szlib
+from szlib.plaza import scores
+
+TOO_FAR, TOO_FAR_WITH_MANY = 0.035, 0.05
+"""Error of the zone without many intruders, and with 1 % or 2 % of them [m]."""
+
+
+@pytest.fixture(scope="module")
+def plazas() -> list[pd.DataFrame]:
+    """Six default plazas, together as large as the paper's data."""
+    return [plaza_samples(seed, szlib.PlazaSettings()) for seed in range(6)]
+
+
+# --- the measures ------------------------------------------------------------------------------------
+
+
+def test_every_sample_knows_its_kind(plazas: list[pd.DataFrame]) -> None:
+    nearest = plazas[0].groupby("encounter").agg(kind=("kind", "first"), distance=("distance", "min"))
+    assert (nearest["distance"] < 0.45).equals(nearest["kind"] == "intruder")
+    together = plazas[0].query("kind == 'together'")
+    assert together.groupby("encounter")["distance"].agg(np.ptp).max() < 1
+
+
+def test_people_of_another_plaza_have_no_kind(plazas: list[pd.DataFrame]) -> None:
+    with pytest.raises(szlib.DataError, match=r"row \d+: .* no pair of a plaza of 40 encounters"):
+        scores.true_kinds(plazas[0], settings=szlib.PlazaSettings(encounters=40))
+    strangers = plazas[0].assign(other_id=plazas[0]["other_id"] + 400)
+    with pytest.raises(szlib.DataError, match=r"row 0: .* no pair"):
+        scores.true_kinds(strangers)
+
+
+def test_precision_and_recall() -> None:
+    removed, intruders = np.array([1, 1, 1, 0, 0], bool), np.array([1, 0, 0, 1, 0], bool)
+    assert scores.precision_and_recall(removed, intruders) == pytest.approx((1 / 3, 1 / 2))
+    assert scores.precision_and_recall(intruders, removed) == pytest.approx((1 / 2, 1 / 3))
+    assert scores.precision_and_recall(removed, removed) == (1, 1)
+    precision, recall = scores.precision_and_recall(np.zeros(5, bool), intruders)
+    assert np.isnan(precision)
+    assert recall == 0
+    assert np.isnan(scores.precision_and_recall(removed, np.zeros(5, bool))[1])
+    with pytest.raises(szlib.DataError, match=r"got \(5,\) and \(4,\)"):
+        scores.precision_and_recall(removed, intruders[1:])
+
+
+def test_the_error_is_the_largest_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:
+    zone, truth = (
+        szlib.SocialZone.fit(plazas[0], method="hull", speeds=scores.SPEEDS, resamples=0),
+        szlib.PlazaSettings(),
+    )
+    off = [
+        np.abs(np.subtract([*zone.ellipse(v).center, *zone.ellipse(v).semi_axes], [*t.center, *t.semi_axes]))
+        for v, t in ((v, truth.true_zone(v)) for v in scores.SPEEDS)
+    ]
+    assert scores.largest_error(zone) == np.max(off)
+    assert scores.largest_error(zone, speeds=(1.1,)) == np.max(off[2])
+    larger = szlib.PlazaSettings(
+        slow=szlib.Ellipse((0.04, 0.0), (0.98, 0.78)), fast=szlib.Ellipse((0.06, 0.0), (1.1, 0.88))
+    )
+    assert scores.largest_error(zone, larger) == pytest.approx(0.1, abs=scores.largest_error(zone))
+    with pytest.raises(szlib.ZoneError, match="at 5 m/s is undefined"):
+        scores.largest_error(zone, speeds=(5.0,))
+
+
+# --- what they say -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("share", "pace"), [(0.0, "rushing"), (0.01, "slow"), (0.02, "slow"), (0.02, "rushing")]
+)
+def test_whole_encounters_find_every_intruder(share: float, pace: str) -> None:
+    settings = szlib.PlazaSettings(intruders=share, pace=PACES[pace])
+    found = judged(plaza_samples(7, settings), settings, {})
+    assert found["error"] < (TOO_FAR_WITH_MANY if share else TOO_FAR)
+    assert found["removed"] < 0.01 + 2 * share
+    assert not found["recall"] < 1  # nan: there are none
+
+
+def test_the_zone_does_not_shrink_at_the_size_of_the_paper(plazas: list[pd.DataFrame]) -> None:
+    samples = pooled(plazas)
+    assert samples["encounter"].nunique() > 15_000
+    found = judged(samples, szlib.PlazaSettings(), {})
+    assert found["error"] < TOO_FAR
+    assert found["recall"] == 1
+
+
+def test_the_table_of_the_notebook_shows_it_for_all_sizes() -> None:
+    table = pd.read_csv(TABLE)
+    assert table["encounters"].max() > 20_000
+    ours = table[table["rule"] == "encounters"]
+    assert len(ours) == 60
+    many = ours["intruders"] > 0.005
+    assert (ours.loc[many, "error"] <= TOO_FAR_WITH_MANY).all()
+    assert (ours.loc[~many, "error"] <= TOO_FAR).all()
+    assert (ours.loc[ours["intruders"] > 0, "recall"] > 0.99).all()
+    quota = table[(table["rule"] == "0.2 %, 20 neighbours") & (table["plazas"] >= 6)]
+    assert (quota.loc[quota["intruders"] == 0.0025, "error"] > 0.15).all()
+    assert not (quota.loc[quota["intruders"] > 0.005, "error"] < 0.3).any()

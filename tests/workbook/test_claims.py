@@ -1,0 +1,113 @@
+"""Claims: effects whose intervals mean what they say, and verdicts that follow from them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import szlib
+from szlib.workbook import claims
+from szlib.workbook.sensitivity import sensitivity
+
+
+def finding(low: float, high: float) -> claims.Finding:
+    return claims.Finding("people keep apart", (low + high) / 2, low, high, "m", 12)
+
+
+def test_a_verdict_is_where_the_interval_lies() -> None:
+    assert finding(0.1, 0.2).verdict == "supported"
+    assert finding(-0.2, -0.1).verdict == "contradicted"
+    assert finding(-0.1, 0.2).verdict == "not decidable with n = 12"
+    table = claims.findings_table([finding(0.1, 0.3)], data="here")
+    assert table.loc[0, ["data", "n", "verdict"]].tolist() == ["here", 12, "supported"]
+    assert claims.as_cell(table.iloc[0]) == "+0.20 [+0.10, +0.30] m: supported"
+
+
+def meetings(on_the_left: int, on_the_right: int) -> pd.DataFrame:
+    """Encounters of people who walk towards each other; the other is nearest on that side."""
+    n = on_the_left + on_the_right
+    side = np.repeat([1.0, -1.0], [on_the_left, on_the_right])
+    return pd.DataFrame(
+        {
+            "encounter": np.repeat(np.arange(n), 3), "day": "d", "ref_id": np.repeat(2 * np.arange(n), 3),
+            "other_id": np.repeat(2 * np.arange(n) + 1, 3), "distance": np.tile([2.0, 0.8, 2.0], n),
+            "los_angle": np.repeat(side, 3) * np.tile([0.1, 1.5, 3.0], n), "kind": "opposite",
+        }
+    )  # fmt: skip
+
+
+def test_who_has_the_other_to_the_left_passes_on_the_right() -> None:
+    assert claims.passes_on_the_right(meetings(60, 20)).verdict == "supported"
+    assert claims.passes_on_the_right(meetings(20, 60)).verdict == "contradicted"
+    even = claims.passes_on_the_right(meetings(10, 10))
+    assert even.effect == 0 and even.low == pytest.approx(-even.high)
+    assert claims.passes_on_the_right(meetings(3, 3).assign(kind="crossing")).n == 0
+
+
+def test_both_people_of_a_pair_are_one_piece_of_evidence() -> None:
+    once = meetings(30, 10)
+    both = pd.concat([once, once.rename(columns={"ref_id": "other_id", "other_id": "ref_id"}).assign(
+        encounter=once["encounter"] + 1000)])  # fmt: skip
+    assert claims.passes_on_the_right(both).n == claims.passes_on_the_right(once).n == 40
+
+
+@pytest.mark.parametrize(
+    ("count", "days", "verdict"),
+    [(16_181, 92, "supported"), (252, 1, "supported"), (40, 1, "contradicted"), (90, 1, "not decidable"),
+     (40_000, 92, "contradicted")],
+)  # fmt: skip
+def test_the_papers_own_rate_is_supported_and_a_fifth_of_it_is_not(
+    count: int, days: float, verdict: str
+) -> None:
+    assert claims.as_many_a_day(count, days).verdict.startswith(verdict)
+
+
+def test_an_interval_of_a_rate_covers_it() -> None:
+    rng, inside = np.random.default_rng(0), 0
+    truth = claims.as_many_a_day(300, 2.0).effect
+    for count in rng.poisson(300, 400):
+        found = claims.as_many_a_day(int(count), 2.0)
+        inside += found.low <= truth <= found.high
+    assert 0.92 <= inside / 400 <= 0.99
+
+
+def test_wilsons_interval_holds_half_where_half_is_true() -> None:
+    rng = np.random.default_rng(1)
+    undecided = [claims.outliers_are_intruders(int(k), 80) for k in rng.binomial(80, 0.5, 400)]
+    assert 0.92 <= np.mean([f.low <= 0 <= f.high for f in undecided]) <= 0.98
+
+
+def zone_of(people: pd.DataFrame, **options: object) -> szlib.SocialZone:
+    return szlib.SocialZone.fit(people, method="quantile", speeds=(0.7, 1.1, 1.3), **options)
+
+
+def test_the_plaza_is_larger_ahead_and_grows_as_it_was_made_to(tmp_path) -> None:
+    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=3))
+    zone = zone_of(szlib.find_encounters(tracks), resamples=60)
+    ahead, growth = claims.larger_ahead(zone), claims.grows_with_speed(zone)
+    assert ahead.verdict == growth.verdict == "supported"
+    true = szlib.PlazaSettings().true_zone
+    assert growth.low <= true(1.3).area - true(0.7).area <= growth.high
+    assert 0 < ahead.effect < 2 * true(1.1).center[0] + 0.05
+    row = zone.table().set_index("speed").loc[0.7]
+    assert growth.high - growth.low >= row["area_high"] - row["area_low"]
+    with pytest.raises(szlib.ZoneError, match=r"no interval at 1\.2 m/s; fit with speeds"):
+        claims.larger_ahead(zone, speed=1.2)
+
+
+def test_a_larger_zone_makes_the_robot_later() -> None:
+    zone = szlib.Ellipse((0.05, 0.0), (0.9, 0.7))
+    found = claims.size_trades_efficiency(zone, names=("passing", "corridor"))
+    assert found.low > 0 and found.n == 2
+    assert claims.scaled(zone, 2.0) == szlib.Ellipse((0.1, 0.0), (1.8, 1.4))
+
+
+def test_sensitivity_varies_one_parameter_at_a_time(tmp_path) -> None:
+    settings = szlib.PlazaSettings(encounters=400)
+    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=0, settings=settings))
+    table = sensitivity(tracks, square=szlib.ATC_SQUARE)
+    assert table.loc[0, "parameter"] == "default" and np.isfinite(table.loc[0, "area"])
+    assert {"min_distance", "duration", "kinds", "square", "r_max", "speed"} <= set(table["parameter"])
+    assert (table.loc[table["parameter"] == "r_max", "encounters"] == table.loc[0, "encounters"]).all()
+    assert table.loc[table["parameter"] == "min_distance", "encounters"].is_monotonic_decreasing
