@@ -26,7 +26,7 @@ from ..errors import DataWarning, ZoneError
 from ..tracks.clock import check_columns
 from .ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
 from .hulls import HullZones, Slice, hull_vertices, slice_hull
-from .outliers import R_MAX
+from .outliers import R_MAX, encounter_numbers
 from .quantile import QuantileZones
 from .radii import Radii
 from .respect.estimate import RespectZones
@@ -149,7 +149,7 @@ class SocialZone:
         provenance = {
             "szlib": __version__,
             "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
-            "encounters": int(samples["encounter"].nunique()) if "encounter" in samples else None,
+            "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
             "parameters": {"method": method, "r_max": float(r_max), **estimate.parameters},
             "funnel": estimate.funnel,
         }
