@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 endif
 INSTALLED := $(VENV)/installed
 
-.PHONY: run test lab bench lock notebooks dist clean
+.PHONY: run test lab bench lock audit hostile notebooks dist clean
 
 run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza
 	$(BIN)/szlib run
@@ -31,6 +31,12 @@ notebooks: $(INSTALLED)  ## execute the committed copies anew, and renew the REA
 lock: $(INSTALLED)  ## pin every dependency with hashes, for every platform, from pyproject.toml
 	$(BIN)/uv pip compile pyproject.toml --universal --all-extras --generate-hashes --upgrade --quiet \
 	    --no-emit-index-url --custom-compile-command "make lock" --output-file environment.lock
+
+audit: $(INSTALLED)  ## fail where a pinned version has a published vulnerability (OSV); without network say so
+	$(BIN)/python .ci/audit.py
+
+hostile: $(INSTALLED)  ## every attack in full: commands, files, processes, controller
+	$(BIN)/python tests/hostile --long
 
 dist: $(INSTALLED)  ## sdist and wheel; HOME_URL says where the README's pictures are served
 	$(BIN)/python .ci/dist.py "$(HOME_URL)"

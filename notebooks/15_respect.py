@@ -181,7 +181,7 @@ with warnings.catch_warnings():
         for method in ("hull", "quantile", "respect"):
             rows[method, name] = zone_at(people, model, method)
 zones = pd.DataFrame(rows).T[["a", "a_low", "a_high", "b", "center_x", "area", "influence", "adequate"]]
-zones.to_csv(record.out / "15_zones.csv")
+record.table(zones.rename_axis(["method", "who"]).reset_index(), "15_zones")
 zones
 
 # %%

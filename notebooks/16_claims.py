@@ -72,20 +72,20 @@ speeds = (0.7, 1.1, 1.3)
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", szlib.DataWarning)  # what is not adequate cannot decide, and says so
     fit = partial(szlib.SocialZone.fit, samples, speeds=speeds, resamples=resamples, seed=seed)
-    zones = {"hull": fit(), "quantile": fit(method="quantile")}
+    zones = {method: fit(method=method) for method in ("hull", "quantile")}
 
 # %%
-found = [
-    claims.passes_on_the_right(samples),
-    claims.as_many_a_day(len(samples) // 31, samples["day"].nunique()),
-]
-for zone in zones.values():
+found, methods = [claims.passes_on_the_right(samples)], ["-"]
+if data == "atc-1hz":
+    found.append(claims.as_many_a_day(samples["encounter"].nunique(), samples["day"].nunique()))
+    methods.append("-")
+for method, zone in zones.items():
     found += [claims.larger_ahead(zone), claims.grows_with_speed(zone)]
-methods = ["-", "-", "hull", "hull", "quantile", "quantile"]
+    methods += [method, method]
 table = claims.findings_table(found, data=record.out.name).assign(method=methods)
-table.to_csv(record.out / "16_claims.csv", index=False)
+record.table(table, "16_claims")
 for each, method in zip(found, methods, strict=True):
-    record.claim(f"{each.claim} ({method})", each.low > 0, str(each))
+    record.claim(f"{each.claim} ({method})", each.verdict == "supported", str(each))
 
 # %%
 if record.synthetic:
@@ -126,7 +126,7 @@ wide[list(dict.fromkeys(everywhere["data"]))]
 # %%
 tracks = record.tracks()
 moved = sensitivity(tracks, square=szlib.ATC_SQUARE)
-moved.to_csv(record.out / "16_sensitivity.csv", index=False)
+record.table(moved, "16_sensitivity")
 most = moved.iloc[1:].assign(change=lambda t: (t["area"] / moved["area"].iloc[0] - 1).abs())
 strongest = most.loc[most["change"].idxmax()]
 record.key |= {"moves the zone most": strongest["parameter"], "by": f"{100 * strongest['change']:.0f} %"}

@@ -36,6 +36,7 @@ INTRUDERS = [
 PACES = {"rushing": truth.RUSHING, "slow": truth.SLOW}
 FAMILIES = (0, 100)
 POOLED = (1, 3, 5, 6, 8)
+HULL = {"method": "hull", "outlier_fraction": 0.0, "speeds": scores.SPEEDS, "resamples": 0}
 COSTLY = {
     (share, pace, 0, plazas)
     for share, pace in (INTRUDERS[1], INTRUDERS[3], INTRUDERS[5])
@@ -68,9 +69,7 @@ def judged(
     removed = ~close.index.isin(kept.index)
     precision, recall = scores.precision_and_recall(removed, close["kind"] == "intruder")
     try:
-        error = scores.largest_error(
-            szlib.SocialZone.fit(kept, outlier_fraction=0, speeds=scores.SPEEDS, resamples=0), settings
-        )
+        error = scores.largest_error(szlib.SocialZone.fit(kept, **HULL), settings)
     except ZoneError:  # nothing is left of the zone
         error = np.nan
     return {"removed": removed.mean(), "precision": precision, "recall": recall, "error": error}

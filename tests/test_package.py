@@ -29,7 +29,7 @@ ROOMS = {
     "zones.respect": ["presence", "boundary", "significance", "estimate"],
     "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
-        "barriers", "settings", "distances", "people", "head_on", "problem", "ipopt", "sqp", "mpc",
+        "barriers", "settings", "distances", "people", "problem", "ipopt", "sqp", "step", "mpc",
     ],
     "simulation": [
         "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",

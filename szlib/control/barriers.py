@@ -22,6 +22,12 @@ from ..zones.ellipses import Ellipse
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e8
+"""Greatest coordinate, speed or parameter that can be used [m, m/s, ...]: the double next to it is 1.5e-8
+away, well below the tolerance of the controller. Any map projection on Earth stays below it."""
+SHORTEST_WALL = 1e-3
+"""Length below which the direction of a wall is not usable [m]; a pillar may be a wall of a millimetre."""
+
 
 def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
     """Approximate distance of (x, y) to the segment from (xa, ya) to (xb, yb) [m] (paper, eq. 3-5)."""
@@ -31,12 +37,21 @@ def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
     return (g**2 + ((abs(t) - t) / 2) ** 2) ** 0.5
 
 
+def euclidean_segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
+    """Euclidean distance of (x, y) to the segment from (xa, ya) to (xb, yb) [m]: what a disc feels."""
+    length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
+    g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
+    along = ((x - (xa + xb) / 2) * (xb - xa) + (y - (ya + yb) / 2) * (yb - ya)) / length
+    beyond = abs(along) - length / 2
+    return (g**2 + ((abs(beyond) + beyond) / 2) ** 2) ** 0.5
+
+
 def ellipse_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any, a: Any) -> Any:
     """Approximate distance of (x, y) to the ellipse of these foci and semi-major axis [m] (paper, eq. 7)."""
     return (((x - xa) ** 2 + (y - ya) ** 2) ** 0.5 + ((x - xb) ** 2 + (y - yb) ** 2) ** 0.5) / 2 - a
 
 
-def barrier(distance: Any, radius: float, margin: float) -> Any:
+def barrier(distance: Any, radius: float, margin: Any) -> Any:
     """h = d - r_robot - eps [m]: safe where it is not negative (paper, sec. 4)."""
     return distance - (radius + margin)
 
@@ -90,15 +105,21 @@ def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
 
 
 def check_wall(wall: ArrayLike) -> Array:
-    """A wall's end points, shape (2, 2) [m]; SolverError unless finite and of positive length."""
+    """A wall's end points, shape (2, 2) [m]; SolverError unless usable and not below `SHORTEST_WALL`."""
     ends = finite("wall", wall, (2, 2))
-    if np.array_equal(ends[0], ends[1]):
+    length = np.hypot(*(ends[1] - ends[0]))
+    if length == 0:
         raise SolverError(f"a wall needs two different end points; got {ends[0].tolist()} twice")
+    if length < SHORTEST_WALL:
+        raise SolverError(
+            f"a wall must be at least {SHORTEST_WALL} m long; got {length:.3g} m from {ends[0].tolist()}; "
+            "leave it out or join it to its neighbour"
+        )
     return ends
 
 
 def finite(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
-    """A copy of `value` as finite floats of this shape (a leading ... for any); else SolverError."""
+    """A copy of `value` as floats of this shape (a leading ... for any) in +-`LARGEST`; else SolverError."""
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -109,6 +130,8 @@ def finite(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     if not fits:
         raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
     array = array.astype(float)
-    if not np.isfinite(array).all():
-        raise SolverError(f"{name} must be finite; got {array.tolist()}")
+    if not np.abs(array).max(initial=0.0) <= LARGEST:
+        if not np.isfinite(array).all():
+            raise SolverError(f"{name} must be finite; got {array.tolist()}")
+        raise SolverError(f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin")
     return array

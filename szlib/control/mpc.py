@@ -10,6 +10,9 @@ down a ladder until a rung holds:
     kept      the last plan, shifted, if it is a way to a safe end             terminal condition only
     braking   to rest as soon as the bounds allow
 
+Where the time of a step is up, what is left of the ladder is skipped; a relaxed plan that was cut short is
+taken if it violates no more than braking would.
+
 The terminal condition and what it is good for
 ----------------------------------------------
 `terminal="rest"` (barriers on the whole horizon, v_N = 0). *Recursive feasibility*: let everybody
@@ -36,9 +39,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from threading import get_ident
 from time import perf_counter
-from typing import Literal, cast, get_args
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,72 +49,21 @@ from numpy.typing import ArrayLike
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from .barriers import Array, barrier, check_wall, finite, segment_formula
-from .head_on import subgoal
+from .distances import wall_margin
 from .ipopt import Ipopt
-from .people import Person, PlacedZone, SpeedZone, as_ellipse, place
-from .problem import TOLERANCE, Numbers, ProblemSolver
+from .people import Person, PlacedZone, SpeedZone, as_ellipse, place, subgoal
+from .problem import HARD_SHARE, TOLERANCE, Budget, Numbers, ProblemSolver
 from .settings import MPCSettings
 from .sqp import Sqp
-
-Rung = Literal["warm", "cold", "kept", "relaxed", "braking"]
-RUNGS: tuple[Rung, ...] = get_args(Rung)
-Status = Literal["optimal", "kept", "relaxed", "braking"]
+from .step import Rung, Scene, Step, terminal_of
 
 _log = logging.getLogger("szlib")
 
 
-@dataclass(frozen=True)
-class Step:
-    """What the controller decided, and how far it can be relied upon.
-
-    Attributes
-    ----------
-    control : acceleration (ax, ay) to apply now, within its bounds, shape (2,) [m/s2].
-    predicted : states x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s].
-    rung : the rung of the ladder that gave the plan; see `szlib.control.mpc`.
-    slack : largest violation of a hard row by the plan, 0 if none [m for barriers, m2/s2 for speed,
-        m/s for the terminal velocity].
-    residual : h_{k+1} - (1-gamma) h_k, people before walls, shape (people + walls, N_h) [m].
-    h : barriers in the state itself, people before walls, shape (people + walls,) [m]; where one is
-        negative, the robot already is where it should not be, and the plan leads out again.
-    target : where the plan is drawn to: the goal, but for a meeting head-on, shape (2,) [m].
-    cost : the cost of the plan, without any penalty.
-    solve_time : wall-clock time of the whole step [s].
-    """
-
-    control: Array
-    predicted: Array
-    rung: Rung
-    slack: float
-    residual: Array
-    h: Array
-    target: Array
-    cost: float
-    solve_time: float
-
-    @property
-    def status(self) -> Status:
-        """ "optimal": a solver converged and every hard row holds; else the rung."""
-        return status_of(self.rung)
-
-    @property
-    def feasible(self) -> bool:
-        """True if the plan satisfies the hard problem, whatever rung it comes from; else see `slack`."""
-        return self.slack <= TOLERANCE
-
-    @property
-    def safe(self) -> bool:
-        """True if the plan satisfies the hard problem, from a state that satisfies every barrier."""
-        return self.feasible and bool((self.h >= -TOLERANCE).all())
-
-
-def status_of(rung: Rung) -> Status:
-    """What a rung says of its plan: see `Step.status`."""
-    return "optimal" if rung in ("warm", "cold") else cast(Status, rung)
-
-
 class MPCCBF:
     """Drives a double integrator to a goal, outside the social zones of people and clear of walls.
+
+    A controller belongs to the thread that first asks it for a step; give each thread one of its own.
 
     Parameters
     ----------
@@ -120,7 +72,7 @@ class MPCCBF:
     walls : segments, shape (n, 2, 2): end points [m].
     settings : every other parameter.
     max_people : how many people to build for now. More make the controller grow once, which takes
-        a moment and is logged by "szlib" (at level INFO).
+        a moment that no time limit covers, and is logged by "szlib" (at level INFO).
 
     Raises
     ------
@@ -144,8 +96,12 @@ class MPCCBF:
             raise SolverError(f"terminal='person' is for open space; got {len(ends)} walls; use 'rest'")
         if not isinstance(max_people, int) or max_people < 0:
             raise SolverError(f"max_people must be a whole number >= 0; got {max_people!r}")
-        self._segments = [tuple(wall) for wall in self.walls.reshape(-1, 4).tolist()]
+        self._segments: list[list[float]] = self.walls.reshape(-1, 4).tolist()
+        self._margins = [wall_margin(wall, self.settings) for wall in self.walls]
+        pairs = zip(self._segments, self._margins, strict=True)
+        self._wall_numbers = [number for segment, margin in pairs for number in (*segment, margin)]
         self._solvers: list[ProblemSolver] = []
+        self._budget, self._thread = Budget(self.settings.time_limit), dict[str, int]()
         self._build(max_people)
         self.reset()
 
@@ -153,6 +109,7 @@ class MPCCBF:
         kind = Sqp if self.settings.solver == "sqp" else Ipopt
         for n in range(len(self._solvers), n_people + 1):
             self._solvers.append(kind(self.settings, n, len(self.walls)))
+            self._solvers[n].budget = self._budget
 
     def reset(self) -> None:
         """Forget the last plan and goal: what follows depends on nothing that went before."""
@@ -164,7 +121,8 @@ class MPCCBF:
     def step(self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()) -> Step:
         """The acceleration to apply for the next `dt`.
 
-        A goal is checked when it is new; from then on a moving robot always gets a control.
+        Whatever people do, the robot gets a control: where they leave it no way, `Step.rung` and
+        `Step.slack` say so, and `Step.goal_blocked` where somebody stands on its goal.
 
         Parameters
         ----------
@@ -174,21 +132,24 @@ class MPCCBF:
 
         Raises
         ------
-        SolverError : a number is not finite, a shape is wrong, or a new goal cannot be reached,
-            because it lies too close to a wall or in the zone of somebody who stands.
+        SolverError : a number is not usable, a shape is wrong, a new goal lies too close to a wall, or
+            another thread has this controller.
         """
         began = perf_counter()
+        if self._thread.setdefault("first", get_ident()) != get_ident():
+            raise SolverError("this controller belongs to another thread; build one in each thread")
         x = finite("state", state, (4,))
         gx, gy = finite("goal", goal, (2,)).tolist()
         if (gx, gy) != self._goal:
-            self._check_goal((gx, gy), people)
+            self._check_goal((gx, gy))
             self._goal = (gx, gy)
         solver = self._solver(len(people))
+        self._budget.begin()
         placed = [place(person, self.zone_of(person)) for person in people]
         target = subgoal((float(x[0]), float(x[1])), (gx, gy), placed, self.walls, self.settings)
         parameters = self._parameters(x, target, placed)
 
-        rung, plan, numbers = self._solve_with_fallbacks(solver, parameters)
+        rung, plan, numbers, timed_out = self._solve_with_fallbacks(solver, parameters)
         self._plan = plan
         return Step(
             control=plan[:2].copy(),
@@ -200,52 +161,62 @@ class MPCCBF:
             target=parameters[4:6],
             cost=numbers.cost,
             solve_time=perf_counter() - began,
+            timed_out=timed_out,
+            scene=Scene((gx, gy), tuple(people), placed, self._segments, self.settings),
         )
 
     def _solver(self, n_people: int) -> ProblemSolver:
         built = len(self._solvers) - 1
         if n_people > built:
-            if self.settings.terminal == "person" and n_people > 1:
-                raise SolverError(f"terminal='person' is for one person; got {n_people}; use 'rest'")
             _log.info("the controller was built for %d people and now grows to %d", built, n_people)
             self._build(n_people)
         return self._solvers[n_people]
 
     def _parameters(self, x: Array, target: tuple[float, float], placed: Sequence[PlacedZone]) -> Array:
         """The numbers of `Problem.parameters`."""
-        pace = placed[0][5:] if self.settings.terminal == "person" and placed else (0.0, 0.0)
+        pace = placed[0][5:] if terminal_of(self.settings, len(placed)) == "person" else (0.0, 0.0)
         numbers = [*x.tolist(), *target, *pace]
         for zone in placed:
             numbers += zone
-        for segment in self._segments:
-            numbers += segment
-        return np.array(numbers)
+        return np.array(numbers + self._wall_numbers)
 
-    def _solve_with_fallbacks(self, solver: ProblemSolver, parameters: Array) -> tuple[Rung, Array, Numbers]:
-        """The first rung that holds, its plan, and the plan's numbers."""
+    def _solve_with_fallbacks(
+        self, solver: ProblemSolver, parameters: Array
+    ) -> tuple[Rung, Array, Numbers, bool]:
+        """The first rung that holds, its plan, the plan's numbers, and whether the time was up."""
         ends = self.settings.terminal != "none"
-        shifted = np.concatenate([self._plan[2:], (0.0, 0.0)])
+        shifted = start = np.concatenate([self._plan[2:], (0.0, 0.0)])
+        late = False
         rung: Rung
         for rung in ("warm", "cold"):
+            if rung == "cold" and self._budget.spent(HARD_SHARE / 2):
+                late = True
+                break
             guess = shifted if rung == "warm" else self._brake(parameters[2:4])
             plan, converged = solver.hard(guess, parameters)
             if converged:
                 numbers = solver.evaluate(plan, parameters)
                 if numbers.slack <= TOLERANCE:
-                    return rung, plan, numbers
+                    return rung, plan, numbers, late
+            late |= solver.late
+            start = plan if solver.late and np.isfinite(plan).all() else start
         kept = solver.evaluate(shifted, parameters)
         if ends and kept.slack <= TOLERANCE:
-            return "kept", shifted, kept
+            return "kept", shifted, kept, late
         safe_end = ends and _safe_to_its_end(kept, parameters)
-        plan, converged = solver.relaxed(shifted, parameters)
-        if converged and np.isfinite(plan).all():
+        plan, converged = solver.relaxed(start, parameters)
+        late |= solver.late
+        brake = self._brake(parameters[2:4])
+        braking = solver.evaluate(brake, parameters)
+        if (converged or solver.late) and np.isfinite(plan).all():
             numbers = solver.evaluate(plan, parameters)
-            if not safe_end or _safe_to_its_end(numbers, parameters):
-                return ("warm" if numbers.slack <= TOLERANCE else "relaxed"), plan, numbers
+            better = converged or numbers.slack <= braking.slack
+            if better and (not safe_end or _safe_to_its_end(numbers, parameters)):
+                rung = "warm" if converged and numbers.slack <= TOLERANCE else "relaxed"
+                return rung, plan, numbers, late
         if safe_end:
-            return "kept", shifted, kept
-        plan = self._brake(parameters[2:4])
-        return "braking", plan, solver.evaluate(plan, parameters)
+            return "kept", shifted, kept, late
+        return "braking", brake, braking, late
 
     def _brake(self, velocity: Array) -> Array:
         """The inputs that bring the robot to rest soonest along its path, shape (2N,) [m/s2]."""
@@ -270,20 +241,21 @@ class MPCCBF:
         x, y = finite("position", position, (2,)).tolist()
         distances = [place(person, self.zone_of(person)).distance(x, y) for person in people]
         distances += [segment_formula(x, y, *segment) for segment in self._segments]
-        return np.asarray(barrier(np.array(distances, float), self.settings.r_robot, self.settings.eps))
+        margins = [self.settings.eps] * len(people) + self._margins
+        return np.asarray(barrier(np.array(distances), self.settings.r_robot, np.array(margins)), float)
 
-    def _check_goal(self, goal: tuple[float, float], people: Sequence[Person]) -> None:
-        standing = [p for p in people if p.stands]
-        h = self.barriers(goal, standing)
+    def goal_blocked(self, goal: ArrayLike, people: Sequence[Person]) -> bool:
+        """True if somebody who stands has the goal in their zone: h < 0 there."""
+        x, y = finite("goal", goal, (2,)).tolist()
+        return any(place(who, self.zone_of(who)).blocks((x, y), self.settings) for who in people)
+
+    def _check_goal(self, goal: tuple[float, float]) -> None:
+        h = self.barriers(goal)
         if (h < 0).any():
             i = int(h.argmin())
-            if i < len(standing):
-                what = f"in the zone of the person who stands at {standing[i].position}"
-            else:
-                what = f"too close to the wall {self.walls[i - len(standing)].tolist()}"
             raise SolverError(
-                f"the goal {list(goal)} cannot be reached: it lies {what} (h = {h[i]:.3f} m); "
-                "choose one where h >= 0"
+                f"the goal {list(goal)} cannot be reached: it lies too close to the wall "
+                f"{self.walls[i].tolist()} (h = {h[i]:.3f} m); choose one where h >= 0"
             )
 
 

@@ -10,7 +10,7 @@
         (vx, vy)_N = w                                                if there is a terminal condition
 
 (paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., k) takes person i at constant
-velocity, k steps ahead. `g` is the goal at rest, but for people met head-on (`head_on.subgoal`); w is 0
+velocity, k steps ahead. `g` is the goal at rest, but for people met head-on (`people.subgoal`); w is 0
 or the velocity of a person. The states are eliminated: 2 N unknowns remain. The *relaxed* problem
 adds a slack s >= 0 to each barrier row, and to the speed rows if the robot is already too fast, and
 penalises their sum: exactly, so wherever the hard problem has a solution near by, both have the
@@ -23,6 +23,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import hypot
+from threading import RLock
+from time import perf_counter, thread_time
 from typing import Any, Protocol
 
 import casadi as ca
@@ -33,6 +35,12 @@ from .settings import MPCSettings
 
 TOLERANCE = 1e-6
 """Largest violation of a hard row, in its own unit, that still counts as satisfied."""
+HARD_SHARE = 0.4
+"""Share of a step's time for the hard problem. Its second try begins within half of that, or not at all, so
+that as much again is left for the relaxed problem."""
+BUILDING = RLock()
+"""Held while anything of CasADi is written down, compiled or given away: its symbols count their users, and
+not safely for threads. Compiled functions may run at the same time, each in memory of its own."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +51,7 @@ class Problem:
     the N speed limits. `terminal` is meant to be 0, and empty without a terminal condition. `h` has a
     row for each person and wall, a column for each of the states x_0 .. x_N. `parameters` stacks the
     state (4), the target (2), the terminal velocity w (2), then for each person the foci and a of the
-    zone and the velocity (7), then the end points of each wall (4).
+    zone and the velocity (7), then for each wall its end points and its margin (5).
     """
 
     inputs: Any
@@ -65,7 +73,7 @@ def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem
     """Write down the problem of this module's docstring; once for each size and settings."""
     s = settings
     inputs, start, target = ca.SX.sym("u", 2, s.N), ca.SX.sym("x0", 4), ca.SX.sym("target", 2)
-    people, walls, w = ca.SX.sym("person", 7, n_people), ca.SX.sym("wall", 4, n_walls), ca.SX.sym("w", 2)
+    people, walls, w = ca.SX.sym("person", 7, n_people), ca.SX.sym("wall", 5, n_walls), ca.SX.sym("w", 2)
 
     states = [start]
     for k in range(s.N):
@@ -77,14 +85,14 @@ def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem
     cost += sum(ca.dot(ca.DM(s.Q), error[k] ** 2) for k in range(1, s.N))
     cost += sum(ca.dot(ca.DM(s.R), inputs[:, k] ** 2) for k in range(s.N))
 
-    distances = []
+    h = []
     for i in range(n_people):
         xa, ya, xb, yb, a, vx, vy = ca.vertsplit(people[:, i])
         seen = [(x[0] - k * s.dt * vx, x[1] - k * s.dt * vy) for k, x in enumerate(states)]
-        distances.append([ellipse_formula(x, y, xa, ya, xb, yb, a) for x, y in seen])
+        h.append([barrier(ellipse_formula(x, y, xa, ya, xb, yb, a), s.r_robot, s.eps) for x, y in seen])
     for j in range(n_walls):
-        distances.append([segment_formula(x[0], x[1], *ca.vertsplit(walls[:, j])) for x in states])
-    h = [[barrier(d, s.r_robot, s.eps) for d in row] for row in distances]
+        *ends, margin = ca.vertsplit(walls[:, j])
+        h.append([barrier(segment_formula(x[0], x[1], *ends), s.r_robot, margin) for x in states])
     cbf = [cbf_residual(row[k + 1], row[k], s.gamma) for row in h for k in range(s.N_h)]
     speed = [s.v_max**2 - ca.sumsqr(x[2:]) for x in states[1:]]
 
@@ -139,10 +147,11 @@ class Evaluator:
     """The numbers of any plan, without a solver; the first `n_cbf` of the `n_rows` rows are barriers."""
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        function, self.n_cbf = _evaluation(settings, n_people, n_walls)
-        self.n_rows = function.nnz_out(1)
-        self._inputs, self._parameters = np.zeros(function.nnz_in(0)), np.zeros(function.nnz_in(1))
-        self._function = Buffered(function, self._inputs, self._parameters)
+        with BUILDING:
+            function, self.n_cbf = _evaluation(settings, n_people, n_walls)
+            self.n_rows = function.nnz_out(1)
+            self._inputs, self._parameters = np.zeros(function.nnz_in(0)), np.zeros(function.nnz_in(1))
+            self._function = Buffered(function, self._inputs, self._parameters)
         self._shape = (n_people + n_walls, settings.N + 1)
 
     def __call__(self, plan: Array, parameters: Array) -> Numbers:
@@ -161,10 +170,32 @@ def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any
     return p.function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
 
 
+class Budget:
+    """The computing time of one step [s]; `begin` it anew with each."""
+
+    def __init__(self, limit: float) -> None:
+        self._limit = limit
+        self.begin()
+
+    def begin(self) -> None:
+        """From now on."""
+        self._wall, self._thread = perf_counter(), thread_time()
+
+    def spent(self, share: float = 1.0) -> bool:
+        """True if this share is used up. To read the thread's own clock takes long: wall time goes first."""
+        limit = share * self._limit
+        return perf_counter() - self._wall > limit and thread_time() - self._thread > limit
+
+
 class ProblemSolver(Protocol):
-    """What the solvers of this problem have in common; inputs have shape (2N,) [m/s2]."""
+    """What the solvers of this problem have in common; inputs have shape (2N,) [m/s2].
+
+    `late` says that the last call was cut off by the `budget`, and gave what it had by then.
+    """
 
     evaluate: Evaluator
+    budget: Budget
+    late: bool
 
     def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
     def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...

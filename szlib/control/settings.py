@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import SolverError
 from .barriers import finite
 
+Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
 Solver = Literal["sqp", "ipopt"]
 Terminal = Literal["none", "rest", "person"]
@@ -35,16 +36,23 @@ class MPCSettings:
     v_max : largest Euclidean speed [m/s].
     r_robot : radius of the robot [m].
     eps : margin for the error of the approximate distances [m].
+    margin : around walls: "euclidean", what each requires to stay clear of the robot's disc, and at least
+        eps (`distances.wall_margin`); "paper", eps, which overlooks overlaps with the ends of walls shorter
+        than r_robot^2 / eps.
     zone_speed : walking speed whose social zone is kept, where a zone depends on speed [m/s].
     pass_side : the robot's own hand on which it passes a person whom it meets head-on.
     tie : a meeting is head-on while the goal lies within this share of the half-angle under which the
-        robot sees the person's zone; see `head_on.subgoal`. At most 0.5.
+        robot sees the person's zone; see `people.subgoal`. At most 0.5.
     terminal : what the plan ends in: "none", as in the paper; "rest", zero velocity; "person", the
-        velocity of the one person there is, in open space. See the proof in `szlib.control.mpc`.
+        velocity of the one person there is, in open space ("rest" while there is not exactly one; see
+        `Step.terminal`). See the proof in `szlib.control.mpc`.
     solver : "sqp", the condensed SQP of `szlib.control.sqp`, or "ipopt", as in the paper.
     slack_weight : penalty of slack [cost per m, and per m of distance to the goal (at least 1 m)],
         to which the multipliers of the barriers are in proportion.
     max_iterations : iterations that a solver may take before the next rung of the ladder.
+    time_limit : computing time of the step's thread after which the best plan so far, or full braking, is
+        taken; see `Step.timed_out` [s]. `inf` for none. What other processes take does not count, so that
+        runs stay the same on a busy machine.
 
     Raises
     ------
@@ -62,6 +70,7 @@ class MPCSettings:
     v_max: float = _from("paper", 1.0)
     r_robot: float = _from("paper", 0.5)
     eps: float = _from("paper", 0.05)
+    margin: Margin = _from("measured", "euclidean")  # noqa: RUF009
     zone_speed: float = _from("paper", 1.1)
     pass_side: Side = _from("assumed", "right")  # noqa: RUF009
     tie: float = _from("assumed", 0.25)
@@ -69,6 +78,7 @@ class MPCSettings:
     solver: Solver = _from("measured", "sqp")  # noqa: RUF009
     slack_weight: float = _from("measured", 1e5)
     max_iterations: int = _from("assumed", 100)
+    time_limit: float = _from("assumed", 0.05)
 
     def __post_init__(self) -> None:
         for name, length in (("Q", 4), ("R", 2), ("P", 4)):
@@ -88,12 +98,18 @@ class MPCSettings:
         _require(min(self.Q) >= 0, "Q", self.Q, "weights >= 0")
         _require(min(self.P) >= 0, "P", self.P, "weights >= 0")
         _require(min(self.R) > 0, "R", self.R, "weights > 0")
-        for name, choices in (("pass_side", Side), ("terminal", Terminal), ("solver", Solver)):
-            given, allowed = getattr(self, name), get_args(choices)
-            _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
+        self._check_choices()
+        positive = isinstance(self.time_limit, int | float | np.number) and self.time_limit > 0
+        _require(positive, "time_limit", self.time_limit, "a positive number of seconds, or inf")
         if self.terminal != "none":
             object.__setattr__(self, "N_h", self.N)
         _require(0 <= self.tie <= 0.5, "tie", self.tie, "in [0, 0.5]")
+
+    def _check_choices(self) -> None:
+        choices = {"margin": Margin, "pass_side": Side, "terminal": Terminal, "solver": Solver}
+        for name, literal in choices.items():
+            given, allowed = getattr(self, name), get_args(literal)
+            _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
 
     @classmethod
     def badges(cls) -> dict[str, str]:

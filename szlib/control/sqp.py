@@ -23,10 +23,10 @@ import daqp
 import numpy as np
 
 from .barriers import Array
-from .problem import Buffered, Evaluator, build_problem, slack_weight
+from .problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, build_problem, slack_weight
 from .settings import MPCSettings
 
-Outcome = Literal["converged", "stalled", "failed"]
+Outcome = Literal["converged", "stalled", "late", "failed"]
 CONVERGED = {True: 1e-2, False: 1e-5}
 """The last step of the SQP moves no input by more than this [m/s2]: with the exact Hessian, when the
 error is of the order of its square, and without."""
@@ -47,9 +47,14 @@ class Sqp:
     """The hard problem and the relaxed one, by SQP; it remembers multipliers from call to call."""
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        self.settings = settings
+        self.settings, self.budget, self.late = settings, Budget(settings.time_limit), False
         self.evaluate = Evaluator(settings, n_people, n_walls)
-        derive, measure, self._gain = _functions(settings, n_people, n_walls)
+        with BUILDING:
+            derive, measure, self._gain = _functions(settings, n_people, n_walls)
+            self._allocate(derive, measure)
+
+    def _allocate(self, derive: Any, measure: Any) -> None:
+        """Memory for the compiled functions and for the program."""
         n, m, n_rows = derive.nnz_in(0), derive.nnz_in(2), self.evaluate.n_rows
         self._inputs, self._step, self._share = np.zeros(n), np.zeros(n), np.ones(1)
         self._parameters, self._multipliers = np.zeros(derive.nnz_in(1)), np.zeros(m)
@@ -75,24 +80,25 @@ class Sqp:
 
     def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
         """Inputs, shape (2N,), and whether they converged; if rows stay violated, to the relaxed problem."""
-        plan, outcome = self._solve(guess, parameters)
+        plan, outcome = self._solve(guess, parameters, HARD_SHARE)
         return plan, outcome == "converged"
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
         """The same, where it is enough that no step lowers the merit any more."""
-        plan, outcome = self._solve(guess, parameters)
-        return plan, outcome != "failed"
+        plan, outcome = self._solve(guess, parameters, 1.0)
+        return plan, outcome in ("converged", "stalled")
 
-    def _solve(self, guess: Array, parameters: Array) -> tuple[Array, Outcome]:
+    def _solve(self, guess: Array, parameters: Array, share: float) -> tuple[Array, Outcome]:
         self._parameters[:] = parameters
         outcome: Outcome = "converged"
         if not self._is_free():
             self._inputs[:] = guess
             self._weights[:] = limit = slack_weight(self.settings, parameters)
             self._model.soft_weights(w_l=self._weights, w_u=self._weights)
-            outcome = self._iterate(limit)
+            outcome = self._iterate(limit, share)
             if outcome == "failed":
                 self.reset()
+        self.late = outcome == "late"
         return self._inputs.copy(), outcome
 
     def _is_free(self) -> bool:
@@ -106,10 +112,12 @@ class Sqp:
         self._measure.call()
         return bool(self._after[1] == 0)
 
-    def _iterate(self, limit: float) -> Outcome:
-        """Improve `_inputs`; no price above `limit`, the weight of slack."""
+    def _iterate(self, limit: float, share: float) -> Outcome:
+        """Improve `_inputs`; no price above `limit`, the weight of slack; within this share of the budget."""
         price = curved = 0.0
         for _ in range(self.settings.max_iterations):
+            if self.budget.spent(share):
+                return "late"
             exact = self._linearise()
             step, _, flag, info = self._model.solve()
             if flag < 0:

@@ -13,7 +13,8 @@ from math import hypot
 import numpy as np
 
 from ..control.barriers import Array
-from ..control.mpc import MPCCBF, Step
+from ..control.mpc import MPCCBF
+from ..control.step import Step
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from .log import SimulationLog
@@ -32,7 +33,7 @@ def simulate(scenario: Scenario, controller: MPCCBF, *, max_time: float | None =
     Raises
     ------
     SolverError : the controller has other walls, the start violates a barrier or the speed limit, or
-        the goal cannot be reached.
+        the goal cannot be reached: it lies too close to a wall, or in the zone of somebody who stands.
     """
     if not np.array_equal(controller.walls, scenario.walls):
         raise SolverError(
@@ -65,7 +66,7 @@ def drive(
 
     Raises
     ------
-    SolverError : the goal cannot be reached.
+    SolverError : the goal lies too close to a wall.
     """
     dt = controller.settings.dt
     end = scenario.duration if max_time is None else max_time
@@ -128,6 +129,11 @@ def _check_start(scenario: Scenario, controller: MPCCBF) -> None:
         raise SolverError(
             f"{scenario.name!r} starts in violation: h = {h[i]:.3f} m for {of} at "
             f"{scenario.start[:2].tolist()}; start where h >= 0"
+        )
+    if controller.goal_blocked(scenario.goal, scenario.people):
+        raise SolverError(
+            f"{scenario.name!r}: the goal {scenario.goal.tolist()} cannot be reached: it lies in the zone of "
+            "somebody who stands; choose one where h >= 0"
         )
     speed, limit = float(np.hypot(*scenario.start[2:])), controller.settings.v_max
     if speed > limit:

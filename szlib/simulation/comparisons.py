@@ -23,14 +23,14 @@ import pandas as pd
 
 from ..control.barriers import Array
 from ..control.distances import euclidean_to_ellipse
-from ..control.people import as_ellipse
+from ..control.people import BODY_RADIUS, as_ellipse
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
 from .closed_loop import Zones
 from .log import SimulationLog
 from .rollouts import rollouts
-from .scenario import BODY_RADIUS, Behaviour
+from .scenario import Behaviour
 from .worlds import Worlds
 
 HALL_PERSONAL = 1.2

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..control.barriers import Array, barrier, ellipse_distance, segment_distance
-from ..control.distances import euclidean_to_segment
-from ..control.mpc import status_of
-from ..control.people import Person
+from ..control.distances import euclidean_to_segment, wall_margin
+from ..control.people import BODY_RADIUS, Person
 from ..control.settings import MPCSettings
+from ..control.step import status_of
 from ..errors import DataError
 from ..files import write_file
 from ..zones.ellipses import Ellipse
 from .metrics import metrics
-from .scenario import BODY_RADIUS, Scenario
+from .scenario import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -97,8 +97,9 @@ class SimulationLog:
         """Barriers with people as they truly were, people before walls, shape (n, P+W) [m]."""
         d = [ellipse_distance(self.relative[:, i], zone) for i, zone in enumerate(self.zones)]
         d += [segment_distance(self.states[:, :2], *wall) for wall in self.scenario.walls]
-        distances = np.reshape(d, (len(d), len(self.states))).T
-        return np.asarray(barrier(distances, self.settings.r_robot, self.settings.eps))
+        distances, s = np.reshape(d, (len(d), len(self.states))).T, self.settings
+        margins = [s.eps] * len(self.zones) + [wall_margin(wall, s) for wall in self.scenario.walls]
+        return np.asarray(barrier(distances, s.r_robot, np.array(margins)))
 
     @cached_property
     def clearance(self) -> Array:

@@ -11,8 +11,9 @@ import numpy as np
 from scipy.ndimage import label
 
 from ..control.barriers import Array, barrier, ellipse_distance, segment_distance
-from ..control.mpc import RUNGS
+from ..control.distances import wall_margin
 from ..control.problem import TOLERANCE
+from ..control.step import RUNGS
 from .scenario import GOAL_RADIUS, STOPPED
 
 if TYPE_CHECKING:
@@ -46,7 +47,8 @@ def metrics(log: SimulationLog) -> dict[str, Any]:
     time_to_goal : until then; NaN without success.
     path_length : length of the polygon through the robot's positions until the arrival.
     min_h, min_h_people, min_h_walls : smallest h at any state, with people as they truly were.
-    min_clearance : smallest Euclidean gap from the robot's disc to a wall or to a person's body.
+    min_clearance, min_clearance_people, min_clearance_walls : smallest Euclidean gap from the robot's disc
+        to a person's body or to a wall; negative is an overlap.
     min_speed, mean_speed, max_speed : of the robot until the arrival; min_speed after the start-up and
         before it brakes into the goal, after it last had `CRUISE` of its greatest speed.
     time_stopped : slower than `STOPPED` after it first was faster, until the arrival.
@@ -59,6 +61,7 @@ def metrics(log: SimulationLog) -> dict[str, Any]:
     infeasible_steps : steps whose plan violates the hard problem.
     flagged_steps : steps that say that they are not safe.
     unflagged_violations : steps that said they were safe and led to h < 0.
+    unflagged_overlaps : steps that said they were safe and led to a Euclidean overlap.
     steps_warm, steps_cold, steps_kept, steps_relaxed, steps_braking : steps of each rung of the
         ladder in `szlib.control.mpc`.
     max_slack : largest violation of a hard row by any plan.
@@ -76,7 +79,7 @@ def metrics(log: SimulationLog) -> dict[str, Any]:
     away = np.hypot(*(log.states[way, :2] - log.scenario.goal).T)
     held = (time >= START_UP) & (away > GOAL_RADIUS) & (log.cbf_people[way] <= ACTIVE)
     yields = held[:-1] & (-np.diff(away) / dt < STOPPED)
-    worst = log.h.min(axis=1, initial=np.inf)
+    worst, gap = log.h.min(axis=1, initial=np.inf), log.clearance.min(axis=1, initial=np.inf)
     return {
         "success": log.success,
         "outcome": outcome(log),
@@ -86,6 +89,8 @@ def metrics(log: SimulationLog) -> dict[str, Any]:
         "min_h_people": _least(log.h[:, :n_people]),
         "min_h_walls": _least(log.h[:, n_people:]),
         "min_clearance": _least(log.clearance),
+        "min_clearance_people": _least(log.clearance[:, :n_people]),
+        "min_clearance_walls": _least(log.clearance[:, n_people:]),
         "min_speed": float(speed[(time >= START_UP) & cruising].min(initial=speed.max())),
         "mean_speed": float(speed.mean()),
         "max_speed": float(speed.max()),
@@ -98,6 +103,7 @@ def metrics(log: SimulationLog) -> dict[str, Any]:
         "infeasible_steps": int((log.slack[applied] > TOLERANCE).sum()),
         "flagged_steps": int((~log.safe[applied]).sum()),
         "unflagged_violations": int((log.safe[applied] & (worst[1:] < -TOLERANCE)).sum()),
+        "unflagged_overlaps": int((log.safe[applied] & (gap[1:] < -TOLERANCE)).sum()),
         **{f"steps_{rung}": int((log.rung[applied] == rung).sum()) for rung in RUNGS},
         "max_slack": float(log.slack[applied].max(initial=0.0)),
         "solve_time_median": float(np.median(log.solve_time)),
@@ -201,7 +207,7 @@ def path_exists(log: SimulationLog) -> bool:
     for zone, (x, y, heading) in zip(log.zones, log.people[-1], strict=True):
         free &= barrier(ellipse_distance(grid, zone.placed((x, y), heading)), s.r_robot, s.eps) >= 0
     for wall in log.scenario.walls:
-        free &= barrier(segment_distance(grid, *wall), s.r_robot, s.eps) >= 0
+        free &= barrier(segment_distance(grid, *wall), s.r_robot, wall_margin(wall, s)) >= 0
     here, there = np.round((ends - low) / _CELL).astype(int)
     regions = label(free, structure=np.ones((3, 3)))[0]
     around = [regions[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] for i, j in (here, there)]

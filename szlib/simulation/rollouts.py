@@ -21,7 +21,6 @@ from joblib import delayed
 from tqdm import tqdm
 
 from .. import __version__
-from ..control.distances import with_margin
 from ..control.mpc import MPCCBF
 from ..control.problem import TOLERANCE
 from ..control.settings import MPCSettings
@@ -57,7 +56,6 @@ def rollouts(
     behaviour: Behaviour | None = None,
     zones: Zones | None = None,
     measure: Measure | None = None,
-    margin: bool = False,
     out: str | Path | None = None,
     n_jobs: int = -1,
     progress: bool = True,
@@ -70,7 +68,6 @@ def rollouts(
     settings, worlds, behaviour : of the controller, of the worlds, and of the people in them.
     zones : what the controller keeps in place of a person's own zone; a function of a module.
     measure : further columns from each run.
-    margin : raise eps in each world to what its walls require (`distances.with_margin`).
     out : folder for finished chunks, to go on from; default: none is kept. Parameters and szlib's
         version name the folder inside it; after a change of the code choose another.
     n_jobs : worlds at a time, as joblib counts: -1 for every core.
@@ -86,9 +83,7 @@ def rollouts(
     """
     if n < 1:
         raise SolverError(f"n must be at least 1; got {n}")
-    setup = Setup(
-        settings or MPCSettings(), worlds or Worlds(), behaviour or Behaviour(), zones, measure, margin
-    )
+    setup = Setup(settings or MPCSettings(), worlds or Worlds(), behaviour or Behaviour(), zones, measure)
     folder = None if out is None else Path(out) / setup.key()
     if folder is not None:
         own_folder(folder.parent, PURPOSE)
@@ -113,12 +108,11 @@ class Setup:
     behaviour: Behaviour
     zones: Zones | None
     measure: Measure | None
-    margin: bool
 
     def describe(self) -> str:
         """Every parameter, as text."""
         names = [f"{f.__module__}.{f.__qualname__}" if f else "default" for f in (self.zones, self.measure)]
-        return repr((__version__, self.settings, self.worlds, self.behaviour, *names, self.margin))
+        return repr((__version__, self.settings, self.worlds, self.behaviour, *names))
 
     def key(self) -> str:
         """A short name for these parameters."""
@@ -127,8 +121,9 @@ class Setup:
     def run(self, seed: int) -> SimulationLog:
         """Drive through one world."""
         scenario = world(seed, self.worlds)
-        settings = with_margin(self.settings, scenario.walls) if self.margin else self.settings
-        controller = MPCCBF(_UNUSED, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
+        controller = MPCCBF(
+            _UNUSED, walls=scenario.walls, settings=self.settings, max_people=len(scenario.people)
+        )
         try:
             return drive(
                 scenario,
@@ -145,14 +140,19 @@ class Setup:
 
 
 def tally(rows: pd.DataFrame) -> pd.Series[Any]:
-    """Rows of `rollouts` in one: worlds, share of each outcome, steps by what they say, least h [m]."""
+    """Rows of `rollouts` in one: worlds, steps by what they say, shares of worlds with h < 0, with Euclidean
+    overlaps, and of each outcome, least h and clearance [m]."""
     numbers: dict[str, Any] = {"worlds": len(rows)}
     numbers |= {
-        name: int(rows[name].sum()) for name in ("infeasible_steps", "flagged_steps", "unflagged_violations")
+        name: int(rows[name].sum())
+        for name in ("infeasible_steps", "flagged_steps", "unflagged_violations", "unflagged_overlaps")
     }
     numbers |= {
         "share h < 0": float((rows["min_h"] < -TOLERANCE).mean()),
         "min_h": float(rows["min_h"].min()),
+        "share overlap wall": float((rows["min_clearance_walls"] < -TOLERANCE).mean()),
+        "share overlap person": float((rows["min_clearance_people"] < -TOLERANCE).mean()),
+        "min_clearance": float(rows["min_clearance"].min()),
     }
     numbers |= {ending: float((rows["outcome"] == ending).mean()) for ending in get_args(Outcome)}
     return pd.Series(numbers)
@@ -161,7 +161,7 @@ def tally(rows: pd.DataFrame) -> pd.Series[Any]:
 def replay(seed: int, **parameters: Any) -> SimulationLog:
     """One world again, with every state; parameters as of `rollouts` (settings, worlds, ...)."""
     given = {"settings": MPCSettings(), "worlds": Worlds(), "behaviour": Behaviour()}
-    given |= {"zones": None, "measure": None, "margin": False}
+    given |= {"zones": None, "measure": None}
     return Setup(**(given | parameters)).run(seed)  # type: ignore[arg-type]
 
 

@@ -23,8 +23,6 @@ GOAL_RADIUS = 0.1
 """The robot has arrived within this distance of the goal [m], when it has stopped (assumed)."""
 STOPPED = 0.05
 """Below this speed the robot stands, and below this progress to the goal it yields [m/s] (assumed)."""
-BODY_RADIUS = 0.25
-"""Radius of a person's body, for the clearance: half the breadth of shoulders [m] (assumed)."""
 
 Crowd = Callable[[float, Array], tuple[Person, ...]]
 """Everybody as they truly are, from the time [s] and the robot's state (x, y, vx, vy) then."""

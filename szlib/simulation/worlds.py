@@ -12,11 +12,11 @@ import numpy as np
 
 from ..control.barriers import Array, barrier, ellipse_distance, segment_distance
 from ..control.distances import euclidean_to_segment, with_margin
-from ..control.people import Person
+from ..control.people import BODY_RADIUS, Person
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .scenario import BODY_RADIUS, Scenario
+from .scenario import Scenario
 
 _TRIES = 5_000
 """Draws after which a world is given up as impossible; a usual one takes fewer than a hundred."""

@@ -26,6 +26,8 @@ PAPERS_RATE = 16_181 / 92
 """Encounters a day in the paper (sec. 2)."""
 LEVEL = 0.95
 """Of every interval here."""
+LARGER_AHEAD = "the zone reaches farther ahead than behind"
+GROWS = "the zone grows with walking speed"
 OPPOSITE = "opposite"
 """The kind of encounter in which people pass each other."""
 
@@ -40,6 +42,7 @@ class Finding:
     effect, low, high : what was measured and its interval, in `unit`; above 0: as the paper says.
     unit : of the effect.
     n : encounters, pairs, days or runs it rests on.
+    adequate : whether enough people were seen on every side; if not, nothing is decided.
     """
 
     claim: str
@@ -48,13 +51,16 @@ class Finding:
     high: float
     unit: str
     n: int
+    adequate: bool = True
 
     @property
     def verdict(self) -> str:
         """ "supported", "contradicted", or "not decidable" with the n it rests on."""
-        if self.low > 0:
+        if self.adequate and self.low > 0:
             return "supported"
-        return "contradicted" if self.high < 0 else f"not decidable with n = {self.n:,}"
+        if self.adequate and self.high < 0:
+            return "contradicted"
+        return f"not decidable with n = {self.n:,}"
 
     def __str__(self) -> str:
         return f"{self.effect:+.2f} [{self.low:+.2f}, {self.high:+.2f}] {self.unit}: {self.verdict}"
@@ -74,8 +80,8 @@ def as_cell(row: pd.Series[Any]) -> str:
 def larger_ahead(zone: SocialZone, *, speed: float = 1.1) -> Finding:
     """The zone reaches farther ahead than behind, by twice the offset of its centre (sec. 1 and 4)."""
     center, low, high = _interval(zone, speed, "center_x")
-    claim = f"the zone at {speed:g} m/s reaches farther ahead than behind"
-    return Finding(claim, 2 * center, 2 * low, 2 * high, "m", _encounters(zone, speed))
+    n, adequate = _encounters(zone, speed), zone.adequate(speed)
+    return Finding(LARGER_AHEAD, 2 * center, 2 * low, 2 * high, "m", n, adequate)
 
 
 def grows_with_speed(zone: SocialZone, *, slow: float = 0.7, fast: float = 1.3) -> Finding:
@@ -90,9 +96,8 @@ def grows_with_speed(zone: SocialZone, *, slow: float = 0.7, fast: float = 1.3) 
     effect = area - other
     down = sqrt((area - low) ** 2 + (other_high - other) ** 2)
     up = sqrt((high - area) ** 2 + (other - other_low) ** 2)
-    claim = f"the zone is larger at {fast:g} than at {slow:g} m/s"
-    n = min(_encounters(zone, slow), _encounters(zone, fast))
-    return Finding(claim, effect, effect - down, effect + up, "m2", n)
+    n, adequate = min(_encounters(zone, v) for v in (slow, fast)), all(map(zone.adequate, (slow, fast)))
+    return Finding(GROWS, effect, effect - down, effect + up, "m2", n, adequate)
 
 
 def passes_on_the_right(samples: pd.DataFrame) -> Finding:

@@ -32,7 +32,7 @@ from .radii import Radii
 from .respect.estimate import RespectZones
 from .respect.significance import NullTest, null_test
 from .uncertainty import QUANTITIES, RESAMPLES, Estimate, Uncertainty, count_seen, measure, missing_sides
-from .zone_file import read_zone, write_zone, zone_fields
+from .zone_file import check_whole, read_zone, write_zone, zone_fields
 
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Speeds of the reference pedestrian whose zones are fitted [m/s] (assumed; the paper shows a range)."""
@@ -250,11 +250,13 @@ class SocialZone:
         """Read a zone written by `save`; raises ZoneError where the file is none, or of a newer szlib."""
         content = read_zone(Path(path))
         try:
-            return cls(**zone_fields(content))
+            zone = cls(**zone_fields(content))
         except (KeyError, TypeError, IndexError, ValueError, OverflowError, AttributeError) as error:
             raise ZoneError(
                 f"{path}: the zone in it is damaged ({error!r}); fit and save it again"
             ) from error
+        check_whole(content, Path(path))
+        return zone
 
     def _hull(self) -> np.ndarray:
         if self.vertices is None:

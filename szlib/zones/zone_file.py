@@ -1,10 +1,12 @@
 """The file of a social zone: versioned JSON, whole or not at all, and what is wrong with one that is none.
 
-Version 2 adds the method, radii by direction, who was seen, and intervals; version 1 (hulls only) loads.
+Version 2 adds the method, radii by direction, who was seen, intervals, and a checksum of all of it; version 1
+(hulls only) loads.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,6 +24,8 @@ from .respect.significance import NullTest
 from .uncertainty import SECTORS, Uncertainty
 
 FORMAT, VERSION = "szlib.SocialZone", 2
+THINNEST_ZONE = 0.05
+"""Semi-axis below which a zone of a file without a checksum is damage and no zone [m]: nobody is so thin."""
 UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
 
 _TABLES = {
@@ -54,6 +58,7 @@ def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
         "hull_vertices": None if fields["vertices"] is None else fields["vertices"].tolist(),
     }
     try:
+        content["checksum"] = _checksum(content)
         write_file(path, json.dumps(content, indent=1))
     except (SzlibError, OSError, TypeError, ValueError) as error:
         raise ZoneError(
@@ -89,12 +94,13 @@ def zone_fields(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a `SocialZone` from the content of its file; damage shows as an ordinary Python error."""
     radii, seen, uncertainty = content["radii"], content["seen"], content["uncertainty"]
     vertices = content["hull_vertices"]
+    ellipses = {_number(e["speed"]): _ellipse(e) for e in content["ellipses"]}
+    if content["version"] == 1 and any(e.semi_axes[1] < THINNEST_ZONE for e in ellipses.values()):
+        raise ValueError(f"an ellipse is thinner than {THINNEST_ZONE} m")
     return {
         "vertices": None if vertices is None else np.array(vertices, float),
-        "r_max": float(content["r_max"]),
-        "ellipses": {
-            float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"]) for e in content["ellipses"]
-        },
+        "r_max": _number(content["r_max"]),
+        "ellipses": ellipses,
         "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
         "provenance": dict(content["provenance"]),
         "method": str(content["method"]),
@@ -103,6 +109,33 @@ def zone_fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "uncertainty": None if uncertainty is None else _uncertainty(uncertainty),
         "null_test": None if content["null_test"] is None else NullTest.from_record(content["null_test"]),
     }
+
+
+def check_whole(content: Mapping[str, Any], path: Path) -> None:
+    """ZoneError unless the content of the file is what was written; version 1 has no checksum."""
+    expected = content.get("checksum")
+    if content["version"] > 1 and expected != _checksum(content):
+        raise ZoneError(
+            f"{path}: the zone in it is damaged: its checksum is {expected!r}, and not that of its content; "
+            "a zone is not to be edited: fit and save it again"
+        )
+
+
+def _checksum(content: Mapping[str, Any]) -> str:
+    """SHA-256 of everything else, as it is once written and read."""
+    rest = json.loads(json.dumps({name: value for name, value in content.items() if name != "checksum"}))
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError(f"expected a number; got {value!r}")
+    return float(value)
+
+
+def _ellipse(record: Mapping[str, Any]) -> Ellipse:
+    (m, n), (a, b) = ([_number(each) for each in record[name]] for name in ("center", "semi_axes"))
+    return Ellipse((m, n), (a, b), _number(record["angle"]))
 
 
 def _record(uncertainty: Uncertainty) -> dict[str, Any]:

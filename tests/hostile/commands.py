@@ -31,7 +31,7 @@ from szlib.tracks.clock import read_tracks
 from szlib.workbook import runner
 from szlib.workbook.command_line import main
 
-COUNT = {False: 60, True: 1000}
+COUNT = {False: 40, True: 1000}
 LONGEST = 60
 """No command takes longer than that [s]."""
 NOTEBOOK = """# %% tags=["parameters"]

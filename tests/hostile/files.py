@@ -24,15 +24,15 @@ import pandas as pd
 
 import szlib
 from szlib import files
-from szlib.errors import DataError, StorageError
+from szlib.errors import DataError, StorageError, ZoneError
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.simulation.rollouts import rollouts
 from szlib.simulation.worlds import Worlds
 from szlib.workbook.record import NotebookRecord
 
-DAMAGES = {False: 15, True: 300}
-JUMPS = {False: 3, True: 40}
+DAMAGES = {False: 6, True: 300}
+JUMPS = {False: 2, True: 40}
 
 
 class Disk:
@@ -89,7 +89,7 @@ def fill_disks(
             try:
                 work(place / "data", out)
                 refused = False
-            except StorageError:
+            except (StorageError, ZoneError):
                 refused = True
         if disk.writes <= full:
             break

@@ -20,7 +20,7 @@ from szlib.files import MARKER
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 
-KILLS = {False: 3, True: 50}
+KILLS = {False: 1, True: 50}
 GRACE = 8.0
 """So long after the end of a command its processes may take to end [s]."""
 PROGRAM = """

@@ -8,9 +8,9 @@ import pytest
 import shapely
 
 import szlib
+from szlib.control.people import BODY_RADIUS
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.metrics import avoidance_start, passing_side
-from szlib.simulation.scenario import BODY_RADIUS
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 KEYS = {
@@ -19,6 +19,7 @@ KEYS = {
     "solve_time_median", "solve_time_p95", "solve_time_max", "steps_warm", "steps_cold", "steps_kept",
     "steps_relaxed", "steps_braking", "outcome",
     "min_h_people", "min_h_walls", "jerk", "people", "walls", "flagged_steps", "unflagged_violations",
+    "unflagged_overlaps", "min_clearance_people", "min_clearance_walls",
     "max_slack", "solve_time_p99",
 }  # fmt: skip
 

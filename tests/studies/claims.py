@@ -16,6 +16,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 import szlib
@@ -30,7 +31,7 @@ DATA = Path(os.environ.get("SZLIB_DATA_DIR", "."))
 SPEEDS = (0.7, 1.1, 1.3)
 RESAMPLES = 200
 HOURS_A_DAY = 11.0
-"""That ATC is recorded (09:20 to 20:27 on the first day); other sites are scaled to it."""
+"""That ATC is recorded (09:20 to 20:27 on the first day)."""
 
 
 def plaza() -> pd.DataFrame:
@@ -62,8 +63,10 @@ def of_site(name: str) -> Iterator[pd.DataFrame]:
     load, square = SITES[name]
     tracks = load()
     samples = szlib.find_encounters(tracks, square=square)
-    days = tracks["day"].nunique() * (tracks["t"].max() - tracks["t"].min()) / 3600 / HOURS_A_DAY
-    plain = [claims.passes_on_the_right(samples), claims.as_many_a_day(samples["encounter"].nunique(), days)]
+    plain = [claims.passes_on_the_right(samples)]
+    if name == "ATC day":
+        days = (tracks["t"].max() - tracks["t"].min()) / 3600 / HOURS_A_DAY
+        plain.append(claims.as_many_a_day(samples["encounter"].nunique(), days))
     if name == "plaza":
         close = samples[samples["distance"] <= 2.0]
         removed = is_outlier(close, fraction=0.002, neighbours=20)
@@ -78,12 +81,18 @@ def of_site(name: str) -> Iterator[pd.DataFrame]:
 
 def of_zone(people: pd.DataFrame, method: str) -> Iterator[claims.Finding]:
     """The claims about a zone's shape; undecided where there is no zone, or too few people on some side."""
-    for claim, speeds in ((claims.larger_ahead, (1.1,)), (claims.grows_with_speed, (0.7, 1.3))):
+    for claim, text, speeds in (
+        (claims.larger_ahead, claims.LARGER_AHEAD, (1.1,)),
+        (claims.grows_with_speed, claims.GROWS, (0.7, 1.3)),
+    ):
         try:
             zone = szlib.SocialZone.fit(people, method=method, speeds=speeds, resamples=RESAMPLES)
             yield claim(zone)
         except szlib.SzlibError as error:
             print(f"{method}: {error}", file=sys.stderr)
+            yield claims.Finding(
+                text, np.nan, np.nan, np.nan, "", people["encounter"].nunique(), adequate=False
+            )
 
 
 def main() -> None:

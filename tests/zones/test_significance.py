@@ -113,7 +113,7 @@ def test_it_survives_json() -> None:
 
 
 def test_kinds_on_one_side_only() -> None:
-    null, data = null_of(0), encounters(1, SHIFTS, n=60)
+    null, data = null_of(0), encounters(1, SHIFTS, n=100)
     kind = np.where(np.arange(len(null.encounters)) % 2, "crossing", "opposite")
     null = szlib.NullEncounters(null.samples, null.encounters.assign(kind=kind), SHIFTS, 2.0)
     with pytest.warns(DataWarning, match="the data has no encounter of the kind 'opposite'"):

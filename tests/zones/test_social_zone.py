@@ -338,6 +338,14 @@ BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
     "ragged counts": (broken(lambda c: c["seen"]["left"].pop() and None), "is damaged"),
     "no interval": (broken(lambda c: c["uncertainty"].pop("intervals") and None), "is damaged .*intervals"),
     "no provenance": (broken(lambda c: c.update(provenance=3)), "is damaged"),
+    "a centre of digits": (broken(lambda c: c["ellipses"][0].update(center="12")), "is damaged .*number"),
+    "a speed of text": (broken(lambda c: c["ellipses"][0].update(speed="1.1")), "is damaged .*number"),
+    "another zone": (
+        broken(lambda c: c["ellipses"][0].update(semi_axes=[0.01, 0.01])), "is damaged: its checksum"
+    ),
+    "a moved centre": (broken(lambda c: c["ellipses"][0].update(center=[0, 0])), "is damaged: its checksum"),
+    "another origin": (broken(lambda c: c["provenance"].update(szlib="9")), "is damaged: its checksum"),
+    "no checksum": (broken(lambda c: c.pop("checksum") and None), "is damaged: its checksum is None"),
 }  # fmt: skip
 
 
@@ -527,6 +535,18 @@ def test_an_older_file_loads_and_says_that_it_does_not_know(zone: SocialZone, tm
     with pytest.warns(szlib.DataWarning, match="of unknown worth.*fit it again"):
         assert loaded.ellipse(1.1) == zone.ellipse(1.1)
     assert loaded.table()["a_low"].isna().all()
+
+
+def test_an_older_file_whose_ellipse_is_no_zone_is_refused(zone: SocialZone, tmp_path: Path) -> None:
+    zone.save(tmp_path / "zone.json")
+    content = json.loads((tmp_path / "zone.json").read_text(encoding="utf-8"))
+    old = {key: content[key] for key in ("format", "units", "r_max", "ellipses", "undefined", "provenance")}
+    old |= {"version": 1, "hull_vertices": content["hull_vertices"]}
+    for damage, told in (({"semi_axes": [0.01, 0.01]}, "thinner than 0.05 m"), ({"center": "12"}, "number")):
+        old["ellipses"] = [content["ellipses"][0] | damage]
+        (tmp_path / "old.json").write_text(json.dumps(old), encoding="utf-8")
+        with pytest.raises(szlib.ZoneError, match=f"old.json: .* is damaged .*{told}"):
+            SocialZone.load(tmp_path / "old.json")
 
 
 def test_samples_that_do_not_tell_encounters_apart(samples: pd.DataFrame) -> None:

@@ -34,8 +34,8 @@ RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
 """Within which too few may come [m]; none of them needs to be the zone's."""
 SIGNIFICANT = 0.05
 
-_EXPECTED = 10
-"""A kind of encounter expected that often, and never seen, was filtered out on one side only."""
+_EXPECTED = 30
+"""A kind of encounter expected more often, and never seen, was filtered out on one side only."""
 
 
 @dataclass(frozen=True)

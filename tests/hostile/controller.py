@@ -1,0 +1,285 @@
+"""The controller under attack: every step and every world recomputed by formulas of our own.
+
+Nothing of szlib is used to judge it: distances, barriers, motion and bounds are written anew from the paper,
+overlaps are Euclidean.
+"""
+
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+import szlib
+from szlib.simulation.rollouts import replay
+
+BODY = 0.25
+TOLERANCE = 1e-6
+NEAR = 1e-7
+"""Two computations of the same number may differ by so much, relative to it (at least 1)."""
+STEPS = {False: 600, True: 50_000}
+A_SETTING = 100
+"""Steps with the same settings, people and walls: to build a problem takes as long as some hundred steps."""
+WORLDS = {False: 12, True: 20_000}
+FIRST_WORLD = 77_000_000
+CRUEL = {False: 60, True: 3_000}
+
+
+# formulas of our own
+
+
+def to_segment(p: Any, wall: Any) -> float:
+    """Euclidean distance, by a clamped projection."""
+    a, b = np.asarray(wall, float)
+    share = min(1.0, max(0.0, (p - a) @ (b - a) / ((b - a) @ (b - a))))
+    return float(np.linalg.norm(p - a - share * (b - a)))
+
+
+def paper_to_segment(p: Any, wall: Any) -> float:
+    """Eq. 3-5."""
+    a, b = np.asarray(wall, float)
+    length = np.linalg.norm(b - a)
+    g = ((p[0] - a[0]) * (b[1] - a[1]) - (p[1] - a[1]) * (b[0] - a[0])) / length
+    t = ((length / 2) ** 2 - np.sum((p - (a + b) / 2) ** 2)) / length
+    return float(np.hypot(g, min(t, 0.0)))
+
+
+def to_zone(p: Any, center: Any, heading: float, zone: szlib.Ellipse) -> float:
+    """Eq. 7, in the frame of the ellipse."""
+    c, s = np.cos(heading), np.sin(heading)
+    middle = center + np.array([[c, -s], [s, c]]) @ np.asarray(zone.center)
+    tilt = heading + zone.angle
+    along = (p - middle) @ np.array([np.cos(tilt), np.sin(tilt)])
+    across = (p - middle) @ np.array([-np.sin(tilt), np.cos(tilt)])
+    a, f = zone.semi_axes[0], np.sqrt(zone.semi_axes[0] ** 2 - zone.semi_axes[1] ** 2)
+    return float((np.hypot(along - f, across) + np.hypot(along + f, across)) / 2 - a)
+
+
+@dataclass
+class Judge:
+    """What must hold around one robot."""
+
+    s: szlib.MPCSettings
+    walls: list[Any]
+    people: list[szlib.Person]
+
+    def margin(self, wall: Any) -> float:
+        needed = self.s.r_robot**2 / np.linalg.norm(wall[1] - wall[0])
+        return max(self.s.eps, needed if self.s.margin == "euclidean" else 0.0)
+
+    def h(self, p: Any, seconds: float = 0.0) -> Any:
+        found = []
+        for who in self.people:
+            center = np.array(who.position) + seconds * np.array(who.velocity)
+            found.append(to_zone(p, center, who.heading, who.zone) - self.s.r_robot - self.s.eps)
+        found += [paper_to_segment(p, wall) - self.s.r_robot - self.margin(wall) for wall in self.walls]
+        return np.array(found)
+
+    def gaps(self, p: Any, seconds: float = 0.0) -> Any:
+        found = [
+            np.linalg.norm(p - who.position - seconds * np.array(who.velocity)) - BODY for who in self.people
+        ]
+        found += [to_segment(p, wall) for wall in self.walls]
+        return np.array(found) - self.s.r_robot
+
+    def faults(self, state: Any, goal: Any, step: szlib.control.step.Step) -> Iterator[str]:
+        """What is not as it should be."""
+        s, x = self.s, step.predicted
+        if not (np.isfinite(x).all() and np.isfinite(step.control).all()):
+            yield "not finite"
+            return
+        u = np.diff(x[:, 2:], axis=0) / s.dt
+        moved = x[:-1, :2] + s.dt * x[:-1, 2:] + s.dt**2 / 2 * u
+        if not (same(x[0], state) and same(x[1:, :2], moved) and same(u[0], step.control)):
+            yield "plan is no motion"
+        if max(np.abs(u).max(), np.abs(step.control).max()) > s.a_max * (1 + NEAR) + NEAR / s.dt:
+            yield "out of bounds"
+        h = np.array([self.h(p, k * s.dt) for k, p in enumerate(x[:, :2])]).reshape(len(x), -1)
+        rows = (h[1 : s.N_h + 1] - (1 - s.gamma) * h[: s.N_h]).T
+        if not same(step.h, h[0]) or not same(step.residual, rows, np.abs(h).max(initial=1)):
+            yield "h or residual"
+        speeding = (x[1:, 2:] ** 2).sum(axis=1).max() - s.v_max**2
+        target = {"none": x[-1, 2:], "rest": np.zeros(2)}
+        end = self.people[0].velocity if step.terminal == "person" else target[step.terminal]
+        slack = max(0.0, -rows.min(initial=0.0), speeding, np.abs(x[-1, 2:] - end).max())
+        if not same(step.slack, slack, np.abs(h).max(initial=1)):
+            yield "slack"
+        if step.feasible != (step.slack <= TOLERANCE) or (step.status == "optimal" and not step.feasible):
+            yield "feasible or status"
+        gaps = np.array([self.gaps(p, k * s.dt) for k, p in enumerate(x[:, :2])]).reshape(len(x), -1)
+        if not same(step.clearance, gaps.T):
+            yield "clearance"
+        if step.safe:
+            ahead = state[:2] + s.dt * state[2:] + s.dt**2 / 2 * step.control
+            least = min(self.gaps(state[:2]).min(initial=1), self.gaps(ahead, s.dt).min(initial=1))
+            worst = min(self.h(state[:2]).min(initial=1), self.h(ahead, s.dt).min(initial=1))
+            if least < -TOLERANCE - NEAR or worst < -2 * TOLERANCE - NEAR or not step.feasible:
+                yield "safe"
+        on_goal = self.h(np.asarray(goal))[: len(self.people)]
+        standing = [h < -NEAR for h, who in zip(on_goal, self.people, strict=True) if not any(who.velocity)]
+        if any(standing) and not step.goal_blocked:
+            yield "goal_blocked"
+
+
+def same(one: Any, other: Any, scale: float = 1.0) -> bool:
+    return bool(np.allclose(one, other, rtol=NEAR, atol=NEAR * max(1.0, scale)))
+
+
+# what is tried
+
+
+def settings_of(rng: np.random.Generator, solver: str = "sqp") -> szlib.MPCSettings:
+    """Any settings that a robot may have."""
+    n = int(rng.integers(1, 13))
+    return szlib.MPCSettings(
+        dt=rng.uniform(0.02, 0.4),
+        N=n,
+        N_h=int(rng.integers(1, n + 1)),
+        gamma=10 ** rng.uniform(-2, 0),
+        Q=tuple(10 ** rng.uniform(-1, 2, 4)),
+        R=tuple(10 ** rng.uniform(-2, 2, 2)),
+        P=tuple(10 ** rng.uniform(-1, 3, 4)),
+        a_max=rng.uniform(0.2, 4),
+        v_max=rng.uniform(0.2, 3),
+        r_robot=rng.choice([0.0, rng.uniform(0.05, 0.8)]),
+        eps=rng.choice([0.0, 0.05, rng.uniform(0, 0.3)]),
+        margin=rng.choice(["euclidean", "euclidean", "paper"]),
+        tie=rng.choice([0.0, 0.25, 0.5]),
+        pass_side=rng.choice(["left", "right"]),
+        terminal=rng.choice(["none", "none", "rest", "person"]),
+        solver=solver,
+    )
+
+
+def person_of(rng: np.random.Generator) -> szlib.Person:
+    a = rng.uniform(0.3, 2)
+    zone = szlib.Ellipse(tuple(rng.uniform(-0.5, 0.5, 2)), (a, a * rng.uniform(0.1, 1)), rng.uniform(-3, 3))
+    velocity = rng.uniform(-1.5, 1.5, 2) * (rng.random() < 0.6)
+    return szlib.Person(tuple(rng.uniform(-5, 5, 2)), tuple(velocity), rng.uniform(-4, 4), zone)
+
+
+def attack_steps(count: int, tally: Counter[str], seed: int = 0, solver: str = "sqp") -> None:
+    """Steps in any state: driven for a while, then thrown elsewhere, with other people and goals."""
+    with tqdm(total=count, unit="step", desc=f"steps, {solver}", leave=False) as bar:
+        for k in range(count // A_SETTING):
+            rng = np.random.default_rng([seed, k])
+            s, here = settings_of(rng, solver), rng.uniform(-5, 5, (rng.integers(0, 5), 1, 2))
+            if s.terminal == "person":
+                here = here[:0]
+            turns, lengths = rng.uniform(-3, 3, len(here)), 10 ** rng.uniform(-2, 1.2, len(here))
+            reach = (lengths * np.array([np.cos(turns), np.sin(turns)])).T[:, None]
+            walls = list(np.concatenate([here, here + reach], axis=1))
+            count_people = int(rng.integers(0, 5))
+            controller = szlib.MPCCBF(
+                szlib.Ellipse((0, 0), (1, 1)), walls=walls, settings=s, max_people=count_people
+            )
+            state = goal = people = None
+            for i in range(A_SETTING):
+                if i % 10 == 0:
+                    state = np.r_[rng.uniform(-6, 6, 2), rng.uniform(-1.2, 1.2, 2) * s.v_max]
+                    goal = rng.uniform(-6, 6, 2)
+                    people = [person_of(rng) for _ in range(rng.integers(0, count_people + 1))]
+                judge, step = Judge(s, walls, people), None
+                reachable = Judge(s, walls, []).h(goal).min(initial=1)
+                try:
+                    step = controller.step(state, goal, people)
+                except szlib.SolverError:
+                    tally["goals refused"] += 1
+                    tally["broken: refused a goal that is clear of walls"] += int(reachable > NEAR)
+                    goal = state[:2] + 100.0
+                    continue
+                tally["steps"] += 1
+                tally["steps safe"] += int(step.safe)
+                tally[f"steps {step.rung}"] += 1
+                tally["steps timed out"] += int(step.timed_out)
+                for fault in judge.faults(state, goal, step):
+                    tally[f"broken: {fault}"] += 1
+                    tqdm.write(f"{fault}: seed [{seed}, {k}], step {i}, {s}")
+                u = step.control
+                state = np.r_[state[:2] + s.dt * state[2:] + s.dt**2 / 2 * u, state[2:] + s.dt * u]
+                people = [who.after(s.dt) for who in people]
+            bar.update(A_SETTING)
+
+
+def attack_worlds(seeds: range, tally: Counter[str], **parameters: Any) -> None:
+    """Whole runs: motion, barriers, overlaps, and what was said of them, from the states alone."""
+    for seed in tqdm(seeds, unit="world", leave=False):
+        log = replay(seed, **parameters)
+        judge = Judge(log.settings, list(log.scenario.walls), list(log.scenario.people))
+        dt, x, u = log.settings.dt, log.states, log.controls[:-1]
+        times = dt * np.arange(len(x))
+        h = np.array([judge.h(p, t) for p, t in zip(x[:, :2], times, strict=True)]).reshape(len(x), -1)
+        gaps = np.array([judge.gaps(p, t) for p, t in zip(x[:, :2], times, strict=True)]).reshape(len(x), -1)
+        people, numbers = len(judge.people), log.metrics()
+        moved = np.c_[x[:-1, :2] + dt * x[:-1, 2:] + dt**2 / 2 * u, x[:-1, 2:] + dt * u]
+        tally["worlds"] += 1
+        tally["worlds with h < 0"] += int(h.min(initial=1) < -TOLERANCE)
+        tally["worlds with an overlap of a wall"] += int(gaps[:, people:].min(initial=1) < -TOLERANCE)
+        tally["worlds with an overlap of a person"] += int(gaps[:, :people].min(initial=1) < -TOLERANCE)
+        said = log.safe[:-1]
+        tally["broken: safe before h < 0"] += int((said & (h[1:].min(axis=1, initial=1) < -1e-5)).sum())
+        tally["broken: safe before an overlap"] += int(
+            (said & (gaps[1:].min(axis=1, initial=1) < -1e-5)).sum()
+        )
+        tally["broken: no motion"] += int(not same(x[1:], moved))
+        tally["broken: out of bounds"] += bool((np.abs(u) > log.settings.a_max + NEAR).any())
+        tally["broken: metrics"] += not (
+            same(numbers["min_h"], h.min(initial=np.inf)) and same(numbers["min_clearance"], gaps.min())
+            if h.size
+            else True
+        )
+
+
+def cruel_states(seed: int) -> Iterator[tuple[Any, Any, list[szlib.Person], list[Any]]]:
+    """Deep inside zones that move against each other, at speed, between walls: here solvers take longest."""
+    rng = np.random.default_rng(seed)
+    zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+    while True:
+        x, spread, pace = (
+            rng.uniform(-2, 2, 2),
+            rng.choice([0.01, 0.3, 1.5]),
+            rng.choice([0.0, 0.7, 1.0, 3.0]),
+        )
+        walls = [np.array([p, p + rng.uniform(-3, 3, 2)]) for p in rng.uniform(-2, 2, (rng.integers(5), 2))]
+        people = [
+            szlib.Person(tuple(x + rng.normal(0, spread, 2)), tuple(rng.uniform(-1, 1, 2)), zone=zone)
+            for _ in range(rng.integers(1, 6))
+        ]
+        yield np.r_[x, rng.uniform(-1, 1, 2) * pace], (30.0, 20.0), people, walls
+
+
+def attack_time(count: int, tally: Counter[str], solver: str, **settings: Any) -> None:
+    """The time that a step takes of its thread, against its limit."""
+    s = szlib.MPCSettings(solver=solver, N_h=8, gamma=0.5, **settings)
+    took = []
+    for state, goal, people, walls in tqdm(
+        islice(cruel_states(5), count), total=count, desc=f"cruel, {solver}", leave=False
+    ):
+        controller = szlib.MPCCBF(szlib.Ellipse((0, 0), (1, 1)), walls=walls, settings=s, max_people=5)
+        begun = time.thread_time()
+        step = controller.step(state, goal, people)
+        took.append(time.thread_time() - begun)
+        tally[f"cruel states, {solver}"] += 1
+        tally[f"timed out, {solver}"] += int(step.timed_out)
+        for fault in Judge(s, walls, people).faults(state, goal, step):
+            tally[f"broken: {fault}"] += 1
+    for name, share in (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)):
+        tally[f"{name} of cruel steps, {solver} [ms]"] = round(1e3 * float(np.quantile(took, share)), 2)
+    over = sum(each > 2 * s.time_limit for each in took)  # clocks of computing time may tick every 10 ms
+    tally["broken: took longer than two limits"] += over
+
+
+def attack(long: bool) -> Counter[str]:
+    tally: Counter[str] = Counter()
+    attack_steps(STEPS[long], tally)
+    attack_steps(STEPS[long] // 50 * 2 // A_SETTING * A_SETTING, tally, seed=1, solver="ipopt")
+    attack_worlds(range(FIRST_WORLD, FIRST_WORLD + WORLDS[long] // 2), tally)
+    rest = szlib.MPCSettings(terminal="rest")
+    attack_worlds(range(FIRST_WORLD, FIRST_WORLD + WORLDS[long] // 2), tally, settings=rest)
+    for solver in ("sqp", "ipopt"):
+        attack_time(CRUEL[long], tally, solver)
+    return tally

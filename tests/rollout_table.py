@@ -1,0 +1,89 @@
+"""The table of random worlds, with intervals: `python tests/rollout_table.py [--blocks 4] [--worlds 2000]`.
+
+Writes notebooks/tables/11_rollouts.csv: a row for each set of worlds and formulation, over blocks of seeds
+far apart, each share with its 95 % Clopper-Pearson interval, and the counts of the single blocks. Finished
+worlds are kept in results/rollouts, so that a run that was stopped goes on.
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from scipy.stats import beta
+
+import szlib
+from szlib.control.problem import TOLERANCE
+from szlib.simulation.rollouts import rollouts, tally
+from szlib.simulation.worlds import ONE_PERSON, Worlds
+
+TABLE = Path(__file__).parent.parent / "notebooks" / "tables" / "11_rollouts.csv"
+APART = 1_000_000
+"""Seeds between the first ones of two blocks; block 0 starts at this as well."""
+FORMULATIONS = {
+    "paper": szlib.MPCSettings(),
+    "whole horizon": szlib.MPCSettings(N_h=szlib.MPCSettings.N),
+    "rest": szlib.MPCSettings(terminal="rest"),
+    "paper, margin = paper": szlib.MPCSettings(margin="paper"),
+    "paper, gamma = 0.2": szlib.MPCSettings(gamma=0.2),
+    "paper, gamma = 0.8": szlib.MPCSettings(gamma=0.8),
+}
+SETS: dict[str, tuple[Worlds, tuple[str, ...]]] = {
+    "all": (Worlds(), ("paper", "rest", "paper, margin = paper")),
+    "one person": (
+        ONE_PERSON,
+        ("paper", "whole horizon", "rest", "paper, gamma = 0.2", "paper, gamma = 0.8"),
+    ),
+}
+"""Worlds, and the formulations that drive in them."""
+EVENTS = {"h < 0": "min_h", "overlap wall": "min_clearance_walls", "overlap person": "min_clearance_people"}
+"""What may happen in a world, and the column that is negative then."""
+
+
+def interval(count: int, n: int, level: float = 0.95) -> tuple[float, float]:
+    """Clopper-Pearson: the shares under which `count` of `n` or fewer, or more, is not too unlikely."""
+    tail = (1 - level) / 2
+    low = float(beta.ppf(tail, count, n - count + 1)) if count else 0.0
+    return low, float(beta.ppf(1 - tail, count + 1, n - count)) if count < n else 1.0
+
+
+def row(blocks: list[pd.DataFrame]) -> dict[str, Any]:
+    """All blocks in one line."""
+    rows = pd.concat(blocks, ignore_index=True)
+    line = tally(rows).to_dict()
+    line["worlds of blocks"] = " ".join(str(len(block)) for block in blocks)
+    for event, column in EVENTS.items():
+        happened = [int((block[column] < -TOLERANCE).sum()) for block in blocks]
+        line[f"worlds {event}"] = sum(happened)
+        line[f"low {event}"], line[f"high {event}"] = interval(sum(happened), len(rows))
+        line[f"blocks {event}"] = " ".join(map(str, happened))
+    line["largest solve_time [s]"] = float(rows["solve_time_max"].max())
+    return line
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--blocks", type=int, default=4, help="blocks of fresh seeds")
+    parser.add_argument("--worlds", type=int, default=2000, help="worlds in a block")
+    parser.add_argument("--jobs", type=int, default=-1, help="processes")
+    parser.add_argument("--out", default="results/rollouts", help="where finished worlds are kept")
+    given = parser.parse_args()
+    tables: dict[tuple[str, str], list[pd.DataFrame]] = {}
+    for name, (worlds, formulations) in SETS.items():
+        for block in range(given.blocks):
+            for formulation in formulations:
+                table = rollouts(
+                    given.worlds,
+                    seed=(block + 1) * APART,
+                    settings=FORMULATIONS[formulation],
+                    worlds=worlds,
+                    out=given.out,
+                    n_jobs=given.jobs,
+                )
+                tables.setdefault((name, formulation), []).append(table)
+                lines = [{"set": s, "formulation": f, **row(blocks)} for (s, f), blocks in tables.items()]
+                pd.DataFrame(lines).round(6).to_csv(TABLE, index=False)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+"""Different recordings are told apart, pieces of one are put together, and only regular files are read."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import signal
+import tempfile
+from pathlib import Path
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+import szlib
+from szlib import memory
+from szlib.errors import MemoryLimitError, StorageError
+from szlib.tracks import datasets, formats
+from szlib.tracks.readers import read_raw
+
+BEGIN = 1_351_040_400.0
+
+
+def recording(
+    x: float, *, begin: float = 0.0, people: range = range(1, 5), seconds: int = 30
+) -> pd.DataFrame:
+    """People who walk to the right from x, each on a line of their own; two rows a second."""
+    rows = [(begin + k / 2, p, x + k / 2, float(p)) for p in people for k in range(2 * seconds)]
+    return pd.DataFrame(rows, columns=["t", "id", "x", "y"])
+
+
+def write(path: Path, rows: pd.DataFrame) -> Path:
+    path.parent.mkdir(exist_ok=True)
+    rows.to_csv(path, index=False)
+    return path
+
+
+def fastest(tracks: pd.DataFrame) -> float:
+    return float(tracks[["vx", "vy"]].abs().max().max())
+
+
+def test_two_recordings_whose_clocks_begin_at_zero_stay_two(tmp_path: Path) -> None:
+    files = [write(tmp_path / name / "rec.csv", recording(x)) for name, x in (("a", 0.0), ("b", 50.0))]
+    tracks = szlib.read_tracks(files)
+    assert set(tracks["day"]) == {"a-rec", "b-rec"}, "the same stem in two folders"
+    assert fastest(tracks) < 1.5, "nobody jumps"
+    assert set(szlib.read_tracks(files[0])["day"]) == {"rec"}
+
+
+def test_pieces_of_one_recording_are_put_together_whatever_its_clock(tmp_path: Path) -> None:
+    for begin in (0.0, BEGIN):
+        whole = recording(0.0, begin=begin)
+        early = whole["t"] < begin + 12
+        files = [write(tmp_path / "one.csv", whole[early]), write(tmp_path / "two.csv", whole[~early])]
+        tracks = szlib.read_tracks(files)
+        assert tracks["day"].nunique() == 1
+        assert tracks.groupby("id").size().tolist() == [296] * 4
+
+
+def test_a_person_in_two_places_at_once_is_never_accepted_in_silence(tmp_path: Path) -> None:
+    one = write(tmp_path / "one.csv", recording(0.0, begin=BEGIN))
+    other = write(tmp_path / "other.csv", recording(50.0, begin=BEGIN))
+    with pytest.warns(szlib.DataWarning, match="4 people are in two places at once; read as two recordings"):
+        tracks = szlib.read_tracks([one, other])
+    assert set(tracks["day"]) == {"2012-10-24", "2012-10-24 other"}
+    assert fastest(tracks) < 1.5
+    mostly = pd.concat([recording(50.0, begin=BEGIN, people=range(1, 2)),
+                        recording(30.0, begin=BEGIN + 30, people=range(2, 5))])  # fmt: skip
+    with pytest.raises(szlib.DataError, match="person 1 is in two places at once"):
+        szlib.read_tracks([one, write(tmp_path / "mostly.csv", mostly)])
+
+
+@pytest.fixture
+def alarm() -> None:
+    signal.alarm(20)
+    yield
+    signal.alarm(0)
+
+
+@pytest.mark.usefixtures("alarm")
+def test_only_regular_files_are_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "fifo.csv")
+    for path in (tmp_path / "fifo.csv", Path("/dev/zero")):
+        for read in (read_raw, datasets.find):
+            with pytest.raises(szlib.DataError, match="is no regular file"):
+                read(path)
+    good = write(tmp_path / "good.csv", recording(0.0))
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.warns(szlib.DataWarning, match="left out what is no regular file: 2 x"):
+        assert datasets.find(str(tmp_path / "*.csv")) == [good]
+
+
+@pytest.mark.parametrize("glob", ["a**b", "x" * 300, "nowhere/*.csv"])
+def test_globs_that_lead_nowhere(glob: str) -> None:
+    with pytest.raises(szlib.DataError, match=r"cannot be looked up|no such file"):
+        datasets.find(glob)
+
+
+def test_a_doubled_column_is_named(tmp_path: Path) -> None:
+    columns = [pa.array([0.0, 1.0])] * 5
+    pq.write_table(pa.Table.from_arrays(columns, names=["t", "id", "x", "y", "x"]), tmp_path / "a.parquet")
+    with pytest.raises(szlib.DataError, match="names x twice; rename one of them"):
+        read_raw(tmp_path / "a.parquet")
+
+
+def test_a_full_temporary_folder_is_no_damaged_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    packed = tmp_path / "a.csv.gz"
+    packed.write_bytes(gzip.compress(recording(0.0).to_csv(index=False).encode()))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "no such folder"))
+    with pytest.raises(StorageError, match=r"no temporary folder .*TMPDIR"):
+        read_raw(packed)
+    full = tmp_path / "full"
+    full.mkdir()
+    (full / "unpacked").symlink_to("/dev/full")
+    with pytest.raises(StorageError, match=r"no room to unpack it .*No space left"):
+        formats._unpack(packed, full / "unpacked")
+    with pytest.raises(szlib.DataError, match=r"damaged \.gz"):
+        (tmp_path / "cut.gz").write_bytes(packed.read_bytes()[:-30])
+        formats._unpack(tmp_path / "cut.gz", tmp_path / "unpacked")
+
+
+def test_what_memory_cannot_take_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    file = write(tmp_path / "a.csv", recording(0.0))
+    for name in ("a.csv.gz", "a.csv"):
+        (tmp_path / "a.csv.gz").write_bytes(gzip.compress(file.read_bytes()))
+        with memory.granted(10_000), pytest.raises(MemoryLimitError, match="to read 241 rows takes about"):
+            read_raw(tmp_path / name)
+    recording(0.0).to_parquet(tmp_path / "a.parquet")
+    with memory.granted(10_000), pytest.raises(MemoryLimitError, match="to read 240 rows"):
+        read_raw(tmp_path / "a.parquet")
+    raw = read_raw(file)
+    with memory.granted(10_000), pytest.raises(MemoryLimitError, match=r"the clock: 1,180 ticks of 240 rows"):
+        szlib.tracks.clock.to_clock(raw)

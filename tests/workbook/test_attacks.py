@@ -1,0 +1,258 @@
+"""What was once lost or wrongly believed: folders, stale results, parameters, endings."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import szlib
+from szlib.errors import DataError, StorageError
+from szlib.plaza.people import make_plaza
+from szlib.plaza.truth import PlazaSettings
+from szlib.tracks import datasets
+from szlib.workbook import places, record, runner
+from szlib.workbook.command_line import main
+from szlib.workbook.parameters import check_parameters
+from szlib.workbook.record import NotebookRecord
+
+HERE = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
+
+
+def refused(arguments, capsys, message):
+    """It ends with 2, and one line says why."""
+    assert main(arguments) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+
+
+def test_tracks_are_never_overwritten_by_encounters(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tracks").mkdir()
+    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=5))
+    szlib.read_tracks(day).to_parquet(tmp_path / "tracks" / "day.parquet")
+    before = (tmp_path / "tracks" / "day.parquet").read_bytes()
+    refused(["extract", "tracks", "--out", "tracks"], capsys, "holds data that is to be read")
+    refused(["extract", "day.csv", "--out", "tracks"], capsys, "holds what szlib did not write")
+    assert (tmp_path / "tracks" / "day.parquet").read_bytes() == before
+
+
+def test_results_go_nowhere_but_into_folders_of_our_own(notebooks, tmp_path, capsys):
+    notebooks(_01_one="")
+    refused(["run", "--data", "mine.csv", "--out", "."], capsys, "holds what szlib did not write")
+
+
+def test_one_data_set_has_one_folder_by_whatever_name(notebooks, tmp_path):
+    notebooks(_01_one='record.table(__import__("pandas").DataFrame({"a": [1]}), "table")')
+    (tmp_path / "dir").mkdir()
+    (tmp_path / "dir" / "b.csv").write_bytes((tmp_path / "mine.csv").read_bytes())
+    (tmp_path / "today.csv").symlink_to("mine.csv")
+    for data, name in (("dir/.", "dir"), ("di*/*.csv", "files"), ("today.csv", "today")):
+        assert main(["run", "--data", data, "--out", "out", "--jobs", "1"]) == 0, data
+        left = {path.name for path in (tmp_path / "out" / name).iterdir()}
+        assert {"summary.json", "01_one.ipynb", "table.csv", "records"} <= left, data
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {".szlib", "dir", "files", "today"}
+
+
+def test_data_sets_of_one_name_do_not_share_results(tmp_path):
+    homes = {places.home(tmp_path / "out", str(tmp_path / name / "day.csv")) for name in "ab"}
+    assert len(homes) == 2
+    again = places.home(tmp_path / "out", str(tmp_path / "a" / "day.csv"))
+    assert again == tmp_path / "out" / "day" and again in homes
+    assert places.home(tmp_path / "out", str(tmp_path / "synthetic.csv")).name == "synthetic"
+    assert places.home(tmp_path / "out", "synthetic").name.startswith("synthetic-")
+    assert datasets.label("a/dir/.") == "dir"
+
+
+def test_encounters_and_zone_of_another_day_of_the_same_name_and_size_are_not_served(tmp_path, monkeypatch):
+    file = tmp_path / "day.csv"
+    make_plaza(file, settings=PlazaSettings(encounters=60))
+    samples = NotebookRecord("02", data=str(file), results=tmp_path / "out").encounters()
+    size, content = file.stat().st_size, file.read_text().splitlines(keepends=True)
+    file.write_text("".join(content[len(content) // 2 :]))
+    with file.open("a") as stream:  # a row that cannot be used, to make up the size
+        stream.write("9" * (size - file.stat().st_size - 1) + "\n")
+    later = NotebookRecord("02", data=str(file), results=tmp_path / "out")
+    with pytest.warns(szlib.DataWarning):
+        assert len(later.encounters()) < len(samples)
+    artefact = later.out / "encounters.parquet"
+    artefact.write_bytes(artefact.read_bytes()[:-100])
+    with pytest.warns(szlib.DataWarning):
+        assert len(later.encounters()) > 0, "what is damaged is healed"
+    assert len(pd.read_parquet(artefact)) > 0
+
+
+def test_a_foreign_plaza_is_not_taken_for_ours(tmp_path, monkeypatch):
+    (tmp_path / "plaza-0.csv").write_text("1,2,3,4,5,6,7,8\n")
+    small = PlazaSettings(encounters=3)
+    monkeypatch.setattr(record, "make_plaza", lambda file, seed: make_plaza(file, seed=seed, settings=small))
+    (file,) = record.data_files("synthetic", folder=tmp_path, seed=0)
+    assert len(file.read_text().splitlines()) > 100
+    monkeypatch.setattr(record, "make_plaza", None)
+    assert record.data_files("synthetic", folder=tmp_path, seed=0) == [file], "ours is not made again"
+
+
+def test_an_extraction_gives_its_own_samples_or_none(tmp_path):
+    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=30))
+    first = szlib.extract_days(day, out=tmp_path / "out", progress=False)
+    assert len(first.samples()) > 0
+    szlib.extract_days(day, out=tmp_path / "out", progress=False, min_speed=1.2)
+    with pytest.raises(DataError, match="no longer what this extraction has left there"):
+        first.samples()
+
+
+def test_a_poisoned_day_is_a_line_and_the_others_are_done(tmp_path, monkeypatch):
+    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=5))
+    (tmp_path / os.fsdecode(b"latin\xe4.csv")).write_bytes(day.read_bytes())
+    (tmp_path / "other.csv").write_bytes(day.read_bytes())
+    import szlib.encounters.days as days
+
+    real = days.day_key
+
+    def poisoned(files, chain):
+        if files[0].endswith("other.csv"):
+            raise KeyError("foreign")
+        return real(files, chain)
+
+    monkeypatch.setattr(days, "day_key", poisoned)
+    monkeypatch.setattr(days, "_day_of", lambda file, chain: None)
+    done = szlib.extract_days(tmp_path, out=tmp_path / "out", progress=False).table.set_index("day")
+    assert done["status"].to_dict() == {"day": "done", r"latin\xe4": "failed", "other": "failed"}
+    assert done["why"]["other"] == "KeyError: 'foreign'"
+    assert "rename the file" in done["why"][r"latin\xe4"]
+
+
+def test_a_run_that_fails_leaves_no_summary_that_passed(notebooks, tmp_path, monkeypatch):
+    notebooks(_01_one='record.check("ok", True)')
+    arguments = ["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]
+    assert main(arguments) == 0
+    monkeypatch.setattr(runner, "_submit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert main(arguments) == 130
+    assert not (tmp_path / "out" / "mine" / "summary.json").exists()
+    assert not list((tmp_path / "out" / "mine" / "records").iterdir())
+
+
+@pytest.mark.parametrize("garbage", ["summary.json", "zone.json", "records"])
+def test_results_with_garbage_in_them(notebooks, tmp_path, capsys, garbage):
+    notebooks(_01_one="")
+    home = places.home(tmp_path / "out", str(tmp_path / "mine.csv"))
+    (home / garbage).write_text("") if garbage == "records" else (home / garbage).mkdir()
+    refused(["run", "--data", "mine.csv", "--out", "out"], capsys, f"{garbage}: is in the way")
+
+
+def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks, tmp_path, capsys):
+    full = 'from szlib.errors import StorageError\nraise StorageError("no room")'
+    notebooks(_01_full=full, _06_fine='record.check("ok", True)')
+    assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
+    printed = capsys.readouterr()
+    assert "01_full: could not be run: StorageError: no room; what was finished stays" in printed.err
+    left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
+    assert {n: r["status"] for n, r in left["notebooks"].items()} == {"01_full": "refused", "06_fine": "done"}
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"seed": -1}, "seed: expected 0 to"),
+        ({"seed": float("inf")}, "seed: expected int"),
+        ({"seed": 10**5000}, "a number too long to print"),
+        ({"seed": None}, "seed: expected int"),
+        ({"gamma": 2.0}, r"gamma must be in \(0, 1\]"),
+        ({"gamma": 0}, r"gamma must be in \(0, 1\]"),
+        ({"gamma": float("nan")}, "expected a finite number"),
+        ({"gamma": "__import__('os')"}, "gamma: expected float"),
+        ({"gammas": [0.1, 3.0]}, "gamma must be in"),
+        ({"gammas": []}, "gammas: expected values such as"),
+        ({"gammas": [0.1, "x"]}, "gammas: expected float"),
+        ({"horizons": [0]}, "N_h must be a whole number >= 1"),
+        ({"speeds": [-1.0]}, "speeds: expected 0.01 to 10"),
+        ({"fraction": 0.9}, "fraction: expected 0 to 0.5"),
+        ({"n_jobs": 0}, "n_jobs"),
+        ({"results": "x"}, "is set by --out"),
+    ],
+)
+def test_parameters_are_checked_before_any_notebook_starts(given, message):
+    with pytest.raises(DataError, match=message):
+        check_parameters(given, sorted(runner.NOTEBOOKS.glob("[0-9][0-9]_*.py")))
+
+
+def test_what_the_notebooks_set_themselves_is_in_range():
+    from szlib.workbook.parameters import defaults_of
+
+    for source in runner.NOTEBOOKS.glob("[0-9][0-9]_*.py"):
+        given = {n: v for n, v in defaults_of(source).items() if n not in ("data", "results")}
+        check_parameters(given, [source])
+
+
+def test_a_parameter_is_text_to_a_notebook_and_never_code(notebooks, tmp_path):
+    notebooks(_01_one='record.key["word"] = word')
+    source = tmp_path / "notebooks" / "01_one.py"
+    source.write_text(source.read_text().replace("seed = 0\n", 'seed = 0\nword = ""\n', 1))
+    evil = "\"; __import__('pathlib').Path('pwned').touch(); '\"\"\""
+    summary = runner.run("mine.csv", out="out", parameters={"word": evil})
+    assert summary["notebooks"]["01_one"]["key_figures"]["word"] == evil
+    assert not list(tmp_path.rglob("pwned"))
+
+
+@pytest.mark.parametrize("value", ["9" * 5000, "[" * 100_000])
+def test_values_that_cannot_even_be_read(value, capsys):
+    refused(["run", "-p", f"seed={value}"], capsys, "seed")
+
+
+def command(*arguments, **options):
+    code = "import sys; from szlib.workbook.command_line import main; sys.exit(main())"
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *arguments], env=HERE | options.pop("env", {}), text=True,
+        stderr=subprocess.PIPE, **options,
+    )  # fmt: skip
+
+
+def test_standard_output_that_is_full_or_knows_ascii_only(tmp_path):
+    make_plaza(tmp_path / "plätze.csv", settings=PlazaSettings(encounters=3))
+    with Path("/dev/full").open("w") as full:
+        done = command("inspect", str(tmp_path / "plätze.csv"), stdout=full)
+        _, printed = done.communicate()
+    assert done.returncode == 2
+    assert printed.splitlines() == ["szlib: [Errno 28] No space left on device"]
+    ascii_only = {"PYTHONIOENCODING": "ascii"}
+    done = command("inspect", str(tmp_path / "plätze.csv"), stdout=subprocess.PIPE, env=ascii_only)
+    assert r"pl\xe4tze" in done.communicate()[0]
+    assert done.returncode == 0
+
+
+def test_sigterm_ends_a_command_as_ctrl_c_does(tmp_path):
+    days = [make_plaza(tmp_path / f"d{k}.csv", settings=PlazaSettings(encounters=300, date=f"2000-01-0{k}"))
+            for k in range(1, 6)]  # fmt: skip
+    done = command("extract", *map(str, days), "--out", str(tmp_path / "out"))
+    while not list(tmp_path.glob("out/*.json")) and done.poll() is None:
+        time.sleep(0.01)
+    done.send_signal(signal.SIGTERM)
+    _, printed = done.communicate()
+    assert done.returncode == 143
+    assert "szlib: stopped; what was finished stays in the results" in printed
+    assert not list(tmp_path.rglob(".szlib-*"))
+
+
+@pytest.mark.filterwarnings("default")
+def test_jobs_are_capped_and_that_is_said(tmp_path, capsys):
+    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=3))
+    assert main(["extract", str(day), "--out", str(tmp_path / "out"), "--jobs", "100000"]) == 0
+    assert "of 100000 processes 1 are used" in capsys.readouterr().err
+
+
+def test_memory_is_granted_by_the_command_line(tmp_path, capsys):
+    file = tmp_path / "day.csv"
+    file.write_text("t,id,x,y\n" + "0,1,0,0\n" * 20_000)
+    refused(
+        ["inspect", str(file), "--memory", "1MB"], capsys, "to read 20,001 rows takes about 3 MB of memory"
+    )
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    with pytest.raises(StorageError, match="cannot be made or read"):
+        places.home("/proc/nowhere", "synthetic")
