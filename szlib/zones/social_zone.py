@@ -212,8 +212,8 @@ class SocialZone:
         """What the zone at a speed [m/s] lacks to be relied on; "" where it is adequate."""
         if self.seen is None:
             return (
-                f"the zone at {speed:g} m/s is of unknown worth: who was seen on which side is not known "
-                "(an older file, or samples without `encounter`); fit it again"
+                "the zone is of unknown worth: who was seen on which side is not known (an older file, or "
+                "samples without `encounter`); fit it again"
             )
         return missing_sides(self.seen, float(speed))
 
