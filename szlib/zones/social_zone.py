@@ -26,7 +26,7 @@ from ..errors import DataWarning, ZoneError
 from ..tracks.clock import check_columns
 from .ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
 from .hulls import HullZones, Slice, hull_vertices, slice_hull
-from .outliers import R_MAX
+from .outliers import R_MAX, encounter_numbers
 from .quantile import QuantileZones
 from .radii import Radii
 from .respect.estimate import RespectZones
@@ -149,7 +149,7 @@ class SocialZone:
         provenance = {
             "szlib": __version__,
             "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
-            "encounters": int(samples["encounter"].nunique()) if "encounter" in samples else None,
+            "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
             "parameters": {"method": method, "r_max": float(r_max), **estimate.parameters},
             "funnel": estimate.funnel,
         }
@@ -212,8 +212,8 @@ class SocialZone:
         """What the zone at a speed [m/s] lacks to be relied on; "" where it is adequate."""
         if self.seen is None:
             return (
-                f"the zone at {speed:g} m/s is of unknown worth: who was seen on which side is not known "
-                "(an older file, or samples without `encounter`); fit it again"
+                "the zone is of unknown worth: who was seen on which side is not known (an older file, or "
+                "samples without `encounter`); fit it again"
             )
         return missing_sides(self.seen, float(speed))
 
