@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import hypothesis
@@ -86,3 +86,39 @@ def real_tracks() -> pd.DataFrame:
 def real_samples(real_tracks: pd.DataFrame) -> pd.DataFrame:
     """The encounters of the real day."""
     return szlib.find_encounters(real_tracks)
+
+
+NOTEBOOK = """# %%
+import pathlib
+
+from szlib.workbook.record import NotebookRecord
+
+# %% tags=["parameters"]
+data = "synthetic"
+seed = 0
+results = "../results"
+
+# %%
+record = NotebookRecord("{name}", data=data, results=results, seed=seed)
+record.key["seed"] = seed
+"""
+"""What a notebook of a test begins with."""
+
+
+@pytest.fixture
+def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """A workbook of one's own: `notebooks(name=code)` writes them; its data is a file of two rows."""
+    from szlib.workbook import runner
+
+    folder = tmp_path / "notebooks"
+    folder.mkdir()
+    monkeypatch.setattr(runner, "NOTEBOOKS", folder)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.csv").write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n")
+
+    def write(**codes: str) -> None:
+        for name, code in codes.items():
+            text = NOTEBOOK.format(name=f"{name[1:]}") + code + "\n\n# %%\nrecord.close()\n"
+            (folder / f"{name[1:]}.py").write_text(text)
+
+    return write
