@@ -21,7 +21,7 @@ from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 
 KILLS = {False: 1, True: 50}
-GRACE = 8.0
+GRACE = 20.0
 """So long after the end of a command its processes may take to end [s]."""
 PROGRAM = """
 import sys
