@@ -72,7 +72,8 @@ def sensitivity(
         except (ZoneError, DataError):
             if not rows:
                 raise
-        rows.append((parameter, str(value), count, *sizes))
+        text = ", ".join(value) if isinstance(value, tuple) else str(value)
+        rows.append((parameter, text, count, *sizes))
 
     usual = find_encounters(tracks, square=square)
     add("default", "", usual)

@@ -200,3 +200,37 @@ def test_an_animation_has_a_frame_for_every_time_asked(log):
     with Image.open(io.BytesIO(figures.animate(log, every=1.0, width=3.0))) as movie:
         assert movie.format == "GIF"
         assert movie.n_frames == int(np.floor(log.table["t"].iloc[-1] + 1e-9)) + 1
+
+
+# --- respect, claims, what moves a zone --------------------------------------------------------------
+
+
+def test_the_map_of_g_is_in_metres_and_names_its_contour():
+    direction, distance = np.linspace(0.1, 6.1, 36), np.linspace(0.05, 1.95, 40)
+    g = np.tile(1 / (1 + np.exp(-(distance - 0.8) / 0.1)), (36, 1))
+    ax = figures.plot_pair_correlation(szlib.PairCorrelation(distance, direction, g), radius=0.8)
+    assert in_metres(ax)
+    assert "all bearings: 0.80 m" in [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_sizes_by_number_have_a_band_each():
+    sizes = {"a": [1.2, 1.0], "a_low": [1.0, 0.9], "a_high": [1.5, 1.1]}
+    ax = figures.plot_by_number(pd.DataFrame({"encounters": [10, 100], **sizes}), {"a": "hull"})
+    assert ax.get_xscale() == "log" and "[m]" in ax.get_ylabel()
+    assert len(ax.collections) == len(ax.lines) == 1
+
+
+def test_a_tornado_puts_what_moves_most_on_top():
+    rows = [("default", "", 2.0), ("r_max", "1.5", 1.9), ("speed", "0.9", 0.5), ("speed", "1.3", 4.0)]
+    ax = figures.plot_tornado(pd.DataFrame(rows, columns=["parameter", "value", "area"]))
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["r_max", "speed"]
+
+
+def test_findings_are_told_apart_by_more_than_colour():
+    table = pd.DataFrame(
+        {"claim": list("abc"), "effect": [1.0, -1.0, 0.1], "low": [0.5, -2, -1], "high": [2.0, -0.5, 1],
+         "verdict": ["supported", "contradicted", "not decidable with n = 3"]}
+    )  # fmt: skip
+    ax = figures.plot_findings(table)
+    assert len({line.get_marker() for line in ax.lines if line.get_marker() != "None"}) == 3
+    assert [label.get_text() for label in ax.get_yticklabels()] == list("abc")

@@ -167,11 +167,10 @@ def plot_tornado(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     at = np.arange(len(spans))
     ax.barh(at, spans["high"] - spans["low"], left=spans["low"], color=BLUE, alpha=0.35, height=0.6)
     row = dict(zip(spans.index, at.tolist(), strict=True))
-    for name, value, area in varied[["parameter", "value", "area"]].itertuples(index=False):
+    for i, (name, value, area) in enumerate(varied[["parameter", "value", "area"]].itertuples(index=False)):
         ax.plot(area, row[name], "o", color=BLUE, markersize=4)
-        ax.annotate(
-            str(value), (area, row[name]), (0, 6), textcoords="offset points", ha="center", fontsize=7
-        )
+        beside = (0, 7 if i % 2 else -13)  # so that neighbours do not overlap
+        ax.annotate(value, (area, row[name]), beside, textcoords="offset points", ha="center", fontsize=7)
     ax.axvline(usual, color=BLACK, linewidth=1.2, label=f"defaults: {usual:.2f} m$^2$")
     ax.set_yticks(at, list(spans.index))
     ax.set(xlabel="area of the zone [m$^2$]", ylim=(-0.6, len(spans) - 0.2))
