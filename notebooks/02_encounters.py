@@ -97,6 +97,20 @@ if data == "atc-1hz":
     )
 
 # %% [markdown]
+# ## Who they are to each other
+#
+# The paper takes everybody. But two people who walk together keep near each other by choice. The kind of an
+# encounter is decided on the whole common track of the two people, and kept in the column `kind`;
+# `szlib.of_kind(samples, "strangers")` leaves companions out. Notebooks 05, 15 and 16 show both.
+
+# %%
+kinds = first["kind"].value_counts()
+strangers = szlib.of_kind(samples, "strangers")["encounter"].nunique()
+record.key["strangers"] = strangers
+record.check("strangers are all but companions", strangers == count - kinds["companions"], strangers)
+kinds.to_frame("encounters")
+
+# %% [markdown]
 # ## What they look like
 #
 # Each path starts at a dot and is drawn in the frame that the reference pedestrian had when the
