@@ -174,7 +174,8 @@ def plot_tornado(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     ax.axvline(usual, color=BLACK, linewidth=1.2, label=f"defaults: {usual:.2f} m$^2$")
     ax.set_yticks(at, list(spans.index))
     ax.set(xlabel="area of the zone [m$^2$]", ylim=(-0.6, len(spans) - 0.2))
-    ax.legend(loc="lower right", fontsize=8)
+    ax.margins(x=0.1)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), fontsize=8)
     return ax
 
 
