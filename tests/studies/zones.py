@@ -8,8 +8,9 @@
     python tests/studies/zones.py two_sided 3 > notebooks/tables/16_two_sided.csv         (plazas a truth)
 
 Coverage: share of the 95 % intervals, from 600 pairs, that hold the truth of the plaza, and the limit: what
-the quantile gives for the people of all these plazas together (a hull has no limit: it shrinks).  Files of
-subsets are a day of tracks, as `szlib.read_tracks` reads them.
+the quantile gives for the people of all these plazas together (a hull has no limit: it shrinks).  The column
+plazas says how many are in the table kept: for time, only 110 of the default truth.  Files of subsets are a
+day of tracks, as `szlib.read_tracks` reads them.
 """
 
 from __future__ import annotations
