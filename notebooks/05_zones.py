@@ -28,7 +28,7 @@ import pandas as pd
 
 import szlib
 from szlib.plaza.truth import PlazaSettings
-from szlib.workbook import figures
+from szlib.workbook import claims, figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
@@ -157,16 +157,10 @@ seen = near.groupby(sector, observed=False).agg(
 seen.round(2)
 
 # %%
-behind, _, ahead, _, _ = (float(r) for r in np.hypot(*zone.boundary(1.1, 5).T))
 few = int(seen["encounters"].iloc[[0, -1]].sum())
-value = f"{ahead:.2f} m ahead; {behind:.2f} m behind, where {few} encounters were in view"
-record.claim("the zone at 1.1 m/s reaches farther ahead than behind", ahead > behind, value)
-row = zone.table().set_index("speed").loc[1.1]
-record.claim(
-    "the ellipse is centred ahead of the person",
-    row["center_x_low"] > 0,
-    f"centre {row['center_x']:+.2f} m [{row['center_x_low']:+.2f}, {row['center_x_high']:+.2f}]",
-)
+ahead = claims.larger_ahead(zone)
+value = f"{ahead}; {few} encounters were in view behind"
+record.claim("the zone at 1.1 m/s reaches farther ahead than behind", ahead.verdict == "supported", value)
 
 # %% [markdown]
 # On the plaza this is so by construction, and the data shows only part of it: whoever is behind
