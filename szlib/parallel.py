@@ -68,8 +68,13 @@ def bounded(n_jobs: int | None, tasks: int) -> int | None:
     return min(n_jobs, most, max(tasks, 1))
 
 
-def end_with(parent: int) -> None:
-    """End this process as soon as `parent`, if it is its parent, has ended, even by SIGKILL."""
+def end_with(parent: int, child: bool = False) -> None:
+    """End this process as soon as `parent`, if it is its parent, has ended, even by SIGKILL.
+
+    With `child` it is known to be its parent: who is no longer, ended before this process was up.
+    """
+    if child and os.getppid() != parent:
+        os._exit(1)
     if os.getppid() == parent and not any(t.name == _WATCH for t in threading.enumerate()):
         threading.Thread(target=_watch, args=(parent,), name=_WATCH, daemon=True).start()
 
