@@ -38,9 +38,12 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int | None = None) -> Iterator[An
     """
     done, parent, n_jobs = 0, os.getpid(), bounded(n_jobs, len(tasks))
     share = _share(n_jobs)
-    guarded = [joblib.delayed(_guarded)(parent, share, task) for task in tasks]
+    guarded = [joblib.delayed(_in_share)(parent, share, task) for task in tasks]
+    workers = joblib.Parallel(
+        n_jobs=n_jobs, return_as="generator_unordered", initializer=end_with, initargs=(parent,)
+    )
     try:
-        with closing(joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(guarded)) as results:
+        with closing(workers(guarded)) as results:
             for result in results:
                 done += 1
                 yield result
@@ -68,31 +71,26 @@ def bounded(n_jobs: int | None, tasks: int) -> int | None:
     return min(n_jobs, most, max(tasks, 1))
 
 
-def end_with(parent: int, child: bool = False) -> None:
-    """End this process as soon as `parent`, if it is its parent, has ended, even by SIGKILL.
+def end_with(parent: int) -> None:
+    """End this process as soon as `parent`, which started it, has ended, even by SIGKILL.
 
-    With `child` it is known to be its parent: who is no longer, ended before this process was up.
+    As the initializer of a pool it holds before the first task comes, and where the parent is gone by then.
     """
-    if child and os.getppid() != parent:
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_HEARTBEAT)
         os._exit(1)
-    if os.getppid() == parent and not any(t.name == _WATCH for t in threading.enumerate()):
-        threading.Thread(target=_watch, args=(parent,), name=_WATCH, daemon=True).start()
+
+    if os.getppid() != parent:
+        os._exit(1)
+    threading.Thread(target=watch, name="ends with its parent", daemon=True).start()
 
 
-_WATCH = "szlib: ends with its parent"
-
-
-def _watch(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(_HEARTBEAT)
-    os._exit(1)
-
-
-def _guarded(parent: int, share: int | None, task: tuple[Callable[..., Any], Any, Any]) -> Any:
-    """One task, in a process that ends with its parent and keeps to its share of memory."""
-    end_with(parent)
+def _in_share(parent: int, share: int | None, task: tuple[Callable[..., Any], Any, Any]) -> Any:
+    """One task, in this process or one that it started, within that process's share of memory."""
     function, positional, named = task
-    with memory.granted(share if os.getppid() == parent or os.getpid() == parent else None):
+    with memory.granted(share if parent in (os.getpid(), os.getppid()) else None):
         return function(*positional, **named)
 
 

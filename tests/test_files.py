@@ -141,9 +141,3 @@ def test_the_ceiling(monkeypatch: pytest.MonkeyPatch) -> None:
         with pytest.raises(MemoryLimitError, match=r"it takes about 5\.0 GB of memory, and 0 MB may be used"):
             memory.require(5e9, "it")
     assert memory.ceiling() == 2e9
-
-
-@pytest.mark.parametrize(("parent", "code"), [("os.getppid()", 0), ("10**9", 1)])
-def test_a_worker_whose_parent_ended_before_it_was_up_ends_as_well(parent: str, code: int) -> None:
-    program = f"import os; from szlib.parallel import end_with; end_with({parent}, True)"
-    assert subprocess.run([sys.executable, "-c", program]).returncode == code

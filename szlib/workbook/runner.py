@@ -148,7 +148,7 @@ def _pool(client: Any, jobs: int) -> Iterator[Executor]:
         return
     others = set(active_children())
     pool = ProcessPoolExecutor(
-        max(jobs, 1), mp_context=get_context("spawn"), initializer=end_with, initargs=(os.getpid(), True)
+        max(jobs, 1), mp_context=get_context("spawn"), initializer=end_with, initargs=(os.getpid(),)
     )
     try:
         yield pool
