@@ -32,8 +32,11 @@ ROOMS = {
         "barriers", "settings", "distances", "people", "problem", "ipopt", "sqp", "step", "mpc",
     ],
     "simulation": [
-        "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
+        "scenario", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts", "comparisons",
     ],
+    "simulation.controllers": ["protocol"],
+    "simulation.metrics": ["endings", "motion"],
+    "simulation.scenarios": ["paper", "worlds"],
     "workbook": [
         "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
     ],
