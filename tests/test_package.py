@@ -34,7 +34,7 @@ ROOMS = {
     "simulation": [
         "scenario", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts", "comparisons",
     ],
-    "simulation.controllers": ["protocol"],
+    "simulation.controllers": ["protocol", "baselines"],
     "simulation.metrics": ["endings", "motion"],
     "simulation.scenarios": ["paper", "worlds"],
     "workbook": [
