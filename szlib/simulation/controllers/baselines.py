@@ -73,7 +73,7 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Straight(Baseline):
-    """Straight ahead; stops for who is in its lane now, no farther than it needs to stop, and `margin` [m]."""
+    """Straight ahead; stops for who is in its lane, no farther than it needs to stop, and `margin` [m]."""
 
     margin: float = 0.5
 
@@ -134,9 +134,9 @@ class DynamicWindow(Baseline):
     """The dynamic window, for a robot that accelerates in any direction; weights and sizes are assumed.
 
     Of `samples` squared velocities that can be had one step from now, those are admissible with which the
-    robot, held at them, could still brake before it touches a wall, or people at constant velocity; the best is
-    nearest to the goal after `horizon` [s], less `clearance` times the least gap on the way, of which more than
-    1 m is worth nothing.  Where none is admissible the robot brakes.
+    robot, held at them, could still brake before it touches a wall, or people at constant velocity; the best
+    is nearest to the goal after `horizon` [s], less `clearance` times the least gap on the way, of which more
+    than 1 m is worth nothing.  Where none is admissible the robot brakes.
     """
 
     horizon: float = 2.0
