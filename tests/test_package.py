@@ -35,8 +35,8 @@ ROOMS = {
         "scenario", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts", "comparisons",
     ],
     "simulation.controllers": ["protocol", "baselines"],
-    "simulation.metrics": ["endings", "motion"],
-    "simulation.scenarios": ["paper", "worlds"],
+    "simulation.metrics": ["endings", "motion", "social"],
+    "simulation.scenarios": ["paper", "meetings", "worlds"],
     "workbook": [
         "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
     ],

@@ -96,12 +96,12 @@ class CrowdModel(Protocol):
     """What people do, and how the controller is given them: a `Behaviour`, or anything else with these two.
 
     `crowd` starts everybody in a scenario, whose people have the zones that are kept for them; `seen` makes
-    of those who are there what the controller gets.
+    of those who are there what the controller gets, in the same order; None for who is not seen.
     """
 
     def crowd(self, scenario: Scenario, seed: int) -> Crowd: ...
 
-    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]: ...
+    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> Sequence[Person | None]: ...
 
 
 @dataclass(frozen=True)

@@ -262,7 +262,11 @@ class Broken(Straight):
     ("controller", "crowd", "message"),
     [
         (Broken(control=[np.nan, 0.0]), None, r"the controller gave \[nan, 0.0\] at 0 s"),
-        (Broken(residual=np.zeros((2, 2))), None, "has a row for everybody who is there"),
+        (
+            Broken(residual=np.zeros((1, 2))),
+            lambda t, _: [person(0.0, y) for y in (2, 3)],
+            "got 1 rows, expected 2",
+        ),
         (Straight(), lambda t, _: [None] * (1 + (t > 1)), "was 1, and now is 2"),
     ],
 )
