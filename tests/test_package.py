@@ -35,7 +35,8 @@ ROOMS = {
         "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
     ],
     "workbook": [
-        "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
+        "figures", "claims", "sensitivity", "places", "parameters", "record", "summary", "runner",
+        "command_line",
     ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation",
