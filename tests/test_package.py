@@ -20,7 +20,7 @@ ROOMS = {
         "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
     "encounters": [
-        "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
+        "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
     "zones": [
         "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
