@@ -34,8 +34,11 @@ ROOMS = {
     "control.people": ["person", "tracker", "meetings"],
     "control.solvers": ["ipopt", "sqp", "ladder"],
     "simulation": [
-        "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
+        "scenario", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts", "comparisons",
     ],
+    "simulation.controllers": ["protocol", "baselines"],
+    "simulation.metrics": ["endings", "motion"],
+    "simulation.scenarios": ["paper", "worlds"],
     "workbook": [
         "figures", "claims", "sensitivity", "places", "parameters", "record", "summary", "runner",
         "command_line",
