@@ -32,7 +32,11 @@ ROOMS = {
         "barriers", "settings", "distances", "people", "problem", "ipopt", "sqp", "step", "mpc",
     ],
     "simulation": [
-        "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
+        "scenario", "crowds", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts",
+        "comparisons",
+    ],
+    "simulation.crowds": [
+        "walkers", "orca", "social_force", "speed_model", "reacting", "replay",
     ],
     "workbook": [
         "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
