@@ -36,7 +36,7 @@ ROOMS = {
         "comparisons",
     ],
     "simulation.crowds": [
-        "walkers", "orca", "social_force", "speed_model", "reacting", "replay",
+        "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
     ],
     "workbook": [
         "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
