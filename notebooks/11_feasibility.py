@@ -31,7 +31,7 @@ import pandas as pd
 
 import szlib
 from szlib.simulation.closed_loop import advance, drive
-from szlib.simulation.worlds import ONE_PERSON, Worlds, world
+from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds, world
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 

@@ -32,12 +32,15 @@ ROOMS = {
         "barriers", "settings", "distances", "people", "problem", "ipopt", "sqp", "step", "mpc",
     ],
     "simulation": [
-        "scenario", "crowds", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts",
+        "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
         "comparisons",
     ],
     "simulation.crowds": [
         "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
     ],
+    "simulation.controllers": ["protocol"],
+    "simulation.metrics": ["endings", "motion"],
+    "simulation.scenarios": ["paper", "worlds"],
     "workbook": [
         "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
     ],

@@ -28,7 +28,7 @@ from szlib.errors import DataError, StorageError, ZoneError
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.simulation.rollouts import rollouts
-from szlib.simulation.worlds import Worlds
+from szlib.simulation.scenarios.worlds import Worlds
 from szlib.workbook.record import NotebookRecord
 
 DAMAGES = {False: 6, True: 300}

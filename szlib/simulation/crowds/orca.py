@@ -45,6 +45,7 @@ class Orca:
         return sim
 
     def velocities(self, positions: Array, robot: Array, dt: float) -> Array:
+        """Everybody's velocity for the next `dt`, shape (n, 2) [m/s]; see `Model`."""
         w, sim, n = self._walkers, self._sim, len(positions)
         way = w.goals - positions
         left = np.hypot(*way.T)

@@ -38,6 +38,10 @@ class SocialForce:
         self._sim.peds.initial_speeds, self._sim.peds.max_speed_multiplier = paces, 1.0
 
     def velocities(self, positions: Array, robot: Array, dt: float) -> Array:
+        """Everybody's velocity for the next `dt`, shape (n, 2) [m/s]; see `Model`.
+
+        Raises SolverError where it is not finite.
+        """
         n, peds = len(positions), self._sim.peds
         if n == 0:
             return np.zeros((0, 2))

@@ -37,7 +37,7 @@ class SpeedModel:
         numbers = (walkers.positions.tolist(), walkers.goals.tolist(), walkers.paces.tolist())
         try:
             self._ids = [
-                self._add(at, RADIUS, pace, self._sim.add_waypoint_stage(tuple(goal), _REACHED))
+                self._add(at, RADIUS, pace, *self._way(self._sim.add_waypoint_stage(tuple(goal), _REACHED)))
                 for at, goal, pace in zip(*numbers, strict=True)
             ]
         except RuntimeError as error:
@@ -45,10 +45,14 @@ class SpeedModel:
                 f"JuPedSim does not take these people: {error}; nobody may begin within {RADIUS} m of a wall "
                 f"or {2 * RADIUS} m of another, and every goal must lie off walls"
             ) from error
-        self._steered = self._sim.add_direct_steering_stage()
+        self._steered = self._way(self._sim.add_direct_steering_stage())
         self._robot: int | None = None
 
     def velocities(self, positions: Array, robot: Array, dt: float) -> Array:
+        """Everybody's mean velocity over the next `dt`, shape (n, 2) [m/s]; see `Model`.
+
+        Raises SolverError where `dt` is no multiple of `TICK`.
+        """
         before, ticks = self._positions(), round(dt / TICK)
         if ticks < 1 or abs(ticks * TICK - dt) > 1e-9:
             raise SolverError(f"JuPedSim's time goes by steps of {TICK} s; got dt = {dt} s")
@@ -65,13 +69,16 @@ class SpeedModel:
         shapely = package("shapely", INSTALL)
         if gap <= 2 * _POINT or not self._floor.buffer(-2 * _POINT).contains(shapely.Point(at)):
             return None
-        robot = self._add(at, _POINT, 0.0, self._steered)
+        robot = self._add(at, _POINT, 0.0, *self._steered)
         agent = self._sim.agent(robot)
         agent.target, agent.model.radius = tuple(at), radius
         return robot
 
-    def _add(self, at: list[float], radius: float, pace: float, stage: int) -> int:
-        journey = self._sim.add_journey(self._jps.JourneyDescription([stage]))
+    def _way(self, stage: int) -> tuple[int, int]:
+        """The journey that has this one stage, and the stage."""
+        return int(self._sim.add_journey(self._jps.JourneyDescription([stage]))), stage
+
+    def _add(self, at: list[float], radius: float, pace: float, journey: int, stage: int) -> int:
         agent = self._jps.CollisionFreeSpeedModelAgentParameters(
             position=tuple(at), radius=radius, desired_speed=pace, journey_id=journey, stage_id=stage
         )

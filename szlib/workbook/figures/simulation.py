@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -169,13 +170,14 @@ def _draw_moment(ax: Axes, log: SimulationLog, row: int, *, robot: Any, zone: An
     for ellipse in _zones(log, row):
         _draw_zone(ax, ellipse, zone)
     ax.add_patch(Circle((x, y), log.settings.r_robot, color=robot, alpha=0.6, lw=0))
-    for px, py, heading in log.people[row].tolist():
+    for px, py, heading in log.people[row, :, :3].tolist():
         ax.plot(px, py, marker=(3, 0, np.degrees(heading) - 90), color=RED, markersize=6)
 
 
 def _zones(log: SimulationLog, row: int) -> list[Ellipse]:
-    """Everybody's zone in the world at one time."""
-    return [z.placed((x, y), heading) for z, (x, y, heading) in zip(log.zones, log.people[row], strict=True)]
+    """The zone in the world of everybody who is there at one time."""
+    at = zip(log.zones, log.people[row, :, :3].tolist(), strict=True)
+    return [zone.placed((x, y), heading) for zone, (x, y, heading) in at if not isnan(x)]
 
 
 def _frame(ax: Axes, shown: Sequence[tuple[SimulationLog, Any]]) -> None:
