@@ -34,7 +34,11 @@ ROOMS = {
     "control.people": ["person", "tracker", "meetings"],
     "control.solvers": ["ipopt", "sqp", "ladder"],
     "simulation": [
-        "scenario", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts", "comparisons",
+        "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
+        "comparisons",
+    ],
+    "simulation.crowds": [
+        "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
     ],
     "simulation.controllers": ["protocol", "baselines"],
     "simulation.metrics": ["endings", "motion"],
