@@ -1,6 +1,7 @@
 """What happens then: the robot among people, in the paper's scenarios and in random worlds.
 
 scenario     a scene, what is claimed of it, and what people do: `Scenario`
+crowds       people who react, and people who were recorded
 controllers  what a controller and a robot must have, to drive here
 metrics      one dictionary of metrics, and how a run ended
 log          the log of a run: its table, metrics, pictures, file: `SimulationLog`
@@ -16,6 +17,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
     submodules=[
         "scenario",
+        "crowds",
         "controllers",
         "metrics",
         "log",
