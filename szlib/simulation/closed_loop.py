@@ -14,10 +14,11 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from ..control.barriers import Array
 from ..control.mpc import MPCCBF
-from ..control.people import BODY_RADIUS, Person, SpeedZone, as_ellipse
+from ..control.people.person import BODY_RADIUS, Person, SpeedZone, as_ellipse, circle_around
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
@@ -89,7 +90,8 @@ def drive(
     behaviour, seed : what people do and how they are seen, and the seed of it.
     crowd : what people do, in place of the behaviour's. If the scenario has people, the crowd is as many, and
         theirs are the zones; else everybody has the zone with which they first come.
-    zones : makes what is kept from each person's own zone, or else the controller's, or else `BODY`.
+    zones : makes what is kept from each person's own zone, or else the controller's, or else `BODY`; of who
+        comes without a heading, from the smallest circle around it.
     settings : what is measured by (dt, r_robot, eps, zone_speed); default: the controller's, if it has any.
     max_time : end of the run [s]; default: the scenario's duration.
     until_arrival : False drives on to the end of time, so that a robot that rests at its goal may still
@@ -132,8 +134,17 @@ def drive(
         if not all(map(isfinite, control.tolist())):
             raise SolverError(f"{scenario.name!r}: the controller gave {control.tolist()} at {k * dt:g} s")
         own = robot.advance(own, control, dt)
-    at = np.reshape(np.array(true, float), (len(states), len(everybody), 5))
+    at = _facing(np.reshape(np.array(true, float), (len(states), len(everybody), 5)))
     return _log(scenario, s, cast.kept(len(everybody)), np.array(states), at, steps, took, given, robot)
+
+
+def _facing(people: Array) -> Array:
+    """The same, with the last heading known of those who are there without one; 0 if there never was one."""
+    headings, there = people[:, :, 2], ~np.isnan(people[:, :, 0])
+    if np.isnan(headings[there]).any():
+        known = pd.DataFrame(headings).ffill().fillna(0.0).to_numpy()
+        people[:, :, 2] = np.where(there, known, np.nan)
+    return people
 
 
 def _settings(controller: Controller, given: MPCSettings | None) -> MPCSettings:
@@ -158,6 +169,8 @@ class _Cast:
         if i not in self._zones:
             own = self._default if person is None or person.zone is None else person.zone
             ellipse = as_ellipse(own, self._speed)
+            if person is not None and person.heading is None:
+                ellipse = circle_around(ellipse)
             self._zones[i] = self._change(ellipse) if self._change else ellipse
         return self._zones[i]
 
