@@ -243,7 +243,7 @@ def summarise(
 
     Returns
     -------
-    One row each method and metric: `by`, metric, mean, low, high, n (worlds that count).
+    One row each method and metric: `by`, metric, mean, low, high, n (worlds that count); NaN if none does.
     """
     if not 0 < level < 1 or resamples < 1:
         raise SolverError(f"level must be in (0, 1) and resamples positive; got {level}, {resamples}")
@@ -259,8 +259,10 @@ def summarise(
     data, there = wide.fillna(0.0).to_numpy(), wide.notna().to_numpy()
     weight = counts @ there
     means = np.divide(counts @ data, weight, out=np.full(weight.shape, np.nan), where=weight > 0)
-    low, high = np.nanquantile(means, [(1 - level) / 2, (1 + level) / 2], axis=0)
+    some = there.any(axis=0)
+    low, high = bounds = np.full((2, len(some)), np.nan)
+    bounds[:, some] = np.nanquantile(means[:, some], [(1 - level) / 2, (1 + level) / 2], axis=0)
     table = pd.DataFrame(wide.columns.tolist(), columns=["metric", *by])
-    mean = data.sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    mean = np.where(some, data.sum(axis=0) / np.maximum(there.sum(axis=0), 1), np.nan)
     table = table.assign(mean=mean, low=low, high=high, n=there.sum(axis=0))
     return table[[*by, "metric", "mean", "low", "high", "n"]]
