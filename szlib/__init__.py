@@ -40,6 +40,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "simulation.scenario": ["Scenario"],
         "simulation.scenarios": ["SCENARIOS"],
         "tracks.clock": ["read_tracks"],
+        "zones.costmap": ["Grid"],
         "zones.ellipses": ["Ellipse", "minimum_enclosing_ellipse"],
         "zones.outliers": ["remove_outliers"],
         "zones.respect.boundary": ["Respect", "fit_respect", "respect_boundary", "respect_radius"],

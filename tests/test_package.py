@@ -23,9 +23,10 @@ ROOMS = {
         "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
     ],
     "zones": [
-        "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
+        "costmap", "ellipses", "outliers", "by_direction", "hulls", "respect", "uncertainty", "zone_file",
         "social_zone",
     ],
+    "zones.by_direction": ["radii", "quantile"],
     "zones.respect": ["presence", "boundary", "significance", "estimate"],
     "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
