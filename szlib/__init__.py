@@ -22,7 +22,8 @@ __getattr__, __dir__, __all__ = lazy.attach(
     submod_attrs={
         "control.barriers": ["ellipse_distance", "segment_distance"],
         "control.mpc": ["MPCCBF", "Step"],
-        "control.people": ["Person"],
+        "control.people.person": ["Person"],
+        "control.people.tracker": ["Tracker"],
         "control.settings": ["MPCSettings"],
         "encounters.days": ["Extraction", "extract_days"],
         "encounters.geometry": ["ATC_SQUARE", "AttentionalSpace", "Square"],
