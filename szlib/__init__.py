@@ -21,6 +21,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
     ],
     submod_attrs={
         "control.barriers": ["ellipse_distance", "segment_distance"],
+        "control.differential": ["DifferentialDrive"],
         "control.mpc": ["MPCCBF", "Step"],
         "control.people.person": ["Person"],
         "control.people.tracker": ["Tracker"],

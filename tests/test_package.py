@@ -31,6 +31,7 @@ ROOMS = {
     "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "problem", "step", "solvers", "mpc",
+        "differential",
     ],
     "control.people": ["person", "tracker", "meetings"],
     "control.solvers": ["ipopt", "sqp", "ladder"],
