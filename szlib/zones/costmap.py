@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import atan2, cos, hypot, pi, sin
 from typing import Any, Protocol, TypeVar, cast
 
@@ -160,17 +161,22 @@ def circle_around(zone: Z) -> Z:
 
     changes its sign once there: divided by sin t cos t it falls.
     """
-    (m, n), (a, b) = zone.center, zone.semi_axes
-    c, s = cos(zone.angle), sin(zone.angle)
+    radius = _farthest(zone.center, zone.semi_axes, zone.angle)
+    circle = {"center": (0.0, 0.0), "semi_axes": (radius, radius), "angle": 0.0, "support": None}
+    return cast(Z, replace(cast(Any, zone), **circle))
+
+
+@lru_cache(maxsize=256)
+def _farthest(center: tuple[float, float], semi_axes: tuple[float, float], angle: float) -> float:
+    (m, n), (a, b) = center, semi_axes
+    c, s = cos(angle), sin(angle)
     p, q = abs(m * c + n * s), abs(n * c - m * s)
     low, high = 0.0, pi / 2
     for _ in range(_BISECTIONS):
         t = (low + high) / 2
         rises = b * q * cos(t) - a * p * sin(t) - (a**2 - b**2) * sin(t) * cos(t) > 0
         low, high = (t, high) if rises else (low, t)
-    radius = hypot(p + a * cos(low), q + b * sin(low))
-    circle = {"center": (0.0, 0.0), "semi_axes": (radius, radius), "angle": 0.0, "support": None}
-    return cast(Z, replace(cast(Any, zone), **circle))
+    return hypot(p + a * cos(low), q + b * sin(low))
 
 
 def _zone_cost(points: Array, zone: Oval, fade: float) -> NDArray[np.int8]:
