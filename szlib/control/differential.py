@@ -63,8 +63,6 @@ from .step import Rung, Step
 
 OMEGA_MAX = 4.0
 """Turning rate of a common indoor robot whose wheels reach 1 m/s [rad/s] (assumed)."""
-_DIRECTIONS = np.concatenate([[0.0], *((a, -a) for a in np.linspace(0, pi, 13)[1:])])
-"""Where the point may be about a goal close to a wall: nearest to the heading first [rad]."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +133,13 @@ class DriveStep:
         return self.point.residual
 
 
+class _Point(MPCCBF):
+    """The point ahead of the axle; whether a goal can be reached, the disc decides."""
+
+    def _check_goal(self, goal: tuple[float, float]) -> None:
+        pass
+
+
 class DifferentialDrive:
     """Drives a robot with two wheels to a goal, outside the social zones of people and clear of walls.
 
@@ -153,7 +158,7 @@ class DifferentialDrive:
     v_max : speed that it really reaches [m/s]; see `ahead`.
     bow : how far the point leaves the straight line between two samples at most [m].
     room : how far off walls and zones of people who stand a goal must be to be reached from any side [m]; the
-        disc's centre comes to rest there, at any heading. Nearer ones may be missed by up to 2 `ahead`.
+        disc's centre comes to rest there, at any heading. Nearer goals may be missed by up to 2 `ahead`.
 
     Raises
     ------
@@ -185,7 +190,7 @@ class DifferentialDrive:
         radius = s.r_robot + s.eps + self.ahead + self.bow
         grown = replace(s, r_robot=radius, eps=0.0, margin="euclidean", v_max=self.v_max)
         self.room = radius + self.ahead
-        self._point = MPCCBF(zone, walls=walls, settings=grown, max_people=max_people, tracker=tracker)
+        self._point = _Point(zone, walls=walls, settings=grown, max_people=max_people, tracker=tracker)
         self.zone, self.walls = self._point.zone, self._point.walls
         self._margins = [wall_margin(wall, s) for wall in self.walls]
         self.reset()
@@ -218,15 +223,16 @@ class DifferentialDrive:
 
         Raises
         ------
-        SolverError : as of `MPCCBF.step`; a wall leaves no room at the goal of the first step.
+        SolverError : as of `MPCCBF.step`.
         """
         began = perf_counter()
         own = finite("state", state, (5,) if np.size(state) == 5 else (3,)).tolist()
         x, y, theta = own[:3]
-        tip = (x + self.ahead * cos(theta), y + self.ahead * sin(theta))
-        velocity = self._velocity(theta, own[3:])
-        target = self._target(finite("goal", goal, (2,)), theta)
-        point = self._point.step((*tip, *velocity), target, people, ids=ids, stamps=stamps, now=now)
+        there, lever = finite("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
+        if not self._told:
+            self._check_goal(there)
+        start = (*(own[:2] + lever).tolist(), *self._velocity(theta, own[3:]))
+        point = self._point.step(start, there + lever, people, ids=ids, stamps=stamps, now=now)
         states, controls = self._follow(own, point.predicted[1:, :2])
         self._told, self._planned = controls[0].tolist(), point.predicted[1, 2:].tolist()
         scene, dt = point.scene._replace(settings=self.settings), self.settings.dt
@@ -266,19 +272,13 @@ class DifferentialDrive:
         c, s, sideways = cos(theta), sin(theta), self.ahead * omega
         return [v * c - sideways * s, v * s + sideways * c]
 
-    def _target(self, goal: Array, theta: float) -> Array:
-        """Where the point is to be: ahead of the goal, as the robot heads now, or as near as walls let it."""
-        around = theta + _DIRECTIONS[: None if len(self.walls) else 1]
-        targets = goal + self.ahead * np.column_stack([np.cos(around), np.sin(around)])
-        for target in targets:
-            if min(self._point.barriers(target), default=0.0) >= 0:
-                return np.asarray(target)
-        if self._told:
-            return np.asarray(targets[0])
-        raise SolverError(
-            f"the goal {goal.tolist()} cannot be reached: it leaves the point {self.ahead:.2f} m ahead of "
-            f"the axle no room; choose one at least {self.room:.2f} m off every wall"
-        )
+    def _check_goal(self, goal: Array) -> None:
+        h = self.barriers(goal)
+        if (h < 0).any():
+            raise SolverError(
+                f"the goal {goal.tolist()} cannot be reached: it lies too close to the wall "
+                f"{self.walls[int(h.argmin())].tolist()}; choose one {self.room:.2f} m off all walls"
+            )
 
     def _follow(self, own: list[float], points: Array) -> tuple[list[Array], list[Array]]:
         """The disc's states, now and after each of the commands that bring the point to points (N, 2)."""
