@@ -32,7 +32,7 @@ ROOMS = {
         "barriers", "settings", "distances", "people", "problem", "step", "solvers", "mpc",
     ],
     "control.people": ["person", "tracker", "meetings"],
-    "control.solvers": ["ipopt", "sqp", "ladder"],
+    "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
     "simulation": [
         "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
     ],
