@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 LARGEST = 1e8
 """Greatest coordinate, speed or parameter that can be used [m, m/s, ...]: the double next to it is 1.5e-8
 away, well below the tolerance of the controller. Any map projection on Earth stays below it."""
+_FEW = 16
+"""Numbers up to which Python compares faster than NumPy begins to."""
 SHORTEST_WALL = 1e-3
 """Length below which the direction of a wall is not usable [m]; a pillar may be a wall of a millimetre."""
 
@@ -187,7 +189,11 @@ def finite(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     if not fits:
         raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
     array = array.astype(float)
-    if not np.abs(array).max(initial=0.0) <= LARGEST:
+    if array.size <= _FEW:
+        usable = all(-LARGEST <= number <= LARGEST for number in array.ravel().tolist())
+    else:
+        usable = bool(np.abs(array).max() <= LARGEST)
+    if not usable:
         if not np.isfinite(array).all():
             raise SolverError(f"{name} must be finite; got {array.tolist()}")
         raise SolverError(f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin")

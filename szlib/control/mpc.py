@@ -97,7 +97,7 @@ class MPCCBF:
         self._segments: list[list[float]] = self.walls.reshape(-1, 4).tolist()
         self._margins = [wall_margin(wall, self.settings) for wall in self.walls]
         pairs = zip(self._segments, self._margins, strict=True)
-        self._wall_numbers = [(*segment, margin) for segment, margin in pairs]
+        self._wall_numbers = [number for segment, margin in pairs for number in (*segment, margin)]
 
     def set_walls(self, walls: Any) -> None:
         """Know these walls from the next step on, in place of those before; given as to the controller.

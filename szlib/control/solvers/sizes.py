@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from functools import lru_cache
 from threading import Thread
 from typing import Any
 
@@ -110,21 +111,25 @@ class Sizes:
 
 
 def slots(
-    x: Array, zones: Sequence[Sequence[float]], walls: Sequence[Sequence[float]], size: tuple[int, int]
+    x: Array, zones: Sequence[Sequence[float]], walls: Sequence[float], size: tuple[int, int]
 ) -> list[float]:
     """Zones (7 numbers each) and walls (5) as in `Problem.parameters`, with empty slots up to `size`.
 
-    `x` is the state of the robot, (x, y, vx, vy) [m, m/s].
+    `x` is the state of the robot, (x, y, vx, vy) [m, m/s]; the walls come one after another.
     """
-    there, away = float(x[0]) + _AWAY, float(x[1])
-    nobody = (there, away, there, away, -UNFELT, 0.0, 0.0)
-    no_wall = (there, away, there, away + 1.0, -UNFELT)
-    filled = [*zones, *(size[0] - len(zones)) * [nobody], *walls, *(size[1] - len(walls)) * [no_wall]]
-    return [number for slot in filled for number in slot]
+    there, y = float(x[0]) + _AWAY, float(x[1])
+    numbers: list[float] = []
+    for zone in zones:
+        numbers += zone
+    numbers += (size[0] - len(zones)) * (there, y, there, y, -UNFELT, 0.0, 0.0)
+    numbers += walls
+    numbers += (size[1] - len(walls) // 5) * (there, y, there, y + 1.0, -UNFELT)
+    return numbers
 
 
+@lru_cache
 def taken(n_people: int, n_walls: int, size: tuple[int, int]) -> slice | list[int]:
     """Which rows of people and walls are those of slots that are taken."""
-    if (n_people, n_walls) == size:
-        return slice(None)
+    if n_people == size[0] or n_walls == 0:
+        return slice(n_people + n_walls)
     return [*range(n_people), *range(size[0], size[0] + n_walls)]
