@@ -20,7 +20,7 @@ ROOMS = {
         "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
     "encounters": [
-        "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
+        "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
     "zones": [
         "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
@@ -34,10 +34,18 @@ ROOMS = {
     "control.people": ["person", "tracker", "meetings"],
     "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
     "simulation": [
-        "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
+        "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
+        "comparisons",
     ],
+    "simulation.crowds": [
+        "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
+    ],
+    "simulation.controllers": ["protocol", "baselines"],
+    "simulation.metrics": ["endings", "motion"],
+    "simulation.scenarios": ["paper", "worlds"],
     "workbook": [
-        "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
+        "figures", "claims", "sensitivity", "places", "parameters", "record", "summary", "runner",
+        "command_line",
     ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation",
