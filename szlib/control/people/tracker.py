@@ -155,8 +155,9 @@ def _usable(*numbers: float) -> bool:
 
 def _are_new(people: People) -> TypeGuard[Sequence[Person]]:
     """True if these are `Person`s of whom nobody has an id."""
-    known = isinstance(people, list | tuple)
-    return known and all(isinstance(person, Person) and person.id is None for person in people)
+    if not isinstance(people, list | tuple):
+        return False
+    return all(isinstance(person, Person) and person.id is None for person in people)
 
 
 def _rows(people: People) -> Sequence[Person | list[float]]:
