@@ -34,7 +34,7 @@ ROOMS = {
         "differential",
     ],
     "control.people": ["person", "tracker", "meetings"],
-    "control.solvers": ["ipopt", "sqp", "ladder"],
+    "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
     "simulation": [
         "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
         "comparisons",
