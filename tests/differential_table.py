@@ -16,7 +16,7 @@ import pandas as pd
 from rollout_table import interval
 
 import szlib
-from szlib.control.barriers import Array
+from szlib.control.barriers import Array, ellipse_distance
 from szlib.control.differential import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
 from szlib.control.people import BODY_RADIUS
@@ -87,6 +87,14 @@ def along(log: szlib.SimulationLog) -> Array:
     return centers
 
 
+def to_zone(points: Array, zone: szlib.Ellipse) -> Array:
+    """Euclidean distances where they matter, within 1 m; beyond, the focal ones, which are smaller."""
+    distances = ellipse_distance(points, zone)
+    near = distances < 1.0
+    distances[near] = euclidean_to_ellipse(points[near], zone)
+    return distances
+
+
 def finely(log: szlib.SimulationLog) -> dict[str, float]:
     """Smallest Euclidean gaps of the disc within and after the steps that said they were safe, and more."""
     s, centers = log.settings, along(log)
@@ -95,7 +103,7 @@ def finely(log: szlib.SimulationLog) -> dict[str, float]:
     for i, zone in enumerate(log.zones):
         here, there = log.people[:-1, None, i, :2], log.people[1:, None, i, :2]
         offset, heading = centers - here - share * (there - here), log.people[0, i, 2]
-        gaps["zone"].append(euclidean_to_ellipse(offset, zone.placed((0.0, 0.0), heading)) - s.r_robot)
+        gaps["zone"].append(to_zone(offset, zone.placed((0.0, 0.0), heading)) - s.r_robot)
         gaps["body"].append(np.hypot(*np.moveaxis(offset, -1, 0)) - BODY_RADIUS - s.r_robot)
     gaps["wall"] = [euclidean_to_segment(centers, *wall) - s.r_robot for wall in log.scenario.walls]
     row = {}
