@@ -41,8 +41,8 @@ ROOMS = {
         "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
     ],
     "simulation.controllers": ["protocol", "baselines"],
-    "simulation.metrics": ["endings", "motion"],
-    "simulation.scenarios": ["paper", "worlds"],
+    "simulation.metrics": ["endings", "motion", "social"],
+    "simulation.scenarios": ["paper", "meetings", "worlds"],
     "workbook": [
         "figures", "claims", "sensitivity", "places", "parameters", "record", "summary", "runner",
         "command_line",
