@@ -23,13 +23,15 @@ ROOMS = {
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
     "zones": [
-        "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
+        "costmap", "ellipses", "outliers", "by_direction", "hulls", "respect", "uncertainty", "zone_file",
         "social_zone",
     ],
+    "zones.by_direction": ["radii", "quantile"],
     "zones.respect": ["presence", "boundary", "significance", "estimate"],
     "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "problem", "step", "solvers", "mpc",
+        "differential",
     ],
     "control.people": ["person", "tracker", "meetings"],
     "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
