@@ -22,7 +22,8 @@ __getattr__, __dir__, __all__ = lazy.attach(
     submod_attrs={
         "control.barriers": ["ellipse_distance", "segment_distance"],
         "control.mpc": ["MPCCBF", "Step"],
-        "control.people": ["Person"],
+        "control.people.person": ["Person"],
+        "control.people.tracker": ["Tracker"],
         "control.settings": ["MPCSettings"],
         "encounters.days": ["Extraction", "extract_days"],
         "encounters.areas": ["as_area", "walked_area"],
@@ -39,7 +40,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "simulation.log": ["SimulationLog"],
         "simulation.rollouts": ["rollouts"],
         "simulation.scenario": ["Scenario"],
-        "simulation.scenarios": ["SCENARIOS"],
+        "simulation.scenarios.paper": ["SCENARIOS"],
         "tracks.clock": ["read_tracks"],
         "zones.ellipses": ["Ellipse", "minimum_enclosing_ellipse"],
         "zones.outliers": ["remove_outliers"],

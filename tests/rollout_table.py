@@ -15,7 +15,7 @@ from scipy.stats import beta
 import szlib
 from szlib.control.problem import TOLERANCE
 from szlib.simulation.rollouts import rollouts, tally
-from szlib.simulation.worlds import ONE_PERSON, Worlds
+from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds
 
 TABLE = Path(__file__).parent.parent / "notebooks" / "tables" / "11_rollouts.csv"
 APART = 1_000_000

@@ -30,13 +30,23 @@ ROOMS = {
     "zones.respect": ["presence", "boundary", "significance", "estimate"],
     "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
-        "barriers", "settings", "distances", "people", "problem", "ipopt", "sqp", "step", "mpc",
+        "barriers", "settings", "distances", "people", "problem", "step", "solvers", "mpc",
     ],
+    "control.people": ["person", "tracker", "meetings"],
+    "control.solvers": ["ipopt", "sqp", "ladder"],
     "simulation": [
-        "scenario", "metrics", "log", "closed_loop", "scenarios", "worlds", "rollouts", "comparisons",
+        "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
+        "comparisons",
     ],
+    "simulation.crowds": [
+        "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
+    ],
+    "simulation.controllers": ["protocol", "baselines"],
+    "simulation.metrics": ["endings", "motion"],
+    "simulation.scenarios": ["paper", "worlds"],
     "workbook": [
-        "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
+        "figures", "claims", "sensitivity", "places", "parameters", "record", "summary", "runner",
+        "command_line",
     ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation",
@@ -44,7 +54,7 @@ ROOMS = {
 }  # fmt: skip
 """From the ground up: a room imports only from rooms before it, a file only from files before it."""
 MOST_FILES, LONGEST = 9, 300
-CASADI = {"control.problem", "control.ipopt", "control.sqp"}
+CASADI = {"control.problem", "control.solvers.ipopt", "control.solvers.sqp"}
 HANDED_OVER = {("simulation.log", "workbook.figures.simulation")}
 """What a log draws of itself, it asks of the workbook when it is called; nothing else looks up."""
 

@@ -1,13 +1,14 @@
 """What happens then: the robot among people, in the paper's scenarios and in random worlds.
 
 scenario     a scene, what is claimed of it, and what people do: `Scenario`
+crowds       people who react, and people who were recorded
+controllers  what a controller and a robot must have, to drive here
 metrics      one dictionary of metrics, and how a run ended
 log          the log of a run: its table, metrics, pictures, file: `SimulationLog`
 closed_loop  the robot among people, step by step: `simulate`
-scenarios    the four scenarios of the paper: `SCENARIOS`
-worlds       random worlds, each from its seed
+scenarios    the four scenarios of the paper, random worlds: `SCENARIOS`
 rollouts     thousands of them, in parallel: `rollouts`
-comparisons  zones, formulations and behaviours on identical worlds
+comparisons  zones, formulations, behaviours and controllers on identical worlds
 """
 
 import lazy_loader as lazy
@@ -16,11 +17,12 @@ __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
     submodules=[
         "scenario",
+        "crowds",
+        "controllers",
         "metrics",
         "log",
         "closed_loop",
         "scenarios",
-        "worlds",
         "rollouts",
         "comparisons",
     ],

@@ -12,11 +12,12 @@ robot navigation algorithms", 2023.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product
 from math import pi, sqrt
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,10 +29,12 @@ from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
 from .closed_loop import Zones
+from .controllers.baselines import dynamic_window, social_force, straight
+from .controllers.protocol import Factory
 from .log import SimulationLog
-from .rollouts import rollouts
-from .scenario import Behaviour
-from .worlds import Worlds
+from .rollouts import Scenes, mpc_cbf, rollouts
+from .scenario import Behaviour, CrowdModel
+from .scenarios.worlds import Worlds
 
 HALL_PERSONAL = 1.2
 """Far end of the personal distance [m] (Hall 1966)."""
@@ -109,6 +112,19 @@ BEHAVIOURS: Mapping[str, Behaviour] = MappingProxyType(
 )
 """What people do, or how they are seen, by name."""
 
+CONTROLLERS: Mapping[str, Factory] = MappingProxyType(
+    {
+        "MPC-CBF": mpc_cbf,
+        "straight": straight,
+        "social force": social_force,
+        "dynamic window": dynamic_window,
+    }
+)
+"""What drives the robot, by name."""
+
+METHOD = ("controller", "zone", "formulation", "behaviour")
+"""Columns of `compare` that name a method."""
+
 WORLDS = Worlds(people=(3, 5), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=1.0)
 """Room enough at the start and at the goal for every one of the zones: nobody begins inside one."""
 
@@ -129,19 +145,20 @@ METRICS = (
 def time_inside(log: SimulationLog) -> dict[str, float]:
     """Seconds for which the robot's disc overlapped anybody's zone of each kind, Euclidean.
 
-    The fitted zones are those of the world, whatever the controller kept.
+    The fitted zones are those of the world, whatever the controller kept; those that were kept for people
+    of whom the world says nothing.
     """
+    own = [person.zone for person in log.scenario.people] or [None] * len(log.zones)
     fitted = [
-        as_ellipse(person.zone or zone, log.settings.zone_speed)
-        for person, zone in zip(log.scenario.people, log.zones, strict=True)
+        as_ellipse(each or zone, log.settings.zone_speed) for each, zone in zip(own, log.zones, strict=True)
     ]
     inside = {}
     for name, zone in ZONES.items():
         gaps = [
-            euclidean_to_ellipse(log.relative[:, i], zone(each)) - log.settings.r_robot
+            log.to_person(i, partial(euclidean_to_ellipse, ellipse=zone(each))) - log.settings.r_robot
             for i, each in enumerate(fitted)
         ]
-        overlaps = np.array(gaps).min(axis=0, initial=np.inf) < 0
+        overlaps = np.fmin.reduce(np.reshape(gaps, (-1, len(log.states))), initial=np.inf) < 0
         inside[f"inside {name}"] = log.settings.dt * float(overlaps.sum())
     return inside
 
@@ -150,10 +167,11 @@ def compare(
     n: int,
     *,
     seed: int = 0,
-    zones: Sequence[str] = tuple(ZONES),
-    formulations: Sequence[str] = tuple(FORMULATIONS),
-    behaviours: Sequence[str] = ("as expected",),
-    worlds: Worlds = WORLDS,
+    controllers: Sequence[str] | Mapping[str, Factory] = ("MPC-CBF",),
+    zones: Sequence[str] | Mapping[str, Zones] = tuple(ZONES),
+    formulations: Sequence[str] | Mapping[str, MPCSettings] = tuple(FORMULATIONS),
+    behaviours: Sequence[str] | Mapping[str, CrowdModel] = ("as expected",),
+    worlds: Scenes = WORLDS,
     out: str | Path | None = None,
     n_jobs: int = -1,
     progress: bool = True,
@@ -162,37 +180,49 @@ def compare(
 
     Parameters
     ----------
-    zones, formulations, behaviours : names in `ZONES`, `FORMULATIONS`, `BEHAVIOURS`.
+    controllers, zones, formulations, behaviours : names in `CONTROLLERS`, `ZONES`, `FORMULATIONS`,
+        `BEHAVIOURS`, or a mapping from names of your own to factories, zones, settings, crowd models.
     n, seed, worlds, out, n_jobs, progress : as of `rollouts`.
 
     Raises
     ------
     SolverError : an unknown name.
     """
-    for names, known in ((zones, ZONES), (formulations, FORMULATIONS), (behaviours, BEHAVIOURS)):
-        if unknown := sorted(set(names) - set(known)):
-            raise SolverError(f"unknown: {', '.join(unknown)}; there are {', '.join(known)}")
+    given = (controllers, zones, formulations, behaviours)
     tables = []
-    for zone, formulation, behaviour in product(zones, formulations, behaviours):
+    for names in product(*map(_by_name, given, (CONTROLLERS, ZONES, FORMULATIONS, BEHAVIOURS))):
+        (_, controller), (_, zone), (_, settings), (_, behaviour) = names
         table = rollouts(
             n,
             seed=seed,
-            settings=FORMULATIONS[formulation],
+            settings=settings,
             worlds=worlds,
-            behaviour=BEHAVIOURS[behaviour],
-            zones=ZONES[zone],
+            behaviour=behaviour,
+            controller=controller,
+            zones=zone,
             measure=time_inside,
             out=out,
             n_jobs=n_jobs,
             progress=progress,
         )
-        tables.append(table.assign(zone=zone, formulation=formulation, behaviour=behaviour))
+        tables.append(table.assign(**dict(zip(METHOD, (name for name, _ in names), strict=True))))
     return pd.concat(tables, ignore_index=True)
+
+
+def _by_name(given: Sequence[str] | Mapping[str, Any], known: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Names and what they stand for."""
+    if isinstance(given, Mapping):
+        return list(given.items())
+    if unknown := sorted(set(given) - set(known)):
+        raise SolverError(
+            f"unknown: {', '.join(unknown)}; there are {', '.join(known)}; for your own give a mapping"
+        )
+    return [(name, known[name]) for name in given]
 
 
 def summarise(
     rows: pd.DataFrame,
-    by: Sequence[str] = ("zone", "formulation", "behaviour"),
+    by: Sequence[str] = METHOD,
     metrics: Sequence[str] = METRICS,
     *,
     against: Mapping[str, str] | None = None,

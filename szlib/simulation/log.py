@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,13 +23,14 @@ from ..control.step import status_of
 from ..errors import DataError
 from ..files import write_file
 from ..zones.ellipses import Ellipse
-from .metrics import metrics
+from .metrics.endings import least
+from .metrics.motion import metrics
 from .scenario import Scenario
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_FORMAT, _VERSION = "szlib.SimulationLog", 1
+_FORMAT, _VERSION = "szlib.SimulationLog", 2
 _ARRAYS = ("states", "controls", "people", "predicted", "residual", "rung", "safe", "slack", "solve_time")
 _SHOWN = ("success", "outcome", "time_to_goal", "min_h", "min_clearance", "infeasible_steps")
 
@@ -41,18 +42,25 @@ class SimulationLog:
     Attributes
     ----------
     scenario : what was run, its people with their own zones.
-    settings : of the controller.
-    zones : the zone of each person that the controller kept, in the person's frame; h is about these.
-    states : (x, y, vx, vy), shape (n, 4) [m, m/s].
-    controls : (ax, ay), shape (n, 2) [m/s2]; that of the last state was not applied any more.
-    people : (x, y, heading) of everybody as they truly were, shape (n, P, 3) [m, rad].
-    predicted : the plan of each step, shape (n, N+1, 4).
-    residual : `Step.residual`, people before walls, shape (n, P+W, N_h) [m].
-    rung : `Step.rung`, shape (n,).
-    safe : `Step.safe`, shape (n,): False is a flag.
-    slack : largest violation of a hard row by each plan, shape (n,).
-    solve_time : of each step, shape (n,) [s].
+    settings : of the loop, and of what is measured: dt, r_robot, eps; the controller's, if it has any.
+    zones : the zone of each person that was kept for them, in the person's frame; h is about these.
+    states : (x, y, vx, vy) of the robot's disc, shape (n, 4) [m, m/s].
+    controls : what the robot was driven by, (ax, ay) [m/s2] for the paper's, shape (n, 2); that of the last
+        state was not applied any more.
+    people : (x, y, heading, vx, vy) of everybody as they truly were, shape (n, P, 5) [m, rad, m/s]; NaN
+        where somebody was not there.
+    predicted : the plan of each step, shape (n, N+1, 4), or (n, 0, 4).
+    residual : `Step.residual`, people before walls, shape (n, P+W, N_h) [m], NaN for who was not there, or
+        (n, P+W, 0).
+    rung : `Step.rung`, shape (n,), or "".
+    safe : `Step.safe`, shape (n,): True is a promise.
+    slack : largest violation of a hard row by each plan, shape (n,), or NaN.
+    solve_time : of each step, shape (n,) [s]: what it says, or how long the call took.
     arrived : index of the first state at rest at the goal; None if there is none.
+    promises : whether the controller says of its steps if they are safe.
+    inputs : names of the controls.
+
+    `predicted`, `residual`, `rung`, `slack` are empty as said where a controller does not tell them.
     """
 
     scenario: Scenario
@@ -68,6 +76,13 @@ class SimulationLog:
     slack: Array
     solve_time: Array
     arrived: int | None
+    promises: bool = True
+    inputs: tuple[str, ...] = ("ax", "ay")
+
+    @property
+    def flagged(self) -> NDArray[np.bool_]:
+        """Steps that said they were not safe, shape (n,): none of a controller that promises nothing."""
+        return ~self.safe & self.promises
 
     @property
     def success(self) -> bool:
@@ -93,9 +108,20 @@ class SimulationLog:
         return np.stack([ahead, offset[..., 1] * cos - offset[..., 0] * sin], axis=-1)
 
     @cached_property
+    def there(self) -> NDArray[np.bool_]:
+        """Who was there when, shape (n, P)."""
+        return ~np.isnan(self.people[:, :, 0])
+
+    def to_person(self, i: int, distance: Callable[[Array], Array]) -> Array:
+        """A distance of the robot, seen from person i, shape (n,); NaN while they are away."""
+        values = np.full(len(self.states), np.nan)
+        values[self.there[:, i]] = distance(self.relative[self.there[:, i], i])
+        return values
+
+    @cached_property
     def h(self) -> Array:
         """Barriers with people as they truly were, people before walls, shape (n, P+W) [m]."""
-        d = [ellipse_distance(self.relative[:, i], zone) for i, zone in enumerate(self.zones)]
+        d = [self.to_person(i, partial(ellipse_distance, ellipse=z)) for i, z in enumerate(self.zones)]
         d += [segment_distance(self.states[:, :2], *wall) for wall in self.scenario.walls]
         distances, s = np.reshape(d, (len(d), len(self.states))).T, self.settings
         margins = [s.eps] * len(self.zones) + [wall_margin(wall, s) for wall in self.scenario.walls]
@@ -111,26 +137,25 @@ class SimulationLog:
 
     @cached_property
     def cbf_people(self) -> Array:
-        """Smallest residual of a person's barrier condition, shape (n,) [m]; inf without people."""
-        of_people = self.residual[:, : len(self.scenario.people)]
-        return np.asarray(of_people.min(axis=(1, 2), initial=np.inf))
+        """Smallest residual of a person's barrier condition, shape (n,) [m]; inf where there is none."""
+        return least(self.residual[:, : len(self.zones)], axis=(1, 2))
 
     @cached_property
     def table(self) -> pd.DataFrame:
         """One row a step: the state at its time and the control decided there.
 
-        Columns: t [s], x, y [m], vx, vy, speed [m/s], ax, ay [m/s2], status, rung, slack, solve_time
-        [s], cbf_people [m], clearance (the least) [m], and for each person i and wall j: person_i_x,
-        person_i_y [m], person_i_heading [rad], h_person_i, h_wall_j [m].
+        Columns: t [s], x, y [m], vx, vy, speed [m/s], ax, ay [m/s2] (or else `inputs`),
+        status, rung, slack, solve_time [s], cbf_people [m], clearance (the least) [m], and for each person
+        i and wall j: person_i_x, person_i_y [m], person_i_heading [rad], h_person_i, h_wall_j [m].
         """
-        n, columns = len(self.scenario.people), {"t": self.time}
+        n, columns = len(self.zones), {"t": self.time}
         columns |= dict(zip(("x", "y", "vx", "vy"), self.states.T, strict=True)) | {"speed": self.speed}
-        columns |= dict(zip(("ax", "ay"), self.controls.T, strict=True))
+        columns |= dict(zip(self.inputs, self.controls.T, strict=True))
         words = {"status": [status_of(rung) for rung in self.rung.tolist()], "rung": self.rung}
         numbers = {"slack": self.slack, "solve_time": self.solve_time, "cbf_people": self.cbf_people}
-        numbers["clearance"] = self.clearance.min(axis=1, initial=np.inf)
+        numbers["clearance"] = least(self.clearance, axis=1)
         for i in range(n):
-            x, y, heading = self.people[:, i].T
+            x, y, heading = self.people[:, i, :3].T
             numbers |= {f"person_{i}_x": x, f"person_{i}_y": y, f"person_{i}_heading": heading}
             numbers[f"h_person_{i}"] = self.h[:, i]
         numbers |= {f"h_wall_{j}": self.h[:, n + j] for j in range(len(self.scenario.walls))}
@@ -161,7 +186,7 @@ class SimulationLog:
         numbers = ", ".join(f"{name} {_short(shown[name])}" for name in _SHOWN)
         return (
             f"SimulationLog of {self.scenario.name!r}: {len(self.states)} states in {self.time[-1]:g} s, "
-            f"{len(self.scenario.people)} people, {len(self.scenario.walls)} walls\n  {numbers}"
+            f"{len(self.zones)} people, {len(self.scenario.walls)} walls\n  {numbers}"
         )
 
     def _repr_html_(self) -> str:
@@ -185,6 +210,9 @@ class SimulationLog:
             "szlib": __version__,
             "units": "m, s, rad; world frame, zones in the frame of their person",
             "arrived": self.arrived,
+            "promises": self.promises,
+            "inputs": self.inputs,
+            "shapes": {name: a.shape for name, a in arrays.items() if a.ndim == 3},
             "settings": asdict(self.settings),
             "zones": [_plain(zone) for zone in self.zones],
             "scenario": {name: getattr(scenario, name) for name in ("name", "title", "duration")}
@@ -202,25 +230,27 @@ class SimulationLog:
     def load(cls, path: str | Path) -> SimulationLog:
         """Read a run written by `save`, its people with the zones that were kept.
 
-        Raises DataError where there is none, or it is damaged or of a newer szlib.
+        Raises DataError where there is none, or it is damaged or of another version of szlib.
         """
         stem = Path(path).with_suffix("")
         try:
             content = json.loads(stem.with_suffix(".json").read_text(encoding="utf-8"))
             if (content["format"], content["version"]) != (_FORMAT, _VERSION):
-                raise ValueError(f"format {content['format']} {content['version']}, expected {_FORMAT} 1")
+                raise ValueError(
+                    f"format {content['format']} {content['version']}, expected {_FORMAT} {_VERSION}"
+                )
             rows = pd.read_parquet(stem.with_suffix(".parquet"))
-            arrays = {name: np.array(rows[name].tolist()) for name in _ARRAYS}
+            arrays: dict[str, Any] = {name: np.array(rows[name].tolist()) for name in _ARRAYS}
             zones = tuple(Ellipse(z["center"], z["semi_axes"], z["angle"]) for z in content["zones"])
             people = tuple(
-                Person(**person, zone=zone) for person, zone in zip(content["people"], zones, strict=True)
+                Person(**who, zone=zones[i] if i < len(zones) else None)
+                for i, who in enumerate(content["people"])
             )
             settings = MPCSettings(**content["settings"])
             scenario = Scenario(**content["scenario"], people=people)
-            n, p, w = len(rows), len(people), len(scenario.walls)
-            shapes = {"people": (n, p, 3), "predicted": (n, -1, 4), "residual": (n, p + w, settings.N_h)}
-            arrays |= {name: arrays[name].reshape(shape) for name, shape in shapes.items()}
-            return cls(scenario, settings, zones, **arrays, arrived=content["arrived"])
+            arrays |= {name: arrays[name].reshape(shape) for name, shape in content["shapes"].items()}
+            more = {"arrived": content["arrived"], "promises": content["promises"]}
+            return cls(scenario, settings, zones, inputs=tuple(content["inputs"]), **arrays, **more)
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise DataError(
                 f"{stem}: cannot be read as a run ({error!r}); expected the two files of SimulationLog.save"

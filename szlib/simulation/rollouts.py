@@ -12,10 +12,12 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
+from types import FunctionType
 from typing import Any, get_args
 
+import joblib
 import pandas as pd
 from joblib import delayed
 from tqdm import tqdm
@@ -29,10 +31,11 @@ from ..files import keep, kept, own_folder, write_file
 from ..parallel import run_tasks
 from ..zones.ellipses import Ellipse
 from .closed_loop import Zones, drive
+from .controllers.protocol import Factory
 from .log import SimulationLog
-from .metrics import Outcome
-from .scenario import Behaviour
-from .worlds import Worlds, world
+from .metrics.endings import Outcome
+from .scenario import Behaviour, CrowdModel, Scenario
+from .scenarios.worlds import Worlds
 
 PURPOSE = "rollouts"
 """What the folder of finished chunks is marked as."""
@@ -40,8 +43,11 @@ PURPOSE = "rollouts"
 CHUNK = 50
 """Worlds in one file and in one task: about a second of work."""
 
-_UNUSED = Ellipse((0.0, 0.0), (1.0, 1.0))
-"""The controller's zone; in random worlds everybody has one of their own."""
+CIRCLE = Ellipse((0.0, 0.0), (1.0, 1.0))
+"""The zone of people without one [m] (assumed); in random worlds everybody has one of their own."""
+
+Scenes = Callable[[int], Scenario]
+"""A scene of each seed: `Worlds`, or anything else that makes the same one every time."""
 
 Measure = Callable[[SimulationLog], dict[str, float]]
 """Further columns of a row; must be a function of a module."""
@@ -52,8 +58,9 @@ def rollouts(
     *,
     seed: int = 0,
     settings: MPCSettings | None = None,
-    worlds: Worlds | None = None,
-    behaviour: Behaviour | None = None,
+    worlds: Scenes | None = None,
+    behaviour: CrowdModel | None = None,
+    controller: Factory | None = None,
     zones: Zones | None = None,
     measure: Measure | None = None,
     out: str | Path | None = None,
@@ -65,8 +72,10 @@ def rollouts(
     Parameters
     ----------
     n, seed : how many worlds, and the first one's seed.
-    settings, worlds, behaviour : of the controller, of the worlds, and of the people in them.
-    zones : what the controller keeps in place of a person's own zone; a function of a module.
+    settings, worlds, behaviour : of the controller, of the worlds, and of the people in them: a `Worlds` or
+        another function of the seed, a `Behaviour` or another `CrowdModel`.
+    controller : makes the controller for a world, from its scenario and the settings; default: `mpc_cbf`.
+    zones : what is kept in place of a person's own zone, made from it.
     measure : further columns from each run.
     out : folder for finished chunks, to go on from; default: none is kept. Parameters and szlib's
         version name the folder inside it; after a change of the code choose another.
@@ -79,11 +88,19 @@ def rollouts(
 
     Raises
     ------
-    SolverError : `n` is not positive, or a world broke the controller; it names the seed.
+    SolverError : `n` is not positive, a world broke the controller (it names the seed), or chunks are to be
+        kept of a function that is defined inside another: nothing names it.
     """
     if n < 1:
         raise SolverError(f"n must be at least 1; got {n}")
-    setup = Setup(settings or MPCSettings(), worlds or Worlds(), behaviour or Behaviour(), zones, measure)
+    setup = setup_of(
+        settings=settings,
+        worlds=worlds,
+        behaviour=behaviour,
+        controller=controller,
+        zones=zones,
+        measure=measure,
+    )
     folder = None if out is None else Path(out) / setup.key()
     if folder is not None:
         own_folder(folder.parent, PURPOSE)
@@ -99,20 +116,26 @@ def rollouts(
     return pd.concat(tables).sort_values("seed", ignore_index=True)
 
 
+def mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = CIRCLE) -> MPCCBF:
+    """The controller of the paper; `zone` is that of people without one of their own."""
+    return MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
+
+
 @dataclass(frozen=True)
 class Setup:
-    """Everything but the seed that decides what a row says."""
+    """Everything but the seed that decides what a row says; parameters as of `rollouts`."""
 
     settings: MPCSettings
-    worlds: Worlds
-    behaviour: Behaviour
+    worlds: Scenes
+    behaviour: CrowdModel
+    controller: Factory
     zones: Zones | None
     measure: Measure | None
 
     def describe(self) -> str:
         """Every parameter, as text."""
-        names = [f"{f.__module__}.{f.__qualname__}" if f else "default" for f in (self.zones, self.measure)]
-        return repr((__version__, self.settings, self.worlds, self.behaviour, *names))
+        named = {field.name: identity(getattr(self, field.name)) for field in fields(self)}
+        return repr((__version__, named))
 
     def key(self) -> str:
         """A short name for these parameters."""
@@ -120,23 +143,44 @@ class Setup:
 
     def run(self, seed: int) -> SimulationLog:
         """Drive through one world."""
-        scenario = world(seed, self.worlds)
-        controller = MPCCBF(
-            _UNUSED, walls=scenario.walls, settings=self.settings, max_people=len(scenario.people)
-        )
+        scenario = self.worlds(seed)
         try:
             return drive(
                 scenario,
-                controller,
+                self.controller(scenario, self.settings),
                 behaviour=self.behaviour,
                 seed=seed,
                 zones=self.zones,
+                settings=self.settings,
                 until_arrival=False,
             )
         except SzlibError as error:
-            raise SolverError(
-                f"world {seed} broke the controller: {error}; see worlds.world({seed})"
-            ) from error
+            raise SolverError(f"world {seed} broke the controller: {error}; see worlds({seed})") from error
+        except Exception as error:
+            error.add_note(f"in world {seed}")
+            raise
+
+
+def setup_of(**given: Any) -> Setup:
+    """A `Setup` of what is given, and of the defaults where that is None or missing."""
+    setup: dict[str, Any] = {"settings": MPCSettings(), "worlds": Worlds(), "behaviour": Behaviour()}
+    setup |= {"controller": mpc_cbf, "zones": None, "measure": None}
+    return Setup(**(setup | {name: value for name, value in given.items() if value is not None}))
+
+
+def identity(part: Any) -> str:
+    """What tells a part of a `Setup` from any other, in every process: its name if it is a function of a
+    module, its text if it is one of szlib's own settings, and else its type with a hash of what it holds.
+
+    Raises SolverError for a function that is defined inside another.
+    """
+    if part is None or type(part) in (MPCSettings, Worlds, Behaviour):
+        return repr(part)
+    kind = part if isinstance(part, FunctionType | type) else type(part)
+    name = f"{kind.__module__}.{kind.__qualname__}"
+    if "<" in name:
+        raise SolverError(f"{name} cannot be told from others of that name; define it in a module")
+    return name if kind is part else f"{name} {joblib.hash(part)}"
 
 
 def tally(rows: pd.DataFrame) -> pd.Series[Any]:
@@ -160,15 +204,13 @@ def tally(rows: pd.DataFrame) -> pd.Series[Any]:
 
 def replay(seed: int, **parameters: Any) -> SimulationLog:
     """One world again, with every state; parameters as of `rollouts` (settings, worlds, ...)."""
-    given = {"settings": MPCSettings(), "worlds": Worlds(), "behaviour": Behaviour()}
-    given |= {"zones": None, "measure": None}
-    return Setup(**(given | parameters)).run(seed)  # type: ignore[arg-type]
+    return setup_of(**parameters).run(seed)
 
 
 def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
     """The rows of these seeds: read where they are finished, else driven, and kept."""
     file = None if folder is None else folder / f"seeds-{seeds.start:07d}-{seeds.stop - 1:07d}.parquet"
-    made = {"rollouts": setup.describe(), "seeds": [seeds.start, seeds.stop]}
+    made = {"rollouts": file and setup.describe(), "seeds": [seeds.start, seeds.stop]}
     if file is not None and (content := kept(file, made)) is not None:
         return pd.read_parquet(io.BytesIO(content))
     rows = []

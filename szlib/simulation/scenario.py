@@ -5,10 +5,10 @@ World frame, metres and seconds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import cos, hypot, pi, sin
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -24,8 +24,12 @@ GOAL_RADIUS = 0.1
 STOPPED = 0.05
 """Below this speed the robot stands, and below this progress to the goal it yields [m/s] (assumed)."""
 
-Crowd = Callable[[float, Array], tuple[Person, ...]]
-"""Everybody as they truly are, from the time [s] and the robot's state (x, y, vx, vy) then."""
+Crowd = Callable[[float, Array], Sequence[Person | None]]
+"""Everybody as they truly are, from the time [s] and the robot's state (x, y, vx, vy) then.
+
+Always as many, in the same order; None for who is not there at that time. The loop asks once a step, at 0,
+dt, 2 dt, ..., so that a crowd may move on with each call.
+"""
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,18 @@ class Scenario:
         return replace(self, people=people)
 
 
+class CrowdModel(Protocol):
+    """What people do, and how the controller is given them: a `Behaviour`, or anything else with these two.
+
+    `crowd` starts everybody in a scenario, whose people have the zones that are kept for them; `seen` makes
+    of those who are there what the controller gets.
+    """
+
+    def crowd(self, scenario: Scenario, seed: int) -> Crowd: ...
+
+    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]: ...
+
+
 @dataclass(frozen=True)
 class Behaviour:
     """What people do: walk on, unaffected by the robot (paper, sec. 4), or deviate from what is expected.
@@ -117,13 +133,14 @@ class Behaviour:
             if not (np.isfinite(value) & (value >= 0)).all():
                 raise SolverError(f"{each.name} must be finite and >= 0; got {getattr(self, each.name)}")
 
-    def crowd(self, people: tuple[Person, ...], seed: int) -> Crowd:
+    def crowd(self, scenario: Scenario, seed: int) -> Crowd:
         """Everybody's true motion from time 0 on; these people do not look at the robot."""
+        people = scenario.people
         if self.pace == 1.0 and self.turn == 0.0:
-            return lambda t, _: tuple(person.after(t) for person in people)
+            return lambda t, _: [person.after(t) for person in people]
         rng = np.random.default_rng([seed, 1])
         plans = [(p, rng.uniform(*self.between), self.turn * rng.choice([-1, 1])) for p in people]
-        return lambda t, _: tuple(self._at(t, *plan) for plan in plans)
+        return lambda t, _: [self._at(t, *plan) for plan in plans]
 
     def _at(self, t: float, person: Person, when: float, turn: float) -> Person:
         if t <= when or person.stands:

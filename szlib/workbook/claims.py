@@ -17,7 +17,7 @@ from scipy.stats import binomtest, chi2
 from ..control.mpc import MPCCBF
 from ..errors import DataError, ZoneError
 from ..simulation.closed_loop import simulate
-from ..simulation.scenarios import SCENARIOS
+from ..simulation.scenarios.paper import SCENARIOS
 from ..tracks.clock import check_columns
 from ..zones.ellipses import Ellipse
 from ..zones.social_zone import SocialZone

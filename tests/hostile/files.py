@@ -28,7 +28,7 @@ from szlib.errors import DataError, StorageError, ZoneError
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.simulation.rollouts import rollouts
-from szlib.simulation.worlds import Worlds
+from szlib.simulation.scenarios.worlds import Worlds
 from szlib.workbook.record import NotebookRecord
 
 DAMAGES = {False: 6, True: 300}
@@ -161,7 +161,7 @@ def _rollouts(_: Path, out: Path) -> None:
 
 
 def _notebook(data: Path, out: Path) -> None:
-    record = NotebookRecord("05_attack", data=[str(data / "day0.csv")], results=out)
+    record = NotebookRecord("05_attack", {"data": [str(data / "day0.csv")], "results": out})
     record.check("encounters", len(record.encounters()) > 0)
     record.zone()
     record.table(pd.DataFrame({"a": [1, 2]}), "table")

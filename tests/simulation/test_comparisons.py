@@ -17,7 +17,7 @@ from szlib.simulation.comparisons import (
     time_inside,
 )
 from szlib.simulation.rollouts import replay
-from szlib.simulation.worlds import world
+from szlib.simulation.scenarios.worlds import world
 
 FITTED = szlib.Ellipse((0.1, -0.02), (1.0, 0.7), 0.3)
 

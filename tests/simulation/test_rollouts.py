@@ -9,7 +9,7 @@ import pytest
 import szlib
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.rollouts import replay, rollouts, tally
-from szlib.simulation.worlds import ONE_PERSON, Worlds
+from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 MODULE = importlib.import_module("szlib.simulation.rollouts")  # the name of its function, too

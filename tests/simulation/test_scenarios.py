@@ -10,7 +10,7 @@ import shapely
 import szlib
 from szlib.control.people import BODY_RADIUS
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.metrics import avoidance_start, passing_side
+from szlib.simulation.metrics.motion import avoidance_start, passing_side
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 KEYS = {
@@ -20,7 +20,7 @@ KEYS = {
     "steps_relaxed", "steps_braking", "outcome",
     "min_h_people", "min_h_walls", "jerk", "people", "walls", "flagged_steps", "unflagged_violations",
     "unflagged_overlaps", "min_clearance_people", "min_clearance_walls",
-    "max_slack", "solve_time_p99",
+    "max_slack", "solve_time_p99", "violations", "overlaps", "promised_steps",
 }  # fmt: skip
 
 
@@ -182,7 +182,7 @@ def passing_log(y, x=(-2.0, -1.0, 0.5, 2.0)):
     plans = {"predicted": np.zeros((4, 9, 4)), "residual": np.zeros((4, 1, 2)), "controls": np.zeros((4, 2))}
     steps = {"rung": np.full(4, "warm"), "safe": np.ones(4, bool)}
     times = {"slack": np.zeros(4), "solve_time": np.zeros(4), "arrived": 3}
-    people = np.zeros((4, 1, 3))
+    people = np.zeros((4, 1, 5))
     return SimulationLog(scenario, settings, (ZONE,), states, people=people, **plans, **steps, **times)
 
 

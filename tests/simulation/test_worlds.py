@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import szlib
 from szlib.control.distances import euclidean_to_segment
 from szlib.simulation.scenario import Behaviour
-from szlib.simulation.worlds import ONE_PERSON, Worlds, world
+from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds, world
 
 seeds = st.integers(0, 2**32)
 
@@ -65,6 +65,7 @@ def test_what_cannot_be():
 
 WALKER = szlib.Person((0.0, 0.0), (0.5, 0.0))
 STANDING = szlib.Person((3.0, 0.0), heading=1.0)
+MEETING = szlib.Scenario("meeting", np.zeros(4), np.ones(2), people=(WALKER, STANDING))
 
 
 @pytest.mark.parametrize(
@@ -77,7 +78,7 @@ STANDING = szlib.Person((3.0, 0.0), heading=1.0)
     ],
 )
 def test_walkers_change_their_mind_and_never_jump(behaviour, pace, turn):
-    crowd = behaviour.crowd((WALKER, STANDING), seed=1)
+    crowd = behaviour.crowd(MEETING, seed=1)
     paths = [crowd(t, np.zeros(4)) for t in np.linspace(0, 10, 101).tolist()]
     walker, standing = zip(*paths, strict=True)
     assert set(standing) == {STANDING}
@@ -92,4 +93,4 @@ def test_noise_is_what_it_says_and_moves_nobody():
     rng = np.random.default_rng(0)
     seen = [Behaviour(noise=0.1).seen((WALKER,), rng)[0].position for _ in range(2000)]
     assert np.std(seen, axis=0) == pytest.approx([0.1, 0.1], rel=0.1)
-    assert Behaviour(noise=0.1).crowd((WALKER,), 0)(2.0, np.zeros(4)) == (WALKER.after(2.0),)
+    assert Behaviour(noise=0.1).crowd(MEETING, 0)(2.0, np.zeros(4)) == [WALKER.after(2.0), STANDING]

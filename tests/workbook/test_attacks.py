@@ -1,7 +1,10 @@
 """What was once lost or wrongly believed: folders, stale results, parameters, endings."""
 
+import errno
+import itertools
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +15,7 @@ import pandas as pd
 import pytest
 
 import szlib
+from szlib import files
 from szlib.errors import DataError, StorageError
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
@@ -72,12 +76,12 @@ def test_data_sets_of_one_name_do_not_share_results(tmp_path):
 def test_encounters_and_zone_of_another_day_of_the_same_name_and_size_are_not_served(tmp_path, monkeypatch):
     file = tmp_path / "day.csv"
     make_plaza(file, settings=PlazaSettings(encounters=60))
-    samples = NotebookRecord("02", data=str(file), results=tmp_path / "out").encounters()
+    samples = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"}).encounters()
     size, content = file.stat().st_size, file.read_text().splitlines(keepends=True)
     file.write_text("".join(content[len(content) // 2 :]))
     with file.open("a") as stream:  # a row that cannot be used, to make up the size
         stream.write("9" * (size - file.stat().st_size - 1) + "\n")
-    later = NotebookRecord("02", data=str(file), results=tmp_path / "out")
+    later = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"})
     with pytest.warns(szlib.DataWarning):
         assert len(later.encounters()) < len(samples)
     artefact = later.out / "encounters.parquet"
@@ -178,13 +182,13 @@ def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks
 )
 def test_parameters_are_checked_before_any_notebook_starts(given, message):
     with pytest.raises(DataError, match=message):
-        check_parameters(given, sorted(runner.NOTEBOOKS.glob("[0-9][0-9]_*.py")))
+        check_parameters(given, sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py")))
 
 
 def test_what_the_notebooks_set_themselves_is_in_range():
     from szlib.workbook.parameters import defaults_of
 
-    for source in runner.NOTEBOOKS.glob("[0-9][0-9]_*.py"):
+    for source in places.NOTEBOOKS.glob("[0-9][0-9]_*.py"):
         given = {n: v for n, v in defaults_of(source).items() if n not in ("data", "results")}
         check_parameters(given, [source])
 
@@ -236,6 +240,64 @@ def test_sigterm_ends_a_command_as_ctrl_c_does(tmp_path):
     assert done.returncode == 143
     assert "szlib: stopped; what was finished stays in the results" in printed
     assert not list(tmp_path.rglob(".szlib-*"))
+
+
+def test_sigterm_ends_a_run_and_its_kernels(notebooks, tmp_path):
+    sleeper = """
+import os, time
+record.table(__import__("pandas").DataFrame({"pid": [os.getpid()]}), "kernel")
+time.sleep(120)"""
+    folder = notebooks(_01_sleeper=sleeper)
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import sys\nfrom pathlib import Path\nfrom szlib.workbook import places\n"
+        "from szlib.workbook.command_line import main\nif __name__ == '__main__':\n"
+        f"    places.NOTEBOOKS = Path({str(folder)!r})\n    sys.exit(main())\n"
+    )
+    run = subprocess.Popen(
+        [sys.executable, str(program), "run", "--data", "mine.csv", "--out", "out"],
+        env=HERE, text=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
+    table = tmp_path / "out" / "mine" / "kernel.csv"
+    while not table.exists() and run.poll() is None:
+        time.sleep(0.05)
+    kernel = int(table.read_text().split()[1])
+    run.send_signal(signal.SIGTERM)
+    _, printed = run.communicate()
+    assert run.returncode == 143
+    assert "szlib: stopped; what was finished stays in the results" in printed
+    end = time.monotonic() + 30
+    while Path(f"/proc/{kernel}").exists() and time.monotonic() < end:
+        time.sleep(0.1)
+    assert not Path(f"/proc/{kernel}").exists()
+    assert not (tmp_path / "out" / "mine" / "summary.json").exists()
+
+
+def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypatch, capsys):
+    notebooks(_01_one="", _06_two="")
+    done = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
+    monkeypatch.setattr(runner, "_outcomes", lambda sources, *_: {s.stem: done for s in sources})
+    fill, command = files._fill, ["run", "--data", "mine.csv", "--out", "out"]
+    for full in itertools.count():
+        shutil.rmtree(tmp_path / "out", ignore_errors=True)
+        writes = itertools.count()
+
+        def disk(*write, full=full, writes=writes):
+            if next(writes) == full:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            fill(*write)
+
+        monkeypatch.setattr(files, "_fill", disk)
+        if main(command) == 0:
+            break
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "No space left on device" in line
+        assert not list(tmp_path.rglob("summary.json"))
+        monkeypatch.setattr(files, "_fill", fill)
+        assert main(command) == 0
+        assert main([*command, "--only", "06"]) == 0
+        capsys.readouterr()
+    assert full == next(writes) >= 4, "the two markers, the parameters, the summary"
 
 
 @pytest.mark.filterwarnings("default")

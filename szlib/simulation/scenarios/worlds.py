@@ -10,13 +10,13 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from ..control.barriers import Array, barrier, ellipse_distance, segment_distance
-from ..control.distances import euclidean_to_segment, with_margin
-from ..control.people import BODY_RADIUS, Person
-from ..control.settings import MPCSettings
-from ..errors import SolverError
-from ..zones.ellipses import Ellipse
-from .scenario import Scenario
+from ...control.barriers import Array, barrier, ellipse_distance, segment_distance
+from ...control.distances import euclidean_to_segment, with_margin
+from ...control.people import BODY_RADIUS, Person
+from ...control.settings import MPCSettings
+from ...errors import SolverError
+from ...zones.ellipses import Ellipse
+from ..scenario import Scenario
 
 _TRIES = 5_000
 """Draws after which a world is given up as impossible; a usual one takes fewer than a hundred."""
@@ -70,6 +70,10 @@ class Worlds:
         for name in ("max_walls", "size", "duration"):
             if not 0 < getattr(self, name) < np.inf:
                 raise SolverError(f"{name} must be positive; got {getattr(self, name)}")
+
+    def __call__(self, seed: int) -> Scenario:
+        """The world of this seed; see `world`."""
+        return world(seed, self)
 
 
 ONE_PERSON = Worlds(people=(1, 1), walls=0.0, start_speed=0.0, min_h=0.3)

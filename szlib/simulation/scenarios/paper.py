@@ -10,12 +10,12 @@ from math import pi
 
 import numpy as np
 
-from ..control.mpc import MPCCBF
-from ..control.people import Person
-from .closed_loop import simulate
-from .log import SimulationLog
-from .metrics import along_course, avoidance_start, passing_side
-from .scenario import GOAL_RADIUS, Claim, Scenario
+from ...control.mpc import MPCCBF
+from ...control.people import Person
+from ..closed_loop import simulate
+from ..log import SimulationLog
+from ..metrics.motion import along_course, avoidance_start, passing_side
+from ..scenario import GOAL_RADIUS, Claim, Scenario
 
 WELL_BEFORE = 0.5
 """Avoidance that starts at this h starts well before the zone [m] (assumed)."""

@@ -1,0 +1,16 @@
+"""A run in numbers.
+
+endings  how a run ended, and who broke a barrier: `outcome`
+motion   one dictionary of metrics for scenarios, random worlds and comparisons: `metrics`
+"""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach(
+    __name__,
+    submodules=["endings", "motion"],
+    submod_attrs={
+        "endings": ["Outcome", "outcome", "path_exists"],
+        "motion": ["along_course", "avoidance_start", "metrics", "passing_side"],
+    },
+)

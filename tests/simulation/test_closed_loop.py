@@ -1,0 +1,354 @@
+"""The closed loop takes any controller, any robot, and people who come and go."""
+
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import szlib
+from szlib.simulation.closed_loop import BODY, drive
+from szlib.simulation.comparisons import compare, summarise
+from szlib.simulation.rollouts import identity, replay, rollouts, tally
+from szlib.simulation.scenario import Behaviour
+from szlib.simulation.scenarios.worlds import Worlds
+
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+WALK = szlib.Scenario("walk", (-4.0, 0.0, 0.0, 0.0), (4.0, 0.0), duration=20.0)
+ALONE = Worlds(people=(0, 0), walls=0.0, start_speed=0.0, duration=12.0)
+TIMES = ["solve_time_median", "solve_time_p95", "solve_time_p99", "solve_time_max"]
+
+
+class Straight:
+    """The controller of the protocol's docstring: blind."""
+
+    def __init__(self, pace=1.0):
+        self.pace, self.seen = pace, []
+
+    def reset(self):
+        self.seen = []
+
+    def step(self, state, goal, people):
+        self.seen.append(tuple(people))
+        ahead = goal - state[:2]
+        wanted = self.pace * ahead / max(1.0, np.hypot(*ahead))
+        return SimpleNamespace(control=np.clip(2 * (wanted - state[2:]), -1, 1))
+
+
+def straight(scenario, settings, pace=1.0):
+    return Straight(pace)
+
+
+def person(x, y, velocity=(0.0, 0.0), zone=None):
+    return szlib.Person((x, y), velocity, heading=0.0, zone=zone)
+
+
+def visitor(t, _):
+    """Somebody who stands beside the way, from 2 s to 4 s only, and somebody who never comes."""
+    return (person(-1.0, 1.6) if 2 <= t < 4 else None, None)
+
+
+# --- any controller ----------------------------------------------------------------------------------
+
+
+def test_a_strangers_controller_drives_and_what_it_does_not_tell_is_empty(tmp_path):
+    log = szlib.simulate(WALK, Straight())
+    metrics = log.metrics()
+    assert log.success and metrics["outcome"] == "arrived"
+    assert log.predicted.shape[1] == log.residual.shape[2] == 0
+    assert set(log.rung) == {""} and np.isnan(log.slack).all()
+    assert (log.solve_time > 0).all()
+    log.save(tmp_path / "run")
+    back = szlib.SimulationLog.load(tmp_path / "run")
+    pd.testing.assert_frame_equal(back.table, log.table)
+    assert back.metrics() == pytest.approx(metrics, nan_ok=True)
+    assert "arrived" in repr(log)
+
+
+def test_a_controller_that_promises_nothing_breaks_no_promise_and_its_violations_count():
+    scenario = szlib.Scenario("blind", WALK.start, WALK.goal, (person(0.0, 0.0, zone=ZONE),))
+    log = szlib.simulate(scenario, Straight())
+    metrics = log.metrics()
+    inside = int((log.h[1:].min(axis=1) < -1e-6).sum())
+    assert metrics["violations"] == inside > 0
+    assert metrics["overlaps"] == int((log.clearance[1:].min(axis=1) < -1e-6).sum()) > 0
+    assert metrics["promised_steps"] == metrics["flagged_steps"] == metrics["unflagged_violations"] == 0
+    assert metrics["outcome"] == "drove in"
+    assert np.isnan(metrics["time_yielding"])
+
+
+def test_a_controller_that_promises_is_held_to_it():
+    log = szlib.simulate(
+        szlib.SCENARIOS["corridor"], szlib.MPCCBF(ZONE, walls=szlib.SCENARIOS["corridor"].walls)
+    )
+    metrics = log.metrics()
+    assert metrics["promised_steps"] + metrics["flagged_steps"] == len(log.states) - 1
+    assert metrics["violations"] == metrics["overlaps"] == 0
+
+
+def test_people_without_a_zone_have_the_controllers_or_their_body():
+    scenario = szlib.Scenario("met", WALK.start, WALK.goal, (person(0.0, 3.0), person(1.0, 3.0, zone=ZONE)))
+    assert szlib.simulate(scenario, Straight()).zones == (BODY, ZONE)
+    other = szlib.Ellipse((0.0, 0.0), (0.5, 0.5))
+    log = szlib.simulate(scenario, szlib.MPCCBF(other))
+    assert log.zones == (other, ZONE)
+
+
+def test_plans_of_different_lengths_are_kept():
+    class Planner(Straight):
+        def step(self, state, goal, people):
+            control = super().step(state, goal, people).control
+            return SimpleNamespace(control=control, predicted=np.tile(state, (2 + len(self.seen) % 2, 1)))
+
+    log = szlib.simulate(WALK, Planner())
+    assert log.predicted.shape == (len(log.states), 3, 4)
+    assert np.array_equal(log.predicted[:, 1], log.states)
+    assert np.isnan(log.predicted[1::2, 2]).all()
+
+
+# --- any robot ---------------------------------------------------------------------------------------
+
+
+class Cart:
+    """A differential drive: (x, y, angle), driven by (v, omega); its disc's centre is the axle's."""
+
+    inputs = ("v", "omega")
+
+    def start(self, state):
+        return np.array([*state[:2], 0.0, 0.0])
+
+    def body(self, own):
+        x, y, angle, v = own
+        return np.array([x, y, v * np.cos(angle), v * np.sin(angle)])
+
+    def advance(self, own, control, dt):
+        (x, y, angle, _), (v, omega) = own, control
+        middle = angle + dt * omega / 2
+        return np.array([x + dt * v * np.cos(middle), y + dt * v * np.sin(middle), angle + dt * omega, v])
+
+
+class Steered:
+    """Turns to the goal, and drives there as it sees it."""
+
+    robot = Cart()
+
+    def reset(self):
+        pass
+
+    def step(self, state, goal, people):
+        assert state.shape == (4,)
+        x, y, angle, _ = state
+        distance = np.hypot(*(goal - state[:2]))
+        off = np.angle(np.exp(1j * (np.arctan2(goal[1] - y, goal[0] - x) - angle)))
+        v = min(1.0, distance) * max(0.0, np.cos(off)) if distance > 0.05 else 0.0
+        return SimpleNamespace(control=[v, np.clip(2 * off, -1, 1) if v else 0.0])
+
+
+def test_another_robot_is_logged_by_its_disc():
+    scenario = szlib.Scenario("turn", (0.0, 0.0, 0.0, 0.0), (0.0, 4.0), (person(5.0, 0.0),), duration=20)
+    log = szlib.simulate(scenario, Steered())
+    assert log.success
+    moved = np.diff(log.states[:, :2], axis=0) / 0.1
+    after = log.states[1:, 2:]
+    assert np.hypot(*moved.T) == pytest.approx(np.hypot(*after.T))  # arcs of 5 deg at most: chords
+    assert log.inputs == ("v", "omega")
+    assert log.table["omega"].to_numpy() == pytest.approx(log.controls[:, 1])
+    assert log.clearance[0, 0] == pytest.approx(5.0 - 0.25 - 0.5)
+
+
+# --- people who come and go, and react ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("controller", [Straight(), szlib.MPCCBF(ZONE)])
+def test_people_are_there_only_while_they_are_there(controller):
+    log = szlib.simulate(WALK, controller, crowd=visitor)
+    there = (log.time >= 2) & (log.time < 4)
+    assert log.people.shape == (len(log.states), 2, 5)
+    for values in (log.people[:, 0, 0], log.h[:, 0], log.clearance[:, 0]):
+        assert np.array_equal(~np.isnan(values), there)
+    assert np.isnan(log.people[:, 1]).all() and np.isnan(log.h[:, 1]).all()
+    metrics = log.metrics()
+    assert metrics["people"] == 2
+    assert metrics["min_h"] == np.nanmin(log.h) and metrics["min_clearance"] == np.nanmin(log.clearance)
+    assert metrics["outcome"] == "arrived" and metrics["violations"] == 0
+    assert log.table["clearance"][0] == np.inf
+
+
+def test_the_controller_gets_those_who_are_there_with_the_zones_that_are_kept():
+    controller = Straight()
+    log = szlib.simulate(WALK, controller, crowd=visitor)
+    there = (log.time >= 2) & (log.time < 4)
+    assert [len(seen) for seen in controller.seen] == there.astype(int).tolist()
+    assert {p.zone for seen in controller.seen for p in seen} == {BODY}
+
+
+def test_residuals_belong_to_who_was_there():
+    log = szlib.simulate(WALK, szlib.MPCCBF(ZONE, max_people=2), crowd=visitor)
+    there = (log.time >= 2) & (log.time < 4)
+    assert np.array_equal(~np.isnan(log.residual[:, 0, 0]), there)
+    assert np.isfinite(log.cbf_people[there]).all() and (log.cbf_people[~there] == np.inf).all()
+    assert log.metrics()["time_yielding"] == 0
+
+
+def test_who_never_comes_changes_nothing():
+    alone = szlib.simulate(WALK, szlib.MPCCBF(ZONE))
+    awaited = szlib.simulate(WALK, szlib.MPCCBF(ZONE), crowd=lambda t, _: [None])
+    assert np.array_equal(alone.states, awaited.states)
+    drop = [*TIMES, "people"]
+    ours, theirs = (pd.Series(log.metrics()).drop(drop) for log in (alone, awaited))
+    pd.testing.assert_series_equal(ours, theirs)
+
+
+def test_who_appears_inside_ran_into_the_robot_and_the_way_is_told():
+    def ghost(t, state):
+        return [person(state[0] + 0.5, state[1]) if t >= 3 else None]
+
+    log = szlib.simulate(WALK, Straight(), crowd=ghost, max_time=5.0)
+    assert log.metrics()["outcome"] == "run into"
+
+
+def test_a_crowd_sees_the_robot():
+    states = []
+
+    def mirror(t, state):
+        states.append(state)
+        return [person(state[0], state[1] + 3.0, (0.1, 0.0))]
+
+    log = szlib.simulate(WALK, Straight(), crowd=mirror)
+    assert np.array_equal(states, log.states)
+    assert log.people[:, 0, 1] - log.states[:, 1] == pytest.approx(3.0)
+    assert (log.people[:, 0, 3] == 0.1).all()
+
+
+def test_a_log_of_visitors_comes_back_from_its_files(tmp_path):
+    log = szlib.simulate(WALK, szlib.MPCCBF(ZONE), crowd=visitor)
+    log.save(tmp_path / "run")
+    back = szlib.SimulationLog.load(tmp_path / "run")
+    pd.testing.assert_frame_equal(back.table, log.table)
+    assert back.metrics() == log.metrics()
+    assert np.array_equal(back.residual, log.residual, equal_nan=True)
+
+
+def test_a_crowd_model_needs_only_two_methods():
+    class Circling:
+        def crowd(self, scenario, seed):
+            center = (
+                np.mean([p.position for p in scenario.people], axis=0) if scenario.people else np.zeros(2)
+            )
+            return lambda t, _: [person(center[0] + np.cos(t), center[1] + 3 + np.sin(t), (0.1, 0), ZONE)]
+
+        def seen(self, people, rng):
+            return people
+
+    log = drive(WALK, Straight(), behaviour=Circling(), seed=3)
+    assert log.people[:, 0, 0] == pytest.approx(np.cos(log.time))
+    assert log.zones == (ZONE,)
+
+
+# --- what cannot be ----------------------------------------------------------------------------------
+
+
+class Broken(Straight):
+    def __init__(self, **step):
+        super().__init__()
+        self.more = step
+
+    def step(self, state, goal, people):
+        return SimpleNamespace(**({"control": np.zeros(2)} | self.more))
+
+
+@pytest.mark.parametrize(
+    ("controller", "crowd", "message"),
+    [
+        (Broken(control=[np.nan, 0.0]), None, r"the controller gave \[nan, 0.0\] at 0 s"),
+        (Broken(residual=np.zeros((2, 2))), None, "has a row for everybody who is there"),
+        (Straight(), lambda t, _: [None] * (1 + (t > 1)), "was 1, and now is 2"),
+    ],
+)
+def test_what_does_not_fit_is_named(controller, crowd, message):
+    with pytest.raises(szlib.SolverError, match=message):
+        szlib.simulate(WALK, controller, crowd=crowd, max_time=2.0)
+
+
+def test_a_loop_has_one_dt():
+    with pytest.raises(szlib.SolverError, match=r"every 0.1 s, the loop every 0.2 s"):
+        drive(WALK, szlib.MPCCBF(ZONE), settings=szlib.MPCSettings(dt=0.2))
+
+
+# --- rollouts and comparisons ------------------------------------------------------------------------
+
+
+def test_rollouts_with_a_controller_of_ones_own():
+    rows = rollouts(3, worlds=ALONE, controller=straight, n_jobs=1, progress=False)
+    assert rows["success"].all() and (rows["promised_steps"] == 0).all()
+    slow = rollouts(3, worlds=ALONE, controller=partial(straight, pace=0.5), n_jobs=1, progress=False)
+    assert (slow["max_speed"] <= 0.5 + 1e-9).all()
+    again = replay(1, worlds=ALONE, controller=straight).metrics()
+    assert again["path_length"] == rows["path_length"][1]
+    assert tally(rows)["unflagged_violations"] == 0
+
+
+def scene(seed):
+    return szlib.Scenario(f"{seed}", (0.0, 0.0, 0.0, 0.0), (1.0 + seed, 0.0), duration=8.0)
+
+
+def test_any_function_of_the_seed_makes_worlds():
+    rows = rollouts(3, worlds=scene, controller=straight, n_jobs=1, progress=False)
+    assert rows["path_length"].to_numpy() == pytest.approx([1, 2, 3], abs=0.1)
+
+
+def test_the_controller_is_part_of_what_chunks_are_of(tmp_path):
+    def run(controller):
+        rollouts(1, worlds=ALONE, controller=controller, out=tmp_path, n_jobs=1, progress=False)
+        return sum(path.is_dir() for path in tmp_path.iterdir())
+
+    assert run(straight) == run(straight) == 1
+    assert run(None) == 2
+    assert run(partial(straight, pace=0.5)) == 3
+    assert run(partial(straight, pace=0.4)) == run(partial(straight, pace=0.5)) == 4
+    with pytest.raises(szlib.SolverError, match="define it in a module"):
+        run(lambda scenario, settings: Straight())
+
+
+def test_parts_are_told_apart_by_what_they_hold():
+    parts = [None, straight, Straight, szlib.MPCSettings(), szlib.MPCSettings(gamma=0.1), Behaviour(), ALONE]
+    parts += [partial(straight, pace=0.5), partial(straight, pace=0.4), Worlds().__call__, ALONE.__call__]
+    assert len({identity(part) for part in parts}) == len(parts)
+    assert identity(partial(straight, pace=0.5)) == identity(partial(straight, pace=0.5))
+
+
+class Failing(Straight):
+    def step(self, state, goal, people):
+        raise KeyError("mine")
+
+
+def failing(scenario, settings):
+    return Failing()
+
+
+def test_the_world_in_which_a_stranger_fails_is_named():
+    with pytest.raises(KeyError, match="mine") as error:
+        rollouts(1, seed=4, worlds=ALONE, controller=failing, n_jobs=1, progress=False)
+    assert error.value.__notes__ == ["in world 4"]
+
+
+def half(zone):
+    return szlib.Ellipse(zone.center, (zone.semi_axes[0] / 2, zone.semi_axes[1] / 2), zone.angle)
+
+
+def test_compare_takes_names_and_objects():
+    rows = compare(
+        1,
+        controllers={"blind": straight},
+        zones={"half": half},
+        formulations={"mine": szlib.MPCSettings(gamma=0.2)},
+        behaviours={"slower": Behaviour(pace=0.5)},
+        n_jobs=1,
+        progress=False,
+    )
+    named = rows[["controller", "zone", "formulation", "behaviour"]]
+    assert named.to_numpy().tolist() == [["blind", "half", "mine", "slower"]]
+    assert summarise(rows)["controller"].unique().tolist() == ["blind"]
+    with pytest.raises(szlib.SolverError, match="unknown: PID; there are MPC-CBF"):
+        compare(1, controllers=["PID"])

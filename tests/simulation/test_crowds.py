@@ -1,0 +1,258 @@
+"""Other people's crowds: who reacts comes to their goal, who is replayed is where they were."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import make_tracks, make_walk
+
+import szlib
+from szlib.control.people import BODY_RADIUS, Person
+from szlib.simulation.crowds.reacting import MODELS, Reacting
+from szlib.simulation.crowds.replay import APART, SIGHT, AsRecorded, Replay, replays
+from szlib.simulation.scenario import Crowd, Scenario
+
+PACKAGES = {"orca": "pyrvo", "social force": "pysocialforce", "speed model": "jupedsim"}
+FAR = np.array([50.0, 50.0, 0.0, 0.0])
+TWO = (Person((-4.0, 0.0), (0.5, 0.0)), Person((4.0, 0.1), (-0.5, 0.0)))
+
+
+@pytest.fixture(params=MODELS)
+def model(request: pytest.FixtureRequest) -> str:
+    """Every model of walking whose package is installed."""
+    if request.param == "social force":
+        pytest.importorskip("numba")  # the package itself is imported quietly, by szlib
+    else:
+        pytest.importorskip(PACKAGES[request.param])
+    return str(request.param)
+
+
+def scene(*people: Person, walls: object = (), duration: float = 20.0) -> Scenario:
+    return Scenario(
+        "scene", np.zeros(4), np.ones(2), people, np.reshape(walls, (-1, 2, 2)), duration=duration
+    )
+
+
+def walk(crowd: Crowd, robot: np.ndarray = FAR, seconds: float = 20.0) -> np.ndarray:
+    """x, y, vx, vy, heading of everybody every 0.1 s, shape (n, P, 5); a robot that moves drives on."""
+    rows = []
+    for k in range(round(seconds * 10) + 1):
+        here = np.r_[robot[:2] + 0.1 * k * robot[2:], robot[2:]]
+        rows.append([(*p.position, *p.velocity, p.heading) for p in crowd(0.1 * k, here)])
+    return np.array(rows)
+
+
+def gaps(paths: np.ndarray) -> np.ndarray:
+    """Distance of the first two people at each time [m]."""
+    return np.hypot(*(paths[:, 0, :2] - paths[:, 1, :2]).T)
+
+
+def test_who_is_alone_walks_straight_to_their_goal_at_their_pace(model: str) -> None:
+    path = walk(Reacting(model, jitter=0).crowd(scene(TWO[0], duration=10.0), 0), seconds=10.0)[:, 0]
+    assert path[0, :2] == pytest.approx((-4, 0))
+    assert np.abs(path[:, 1]).max() < 1e-6
+    assert np.hypot(*path[20:60, 2:4].T) == pytest.approx(0.5, abs=1e-3)
+    assert abs(path[-1, 0] - 1.0) <= 0.61, "within the 0.5 m where PySocialForce stops, and a start from rest"
+
+
+def test_velocity_is_what_brought_people_here(model: str) -> None:
+    paths = walk(Reacting(model).crowd(scene(*TWO), 3))
+    assert np.diff(paths[:, :, :2], axis=0) == pytest.approx(0.1 * paths[1:, :, 2:4], abs=1e-6)
+
+
+def test_two_who_meet_head_on_pass_each_other(model: str) -> None:
+    head_on = (TWO[0], Person((4.0, 0.0), (-0.5, 0.0)))
+    paths = walk(Reacting(model).crowd(scene(*head_on), 1))
+    assert paths[-1, 0, 0] > 3 and paths[-1, 1, 0] < -3
+    assert gaps(paths).min() > 0.35
+
+
+def test_they_avoid_the_robot_that_they_see_and_not_the_one_that_they_do_not(model: str) -> None:
+    alone = scene(Person((-4.0, 0.1), (0.5, 0.0)))
+    robot = np.array([0.0, 0.0, 0.0, 0.0])
+    nearest = {
+        sees: np.hypot(*walk(Reacting(model, sees=sees).crowd(alone, 0), robot)[:, 0, :2].T).min()
+        for sees in ("robot", "person", "nothing")
+    }
+    assert nearest["nothing"] < 0.25
+    assert nearest["person"] > 2 * BODY_RADIUS - 0.11, "JuPedSim's bodies are 5 cm smaller"
+    assert nearest["robot"] >= nearest["person"] - 1e-6
+    if model != "social force":
+        assert nearest["robot"] > 0.5 + BODY_RADIUS - 0.11
+
+
+def test_nobody_walks_through_a_wall(model: str) -> None:
+    wall = [[(0.0, -1.0), (0.0, 1.5)]]
+    paths = walk(Reacting(model).crowd(scene(TWO[0], walls=wall), 2), seconds=40.0)[:, 0, :2]
+    crossing = np.flatnonzero(np.diff(np.sign(paths[:, 0])) != 0)
+    assert all(not -1.0 <= paths[k, 1] <= 1.5 for k in crossing)
+
+
+def test_who_stands_stays_and_keeps_their_heading(model: str) -> None:
+    standing = Person((0.0, 3.0), heading=1.0)
+    path = walk(Reacting(model).crowd(scene(standing), 0))[:, 0]
+    assert path[:, :2] == pytest.approx(np.tile((0.0, 3.0), (201, 1)), abs=1e-3)
+    assert (path[:, 4] == 1.0).all()
+
+
+def test_goals_can_be_given(model: str) -> None:
+    crowd = Reacting(model, goals=((3.0, 4.0),), jitter=0).crowd(scene(Person((0.0, 0.0), heading=0.0)), 0)
+    path = walk(crowd, seconds=25.0)[:, 0]
+    assert np.hypot(*(path[-1, :2] - (3.0, 4.0))) < 0.6
+
+
+def test_the_same_seed_gives_the_same_people_and_another_seed_others(model: str) -> None:
+    first, again, other = (walk(Reacting(model).crowd(scene(*TWO), seed)) for seed in (1, 1, 2))
+    assert (first == again).all()
+    assert not np.allclose(first, other, atol=1e-4)
+
+
+def test_people_keep_their_zones_and_an_empty_place_stays_empty(model: str) -> None:
+    zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+    crowd = Reacting(model).crowd(scene(Person((0.0, 0.0), (0.5, 0.0), zone=zone)), 0)
+    assert [crowd(t, FAR)[0].zone for t in (0.0, 0.1, 0.2)] == [zone] * 3
+    nobody = Reacting(model).crowd(scene(), 0)
+    assert [len(nobody(t, FAR)) for t in (0.0, 0.1)] == [0, 0]
+
+
+def test_time_does_not_go_back(model: str) -> None:
+    crowd = Reacting(model).crowd(scene(*TWO), 0)
+    crowd(0.5, FAR)
+    assert crowd(0.5, FAR)[0] == crowd(0.5, FAR)[0]
+    with pytest.raises(szlib.SolverError, match=r"it is at 0.5 s, and got 0.4 s"):
+        crowd(0.4, FAR)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_missing_package_is_named_with_what_installs_it(
+    model: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, PACKAGES[model], None)
+    with pytest.raises(szlib.SolverError, match=r"pip install .*(crowds|jupedsim)"):
+        Reacting(model).crowd(scene(*TWO), 0)
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    with pytest.raises(szlib.SolverError, match="orca, social force, speed model; got 'boids'"):
+        Reacting("boids")
+    with pytest.raises(szlib.SolverError, match="robot, person, nothing"):
+        Reacting("orca", sees="everything")  # type: ignore[arg-type]
+    with pytest.raises(szlib.SolverError, match="jitter must be finite"):
+        Reacting("orca", jitter=np.nan)
+    with pytest.raises(szlib.SolverError, match="2 people need a goal each; got 1"):
+        Reacting("orca", goals=((0.0, 0.0),)).crowd(scene(*TWO), 0)
+
+
+def test_importing_the_social_force_leaves_no_file_and_no_logging_behind(tmp_path: Path) -> None:
+    pytest.importorskip("numba")
+    code = (
+        "import logging, os, numba, szlib\n"
+        "from szlib.simulation.crowds.social_force import _quietly\n"
+        "_quietly()\n"
+        "root = logging.getLogger()\n"
+        "print(root.level, root.handlers, os.listdir())\n"
+        "print(numba.config.DISABLE_JIT, logging.FileHandler.__name__, logging.root.manager.disable)"
+    )
+    env = {**os.environ, "PYTHONPATH": str(Path(szlib.__file__).parents[1])}
+    command = [sys.executable, "-W", "error", "-c", code]
+    said = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=env, check=True)
+    assert said.stdout.strip() == f"{logging.WARNING} [] []\n0 FileHandler 0"
+    assert said.stderr == ""
+
+
+# --- replay ------------------------------------------------------------------------------------------
+
+
+def recording() -> pd.DataFrame:
+    """One walks 8 m; one crosses in front of them; one comes late; one stands; one is far away."""
+    return make_tracks(
+        make_walk((0, 0), (1.0, 0.0), person=1, begin=10.0, duration=8.0),
+        make_walk((4, -4), (0.0, 1.0), person=2, begin=9.0, duration=9.0),
+        make_walk((8, 4), (-1.0, 0.0), person=3, begin=12.0, duration=5.0),
+        make_walk((4, 3), (0.0, 0.0), person=4, begin=0.0, duration=40.0),
+        make_walk((90, 90), (0.5, 0.0), person=5, begin=0.0, duration=40.0),
+    )
+
+
+def replay_of(tracks: pd.DataFrame, person: int) -> Replay:
+    return next(each for each in replays(tracks, 99) if each.walker.id == person)
+
+
+def test_the_robot_goes_where_the_walker_went_among_all_the_others() -> None:
+    replay = replay_of(recording(), 1)
+    assert replay.scenario.start == pytest.approx((0, 0, 0.99, 0)), "as fast as they were, or as it may be"
+    assert replay.scenario.goal == pytest.approx((8, 0))
+    assert replay.scenario.duration == 16.0
+    assert {other.id for other in replay.others} == {2, 3, 4, 5}
+
+
+def test_people_come_go_and_are_where_they_were() -> None:
+    tracks = recording()
+    crowd, robot = replay_of(tracks, 1).crowd(scene(), 0), np.array([4.0, 0.0, 0.0, 0.0])
+    for t in np.arange(0.0, 16.0, 0.1):
+        seen = [p for p in crowd(t, robot) if p is not None]
+        now = tracks[np.isclose(tracks["t"], 10.0 + t) & (tracks["id"] != 1)]
+        near = now[np.hypot(now["x"] - 4.0, now["y"]) <= SIGHT]
+        was, true = sorted(p.position for p in seen), sorted(zip(near["x"], near["y"], strict=True))
+        assert np.reshape(was, (-1, 2)) == pytest.approx(np.reshape(true, (-1, 2)))
+        assert {p.velocity for p in seen if p.heading} <= {(0.0, 1.0), (-1.0, 0.0)}
+    assert [len([p for p in crowd(t, robot) if p]) for t in (0.0, 5.0, 15.0)] == [2, 3, 1]
+
+
+def test_between_ticks_people_walk_straight_on() -> None:
+    crowd = replay_of(recording(), 1).crowd(scene(), 0)
+    (other,) = (p for p in crowd(1.23, np.array([4.0, -2.0, 0, 0])) if p is not None and p.velocity[1])
+    assert other.position == pytest.approx((4.0, -4.0 + 1.0 + 1.23))
+
+
+def test_a_person_who_stops_keeps_facing_where_they_walked() -> None:
+    tracks = make_tracks(
+        make_walk((0, 0), (1.0, 0.0), person=1, duration=8.0),
+        make_walk((0, 3), (0.0, 1.0), person=2, duration=2.0),
+        make_walk((0, 5), (0.0, 0.0), person=2, begin=2.1, duration=6.0),
+    )
+    crowd = replay_of(tracks, 1).crowd(scene(), 0)
+    facing = [crowd(t, np.zeros(4))[0].heading for t in (0.0, 2.0, 5.0, 8.0)]
+    assert facing == pytest.approx([np.pi / 2] * 4)
+
+
+def test_the_walker_replaced_can_be_driven_like_a_controller() -> None:
+    replay = replay_of(recording(), 1)
+    walker = AsRecorded(replay)
+    own = walker.robot.start(replay.scenario.start)
+    bodies = []
+    for _ in range(101):
+        bodies.append(walker.robot.body(own))
+        own = walker.robot.advance(own, walker.step(own, replay.scenario.goal, ()).control, 0.1)
+    assert np.array(bodies)[:81] == pytest.approx(replay.walker.states[:, :4])
+    assert np.array(bodies)[81:, :2] == pytest.approx(np.tile((8.0, 0.0), (20, 1)))
+
+
+def test_ways_begin_and_end_in_the_area_and_in_open_space() -> None:
+    area = szlib.Square(x=(1.0, 7.0), y=(-5.0, 5.0))
+    (replay,) = (each for each in replays(recording(), 99, area=area) if each.walker.id == 1)
+    assert (replay.scenario.start[0], replay.scenario.goal[0]) == pytest.approx((1.0, 7.0))
+    beside = make_walk((0, APART - 0.1), (1.0, 0.0), person=9, begin=10.0, duration=8.0)
+    ids = {each.walker.id for each in replays(make_tracks(recording(), beside), 99)}
+    assert ids.isdisjoint({1, 9}), "the robot has no companions"
+    with pytest.raises(szlib.DataError, match=r"no walker came 5.0 m far"):
+        replays(recording(), 5, area=szlib.Square(x=(0.0, 1.0), y=(0.0, 1.0)))
+
+
+def test_the_seed_draws_the_walkers() -> None:
+    ids = [[each.walker.id for each in replays(recording(), 2, seed=seed)] for seed in (0, 0, 1, 2, 3)]
+    assert ids[0] == ids[1]
+    assert len({tuple(each) for each in ids}) > 1
+
+
+def test_days_are_scenes_of_their_own() -> None:
+    other_day = make_walk((4, 1), (0.0, 1.0), person=2, begin=10.0, duration=9.0, day="2012-10-28")
+    first = next(r for r in replays(make_tracks(recording(), other_day), 99) if r.walker.id == 1)
+    assert [other.id for other in first.others].count(2) == 1
