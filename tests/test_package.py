@@ -17,8 +17,9 @@ PACKAGE = Path(szlib.__file__).parent
 GROUND = ["errors", "files", "memory", "parallel"]
 ROOMS = {
     "tracks": [
-        "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
+        "funnels", "formats", "plausible", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
+    "tracks.formats": ["frame_rates", "plain", "foreign", "layouts", "tables"],
     "encounters": [
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
