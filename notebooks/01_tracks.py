@@ -33,11 +33,12 @@ from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 
 # %%
-record = NotebookRecord("01_tracks", data=data, results=results, seed=seed)
+record = NotebookRecord("01_tracks", globals())
 parameters(
     [
         ("clock", "0.1 s", ASSUMED, "two people's samples must coincide; the paper's control step"),

@@ -33,12 +33,13 @@ from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 examples = 200  # paths drawn, as in the paper's fig. 2
 
 # %%
-record = NotebookRecord("02_encounters", data=data, results=results, seed=seed)
+record = NotebookRecord("02_encounters", globals())
 space = szlib.AttentionalSpace()
 parameters(
     [

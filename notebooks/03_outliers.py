@@ -36,6 +36,7 @@ from szlib.zones import outliers
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 fraction = 0.002
@@ -43,7 +44,7 @@ r_max = 2.0
 intruders = 0.01  # share of slow intruders on the plaza that puts the rules to the test
 
 # %%
-record = NotebookRecord("03_outliers", data=data, results=results, seed=seed)
+record = NotebookRecord("03_outliers", globals())
 parameters(
     [
         ("r_max", f"{r_max:g} m", PAPER, "sec. 2"),

@@ -32,12 +32,13 @@ from szlib.zones import hulls, outliers
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 speeds = [0.7, 0.9, 1.1, 1.3]
 
 # %%
-record = NotebookRecord("04_hull", data=data, results=results, seed=seed)
+record = NotebookRecord("04_hull", globals())
 parameters(
     [
         ("hull over", "x', y', speed", PAPER, "sec. 2, fig. 4b"),

@@ -33,12 +33,13 @@ from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 interactive = False  # True: a slider for the speed
 
 # %%
-record = NotebookRecord("05_zones", data=data, results=results, seed=seed)
+record = NotebookRecord("05_zones", globals())
 parameters(
     [
         ("ellipse", "smallest area", PAPER, "sec. 2"),

@@ -32,11 +32,12 @@ from szlib.workbook.record import MEASURED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 
 # %%
-record = NotebookRecord("06_barriers", data=data, results=results, seed=seed)
+record = NotebookRecord("06_barriers", globals())
 settings = szlib.MPCSettings()
 parameters(
     [

@@ -34,13 +34,14 @@ from szlib.workbook.record import NotebookRecord, settings_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 gamma = 0.05
 interactive = False  # True: a slider for gamma
 
 # %%
-record = NotebookRecord("07_passing", data=data, results=results, seed=seed)
+record = NotebookRecord("07_passing", globals())
 settings = szlib.MPCSettings(gamma=gamma)
 settings_table(settings)
 

@@ -31,12 +31,13 @@ from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, para
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 gamma = 0.05
 
 # %%
-record = NotebookRecord("08_corridor", data=data, results=results, seed=seed)
+record = NotebookRecord("08_corridor", globals())
 settings = szlib.MPCSettings(gamma=gamma)
 scenario = szlib.SCENARIOS["corridor"]
 person = scenario.people[0]

@@ -29,12 +29,13 @@ from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, para
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 gamma = 0.05
 
 # %%
-record = NotebookRecord("09_waiting", data=data, results=results, seed=seed)
+record = NotebookRecord("09_waiting", globals())
 settings = szlib.MPCSettings(gamma=gamma)
 scenario = szlib.SCENARIOS["waiting"]
 person = scenario.people[0]

@@ -37,6 +37,7 @@ from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, para
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 worlds = 3  # worlds for each cell of the map; 20 for the table that is saved
@@ -46,7 +47,7 @@ limits = [0.5, 1.0]  # a_max
 n_jobs = 1
 
 # %%
-record = NotebookRecord("11_feasibility", data=data, results=results, seed=seed)
+record = NotebookRecord("11_feasibility", globals())
 crowd = Worlds(people=(2, 4), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=0.3)
 parameters(
     [

@@ -35,13 +35,14 @@ from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 lengths = [0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 8.0, 13.0]  # of walls [m]
 eccentricities = [0.0, 0.3, 0.5, 0.65, 0.8, 0.9, 0.99]  # of ellipses as long as the learned one
 
 # %%
-record = NotebookRecord("12_distances", data=data, results=results, seed=seed)
+record = NotebookRecord("12_distances", globals())
 settings = szlib.MPCSettings()
 r, eps = settings.r_robot, settings.eps
 parameters(

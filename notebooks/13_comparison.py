@@ -35,13 +35,14 @@ from szlib.workbook.record import ASSUMED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 worlds = 4  # worlds for each method; 100 for the table that is saved
 n_jobs = 1
 
 # %%
-record = NotebookRecord("13_comparison", data=data, results=results, seed=seed)
+record = NotebookRecord("13_comparison", globals())
 full_table = Path("tables/13_comparison.csv")  # of worlds = 100
 parameters(
     [

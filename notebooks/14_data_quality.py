@@ -35,12 +35,13 @@ from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 exclude = []
 
 # %%
-record = NotebookRecord("14_data_quality", data=data, results=results, seed=seed)
+record = NotebookRecord("14_data_quality", globals())
 parameters(
     [
         ("standing", f"< {quality.STANDING:g} m in 1 s", MEASURED, "the sensor's noise stays below it"),

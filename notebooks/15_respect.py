@@ -32,13 +32,14 @@ from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 shifts = 20  # null models; the saved tables have 100
 resamples = 100  # for the intervals
 
 # %%
-record = NotebookRecord("15_respect", data=data, results=results, seed=seed)
+record = NotebookRecord("15_respect", globals())
 parameters(
     [
         (

@@ -35,12 +35,13 @@ from szlib.zones.outliers import is_outlier
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
 resamples = 200  # for the intervals
 
 # %%
-record = NotebookRecord("16_claims", data=data, results=results, seed=seed)
+record = NotebookRecord("16_claims", globals())
 parameters(
     [
         (

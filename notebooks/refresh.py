@@ -8,7 +8,7 @@ import jupytext
 from nbclient import NotebookClient
 
 HERE = Path(__file__).parent
-FIGURES = HERE.parent / "results" / "synthetic" / "figures"
+FIGURES = HERE.parent / "results" / "lab" / "synthetic" / "figures"
 PICTURES = {
     "zone.png": "05_zones-zone.png",
     "los.png": "02_encounters-los.png",

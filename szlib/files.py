@@ -13,6 +13,7 @@ import os
 import re
 import shutil
 import socket
+import sys
 import tempfile
 import uuid
 import zlib
@@ -119,6 +120,34 @@ def owner_of(folder: str | Path) -> str | None:
         return (Path(folder) / MARKER).read_text(encoding="utf-8").splitlines()[0]
     except (OSError, ValueError, IndexError):
         return None
+
+
+@contextmanager
+def held(folder: str | Path) -> Iterator[None]:
+    """Keep a folder of szlib's to this process; it is free again however the process ends.
+
+    Raises StorageError where another process has it.
+    """
+    with (Path(folder) / MARKER).open("r+b") as marker:
+        try:
+            _lock(marker.fileno())
+        except OSError as error:
+            raise StorageError(
+                f"{folder}: another process is writing there; wait for its end, or choose another folder"
+            ) from error
+        yield
+
+
+def _lock(file: int) -> None:
+    if sys.platform == "win32":
+        import msvcrt
+
+        os.lseek(file, _BLOCK, os.SEEK_SET)  # beyond what is read of it
+        msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 @contextmanager

@@ -26,8 +26,9 @@ from random_states import meetings, questions
 from tqdm import tqdm
 
 import szlib
-from szlib.control import ipopt, problem
+from szlib.control import problem
 from szlib.control.barriers import Array
+from szlib.control.solvers import ipopt
 from szlib.plaza.people import make_plaza
 from szlib.tracks import datasets
 

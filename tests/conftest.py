@@ -99,26 +99,27 @@ seed = 0
 results = "../results"
 
 # %%
-record = NotebookRecord("{name}", data=data, results=results, seed=seed)
+record = NotebookRecord("{name}", globals())
 record.key["seed"] = seed
 """
 """What a notebook of a test begins with."""
 
 
 @pytest.fixture
-def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """A workbook of one's own: `notebooks(name=code)` writes them; its data is a file of two rows."""
-    from szlib.workbook import runner
+def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
+    """A workbook of one's own: `notebooks(name=code)` writes them and gives their folder; few data."""
+    from szlib.workbook import places
 
     folder = tmp_path / "notebooks"
     folder.mkdir()
-    monkeypatch.setattr(runner, "NOTEBOOKS", folder)
+    monkeypatch.setattr(places, "NOTEBOOKS", folder)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.csv").write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n")
 
-    def write(**codes: str) -> None:
+    def write(**codes: str) -> Path:
         for name, code in codes.items():
             text = NOTEBOOK.format(name=f"{name[1:]}") + code + "\n\n# %%\nrecord.close()\n"
             (folder / f"{name[1:]}.py").write_text(text)
+        return folder
 
     return write

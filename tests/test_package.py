@@ -20,7 +20,7 @@ ROOMS = {
         "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
     "encounters": [
-        "geometry", "kinds", "search", "streaming", "pipeline", "records", "days", "shifting", "null",
+        "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
     "zones": [
         "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
@@ -29,8 +29,10 @@ ROOMS = {
     "zones.respect": ["presence", "boundary", "significance", "estimate"],
     "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
-        "barriers", "settings", "distances", "people", "problem", "ipopt", "sqp", "step", "mpc",
+        "barriers", "settings", "distances", "people", "problem", "step", "solvers", "mpc",
     ],
+    "control.people": ["person", "tracker", "meetings"],
+    "control.solvers": ["ipopt", "sqp", "ladder"],
     "simulation": [
         "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
         "comparisons",
@@ -38,11 +40,12 @@ ROOMS = {
     "simulation.crowds": [
         "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
     ],
-    "simulation.controllers": ["protocol"],
+    "simulation.controllers": ["protocol", "baselines"],
     "simulation.metrics": ["endings", "motion"],
     "simulation.scenarios": ["paper", "worlds"],
     "workbook": [
-        "figures", "claims", "sensitivity", "places", "record", "parameters", "runner", "command_line",
+        "figures", "claims", "sensitivity", "places", "parameters", "record", "summary", "runner",
+        "command_line",
     ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation",
@@ -50,7 +53,7 @@ ROOMS = {
 }  # fmt: skip
 """From the ground up: a room imports only from rooms before it, a file only from files before it."""
 MOST_FILES, LONGEST = 9, 300
-CASADI = {"control.problem", "control.ipopt", "control.sqp"}
+CASADI = {"control.problem", "control.solvers.ipopt", "control.solvers.sqp"}
 HANDED_OVER = {("simulation.log", "workbook.figures.simulation")}
 """What a log draws of itself, it asks of the workbook when it is called; nothing else looks up."""
 

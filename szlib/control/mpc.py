@@ -1,17 +1,6 @@
 """The controller: model predictive control with barriers around people and walls (MPC-CBF).
 
-The problem stands in `problem`; it is solved by `sqp` or `ipopt`. Each step climbs
-down a ladder until a rung holds:
-
-    warm      the problem, from the last plan, shifted
-    cold      the problem, from full braking
-    kept      the last plan, shifted, if it still satisfies the problem        terminal condition only
-    relaxed   the problem with penalised slack
-    kept      the last plan, shifted, if it is a way to a safe end             terminal condition only
-    braking   to rest as soon as the bounds allow
-
-Where the time of a step is up, what is left of the ladder is skipped; a relaxed plan that was cut short is
-taken if it violates no more than braking would.
+The problem stands in `problem`; `solvers` solve it, and `solvers.ladder` says what is done where they cannot.
 
 The terminal condition and what it is good for
 ----------------------------------------------
@@ -38,7 +27,7 @@ h(x_{N+1}, N+1) = h(x_N, N), and the problem is recursively feasible although th
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from threading import get_ident
 from time import perf_counter
 from typing import cast
@@ -50,12 +39,15 @@ from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from .barriers import Array, barrier, check_wall, finite, segment_formula
 from .distances import wall_margin
-from .ipopt import Ipopt
-from .people import Person, PlacedZone, SpeedZone, as_ellipse, place, subgoal
-from .problem import HARD_SHARE, TOLERANCE, Budget, Numbers, ProblemSolver
+from .people.meetings import subgoal
+from .people.person import Person, PlacedZone, SpeedZone, as_ellipse, circle_around, place
+from .people.tracker import People, Seen, Tracker
+from .problem import Budget, ProblemSolver
 from .settings import MPCSettings
-from .sqp import Sqp
-from .step import Rung, Scene, Step, terminal_of
+from .solvers.ipopt import Ipopt
+from .solvers.ladder import solve_with_fallbacks
+from .solvers.sqp import Sqp
+from .step import Scene, Step, terminal_of
 
 _log = logging.getLogger("szlib")
 
@@ -73,6 +65,7 @@ class MPCCBF:
     settings : every other parameter.
     max_people : how many people to build for now. More make the controller grow once, which takes
         a moment that no time limit covers, and is logged by "szlib" (at level INFO).
+    tracker : what is remembered of people by their ids; default: `Tracker()`.
 
     Raises
     ------
@@ -87,6 +80,7 @@ class MPCCBF:
         walls: ArrayLike | Sequence[ArrayLike] = (),
         settings: MPCSettings | None = None,
         max_people: int = 1,
+        tracker: Tracker | None = None,
     ) -> None:
         self.settings = settings or MPCSettings()
         self.zone = as_ellipse(zone, self.settings.zone_speed)
@@ -102,6 +96,7 @@ class MPCCBF:
         self._wall_numbers = [number for segment, margin in pairs for number in (*segment, margin)]
         self._solvers: list[ProblemSolver] = []
         self._budget, self._thread = Budget(self.settings.time_limit), dict[str, int]()
+        self.tracker = tracker or Tracker()
         self._build(max_people)
         self.reset()
 
@@ -112,44 +107,69 @@ class MPCCBF:
             self._solvers[n].budget = self._budget
 
     def reset(self) -> None:
-        """Forget the last plan and goal: what follows depends on nothing that went before."""
-        self._plan = np.zeros(2 * self.settings.N)
-        self._goal: tuple[float, float] | None = None
+        """Forget the last plan and everybody: what follows depends on nothing that went before."""
+        self._plan, self._now = np.zeros(2 * self.settings.N), 0.0
+        self._moved = False
+        self.tracker.reset()
         for solver in self._solvers:
             solver.reset()
 
-    def step(self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()) -> Step:
+    def step(
+        self,
+        state: ArrayLike,
+        goal: ArrayLike,
+        people: People = (),
+        *,
+        ids: Iterable[Hashable] | None = None,
+        stamps: ArrayLike | None = None,
+        now: float | None = None,
+    ) -> Step:
         """The acceleration to apply for the next `dt`.
 
-        Whatever people do, the robot gets a control: where they leave it no way, `Step.rung` and
-        `Step.slack` say so, and `Step.goal_blocked` where somebody stands on its goal.
+        Whatever people do, and whatever a sensor says of them, the robot gets a control: where they leave it
+        no way, `Step.rung` and `Step.slack` say so, and `Step.goal_blocked` where the goal cannot be reached.
+
+        People with numbers that cannot be used are set aside and counted (`Step.set_aside`); in their place
+        the tracker puts where they must be by now. Out of the zone of those of whom it knows nothing
+        (`Step.lost`) no plan can be proved to keep, but a robot at rest hits nobody. So while somebody is
+        lost the step is not `safe`, and the robot is drawn to where full braking ends, not to the goal; out
+        of the zones of those whom it sees, and off walls, it keeps all the same.
 
         Parameters
         ----------
         state : (x, y, vx, vy) [m, m/s].
         goal : (x, y) [m].
-        people : everybody to be respected now.
+        people : everybody to be respected: `Person`s, or an array, shape (n, 4): x, y [m], vx, vy [m/s].
+        ids : of each of them, by which they are known again, None for who has none; default: those of the
+            `Person`s. See `Tracker` for what is remembered.
+        stamps : when they were seen, a time for each or one for all [s]; default: now.
+        now : time [s], of the same clock; default: `dt` after the last step.
 
         Raises
         ------
-        SolverError : a number is not usable, a shape is wrong, a new goal lies too close to a wall, or
-            another thread has this controller.
+        SolverError : an error of the program: state or goal is no number, a shape is wrong, the goal of the
+            first step lies too close to a wall, or another thread has this controller.
         """
         began = perf_counter()
         if self._thread.setdefault("first", get_ident()) != get_ident():
             raise SolverError("this controller belongs to another thread; build one in each thread")
         x = finite("state", state, (4,))
         gx, gy = finite("goal", goal, (2,)).tolist()
-        if (gx, gy) != self._goal:
+        if not self._moved:
             self._check_goal((gx, gy))
-            self._goal = (gx, gy)
-        solver = self._solver(len(people))
+        self._now = self._clock(now, stamps)
+        seen = self.tracker.see(people, now=self._now, ids=ids, stamps=stamps)
+        self._moved = True
+        solver = self._solver(len(seen.people))
         self._budget.begin()
-        placed = [place(person, self.zone_of(person)) for person in people]
-        target = subgoal((float(x[0]), float(x[1])), (gx, gy), placed, self.walls, self.settings)
+        placed = [place(person, self.zone_of(person)) for person in seen.people]
+        if seen.lost:
+            target = self._stop(x)
+        else:
+            target = subgoal((float(x[0]), float(x[1])), (gx, gy), placed, self.walls, self.settings)
         parameters = self._parameters(x, target, placed)
 
-        rung, plan, numbers, timed_out = self._solve_with_fallbacks(solver, parameters)
+        rung, plan, numbers, timed_out = solve_with_fallbacks(solver, self._plan, parameters)
         self._plan = plan
         return Step(
             control=plan[:2].copy(),
@@ -162,8 +182,26 @@ class MPCCBF:
             cost=numbers.cost,
             solve_time=perf_counter() - began,
             timed_out=timed_out,
-            scene=Scene((gx, gy), tuple(people), placed, self._segments, self.settings),
+            scene=Scene((gx, gy), seen, placed, self._segments, self._margins, self.settings),
         )
+
+    def _clock(self, now: float | None, stamps: ArrayLike | None) -> float:
+        """The time of this step [s]: as given, or `dt` after the last."""
+        if now is None:
+            if stamps is not None:
+                raise SolverError(
+                    "stamps need `now`, the time of the robot's state by the same clock; got none"
+                )
+            return self._now + self.settings.dt if self._moved else 0.0
+        if not np.isfinite(now):
+            raise SolverError(f"now must be a finite time [s]; got {now!r}")
+        return float(now)
+
+    def _stop(self, x: Array) -> tuple[float, float]:
+        """Where full braking along the way ends [m]."""
+        px, py, vx, vy = x.tolist()
+        time = max(abs(vx), abs(vy)) / self.settings.a_max
+        return px + vx * time / 2, py + vy * time / 2
 
     def _solver(self, n_people: int) -> ProblemSolver:
         built = len(self._solvers) - 1
@@ -180,61 +218,17 @@ class MPCCBF:
             numbers += zone
         return np.array(numbers + self._wall_numbers)
 
-    def _solve_with_fallbacks(
-        self, solver: ProblemSolver, parameters: Array
-    ) -> tuple[Rung, Array, Numbers, bool]:
-        """The first rung that holds, its plan, the plan's numbers, and whether the time was up."""
-        ends = self.settings.terminal != "none"
-        shifted = start = np.concatenate([self._plan[2:], (0.0, 0.0)])
-        late = False
-        rung: Rung
-        for rung in ("warm", "cold"):
-            if rung == "cold" and self._budget.spent(HARD_SHARE / 2):
-                late = True
-                break
-            guess = shifted if rung == "warm" else self._brake(parameters[2:4])
-            plan, converged = solver.hard(guess, parameters)
-            if converged:
-                numbers = solver.evaluate(plan, parameters)
-                if numbers.slack <= TOLERANCE:
-                    return rung, plan, numbers, late
-            late |= solver.late
-            start = plan if solver.late and np.isfinite(plan).all() else start
-        kept = solver.evaluate(shifted, parameters)
-        if ends and kept.slack <= TOLERANCE:
-            return "kept", shifted, kept, late
-        safe_end = ends and _safe_to_its_end(kept, parameters)
-        plan, converged = solver.relaxed(start, parameters)
-        late |= solver.late
-        brake = self._brake(parameters[2:4])
-        braking = solver.evaluate(brake, parameters)
-        if (converged or solver.late) and np.isfinite(plan).all():
-            numbers = solver.evaluate(plan, parameters)
-            better = converged or numbers.slack <= braking.slack
-            if better and (not safe_end or _safe_to_its_end(numbers, parameters)):
-                rung = "warm" if converged and numbers.slack <= TOLERANCE else "relaxed"
-                return rung, plan, numbers, late
-        if safe_end:
-            return "kept", shifted, kept, late
-        return "braking", brake, braking, late
-
-    def _brake(self, velocity: Array) -> Array:
-        """The inputs that bring the robot to rest soonest along its path, shape (2N,) [m/s2]."""
-        s, (vx, vy) = self.settings, velocity.tolist()
-        plan: list[float] = []
-        for _ in range(s.N):
-            time = max(s.dt, max(abs(vx), abs(vy)) / s.a_max)
-            plan += (-vx / time, -vy / time)
-            vx, vy = vx - s.dt * vx / time, vy - s.dt * vy / time
-        return np.array(plan)
-
     def zone_of(self, person: Person) -> Ellipse:
-        """The zone that is kept for a person: their own, or the controller's; in the person's frame."""
-        return self.zone if person.zone is None else as_ellipse(person.zone, self.settings.zone_speed)
+        """The zone that is kept for a person: their own, or the controller's; in the person's frame.
+
+        Of somebody whose heading is unknown it is `circle_around` that.
+        """
+        zone = self.zone if person.zone is None else as_ellipse(person.zone, self.settings.zone_speed)
+        return circle_around(zone) if person.heading is None else zone
 
     def placed_zones(self, people: Sequence[Person]) -> list[Ellipse]:
         """The zone of each person, in the world frame."""
-        return [self.zone_of(p).placed(p.position, cast(float, p.heading)) for p in people]
+        return [self.zone_of(p).placed(p.position, p.heading or 0.0) for p in people]
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h of every person and then of every wall at a position, shape (people + walls,) [m]."""
@@ -244,10 +238,13 @@ class MPCCBF:
         margins = [self.settings.eps] * len(people) + self._margins
         return np.asarray(barrier(np.array(distances), self.settings.r_robot, np.array(margins)), float)
 
-    def goal_blocked(self, goal: ArrayLike, people: Sequence[Person]) -> bool:
-        """True if somebody who stands has the goal in their zone: h < 0 there."""
+    def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
+        """True if the goal cannot be reached, h < 0 there: for a wall, or for somebody who stands."""
         x, y = finite("goal", goal, (2,)).tolist()
-        return any(place(who, self.zone_of(who)).blocks((x, y), self.settings) for who in people)
+        placed = [place(who, self.zone_of(who)) for who in people]
+        return Scene(
+            (x, y), Seen(tuple(people)), placed, self._segments, self._margins, self.settings
+        ).goal_blocked
 
     def _check_goal(self, goal: tuple[float, float]) -> None:
         h = self.barriers(goal)
@@ -257,10 +254,3 @@ class MPCCBF:
                 f"the goal {list(goal)} cannot be reached: it lies too close to the wall "
                 f"{self.walls[i].tolist()} (h = {h[i]:.3f} m); choose one where h >= 0"
             )
-
-
-def _safe_to_its_end(plan: Numbers, parameters: Array) -> bool:
-    """True if the plan ends as it should, with h >= 0 at every state up to the one from which on it does."""
-    off = np.abs(plan.states[:, 2:] - parameters[6:8]).max(axis=1) > TOLERANCE
-    last = int(off.nonzero()[0].max(initial=-1)) + 1
-    return last < len(off) and bool((plan.h[:, : last + 1] >= -TOLERANCE).all())

@@ -193,6 +193,7 @@ class ProblemSolver(Protocol):
     `late` says that the last call was cut off by the `budget`, and gave what it had by then.
     """
 
+    settings: MPCSettings
     evaluate: Evaluator
     budget: Budget
     late: bool

@@ -46,7 +46,7 @@ class MPCSettings:
     terminal : what the plan ends in: "none", as in the paper; "rest", zero velocity; "person", the
         velocity of the one person there is, in open space ("rest" while there is not exactly one; see
         `Step.terminal`). See the proof in `szlib.control.mpc`.
-    solver : "sqp", the condensed SQP of `szlib.control.sqp`, or "ipopt", as in the paper.
+    solver : "sqp", the condensed SQP of `szlib.control.solvers.sqp`, or "ipopt", as in the paper.
     slack_weight : penalty of slack [cost per m, and per m of distance to the goal (at least 1 m)],
         to which the multipliers of the barriers are in proportion.
     max_iterations : iterations that a solver may take before the next rung of the ladder.

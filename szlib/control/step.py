@@ -9,8 +9,9 @@ from typing import Literal, NamedTuple, cast, get_args
 
 import numpy as np
 
-from .barriers import Array, euclidean_segment_formula
-from .people import BODY_RADIUS, Person, PlacedZone
+from .barriers import Array, barrier, euclidean_segment_formula, segment_formula
+from .people.person import BODY_RADIUS, Person, PlacedZone
+from .people.tracker import Seen
 from .problem import TOLERANCE
 from .settings import MPCSettings, Terminal
 
@@ -20,13 +21,30 @@ Status = Literal["optimal", "kept", "relaxed", "braking"]
 
 
 class Scene(NamedTuple):
-    """What was asked: the goal, everybody as they were given and their zones, the walls, and the settings."""
+    """What was asked: the goal, people as the tracker sees them, their zones, walls with their margins."""
 
     goal: tuple[float, float]
-    people: tuple[Person, ...]
+    seen: Seen
     zones: Sequence[PlacedZone]
     walls: Sequence[Sequence[float]]
+    margins: Sequence[float]
     settings: MPCSettings
+
+    @property
+    def people(self) -> tuple[Person, ...]:
+        """Everybody to be respected, in the order of `Step.h`."""
+        return self.seen.people
+
+    @property
+    def goal_blocked(self) -> bool:
+        """True if h < 0 at the goal, for a wall or for somebody who stands there."""
+        if any(zone.blocks(self.goal, self.settings) for zone in self.zones):
+            return True
+        h = (
+            barrier(segment_formula(*self.goal, *wall), self.settings.r_robot, margin)
+            for wall, margin in zip(self.walls, self.margins, strict=True)
+        )
+        return any(each < 0 for each in h)
 
     def gaps(self, x: float, y: float, seconds: float) -> list[float]:
         """Euclidean gaps from the robot's disc at (x, y) to bodies, so many seconds ahead, and walls [m]."""
@@ -46,7 +64,7 @@ class Step:
     ----------
     control : acceleration (ax, ay) to apply now, within its bounds, shape (2,) [m/s2].
     predicted : states x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s].
-    rung : the rung of the ladder that gave the plan; see `szlib.control.mpc`.
+    rung : the rung of the ladder that gave the plan; see `szlib.control.solvers.ladder`.
     slack : largest violation of a hard row by the plan, 0 if none [m for barriers, m2/s2 for speed,
         m/s for the terminal velocity].
     residual : h_{k+1} - (1-gamma) h_k, people before walls, shape (people + walls, N_h) [m].
@@ -83,8 +101,21 @@ class Step:
 
     @property
     def goal_blocked(self) -> bool:
-        """True if somebody who stands has the goal in their zone (h < 0 there): the robot waits beside it."""
-        return any(zone.blocks(self.scene.goal, self.scene.settings) for zone in self.scene.zones)
+        """True if the goal cannot be reached, h < 0 there: for a wall, or for somebody who stands.
+
+        Who is slower than `people.person.STANDS` counts as standing. The robot waits beside them.
+        """
+        return self.scene.goal_blocked
+
+    @property
+    def set_aside(self) -> int:
+        """How many people were given with numbers that could not be used; see `MPCCBF.step`."""
+        return self.scene.seen.set_aside
+
+    @property
+    def lost(self) -> int:
+        """Of how many of those nothing is known that could stand in: the robot brakes."""
+        return self.scene.seen.lost
 
     @property
     def terminal(self) -> Terminal:
@@ -105,12 +136,13 @@ class Step:
     def safe(self) -> bool:
         """True if this step keeps every promise to people who keep their velocity, and to walls.
 
-        That is: the plan satisfies the hard problem, from a state that satisfies every barrier, and the
-        robot's disc overlaps nobody's body and no wall, neither now nor when the control has been applied,
-        by Euclidean distance. People who turn, stop or speed up within a step may still bring about
-        h < 0 after a step that was safe (notebook 13 counts them); the next step then says so.
+        That is: nobody is lost (see `MPCCBF.step`), the plan satisfies the hard problem, from a state that
+        satisfies every barrier, and the robot's disc overlaps nobody's body and no wall, neither now nor when
+        the control has been applied, by Euclidean distance. People who turn, stop or speed up within a step
+        may still bring about h < 0 after a step that was safe (notebook 13 counts them); the next step then
+        says so.
         """
-        if not self.feasible or (self.h < -TOLERANCE).any():
+        if not self.feasible or self.scene.seen.lost or (self.h < -TOLERANCE).any():
             return False
         return min(self._gaps(0) + self._gaps(1), default=0.0) >= -TOLERANCE
 

@@ -8,12 +8,11 @@ the right SHA-256, is not computed again; so a run that was stopped or killed go
 
 from __future__ import annotations
 
-import gzip
 import time
 import warnings
-import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -28,10 +27,10 @@ from ..errors import DataError, DataWarning, SzlibError
 from ..files import own_folder, printable
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.formats import LONGEST_LINE, layout_of, start_of_day
+from ..tracks.formats import first_line, layout_of, start_of_day
 from ..tracks.readers import CALENDAR_BEGINS, recording_names
-from .pipeline import Chain
-from .records import day_key, finished_record, write_record
+from .geometry import Area
+from .pipeline import Chain, day_key, finished_record, write_record
 
 PURPOSE = "encounters by day"
 """What the folder of an extraction is marked as."""
@@ -50,12 +49,14 @@ class Extraction:
         read, unusable rows among them, encounters, samples, seconds, and why a day failed.
     exclude : days that were left out.
     keys : of each finished day, the name of its result: content, parameters and version.
+    area : where encounters were looked for, in every day; None where the files of no day have one.
     """
 
     out: Path
     table: pd.DataFrame
     exclude: tuple[str, ...] = ()
     keys: Mapping[str, str] = field(default_factory=dict)
+    area: Area | None = None
 
     @property
     def failed(self) -> pd.DataFrame:
@@ -99,7 +100,8 @@ class Extraction:
     def __str__(self) -> str:
         shown = self.table.to_string(index=False, float_format="{:.1f}".format)
         counts = self.table["status"].value_counts().sort_index()
-        return f"{shown}\n" + ", ".join(f"{n} {status}" for status, n in counts.items())
+        told = ", ".join(f"{n} {status}" for status, n in counts.items())
+        return f"{shown}\n{told}" + (f"; area: {self.area}" if self.area else "")
 
 
 def extract_days(
@@ -123,7 +125,8 @@ def extract_days(
     exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
     progress : whether to show a bar over the days.
     parameters : of `szlib.read_tracks` and `szlib.find_encounters`: square, space, duration, min_distance,
-        min_speed, throughout, file_format, unit, frame_rate, max_gap, tz.
+        min_speed, throughout, file_format, unit, frame_rate, max_gap, tz.  Without a square the ATC mall's
+        files have `ATC_SQUARE`, others "auto": the `szlib.walked_area` of the first day, the same for all.
 
     Returns
     -------
@@ -144,6 +147,7 @@ def extract_days(
     own_folder(folder, PURPOSE, inputs=files)
     for file, name in zip(files, recording_names(files), strict=True):
         days.setdefault(_day_of(file, chain) or printable(name), []).append(str(file))
+    chain = _settled(chain, [files for day, files in sorted(days.items()) if day not in excluded])
     rows = [_row(day, files, status="excluded") for day, files in days.items() if day in excluded]
     tasks = [
         joblib.delayed(extract_day)(day, files, str(folder.resolve()), chain)
@@ -157,7 +161,15 @@ def extract_days(
             bar.set_postfix_str(f"{row['day']} {row['status']}")
     keys = {row["day"]: row.pop("key") for row in rows}
     table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
-    return Extraction(folder, table, excluded, keys)
+    return Extraction(folder, table, excluded, keys, chain.square if isinstance(chain.square, Area) else None)
+
+
+def _settled(chain: Chain, days: Iterable[Sequence[str]]) -> Chain:
+    """The parameters with the area of the first day that has one."""
+    for files in days:
+        with suppress(SzlibError):  # computing that day will tell why
+            return chain.settled([Path(file) for file in files])
+    return chain
 
 
 def extract_day(day: str, files: Sequence[str], out: str, chain: Chain) -> dict[str, Any]:
@@ -190,10 +202,7 @@ def _row(day: str, files: Sequence[str], status: str) -> dict[str, Any]:
 def _day_of(file: Path, chain: Chain) -> str | None:
     """The calendar day on which a file begins; None where it tells none."""
     try:
-        with file.open("rb") as stream:
-            packed = stream.read(2) == b"\x1f\x8b"
-        with gzip.open(file) if packed else file.open("rb") as stream:
-            first = stream.readline(LONGEST_LINE).decode("utf-8", errors="replace").lstrip("\ufeff").strip()
+        first = first_line(file)
         layout = layout_of(first, chain.file_format)
         if layout.name not in ("atc-raw", "atc-1hz"):
             return None
@@ -201,5 +210,5 @@ def _day_of(file: Path, chain: Chain) -> str | None:
         if not begun >= CALENDAR_BEGINS:
             return None
         return datetime.fromtimestamp(begun, ZoneInfo(chain.tz)).strftime("%Y-%m-%d")
-    except (OSError, EOFError, zlib.error, ValueError, OverflowError):  # reading the day will tell why
+    except (OSError, ValueError, OverflowError):  # reading the day will tell why
         return None

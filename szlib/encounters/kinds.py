@@ -31,7 +31,7 @@ import pandas as pd
 from ..errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, check_columns, clock_index
-from .geometry import Square
+from .areas import as_area
 
 COMPANIONS, STANDING, SAME, OPPOSITE, CROSSING = KINDS = (
     "companions", "standing", "same direction", "opposite", "crossing",
@@ -52,9 +52,7 @@ ALONG = np.pi / 4
 """Directions at most this far apart [rad] are the same, from pi less this on opposite (assumed)."""
 
 
-def encounter_kinds(
-    tracks: pd.DataFrame, pairs: pd.DataFrame, *, square: Square | None = None
-) -> pd.Categorical:
+def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, square: object = None) -> pd.Categorical:
     """The kind of each pair of people, one of `KINDS`; missing where two people were never there at once.
 
     Parameters
@@ -80,7 +78,7 @@ def encounter_kinds(
     if (lost := (ref < 0) | (other < 0)).any():
         found = pairs[["day", "ref_id", "other_id"]].iloc[int(np.flatnonzero(lost)[0])].to_dict()
         raise DataError(f"{found}: not in these tracks; pass the tracks in which the pairs were found")
-    there = np.ones(len(x), bool) if square is None else square.grown(REACH).contains(x, y)
+    there = np.ones(len(x), bool) if square is None else as_area(square).grown(REACH).contains(x, y)
     return kinds_of_pairs(ref, other, person, tick, np.column_stack([x, y]), np.column_stack([vx, vy]), there)
 
 

@@ -18,7 +18,8 @@ from tqdm import tqdm
 from ..errors import DataError
 from ..parallel import run_tasks
 from ..tracks import funnels
-from .geometry import ATC_SQUARE, Square
+from .areas import area_for
+from .geometry import ATC_SQUARE
 from .kinds import of_kind
 from .search import find_encounters
 from .shifting import MINUTES, Crowd
@@ -68,7 +69,7 @@ def null_encounters(
     seed: int = 0,
     minutes: tuple[float, float] = MINUTES,
     r_max: float = CLOSE,
-    square: Square = ATC_SQUARE,
+    square: object = ATC_SQUARE,
     duration: float = 3.0,
     n_jobs: int | None = None,
     progress: bool = True,
@@ -97,9 +98,10 @@ def null_encounters(
         raise DataError(f"expected shifts >= 1 and r_max > 0 m; got {shifts} shifts, {r_max} m")
     crowd = Crowd.of(tracks)
     crowd.shifts(seed, minutes)  # what cannot be shifted is told here, not by a worker
-    near, companions = crowd.near(square, duration), len(crowd.companions)
+    area = area_for(tracks, square)
+    near, companions = crowd.near(area, duration), len(crowd.companions)
     del crowd  # of a whole day only what is near the square is needed from here on
-    asked = {"square": square, "duration": duration, **parameters}
+    asked = {"square": area, "duration": duration, **parameters}
     batches = [range(k, min(k + _AT_ONCE, shifts)) for k in range(0, shifts, _AT_ONCE)]
     tasks = [joblib.delayed(_shift_and_find)(near, seed, batch, minutes, r_max, asked) for batch in batches]
     found: dict[int, tuple[pd.DataFrame, pd.DataFrame]] = {}

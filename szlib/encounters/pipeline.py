@@ -1,9 +1,16 @@
-"""One day from its files to its encounters: every parameter on the way, and the way itself."""
+"""One day from its files to its encounters: every parameter on the way, the way itself, and its record.
+
+The stored encounters of a day are written as a whole or not at all, and known by what they were made of.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import io
+import json
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
@@ -11,22 +18,31 @@ from zoneinfo import ZoneInfo
 import numpy as np
 import pandas as pd
 
-from ..errors import DataError
+from .. import __version__
+from ..errors import DataError, DataWarning
+from ..files import file_content, write_file
 from ..tracks import funnels
 from ..tracks.clock import to_clock
-from ..tracks.formats import FORMATS
+from ..tracks.formats import FORMATS, first_line, layout_of
 from ..tracks.readers import read_raw
-from .geometry import ATC_SQUARE, PAPER_SPACE, AttentionalSpace, Square
+from .areas import AUTO, as_area, walked_area
+from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
 from .kinds import KINDS
 from .search import SAMPLE_COLUMNS, find_encounters
 from .streaming import read_near_square
 
+_FORMAT, _VERSION = "szlib.extraction", 4
+
 
 @dataclass(frozen=True)
 class Chain:
-    """Every parameter from a file to its encounters: those of `read_tracks` and `find_encounters`."""
+    """Every parameter from a file to its encounters: those of `read_tracks` and `find_encounters`.
 
-    square: Square = ATC_SQUARE
+    `square` may be anything that `szlib.as_area` takes; "auto" finds the `szlib.walked_area` of the files;
+    None stands for the data's own: `ATC_SQUARE` for files in a format of the ATC mall's, else "auto".
+    """
+
+    square: object = None
     space: AttentionalSpace = PAPER_SPACE
     duration: float = 3.0
     min_distance: float = 1.0
@@ -39,6 +55,8 @@ class Chain:
     tz: str = "Asia/Tokyo"
 
     def __post_init__(self) -> None:
+        if self.square is not None and self.square != AUTO:
+            object.__setattr__(self, "square", as_area(self.square))
         try:
             ZoneInfo(self.tz)
         except (KeyError, ValueError, OSError) as error:
@@ -48,39 +66,50 @@ class Chain:
         if self.unit not in (None, "m", "mm"):
             raise DataError(f"unit must be 'm' or 'mm'; got {self.unit!r}")
 
+    def parameters(self) -> dict[str, Any]:
+        """Every parameter as JSON values; the area as text that reads back."""
+        return asdict(self) | {"square": None if self.square is None else str(self.square)}
+
+    def settled(self, files: Sequence[Path]) -> Chain:
+        """The same with the area that these files have where none was given."""
+        if area := self._known_area(files):
+            return replace(self, square=area)
+        with warnings.catch_warnings():  # rows set aside are told when the day itself is read
+            warnings.simplefilter("ignore", DataWarning)
+            tracks = to_clock(self._read(files), max_gap=self.max_gap)
+        return replace(self, square=walked_area(tracks))
+
     def encounters(self, files: Sequence[Path]) -> pd.DataFrame:
         """The encounters of one day's files: identical to those found from `szlib.read_tracks(files)`."""
-        if len(files) == 1:
-            raw = read_near_square(
-                files[0],
-                square=self.square,
-                duration=self.duration,
-                file_format=self.file_format,
-                unit=self.unit,
-                frame_rate=self.frame_rate,
-                max_gap=self.max_gap,
-                tz=self.tz,
-            )
-        else:
-            raw = read_raw(
-                files,
-                file_format=self.file_format,
-                unit=self.unit,
-                frame_rate=self.frame_rate,
-                tz=self.tz,
-            )
+        area = self._known_area(files)
+        raw = self._read(files, area)
         tracks = to_clock(raw, max_gap=self.max_gap) if len(raw) else raw
         if len(tracks) == 0:
             return funnels.carry(no_samples(), funnels.of(tracks))
         return find_encounters(
             tracks,
-            square=self.square,
+            square=area or walked_area(tracks),
             space=self.space,
             duration=self.duration,
             min_distance=self.min_distance,
             min_speed=self.min_speed,
             throughout=self.throughout,
         )
+
+    def _known_area(self, files: Sequence[Path]) -> Area | None:
+        """The area given, or the mall's; None where it must be found."""
+        if isinstance(self.square, Square | Region):
+            return self.square
+        layouts = {layout_of(first_line(file), self.file_format).name for file in files}
+        return ATC_SQUARE if self.square is None and layouts <= {"atc-raw", "atc-1hz"} else None
+
+    def _read(self, files: Sequence[Path], near: Area | None = None) -> pd.DataFrame:
+        """Rows of the files; of a single one, where an area is given, those near it."""
+        given = {"file_format": self.file_format, "unit": self.unit, "frame_rate": self.frame_rate}
+        if near is None or len(files) > 1:
+            return read_raw(files, tz=self.tz, **given)  # type: ignore[arg-type]
+        of = {"square": near, "duration": self.duration, "max_gap": self.max_gap}
+        return read_near_square(files[0], tz=self.tz, **of, **given)  # type: ignore[arg-type]
 
 
 def no_samples() -> pd.DataFrame:
@@ -91,3 +120,56 @@ def no_samples() -> pd.DataFrame:
     )
     samples = pd.DataFrame({**columns, "day": pd.Categorical([])})[SAMPLE_COLUMNS]
     return samples.assign(kind=pd.Categorical([], categories=list(KINDS)))
+
+
+def day_key(files: Sequence[str], chain: Chain) -> str:
+    """Names the result: the content of the files, every parameter, and this version of szlib."""
+    content = sorted((Path(file).name, *file_content(Path(file))) for file in files)
+    named = {"format": [_FORMAT, _VERSION, __version__], "files": content, "parameters": chain.parameters()}
+    return hashlib.sha256(json.dumps(named, sort_keys=True).encode()).hexdigest()
+
+
+def finished_record(folder: Path, day: str, key: str) -> dict[str, Any] | None:
+    """The record of a day that is there, whole, and made of the same content with the same parameters."""
+    try:
+        record = json.loads((folder / f"{day}.json").read_text(encoding="utf-8"))
+        samples = (folder / f"{day}.parquet").read_bytes()
+    except (OSError, ValueError):  # not there, or not whole
+        return None
+    whole = isinstance(record, dict) and record.get("key") == key and record.get("seal") == _seal(record)
+    return record if whole and record.get("sha256") == hashlib.sha256(samples).hexdigest() else None
+
+
+def write_record(
+    folder: Path, day: str, key: str, samples: pd.DataFrame, files: Sequence[str], chain: Chain
+) -> dict[str, Any]:
+    """Write the samples of a day, then its record."""
+    content = io.BytesIO()
+    samples.to_parquet(content, index=False)
+    stages = funnels.of(samples)
+    read = [stage for stage in stages if stage["stage"].startswith("read ")]
+    record = {
+        "format": _FORMAT,
+        "version": _VERSION,
+        "szlib": __version__,
+        "key": key,
+        "day": day,
+        "files": [Path(file).name for file in files],
+        "parameters": chain.parameters(),
+        "rows": sum(stage["entered"] for stage in read),
+        "unusable": sum(stage["entered"] - stage["kept"] for stage in read),
+        "encounters": int(samples["encounter"].nunique()),
+        "samples": len(samples),
+        "sha256": hashlib.sha256(content.getvalue()).hexdigest(),
+        "funnel": stages,
+    }
+    record["seal"] = _seal(record)
+    write_file(folder / f"{day}.parquet", content.getvalue())
+    write_file(folder / f"{day}.json", json.dumps(record, indent=1))
+    return record
+
+
+def _seal(record: Mapping[str, Any]) -> str:
+    """SHA-256 of all else in a record."""
+    rest = {name: value for name, value in record.items() if name != "seal"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()

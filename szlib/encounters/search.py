@@ -3,7 +3,7 @@
 The *attentional space* is a rectangle ahead of the reference pedestrian that turns with them.  Over
 a window of 3 s (31 ticks of 0.1 s):
 
-1. the four corners of the space stay inside the square;
+1. the space stays inside the square (in any convex area: its four corners do);
 2. nobody but one and the same other person is ever inside the space, and that person is inside it
    when the window opens;
 3. at the opening that person is at least 1 m away;
@@ -23,18 +23,16 @@ import pandas as pd
 from ..errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, check_columns, clock_index, nearest_tick
-from .geometry import ATC_SQUARE, PAPER_SPACE, AttentionalSpace, Square, wrap_angle
+from .areas import area_for
+from .geometry import ATC_SQUARE, PAPER_SPACE, AttentionalSpace, wrap_angle
 from .kinds import REACH, kinds_of_pairs, number_people, of_kind
 
 SAMPLE_COLUMNS = ["encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed"]
 """What is measured; the column kind follows them."""
-
 _PAIRS_AT_ONCE = 4_000_000
 """Pairs of people held in memory at a time."""
-
 _TOUCH = 1e-3
 """Covers every rounding of a position, however many ticks there are [m]."""
-
 _LONGEST_WINDOW = 3600.0
 """No two people are watched for an hour [s]."""
 
@@ -42,7 +40,7 @@ _LONGEST_WINDOW = 3600.0
 def find_encounters(
     tracks: pd.DataFrame,
     *,
-    square: Square = ATC_SQUARE,
+    square: object = ATC_SQUARE,
     space: AttentionalSpace = PAPER_SPACE,
     duration: float = 3.0,
     min_distance: float = 1.0,
@@ -55,7 +53,8 @@ def find_encounters(
     Parameters
     ----------
     tracks : a track table as from `szlib.read_tracks` (any row order, left untouched).
-    square : where the attentional space must stay.
+    square : where the attentional space must stay: a `Square`, a Shapely polygon, PedPy's ``WalkableArea``,
+        text or a file, as for `szlib.as_area`; or "auto", the `szlib.walked_area` of these tracks.
     space : the attentional space.
     duration : of a window [s], a multiple of 0.1 (paper: 3).
     min_distance : of the other person when the window opens [m] (paper: 1).
@@ -89,12 +88,13 @@ def find_encounters(
     x, y, vx, vy = (tracks[name].to_numpy(float)[order] for name in ("x", "y", "vx", "vy"))
     speed, heading = np.hypot(vx, vy), np.arctan2(vy, vx)
 
-    inside = square.contains(x, y)
+    area = area_for(tracks, square)
+    inside = area.contains(x, y)
     cornered = inside.copy()
     at = np.flatnonzero(inside)
     cos, sin = np.cos(heading[at]), np.sin(heading[at])
-    for ahead, side in space.corners:
-        cornered[at] &= square.contains(x[at] + ahead * cos - side * sin, y[at] + ahead * sin + side * cos)
+    ahead, side = space.corners.T[..., None]
+    cornered[at] = area.covers(x[at] + ahead * cos - side * sin, y[at] + ahead * sin + side * cos)
     ready = cornered & (speed >= min_speed)
     days = pd.factorize(tracks["day"])[0][order]
     people, other = _occupants(at, ready, days, tick, x, y, heading, space)
@@ -136,9 +136,10 @@ def find_encounters(
     samples = _sampled(tracks, order, openings[kept], partner[kept], steps)
     number, _ = number_people(days, person)
     met = number[openings[kept]], number[partner[kept]]
-    near = square.grown(REACH).contains(x, y)
+    near = area.grown(REACH).contains(x, y)
     kind = kinds_of_pairs(*met, number, tick, np.column_stack([x, y]), np.column_stack([vx, vy]), near)
     samples["kind"] = kind.repeat(steps + 1)
+    samples.attrs["area"] = str(area)
     stages = [
         *funnels.of(tracks),
         funnels.stage("encounters: ticks that open a window", len(x), len(openings), opened),

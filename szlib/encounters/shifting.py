@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 from ..errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN, clock_index, to_clock
-from .geometry import Square
+from .geometry import Area
 from .kinds import NEAR, REACH, TOGETHER, number_people
 
 MINUTES = (1.0, 10.0)
@@ -94,7 +94,7 @@ class Crowd:
         period = np.maximum.reduceat(tick, begun) - first + 2
         return cls(table, person, tick, days[begins], first, period, _companions(table, person, days, tick))
 
-    def near(self, square: Square, duration: float) -> Crowd:
+    def near(self, square: Area, duration: float) -> Crowd:
         """Only the rows that `find_encounters` can depend on, whatever the shifts: of people who are in the
         square at all, those in the square grown by `REACH` (kinds), half a second around (velocity), and the
         `duration` [s] after (both people must be tracked)."""

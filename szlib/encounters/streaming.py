@@ -2,7 +2,8 @@
 
 `read_near_square` gives a table from which `to_clock` and `find_encounters` make the very encounters, bit
 for bit, that they make from the whole day.  Why that is so, with g the longest gap [s] within a track, 0.1 s
-the clock, and "the square" the one asked for, grown by the 5 m in which kinds of encounter are decided:
+the clock, and "the square" the one asked for (or the smallest around an
+area of another shape), grown by the 5 m in which kinds of encounter are decided:
 
 1. Cut time into cells of w > g seconds for each person.  Rows leave the scan by whole cells.  Of two
    kept rows, consecutive among the kept ones and at most g apart, no dropped row can lie between: a
@@ -39,7 +40,7 @@ from ..tracks import funnels
 from ..tracks.clock import VELOCITY_SPAN
 from ..tracks.formats import Format, plain_file, readable, recognise
 from ..tracks.readers import check_unit, fault, faults, in_metres, merge, read_raw, read_stage
-from .geometry import Square
+from .geometry import Area, Square
 from .kinds import REACH
 
 _ROWS_AT_ONCE = 1 << 17
@@ -110,7 +111,7 @@ class Cells:
 def read_near_square(
     path: str | Path,
     *,
-    square: Square,
+    square: Area,
     duration: float,
     file_format: str | None = None,
     unit: str | None = None,
@@ -134,7 +135,7 @@ def read_near_square(
             layout, scan = recognise(plain, path, file_format, frame_rate)
             if layout.name == "atc-raw":
                 metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
-                cells = Cells(square.grown(REACH), duration, max_gap or layout.max_gap or 0.0, metres)
+                cells = Cells(square.grown(REACH).box, duration, max_gap or layout.max_gap or 0.0, metres)
                 return _read(scan, path, layout, cells, unit=unit, tz=tz)
     return read_raw(path, file_format=file_format, unit=unit, frame_rate=frame_rate, tz=tz)
 

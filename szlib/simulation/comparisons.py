@@ -29,6 +29,7 @@ from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
 from .closed_loop import Zones
+from .controllers.baselines import dynamic_window, social_force, straight
 from .controllers.protocol import Factory
 from .log import SimulationLog
 from .rollouts import Scenes, mpc_cbf, rollouts
@@ -111,7 +112,14 @@ BEHAVIOURS: Mapping[str, Behaviour] = MappingProxyType(
 )
 """What people do, or how they are seen, by name."""
 
-CONTROLLERS: Mapping[str, Factory] = MappingProxyType({"MPC-CBF": mpc_cbf})
+CONTROLLERS: Mapping[str, Factory] = MappingProxyType(
+    {
+        "MPC-CBF": mpc_cbf,
+        "straight": straight,
+        "social force": social_force,
+        "dynamic window": dynamic_window,
+    }
+)
 """What drives the robot, by name."""
 
 METHOD = ("controller", "zone", "formulation", "behaviour")

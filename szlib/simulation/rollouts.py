@@ -43,8 +43,8 @@ PURPOSE = "rollouts"
 CHUNK = 50
 """Worlds in one file and in one task: about a second of work."""
 
-_UNUSED = Ellipse((0.0, 0.0), (1.0, 1.0))
-"""The controller's zone; in random worlds everybody has one of their own."""
+CIRCLE = Ellipse((0.0, 0.0), (1.0, 1.0))
+"""The zone of people without one [m] (assumed); in random worlds everybody has one of their own."""
 
 Scenes = Callable[[int], Scenario]
 """A scene of each seed: `Worlds`, or anything else that makes the same one every time."""
@@ -116,9 +116,9 @@ def rollouts(
     return pd.concat(tables).sort_values("seed", ignore_index=True)
 
 
-def mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
-    """The controller of the paper; everybody has a zone of their own."""
-    return MPCCBF(_UNUSED, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
+def mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = CIRCLE) -> MPCCBF:
+    """The controller of the paper; `zone` is that of people without one of their own."""
+    return MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
 
 
 @dataclass(frozen=True)

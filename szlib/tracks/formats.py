@@ -176,6 +176,17 @@ def recognise(
     return replace(layout, seconds=second, max_gap=gap), rows.lazy()
 
 
+def first_line(path: Path) -> str:
+    """The first line of a file, plain or .gz; empty where it cannot be read (reading it will tell why)."""
+    try:
+        with path.open("rb") as stream:
+            packed = stream.read(2) == b"\x1f\x8b"
+        with gzip.open(path) if packed else path.open("rb") as stream:
+            return stream.readline(LONGEST_LINE).decode("utf-8", errors="replace").lstrip("\ufeff").strip()
+    except (OSError, EOFError, zlib.error):
+        return ""
+
+
 def layout_of(first: str, name: str | None) -> Format:
     """The layout of that name, or the one that a file's first line looks like."""
     return (

@@ -3,9 +3,10 @@
 figures       every figure, one file a room
 claims        what data says of the paper's claims: effects, intervals, verdicts
 sensitivity   what moves a zone most
-places        the folder of results that belongs to a data set
-record        what a notebook records: checks, claims, figures, artefacts
+places        the folder of results that belongs to a data set and its parameters
 parameters    known, of the right type and in range, before a notebook starts
+record        what a notebook records: checks, claims, figures, artefacts
+summary       what came of a run, and the table that ends it
 runner        the notebooks executed by papermill
 command_line  `szlib run | inspect | extract`
 """
@@ -19,8 +20,9 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "claims",
         "sensitivity",
         "places",
-        "record",
         "parameters",
+        "record",
+        "summary",
         "runner",
         "command_line",
     ],

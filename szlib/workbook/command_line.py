@@ -126,11 +126,13 @@ def _extract(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     parameters = dict(_assignment(text) for text in options.parameter)
     _check_workbook()
-    from .runner import render, run
+    from . import places
+    from .runner import run
+    from .summary import render
 
     summary = run(
         options.data[0] if len(options.data) == 1 else options.data,
-        out=options.out,
+        out=options.out or places.RESULTS,
         jobs=options.jobs,
         only=options.only,
         parameters=parameters,
@@ -193,7 +195,10 @@ def _parser() -> argparse.ArgumentParser:
         "--data", nargs="+", default=["synthetic"], metavar="DATA",
         help="synthetic (default), atc-1hz, atc-10-days, or files, folders or globs of tracks",
     )  # fmt: skip
-    run.add_argument("--out", default="results", metavar="FOLDER", help="where results go (default: results)")
+    run.add_argument(
+        "--out", type=os.path.abspath, metavar="FOLDER",
+        help="where results go (default: results, beside the notebooks)",
+    )  # fmt: skip
     run.add_argument(
         "--jobs", type=_jobs, default=min(os.cpu_count() or 1, 4), metavar="N",
         help="notebooks at a time (default: the cores, at most 4)",

@@ -12,8 +12,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import jupytext
-
 from ..control.settings import MPCSettings
 from ..errors import DataError, SolverError
 from ..files import printable
@@ -31,8 +29,8 @@ FOR_OPTIONS = {"data": "--data", "results": "--out"}
 """Parameters that the command line has options for."""
 
 
-def check_parameters(given: Mapping[str, Any], sources: Sequence[Path]) -> None:
-    """Raise DataError unless each parameter is known to one of these notebooks, and right for it."""
+def check_parameters(given: Mapping[str, Any], sources: Sequence[Path]) -> dict[str, Any]:
+    """The defaults of these notebooks; DataError unless each parameter is known to one, and right for it."""
     defaults: dict[str, Any] = {}
     for source in sources:
         defaults |= defaults_of(source)
@@ -54,10 +52,13 @@ def check_parameters(given: Mapping[str, Any], sources: Sequence[Path]) -> None:
                 _check_type(name, each, default[0] if default else "")
         for each in value if isinstance(value, list) else [value]:
             _check_range(name, each)
+    return defaults
 
 
 def defaults_of(source: Path) -> dict[str, Any]:
     """What the cell tagged "parameters" of a notebook sets."""
+    import jupytext
+
     return {
         node.targets[0].id: ast.literal_eval(node.value)
         for cell in jupytext.read(source).cells

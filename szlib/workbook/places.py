@@ -1,23 +1,43 @@
-"""Where the results of a data set go: one folder each, whatever the data is called by.
+"""Where results go: one folder for each data set and each choice of parameters.
 
-A folder is marked with the data that it is for; another data set of the same name gets a folder of its own,
-its name with eight digits behind it.  A link, a folder or a glob has the name it was asked for by.
+    results/DATA/               a run with the default parameters
+    results/DATA-1234abcd/      a run with others; its parameters.json says which
+    results/lab/DATA[-...]/     what is executed by hand, in JupyterLab: never a run's record
+
+A folder is marked with what it is for; another data set of the same name gets a folder of its own, its name
+with eight digits behind it.  A link, a folder or a glob has the name it was asked for by.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from ..errors import DataError, StorageError
 from ..files import own_folder, owner_of, printable
 from ..tracks import datasets
 
+NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
+"""The workbook's home: beside the package in the repository."""
+RESULTS = "../results"
+"""The folder of all results, from the notebooks."""
 ROOT = "results of the workbook"
 """What the folder of all results is marked as."""
+LAB = "lab"
+"""In the folder of all results: what no run has made."""
+RUN_VARIABLE = "SZLIB_RUN"
+"""The folder of the run to which a kernel belongs, in its environment."""
+
+
+def root(results: str | Path) -> Path:
+    """The folder of all results: a relative path starts at the notebooks, wherever this is called."""
+    start = NOTEBOOKS if NOTEBOOKS.is_dir() else Path()
+    return (start / results).resolve()
 
 
 def absolute(data: str | Path | Sequence[str | Path]) -> str | list[str]:
@@ -35,19 +55,25 @@ def absolute(data: str | Path | Sequence[str | Path]) -> str | list[str]:
 
 
 def home(
-    results: str | Path, data: str | Path | Sequence[str | Path], *, inputs: Iterable[Path] = ()
+    results: str | Path,
+    data: str | Path | Sequence[str | Path],
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    inputs: Iterable[Path] = (),
 ) -> Path:
-    """The folder for this data among the results; made and marked where it is missing.
+    """The folder for this data and these parameters, but for defaults; made and marked where it is missing.
 
     Raises StorageError where it cannot be made, holds what szlib did not write, or any of `inputs`.
     """
     source = absolute(data)
     name = datasets.label(data)
     purpose = f"results of {source if isinstance(source, str) else ', '.join(source)}"
+    if parameters:
+        purpose += f" with {json.dumps(parameters, sort_keys=True)}"
     digits = hashlib.sha256(purpose.encode()).hexdigest()[:8]
     own_folder(results, ROOT)
     folder = Path(results) / name
-    if owner_of(folder) in (None, purpose):
+    if not parameters and owner_of(folder) in (None, purpose):
         with suppress(_TakenError):
             return _take(folder, purpose, inputs)
     return _take(Path(results) / f"{name}-{digits}", purpose, inputs)
@@ -63,7 +89,7 @@ def withdraw(folder: Path, notebooks: Iterable[str]) -> None:
             (folder / name).mkdir(exist_ok=True)
         except OSError as error:
             raise _in_the_way(folder / name, error) from error
-    old = [folder / "summary.json"]
+    old = []
     for name in notebooks:
         old += [folder / f"{name}.ipynb", folder / "records" / f"{name}.json"]
         old += (folder / "figures").glob(f"{name}-*")

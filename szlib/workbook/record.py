@@ -9,10 +9,10 @@ from __future__ import annotations
 import inspect
 import io
 import json
+import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,13 +24,14 @@ from .. import __version__
 from ..encounters.pipeline import Chain
 from ..encounters.search import find_encounters
 from ..errors import DataError, ZoneError
-from ..files import file_content, keep, kept, sign, write_file
+from ..files import file_content, keep, kept, own_folder, sign, write_file
 from ..plaza.people import make_plaza
 from ..plaza.truth import PlazaSettings
 from ..tracks import datasets
 from ..tracks.clock import read_tracks
 from ..zones.social_zone import SocialZone
 from . import places
+from .parameters import FOR_OPTIONS, defaults_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,34 +42,49 @@ PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
 """Badges: where a parameter comes from."""
 
 
-@dataclass
 class NotebookRecord:
     """The record of one notebook.
 
     Parameters
     ----------
     name : of the notebook, "NN_topic".
-    data : "synthetic" (the plaza, written among the results), or as in `szlib.tracks.datasets.find`.
-    results : folder that holds a folder of results for each data set.
-    seed : of everything random, the synthetic plaza included.
+    variables : the notebook's, `globals()`, of which these and those of its cell tagged "parameters" count:
+        data: "synthetic" (the plaza, written among the results), or as in `szlib.tracks.datasets.find`;
+        area: where encounters are looked for, "" for the data's own; seed: of everything random, the
+        synthetic plaza included; results: folder of all results, `places.RESULTS` where it is not given.
+
+    Attributes
+    ----------
+    data, area, seed : these.
+    out : where its results go: into the folder of the run that executes it; executed by hand, into one
+        for its data and parameters in the folder `lab` of all results.
     """
 
-    name: str
-    data: str | Sequence[str]
-    results: str | Path = "../results"
-    seed: int = 0
-    checks: list[dict[str, Any]] = field(default_factory=list)
-    figures: list[str] = field(default_factory=list)
-    key: dict[str, Any] = field(default_factory=dict)
+    def __init__(self, name: str, variables: Mapping[str, Any]) -> None:
+        self.name = name
+        self.data: str | Sequence[str] = variables["data"]
+        self.area: str = variables.get("area", "")
+        self.seed: int = variables.get("seed", 0)
+        self.checks: list[dict[str, Any]] = []
+        self.figures: list[str] = []
+        self.key: dict[str, Any] = {}
+        self.out = self._folder(variables)
+        for part in ("records", "figures"):
+            (self.out / part).mkdir(exist_ok=True)
 
-    def __post_init__(self) -> None:
-        for name in ("records", "figures"):
-            (self.out / name).mkdir(exist_ok=True)
-
-    @cached_property
-    def out(self) -> Path:
-        """Where this data set's results go: a folder of its own, see `places.home`."""
-        return places.home(self.results, self.data)
+    def _folder(self, variables: Mapping[str, Any]) -> Path:
+        if run := os.environ.get(places.RUN_VARIABLE):
+            return Path(run)
+        script = places.NOTEBOOKS / f"{self.name}.py"
+        defaults = defaults_of(script) if script.exists() else {"area": "", "seed": 0}
+        given = {
+            name: variables[name]
+            for name, default in defaults.items()
+            if name not in FOR_OPTIONS and variables.get(name, default) != default
+        }
+        results = places.root(variables.get("results", places.RESULTS))
+        own_folder(results, places.ROOT)
+        return places.home(results / places.LAB, self.data, given)
 
     @property
     def synthetic(self) -> bool:
@@ -165,7 +181,8 @@ class NotebookRecord:
     def _source(self) -> dict[str, Any]:
         """What the artefacts are made of: the content of the files, every parameter, this version."""
         files = [[file.name, *file_content(file)] for file in self.files()]
-        made = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "szlib": __version__}
+        made = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "area": self.area}
+        made["szlib"] = __version__
         return json.loads(json.dumps(made | {"parameters": asdict(Chain())}))  # type: ignore[no-any-return]
 
 

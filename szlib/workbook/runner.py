@@ -23,15 +23,13 @@ from tqdm import tqdm
 
 from .. import __version__, memory
 from ..errors import DataError, SzlibError
-from ..files import printable, sweep_temporary, temporary_folder, write_file
+from ..files import file_content, held, printable, sweep_temporary, temporary_folder, write_file
 from ..parallel import bounded, cluster, end_with
 from ..tracks import datasets
-from . import places
+from . import places, summary
 from .parameters import check_parameters
 from .record import data_files
 
-NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
-"""The workbook's home: beside the package in the repository."""
 LAST_PRODUCER = "05"
 """Up to here each notebook needs the artefact of the one before; later ones can run side by side."""
 REFUSED = {
@@ -45,7 +43,7 @@ REFUSED = {
 def run(
     data: str | Sequence[str] = datasets.SYNTHETIC,
     *,
-    out: str | Path = "results",
+    out: str | Path = places.RESULTS,
     jobs: int = 1,
     only: Iterable[str] = (),
     parameters: Mapping[str, Any] | None = None,
@@ -56,7 +54,8 @@ def run(
     Parameters
     ----------
     data : "synthetic", "atc-1hz", or paths of track files.
-    out : folder of results; this data set's go into a folder of their own in it.
+    out : folder of results, by default `results` beside the notebooks; this data set's go into a folder
+        of their own in it, and with other than the default parameters into another: see `places`.
     jobs : notebooks at a time, once the zone is there.
     only : numbers ("07") or names of the notebooks to run; all of them by default.
     parameters : further parameters of the notebooks, such as {"seed": 1}.
@@ -64,33 +63,52 @@ def run(
 
     Returns
     -------
-    The summary, also written to ``<out>/<data>/summary.json``: passed, and for each notebook its
-    status ("done"; "error": the notebook broke off; "refused": data, disk or memory do not allow it),
-    seconds, checks (name, passed, value) and key figures.  What it replaces is withdrawn first.
+    The summary: passed, and for each notebook its status ("done"; "error": the notebook broke off;
+    "refused": data, disk or memory do not allow it), seconds, checks (name, passed, value) and key figures.
+    It is written to ``summary.json`` in that folder, together with what earlier runs of other notebooks
+    left there with the same parameters, data and version.  What a run replaces is withdrawn first.
 
     Raises
     ------
     DataError : no such data, notebook or parameter, or a parameter out of its range.
-    StorageError : results cannot be written there.
+    StorageError : results cannot be written there, or another run is writing there.
     """
     sources = _chosen(only)
-    given = dict(parameters or {})
-    check_parameters(given, sources)
-    seed = given.get("seed", 0)
+    defaults = check_parameters(parameters or {}, sources)
+    given = {name: value for name, value in (parameters or {}).items() if value != defaults[name]}
     asked = places.absolute(data)
     files = [] if asked == datasets.SYNTHETIC else datasets.find(asked)
-    results = Path(out).resolve()
-    home = places.home(results, asked, inputs=files)
-    places.withdraw(home, [source.stem for source in sources])
-    if asked == datasets.SYNTHETIC:
-        data_files(asked, folder=home, seed=seed)
-    given |= {"data": asked, "results": str(results)}
+    results = places.root(out)
+    home = places.home(results, asked, given, inputs=files)
+    with held(home):
+        seed = given.get("seed", 0)
+        files = files or data_files(asked, folder=home, seed=seed)
+        names = [source.stem for source in sources]
+        identity = _identity(asked, files, given)
+        earlier = summary.begin(home, identity, names)
+        places.withdraw(home, names)
+        given |= {"data": asked, "results": str(results)}
+        outcomes = _outcomes(
+            sources, given, home, label=datasets.label(asked), jobs=jobs, scheduler=scheduler
+        )
+        return summary.finish(home, identity, earlier, {name: outcomes[name] for name in names})
+
+
+def _outcomes(
+    sources: Sequence[Path],
+    given: dict[str, Any],
+    home: Path,
+    *,
+    label: str,
+    jobs: int,
+    scheduler: str | None,
+) -> dict[str, dict[str, Any]]:
+    """What came of each notebook, by its name."""
     jobs = bounded(jobs, len(sources)) or 1
     limit = None if scheduler else memory.ceiling()
     share = None if limit is None else limit // max(jobs, 1)
-
     outcomes: dict[str, dict[str, Any]] = {}
-    with tqdm(total=len(sources), unit="notebook", desc=datasets.label(asked)) as bar:
+    with tqdm(total=len(sources), unit="notebook", desc=datasets.label(given["data"])) as bar:
         first = [source for source in sources if source.stem[:2] <= LAST_PRODUCER]
         rest = sources[len(first) :]
         with cluster(scheduler) as client, _pool(client, jobs) as pool:
@@ -100,43 +118,17 @@ def run(
                     outcomes[name] = outcome
                     bar.update()
                     bar.set_postfix_str(f"{name} {outcome['status']}")
-    notebooks = {source.stem: outcomes[source.stem] for source in sources}
-    passed = all(
-        n["status"] == "done" and all(c["passed"] for c in n["checks"] if c["kind"] == "check")
-        for n in notebooks.values()
-    )
-    summary = {
+    return outcomes
+
+
+def _identity(data: str | Sequence[str], files: Sequence[Path], given: Mapping[str, Any]) -> dict[str, Any]:
+    """What a run is of: the version, the content of the data, and the parameters that are not defaults."""
+    return {
         "szlib": __version__,
         "data": datasets.label(data),
-        "seed": seed,
-        "passed": passed,
-        "notebooks": notebooks,
+        "files": [[file.name, *file_content(file)] for file in files],
+        "parameters": dict(given),
     }
-    write_file(home / "summary.json", json.dumps(summary, indent=1))
-    return summary
-
-
-def render(summary: Mapping[str, Any]) -> str:
-    """The table that ends a run: notebook, time, checks passed, key figures; then what did not hold."""
-    lines = [f"{'notebook':<20} {'seconds':>7} {'checks':>7}  key figures"]
-    notes = []
-    for name, record in summary["notebooks"].items():
-        checks = [c for c in record["checks"] if c["kind"] == "check"]
-        held = (
-            f"{sum(c['passed'] for c in checks)}/{len(checks)}"
-            if record["status"] == "done"
-            else record["status"]
-        )
-        key = ", ".join(
-            f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in record["key_figures"].items()
-        )
-        lines.append(f"{name:<20} {record['seconds']:>7.1f} {held:>7}  {key}")
-        notes += [
-            f"{name}: {c['name']}: {c['result']} ({c['value']})" for c in record["checks"] if not c["passed"]
-        ]
-        if record.get("error"):
-            notes.append(f"{name}: {record['error']}")
-    return "\n".join([*lines, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
 
 
 @contextmanager
@@ -180,6 +172,7 @@ def _execute(source: str, given: dict[str, Any], home: str, share: int | None) -
     try:
         with temporary_folder() as temporary:
             runtime = {"JUPYTER_RUNTIME_DIR": str(temporary / "runtime")}  # gone with the folder, always
+            runtime[places.RUN_VARIABLE] = str(folder)
             with _environment(runtime | ({memory.VARIABLE: str(share)} if share else {})):
                 outcome |= _execute_in(temporary, script, folder, given)
     except (SzlibError, OSError, MemoryError) as error:
@@ -245,11 +238,11 @@ _EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
 
 
 def _chosen(only: Iterable[str]) -> list[Path]:
-    sources = sorted(NOTEBOOKS.glob("[0-9][0-9]_*.py"))
+    sources = sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
     if not sources:
         raise DataError(
-            f"{NOTEBOOKS}: no notebooks; they come with the repository, not with the package: get a copy of "
-            "it, and there `make run`, or pip install -e '.[workbook]' and `szlib run`"
+            f"{places.NOTEBOOKS}: no notebooks; they come with the repository, not with the package: get a "
+            "copy of it, and there `make run`, or pip install -e '.[workbook]' and `szlib run`"
         )
     wanted = list(only)
     unknown = [name for name in wanted if not any(source.stem.startswith(name) for source in sources)]

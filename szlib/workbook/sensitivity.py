@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..encounters.geometry import Square
+from ..encounters.geometry import Area
 from ..encounters.search import find_encounters
 from ..errors import DataError, DataWarning, ZoneError
 from ..zones.social_zone import SocialZone
@@ -37,7 +37,7 @@ NARROWER = 1.0
 def sensitivity(
     tracks: pd.DataFrame,
     *,
-    square: Square,
+    square: Area,
     speed: float = 1.1,
     method: str = "hull",
     fit: Mapping[str, Sequence[Any]] = FIT,
@@ -80,8 +80,7 @@ def sensitivity(
     for name, values in SEARCH.items():
         for value in values:
             add(name, value, find_encounters(tracks, square=square, **{name: value}))
-    (x0, x1), (y0, y1) = square.x, square.y
-    smaller = Square((x0 + NARROWER, x1 - NARROWER), (y0 + NARROWER, y1 - NARROWER))
+    smaller = square.grown(-NARROWER)
     add("square", f"{NARROWER:g} m narrower", find_encounters(tracks, square=smaller))
     for name, values in fit.items():
         for value in values:

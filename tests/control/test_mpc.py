@@ -10,10 +10,10 @@ import pytest
 from scipy.optimize import minimize
 
 import szlib
-from szlib.control.ipopt import Ipopt
 from szlib.control.people import place
 from szlib.control.problem import TOLERANCE, build_problem
-from szlib.control.sqp import Sqp
+from szlib.control.solvers.ipopt import Ipopt
+from szlib.control.solvers.sqp import Sqp
 from szlib.simulation.closed_loop import advance
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
@@ -412,7 +412,7 @@ def test_a_person_who_stops_on_the_goal_does_not_leave_a_moving_robot_without_co
         ({"position": (0, np.nan), "heading": 0.0}, "position must be finite"),
         ({"position": (0, 0), "velocity": (np.inf, 0)}, "velocity must be finite"),
         ({"position": (0, 0, 0), "heading": 0.0}, "position must have shape"),
-        ({"position": (0, 0)}, "stands needs a heading"),
+        ({"position": (0, 0), "heading": 0.1, "heading_unknown": True}, "given or unknown"),
         ({"position": (0, 0), "heading": np.nan}, "heading must be finite"),
         ({"position": (1e155, 0), "heading": 0.0}, "position must lie within"),
         ({"position": (0, 0), "velocity": (0, -1e155)}, "velocity must lie within"),

@@ -28,7 +28,7 @@ import szlib.zones.social_zone  # noqa: F401 - before the first fork
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.tracks.clock import read_tracks
-from szlib.workbook import runner
+from szlib.workbook import places
 from szlib.workbook.command_line import main
 
 COUNT = {False: 40, True: 1000}
@@ -43,7 +43,7 @@ speeds = [0.7, 0.9]
 
 # %%
 from szlib.workbook.record import NotebookRecord
-record = NotebookRecord("01_one", data=data, results=results, seed=seed)
+record = NotebookRecord("01_one", globals())
 record.check("files", len(record.files()) > 0)
 record.close()
 """
@@ -171,7 +171,7 @@ def execute(line: list[str], place: Path) -> tuple[int, str]:
         handle = os.open(".printed", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(handle, 1)
         os.dup2(handle, 2)
-        runner.NOTEBOOKS = place / "notebooks"
+        places.NOTEBOOKS = place / "notebooks"
         sys.exit(main(line))
 
     code = _in_a_fork(command)

@@ -26,10 +26,10 @@ GRACE = 20.0
 PROGRAM = """
 import sys
 from pathlib import Path
-from szlib.workbook import runner
+from szlib.workbook import places
 from szlib.workbook.command_line import main
 if __name__ == "__main__":
-    runner.NOTEBOOKS = Path({notebooks!r})
+    places.NOTEBOOKS = Path({notebooks!r})
     sys.exit(main())
 """
 NOTEBOOK = """# %% tags=["parameters"]
@@ -40,7 +40,7 @@ results = "../results"
 # %%
 import time
 from szlib.workbook.record import NotebookRecord
-record = NotebookRecord("{name}", data=data, results=results, seed=seed)
+record = NotebookRecord("{name}", globals())
 record.check("somebody met", record.encounters()["encounter"].nunique() > 0)
 time.sleep(1.5)
 record.animation(b"GIF89a", "movie")

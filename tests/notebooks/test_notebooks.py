@@ -9,9 +9,10 @@ import jupytext
 import nbformat
 import pytest
 
-from szlib.workbook import runner
+from szlib.workbook import places, runner
+from szlib.workbook import summary as summaries
 
-SOURCES = sorted(runner.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
+SOURCES = sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
 MAX_LINES = 25
 
 
@@ -26,7 +27,7 @@ def code_lines(cell: nbformat.NotebookNode) -> int:
 def test_there_are_ten_and_no_stray_copies():
     assert [s.stem[:2] for s in SOURCES] == [f"{n:02d}" for n in range(1, len(SOURCES) + 1)]
     assert len(SOURCES) >= 10
-    assert [p.stem for p in sorted(runner.NOTEBOOKS.glob("*.ipynb"))] == [s.stem for s in SOURCES]
+    assert [p.stem for p in sorted(places.NOTEBOOKS.glob("*.ipynb"))] == [s.stem for s in SOURCES]
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.stem)
@@ -68,7 +69,7 @@ class TestEach:
 
 
 def proven(summary: dict, home: Path) -> None:
-    assert summary["passed"], runner.render(summary)
+    assert summary["passed"], summaries.render(summary)
     assert json.loads((home / "summary.json").read_text(encoding="utf-8"))["passed"]
     assert list(summary["notebooks"]) == [s.stem for s in SOURCES]
     for name, record in summary["notebooks"].items():

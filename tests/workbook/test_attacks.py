@@ -72,12 +72,12 @@ def test_data_sets_of_one_name_do_not_share_results(tmp_path):
 def test_encounters_and_zone_of_another_day_of_the_same_name_and_size_are_not_served(tmp_path, monkeypatch):
     file = tmp_path / "day.csv"
     make_plaza(file, settings=PlazaSettings(encounters=60))
-    samples = NotebookRecord("02", data=str(file), results=tmp_path / "out").encounters()
+    samples = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"}).encounters()
     size, content = file.stat().st_size, file.read_text().splitlines(keepends=True)
     file.write_text("".join(content[len(content) // 2 :]))
     with file.open("a") as stream:  # a row that cannot be used, to make up the size
         stream.write("9" * (size - file.stat().st_size - 1) + "\n")
-    later = NotebookRecord("02", data=str(file), results=tmp_path / "out")
+    later = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"})
     with pytest.warns(szlib.DataWarning):
         assert len(later.encounters()) < len(samples)
     artefact = later.out / "encounters.parquet"
@@ -178,13 +178,13 @@ def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks
 )
 def test_parameters_are_checked_before_any_notebook_starts(given, message):
     with pytest.raises(DataError, match=message):
-        check_parameters(given, sorted(runner.NOTEBOOKS.glob("[0-9][0-9]_*.py")))
+        check_parameters(given, sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py")))
 
 
 def test_what_the_notebooks_set_themselves_is_in_range():
     from szlib.workbook.parameters import defaults_of
 
-    for source in runner.NOTEBOOKS.glob("[0-9][0-9]_*.py"):
+    for source in places.NOTEBOOKS.glob("[0-9][0-9]_*.py"):
         given = {n: v for n, v in defaults_of(source).items() if n not in ("data", "results")}
         check_parameters(given, [source])
 

@@ -15,7 +15,7 @@ from szlib.workbook.record import NotebookRecord, parameters
 def record(tmp_path):
     file = tmp_path / "mine.csv"
     file.write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n")
-    return NotebookRecord("01_test", data=str(file), results=tmp_path / "results")
+    return NotebookRecord("01_test", {"data": str(file), "results": tmp_path / "results"})
 
 
 def test_checks_and_claims_are_written_down(record, capsys):
@@ -43,7 +43,8 @@ def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monk
     record.encounters()
     record.encounters()
     assert len(made) == 1
-    NotebookRecord("02_test", data=record.data, results=record.results, seed=1).encounters()
+    other = {"data": record.data, "results": record.out.parents[1], "seed": 1}
+    NotebookRecord("02_test", other).encounters()
     assert len(made) == 2
     record.files()[0].write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n2,1,2,0\n")
     record.encounters()

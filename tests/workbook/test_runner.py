@@ -13,14 +13,15 @@ def run(*arguments):
     return main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1", *arguments])
 
 
-def summary(tmp_path):
-    return json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
+def summary(tmp_path, folder="mine"):
+    return json.loads((tmp_path / "out" / folder / "summary.json").read_text())
 
 
 def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp_path, capsys):
     notebooks(_01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)')
     assert run("-p", "seed=3") == 0
-    record = summary(tmp_path)["notebooks"]["01_good"]
+    (folder,) = (path.name for path in (tmp_path / "out").glob("mine-*"))
+    record = summary(tmp_path, folder)["notebooks"]["01_good"]
     assert record["key_figures"] == {"seed": 3}
     assert [(c["name"], c["passed"], c["value"]) for c in record["checks"]] == [
         ("sum", True, 2),

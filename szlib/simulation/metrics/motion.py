@@ -54,7 +54,7 @@ def metrics(log: SimulationLog) -> dict[str, Any]:
     unflagged_violations : steps that said they were safe and led to h < 0.
     unflagged_overlaps : steps that said they were safe and led to a Euclidean overlap.
     steps_warm, steps_cold, steps_kept, steps_relaxed, steps_braking : steps of each rung of the
-        ladder in `szlib.control.mpc`.
+        ladder in `szlib.control.solvers.ladder`.
     max_slack : largest violation of a hard row by any plan; NaN where the controller does not tell it.
     solve_time_median, solve_time_p95, solve_time_p99, solve_time_max : of `Step.solve_time`, or of the call.
 

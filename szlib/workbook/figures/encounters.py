@@ -8,22 +8,22 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Polygon
 
-from ...encounters.geometry import AttentionalSpace, Square
-from .style import BLACK, BLUE, ORANGE, RED, SEQUENCE, axes, metres
+from ...encounters.geometry import Area, AttentionalSpace
+from .style import BLACK, BLUE, ORANGE, RED, SEQUENCE, axes, metres, outline
 
 
 def plot_space(
-    space: AttentionalSpace, square: Square, at: Sequence[float], *, ax: Axes | None = None
+    space: AttentionalSpace, area: Area, at: Sequence[float] = (), *, ax: Axes | None = None
 ) -> Axes:
-    """The attentional space of a person at (x, y, heading) inside the square."""
+    """The attentional space of a person at (x, y, heading), by default towards the middle of the area."""
     ax = axes(ax, size=(4.5, 5.5))
-    x, y, heading = at
+    (x0, x1), (y0, y1) = area.box.x, area.box.y
+    x, y, heading = at or (0.75 * x0 + 0.25 * x1, 0.75 * y0 + 0.25 * y1, np.pi / 4)
     cos, sin = np.cos(heading), np.sin(heading)
     corners = space.corners @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
-    size = (square.x[1] - square.x[0], square.y[1] - square.y[0])
-    ax.add_patch(Rectangle((square.x[0], square.y[0]), *size, fill=False, edgecolor=BLACK, label="square"))
+    ax.add_patch(outline(area, edgecolor=BLACK, label="the area"))
     ax.add_patch(
         Polygon(
             corners,
@@ -34,9 +34,9 @@ def plot_space(
     )
     ax.annotate("", (x + cos, y + sin), (x, y), arrowprops={"arrowstyle": "->", "color": RED, "lw": 2})
     ax.plot(x, y, "o", color=RED, label="reference pedestrian")
-    ax.set(xlim=(square.x[0] - 1, square.x[1] + 1), ylim=(square.y[0] - 1, square.y[1] + 1))
+    ax.set(xlim=(x0 - 1, x1 + 1), ylim=(y0 - 1, y1 + 1))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), fontsize=8)
-    return metres(ax, "The space stays inside the square")
+    return metres(ax, "The space stays inside the area")
 
 
 def plot_encounter_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | None = None) -> Axes:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import tempfile
+import io
 from collections.abc import Mapping, Sequence
 from math import isnan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patches import Ellipse as EllipsePatch
+from PIL import Image
 
 from ...simulation.log import SimulationLog
 from ...simulation.scenario import Scenario
@@ -92,24 +93,32 @@ def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> by
     """The run as an animated GIF: a frame every so many seconds, shown at twice the speed of life."""
     step = max(1, round(every / log.settings.dt))
     rows = np.unique(np.r_[np.arange(0, len(log.states), step), len(log.states) - 1])
-    figure = Figure(figsize=(width, width * 0.55), layout="constrained")
+    figure = Figure(figsize=(width, width * 0.55), layout="constrained", dpi=70)
     ax = figure.subplots()
 
-    def draw(row: int) -> list[object]:
-        ax.clear()
-        _stage(ax, log.scenario)
-        ax.plot(*log.states[: row + 1, :2].T, color=BLUE, linewidth=1)
-        ax.plot(*log.predicted[row, :, :2].T, ".", color=GREEN, markersize=3)
-        _draw_moment(ax, log, row, robot=BLUE, zone=RED)
-        _frame(ax, [(log, rows)])
-        metres(ax, f"t = {log.time[row]:4.1f} s, robot at {log.speed[row]:.2f} m/s (shown twice as fast)")
-        return []
+    _stage(ax, log.scenario)
+    _frame(ax, [(log, rows)])
+    moving: list[Artist] = []
 
-    movie = FuncAnimation(figure, draw, frames=rows.tolist())  # type: ignore[arg-type]
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "run.gif"
-        movie.save(file, writer=PillowWriter(fps=round(2 / every)), dpi=70)
-        return file.read_bytes()
+    canvas = FigureCanvasAgg(figure)
+
+    def picture(row: int) -> Image.Image:
+        while moving:
+            moving.pop().remove()
+        moving.extend(ax.plot(*log.states[: row + 1, :2].T, color=BLUE, linewidth=1))
+        moving.extend(ax.plot(*log.predicted[row, :, :2].T, ".", color=GREEN, markersize=3))
+        moving.extend(_draw_moment(ax, log, row, robot=BLUE, zone=RED))
+        metres(ax, f"t = {log.time[row]:4.1f} s, robot at {log.speed[row]:.2f} m/s (shown twice as fast)")
+        canvas.draw()  # type: ignore[no-untyped-call]
+        drawn = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+        return Image.fromarray(drawn).convert("RGB")
+
+    picture(0)
+    figure.set_layout_engine("none")  # settled by the first picture
+    first, *others = [picture(row) for row in rows.tolist()]
+    movie = io.BytesIO()
+    first.save(movie, "GIF", save_all=True, append_images=others, duration=500 * every, loop=0)
+    return movie.getvalue()
 
 
 def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> Axes:
@@ -156,22 +165,22 @@ def _stage(ax: Axes, scenario: Scenario) -> None:
     ax.plot(*scenario.goal, "D", color=BLUE, markersize=8, markeredgecolor=BLACK, label="goal")
 
 
-def _draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> None:
+def _draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
     a, b = zone.semi_axes
     patch = EllipsePatch(
         zone.center, 2 * a, 2 * b, angle=np.degrees(zone.angle), fill=False, edgecolor=colour, lw=1.6
     )
-    ax.add_patch(patch)
+    return ax.add_patch(patch)
 
 
-def _draw_moment(ax: Axes, log: SimulationLog, row: int, *, robot: Any, zone: Any) -> None:
+def _draw_moment(ax: Axes, log: SimulationLog, row: int, *, robot: Any, zone: Any) -> list[Artist]:
     """Robot and zones at one time; a triangle for each person, its tip where they face."""
     x, y = log.states[row, :2].tolist()
-    for ellipse in _zones(log, row):
-        _draw_zone(ax, ellipse, zone)
-    ax.add_patch(Circle((x, y), log.settings.r_robot, color=robot, alpha=0.6, lw=0))
+    drawn = [_draw_zone(ax, ellipse, zone) for ellipse in _zones(log, row)]
+    drawn.append(ax.add_patch(Circle((x, y), log.settings.r_robot, color=robot, alpha=0.6, lw=0)))
     for px, py, heading in log.people[row, :, :3].tolist():
-        ax.plot(px, py, marker=(3, 0, np.degrees(heading) - 90), color=RED, markersize=6)
+        drawn += ax.plot(px, py, marker=(3, 0, np.degrees(heading) - 90), color=RED, markersize=6)
+    return drawn
 
 
 def _zones(log: SimulationLog, row: int) -> list[Ellipse]:

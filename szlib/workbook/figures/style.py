@@ -8,6 +8,10 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+
+from ...encounters.geometry import Area
 
 BLUE, ORANGE, GREEN, RED, GREY, BLACK = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#999999", "#000000"
 
@@ -26,6 +30,12 @@ def metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
         ax.set_title(title)
     ax.set_aspect("equal")
     return ax
+
+
+def outline(area: Area, **style: Any) -> PathPatch:
+    """The borders of an area, pillars included, as one patch."""
+    rings = [Path(ring, closed=True) for ring in area.outlines]
+    return PathPatch(Path.make_compound_path(*rings), fill=False, **style)
 
 
 def colours(values: Sequence[Any]) -> list[Any]:

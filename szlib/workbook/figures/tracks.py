@@ -5,26 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.patches import Rectangle
 
-from ...encounters.geometry import Square
-from .style import BLUE, RED, SEQUENCE, axes, metres
+from ...encounters.geometry import Area
+from .style import BLUE, RED, SEQUENCE, axes, metres, outline
+
+_MOST_CELLS = 2000
+"""Of a map, along each axis: cells grow with the site."""
 
 
-def plot_map(tracks: pd.DataFrame, square: Square, *, cell: float = 0.25, ax: Axes | None = None) -> Axes:
-    """Where people were: person-seconds per square metre on a log scale, and the square (paper, fig. 1)."""
+def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes | None = None) -> Axes:
+    """Where people were: person-seconds per square metre on a log scale, and the area (paper, fig. 1)."""
     ax = axes(ax, size=(9, 5))
     x, y = tracks["x"].to_numpy(), tracks["y"].to_numpy()
+    while max(np.ptp(x), np.ptp(y)) / cell > _MOST_CELLS:
+        cell *= 2
     edges = [np.arange(np.floor(v.min()), np.ceil(v.max()) + cell, cell) for v in (x, y)]
     seconds = np.histogram2d(x, y, bins=edges)[0] / 10 / cell**2
     shown = np.ma.masked_less_equal(np.log10(np.maximum(seconds, 1e-9)), -0.5)
     image = ax.pcolormesh(edges[0], edges[1], shown.T, cmap=SEQUENCE, rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$")
-    corner, size = (square.x[0], square.y[0]), (square.x[1] - square.x[0], square.y[1] - square.y[0])
-    ax.add_patch(Rectangle(corner, *size, fill=False, edgecolor=RED, linewidth=2, label="the square"))
+    ax.add_patch(outline(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
     ax.legend(loc="lower right")
     ax.margins(0.02)
-    return metres(ax, "Where people were seen, and the open square")
+    return metres(ax, "Where people were seen, and where they are watched")
 
 
 def plot_speeds(by_column: np.ndarray, by_displacement: np.ndarray, *, ax: Axes | None = None) -> Axes:

@@ -14,9 +14,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from .barriers import Array
-from .problem import BUILDING, HARD_SHARE, Budget, Evaluator, build_problem, slack_weight
-from .settings import MPCSettings
+from ..barriers import Array
+from ..problem import BUILDING, HARD_SHARE, Budget, Evaluator, build_problem, slack_weight
+from ..settings import MPCSettings
 
 _OPTIONS = {
     "print_level": 0,

@@ -22,9 +22,9 @@ import casadi as ca
 import daqp
 import numpy as np
 
-from .barriers import Array
-from .problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, build_problem, slack_weight
-from .settings import MPCSettings
+from ..barriers import Array
+from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, build_problem, slack_weight
+from ..settings import MPCSettings
 
 Outcome = Literal["converged", "stalled", "late", "failed"]
 CONVERGED = {True: 1e-2, False: 1e-5}

@@ -1,0 +1,91 @@
+"""Meetings: what to do when somebody is met head-on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import acos, atan2, cos, hypot, inf, sin, sqrt
+
+import numpy as np
+
+from ..barriers import Array, barrier, segment_formula
+from ..distances import wall_margin
+from ..settings import MPCSettings
+from .person import PlacedZone
+
+
+def subgoal(
+    position: tuple[float, float],
+    goal: tuple[float, float],
+    people: Sequence[PlacedZone],
+    walls: Array,
+    s: MPCSettings,
+) -> tuple[float, float]:
+    """Where to be drawn to [m]: the goal, or around a person whom the robot meets head-on.
+
+    A person blocks the way where the line to the goal enters the set h < 0, itself an ellipse with
+    the foci of the zone. Its two tangents from the robot lie at the angles +-w about -grad h, the
+    bisector of the directions to the foci (so it is for all confocal ellipses). Let the goal lie at
+    the angle b from there. At b = 0 both ways around are equally long, the optimum is to stand still
+    in front of the person, and every solver does so for ever. So where |b| <= tie * w the robot is
+    drawn along the tangent on `pass_side`, at the goal's distance. Once it is on that side, what is
+    drawn turns back to the goal between |b| = tie * w and 2 tie * w, without a jump. Where a wall
+    leaves no room beside the person on that side, the same holds for the other side, and where
+    there is no room at all the goal stays the goal: then the robot yields.
+
+    Only where the barrier can be felt yet, h <= closing speed * dt / gamma, and for people who do
+    not walk across the way: those open it by themselves. Nor for who stands on the goal: there is nothing
+    behind them to go to. The nearest such person counts.
+    """
+    (x, y), way = position, (goal[0] - position[0], goal[1] - position[1])
+    distance = hypot(*way)
+    if distance == 0 or s.tie == 0:
+        return goal
+    nearest, target = inf, goal
+    for zone in people:
+        h = barrier(zone.distance(x, y), s.r_robot, s.eps)
+        pace = hypot(zone.vx, zone.vy)
+        if h > min(nearest, distance, (s.v_max + pace) * s.dt / s.gamma):
+            continue
+        to_a, to_b = (zone.xa - x, zone.ya - y), (zone.xb - x, zone.yb - y)
+        ra, rb = hypot(*to_a), hypot(*to_b)
+        across = abs(_cross(way, (zone.vx, zone.vy))) > s.tie * pace * distance
+        if across or ra * rb == 0:
+            continue
+        inward = (to_a[0] / ra + to_b[0] / rb, to_a[1] / ra + to_b[1] / rb)
+        reach = zone.a + s.r_robot + s.eps
+        cosine = (ra**2 + rb**2 - 4 * reach**2) / (2 * ra * rb)
+        w = acos(max(-1.0, min(1.0, cosine))) / 2
+        b = atan2(_cross(inward, way), inward[0] * way[0] + inward[1] * way[1])
+        nearest, target = h, goal
+        if s.tie * w == 0:
+            continue
+        for left in (s.pass_side == "left", s.pass_side != "left"):
+            lead = (b if left else -b) / (s.tie * w)
+            if -1 <= lead < 2 and _has_room(zone, reach, way, left, walls, s) and not zone.blocks(goal, s):
+                turn = ((w if left else -w) - b) * min(1.0, 2 - lead)
+                c, d = cos(turn), sin(turn)
+                target = (x + c * way[0] - d * way[1], y + d * way[0] + c * way[1])
+                break
+    return target
+
+
+def _has_room(
+    zone: PlacedZone, reach: float, way: tuple[float, float], left: bool, walls: Array, s: MPCSettings
+) -> bool:
+    """True if no wall stands between the zone's centre and where the robot passes on that side."""
+    if not len(walls):
+        return True
+    length = hypot(*way) if left else -hypot(*way)
+    beside = (-way[1] / length, way[0] / length)
+    half = ((zone.xa - zone.xb) / 2, (zone.ya - zone.yb) / 2)
+    width = sqrt(reach**2 - _cross(half, beside) ** 2)
+    center = np.array([(zone.xa + zone.xb) / 2, (zone.ya + zone.yb) / 2])
+    points = center + np.linspace(0, width, 20)[:, None] * np.array(beside)
+    h = (
+        barrier(segment_formula(*points.T, *wall.ravel()), s.r_robot, wall_margin(wall, s)) for wall in walls
+    )
+    return all((each >= 0).all() for each in h)
+
+
+def _cross(u: tuple[float, float], v: tuple[float, float]) -> float:
+    return u[0] * v[1] - u[1] * v[0]

@@ -1,0 +1,152 @@
+"""A person as the controller sees them, and their zone in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from functools import lru_cache
+from math import atan2, cos, hypot, pi, sin
+from typing import NamedTuple, Protocol
+
+from ...errors import SolverError, ZoneError
+from ...zones.ellipses import Ellipse
+from ..barriers import LARGEST, barrier, ellipse_formula, finite
+from ..settings import MPCSettings
+
+BODY_RADIUS = 0.25
+"""Radius of a person's body, for the clearance: half the breadth of shoulders [m] (assumed)."""
+
+
+STANDS = 0.1
+"""Who is slower does not leave the goal free by going on, whatever a tracker's noise says [m/s] (assumed)."""
+_BISECTIONS = 60
+"""Halvings of a quarter turn until nothing is left of it in double precision."""
+
+
+class SpeedZone(Protocol):
+    """Anything that has a zone for each walking speed, such as `SocialZone`."""
+
+    def ellipse(self, speed: float) -> Ellipse: ...
+
+
+def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
+    """The zone at a walking speed [m/s]; ZoneError for what is none, or reaches beyond `LARGEST`."""
+    if not isinstance(zone, Ellipse):
+        if not hasattr(zone, "ellipse"):
+            raise ZoneError(f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}")
+        zone = zone.ellipse(speed)
+    (m, n), (a, _) = zone.center, zone.semi_axes
+    if not max(abs(m), abs(n), a) <= LARGEST:
+        raise ZoneError(f"a zone must lie within {LARGEST:g} m of its person; got {zone}")
+    return zone
+
+
+@lru_cache(maxsize=256)
+def circle_around(zone: Ellipse) -> Ellipse:
+    """The smallest circle around a person that contains their zone whichever way they face.
+
+    Its radius is the greatest distance from the person to the ellipse. With the person's offset from the
+    centre (-p, -q), p, q >= 0, in the ellipse's frame, the farthest point (a cos t, b sin t) lies in the
+    first quadrant, and half the derivative of the squared distance by t,
+
+        b q cos t - a p sin t - (a^2 - b^2) sin t cos t,
+
+    changes its sign once there: divided by sin t cos t it falls.
+    """
+    (m, n), (a, b) = zone.center, zone.semi_axes
+    c, s = cos(zone.angle), sin(zone.angle)
+    p, q = abs(m * c + n * s), abs(n * c - m * s)
+    low, high = 0.0, pi / 2
+    for _ in range(_BISECTIONS):
+        t = (low + high) / 2
+        rises = b * q * cos(t) - a * p * sin(t) - (a**2 - b**2) * sin(t) * cos(t) > 0
+        low, high = (t, high) if rises else (low, t)
+    radius = hypot(p + a * cos(low), q + b * sin(low))
+    return Ellipse((0.0, 0.0), (radius, radius))
+
+
+@dataclass(frozen=True)
+class Person:
+    """A person as the controller sees them: here, and at constant velocity from now on.
+
+    Parameters
+    ----------
+    position : (x, y) [m].
+    velocity : (vx, vy) [m/s].
+    heading : where they face, counter-clockwise from x [rad]; None: where they walk. Where nobody knows, for
+        they stand or `heading_unknown`, it stays None, and `circle_around` their zone is kept.
+    zone : their social zone, in their own frame; None: the controller's.
+    id : by which a `Tracker` knows them again; None: they are new at each step.
+    heading_unknown : True: do not take where they walk for where they face; they are too slow.
+
+    Raises
+    ------
+    SolverError : a number is not usable (give what a sensor says to `MPCCBF.step` as an array), or a heading
+        is both given and unknown.
+    ZoneError : the zone reaches beyond `LARGEST`.
+    """
+
+    position: tuple[float, float]
+    velocity: tuple[float, float] = (0.0, 0.0)
+    heading: float | None = None
+    zone: Ellipse | SpeedZone | None = None
+    id: Hashable = None
+    heading_unknown: bool = False
+
+    def __post_init__(self) -> None:
+        x, y = finite("a person's position", self.position, (2,)).tolist()
+        vx, vy = finite("a person's velocity", self.velocity, (2,)).tolist()
+        object.__setattr__(self, "position", (x, y))
+        object.__setattr__(self, "velocity", (vx, vy))
+        if self.heading is not None:
+            object.__setattr__(self, "heading", float(finite("a person's heading", self.heading, ())))
+            if self.heading_unknown:
+                raise SolverError(
+                    f"a heading is given or unknown; got {self.heading} for the one at {(x, y)}"
+                )
+        elif not (self.stands or self.heading_unknown):
+            object.__setattr__(self, "heading", atan2(vy, vx))
+        if isinstance(self.zone, Ellipse):
+            as_ellipse(self.zone, 0.0)
+
+    @property
+    def stands(self) -> bool:
+        """True if the velocity is zero."""
+        return self.velocity == (0.0, 0.0)
+
+    def after(self, seconds: float) -> Person:
+        """The same person, so many seconds later."""
+        (x, y), (vx, vy) = self.position, self.velocity
+        there = (x + vx * seconds, y + vy * seconds)
+        return Person(there, self.velocity, self.heading, self.zone, self.id, self.heading_unknown)
+
+
+class PlacedZone(NamedTuple):
+    """A person's zone in the world: the two foci and the semi-major axis [m], and its velocity [m/s]."""
+
+    xa: float
+    ya: float
+    xb: float
+    yb: float
+    a: float
+    vx: float
+    vy: float
+
+    def distance(self, x: float, y: float) -> float:
+        """Approximate distance of (x, y) to the zone now [m]."""
+        return float(ellipse_formula(x, y, *self[:5]))
+
+    def blocks(self, goal: tuple[float, float], s: MPCSettings) -> bool:
+        """True if somebody slower than `STANDS` is here with the goal in their zone: h < 0 there."""
+        return hypot(self.vx, self.vy) < STANDS and barrier(self.distance(*goal), s.r_robot, s.eps) < 0
+
+
+def place(person: Person, zone: Ellipse) -> PlacedZone:
+    """The zone, of the person's own frame, around a person; of unknown heading: `circle_around` it."""
+    (x, y), heading = person.position, person.heading
+    if heading is None:
+        zone, heading = circle_around(zone), 0.0
+    c, s = cos(heading), sin(heading)
+    (ma, na), (mb, nb) = zone.foci.tolist()
+    foci = (x + ma * c - na * s, y + ma * s + na * c, x + mb * c - nb * s, y + mb * s + nb * c)
+    return PlacedZone(*foci, zone.semi_axes[0], *person.velocity)

@@ -1,0 +1,10 @@
+"""How the problem is solved, and what is done where it is not.
+
+ipopt   by IPOPT, as in the paper
+sqp     by a condensed SQP
+ladder  what is tried one after another, down to full braking
+"""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach(__name__, submodules=["ipopt", "sqp", "ladder"])

@@ -1,0 +1,81 @@
+"""What is done where a solver has no answer: each step climbs down a ladder until a rung holds.
+
+    warm      the problem, from the last plan, shifted
+    cold      the problem, from full braking
+    kept      the last plan, shifted, if it still satisfies the problem        terminal condition only
+    relaxed   the problem with penalised slack
+    kept      the last plan, shifted, if it is a way to a safe end             terminal condition only
+    braking   to rest as soon as the bounds allow
+
+Where the time of a step is up, what is left of the ladder is skipped; a relaxed plan that was cut short is
+taken if it violates no more than braking would. What the rung "kept" is good for: see `szlib.control.mpc`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..barriers import Array
+from ..problem import HARD_SHARE, TOLERANCE, Numbers, ProblemSolver
+from ..settings import MPCSettings
+from ..step import Rung
+
+
+def solve_with_fallbacks(
+    solver: ProblemSolver, last_plan: Array, parameters: Array
+) -> tuple[Rung, Array, Numbers, bool]:
+    """The first rung that holds, its plan, the plan's numbers, and whether the time was up.
+
+    Plans are inputs, shape (2N,) [m/s2]; `parameters` as in `Problem`.
+    """
+    ends = solver.settings.terminal != "none"
+    shifted = start = np.concatenate([last_plan[2:], (0.0, 0.0)])
+    late = False
+    rung: Rung
+    for rung in ("warm", "cold"):
+        if rung == "cold" and solver.budget.spent(HARD_SHARE / 2):
+            late = True
+            break
+        guess = shifted if rung == "warm" else _brake(solver.settings, parameters[2:4])
+        plan, converged = solver.hard(guess, parameters)
+        if converged:
+            numbers = solver.evaluate(plan, parameters)
+            if numbers.slack <= TOLERANCE:
+                return rung, plan, numbers, late
+        late |= solver.late
+        start = plan if solver.late and np.isfinite(plan).all() else start
+    kept = solver.evaluate(shifted, parameters)
+    if ends and kept.slack <= TOLERANCE:
+        return "kept", shifted, kept, late
+    safe_end = ends and _safe_to_its_end(kept, parameters)
+    plan, converged = solver.relaxed(start, parameters)
+    late |= solver.late
+    brake = _brake(solver.settings, parameters[2:4])
+    braking = solver.evaluate(brake, parameters)
+    if (converged or solver.late) and np.isfinite(plan).all():
+        numbers = solver.evaluate(plan, parameters)
+        better = converged or numbers.slack <= braking.slack
+        if better and (not safe_end or _safe_to_its_end(numbers, parameters)):
+            rung = "warm" if converged and numbers.slack <= TOLERANCE else "relaxed"
+            return rung, plan, numbers, late
+    if safe_end:
+        return "kept", shifted, kept, late
+    return "braking", brake, braking, late
+
+
+def _brake(s: MPCSettings, velocity: Array) -> Array:
+    """The inputs that bring the robot to rest soonest along its path, shape (2N,) [m/s2]."""
+    vx, vy = velocity.tolist()
+    plan: list[float] = []
+    for _ in range(s.N):
+        time = max(s.dt, max(abs(vx), abs(vy)) / s.a_max)
+        plan += (-vx / time, -vy / time)
+        vx, vy = vx - s.dt * vx / time, vy - s.dt * vy / time
+    return np.array(plan)
+
+
+def _safe_to_its_end(plan: Numbers, parameters: Array) -> bool:
+    """True if the plan ends as it should, with h >= 0 at every state up to the one from which on it does."""
+    off = np.abs(plan.states[:, 2:] - parameters[6:8]).max(axis=1) > TOLERANCE
+    last = int(off.nonzero()[0].max(initial=-1)) + 1
+    return last < len(off) and bool((plan.h[:, : last + 1] >= -TOLERANCE).all())

@@ -1,0 +1,266 @@
+"""People in a real loop: headings by id, time stamps, who is not seen any more, numbers that are none."""
+
+import numpy as np
+import pytest
+
+import szlib
+from szlib.control.people.person import circle_around
+from szlib.simulation.closed_loop import advance
+
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
+GOAL = (4.0, 0.0)
+SOLVERS = ("sqp", "ipopt")
+
+
+def controller_of(solver="sqp", **more):
+    return szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver), **more)
+
+
+def headings(seen):
+    return [person.heading for person in seen.people]
+
+
+# a zone around somebody of whom nobody knows where they face
+
+
+def test_the_circle_contains_the_zone_in_every_heading_and_touches_it():
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        a = rng.uniform(0.1, 2)
+        zone = szlib.Ellipse(tuple(rng.uniform(-1, 1, 2)), (a, a * rng.uniform(0.05, 1)), rng.uniform(-3, 3))
+        circle = circle_around(zone)
+        outline = zone.curve(5001)
+        assert circle.center == (0, 0) and circle.semi_axes[0] == circle.semi_axes[1]
+        assert circle.level(outline).max() == pytest.approx(1, abs=1e-6)
+        for heading in rng.uniform(-4, 4, 3):
+            assert circle.level(zone.placed((0, 0), heading).curve(500)).max() <= 1 + 1e-9
+    assert circle_around(circle).semi_axes == pytest.approx(circle.semi_axes)
+
+
+def test_who_stands_and_whose_heading_nobody_knows_is_kept_out_of_by_the_circle():
+    unknown, controller = szlib.Person((0.0, 0.0)), controller_of()
+    assert unknown.heading is None and unknown.stands and unknown.after(1.0) == unknown
+    zone = controller.zone_of(unknown)
+    assert zone == circle_around(ZONE)
+    for angle in np.linspace(-3, 3, 7):
+        point = 2.0 * np.array([np.cos(angle), np.sin(angle)])
+        expected = szlib.ellipse_distance(point, zone) - 0.55
+        assert controller.barriers(point, [unknown]) == pytest.approx(expected)
+    assert controller.step((-3, 0.4, 0, 0), GOAL, [unknown]).status == "optimal"
+    slow = szlib.Person((0.0, 0.0), (0.1, 0.0), heading_unknown=True)
+    assert slow.heading is None and slow.after(1.0).heading is None
+    assert szlib.Person((0.0, 0.0), (0.1, 0.0)).heading == 0.0
+
+
+# headings by id
+
+
+def test_noise_does_not_turn_the_zone_of_somebody_who_stands():
+    rng, tracker = np.random.default_rng(1), szlib.Tracker()
+    walked = tracker.see([[-1.0, 0.0, 0.3, 0.4], [2.0, 2.0, 0.0, 0.0]], ids=["a", "b"], now=0.0)
+    assert headings(walked) == [pytest.approx(np.arctan2(0.4, 0.3)), None]
+    for k in range(1, 1001):
+        noisy = np.c_[[[0, 0], [2, 2]], np.zeros((2, 2))] + rng.normal(0, 0.02, (2, 4))
+        seen = tracker.see(noisy, ids=["a", "b"], now=0.1 * k)
+        assert headings(seen) == headings(walked)
+        assert [p.velocity for p in seen.people] == [tuple(row[2:]) for row in noisy]
+        assert headings(tracker.see(noisy, now=0.1 * k))[:2] == [None, None], "nobody knows them without ids"
+
+
+def test_the_heading_is_that_of_the_walk_and_a_given_one_is_kept():
+    for angle in np.linspace(-3, 3, 13):
+        tracker = szlib.Tracker()
+        step = 0.2 * np.array([np.cos(angle), np.sin(angle)])
+        (person,) = tracker.see([[0, 0, *(1.0001 * step)]], ids=[7], now=0.0).people
+        assert person.heading == pytest.approx(angle)
+        assert headings(tracker.see([[0, 0, *(0.99 * step)]], ids=[7], now=0.0)) == [person.heading]
+        assert headings(tracker.see([szlib.Person((0, 0), id=7)], now=0.0)) == [person.heading]
+        told = szlib.Person((0, 0), (1.0, 0.0), heading=2.0, id=8)
+        assert tracker.see([told], now=0.0).people[0] == told
+        facing = szlib.Person((0, 0), heading=0.0, id=9)
+        assert tracker.see([facing], now=0.0).people[0] == facing
+    assert headings(tracker.see([[0, 0, 0, 0]], ids=[7], now=9.0)) == [None], "forgotten meanwhile"
+
+
+def test_persons_without_id_are_taken_at_their_word():
+    people = (szlib.Person((0, 0), (0.01, 0.02)), szlib.Person((1, 1), heading=1.0))
+    assert szlib.Tracker().see(people, now=3.0) == (people, 0, 0)
+
+
+# time
+
+
+def test_people_are_brought_forward_to_now():
+    rng, tracker = np.random.default_rng(2), szlib.Tracker()
+    rows, stamps = rng.uniform(-2, 2, (5, 4)), rng.uniform(1.7e9 - 0.5, 1.7e9, 5)
+    seen = tracker.see(rows, ids=range(5), stamps=stamps, now=1.7e9)
+    assert [p.position for p in seen.people] == [
+        pytest.approx(row[:2] + (1.7e9 - t) * row[2:], abs=1e-6) for row, t in zip(rows, stamps, strict=True)
+    ]
+    alone = tracker.see([szlib.Person((0, 0), (1.0, 0.5))], stamps=9.0, now=10.0)
+    assert alone.people[0].position == (1.0, 0.5)
+
+
+def test_who_is_not_seen_any_more_is_kept_for_a_while_at_constant_velocity():
+    tracker = szlib.Tracker(keep=0.5)
+    tracker.see([[0, 0, 1.0, 0], [5, 5, 0, 0.5]], ids=["a", "b"], now=0.0)
+    for k in range(1, 6):
+        seen = tracker.see([[5, 5, 0, 0.5]], ids=["b"], now=0.1 * k)
+        assert [p.id for p in seen.people] == ["b", "a"]
+        assert seen.people[1].position == pytest.approx((0.1 * k, 0))
+        assert seen.set_aside == seen.lost == 0
+    assert [p.id for p in tracker.see([[5, 5, 0, 0.5]], ids=["b"], now=0.6).people] == ["b"]
+    tracker.reset()
+    assert tracker.see(now=0.6).people == ()
+
+
+def test_a_clock_that_is_set_back_forgets():
+    tracker = szlib.Tracker()
+    tracker.see([[0, 0, 1.0, 0]], ids=[1], now=1000.0)
+    assert tracker.see(now=0.0).people == ()
+
+
+def test_a_controller_counts_its_own_steps_where_it_is_given_no_time():
+    controller = controller_of(tracker=szlib.Tracker(keep=0.25))
+    controller.step((-3, 0, 0, 0), GOAL, [[0, 1, 0.5, 0]], ids=["a"])
+    there = [controller.step((-3, 0, 0, 0), GOAL).scene.people for _ in range(3)]
+    assert [len(people) for people in there] == [1, 1, 0]
+    assert there[1][0].position == pytest.approx((0.1, 1.0))
+    stamped = controller.step((-3, 0, 0, 0), GOAL, [[0, 1, 0.5, 0]], ids=["a"], stamps=[49.8], now=50.0)
+    assert stamped.scene.people[0].position == pytest.approx((0.1, 1.0))
+
+
+# numbers that are none
+
+
+BAD = [np.nan, np.inf, -np.inf, 1e300]
+
+
+@pytest.mark.parametrize("bad", BAD)
+def test_known_people_with_bad_numbers_go_on_and_are_counted(bad):
+    tracker = szlib.Tracker()
+    tracker.see([[0, 0, 1.0, 0]], ids=["a"], now=0.0)
+    for column in (0, 1):
+        row = [0.1, 0, 1.0, 0]
+        row[column] = bad
+        seen = tracker.see([row], ids=["a"], now=0.2)
+        assert (seen.set_aside, seen.lost) == (1, 0)
+        assert seen.people[0].position == pytest.approx((0.2, 0))
+    seen = tracker.see([[0.3, 0.1, bad, 0]], ids=["a"], now=0.3)
+    assert (seen.set_aside, seen.lost) == (1, 0)
+    assert seen.people[0].position == (0.3, 0.1) and seen.people[0].velocity == (1.0, 0.0)
+    seen = tracker.see([[0.3, 0.1, 1, 0]], ids=["a"], stamps=bad, now=0.4)
+    assert (seen.set_aside, seen.lost) == (1, 0)
+    assert seen.people[0].position == pytest.approx((0.4, 0.1))
+    assert tracker.see([[bad] * 4], ids=["a"], now=2.0)[1:] == (1, 1), "too long ago"
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("bad", BAD)
+def test_a_robot_that_does_not_know_where_somebody_is_comes_to_rest_and_says_so(solver, bad):
+    controller, dt = controller_of(solver), 0.1
+    state = np.array([-4.0, 1.4, 0.9, 0.3])
+    assert controller.step(state, GOAL, [[0, 0, 0, 0]]).safe
+    for _ in range(15):
+        step = controller.step(state, GOAL, [[0, 0, 0, 0], [bad, 0, 0, 0]])
+        assert (step.set_aside, step.lost, step.safe) == (1, 1, False)
+        assert len(step.h) == 1 and step.h.min() >= 0, "the other one is kept out of"
+        state = advance(state, step.control, dt)
+    assert np.hypot(*state[2:]) < 0.05
+    assert state[0] < -3.5, "hardly farther than full braking, 0.45 m"
+    assert controller.step(state, GOAL, [[0, 0, 0, 0]]).safe
+
+
+def test_somebody_with_a_place_and_no_velocity_is_kept_out_of_and_counts_as_lost():
+    step = controller_of().step((-3, 0, 0.5, 0), GOAL, [[0, 0, np.nan, np.nan]], ids=["new"])
+    assert (step.set_aside, step.lost) == (1, 1) and not step.safe
+    assert step.h == pytest.approx(controller_of().barriers((-3, 0), [szlib.Person((0, 0))]))
+
+
+@pytest.mark.parametrize(
+    ("people", "more", "message"),
+    [
+        ([[0, 0, 0]], {}, r"shape \(n, 4\): x, y, vx, vy; got \(1, 3\)"),
+        ([0, 0, 0, 0], {}, r"got \(4,\)"),
+        ([["a", 0, 0, 0]], {}, "Persons, or numbers"),
+        ([szlib.Person((0, 0)), (0, 0, 0, 0)], {}, "Persons, or numbers"),
+        ([[0, 0, 0, 0]], {"ids": [1, 2]}, "one for each of 1 people; got 2"),
+        ([[0, 0, 0, 0]], {"stamps": [1, 2], "now": 3}, r"stamps must be one time, .* \(2,\)"),
+        ([[0, 0, 0, 0]], {"stamps": 1.0}, "stamps need `now`"),
+        ([[0, 0, 0, 0]], {"now": np.nan}, "now must be a finite time"),
+    ],
+)
+def test_errors_of_a_program_are_refused(people, more, message):
+    with pytest.raises(szlib.SolverError, match=message):
+        controller_of().step((-4, 0, 0, 0), GOAL, people, **more)
+
+
+@pytest.mark.parametrize("options", [{"keep": -1}, {"keep": np.inf}, {"walking": np.nan}, {"walking": "1"}])
+def test_a_tracker_without_a_meaning_is_refused(options):
+    with pytest.raises(szlib.SolverError, match=f"{next(iter(options))} must be"):
+        szlib.Tracker(**options)
+
+
+# arrays
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_head_on_with_arrays(solver, side):
+    controller = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver, pass_side=side))
+    by_persons = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver, pass_side=side))
+    state, person = np.array([-4.0, 0.0, 0.0, 0.0]), np.array([2.0, 0.0, -0.5, 0.0])
+    passed = None
+    for _ in range(250):
+        step = controller.step(state, GOAL, person[None], ids=[3])
+        same = by_persons.step(state, GOAL, [szlib.Person(tuple(person[:2]), tuple(person[2:]))])
+        assert np.array_equal(step.control, same.control)
+        assert step.safe
+        state, person = advance(state, step.control, 0.1), person + 0.1 * np.r_[person[2:], 0, 0]
+        if passed is None and state[0] > person[0]:
+            passed = state[1]
+    assert (passed > 0) == (side == "left")
+    assert state[:2] == pytest.approx(GOAL, abs=0.1)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_noisy_array_head_on_is_passed(solver):
+    rng, controller = np.random.default_rng(4), controller_of(solver)
+    state, person = np.array([-4.0, 0.0, 0.0, 0.0]), np.array([2.0, 0.0, -0.5, 0.0])
+    for k in range(300):
+        if k == 60:
+            person[2:] = 0.0
+        step = controller.step(state, GOAL, [person + rng.normal(0, 0.02, 4)], ids=["a"])
+        assert np.abs(step.control).max() <= 1
+        state, person = advance(state, step.control, 0.1), person + 0.1 * np.r_[person[2:], 0, 0]
+    assert state[:2] == pytest.approx(GOAL, abs=0.1)
+
+
+# goals that cannot be reached
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_goal_at_a_wall_is_refused_before_the_first_step_and_a_status_after_it(solver):
+    walls, behind = [[(-6, 3), (6, 3)]], (3.0, 2.9)
+    settings = szlib.MPCSettings(solver=solver)
+    controller = szlib.MPCCBF(ZONE, walls=walls, settings=settings)
+    assert controller.goal_blocked(behind) and not controller.goal_blocked(GOAL)
+    with pytest.raises(szlib.SolverError, match="cannot be reached"):
+        controller.step((-4, 0, 0, 0), behind)
+    state = np.array([-4.0, 0.0, 0.0, 0.0])
+    assert not controller.step(state, GOAL).goal_blocked
+    for _ in range(300):
+        step = controller.step(state, behind)
+        assert step.goal_blocked and step.safe
+        state = advance(state, step.control, 0.1)
+    assert state[[0, 2, 3]] == pytest.approx((3, 0, 0), abs=1e-2), "it waits beside it"
+    assert 0 <= step.h[0] < 0.15
+
+
+def test_somebody_who_stands_on_the_goal_blocks_it_whatever_the_noise():
+    rng, controller = np.random.default_rng(5), controller_of()
+    assert all(
+        controller.step((-3, 0, 0, 0), GOAL, [np.r_[GOAL, rng.normal(0, 0.02, 2)]]).goal_blocked
+        for _ in range(200)
+    )
+    assert not controller.step((-3, 0, 0, 0), GOAL, [[*GOAL, 0.1, 0.0]]).goal_blocked

@@ -1,0 +1,354 @@
+"""Areas: one meaning in whatever form, wherever the world's axes are; and the area found by walkers."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import shapely
+from conftest import make_crowd, make_tracks, make_walk
+from hypothesis import given, strategies
+from matplotlib.path import Path as Outline
+from test_search import ROOM, assert_same_samples
+from test_streaming import make_raw, same, write
+
+import szlib
+from szlib.encounters.areas import _largest, area_for
+from szlib.encounters.geometry import Region, Square
+from szlib.encounters.null import null_encounters
+from szlib.encounters.search import find_encounters
+
+ATC_POLYGON = shapely.box(-18.5, -10, -7.5, 8)
+HALL = shapely.Polygon([(0, 0), (12, 0), (12, 8), (0, 8)])
+ELL = shapely.Polygon([(0, 0), (12, 0), (12, 5), (5, 5), (5, 12), (0, 12)])
+PILLAR = shapely.Polygon([(0, 0), (12, 0), (12, 8), (0, 8)], [[(5, 3), (6, 3), (6, 4), (5, 4)]])
+SHAPES = {
+    "hall": HALL,
+    "ell": ELL,
+    "pillar": PILLAR,
+    "two": shapely.MultiPolygon([HALL, shapely.box(20, 0, 30, 9)]),
+}
+
+
+def turned(shape: object, angle: float, by: tuple[float, float] = (3.0, -7.0)) -> object:
+    matrix = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    return shapely.transform(shape, lambda points: points @ matrix.T + by)
+
+
+def turned_tracks(tracks: pd.DataFrame, angle: float, by: tuple[float, float] = (3.0, -7.0)) -> pd.DataFrame:
+    matrix = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    moved = tracks.copy()
+    moved[["x", "y"]] = tracks[["x", "y"]].to_numpy() @ matrix.T + by
+    moved[["vx", "vy"]] = tracks[["vx", "vy"]].to_numpy() @ matrix.T
+    return moved
+
+
+# --- one area, many forms ----------------------------------------------------------------------------
+
+
+def geojson(shape: object, kind: str) -> str:
+    geometry = json.loads(shapely.to_geojson(shape))
+    feature = {"type": "Feature", "properties": {"name": "hall"}, "geometry": geometry}
+    whole = {"type": "FeatureCollection", "features": [feature]}
+    return json.dumps({"geometry": geometry, "feature": feature, "collection": whole}[kind])
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("form", ["shapely", "wkt", "geometry", "feature", "collection", "text", "with z"])
+def test_every_form_is_the_same_area(tmp_path: Path, name: str, form: str) -> None:
+    shape = SHAPES[name]
+    given = {
+        "shapely": shape,
+        "wkt": shape.wkt,
+        "with z": shapely.force_3d(shape),
+        "text": str(szlib.as_area(shape)),
+    }
+    area = szlib.as_area(given[form] if form in given else geojson(shape, form))
+    assert area == szlib.as_area(shape)
+    assert isinstance(area, Square) == (name == "hall")
+    assert area.area == pytest.approx(shape.area)
+    file = tmp_path / "area of the hall.txt"
+    file.write_text("\ufeff" + str(area) + "\n", encoding="utf-8")
+    assert szlib.as_area(file) == szlib.as_area(str(file)) == area
+    assert pickle.loads(pickle.dumps(area)) == area
+
+
+@pytest.mark.parametrize(
+    "given", ["0 12 0 8", "0,12, 0,8", [0, 12, 0, 8], "POLYGON ((0 0, 0 8, 12 8, 12 0, 0 0))"]
+)
+def test_four_numbers_are_a_square(given: object) -> None:
+    assert szlib.as_area(given) == Square(x=(0, 12), y=(0, 8))
+
+
+def test_pedpys_areas_are_areas() -> None:
+    pedpy = pytest.importorskip("pedpy")
+    assert szlib.as_area(pedpy.WalkableArea(HALL)) == Square(x=(0, 12), y=(0, 8))
+    with_pillar = pedpy.WalkableArea(HALL.exterior.coords[:-1], obstacles=[PILLAR.interiors[0].coords[:-1]])
+    assert szlib.as_area(with_pillar).area == 95
+    assert szlib.as_area(pedpy.MeasurementArea(turned(HALL, 1.0))) == szlib.as_area(turned(HALL, 1.0))
+
+
+numbers = strategies.floats(-1e6, 1e6, allow_nan=False)
+
+
+@given(numbers, strategies.floats(1e-3, 1e6), numbers, strategies.floats(1e-3, 1e6))
+def test_the_text_of_a_square_gives_it_again(x: float, width: float, y: float, height: float) -> None:
+    square = Square(x=(x, x + width), y=(y, y + height))
+    assert szlib.as_area(str(square)) == square
+
+
+@given(strategies.floats(0, 7), numbers, numbers)
+def test_the_text_of_a_region_gives_it_again(angle: float, x: float, y: float) -> None:
+    area = szlib.as_area(turned(ELL, angle, (x, y)))
+    assert szlib.as_area(str(area)) == area
+
+
+WRONG = {
+    "": "expected",
+    "1 2 3": "expected",
+    "5 1 0 8": "lowest, highest",
+    "0 12 0 nan": "expected",
+    "no/such/file.wkt": "no file that can be read",
+    "POLYGON ((0 0, 1 1": "no well-known text",
+    "POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))": "cross itself",
+    "POLYGON ((0 0, 4 0, 8 0, 0 0))": "no valid polygon",
+    "POLYGON EMPTY": "with an inside",
+    '{"type": "Polygon"}': "no GeoJSON",
+    '{"type": "Point", "coordinates": [1, 2]}': "must be a polygon",
+    "{broken": "no GeoJSON",
+}
+
+
+@pytest.mark.parametrize(("text", "told"), WRONG.items())
+def test_what_is_no_area_is_told(text: str, told: str) -> None:
+    with pytest.raises(szlib.DataError, match=told):
+        szlib.as_area(text)
+
+
+@pytest.mark.parametrize(
+    "given", [None, 3, [1, 2, 3], shapely.Point(1, 2), shapely.LineString([(0, 0), (1, 1)])]
+)
+def test_what_is_no_area_at_all_is_told(given: object) -> None:
+    with pytest.raises(szlib.DataError, match="area"):
+        szlib.as_area(given)
+
+
+def test_a_file_that_is_no_area_is_named(tmp_path: Path) -> None:
+    for content in (b"t,id,x,y\n1,2,3,4\n", b"", b"\xff\xfe\x00", b"POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))"):
+        (tmp_path / "hall.wkt").write_bytes(content)
+        with pytest.raises(szlib.DataError, match=r"hall\.wkt"):
+            szlib.as_area(tmp_path / "hall.wkt")
+    with pytest.raises(szlib.DataError, match="no area"):
+        szlib.as_area(tmp_path)
+
+
+# --- inside ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_inside_is_where_matplotlib_says_so(name: str, angle: float) -> None:
+    shape = turned(SHAPES[name], angle)
+    area = szlib.as_area(shape)
+    x0, x1, y0, y1 = *area.box.x, *area.box.y
+    x, y = np.random.default_rng(0).uniform([[x0 - 1], [y0 - 1]], [[x1 + 1], [y1 + 1]], (2, 20_000))
+    crossings = sum(
+        Outline(ring).contains_points(np.column_stack([x, y])).astype(int) for ring in area.outlines
+    )
+    np.testing.assert_array_equal(area.contains(x, y), crossings % 2 == 1)
+
+
+def test_the_border_is_inside_as_in_a_square() -> None:
+    square, polygon = szlib.ATC_SQUARE, Region(ATC_POLYGON.wkt)
+    ticks = np.r_[
+        -18.5, -10, -7.5, 8, np.nextafter([-18.5, -7.5, 8, -10], 99), np.nextafter([-18.5, 8], -99), np.nan
+    ]
+    x, y = np.meshgrid(ticks, ticks)
+    np.testing.assert_array_equal(polygon.contains(x, y), square.contains(x, y))
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_space_is_covered_where_every_point_of_it_is_inside(name: str) -> None:
+    area = Region(SHAPES[name].wkt)
+    rng = np.random.default_rng(1)
+    n, unit = 400, np.linspace(0, 1, 41)
+    heading = rng.uniform(-np.pi, np.pi, n)
+    ahead, side = szlib.AttentionalSpace(length=2.5, width=2).corners.T[..., None]
+    x = rng.uniform(0, 12, n) + ahead * np.cos(heading) - side * np.sin(heading)
+    y = rng.uniform(0, 8, n) + ahead * np.sin(heading) + side * np.cos(heading)
+    u, v = (each.ravel()[:, None] for each in np.meshgrid(unit, unit))
+    weights = [(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v]
+    points = [sum(w * corner for w, corner in zip(weights, each, strict=True)) for each in (x, y)]
+    dense = area.contains(*points).all(axis=0)
+    covered = area.covers(x, y)
+    assert 20 < covered.sum() < n - 20
+    assert not (covered & ~dense).any()
+    assert (dense & ~covered).sum() <= 2, "a corner may reach in between two of the points"
+
+
+# --- encounters --------------------------------------------------------------------------------------
+
+
+def test_a_polygon_that_is_the_square_gives_the_identical_table() -> None:
+    pedpy = pytest.importorskip("pedpy")
+    found = 0
+    for seed in range(12):
+        tracks = make_crowd(seed)
+        expected = find_encounters(tracks)
+        forms = [Region(ATC_POLYGON.wkt), ATC_POLYGON, pedpy.WalkableArea(ATC_POLYGON), "-18.5 -7.5 -10 8"]
+        for form in forms:
+            samples = find_encounters(tracks, square=form)
+            pd.testing.assert_frame_equal(samples, expected, check_exact=True)
+            assert samples.attrs["funnel"] == expected.attrs["funnel"]
+        found += len(expected)
+    assert found > 0
+    assert szlib.as_area(expected.attrs["area"]) == szlib.ATC_SQUARE
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.0, 2.5, -2.0])
+def test_world_and_polygon_may_be_turned_by_any_angle(angle: float) -> None:
+    crowd = make_crowd(77, people=160, seconds=200, square=ROOM)
+    for shape in (shapely.box(-20, -20, 20, 20), shapely.box(-20, -20, 20, 20) - shapely.box(-3, -3, 3, 3)):
+        known = find_encounters(crowd, square=shape)
+        samples = find_encounters(turned_tracks(crowd, angle), square=turned(shape, angle))
+        assert len(known) > 0
+        assert_same_samples(samples, known)
+        assert samples["kind"].tolist() == known["kind"].tolist()
+
+
+def test_nobody_is_watched_across_a_pillar() -> None:
+    walks = make_walk((1, 5), (1.0, 0), duration=6), make_walk((9, 5), (-1.0, 0), person=2, duration=6)
+    room, pillar = shapely.box(-5, 0, 15, 10), shapely.box(5.2, 5.5, 5.4, 5.7)
+    assert find_encounters(make_tracks(*walks), square=room)["encounter"].nunique() == 2
+    assert len(find_encounters(make_tracks(*walks), square=room - pillar)) == 0
+
+
+@pytest.mark.parametrize(
+    "shape", [ATC_POLYGON, turned(ATC_POLYGON, 0.3, (-4, 3)), ATC_POLYGON - shapely.box(-13, -1, -12, 0)]
+)
+def test_streaming_keeps_what_a_polygon_needs(tmp_path: Path, shape: object) -> None:
+    found = 0
+    for seed in range(3):
+        path = write(tmp_path / "day.csv", make_raw(seed, wild=seed % 2 == 0))
+        found += same(path, square=szlib.as_area(shape), duration=1.0)
+    assert found > 0
+
+
+def test_the_null_model_takes_any_area() -> None:
+    crowd = make_crowd(7, people=60, seconds=600)
+    options = {"shifts": 2, "minutes": (0.2, 2.0), "progress": False}
+    expected = null_encounters(crowd, **options)
+    found = null_encounters(crowd, square=ATC_POLYGON, **options)
+    pd.testing.assert_frame_equal(found.encounters, expected.encounters)
+
+
+# --- where people walked -----------------------------------------------------------------------------
+
+
+def walkers(
+    seed: int = 0, *, people: int = 250, pillar: tuple[float, ...] = (), size: tuple[float, float] = (12, 8)
+) -> pd.DataFrame:
+    """People who walk straight through a hall from wall to wall; who would meet the pillar stays away."""
+    rng = np.random.default_rng(seed)
+    walks = []
+    for person in range(people):
+        a, b = rng.uniform(0, size, (2, 2))
+        a[person % 2], b[person % 2] = 0, size[person % 2]
+        span = np.linspace(0, 1, 200)[:, None]
+        path = a + span * (b - a)
+        if pillar and ((path > pillar[:2]) & (path < pillar[2:])).all(axis=1).any():
+            continue
+        duration = round(float(np.hypot(*(b - a))) / 1.2, 1)
+        walks.append(make_walk(a, (b - a) / duration, person=person, begin=2.0 * person, duration=duration))
+    return make_tracks(*walks)
+
+
+def best(walked: np.ndarray, side: int, loss: float) -> float:
+    """The most that a rectangle is worth, by trying all of them."""
+    nx, ny = walked.shape
+    found = [
+        (block := walked[i0:i1, j0:j1]).sum() - (loss * (~block).sum() if not block.all() else 0)
+        for i0, i1 in itertools.combinations(range(nx + 1), 2)
+        for j0, j1 in itertools.combinations(range(ny + 1), 2)
+        if min(i1 - i0, j1 - j0) >= side
+    ]
+    return max([0, *found])
+
+
+@pytest.mark.parametrize("loss", [math.inf, 2.0])
+@pytest.mark.parametrize("side", [1, 3])
+def test_the_largest_rectangle_is_the_best_of_all(loss: float, side: int) -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(60):
+        walked = rng.random(rng.integers(1, 9, 2)) < rng.choice([0.3, 0.7, 0.9])
+        (i0, i1), (j0, j1), share = _largest(walked, side, loss)
+        block = walked[i0:i1, j0:j1]
+        worth = block.sum() - (loss * (~block).sum() if not block.all() else 0)
+        assert worth == best(walked, side, loss)
+        assert worth == 0 or (share == block.mean() and min(block.shape) >= side)
+
+
+def test_a_hall_is_found_to_its_walls() -> None:
+    found = szlib.walked_area(walkers())
+    assert shapely.box(found.x[0], found.y[0], found.x[1], found.y[1]).symmetric_difference(HALL).area < 8
+    assert found == area_for(walkers(), "auto")
+    samples = find_encounters(walkers(), square="auto")
+    assert samples.attrs["area"] == str(found)
+
+
+def test_a_pillar_is_left_out() -> None:
+    tracks = walkers(people=2500, pillar=(14, 9, 16, 11), size=(30, 20))
+    found = szlib.walked_area(tracks)
+    around = shapely.box(found.x[0], found.y[0], found.x[1], found.y[1])
+    assert around.intersection(shapely.box(14.5, 9.5, 15.5, 10.5)).area == 0
+    assert around.area > 0.4 * 30 * 20
+
+
+def test_who_stands_who_jumps_and_what_they_are_called_changes_nothing() -> None:
+    tracks = walkers()
+    found = szlib.walked_area(tracks)
+    queue = [make_walk((-3 + 0.1 * k, 4), (0.05, 0), person=1000 + k) for k in range(20)]
+    jump = [make_walk((4000, -3000), (1, 0), person=2000, duration=0.3)]
+    assert szlib.walked_area(make_tracks(tracks, *queue, *jump)) == found
+    assert szlib.walked_area(tracks.sample(frac=1, random_state=1)) == found
+    assert (
+        szlib.walked_area(tracks.assign(id=tracks["id"] % 100 + 7, day=(tracks["id"] // 100).astype(str)))
+        == found
+    )
+
+
+def test_the_area_moves_with_the_world() -> None:
+    found = szlib.walked_area(walkers())
+    moved = szlib.walked_area(walkers().assign(x=lambda t: t["x"] + 37.5, y=lambda t: t["y"] - 12))
+    assert moved == Square(x=(found.x[0] + 37.5, found.x[1] + 37.5), y=(found.y[0] - 12, found.y[1] - 12))
+    turned_by_right_angle = szlib.walked_area(turned_tracks(walkers(), np.pi / 2, (0.0, 0.0)))
+    assert turned_by_right_angle.area == pytest.approx(found.area, abs=8)
+
+
+def test_furniture_is_told() -> None:
+    tracks = walkers(people=900, pillar=(5.2, 3.2, 6.8, 4.8))
+    with pytest.warns(szlib.DataWarning, match="of the area found .* nobody walked"):
+        found = szlib.walked_area(tracks)
+    assert found.area > 60
+
+
+def test_where_there_is_no_area_it_is_told() -> None:
+    with pytest.raises(szlib.DataError, match="nobody walks"):
+        szlib.walked_area(make_tracks(make_walk((0, 0), (0.1, 0))))
+    with pytest.raises(szlib.DataError, match="no area was found"):
+        szlib.walked_area(walkers(size=(30, 3)))
+    with pytest.raises(szlib.DataError, match="people >= 1"):
+        szlib.walked_area(walkers(), people=0)
+
+
+def test_the_square_of_the_mall_is_found_again(real_tracks: pd.DataFrame) -> None:
+    by_eye = Square(x=(-18.5, -7.5), y=(-11.5, 8.5))  # the largest rectangle free of pillars and walls
+    found = szlib.walked_area(real_tracks)
+    for ours, theirs in zip((*found.x, *found.y), (*by_eye.x, *by_eye.y), strict=True):
+        assert abs(ours - theirs) <= 0.5

@@ -1,0 +1,142 @@
+"""A record that holds: where results go, and that nobody else touches them."""
+
+import json
+import multiprocessing
+import runpy
+import subprocess
+import sys
+
+import pytest
+
+from szlib.errors import StorageError
+from szlib.files import held
+from szlib.workbook import places, runner
+from szlib.workbook.command_line import main
+
+CHECK = 'record.key = {"gamma": gamma}\nrecord.check("ok", True)'
+
+
+@pytest.fixture
+def workbook(notebooks, tmp_path):
+    """Two notebooks, one with a parameter of its own."""
+    folder = notebooks(_01_one='record.check("ok", True)', _08_two=CHECK)
+    script = folder / "08_two.py"
+    script.write_text(script.read_text().replace("seed = 0\n", "seed = 0\ngamma = 0.05\n"))
+    return folder
+
+
+def run(*arguments):
+    assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1", *arguments]) == 0
+
+
+def contents(folder):
+    return {
+        str(file.relative_to(folder)): file.read_bytes()
+        for file in folder.rglob("*")
+        if file.is_file() and places.LAB not in file.parts
+    }
+
+
+def test_other_parameters_have_a_folder_of_their_own(workbook, tmp_path):
+    run()
+    before = contents(tmp_path / "out")
+    run("--only", "08", "-p", "gamma=0.1")
+    (other,) = (tmp_path / "out").glob("mine-*")
+    assert json.loads((other / "parameters.json").read_text())["parameters"] == {"gamma": 0.1}
+    assert json.loads((other / "summary.json").read_text())["notebooks"]["08_two"]["key_figures"] == {
+        "gamma": 0.1
+    }
+    after = contents(tmp_path / "out")
+    assert {name: after[name] for name in before} == before
+    run("--only", "08", "-p", "gamma=0.05")
+    assert len(list((tmp_path / "out").glob("mine-*"))) == 1, "a default is no other parameter"
+
+
+def test_a_notebook_executed_anew_leaves_the_others_in_the_summary(workbook, tmp_path):
+    run()
+    folder = tmp_path / "out" / "mine"
+    first = json.loads((folder / "summary.json").read_text())["notebooks"]
+    run("--only", "08")
+    second = json.loads((folder / "summary.json").read_text())["notebooks"]
+    assert list(second) == ["01_one", "08_two"]
+    assert second["01_one"] == first["01_one"]
+    (tmp_path / "mine.csv").write_text((tmp_path / "mine.csv").read_text() + "9,9,9,9\n")
+    run("--only", "08")
+    assert list(json.loads((folder / "summary.json").read_text())["notebooks"]) == ["08_two"], "other data"
+
+
+def test_while_it_runs_no_summary_has_passed(workbook, tmp_path, monkeypatch):
+    run()
+    monkeypatch.setattr(runner, "_submit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert main(["run", "--data", "mine.csv", "--out", "out", "--only", "08"]) == 130
+    left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
+    assert (left["passed"], left["unfinished"], list(left["notebooks"])) == (False, ["08_two"], ["01_one"])
+
+
+@pytest.mark.parametrize("gamma", [0.05, 0.8])
+def test_what_is_executed_by_hand_touches_no_run(workbook, tmp_path, monkeypatch, gamma):
+    run()
+    before = contents(tmp_path / "out")
+    script = workbook / "08_two.py"
+    text = script.read_text()
+    hand = text.replace('data = "synthetic"', f"data = {str(tmp_path / 'mine.csv')!r}")
+    hand = hand.replace('results = "../results"', 'results = "../out"').replace(
+        "gamma = 0.05", f"gamma = {gamma}"
+    )
+    (tmp_path / "hand.py").write_text(hand + "\nrecord.close()\n")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    runpy.run_path(str(tmp_path / "hand.py"))
+    assert contents(tmp_path / "out") == before
+    (left,) = (tmp_path / "out" / places.LAB).glob("mine*/records/08_two.json")
+    assert json.loads(left.read_text())["key_figures"] == {"gamma": gamma}
+
+
+def test_relative_results_start_at_the_notebooks(workbook, tmp_path, monkeypatch):
+    monkeypatch.chdir("/")
+    assert places.root(places.RESULTS) == tmp_path / "results"
+
+
+def _hold(folder, held_now, release):
+    with held(folder):
+        held_now.set()
+        release.wait(60)
+
+
+def test_two_runs_of_the_same_do_not_write_into_each_other(workbook, tmp_path, capsys):
+    run()
+    context = multiprocessing.get_context("spawn")
+    held_now, release = context.Event(), context.Event()
+    other = context.Process(target=_hold, args=(tmp_path / "out" / "mine", held_now, release))
+    other.start()
+    try:
+        assert held_now.wait(60)
+        before = contents(tmp_path / "out")
+        capsys.readouterr()
+        assert main(["run", "--data", "mine.csv", "--out", "out"]) == 2
+        assert "another process is writing there" in capsys.readouterr().err
+        assert contents(tmp_path / "out") == before
+        run("-p", "seed=1")
+    finally:
+        release.set()
+        other.join()
+    run()
+
+
+def test_a_folder_is_free_again_when_its_holder_is_killed(tmp_path):
+    places.own_folder(tmp_path / "own", "a test")
+    program = f"""
+from szlib.files import held
+with held({str(tmp_path / "own")!r}):
+    print("held", flush=True)
+    input()
+"""
+    holder = subprocess.Popen([sys.executable, "-c", program], stdin=-1, stdout=-1)
+    with holder:
+        if holder.stdout is None or holder.stdout.readline() != b"held\n":
+            pytest.fail("it is not held")
+        with pytest.raises(StorageError, match="another process"), held(tmp_path / "own"):
+            pass
+        holder.kill()
+    with held(tmp_path / "own"):
+        pass
