@@ -16,6 +16,7 @@ import argparse
 from collections.abc import Iterator
 from functools import lru_cache
 from importlib.util import find_spec
+from itertools import chain, product
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,8 @@ from studies.claims import SITES, TABLES
 
 import szlib
 from szlib.simulation.closed_loop import drive
-from szlib.simulation.comparisons import summarise
-from szlib.simulation.controllers.protocol import Controller
+from szlib.simulation.comparisons import CONTROLLERS, summarise
+from szlib.simulation.controllers.protocol import Controller, Factory
 from szlib.simulation.crowds.promises import KINDS, broken_promises
 from szlib.simulation.crowds.reacting import Reacting
 from szlib.simulation.crowds.replay import AsRecorded, Replays, replays
@@ -45,10 +46,12 @@ CROWDED = Worlds(
     duration=20.0,
 )
 """Six to ten people in 8 m x 8 m, most of whom walk, at up to the pace of a mall."""
-WORLDS, BASELINE_WORLDS = 250, 100
-WALKERS = {"plaza": 100, "ETH": 150, "Grand Central": 150, "ATC day": 300}
-"""Trials of each kind; fewer where a site has fewer walkers who may be replaced."""
-SETTINGS = {"MPC-CBF": szlib.MPCSettings(), "MPC-CBF, rest": szlib.MPCSettings(terminal="rest")}
+WORLDS = 220
+WALKERS = {"plaza": 100, "ETH": 150, "Grand Central": 40, "ATC day": 300}
+OTHERS = 40
+"""Trials of the paper's controller with each model and at each site, and at most of every other controller;
+fewer where a site has fewer walkers who may be replaced."""
+REST = "MPC-CBF, rest"
 BY = ("crowd", "sees", "controller")
 SCORES = ("reached", "time_to_goal", "path_efficiency", "intrusions", "time_intruding", "nearest")
 
@@ -96,41 +99,47 @@ def violated_by_who_kept(log: SimulationLog) -> int:
     return count
 
 
-def reacting(n: int) -> Iterator[pd.DataFrame]:
+def controllers(n: int, most: int) -> Iterator[tuple[str, Factory, szlib.MPCSettings, int]]:
+    """Name, factory, settings and trials of each."""
+    yield "MPC-CBF", CONTROLLERS["MPC-CBF"], szlib.MPCSettings(), min(n, most)
+    yield REST, CONTROLLERS["MPC-CBF"], szlib.MPCSettings(terminal="rest"), min(n, most, OTHERS)
+    for name in ("straight", "social force", "dynamic window"):
+        yield name, CONTROLLERS[name], szlib.MPCSettings(), min(n, most, OTHERS)
+
+
+def reacting(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
     """Trials among people who react, or would if they saw the robot."""
     models = ["orca", "social force"] + ["speed model"] * (find_spec("jupedsim") is not None)
-    for model in models:
-        for sees in ("robot", "nothing"):
-            for name, settings in SETTINGS.items():
-                most = WORLDS if name == "MPC-CBF" else BASELINE_WORLDS
-                rows = szlib.rollouts(
-                    min(n, most),
-                    settings=settings,
-                    worlds=CROWDED,
-                    behaviour=Reacting(model, sees=sees),
-                    measure=measure,
-                    n_jobs=1,
-                    progress=False,
-                )
-                yield rows.assign(crowd=model, sees=sees, controller=name)
+    for model, sees in product(models, ("robot", "nothing")):
+        for name, factory, settings, trials in controllers(n, WORLDS):
+            rows = szlib.rollouts(
+                trials,
+                settings=settings,
+                worlds=CROWDED,
+                behaviour=Reacting(model, sees=sees),
+                controller=factory,
+                measure=measure,
+                out=work,
+                n_jobs=1,
+                progress=False,
+            )
+            yield rows.assign(crowd=model, sees=sees, controller=name)
 
 
-def recorded(n: int) -> Iterator[pd.DataFrame]:
+def recorded(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
     """Trials in the place of recorded walkers, and these walkers themselves."""
     for site, most in WALKERS.items():
         load, square = SITES[site]
-        tracks = load()
-        zone = zone_of(site)
-        made = replays(tracks, min(n, most), seed=0, area=square, zone=zone)
-        del tracks
-        for name, settings in SETTINGS.items():
+        made = replays(load(), min(n, most), seed=0, area=square, zone=zone_of(site))
+        for name, factory, settings, trials in controllers(n, len(made)):
             rows = szlib.rollouts(
-                len(made),
+                trials,
                 settings=settings,
                 worlds=made,
                 behaviour=made,
-                controller=reused,
+                controller=reused if name.startswith("MPC") else factory,
                 measure=measure,
+                out=work,
                 n_jobs=1,
                 progress=False,
             )
@@ -153,7 +162,7 @@ def zone_of(site: str) -> szlib.Ellipse:
 
 def promises(rows: pd.DataFrame) -> pd.DataFrame:
     """One row each crowd and controller: trials, steps, and what became of the promises."""
-    told = rows[rows["steps"].notna()]
+    told = rows[rows["controller"].str.startswith("MPC")]
     sums = ["steps", "promised_steps", "broken_steps", *KINDS, "unexplained", "to_who_kept", "flagged_steps"]
     table = told.groupby(list(BY), sort=False).agg(
         trials=("seed", "size"), **{name: (name, "sum") for name in sums}, worst=("worst", "min")
@@ -161,9 +170,9 @@ def promises(rows: pd.DataFrame) -> pd.DataFrame:
     return table.astype(dict.fromkeys(sums, int)).reset_index()
 
 
-def main(n: int, out: Path) -> None:
+def main(n: int, out: Path, work: Path | None) -> None:
     parts = []
-    for rows in (*reacting(n), *recorded(n)):
+    for rows in chain(reacting(n, work), recorded(n, work)):
         parts.append(rows)
         print(*rows[list(BY)].iloc[0], len(rows), flush=True)
     means = pd.concat([summarise(rows, by=BY, metrics=SCORES) for rows in parts], ignore_index=True)
@@ -179,5 +188,6 @@ if __name__ == "__main__":
     )
     parser.add_argument("--n", type=int, default=10**6, help="at most so many trials of each kind")
     parser.add_argument("--out", type=Path, default=TABLES)
+    parser.add_argument("--work", type=Path, help="folder of finished chunks, to go on from")
     given = parser.parse_args()
-    main(given.n, given.out)
+    main(given.n, given.out, given.work)
