@@ -46,11 +46,11 @@ CROWDED = Worlds(
     duration=20.0,
 )
 """Six to ten people in 8 m x 8 m, most of whom walk, at up to the pace of a mall."""
-WORLDS = 220
-WALKERS = {"plaza": 100, "ETH": 150, "Grand Central": 40, "ATC day": 300}
-OTHERS = 40
-"""Trials of the paper's controller with each model and at each site, and at most of every other controller;
-fewer where a site has fewer walkers who may be replaced."""
+WORLDS = {"orca": 250, "speed model": 250, "social force": 150}
+WALKERS = {"ATC day": 200, "plaza": 100, "ETH": 150, "Grand Central": 20}
+OTHERS, BASELINES = 40, 25
+"""Trials of the paper's controller with each model and at each site (fewer where fewer walkers may be replaced),
+at most of it with plans that end at rest, and of each baseline."""
 REST = "MPC-CBF, rest"
 BY = ("crowd", "sees", "controller")
 SCORES = ("reached", "time_to_goal", "path_efficiency", "intrusions", "time_intruding", "nearest")
@@ -104,14 +104,14 @@ def controllers(n: int, most: int) -> Iterator[tuple[str, Factory, szlib.MPCSett
     yield "MPC-CBF", CONTROLLERS["MPC-CBF"], szlib.MPCSettings(), min(n, most)
     yield REST, CONTROLLERS["MPC-CBF"], szlib.MPCSettings(terminal="rest"), min(n, most, OTHERS)
     for name in ("straight", "social force", "dynamic window"):
-        yield name, CONTROLLERS[name], szlib.MPCSettings(), min(n, most, OTHERS)
+        yield name, CONTROLLERS[name], szlib.MPCSettings(), min(n, most, BASELINES)
 
 
 def reacting(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
     """Trials among people who react, or would if they saw the robot."""
-    models = ["orca", "social force"] + ["speed model"] * (find_spec("jupedsim") is not None)
+    models = [model for model in WORLDS if model != "speed model" or find_spec("jupedsim")]
     for model, sees in product(models, ("robot", "nothing")):
-        for name, factory, settings, trials in controllers(n, WORLDS):
+        for name, factory, settings, trials in controllers(n, WORLDS[model]):
             rows = szlib.rollouts(
                 trials,
                 settings=settings,
