@@ -49,9 +49,14 @@ CROWDED = Worlds(
 WORLDS = {"orca": 250, "speed model": 250, "social force": 150}
 WALKERS = {"ATC day": 200, "plaza": 100, "ETH": 150, "Grand Central": 20}
 OTHERS, BASELINES = 40, 25
-"""Trials of the paper's controller with each model and at each site (fewer where fewer walkers may be replaced),
-at most of it with plans that end at rest, and of each baseline."""
-REST = "MPC-CBF, rest"
+"""Trials of the paper's controller with each model and at each site (fewer where fewer walkers may be
+replaced), at most of it with other settings, and of each baseline."""
+SETTINGS = {
+    "MPC-CBF": szlib.MPCSettings(),
+    "MPC-CBF, rest": szlib.MPCSettings(terminal="rest"),
+    "MPC-CBF, gamma 0.2": szlib.MPCSettings(gamma=0.2, N_h=8),
+}
+"""The paper's settings; plans that end at rest; barriers on the whole horizon that may be used up faster."""
 BY = ("crowd", "sees", "controller")
 SCORES = ("reached", "time_to_goal", "path_efficiency", "intrusions", "time_intruding", "nearest")
 
@@ -101,8 +106,9 @@ def violated_by_who_kept(log: SimulationLog) -> int:
 
 def controllers(n: int, most: int) -> Iterator[tuple[str, Factory, szlib.MPCSettings, int]]:
     """Name, factory, settings and trials of each."""
-    yield "MPC-CBF", CONTROLLERS["MPC-CBF"], szlib.MPCSettings(), min(n, most)
-    yield REST, CONTROLLERS["MPC-CBF"], szlib.MPCSettings(terminal="rest"), min(n, most, OTHERS)
+    for name, settings in SETTINGS.items():
+        trials = min(n, most) if name == "MPC-CBF" else min(n, most, OTHERS)
+        yield name, CONTROLLERS["MPC-CBF"], settings, trials
     for name in ("straight", "social force", "dynamic window"):
         yield name, CONTROLLERS[name], szlib.MPCSettings(), min(n, most, BASELINES)
 
