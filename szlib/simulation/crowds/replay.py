@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import atan2, floor, hypot
+from math import atan2, hypot
+from math import floor as whole
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,8 @@ import pandas as pd
 from ...control.barriers import Array
 from ...control.people import Person
 from ...control.settings import MPCSettings
-from ...encounters.geometry import Square
+from ...encounters.areas import area_for
+from ...encounters.geometry import Area
 from ...errors import DataError
 from ...tracks.clock import TICKS_PER_SECOND, clock_index
 from ...zones.ellipses import Ellipse
@@ -56,7 +58,7 @@ class Recorded:
         tick = t * TICKS_PER_SECOND - self.first
         if not -_ROUNDING <= tick <= len(self.states) - 1 + _ROUNDING:
             return None
-        row = min(max(floor(tick + _ROUNDING), 0), len(self.states) - 1)
+        row = min(max(whole(tick + _ROUNDING), 0), len(self.states) - 1)
         now, after = self.states[row], self.states[min(row + 1, len(self.states) - 1)]
         x, y, vx, vy = (now[:4] + max(tick - row, 0.0) * (after[:4] - now[:4])).tolist()
         return Person((x, y), (vx, vy), float(now[4]), zone)
@@ -167,7 +169,7 @@ def replays(
     n: int,
     *,
     seed: int = 0,
-    area: Square | None = None,
+    area: object = None,
     zone: Ellipse | None = None,
     settings: MPCSettings | None = None,
 ) -> Replays:
@@ -179,7 +181,8 @@ def replays(
     Parameters
     ----------
     tracks : a track table; of several days, each is a scene of its own.
-    area : open floor, where the robot may drive; None: everywhere, for tracks say nothing of walls.
+    area : open floor, where the robot may drive: whatever `szlib.as_area` takes, or "auto"; None: everywhere,
+        though tracks say nothing of walls.
     zone : of everybody; None: that of the controller.
     settings : of the robot: its greatest speed.
 
@@ -197,7 +200,8 @@ def replays(
     known = ends - starts > 1
     pieces = pd.DataFrame({"from": starts[known], "to": ends[known], "day": days[starts[known]]})
     pieces["first"], pieces["last"] = tick[pieces["from"]], tick[pieces["to"] - 1]
-    ways = _ways(states, pieces, area)
+    floor = None if area is None else area_for(tracks, area)
+    ways = _ways(states, pieces, floor)
     made: list[Replay] = []
     for i in np.random.default_rng(seed).permutation(len(ways)):
         number, begin, end = ways[i]
@@ -225,13 +229,13 @@ def replays(
             break
     if not made:
         raise DataError(
-            f"no walker came {TRAVEL} m far within {area or 'the tracks'} from a point with nobody within "
+            f"no walker came {TRAVEL} m far within {floor or 'the tracks'} from a point with nobody within "
             f"{APART} m ({len(ways)} came so far); give a larger area or other tracks"
         )
     return Replays(made)
 
 
-def _ways(states: Array, pieces: pd.DataFrame, area: Square | None) -> list[tuple[int, int, int]]:
+def _ways(states: Array, pieces: pd.DataFrame, area: Area | None) -> list[tuple[int, int, int]]:
     """Number of the piece, first row and end of every way that is long enough."""
     inside = np.ones(len(states), bool)
     if area is not None:
