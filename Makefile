@@ -44,8 +44,11 @@ dist: $(INSTALLED)  ## sdist and wheel; HOME_URL says where the README's picture
 clean:  ## forget the environment and the results
 	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in ('$(VENV)', 'results')]"
 
-$(INSTALLED): environment.lock pyproject.toml
+$(INSTALLED): environment.lock pyproject.toml  ## uv, of the lock as well, installs it several times faster than pip
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r environment.lock
+	sed -n '/^uv==/,/[^\\]$$/p' environment.lock > $(VENV)/uv.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $(VENV)/uv.lock
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r environment.lock || \
+	    $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r environment.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	$(BIN)/python -c "open('$(INSTALLED)', 'w').close()"

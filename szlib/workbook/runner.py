@@ -88,20 +88,12 @@ def run(
         earlier = summary.begin(home, identity, names)
         places.withdraw(home, names)
         given |= {"data": asked, "results": str(results)}
-        outcomes = _outcomes(
-            sources, given, home, label=datasets.label(asked), jobs=jobs, scheduler=scheduler
-        )
+        outcomes = _outcomes(sources, given, home, jobs, scheduler)
         return summary.finish(home, identity, earlier, {name: outcomes[name] for name in names})
 
 
 def _outcomes(
-    sources: Sequence[Path],
-    given: dict[str, Any],
-    home: Path,
-    *,
-    label: str,
-    jobs: int,
-    scheduler: str | None,
+    sources: Sequence[Path], given: dict[str, Any], home: Path, jobs: int, scheduler: str | None
 ) -> dict[str, dict[str, Any]]:
     """What came of each notebook, by its name."""
     jobs = bounded(jobs, len(sources)) or 1

@@ -1,7 +1,10 @@
 """What was once lost or wrongly believed: folders, stale results, parameters, endings."""
 
+import errno
+import itertools
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +15,7 @@ import pandas as pd
 import pytest
 
 import szlib
+from szlib import files
 from szlib.errors import DataError, StorageError
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
@@ -236,6 +240,64 @@ def test_sigterm_ends_a_command_as_ctrl_c_does(tmp_path):
     assert done.returncode == 143
     assert "szlib: stopped; what was finished stays in the results" in printed
     assert not list(tmp_path.rglob(".szlib-*"))
+
+
+def test_sigterm_ends_a_run_and_its_kernels(notebooks, tmp_path):
+    sleeper = """
+import os, time
+record.table(__import__("pandas").DataFrame({"pid": [os.getpid()]}), "kernel")
+time.sleep(120)"""
+    folder = notebooks(_01_sleeper=sleeper)
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import sys\nfrom pathlib import Path\nfrom szlib.workbook import places\n"
+        "from szlib.workbook.command_line import main\nif __name__ == '__main__':\n"
+        f"    places.NOTEBOOKS = Path({str(folder)!r})\n    sys.exit(main())\n"
+    )
+    run = subprocess.Popen(
+        [sys.executable, str(program), "run", "--data", "mine.csv", "--out", "out"],
+        env=HERE, text=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
+    table = tmp_path / "out" / "mine" / "kernel.csv"
+    while not table.exists() and run.poll() is None:
+        time.sleep(0.05)
+    kernel = int(table.read_text().split()[1])
+    run.send_signal(signal.SIGTERM)
+    _, printed = run.communicate()
+    assert run.returncode == 143
+    assert "szlib: stopped; what was finished stays in the results" in printed
+    end = time.monotonic() + 30
+    while Path(f"/proc/{kernel}").exists() and time.monotonic() < end:
+        time.sleep(0.1)
+    assert not Path(f"/proc/{kernel}").exists()
+    assert not (tmp_path / "out" / "mine" / "summary.json").exists()
+
+
+def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypatch, capsys):
+    notebooks(_01_one="", _06_two="")
+    done = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
+    monkeypatch.setattr(runner, "_outcomes", lambda sources, *_: {s.stem: done for s in sources})
+    fill, command = files._fill, ["run", "--data", "mine.csv", "--out", "out"]
+    for full in itertools.count():
+        shutil.rmtree(tmp_path / "out", ignore_errors=True)
+        writes = itertools.count()
+
+        def disk(*write, full=full, writes=writes):
+            if next(writes) == full:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            fill(*write)
+
+        monkeypatch.setattr(files, "_fill", disk)
+        if main(command) == 0:
+            break
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "No space left on device" in line
+        assert not list(tmp_path.rglob("summary.json"))
+        monkeypatch.setattr(files, "_fill", fill)
+        assert main(command) == 0
+        assert main([*command, "--only", "06"]) == 0
+        capsys.readouterr()
+    assert full == next(writes) >= 4, "the two markers, the parameters, the summary"
 
 
 @pytest.mark.filterwarnings("default")
