@@ -51,7 +51,7 @@ ROOMS = {
         "command_line",
     ],
     "workbook.figures": [
-        "style", "tracks", "encounters", "zones", "control", "simulation",
+        "style", "tracks", "encounters", "zones", "control", "simulation", "crowds",
     ],
 }  # fmt: skip
 """From the ground up: a room imports only from rooms before it, a file only from files before it."""
