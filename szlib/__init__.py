@@ -41,6 +41,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "simulation.log": ["SimulationLog"],
         "simulation.rollouts": ["rollouts"],
         "simulation.scenario": ["Scenario"],
+        "simulation.scenarios.meetings": ["MEETINGS"],
         "simulation.scenarios.paper": ["SCENARIOS"],
         "tracks.clock": ["read_tracks"],
         "zones.costmap": ["Grid"],

@@ -17,8 +17,9 @@ PACKAGE = Path(szlib.__file__).parent
 GROUND = ["errors", "files", "memory", "parallel"]
 ROOMS = {
     "tracks": [
-        "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
+        "funnels", "formats", "plausible", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
+    "tracks.formats": ["frame_rates", "plain", "foreign", "layouts", "tables"],
     "encounters": [
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
@@ -43,14 +44,14 @@ ROOMS = {
         "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
     ],
     "simulation.controllers": ["protocol", "baselines"],
-    "simulation.metrics": ["endings", "motion"],
-    "simulation.scenarios": ["paper", "worlds"],
+    "simulation.metrics": ["endings", "motion", "social"],
+    "simulation.scenarios": ["paper", "meetings", "worlds"],
     "workbook": [
         "figures", "claims", "sensitivity", "places", "parameters", "record", "summary", "runner",
         "command_line",
     ],
     "workbook.figures": [
-        "style", "tracks", "encounters", "zones", "control", "simulation",
+        "style", "tracks", "encounters", "zones", "control", "simulation", "crowds",
     ],
 }  # fmt: skip
 """From the ground up: a room imports only from rooms before it, a file only from files before it."""
