@@ -151,7 +151,8 @@ class DifferentialDrive:
         `a_max` bounds the acceleration of the point ahead of the axle.
     omega_max : limit of |omega| [rad/s].
     ahead : distance of the point from the axle [m]; default: the least one at which `settings.v_max` is
-        reached, about v_max / omega_max. With less the robot is slower, with more it needs more room.
+        reached, about v_max / omega_max. With less the robot is slower, with more it needs more room: it
+        passes through what is passable for a double integrator of the radius r_robot + ahead.
 
     Attributes
     ----------
