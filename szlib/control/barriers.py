@@ -174,7 +174,7 @@ def _pieces(line: Any) -> list[Array]:
     for corner in corners[1:]:
         if np.hypot(*(corner - kept[-1])) >= SHORTEST_WALL:
             kept.append(corner)
-    return [np.array(ends) for ends in pairwise(kept)]
+    return [np.array(ends) for ends in pairwise(kept)] or [corners[[0, -1]]]
 
 
 def finite(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
