@@ -32,6 +32,7 @@ ROOMS = {
         "barriers", "settings", "distances", "people", "problem", "step", "solvers", "mpc",
     ],
     "control.people": ["person", "tracker", "meetings"],
+    "control.step": ["scene", "report", "decision"],
     "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
     "simulation": [
         "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
