@@ -60,7 +60,7 @@ from .people.person import Person, PlacedZone, SpeedZone, place
 from .people.tracker import People, Tracker
 from .problem import TOLERANCE
 from .settings import MPCSettings
-from .step import Rung, Step
+from .step.decision import Rung, Step
 
 OMEGA_MAX = 4.0
 """Turning rate of a common indoor robot whose wheels reach 1 m/s [rad/s] (assumed)."""
