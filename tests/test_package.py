@@ -17,22 +17,26 @@ PACKAGE = Path(szlib.__file__).parent
 GROUND = ["errors", "files", "memory", "parallel"]
 ROOMS = {
     "tracks": [
-        "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
+        "funnels", "formats", "plausible", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
+    "tracks.formats": ["frame_rates", "plain", "foreign", "layouts", "tables"],
     "encounters": [
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
     "zones": [
-        "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
+        "costmap", "ellipses", "outliers", "by_direction", "hulls", "respect", "uncertainty", "zone_file",
         "social_zone",
     ],
+    "zones.by_direction": ["radii", "quantile"],
     "zones.respect": ["presence", "boundary", "significance", "estimate"],
     "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "problem", "step", "solvers", "mpc",
+        "differential",
     ],
     "control.people": ["person", "tracker", "meetings"],
-    "control.solvers": ["ipopt", "sqp", "ladder"],
+    "control.step": ["scene", "report", "decision"],
+    "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
     "simulation": [
         "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
         "comparisons",
@@ -48,7 +52,7 @@ ROOMS = {
         "command_line",
     ],
     "workbook.figures": [
-        "style", "tracks", "encounters", "zones", "control", "simulation",
+        "style", "tracks", "encounters", "zones", "control", "simulation", "crowds",
     ],
 }  # fmt: skip
 """From the ground up: a room imports only from rooms before it, a file only from files before it."""
@@ -62,6 +66,7 @@ PUBLIC = [
     "PlazaSettings", "SCENARIOS", "SimulationLog", "SocialZone", "SolverError", "Square", "SzlibError",
     "ZoneError", "ellipse_distance", "extract_days", "find_encounters", "make_plaza",
     "minimum_enclosing_ellipse", "read_tracks", "remove_outliers", "rollouts", "segment_distance", "simulate",
+    "Tracker",
 ]  # fmt: skip
 PROMISED = [
     "SocialZone.fit", "SocialZone.ellipse", "SocialZone.boundary", "SocialZone.save", "SocialZone.load",

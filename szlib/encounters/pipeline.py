@@ -23,7 +23,8 @@ from ..errors import DataError, DataWarning
 from ..files import file_content, write_file
 from ..tracks import funnels
 from ..tracks.clock import to_clock
-from ..tracks.formats import FORMATS, first_line, layout_of
+from ..tracks.formats.layouts import FORMATS, UNITS, Columns, layout_of
+from ..tracks.formats.plain import first_line
 from ..tracks.readers import read_raw
 from .areas import AUTO, as_area, walked_area
 from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
@@ -31,6 +32,18 @@ from .kinds import KINDS
 from .search import SAMPLE_COLUMNS, find_encounters
 from .streaming import read_near_square
 
+_ADVICE = {
+    "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
+    "square": 'give an area in which people walked: four numbers or a polygon, or "auto"',
+    "slow": "are unit and frame rate right? else pass a smaller min_speed",
+    "velocity": "tracks are single points: pass a longer max_gap, or join the ids of one person",
+    "ends": "tracks are short, or torn: pass a longer max_gap, or a shorter duration",
+    "nobody": "people were never near each other: more data, or a larger space",
+    "several": "it was crowded: a smaller space",
+    "nearer": "people came into view late: pass a smaller min_distance",
+    "somebody else": "more data, or other conditions (szlib.find_encounters)",
+}
+"""What to do where a condition, known by a word of it, has turned everybody away."""
 _FORMAT, _VERSION = "szlib.extraction", 4
 
 
@@ -53,6 +66,7 @@ class Chain:
     frame_rate: float | None = None
     max_gap: float | None = None
     tz: str = "Asia/Tokyo"
+    columns: Columns | None = None
 
     def __post_init__(self) -> None:
         if self.square is not None and self.square != AUTO:
@@ -63,17 +77,19 @@ class Chain:
             raise DataError(f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'") from error
         if self.file_format is not None and self.file_format not in FORMATS:
             raise DataError(f"unknown file_format {self.file_format!r}; expected one of {list(FORMATS)}")
-        if self.unit not in (None, "m", "mm"):
-            raise DataError(f"unit must be 'm' or 'mm'; got {self.unit!r}")
+        if self.unit not in (None, *UNITS):
+            raise DataError(f"unit must be one of {list(UNITS)}; got {self.unit!r}")
 
     def parameters(self) -> dict[str, Any]:
         """Every parameter as JSON values; the area as text that reads back."""
         return asdict(self) | {"square": None if self.square is None else str(self.square)}
 
-    def settled(self, files: Sequence[Path]) -> Chain:
-        """The same with the area that these files have where none was given."""
+    def settled(self, files: Sequence[Path], tracks: pd.DataFrame | None = None) -> Chain:
+        """The same with the area that these files have where none was given; `tracks`: theirs, if known."""
         if area := self._known_area(files):
             return replace(self, square=area)
+        if tracks is not None:
+            return replace(self, square=walked_area(tracks))
         with warnings.catch_warnings():  # rows set aside are told when the day itself is read
             warnings.simplefilter("ignore", DataWarning)
             tracks = to_clock(self._read(files), max_gap=self.max_gap)
@@ -100,16 +116,34 @@ class Chain:
         """The area given, or the mall's; None where it must be found."""
         if isinstance(self.square, Square | Region):
             return self.square
-        layouts = {layout_of(first_line(file), self.file_format).name for file in files}
+        name = "tidy" if self.columns else self.file_format
+        layouts = {layout_of(first_line(file), name).name for file in files}
         return ATC_SQUARE if self.square is None and layouts <= {"atc-raw", "atc-1hz"} else None
 
     def _read(self, files: Sequence[Path], near: Area | None = None) -> pd.DataFrame:
         """Rows of the files; of a single one, where an area is given, those near it."""
-        given = {"file_format": self.file_format, "unit": self.unit, "frame_rate": self.frame_rate}
+        given = {name: getattr(self, name) for name in ("file_format", "unit", "frame_rate", "columns")}
         if near is None or len(files) > 1:
-            return read_raw(files, tz=self.tz, **given)  # type: ignore[arg-type]
+            return read_raw(files, tz=self.tz, **given)
         of = {"square": near, "duration": self.duration, "max_gap": self.max_gap}
         return read_near_square(files[0], tz=self.tz, **of, **given)  # type: ignore[arg-type]
+
+
+def check_met(samples: pd.DataFrame) -> pd.DataFrame:
+    """The samples, where anybody met; else DataError: the stage that was emptied, by what, and what to do."""
+    if len(samples):
+        return samples
+    stages = [stage for stage in funnels.of(samples) if stage["entered"]]
+    emptied = next((stage for stage in stages if not stage["kept"]), None)
+    if emptied is None:
+        raise DataError("the table of samples is empty, and has no funnel that says why")
+    rows = ", ".join(f"{count:,} {reason}" for reason, count in emptied["set_aside"].items())
+    last = list(emptied["set_aside"])[-1]
+    advice = next((told for words, told in _ADVICE.items() if words in last), _ADVICE["somebody else"])
+    raise DataError(
+        f"nobody met in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
+        f"({emptied['stage']}) none is left: {rows}.  What emptied it: {last}; {advice}"
+    )
 
 
 def no_samples() -> pd.DataFrame:

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 import szlib
+from szlib.simulation.crowds.promises import KINDS
 from szlib.workbook import figures
 
 matplotlib.use("Agg")
@@ -234,3 +235,18 @@ def test_findings_are_told_apart_by_more_than_colour():
     ax = figures.plot_findings(table)
     assert len({line.get_marker() for line in ax.lines if line.get_marker() != "None"}) == 3
     assert [label.get_text() for label in ax.get_yticklabels()] == list("abc")
+
+
+def test_a_crowd_is_drawn_where_it_is_nearest(log):
+    ax = figures.plot_crowd(log)
+    (robot,) = ax.patches
+    row = int(np.hypot(log.relative[:, 0, 0], log.relative[:, 0, 1]).argmin())
+    assert robot.center == pytest.approx(tuple(log.states[row, :2]))
+    assert in_metres(ax)
+
+
+def test_promises_are_shares_of_the_steps_that_promised():
+    table = pd.DataFrame(0, index=["orca", "ETH"], columns=[*KINDS, "promised_steps"])
+    table["promised_steps"], table["turned"], table["came"] = [1000, 500], [3, 0], [0, 1]
+    widths = [bar.get_width() for bars in figures.plot_promises(table).containers for bar in bars]
+    assert sorted(widths)[-2:] == [2, 3]

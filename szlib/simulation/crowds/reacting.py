@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, hypot
 from types import MappingProxyType
 from typing import Literal, get_args
@@ -124,4 +124,5 @@ def _moved(person: Person, at: list[float], velocity: list[float]) -> Person:
     """The same person elsewhere, who faces where they walk, or, below `FACES`, where they faced."""
     (x, y), (vx, vy) = at, velocity
     heading = atan2(vy, vx) if hypot(vx, vy) >= FACES else person.heading
-    return Person((x, y), (vx, vy), heading, person.zone)
+    moved = {"position": (x, y), "velocity": (vx, vy), "heading": heading}
+    return replace(person, **moved, heading_unknown=heading is None)

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import atan2, floor, hypot
+from math import atan2, hypot
+from math import floor as whole
 
 import numpy as np
 import pandas as pd
@@ -18,9 +19,11 @@ import pandas as pd
 from ...control.barriers import Array
 from ...control.people import Person
 from ...control.settings import MPCSettings
-from ...encounters.geometry import Square
+from ...encounters.areas import area_for
+from ...encounters.geometry import Area
 from ...errors import DataError
 from ...tracks.clock import TICKS_PER_SECOND, clock_index
+from ...zones.ellipses import Ellipse
 from ..scenario import Crowd, Scenario
 from .reacting import FACES
 
@@ -50,15 +53,15 @@ class Recorded:
     first: int
     states: Array
 
-    def at(self, t: float) -> Person | None:
-        """The person at a time [s]; None where they were not there."""
+    def at(self, t: float, zone: Ellipse | None = None) -> Person | None:
+        """The person, with this zone, at a time [s]; None where they were not there."""
         tick = t * TICKS_PER_SECOND - self.first
         if not -_ROUNDING <= tick <= len(self.states) - 1 + _ROUNDING:
             return None
-        row = min(max(floor(tick + _ROUNDING), 0), len(self.states) - 1)
+        row = min(max(whole(tick + _ROUNDING), 0), len(self.states) - 1)
         now, after = self.states[row], self.states[min(row + 1, len(self.states) - 1)]
         x, y, vx, vy = (now[:4] + max(tick - row, 0.0) * (after[:4] - now[:4])).tolist()
-        return Person((x, y), (vx, vy), float(now[4]))
+        return Person((x, y), (vx, vy), float(now[4]), zone)
 
 
 @dataclass(frozen=True)
@@ -71,12 +74,14 @@ class Replay:
         much of it as it may; people come and go, so that it names none.
     walker : who is replaced.
     others : everybody else who was there meanwhile; who was lost and found again counts twice.
+    zone : of everybody; None: that of the controller.
     sight : how far the controller is given people [m].
     """
 
     scenario: Scenario
     walker: Recorded
     others: tuple[Recorded, ...] = field(repr=False)
+    zone: Ellipse | None = None
     sight: float = SIGHT
 
     def crowd(self, scenario: Scenario, seed: int) -> Crowd:
@@ -84,13 +89,33 @@ class Replay:
         return self._at
 
     def _at(self, t: float, robot: Array) -> tuple[Person | None, ...]:
-        return tuple(self._within_sight(other.at(t), robot) for other in self.others)
+        return tuple(self._within_sight(other.at(t, self.zone), robot) for other in self.others)
 
     def _within_sight(self, person: Person | None, robot: Array) -> Person | None:
         if person is None:
             return None
         (x, y), (rx, ry) = person.position, robot[:2].tolist()
         return person if hypot(x - rx, y - ry) <= self.sight else None
+
+    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
+        """Everybody as the controller is given them: as they are."""
+        return people
+
+
+class Replays(tuple[Replay, ...]):
+    """Several of them, each by its seed, as `rollouts` wants them.
+
+    ``szlib.rollouts(len(made), worlds=made, behaviour=made)``: seed 0 is the first, and after the last comes
+    the first again.
+    """
+
+    def __call__(self, seed: int) -> Scenario:
+        """The scenario of a seed."""
+        return self[seed % len(self)].scenario
+
+    def crowd(self, scenario: Scenario, seed: int) -> Crowd:
+        """The crowd of a seed."""
+        return self[seed % len(self)].crowd(scenario, seed)
 
     def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
         """Everybody as the controller is given them: as they are."""
@@ -144,9 +169,10 @@ def replays(
     n: int,
     *,
     seed: int = 0,
-    area: Square | None = None,
+    area: object = None,
+    zone: Ellipse | None = None,
     settings: MPCSettings | None = None,
-) -> list[Replay]:
+) -> Replays:
     """At most n recorded walkers, drawn by the seed, each to be replaced by the robot.
 
     A walker's way is a gap-free piece of their track within the area, at least `TRAVEL` from its first to its
@@ -155,7 +181,9 @@ def replays(
     Parameters
     ----------
     tracks : a track table; of several days, each is a scene of its own.
-    area : open floor, where the robot may drive; None: everywhere, for tracks say nothing of walls.
+    area : open floor, where the robot may drive: whatever `szlib.as_area` takes, or "auto"; None: everywhere,
+        though tracks say nothing of walls.
+    zone : of everybody; None: that of the controller.
     settings : of the robot: its greatest speed.
 
     Raises
@@ -172,7 +200,8 @@ def replays(
     known = ends - starts > 1
     pieces = pd.DataFrame({"from": starts[known], "to": ends[known], "day": days[starts[known]]})
     pieces["first"], pieces["last"] = tick[pieces["from"]], tick[pieces["to"] - 1]
-    ways = _ways(states, pieces, area)
+    floor = None if area is None else area_for(tracks, area)
+    ways = _ways(states, pieces, floor)
     made: list[Replay] = []
     for i in np.random.default_rng(seed).permutation(len(ways)):
         number, begin, end = ways[i]
@@ -195,18 +224,18 @@ def replays(
             )
         walker = Recorded(int(ids[begin]), 0, _with_heading(states[begin:end]))
         if _has_room(walker, others):
-            made.append(Replay(_scenario(walker, time, s), walker, tuple(others)))
+            made.append(Replay(_scenario(walker, time, s), walker, tuple(others), zone))
         if len(made) == n:
             break
     if not made:
         raise DataError(
-            f"no walker came {TRAVEL} m far within {area or 'the tracks'} from a point with nobody within "
+            f"no walker came {TRAVEL} m far within {floor or 'the tracks'} from a point with nobody within "
             f"{APART} m ({len(ways)} came so far); give a larger area or other tracks"
         )
-    return made
+    return Replays(made)
 
 
-def _ways(states: Array, pieces: pd.DataFrame, area: Square | None) -> list[tuple[int, int, int]]:
+def _ways(states: Array, pieces: pd.DataFrame, area: Area | None) -> list[tuple[int, int, int]]:
     """Number of the piece, first row and end of every way that is long enough."""
     inside = np.ones(len(states), bool)
     if area is not None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...control.barriers import ellipse_formula
+from ...control.barriers import ellipse_distance
 from ...zones.ellipses import Ellipse
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ REACHED = 0.5
 """Who is within this distance has reached the goal [m] (assumed): people pass there, robots come to rest."""
 
 
-def score(log: SimulationLog, zone: Ellipse) -> dict[str, float]:
+def score(log: SimulationLog, zone: Ellipse | None = None) -> dict[str, float]:
     """How the robot came to its goal, and how often it was where people keep others out.
 
     reached : 1 if it came within `REACHED` of the goal, else 0.
@@ -26,25 +27,24 @@ def score(log: SimulationLog, zone: Ellipse) -> dict[str, float]:
     time_intruding : for how long it was in anybody's [s].
     nearest : smallest distance from its centre to a person's [m]; NaN if there was nobody.
 
-    `zone` is the fitted one, in each person's own frame, whatever the controller kept.  It was learned from
+    `zone` is the fitted one, in each person's own frame; None: what was kept for each.  It was learned from
     distances between centres, so that a robot and the person whom it replaces are measured alike.
     """
     away = np.hypot(*(log.states[:, :2] - log.scenario.goal).T)
     there = np.flatnonzero(away <= REACHED)
     way = slice(None, int(there[0]) + 1 if len(there) else None)
-    path, relative = log.states[way, :2], log.relative[way]
+    path = log.states[way, :2]
     length = float(np.hypot(*np.diff(path, axis=0).T).sum())
-    (xa, ya), (xb, yb) = zone.foci.tolist()
-    distances = ellipse_formula(relative[..., 0], relative[..., 1], xa, ya, xb, yb, zone.semi_axes[0])
-    inside = distances < 0  # NaN, where somebody is not there, is not
-    entered = inside & ~np.vstack([np.zeros((1, inside.shape[1]), bool), inside[:-1]])
-    distance = np.hypot(relative[..., 0], relative[..., 1])
+    zones = log.zones if zone is None else (zone,) * len(log.zones)
+    gaps = [log.to_person(i, partial(ellipse_distance, ellipse=each))[way] for i, each in enumerate(zones)]
+    inside = np.reshape(gaps, (len(zones), len(path))).T < 0  # who is away, NaN, is not
+    entered = inside & ~np.vstack([np.zeros((1, len(zones)), bool), inside[:-1]])
+    distance = np.hypot(log.relative[way, :, 0], log.relative[way, :, 1])
+    came, straight = len(there) > 0, float(np.hypot(*(path[-1] - path[0])))
     return {
-        "reached": float(len(there) > 0),
-        "time_to_goal": float(log.time[there[0]]) if len(there) else np.nan,
-        "path_efficiency": float(np.hypot(*(path[-1] - path[0]))) / length
-        if len(there) and length
-        else np.nan,
+        "reached": float(came),
+        "time_to_goal": float(log.time[there[0]]) if came else np.nan,
+        "path_efficiency": straight / length if came and length > 0 else np.nan,
         "intrusions": float(entered.sum()),
         "time_intruding": log.settings.dt * float(inside.any(axis=1).sum()),
         "nearest": float(np.nanmin(distance)) if np.isfinite(distance).any() else np.nan,

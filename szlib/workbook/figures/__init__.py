@@ -6,13 +6,14 @@ encounters  the attentional space and the other person
 zones       outliers, the hull, zones by speed
 control     distances and barriers
 simulation  runs of the robot, animations, sweeps and comparisons
+crowds      robots among other people's crowds
 """
 
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
-    submodules=["style", "tracks", "encounters", "zones", "control", "simulation"],
+    submodules=["style", "tracks", "encounters", "zones", "control", "simulation", "crowds"],
     submod_attrs={
         "tracks": ["plot_map", "plot_speeds", "plot_funnel"],
         "encounters": ["plot_space", "plot_encounter_paths", "plot_los", "plot_los_distance"],
@@ -37,6 +38,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "plot_intervals",
             "legend_below",
         ],
+        "crowds": ["plot_crowd", "plot_promises"],
         "style": [
             "BLUE",
             "ORANGE",

@@ -1,0 +1,199 @@
+"""Robots among other people's crowds, real and simulated: the tables of notebook 17.
+
+python tests/crowd_trials.py           both tables, as they are saved: some 15 min on one core
+python tests/crowd_trials.py --n 10    at most 10 trials of each kind
+
+17_crowds.csv     means with 95 % intervals: crowd by what people see by controller
+17_promises.csv   steps that said they were safe, how many led to h < 0, and what people did meanwhile
+
+They go to notebooks/tables, or to --out.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/,
+eth/); JuPedSim is left out where it is not installed.  An exception in any trial ends the run.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from functools import lru_cache
+from importlib.util import find_spec
+from itertools import chain, product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from studies.claims import SITES, TABLES
+
+import szlib
+from szlib.simulation.closed_loop import drive
+from szlib.simulation.comparisons import CONTROLLERS, summarise
+from szlib.simulation.controllers.protocol import Controller, Factory
+from szlib.simulation.crowds.promises import KINDS, broken_promises
+from szlib.simulation.crowds.reacting import Reacting
+from szlib.simulation.crowds.replay import AsRecorded, Replays, replays
+from szlib.simulation.crowds.scores import score
+from szlib.simulation.log import SimulationLog
+from szlib.simulation.scenario import Scenario
+from szlib.simulation.scenarios.worlds import Worlds
+
+CROWDED = Worlds(
+    people=(6, 10),
+    standing=0.2,
+    pace=(0.3, 1.2),
+    walls=0.3,
+    size=8.0,
+    travel=(5.0, 8.0),
+    start_speed=0.0,
+    duration=20.0,
+)
+"""Six to ten people in 8 m x 8 m, most of whom walk, at up to the pace of a mall."""
+WORLDS = {"orca": 250, "speed model": 250, "social force": 150}
+WALKERS = {"ATC day": 200, "plaza": 100, "ETH": 150, "Grand Central": 20}
+OTHERS, BASELINES = 40, 25
+"""Trials of the paper's controller with each model and at each site (fewer where fewer walkers may be
+replaced), at most of it with other settings, and of each baseline."""
+SETTINGS = {
+    "MPC-CBF": szlib.MPCSettings(),
+    "MPC-CBF, rest": szlib.MPCSettings(terminal="rest"),
+    "MPC-CBF, gamma 0.2": szlib.MPCSettings(gamma=0.2, N_h=8),
+}
+"""The paper's settings; plans that end at rest; barriers on the whole horizon that may be used up faster."""
+BY = ("crowd", "sees", "controller")
+SCORES = ("reached", "time_to_goal", "path_efficiency", "intrusions", "time_intruding", "nearest")
+
+
+@lru_cache
+def _without_walls(settings: szlib.MPCSettings) -> szlib.MPCCBF:
+    return szlib.MPCCBF(szlib.Ellipse((0.0, 0.0), (1.0, 1.0)), settings=settings)
+
+
+def reused(scenario: Scenario, settings: szlib.MPCSettings) -> Controller:
+    """One controller for all recorded crowds: people come and go, and each size is built once."""
+    return _without_walls(settings)
+
+
+def measure(log: SimulationLog) -> dict[str, float]:
+    """Scores, and broken promises by what people did."""
+    broken = broken_promises(log)
+    counts = {did: float((broken["did"] == did).sum()) for did in KINDS}
+    rest = {
+        "unexplained": float((~broken["explained"].astype(bool)).sum()),
+        "broken_steps": float(broken["t"].nunique()),
+        "to_who_kept": float(violated_by_who_kept(log)),
+        "steps": float(len(log.states) - 1),
+        "worst": float(broken["h"].min()) if len(broken) else np.nan,
+    }
+    return score(log) | counts | rest
+
+
+def violated_by_who_kept(log: SimulationLog) -> int:
+    """Steps that said they were safe, times people with h < 0 then who went on as they had been seen.
+
+    From positions alone, by the sum of the distances to the two foci: nothing of `promises` or `log.h`.
+    """
+    count, s = 0, log.settings
+    for k in np.flatnonzero(log.safe[:-1]):
+        before, after = log.people[k], log.people[k + 1]
+        walked = np.hypot(*(after[:, :2] - before[:, :2] - s.dt * before[:, 3:]).T)
+        same = (walked <= 1e-6) & (np.abs(np.angle(np.exp(1j * (after[:, 2] - before[:, 2])))) <= 1e-6)
+        for i in np.flatnonzero(same):
+            x, y, heading = after[i, :3]
+            foci = (x + 1j * y) + np.exp(1j * heading) * (log.zones[i].foci @ (1, 1j))
+            robot = complex(*log.states[k + 1, :2])
+            h = np.abs(robot - foci).sum() / 2 - log.zones[i].semi_axes[0] - s.r_robot - s.eps
+            count += h < -1e-6
+    return count
+
+
+def controllers(n: int, most: int) -> Iterator[tuple[str, Factory, szlib.MPCSettings, int]]:
+    """Name, factory, settings and trials of each."""
+    for name, settings in SETTINGS.items():
+        trials = min(n, most) if name == "MPC-CBF" else min(n, most, OTHERS)
+        yield name, CONTROLLERS["MPC-CBF"], settings, trials
+    for name in ("straight", "social force", "dynamic window"):
+        yield name, CONTROLLERS[name], szlib.MPCSettings(), min(n, most, BASELINES)
+
+
+def reacting(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
+    """Trials among people who react, or would if they saw the robot."""
+    models = [model for model in WORLDS if model != "speed model" or find_spec("jupedsim")]
+    for model, sees in product(models, ("robot", "nothing")):
+        for name, factory, settings, trials in controllers(n, WORLDS[model]):
+            rows = szlib.rollouts(
+                trials,
+                settings=settings,
+                worlds=CROWDED,
+                behaviour=Reacting(model, sees=sees),
+                controller=factory,
+                measure=measure,
+                out=work,
+                n_jobs=1,
+                progress=False,
+            )
+            yield rows.assign(crowd=model, sees=sees, controller=name)
+
+
+def recorded(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
+    """Trials in the place of recorded walkers, and these walkers themselves."""
+    for site, most in WALKERS.items():
+        load, square = SITES[site]
+        made = replays(load(), min(n, most), seed=0, area=square, zone=zone_of(site))
+        for name, factory, settings, trials in controllers(n, len(made)):
+            rows = szlib.rollouts(
+                trials,
+                settings=settings,
+                worlds=made,
+                behaviour=made,
+                controller=reused if name.startswith("MPC") else factory,
+                measure=measure,
+                out=work,
+                n_jobs=1,
+                progress=False,
+            )
+            yield rows.assign(crowd=site, sees="nothing", controller=name)
+        yield walkers(made).assign(crowd=site, sees="nothing", controller="the person replaced")
+
+
+def walkers(made: Replays) -> pd.DataFrame:
+    """Scores of the people who are replaced."""
+    logs = (drive(each.scenario, AsRecorded(each), behaviour=each, until_arrival=False) for each in made)
+    return pd.DataFrame([{"seed": i} | score(log) for i, log in enumerate(logs)])
+
+
+@lru_cache
+def zone_of(site: str) -> szlib.Ellipse:
+    """The zone at 1.1 m/s fitted to the site, to the ATC day where that has too few encounters."""
+    load, square = SITES["ATC day" if site == "ETH" else site]
+    return szlib.SocialZone.fit(szlib.find_encounters(load(), square=square)).ellipse(1.1)
+
+
+def promises(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row each crowd and controller: trials, steps, and what became of the promises."""
+    told = rows[rows["controller"].str.startswith("MPC")]
+    sums = ["steps", "promised_steps", "broken_steps", *KINDS, "unexplained", "to_who_kept", "flagged_steps"]
+    table = told.groupby(list(BY), sort=False).agg(
+        trials=("seed", "size"), **{name: (name, "sum") for name in sums}, worst=("worst", "min")
+    )
+    return table.astype(dict.fromkeys(sums, int)).reset_index()
+
+
+def main(n: int, out: Path, work: Path | None) -> None:
+    parts = []
+    for rows in chain(reacting(n, work), recorded(n, work)):
+        parts.append(rows)
+        print(*rows[list(BY)].iloc[0], len(rows), flush=True)
+    means = pd.concat([summarise(rows, by=BY, metrics=SCORES) for rows in parts], ignore_index=True)
+    table = promises(pd.concat(parts, ignore_index=True))
+    means.round(4).to_csv(out / "17_crowds.csv", index=False)
+    table.round(4).to_csv(out / "17_promises.csv", index=False)
+    print(table.to_string())
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--n", type=int, default=10**6, help="at most so many trials of each kind")
+    parser.add_argument("--out", type=Path, default=TABLES)
+    parser.add_argument("--work", type=Path, help="folder of finished chunks, to go on from")
+    given = parser.parse_args()
+    main(given.n, given.out, given.work)

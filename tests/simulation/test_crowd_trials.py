@@ -1,0 +1,148 @@
+"""Robots among other people's crowds: what is promised is kept.  In full: `tests/crowd_trials.py`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import make_tracks, make_walk
+from crowd_trials import CROWDED, measure, violated_by_who_kept
+from test_crowds import PACKAGES, model, scene
+
+import szlib
+from szlib.control.people import Person
+from szlib.simulation.closed_loop import drive
+from szlib.simulation.crowds.promises import broken_promises
+from szlib.simulation.crowds.reacting import Reacting
+from szlib.simulation.crowds.replay import AsRecorded, replays
+from szlib.simulation.crowds.scores import score
+from szlib.simulation.scenario import Scenario
+
+__all__ = ["PACKAGES", "model"]
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+
+
+class Careless:
+    """Drives on as it began, and says that all is well."""
+
+    settings = szlib.MPCSettings()
+    zone = ZONE
+
+    def reset(self) -> None: ...
+
+    def step(self, state: object, goal: object, people: object) -> SimpleNamespace:
+        return SimpleNamespace(control=np.zeros(2), safe=True)
+
+
+def straight(*people: Person, y: float = 0.0) -> Scenario:
+    """The robot drives from (-4, y) to (4, y) at 1 m/s."""
+    return Scenario("straight", np.array([-4.0, y, 1.0, 0.0]), np.array([4.0, y]), people, duration=10.0)
+
+
+@pytest.mark.parametrize("sees", ["robot", "nothing"])
+def test_who_keeps_their_velocity_is_promised_nothing_that_is_not_kept(model: str, sees: str) -> None:
+    rows = szlib.rollouts(
+        6, worlds=CROWDED, behaviour=Reacting(model, sees=sees), measure=measure, n_jobs=1, progress=False
+    )
+    assert len(rows) == 6
+    assert (rows["to_who_kept"] == 0).all(), "from positions alone"
+    assert (rows["unexplained"] == 0).all(), "and as szlib says"
+    assert (rows["broken_steps"] <= rows["unflagged_violations"]).all()
+
+
+def crossing(seed: int) -> pd.DataFrame:
+    """One walks 10 m; eight others cross their way anyhow, turn, stop, come and go."""
+    rng, walks = np.random.default_rng(seed), [make_walk((0, 0), (1.0, 0.0), person=1, duration=10.0)]
+    for person in range(2, 10):
+        start, begin = rng.uniform((0, -6), (10, 6)), float(rng.integers(0, 8))
+        for _leg in range(3):
+            velocity = rng.uniform(-1.3, 1.3, 2)
+            walks.append(make_walk(start, velocity, person=person, begin=begin, duration=2.9))
+            start, begin = walks[-1][["x", "y"]].to_numpy()[-1], begin + 3.0
+    return make_tracks(*walks)
+
+
+def test_recorded_people_who_do_not_see_the_robot_are_no_exception_either() -> None:
+    rows = []
+    for seed in range(12):
+        for made in replays(crossing(seed), 3, zone=ZONE):
+            controller = szlib.MPCCBF(ZONE)
+            rows.append(measure(drive(made.scenario, controller, behaviour=made, until_arrival=False)))
+    table = pd.DataFrame(rows)
+    assert table["broken_steps"].sum() > 0, "they come and turn so near that some promise is void"
+    assert (table[["unexplained", "to_who_kept", "kept their velocity", "wall"]] == 0).all(axis=None)
+
+
+def test_a_controller_that_lies_is_found_out() -> None:
+    log = drive(straight(Person((0.0, 0.2), (-0.3, 0.0))), Careless())
+    broken = broken_promises(log)
+    assert set(broken["did"]) == {"kept their velocity"}
+    assert not broken["explained"].any()
+    assert broken["h"].to_numpy() == pytest.approx(broken["h_promised"].to_numpy(), abs=1e-9)
+    assert len(broken) == violated_by_who_kept(log) > 5
+    wall = Scenario("wall", np.array([-4.0, 0, 1, 0]), np.zeros(2), walls=[[(0, -1), (0, 1)]], duration=4.0)
+    assert set(broken_promises(drive(wall, Careless()))["did"]) == {"wall"}
+
+
+@pytest.mark.parametrize(
+    ("given", "walked", "turned", "did"),
+    [
+        ((-1.0, 0.0), (0.0, -1.0), 0.0, "turned"),
+        ((-0.4, 0.0), (-0.5, 0.6), 0.0, "turned"),
+        ((-0.4, 0.0), (-1.0, 0.0), 0.0, "sped up"),
+        ((0.0, 0.0), (-1.0, 0.0), 0.0, "sped up"),
+        ((0.9, 0.0), (0.2, 0.0), 0.0, "slowed down"),
+        ((0.9, 0.0), (0.0, 0.0), 1.0, "slowed down"),
+        ((0.5, 0.0), (0.5, 0.0), 1.0, "faced elsewhere"),
+        ((0.5, 0.0), (0.5, 0.0), 2 * np.pi, "kept their velocity"),
+        ((np.nan, np.nan), (0.5, 0.0), 0.0, "came"),
+    ],
+)
+def test_what_people_did_is_told(given: tuple, walked: tuple, turned: float, did: str) -> None:
+    log = drive(straight(Person((0.0, 0.0), heading=0.0)), Careless(), max_time=0.1)
+    at = log.states[1, :2] + (0.5, 0.0)
+    before = np.array([*(at - 0.1 * np.array(walked)), 0.0, *given])
+    people = np.array([before * (np.nan if did == "came" else 1.0), [*at, turned, *walked]])
+    (row,) = broken_promises(replace(log, people=people[:, None])).to_dict("records")
+    assert (row["did"], row["t"], row["person"]) == (did, 0.1, 0)
+    if did != "came":
+        assert row["off"] == pytest.approx(0.1 * np.hypot(*np.subtract(walked, given)))
+    assert row["h"] < 0
+
+
+def test_intrusions_are_counted_as_geometry_says() -> None:
+    circle = szlib.Ellipse((0.0, 0.0), (1.0, 1.0))
+    through = drive(straight(Person((0.0, 0.6), heading=0.0)), Careless(), until_arrival=False)
+    seen = score(through, circle)
+    assert seen["time_intruding"] == pytest.approx(2 * 0.8, abs=0.11), "a chord of 2 sqrt(1 - 0.36) at 1 m/s"
+    assert (seen["intrusions"], seen["nearest"]) == (1, pytest.approx(0.6))
+    assert (seen["reached"], seen["time_to_goal"]) == (1, pytest.approx(7.5))
+    assert seen["path_efficiency"] == pytest.approx(1.0)
+    two = drive(straight(Person((0.0, 0.6), heading=0.0), Person((0.5, -0.6), heading=0.0)), Careless())
+    assert score(two, circle)["intrusions"] == 2
+    assert score(two, circle)["time_intruding"] == pytest.approx(1.6 + 0.5, abs=0.11), "not twice at once"
+    nobody = score(drive(straight(), Careless()), circle)
+    assert (nobody["intrusions"], nobody["time_intruding"]) == (0, 0)
+    assert np.isnan(nobody["nearest"])
+
+
+def test_the_person_replaced_has_their_own_time_and_path() -> None:
+    for made in replays(crossing(0), 9, zone=ZONE):
+        log = drive(made.scenario, AsRecorded(made), behaviour=made, until_arrival=False)
+        path = made.walker.states[:, :2]
+        away = np.hypot(*(path - path[-1]).T)
+        assert score(log)["time_to_goal"] == pytest.approx(0.1 * (away <= 0.5).argmax(), abs=0.101), (
+            "0.5 m may lie on a tick"
+        )
+        assert log.states[: len(path), :2] == pytest.approx(path)
+
+
+def test_replays_are_worlds_and_behaviour_of_rollouts() -> None:
+    made = replays(crossing(3), 2, zone=ZONE)
+    rows = szlib.rollouts(len(made), worlds=made, behaviour=made, measure=score, n_jobs=1, progress=False)
+    alone = drive(made[0].scenario, szlib.MPCCBF(ZONE), behaviour=made[0], until_arrival=False)
+    assert rows.loc[0, list(score(alone))].astype(float).to_dict() == pytest.approx(score(alone), nan_ok=True)
+    assert scene().people == ()
