@@ -121,6 +121,7 @@ def meet(controller: str, settings: szlib.MPCSettings) -> pd.DataFrame:
     return pd.concat(tables)
 
 
+# %%
 paper = szlib.MPCSettings()
 rows = pd.concat([meet(controller, paper) for controller in CONTROLLERS])
 mine = rows[rows["controller"] == "MPC-CBF"]
