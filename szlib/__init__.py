@@ -21,6 +21,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
     ],
     submod_attrs={
         "control.barriers": ["ellipse_distance", "segment_distance"],
+        "control.differential": ["DifferentialDrive"],
         "control.mpc": ["MPCCBF", "Step"],
         "control.people.person": ["Person"],
         "control.people.tracker": ["Tracker"],
@@ -40,8 +41,10 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "simulation.log": ["SimulationLog"],
         "simulation.rollouts": ["rollouts"],
         "simulation.scenario": ["Scenario"],
+        "simulation.scenarios.meetings": ["MEETINGS"],
         "simulation.scenarios.paper": ["SCENARIOS"],
         "tracks.clock": ["read_tracks"],
+        "zones.costmap": ["Grid"],
         "zones.ellipses": ["Ellipse", "minimum_enclosing_ellipse"],
         "zones.outliers": ["remove_outliers"],
         "zones.respect.boundary": ["Respect", "fit_respect", "respect_boundary", "respect_radius"],

@@ -17,22 +17,25 @@ PACKAGE = Path(szlib.__file__).parent
 GROUND = ["errors", "files", "memory", "parallel"]
 ROOMS = {
     "tracks": [
-        "funnels", "frame_rates", "formats", "readers", "clock", "quality", "interop", "sites", "datasets",
+        "funnels", "formats", "plausible", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
+    "tracks.formats": ["frame_rates", "plain", "foreign", "layouts", "tables"],
     "encounters": [
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
     "zones": [
-        "ellipses", "radii", "outliers", "quantile", "hulls", "respect", "uncertainty", "zone_file",
+        "costmap", "ellipses", "outliers", "by_direction", "hulls", "respect", "uncertainty", "zone_file",
         "social_zone",
     ],
+    "zones.by_direction": ["radii", "quantile"],
     "zones.respect": ["presence", "boundary", "significance", "estimate"],
     "plaza": ["truth", "people", "scores", "indifferent"],
     "control": [
         "barriers", "settings", "distances", "people", "problem", "step", "solvers", "mpc",
+        "differential",
     ],
     "control.people": ["person", "tracker", "meetings"],
-    "control.solvers": ["ipopt", "sqp", "ladder"],
+    "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
     "simulation": [
         "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
         "comparisons",
@@ -41,8 +44,8 @@ ROOMS = {
         "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
     ],
     "simulation.controllers": ["protocol", "baselines"],
-    "simulation.metrics": ["endings", "motion"],
-    "simulation.scenarios": ["paper", "worlds"],
+    "simulation.metrics": ["endings", "motion", "social"],
+    "simulation.scenarios": ["paper", "meetings", "worlds"],
     "workbook": [
         "figures", "claims", "sensitivity", "places", "parameters", "record", "summary", "runner",
         "command_line",

@@ -12,6 +12,8 @@ so that the same lines run on floats, on NumPy arrays and on the symbols of CasA
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,8 @@ Array = NDArray[np.float64]
 LARGEST = 1e8
 """Greatest coordinate, speed or parameter that can be used [m, m/s, ...]: the double next to it is 1.5e-8
 away, well below the tolerance of the controller. Any map projection on Earth stays below it."""
+_FEW = 16
+"""Numbers up to which Python compares faster than NumPy begins to."""
 SHORTEST_WALL = 1e-3
 """Length below which the direction of a wall is not usable [m]; a pillar may be a wall of a millimetre."""
 
@@ -118,6 +122,61 @@ def check_wall(wall: ArrayLike) -> Array:
     return ends
 
 
+def walls_of(walls: Any) -> Array:
+    """Walls as segments, shape (n, 2, 2) [m], in the order in which they are given.
+
+    Parameters
+    ----------
+    walls : segments, shape (2, 2) each; polylines, shape (m, 2); Shapely's lines, rings, polygons and
+        collections, or whatever has `.coords`, `.exterior` and `.interiors`, or `.geoms` as they do; one or
+        many, nested in any way. Of a polygon its outline and the edges of its holes count. Corners of a line
+        that are not `SHORTEST_WALL` apart count as one.
+
+    Raises
+    ------
+    SolverError : something is no wall, or a number is not usable.
+    """
+    found = [check_wall(piece) for line in _lines(walls) for piece in _pieces(line)]
+    return np.reshape(np.array(found, float), (-1, 2, 2))
+
+
+def _lines(walls: Any) -> Iterator[Any]:
+    """The corners of each line."""
+    if hasattr(walls, "geoms"):
+        parts = list(walls.geoms)
+    elif hasattr(walls, "exterior"):
+        parts = [walls.exterior, *walls.interiors]
+    elif hasattr(walls, "coords"):
+        parts = [corner[:2] for corner in walls.coords]
+    elif isinstance(walls, Iterable) and not isinstance(walls, str):
+        parts = list(walls)
+    else:
+        raise SolverError(f"a wall must be a segment, a line, or one of Shapely's; got {walls!r}")
+    if parts and all(_is_corner(part) for part in parts):
+        yield parts
+    else:
+        for part in parts:
+            yield from _lines(part)
+
+
+def _is_corner(part: Any) -> bool:
+    return isinstance(part, Sequence | np.ndarray) and all(np.isscalar(number) for number in part)
+
+
+def _pieces(line: Any) -> list[Array]:
+    """The segments of a line."""
+    corners = finite("a wall", line, (..., 2))
+    if len(corners) < 2:
+        raise SolverError(f"a wall needs two end points; got {corners.tolist()}")
+    if len(corners) == 2:
+        return [corners]
+    kept = [corners[0]]
+    for corner in corners[1:]:
+        if np.hypot(*(corner - kept[-1])) >= SHORTEST_WALL:
+            kept.append(corner)
+    return [np.array(ends) for ends in pairwise(kept)] or [corners[[0, -1]]]
+
+
 def finite(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     """A copy of `value` as floats of this shape (a leading ... for any) in +-`LARGEST`; else SolverError."""
     try:
@@ -130,7 +189,11 @@ def finite(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     if not fits:
         raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
     array = array.astype(float)
-    if not np.abs(array).max(initial=0.0) <= LARGEST:
+    if array.size <= _FEW:
+        usable = all(-LARGEST <= number <= LARGEST for number in array.ravel().tolist())
+    else:
+        usable = bool(np.abs(array).max() <= LARGEST)
+    if not usable:
         if not np.isfinite(array).all():
             raise SolverError(f"{name} must be finite; got {array.tolist()}")
         raise SolverError(f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin")

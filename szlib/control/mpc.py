@@ -26,45 +26,43 @@ h(x_{N+1}, N+1) = h(x_N, N), and the problem is recursively feasible although th
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Hashable, Iterable, Sequence
 from threading import get_ident
 from time import perf_counter
-from typing import cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .barriers import Array, barrier, check_wall, finite, segment_formula
+from .barriers import Array, barrier, finite, segment_formula, walls_of
 from .distances import wall_margin
 from .people.meetings import subgoal
-from .people.person import Person, PlacedZone, SpeedZone, as_ellipse, circle_around, place
+from .people.person import Person, SpeedZone, as_ellipse, circle_around, place
 from .people.tracker import People, Seen, Tracker
-from .problem import Budget, ProblemSolver
 from .settings import MPCSettings
-from .solvers.ipopt import Ipopt
 from .solvers.ladder import solve_with_fallbacks
-from .solvers.sqp import Sqp
+from .solvers.sizes import Sizes, slots, taken
 from .step import Scene, Step, terminal_of
-
-_log = logging.getLogger("szlib")
 
 
 class MPCCBF:
     """Drives a double integrator to a goal, outside the social zones of people and clear of walls.
 
-    A controller belongs to the thread that first asks it for a step; give each thread one of its own.
+    A controller belongs to the thread that first asks it for a step; give each thread one of its own, for
+    instance a `copy.deepcopy`. It can be pickled.
 
     Parameters
     ----------
     zone : the social zone of a person, in the person's frame [m]; or anything with `.ellipse(speed)`,
         such as a `SocialZone`, which is asked for `settings.zone_speed`.
-    walls : segments, shape (n, 2, 2): end points [m].
+    walls : segments, shape (n, 2, 2): end points [m]; or polylines, Shapely's lines and polygons, or whatever
+        else `barriers.walls_of` takes; `self.walls` are their segments.
     settings : every other parameter.
-    max_people : how many people to build for now. More make the controller grow once, which takes
-        a moment that no time limit covers, and is logged by "szlib" (at level INFO).
+    max_people : how many people to be ready for; None: for 8, and in time for more, built in a thread of its
+        own from when half of the slots are taken. More people than it is ready for make the controller grow
+        at once, which no time limit covers, and is logged by "szlib" (at level INFO).
     tracker : what is remembered of people by their ids; default: `Tracker()`.
 
     Raises
@@ -77,42 +75,57 @@ class MPCCBF:
         self,
         zone: Ellipse | SpeedZone,
         *,
-        walls: ArrayLike | Sequence[ArrayLike] = (),
+        walls: Any = (),
         settings: MPCSettings | None = None,
-        max_people: int = 1,
+        max_people: int | None = None,
         tracker: Tracker | None = None,
     ) -> None:
         self.settings = settings or MPCSettings()
         self.zone = as_ellipse(zone, self.settings.zone_speed)
-        ends = [check_wall(wall) for wall in cast(Sequence[ArrayLike], walls)]
-        self.walls = np.reshape(np.array(ends, float), (-1, 2, 2))
-        if self.settings.terminal == "person" and len(ends):
-            raise SolverError(f"terminal='person' is for open space; got {len(ends)} walls; use 'rest'")
-        if not isinstance(max_people, int) or max_people < 0:
-            raise SolverError(f"max_people must be a whole number >= 0; got {max_people!r}")
+        if max_people is not None and not (isinstance(max_people, int) and max_people >= 0):
+            raise SolverError(f"max_people must be a whole number >= 0, or None; got {max_people!r}")
+        self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
+        self._take(walls)
+        self._sizes = Sizes(self.settings, max_people, len(self.walls))
+        self.reset()
+
+    def _take(self, walls: Any) -> None:
+        segments = walls_of(walls)
+        if self.settings.terminal == "person" and len(segments):
+            raise SolverError(f"terminal='person' is for open space; got {len(segments)} walls; use 'rest'")
+        self.walls = segments
         self._segments: list[list[float]] = self.walls.reshape(-1, 4).tolist()
         self._margins = [wall_margin(wall, self.settings) for wall in self.walls]
         pairs = zip(self._segments, self._margins, strict=True)
         self._wall_numbers = [number for segment, margin in pairs for number in (*segment, margin)]
-        self._solvers: list[ProblemSolver] = []
-        self._budget, self._thread = Budget(self.settings.time_limit), dict[str, int]()
-        self.tracker = tracker or Tracker()
-        self._build(max_people)
-        self.reset()
 
-    def _build(self, n_people: int) -> None:
-        kind = Sqp if self.settings.solver == "sqp" else Ipopt
-        for n in range(len(self._solvers), n_people + 1):
-            self._solvers.append(kind(self.settings, n, len(self.walls)))
-            self._solvers[n].budget = self._budget
+    def set_walls(self, walls: Any) -> None:
+        """Know these walls from the next step on, in place of those before; given as to the controller.
+
+        Where their number takes another size (1, 2, 4, 8, ...), that is built here: see `solvers.sizes`.
+
+        Raises
+        ------
+        SolverError : as the controller, which then keeps its walls; or another thread has it.
+        """
+        self._own()
+        self._take(walls)
+        self._sizes.of(self._n_people, len(self.walls))
+
+    def _own(self) -> None:
+        if self._thread.setdefault("first", get_ident()) != get_ident():
+            raise SolverError("this controller belongs to another thread; build one in each thread")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the thread: a copy goes on from the same plan, in whatever thread asks it first."""
+        return {**self.__dict__, "_thread": {}}
 
     def reset(self) -> None:
         """Forget the last plan and everybody: what follows depends on nothing that went before."""
         self._plan, self._now = np.zeros(2 * self.settings.N), 0.0
-        self._moved = False
+        self._moved, self._n_people = False, 0
         self.tracker.reset()
-        for solver in self._solvers:
-            solver.reset()
+        self._sizes.reset()
 
     def step(
         self,
@@ -151,33 +164,33 @@ class MPCCBF:
             first step lies too close to a wall, or another thread has this controller.
         """
         began = perf_counter()
-        if self._thread.setdefault("first", get_ident()) != get_ident():
-            raise SolverError("this controller belongs to another thread; build one in each thread")
+        self._own()
         x = finite("state", state, (4,))
         gx, gy = finite("goal", goal, (2,)).tolist()
         if not self._moved:
             self._check_goal((gx, gy))
         self._now = self._clock(now, stamps)
         seen = self.tracker.see(people, now=self._now, ids=ids, stamps=stamps)
-        self._moved = True
-        solver = self._solver(len(seen.people))
-        self._budget.begin()
+        self._moved, self._n_people = True, len(seen.people)
+        solver = self._sizes.of(self._n_people, len(self.walls))
+        self._sizes.budget.begin()
         placed = [place(person, self.zone_of(person)) for person in seen.people]
         if seen.lost:
             target = self._stop(x)
         else:
             target = subgoal((float(x[0]), float(x[1])), (gx, gy), placed, self.walls, self.settings)
-        parameters = self._parameters(x, target, placed)
-
+        pace = placed[0][5:] if terminal_of(self.settings, len(placed)) == "person" else (0.0, 0.0)
+        size = solver.evaluate.size
+        parameters = np.array([*x.tolist(), *target, *pace, *slots(x, placed, self._wall_numbers, size)])
         rung, plan, numbers, timed_out = solve_with_fallbacks(solver, self._plan, parameters)
-        self._plan = plan
+        self._plan, rows = plan, taken(len(placed), len(self.walls), size)
         return Step(
             control=plan[:2].copy(),
             predicted=numbers.states,
             rung=rung,
             slack=numbers.slack,
-            residual=numbers.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h),
-            h=numbers.h[:, 0],
+            residual=numbers.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h)[rows],
+            h=numbers.h[rows, 0],
             target=parameters[4:6],
             cost=numbers.cost,
             solve_time=perf_counter() - began,
@@ -202,21 +215,6 @@ class MPCCBF:
         px, py, vx, vy = x.tolist()
         time = max(abs(vx), abs(vy)) / self.settings.a_max
         return px + vx * time / 2, py + vy * time / 2
-
-    def _solver(self, n_people: int) -> ProblemSolver:
-        built = len(self._solvers) - 1
-        if n_people > built:
-            _log.info("the controller was built for %d people and now grows to %d", built, n_people)
-            self._build(n_people)
-        return self._solvers[n_people]
-
-    def _parameters(self, x: Array, target: tuple[float, float], placed: Sequence[PlacedZone]) -> Array:
-        """The numbers of `Problem.parameters`."""
-        pace = placed[0][5:] if terminal_of(self.settings, len(placed)) == "person" else (0.0, 0.0)
-        numbers = [*x.tolist(), *target, *pace]
-        for zone in placed:
-            numbers += zone
-        return np.array(numbers + self._wall_numbers)
 
     def zone_of(self, person: Person) -> Ellipse:
         """The zone that is kept for a person: their own, or the controller's; in the person's frame.

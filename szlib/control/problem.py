@@ -52,14 +52,22 @@ class Problem:
     row for each person and wall, a column for each of the states x_0 .. x_N. `parameters` stacks the
     state (4), the target (2), the terminal velocity w (2), then for each person the foci and a of the
     zone and the velocity (7), then for each wall its end points and its margin (5).
+
+    `jacobian` is of rows and terminal condition by the inputs; `curvature` is the Hessian of the cost, and
+    `hessian` that of cost + `multipliers`' (rows, terminal).
     """
 
     inputs: Any
     parameters: Any
+    multipliers: Any
     states: Any
     cost: Any
+    gradient: Any
     rows: Any
     terminal: Any
+    jacobian: Any
+    curvature: Any
+    hessian: Any
     h: Any
     n_cbf: int
 
@@ -70,42 +78,69 @@ class Problem:
 
 @lru_cache(maxsize=256)
 def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem:
-    """Write down the problem of this module's docstring; once for each size and settings."""
+    """Write down the problem of this module's docstring; once for each size and settings.
+
+    The states are linear in the inputs, x = M u + (what the start gives), so derivatives by the inputs are
+    those by the states, of which a row has two, times M. This saves most of the time of differentiating, and
+    of evaluating the derivatives.
+    """
     s = settings
     inputs, start, target = ca.SX.sym("u", 2, s.N), ca.SX.sym("x0", 4), ca.SX.sym("target", 2)
     people, walls, w = ca.SX.sym("person", 7, n_people), ca.SX.sym("wall", 5, n_walls), ca.SX.sym("w", 2)
+    u, x = ca.vec(inputs), ca.SX.sym("x", 4, s.N + 1)
 
     states = [start]
     for k in range(s.N):
-        position, velocity, u = states[-1][:2], states[-1][2:], inputs[:, k]
-        states.append(ca.vertcat(position + s.dt * velocity + 0.5 * s.dt**2 * u, velocity + s.dt * u))
+        position, velocity, a = states[-1][:2], states[-1][2:], inputs[:, k]
+        states.append(ca.vertcat(position + s.dt * velocity + 0.5 * s.dt**2 * a, velocity + s.dt * a))
+    motion = ca.horzcat(*states)
 
-    error = [x - ca.vertcat(target, 0, 0) for x in states]
-    cost = ca.dot(ca.DM(s.P), error[s.N] ** 2)
-    cost += sum(ca.dot(ca.DM(s.Q), error[k] ** 2) for k in range(1, s.N))
-    cost += sum(ca.dot(ca.DM(s.R), inputs[:, k] ** 2) for k in range(s.N))
+    weights = ca.DM([[0.0] * 4, *[s.Q] * (s.N - 1), s.P]).T
+    error = x - ca.repmat(ca.vertcat(target, 0, 0), 1, s.N + 1)
+    cost = ca.dot(weights, error**2) + ca.dot(ca.repmat(ca.DM(s.R), 1, s.N), inputs**2)
 
-    h = []
-    for i in range(n_people):
-        xa, ya, xb, yb, a, vx, vy = ca.vertsplit(people[:, i])
-        seen = [(x[0] - k * s.dt * vx, x[1] - k * s.dt * vy) for k, x in enumerate(states)]
-        h.append([barrier(ellipse_formula(x, y, xa, ya, xb, yb, a), s.r_robot, s.eps) for x, y in seen])
-    for j in range(n_walls):
-        *ends, margin = ca.vertsplit(walls[:, j])
-        h.append([barrier(segment_formula(x[0], x[1], *ends), s.r_robot, margin) for x in states])
-    cbf = [cbf_residual(row[k + 1], row[k], s.gamma) for row in h for k in range(s.N_h)]
-    speed = [s.v_max**2 - ca.sumsqr(x[2:]) for x in states[1:]]
+    h = _barriers(s, x, people, walls)
+    cbf = ca.vec(cbf_residual(h[:, 1 : s.N_h + 1], h[:, : s.N_h], s.gamma).T)
+    speed = s.v_max**2 - ca.sum1(x[2:, 1:] ** 2).T
+    terminal = ca.SX(0, 1) if s.terminal == "none" else x[2:, s.N] - w
 
+    rows = ca.vertcat(cbf, speed)
+    values = ca.vertcat(rows, terminal)
+    multipliers = ca.SX.sym("multiplier", values.numel())
+    m = ca.evalf(ca.jacobian(ca.vec(motion), u))
+    gradient = m.T @ ca.gradient(cost, ca.vec(x)) + ca.gradient(cost, u)
+    jacobian = ca.jacobian(values, ca.vec(x)) @ m
+    curvature = ca.evalf(m.T @ ca.hessian(cost, ca.vec(x))[0] @ m + ca.hessian(cost, u)[0])
+    hessian = m.T @ ca.hessian(ca.dot(multipliers, values), ca.vec(x))[0] @ m + curvature
+    moved = ca.substitute([cost, gradient, rows, terminal, jacobian, hessian, h], [x], [motion])
+    cost, gradient, rows, terminal, jacobian, hessian, h = moved
     return Problem(
-        inputs=ca.vec(inputs),
+        inputs=u,
         parameters=ca.vertcat(start, target, w, ca.vec(people), ca.vec(walls)),
-        states=ca.horzcat(*states),
+        multipliers=multipliers,
+        states=motion,
         cost=cost,
-        rows=ca.vertcat(*cbf, *speed),
-        terminal=ca.SX(0, 1) if s.terminal == "none" else states[-1][2:] - w,
-        h=ca.vertcat(*(ca.horzcat(*row) for row in h)) if h else ca.SX(0, s.N + 1),
-        n_cbf=len(cbf),
+        gradient=gradient,
+        rows=rows,
+        terminal=terminal,
+        jacobian=jacobian,
+        curvature=curvature,
+        hessian=hessian,
+        h=h,
+        n_cbf=cbf.numel(),
     )
+
+
+def _barriers(s: MPCSettings, x: Any, people: Any, walls: Any) -> Any:
+    """h of every person and then of every wall in each state, shape (people + walls, N+1)."""
+    steps, n_people, n_walls = x.shape[1], people.shape[1], walls.shape[1]
+    xa, ya, xb, yb, a, vx, vy = (ca.repmat(row.T, 1, steps) for row in ca.vertsplit(people))
+    time = ca.repmat(s.dt * ca.DM(range(steps)).T, n_people, 1)
+    seen = (ca.repmat(x[0, :], n_people, 1) - time * vx, ca.repmat(x[1, :], n_people, 1) - time * vy)
+    of_people = barrier(ellipse_formula(*seen, xa, ya, xb, yb, a), s.r_robot, s.eps)
+    *ends, margin = (ca.repmat(row.T, 1, steps) for row in ca.vertsplit(walls))
+    here = (ca.repmat(x[0, :], n_walls, 1), ca.repmat(x[1, :], n_walls, 1))
+    return ca.vertcat(of_people, barrier(segment_formula(*here, *ends), s.r_robot, margin))
 
 
 def slack_weight(settings: MPCSettings, parameters: Array) -> float:
@@ -144,7 +179,10 @@ class Numbers:
 
 
 class Evaluator:
-    """The numbers of any plan, without a solver; the first `n_cbf` of the `n_rows` rows are barriers."""
+    """The numbers of any plan, without a solver; the first `n_cbf` of the `n_rows` rows are barriers.
+
+    `size` is the numbers of people and walls.
+    """
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
         with BUILDING:
@@ -152,7 +190,7 @@ class Evaluator:
             self.n_rows = function.nnz_out(1)
             self._inputs, self._parameters = np.zeros(function.nnz_in(0)), np.zeros(function.nnz_in(1))
             self._function = Buffered(function, self._inputs, self._parameters)
-        self._shape = (n_people + n_walls, settings.N + 1)
+        self.size, self._shape = (n_people, n_walls), (n_people + n_walls, settings.N + 1)
 
     def __call__(self, plan: Array, parameters: Array) -> Numbers:
         self._inputs[:], self._parameters[:] = plan, parameters
@@ -190,7 +228,8 @@ class Budget:
 class ProblemSolver(Protocol):
     """What the solvers of this problem have in common; inputs have shape (2N,) [m/s2].
 
-    `late` says that the last call was cut off by the `budget`, and gave what it had by then.
+    `late` says that the last call was cut off by the `budget`, and gave what it had by then; what is
+    `remembered` from call to call saves time, and changes the answers by rounding.
     """
 
     settings: MPCSettings
@@ -198,6 +237,8 @@ class ProblemSolver(Protocol):
     budget: Budget
     late: bool
 
+    @property
+    def remembered(self) -> Array: ...
     def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
     def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
     def reset(self) -> None: ...

@@ -27,7 +27,8 @@ from ..errors import DataError, DataWarning, SzlibError
 from ..files import own_folder, printable
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.formats import first_line, layout_of, start_of_day
+from ..tracks.formats.layouts import layout_of, start_of_day
+from ..tracks.formats.plain import first_line
 from ..tracks.readers import CALENDAR_BEGINS, recording_names
 from .geometry import Area
 from .pipeline import Chain, day_key, finished_record, write_record
@@ -125,8 +126,9 @@ def extract_days(
     exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
     progress : whether to show a bar over the days.
     parameters : of `szlib.read_tracks` and `szlib.find_encounters`: square, space, duration, min_distance,
-        min_speed, throughout, file_format, unit, frame_rate, max_gap, tz.  Without a square the ATC mall's
-        files have `ATC_SQUARE`, others "auto": the `szlib.walked_area` of the first day, the same for all.
+        min_speed, throughout, file_format, unit, frame_rate, columns, max_gap, tz.  Without
+        a square the ATC mall's files have `ATC_SQUARE`, others "auto": the `szlib.walked_area` of the first
+        day, the same for all.
 
     Returns
     -------
@@ -203,7 +205,7 @@ def _day_of(file: Path, chain: Chain) -> str | None:
     """The calendar day on which a file begins; None where it tells none."""
     try:
         first = first_line(file)
-        layout = layout_of(first, chain.file_format)
+        layout = layout_of(first, "tidy" if chain.columns else chain.file_format)
         if layout.name not in ("atc-raw", "atc-1hz"):
             return None
         begun = float(first.split(layout.separator)[layout.columns["t"]]) + start_of_day(file, layout, first)

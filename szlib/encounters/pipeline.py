@@ -23,7 +23,8 @@ from ..errors import DataError, DataWarning
 from ..files import file_content, write_file
 from ..tracks import funnels
 from ..tracks.clock import to_clock
-from ..tracks.formats import FORMATS, first_line, layout_of
+from ..tracks.formats.layouts import FORMATS, UNITS, Columns, layout_of
+from ..tracks.formats.plain import first_line
 from ..tracks.readers import read_raw
 from .areas import AUTO, as_area, walked_area
 from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
@@ -53,6 +54,7 @@ class Chain:
     frame_rate: float | None = None
     max_gap: float | None = None
     tz: str = "Asia/Tokyo"
+    columns: Columns | None = None
 
     def __post_init__(self) -> None:
         if self.square is not None and self.square != AUTO:
@@ -63,8 +65,8 @@ class Chain:
             raise DataError(f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'") from error
         if self.file_format is not None and self.file_format not in FORMATS:
             raise DataError(f"unknown file_format {self.file_format!r}; expected one of {list(FORMATS)}")
-        if self.unit not in (None, "m", "mm"):
-            raise DataError(f"unit must be 'm' or 'mm'; got {self.unit!r}")
+        if self.unit not in (None, *UNITS):
+            raise DataError(f"unit must be one of {list(UNITS)}; got {self.unit!r}")
 
     def parameters(self) -> dict[str, Any]:
         """Every parameter as JSON values; the area as text that reads back."""
@@ -100,14 +102,15 @@ class Chain:
         """The area given, or the mall's; None where it must be found."""
         if isinstance(self.square, Square | Region):
             return self.square
-        layouts = {layout_of(first_line(file), self.file_format).name for file in files}
+        name = "tidy" if self.columns else self.file_format
+        layouts = {layout_of(first_line(file), name).name for file in files}
         return ATC_SQUARE if self.square is None and layouts <= {"atc-raw", "atc-1hz"} else None
 
     def _read(self, files: Sequence[Path], near: Area | None = None) -> pd.DataFrame:
         """Rows of the files; of a single one, where an area is given, those near it."""
-        given = {"file_format": self.file_format, "unit": self.unit, "frame_rate": self.frame_rate}
+        given = {name: getattr(self, name) for name in ("file_format", "unit", "frame_rate", "columns")}
         if near is None or len(files) > 1:
-            return read_raw(files, tz=self.tz, **given)  # type: ignore[arg-type]
+            return read_raw(files, tz=self.tz, **given)
         of = {"square": near, "duration": self.duration, "max_gap": self.max_gap}
         return read_near_square(files[0], tz=self.tz, **of, **given)  # type: ignore[arg-type]
 

@@ -38,8 +38,10 @@ import polars as pl
 from .. import memory
 from ..tracks import funnels
 from ..tracks.clock import VELOCITY_SPAN
-from ..tracks.formats import Format, plain_file, readable, recognise
-from ..tracks.readers import check_unit, fault, faults, in_metres, merge, read_raw, read_stage
+from ..tracks.formats.layouts import Columns, Format, readable, recognise
+from ..tracks.formats.plain import plain_file
+from ..tracks.plausible import check_unit
+from ..tracks.readers import fault, faults, in_metres, merge, read_raw, read_stage
 from .geometry import Area, Square
 from .kinds import REACH
 
@@ -118,6 +120,7 @@ def read_near_square(
     frame_rate: float | None = None,
     max_gap: float | None = None,
     tz: str = "Asia/Tokyo",
+    columns: Columns | None = None,
 ) -> pd.DataFrame:
     """The rows of a file that encounters in the square can depend on, as from `tracks.readers.read_raw`.
 
@@ -132,12 +135,13 @@ def read_near_square(
     path = Path(path)
     if path.is_file():
         with plain_file(path) as plain:
-            layout, scan = recognise(plain, path, file_format, frame_rate)
+            layout, scan = recognise(plain, path, file_format, frame_rate, columns=columns, unit=unit)
             if layout.name == "atc-raw":
-                metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
+                metres = layout.metres_in(unit)
                 cells = Cells(square.grown(REACH).box, duration, max_gap or layout.max_gap or 0.0, metres)
                 return _read(scan, path, layout, cells, unit=unit, tz=tz)
-    return read_raw(path, file_format=file_format, unit=unit, frame_rate=frame_rate, tz=tz)
+    given = {"file_format": file_format, "unit": unit, "frame_rate": frame_rate, "columns": columns}
+    return read_raw(path, tz=tz, **given)  # type: ignore[arg-type]
 
 
 def _read(

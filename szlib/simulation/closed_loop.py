@@ -14,11 +14,11 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import pandas as pd
 
 from ..control.barriers import Array
 from ..control.mpc import MPCCBF
-from ..control.people import BODY_RADIUS, Person, SpeedZone, as_ellipse
+from ..control.people.person import BODY_RADIUS, Person, SpeedZone, as_ellipse, circle_around
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
@@ -90,7 +90,8 @@ def drive(
     behaviour, seed : what people do and how they are seen, and the seed of it.
     crowd : what people do, in place of the behaviour's. If the scenario has people, the crowd is as many, and
         theirs are the zones; else everybody has the zone with which they first come.
-    zones : makes what is kept from each person's own zone, or else the controller's, or else `BODY`.
+    zones : makes what is kept from each person's own zone, or else the controller's, or else `BODY`; of who
+        comes without a heading, from the smallest circle around it.
     settings : what is measured by (dt, r_robot, eps, zone_speed); default: the controller's, if it has any.
     max_time : end of the run [s]; default: the scenario's duration.
     until_arrival : False drives on to the end of time, so that a robot that rests at its goal may still
@@ -111,13 +112,18 @@ def drive(
     goal, dt, rng = scenario.goal, s.dt, np.random.default_rng([seed, 2])
     gx, gy = goal.tolist()
     controller.reset()
-    own, states, steps, true, took = robot.start(scenario.start), [], [], [], []
+    own, states, steps, true = robot.start(scenario.start), [], [], []
+    given: list[list[int]] = []
+    took: list[float] = []
     for k in range(round(end / dt) + 1):
         state = robot.body(own)
         everybody = cast.zoned(crowd(k * dt, state))
-        seen = behaviour.seen(tuple(p for p in everybody if p is not None), rng)
+        there = {i: person for i, person in enumerate(everybody) if person is not None}
+        seen = behaviour.seen(tuple(there.values()), rng)
+        known = {i: person for i, person in zip(there, seen, strict=True) if person is not None}
+        given.append(list(known))
         began = perf_counter()
-        steps.append(controller.step(own, goal, seen))
+        steps.append(controller.step(own, goal, tuple(known.values())))
         took.append(perf_counter() - began)
         states.append(state)
         true.append([_ABSENT if p is None else (*p.position, p.heading, *p.velocity) for p in everybody])
@@ -128,8 +134,17 @@ def drive(
         if not all(map(isfinite, control.tolist())):
             raise SolverError(f"{scenario.name!r}: the controller gave {control.tolist()} at {k * dt:g} s")
         own = robot.advance(own, control, dt)
-    at = np.reshape(np.array(true, float), (len(states), len(everybody), 5))
-    return _log(scenario, s, cast.kept(len(everybody)), np.array(states), at, steps, took, robot)
+    at = _facing(np.reshape(np.array(true, float), (len(states), len(everybody), 5)))
+    return _log(scenario, s, cast.kept(len(everybody)), np.array(states), at, steps, took, given, robot)
+
+
+def _facing(people: Array) -> Array:
+    """The same, with the last heading known of those who are there without one; 0 if there never was one."""
+    headings, there = people[:, :, 2], ~np.isnan(people[:, :, 0])
+    if np.isnan(headings[there]).any():
+        known = pd.DataFrame(headings).ffill().fillna(0.0).to_numpy()
+        people[:, :, 2] = np.where(there, known, np.nan)
+    return people
 
 
 def _settings(controller: Controller, given: MPCSettings | None) -> MPCSettings:
@@ -154,6 +169,8 @@ class _Cast:
         if i not in self._zones:
             own = self._default if person is None or person.zone is None else person.zone
             ellipse = as_ellipse(own, self._speed)
+            if person is not None and person.heading is None:
+                ellipse = circle_around(ellipse)
             self._zones[i] = self._change(ellipse) if self._change else ellipse
         return self._zones[i]
 
@@ -184,6 +201,7 @@ def _log(
     people: Array,
     steps: list[StepLike],
     took: list[float],
+    given: list[list[int]],
     robot: Robot,
 ) -> SimulationLog:
     """What the run was, with what the controller does not tell left empty."""
@@ -200,7 +218,7 @@ def _log(
         controls=controls,
         people=people,
         predicted=_plans(steps),
-        residual=_residuals(steps, ~np.isnan(people[:, :, 0]), len(scenario.walls)),
+        residual=_residuals(steps, given, people.shape[1], len(scenario.walls)),
         rung=np.array([getattr(step, "rung", "") for step in steps]),
         safe=np.array([bool(getattr(step, "safe", False)) for step in steps]),
         slack=np.array([getattr(step, "slack", np.nan) for step in steps]),
@@ -220,20 +238,23 @@ def _plans(steps: list[StepLike]) -> Array:
     return np.array([np.pad(p, ((0, longest - len(p)), (0, 0)), constant_values=np.nan) for p in plans])
 
 
-def _residuals(steps: list[StepLike], there: NDArray[np.bool_], walls: int) -> Array:
-    """The conditions of each step, shape (n, P+W, N_h), NaN for who was not there; else (n, P+W, 0)."""
+def _residuals(steps: list[StepLike], given: list[list[int]], people: int, walls: int) -> Array:
+    """The conditions of each step, shape (n, P+W, N_h), NaN for whom it was not given; else (n, P+W, 0).
+
+    A step has a row for everybody it was given, then for whoever it remembers besides, then for each wall.
+    """
     rows: list[Any] = [getattr(step, "residual", None) for step in steps]
-    told = np.hstack([there, np.ones((len(steps), walls), bool)])
     if any(row is None for row in rows):
-        return np.zeros((*told.shape, 0))
-    full = np.full((*told.shape, rows[0].shape[1]), np.nan)
-    found: Array = np.concatenate(rows)
-    if len(found) != told.sum():
-        raise SolverError(
-            f"the residual of a step has a row for everybody who is there and then for each wall; got "
-            f"{len(found)} rows in {len(steps)} steps, expected {told.sum()}"
-        )
-    full[told] = found
+        return np.zeros((len(steps), people + walls, 0))
+    full = np.full((len(steps), people + walls, rows[0].shape[1]), np.nan)
+    for each, row, of in zip(full, rows, given, strict=True):
+        if len(row) < len(of) + walls:
+            raise SolverError(
+                "the residual of a step has a row for everybody whom it is given, and then for each wall; "
+                f"got {len(row)} rows, expected {len(of) + walls}"
+            )
+        each[of] = row[: len(of)]
+        each[people:] = row[len(row) - walls :]
     return full
 
 

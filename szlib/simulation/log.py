@@ -50,8 +50,8 @@ class SimulationLog:
     people : (x, y, heading, vx, vy) of everybody as they truly were, shape (n, P, 5) [m, rad, m/s]; NaN
         where somebody was not there.
     predicted : the plan of each step, shape (n, N+1, 4), or (n, 0, 4).
-    residual : `Step.residual`, people before walls, shape (n, P+W, N_h) [m], NaN for who was not there, or
-        (n, P+W, 0).
+    residual : `Step.residual`, people before walls, shape (n, P+W, N_h) [m], NaN for whom the controller
+        was not given, or (n, P+W, 0).
     rung : `Step.rung`, shape (n,), or "".
     safe : `Step.safe`, shape (n,): True is a promise.
     slack : largest violation of a hard row by each plan, shape (n,), or NaN.

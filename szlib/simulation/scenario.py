@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
-from math import cos, hypot, pi, sin
+from math import atan2, cos, hypot, pi, sin
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -88,7 +88,7 @@ class Scenario:
 
     def turned(self) -> Scenario:
         """The same place with everybody facing the other way; who walks, walks on backwards."""
-        people = tuple(replace(p, heading=(p.heading or 0.0) + pi) for p in self.people)
+        people = tuple(p if p.heading is None else replace(p, heading=p.heading + pi) for p in self.people)
         return replace(self, people=people)
 
 
@@ -96,12 +96,12 @@ class CrowdModel(Protocol):
     """What people do, and how the controller is given them: a `Behaviour`, or anything else with these two.
 
     `crowd` starts everybody in a scenario, whose people have the zones that are kept for them; `seen` makes
-    of those who are there what the controller gets.
+    of those who are there what the controller gets, in the same order; None for who is not seen.
     """
 
     def crowd(self, scenario: Scenario, seed: int) -> Crowd: ...
 
-    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]: ...
+    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> Sequence[Person | None]: ...
 
 
 @dataclass(frozen=True)
@@ -145,11 +145,12 @@ class Behaviour:
     def _at(self, t: float, person: Person, when: float, turn: float) -> Person:
         if t <= when or person.stands:
             return person.after(t)
-        (vx, vy), heading = person.velocity, (person.heading or 0.0) + turn
+        vx, vy = person.velocity
+        heading = (atan2(vy, vx) if person.heading is None else person.heading) + turn
         speed = self.pace * hypot(vx, vy)
         changed = (speed * cos(heading), speed * sin(heading))
         here = person.after(when).position
-        return Person(here, changed, heading, person.zone).after(t - when)
+        return Person(here, changed, heading, person.zone, person.id).after(t - when)
 
     def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
         """Everybody as the controller is given them."""
@@ -157,7 +158,7 @@ class Behaviour:
             return people
         off = rng.normal(0.0, self.noise, (len(people), 2)).tolist()
         return tuple(
-            Person((p.position[0] + dx, p.position[1] + dy), p.velocity, p.heading, p.zone)
+            replace(p, position=(p.position[0] + dx, p.position[1] + dy))
             for p, (dx, dy) in zip(people, off, strict=True)
         )
 

@@ -1,8 +1,8 @@
 """Who was where, when: files of any format to one table of tracks on one clock.
 
 funnels    how many rows entered each stage, and why others were set aside
-frame_rates how long a frame is, where frames are counted
-formats    the layouts of files, and how they are recognised
+formats    the layouts of files and tables, and how they are recognised
+plausible  what people can do, and what is wrong with a table where they cannot
 readers    rows of files as they are
 clock      rows brought to multiples of 0.1 s, with velocities: `read_tracks`
 quality    what a file is like before it is used
@@ -17,8 +17,8 @@ __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
     submodules=[
         "funnels",
-        "frame_rates",
         "formats",
+        "plausible",
         "readers",
         "clock",
         "quality",

@@ -15,7 +15,7 @@ mean that the person was lost in between: nobody is bridged across a gap.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,7 @@ import pandas as pd
 from .. import memory
 from ..errors import DataError
 from . import funnels
+from .formats.layouts import Columns
 from .readers import read_raw
 
 TICKS_PER_SECOND = 10
@@ -47,25 +48,32 @@ COLUMNS = ["day", "id", "t", "x", "y", "vx", "vy"]
 
 
 def read_tracks(
-    paths: str | Path | Iterable[str | Path],
+    paths: Any,
     *,
     file_format: str | None = None,
     unit: str | None = None,
     frame_rate: float | None = None,
+    columns: Columns | None = None,
     max_gap: float | None = None,
     tz: str = "Asia/Tokyo",
     exclude: Iterable[str] = (),
 ) -> pd.DataFrame:
-    """Read one file or many into one track table on the common clock.
+    """Read files or tables, one or many, into one track table on the common clock.
 
     Parameters
     ----------
-    paths : a file, or several: ATC raw, ATC 1 Hz, EWAP obsmat, tidy CSV or Parquet; plain or .gz.
-    file_format : "atc-raw", "atc-1hz", "ewap" or "tidy"; None looks at the content.
-    unit : unit of the positions, "m" or "mm"; None takes the format's and checks that it is plausible.
-    frame_rate : frames a second of EWAP files; None determines it from their velocities (the ETH sequence
-        has 15, hotel, zara and students 25), says so in the funnel, warns of any other, and refuses
-        where they do not tell.
+    paths : a file, or several, plain or .gz: ATC raw, ATC 1 Hz, EWAP obsmat, tidy CSV or Parquet; by PedPy's
+        loaders texts and HDF5 of Juelich's archive, Viswalk, Vadere, JuPedSim (extra `pedpy`).  Or tables: a
+        pandas DataFrame, PedPy's TrajectoryData.
+    file_format : one of `formats.layouts.FORMATS`; None looks at the content.
+    unit : unit of the positions, "m", "cm" or "mm"; None takes the format's.  What people do (speeds, extent)
+        says whether it can be right; a given unit that cannot is a warning, an assumed one an error.
+    frame_rate : frames a second, where `columns` (or a table without t) name a column frame.  EWAP files:
+        None determines it from their velocities (the ETH sequence has 15, hotel, zara and students 25), says
+        so in the funnel, warns of any other, and refuses where they do not tell.
+    columns : which column of a table, CSV or Parquet file is what, such as {"frame": "Frame", "id": "ped",
+        "x": "X", "y": "Y"}: a name, or the number of the field from 0 where there is no header.  Times are in
+        column t [s] (in a DataFrame datetimes as well), or counted in column frame.
     max_gap : a longer silence ends a track [s], more than 0.1; None takes the format's (0.5 raw, 1.6 at 1 Hz;
         EWAP: 2.25 sampling intervals, 0.9 for its 0.4; tidy: 4 of them, at least 0.5 and at most 5).
     tz : time zone whose calendar says which day a time stamp belongs to (ATC: Japan).
@@ -79,7 +87,10 @@ def read_tracks(
     ------
     DataError : names the file and line, what was found, what was expected and what to do.
     """
-    raw = read_raw(paths, file_format=file_format, unit=unit, frame_rate=frame_rate, tz=tz, exclude=exclude)
+    raw = read_raw(
+        paths, file_format=file_format, unit=unit, frame_rate=frame_rate, tz=tz, exclude=exclude,
+        columns=columns,
+    )  # fmt: skip
     return to_clock(raw, max_gap=max_gap)
 
 

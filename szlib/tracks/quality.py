@@ -13,7 +13,8 @@ import polars as pl
 
 from ..errors import DataError
 from .clock import TICKS_PER_SECOND, clock_index, nearest_tick, to_clock
-from .formats import Format, plain_file, readable, recognise
+from .formats.layouts import Format, readable, recognise
+from .formats.plain import plain_file
 from .readers import fault
 
 STANDING = 0.1

@@ -11,19 +11,17 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import polars as pl
 
 from ..errors import DataError, DataWarning
 from ..files import printable
 from . import funnels
-from .formats import EXPECTED, FORMATS, Format, check_rows, plain_file, readable, recognise
+from .formats.layouts import EXPECTED, FORMATS, UNITS, Columns, Format, readable, recognise
+from .formats.plain import check_rows, plain_file
+from .formats.tables import is_table, recognise_table
+from .plausible import check_people, check_unit, suggestion
 
-_MAX_SITE = 1000.0
-"""A site wider than this [m] means that millimetres were read as metres."""
-_MIN_SITE = 0.5
-"""A site that reaches less far than this [m] means that metres were read as millimetres."""
 _LAST_SECOND = 4_102_444_800.0
 """2100-01-01; later time stamps are not seconds since 1970."""
 _FARTHEST = 2e7
@@ -36,13 +34,14 @@ rows farther apart than that [s] tell nothing."""
 
 
 def read_raw(
-    paths: str | Path | Iterable[str | Path],
+    paths: Any,
     *,
     file_format: str | None = None,
     unit: str | None = None,
     frame_rate: float | None = None,
     tz: str = "Asia/Tokyo",
     exclude: Iterable[str] = (),
+    columns: Columns | None = None,
 ) -> pd.DataFrame:
     """Read files as they are: day, id, t [s], x, y [m], sorted, without duplicates.
 
@@ -50,17 +49,18 @@ def read_raw(
     longest gap [s] for `to_clock`, ``.attrs["funnel"]`` counts every row, and says at how many frames a
     second an EWAP file was read.
     """
-    files = [Path(paths)] if isinstance(paths, str | Path) else [Path(p) for p in paths]
+    sources = [paths] if isinstance(paths, str | Path) or is_table(paths) else list(paths)
+    files = [Path(f"table-{k}") if is_table(each) else Path(each) for k, each in enumerate(sources, start=1)]
     excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
     if not files:
         raise DataError("no track file was given; pass at least one path")
-    if unit not in (None, "m", "mm"):
-        raise DataError(f"unit must be 'm' or 'mm'; got {unit!r}")
+    if unit not in (None, *UNITS):
+        raise DataError(f"unit must be one of {list(UNITS)}; got {unit!r}")
     if file_format is not None and file_format not in FORMATS:
         raise DataError(f"unknown file_format {file_format!r}; expected one of {list(FORMATS)}")
-    parts, stages, layouts = zip(
-        *(_read_file(file, file_format, unit, frame_rate, tz) for file in files), strict=True
-    )
+    given = {"name": file_format, "unit": unit, "frame_rate": frame_rate, "tz": tz, "columns": columns}
+    read = [_read(source, file, **given) for source, file in zip(sources, files, strict=True)]  # type: ignore[arg-type]
+    parts, stages, layouts = zip(*read, strict=True)
     _check_sequences([_stem(f) for f, layout in zip(files, layouts, strict=True) if layout.name == "ewap"])
     return merge(told_apart(files, parts, layouts), stages, layouts, excluded)
 
@@ -94,28 +94,48 @@ def merge(
     return funnels.carry(frame, [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)])
 
 
-def _read_file(
-    path: Path, name: str | None, unit: str | None, frame_rate: float | None, tz: str
+def _read(
+    source: Any,
+    path: Path,
+    *,
+    name: str | None,
+    unit: str | None,
+    frame_rate: float | None,
+    tz: str,
+    columns: Columns | None,
 ) -> tuple[pl.DataFrame, dict[str, Any], Format]:
-    """One file: its usable rows (day, id, t, x, y), its funnel stage, its layout."""
-    with plain_file(path) as plain:
-        check_rows(plain, path)
-        layout, scan = recognise(plain, path, name, frame_rate)
-        with readable(path, layout):
-            rows = scan.collect()
-    metres = {"m": 1.0, "mm": 1e-3, None: layout.metres}[unit]
+    """One file or table: its usable rows (day, id, t, x, y), its funnel stage, its layout."""
+    if is_table(source):
+        layout, scan = recognise_table(source, path, columns=columns, frame_rate=frame_rate, tz=tz)
+        rows = scan.collect()
+    else:
+        with plain_file(path) as plain:
+            check_rows(plain, path)
+            layout, scan = recognise(plain, path, name, frame_rate, columns=columns, unit=unit)
+            with readable(path, layout):
+                rows = scan.collect()
+    metres = layout.metres_in(unit)
     rows = rows.with_columns(reason=fault(metres, layout.seconds, "day" in rows.columns))
     bad, good = rows.filter(pl.col("reason").is_not_null()), rows.filter(pl.col("reason").is_null())
     reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
     first = bad.select("line", "reason").row(0) if bad.height else None
-    stage = read_stage(path, layout, good.height, reasons, first)
+    free = layout.name in ("tidy", "atc-1hz")  # the other formats leave no doubt
+    hint = suggestion(rows, layout, metres=metres) if free and bad.height > good.height else ""
+    stage = read_stage(path, layout, good.height, reasons, first, hint)
+    if free:
+        check_people(good, layout, path, metres=metres, sure=unit is not None)
     if unit is None:
         check_unit(good, layout, path)
     return in_metres(good, path, layout, metres, tz), stage, layout
 
 
 def read_stage(
-    path: Path, layout: Format, good: int, reasons: dict[str, int], first: tuple[int, str] | None
+    path: Path,
+    layout: Format,
+    good: int,
+    reasons: dict[str, int],
+    first: tuple[int, str] | None,
+    hint: str = "",
 ) -> dict[str, Any]:
     """Funnel stage of one file; `first` is the line of the first bad row and its reason.
 
@@ -125,13 +145,13 @@ def read_stage(
     if first and bad > good:
         raise DataError(
             f"{path}, line {first[0]}: {first[1]}; {bad} of {bad + good} rows cannot be used "
-            f"as {layout.name}; {EXPECTED}"
+            f"as {layout.name}; {hint or EXPECTED}"
         )
     if good == 0:
         raise DataError(f"{path}: holds no row; {EXPECTED}")
     if first:
         _warn(f"{path.name}, first at line {first[0]}", reasons)
-    rate = f" at {1 / layout.seconds:g} frames/s" if layout.name == "ewap" else ""
+    rate = f" at {1 / layout.seconds:g} frames/s" if layout.seconds != 1 else ""
     return funnels.stage(f"read {path.name}{rate}", good + bad, good, reasons)
 
 
@@ -140,7 +160,7 @@ def in_metres(good: pl.DataFrame, path: Path, layout: Format, metres: float, tz:
     if "day" not in good.columns:
         # the name stands for the day where frames are counted, or seconds since some other moment than 1970
         last = good["t"].max()
-        named = layout.name == "ewap" or (isinstance(last, float) and last < CALENDAR_BEGINS)
+        named = layout.name == "ewap" or (isinstance(last, float) and last * layout.seconds < CALENDAR_BEGINS)
         try:
             good = good.with_columns(day=pl.lit(_stem(path)) if named else _calendar_day(tz))
         except pl.exceptions.PolarsError as error:
@@ -172,23 +192,6 @@ def fault(metres: float, seconds: float, with_day: bool) -> pl.Expr:
     """Why a row cannot be used; null where it can."""
     reasons = faults(metres, seconds, with_day).items()
     return pl.coalesce(pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons)
-
-
-def check_unit(rows: pl.DataFrame, layout: Format, path: Path) -> None:
-    """Raise DataError where a site of that size cannot be."""
-    positions = rows.select("x", "y").to_numpy()
-    if layout.metres < 1 and (reach := float(np.abs(positions).max())) * layout.metres < _MIN_SITE:
-        raise DataError(
-            f"{path}: positions reach only {reach:.3g}, expected millimetres as in {layout.name}; if they "
-            "are metres, pass unit='m' (if the site is that small, unit='mm')"
-        )
-    if layout.metres == 1:
-        low, high = np.quantile(positions, [0.01, 0.99], axis=0)
-        if (spread := float((high - low).max())) > _MAX_SITE:
-            raise DataError(
-                f"{path}: positions spread over {spread:.3g}, expected metres as in {layout.name}; if they "
-                "are millimetres, pass unit='mm' (if the site is that wide, unit='m')"
-            )
 
 
 def _stem(path: Path) -> str:

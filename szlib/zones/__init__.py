@@ -1,14 +1,14 @@
 """How near is too near, and how sure are we: from samples of encounters to the minimum social zone.
 
-ellipses     ellipses, and the smallest one around points or a curve
-radii        a zone told by direction, and the ellipse fitted to it
-outliers     encounters, or samples, that lie apart (local outlier factor): `remove_outliers`
-quantile     where all but a share of encounters keep out
-hulls        the convex hull over (x', y', speed), its slices, and its way to zones
-respect      people against the null model: the contour of half presence, and whether it is respect
-uncertainty  who was seen on which side; intervals from other draws of the same people
-zone_file    versioned JSON
-social_zone  all of it behind one name, by speed, saved as JSON: `SocialZone`
+costmap       zones around people as a layer of a costmap, for navigation stacks: `Grid`
+ellipses      ellipses, and the smallest one around points or a curve
+outliers      encounters, or samples, that lie apart (local outlier factor): `remove_outliers`
+by_direction  zones told by direction, and where all but a share of encounters keep out
+hulls         the convex hull over (x', y', speed), its slices, and its way to zones
+respect       people against the null model: the contour of half presence, and whether it is respect
+uncertainty   who was seen on which side; intervals from other draws of the same people
+zone_file     versioned JSON
+social_zone   all of it behind one name, by speed, saved as JSON: `SocialZone`
 """
 
 import lazy_loader as lazy
@@ -16,10 +16,10 @@ import lazy_loader as lazy
 __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
     submodules=[
+        "costmap",
         "ellipses",
-        "radii",
         "outliers",
-        "quantile",
+        "by_direction",
         "hulls",
         "respect",
         "uncertainty",

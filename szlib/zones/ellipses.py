@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ZoneError
+from .costmap import Layer
 
 Array = NDArray[np.float64]
 Curve = Callable[[Array], Array]
@@ -28,8 +29,7 @@ Curve = Callable[[Array], Array]
 THINNEST = 1e-9  # width over length below which points count as collinear: a choice, far from any zone
 _ENCLOSED, _CURVE_ENCLOSED = 1e-13, 1e-12  # excess of the level at a point and on a curve taken for rounding
 _FULL_STEP, _SETTLED = 0.25, 1e-8  # Newton decrements: each is below the square of the last; one step to go
-_TINY = 1e-15  # floor of singular values: what is below is the kernel
-_SQRT2 = np.sqrt(2)
+_TINY, _SQRT2 = 1e-15, np.sqrt(2)  # floor of singular values: what is below is the kernel
 _TARGET = np.array([-2.0, 1.0, 1.0, 0.0, 0.0, 0.0])  # I - 3 e1 e1^T: gradients of log det M and 3 sum w
 _ARC_SAMPLES = 25  # nodes an arc; on an arc of a zone the level has one or two peaks
 _ZOOM, _ZOOMS = 8, 9  # each zoom makes a bracket 8 times smaller: 8^-9 < sqrt(machine precision)
@@ -37,7 +37,7 @@ _MAX_ROUNDS = 50  # exchanges with a curve; a smooth one settles in about six
 
 
 @dataclass(frozen=True)
-class Ellipse:
+class Ellipse(Layer):
     """An ellipse in the plane, in metres.
 
     Parameters

@@ -24,9 +24,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import ZoneError
 from ..tracks import funnels
+from .by_direction.radii import DIRECTIONS
 from .ellipses import minimum_enclosing_ellipse
 from .outliers import complementary_points, encounter_numbers, remove_outliers
-from .radii import DIRECTIONS
 
 
 def hull_vertices(points: ArrayLike) -> np.ndarray:

@@ -24,11 +24,12 @@ from .. import __version__
 from ..encounters.null import NullEncounters
 from ..errors import DataWarning, ZoneError
 from ..tracks.clock import check_columns
+from .by_direction.quantile import QuantileZones
+from .by_direction.radii import Radii
+from .costmap import Layer
 from .ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
 from .hulls import HullZones, Slice, hull_vertices, slice_hull
 from .outliers import R_MAX, encounter_numbers
-from .quantile import QuantileZones
-from .radii import Radii
 from .respect.estimate import RespectZones
 from .respect.significance import NullTest, null_test
 from .uncertainty import QUANTITIES, RESAMPLES, Estimate, Uncertainty, count_seen, measure, missing_sides
@@ -46,7 +47,7 @@ METHODS: dict[str, tuple[Callable[..., Estimate], tuple[str, ...]]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class SocialZone:
+class SocialZone(Layer):
     """Minimum social zones by speed, in the reference pedestrian's frame (paper, fig. 5).
 
     Parameters

@@ -24,9 +24,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..errors import DataError
+from .by_direction.quantile import BAND
+from .by_direction.radii import DIRECTIONS, Array, Radii, ellipse_reach
 from .outliers import encounter_numbers
-from .quantile import BAND
-from .radii import DIRECTIONS, Array, Radii, ellipse_reach
 
 SECTORS = (
     "ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right"

@@ -18,8 +18,8 @@ import pandas as pd
 from .. import __version__
 from ..errors import SzlibError, ZoneError
 from ..files import write_file
+from .by_direction.radii import Radii
 from .ellipses import Ellipse
-from .radii import Radii
 from .respect.significance import NullTest
 from .uncertainty import SECTORS, Uncertainty
 

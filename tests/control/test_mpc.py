@@ -135,7 +135,7 @@ def test_more_people_than_built_for_make_the_controller_grow_once_and_say_so(cap
     for n in (2, 3, 1, 0):
         controller.step((-4, 0, 0, 0), GOAL, crowd[:n])
     assert [record.getMessage() for record in caplog.records if record.name == "szlib"] == [
-        "the controller was built for 1 people and now grows to 3"
+        "the controller was built for 1 people and now grows to 4"
     ]
 
 

@@ -73,7 +73,7 @@ def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
 
 def broken(monkeypatch, controller, *names):
     for name in names:
-        monkeypatch.setattr(controller._solvers[1], name, lambda guess, _: (guess, False))
+        monkeypatch.setattr(controller._sizes.of(1, 0), name, lambda guess, _: (guess, False))
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -148,7 +148,7 @@ def test_a_day_on_which_nobody_met(days: list[Path], tmp_path: Path) -> None:
     [
         ({"speed": 1}, "unknown parameter"),
         ({"tz": "Mars"}, "unknown time zone 'Mars'"),
-        ({"unit": "cm"}, "unit must be 'm' or 'mm'"),
+        ({"unit": "ft"}, "unit must be one of"),
         ({"file_format": "csv"}, "unknown file_format 'csv'"),
     ],
 )

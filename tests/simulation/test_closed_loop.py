@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 import szlib
+from szlib.control.people.person import circle_around
 from szlib.simulation.closed_loop import BODY, drive
 from szlib.simulation.comparisons import compare, summarise
 from szlib.simulation.rollouts import identity, replay, rollouts, tally
@@ -221,6 +222,22 @@ def test_a_crowd_sees_the_robot():
     assert (log.people[:, 0, 3] == 0.1).all()
 
 
+def test_who_comes_without_a_heading_is_kept_as_a_circle_and_who_loses_it_keeps_the_last():
+    def crowd(t, _):
+        still, walked = (
+            szlib.Person((0.0, 2.0)),
+            szlib.Person((-6.0 + min(t, 5.0), -3.0), (0.0 + (t < 5), 0.0)),
+        )
+        return [still, walked]
+
+    log = szlib.simulate(WALK, szlib.MPCCBF(ZONE, max_people=2), crowd=crowd)
+    assert log.zones == (circle_around(ZONE), ZONE)
+    assert np.isfinite(log.h).all() and (log.people[:, :, 2] == 0).all()
+    barriers = szlib.MPCCBF(ZONE).barriers(log.states[0, :2], [szlib.Person((0.0, 2.0))])
+    assert log.h[0, 0] == pytest.approx(barriers[0])
+    assert log.metrics()["violations"] == 0
+
+
 def test_a_log_of_visitors_comes_back_from_its_files(tmp_path):
     log = szlib.simulate(WALK, szlib.MPCCBF(ZONE), crowd=visitor)
     log.save(tmp_path / "run")
@@ -262,7 +279,11 @@ class Broken(Straight):
     ("controller", "crowd", "message"),
     [
         (Broken(control=[np.nan, 0.0]), None, r"the controller gave \[nan, 0.0\] at 0 s"),
-        (Broken(residual=np.zeros((2, 2))), None, "has a row for everybody who is there"),
+        (
+            Broken(residual=np.zeros((1, 2))),
+            lambda t, _: [person(0.0, y) for y in (2, 3)],
+            "got 1 rows, expected 2",
+        ),
         (Straight(), lambda t, _: [None] * (1 + (t > 1)), "was 1, and now is 2"),
     ],
 )

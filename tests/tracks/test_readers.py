@@ -16,7 +16,7 @@ from conftest import real_data
 
 import szlib
 from szlib.tracks import funnels
-from szlib.tracks.formats import FORMATS
+from szlib.tracks.formats.layouts import FORMATS
 from szlib.tracks.readers import read_raw
 
 BEGIN = 1_351_040_400  # 2012-10-24 10:00 in Tokyo
@@ -383,8 +383,8 @@ def test_options_without_a_meaning(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", as_raw(samples()))
     with pytest.raises(szlib.DataError, match="unknown file_format 'csv'"):
         read_raw(path, file_format="csv")
-    with pytest.raises(szlib.DataError, match="unit must be 'm' or 'mm'; got 'cm'"):
-        read_raw(path, unit="cm")
+    with pytest.raises(szlib.DataError, match=r"unit must be one of .*; got 'ft'"):
+        read_raw(path, unit="ft")
     with pytest.raises(szlib.DataError, match=r"a\.csv, line 1: missing or extra fields; 60 of 60 rows"):
         read_raw(path, file_format="atc-1hz")
 

@@ -16,7 +16,8 @@ import pytest
 import szlib
 from szlib import memory
 from szlib.errors import MemoryLimitError, StorageError
-from szlib.tracks import datasets, formats
+from szlib.tracks import datasets
+from szlib.tracks.formats import plain as formats
 from szlib.tracks.readers import read_raw
 
 BEGIN = 1_351_040_400.0

@@ -8,8 +8,8 @@ import pytest
 from passers import TRUTH, passers
 
 import szlib
-from szlib.zones.quantile import BAND, approaches, encounter_numbers, quantile_radii, smoothed
-from szlib.zones.radii import DIRECTIONS, ellipse_reach
+from szlib.zones.by_direction.quantile import BAND, approaches, encounter_numbers, quantile_radii, smoothed
+from szlib.zones.by_direction.radii import DIRECTIONS, ellipse_reach
 
 
 def ellipse(samples: pd.DataFrame, **options: object) -> np.ndarray:

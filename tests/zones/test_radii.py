@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.zones.radii import DIRECTIONS, Radii, closed, ellipse_reach, fit_ellipses
+from szlib.zones.by_direction.radii import DIRECTIONS, Radii, closed, ellipse_reach, fit_ellipses
 
 KNOWN = np.array(
     [

@@ -8,7 +8,7 @@ import pytest
 from passers import passers
 
 import szlib
-from szlib.zones.quantile import QuantileZones
+from szlib.zones.by_direction.quantile import QuantileZones
 from szlib.zones.uncertainty import (
     DAYS_NEEDED,
     NEEDED,

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
-from functools import lru_cache
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, sin
 from typing import NamedTuple, Protocol
 
 from ...errors import SolverError, ZoneError
+from ...zones.costmap import BODY_RADIUS as BODY_RADIUS
+from ...zones.costmap import circle_around as circle_around
 from ...zones.ellipses import Ellipse
 from ..barriers import LARGEST, barrier, ellipse_formula, finite
 from ..settings import MPCSettings
 
-BODY_RADIUS = 0.25
-"""Radius of a person's body, for the clearance: half the breadth of shoulders [m] (assumed)."""
-
-
 STANDS = 0.1
 """Who is slower does not leave the goal free by going on, whatever a tracker's noise says [m/s] (assumed)."""
-_BISECTIONS = 60
-"""Halvings of a quarter turn until nothing is left of it in double precision."""
 
 
 class SpeedZone(Protocol):
@@ -39,30 +34,6 @@ def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
     if not max(abs(m), abs(n), a) <= LARGEST:
         raise ZoneError(f"a zone must lie within {LARGEST:g} m of its person; got {zone}")
     return zone
-
-
-@lru_cache(maxsize=256)
-def circle_around(zone: Ellipse) -> Ellipse:
-    """The smallest circle around a person that contains their zone whichever way they face.
-
-    Its radius is the greatest distance from the person to the ellipse. With the person's offset from the
-    centre (-p, -q), p, q >= 0, in the ellipse's frame, the farthest point (a cos t, b sin t) lies in the
-    first quadrant, and half the derivative of the squared distance by t,
-
-        b q cos t - a p sin t - (a^2 - b^2) sin t cos t,
-
-    changes its sign once there: divided by sin t cos t it falls.
-    """
-    (m, n), (a, b) = zone.center, zone.semi_axes
-    c, s = cos(zone.angle), sin(zone.angle)
-    p, q = abs(m * c + n * s), abs(n * c - m * s)
-    low, high = 0.0, pi / 2
-    for _ in range(_BISECTIONS):
-        t = (low + high) / 2
-        rises = b * q * cos(t) - a * p * sin(t) - (a**2 - b**2) * sin(t) * cos(t) > 0
-        low, high = (t, high) if rises else (low, t)
-    radius = hypot(p + a * cos(low), q + b * sin(low))
-    return Ellipse((0.0, 0.0), (radius, radius))
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import replace
 from math import atan2, hypot, inf
-from typing import NamedTuple, cast
+from typing import NamedTuple, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,6 +90,8 @@ class Tracker:
         ------
         SolverError : what is given has not the right shape: an error of the program, not of a sensor.
         """
+        if ids is None and stamps is None and not self._known and _are_new(people):
+            return Seen(tuple(people))
         rows = _rows(people)
         names = [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
         if len(names) != len(rows):
@@ -149,6 +151,13 @@ def _forward(person: Person, time: float, now: float) -> Person | None:
 
 def _usable(*numbers: float) -> bool:
     return all(abs(number) <= LARGEST for number in numbers)
+
+
+def _are_new(people: People) -> TypeGuard[Sequence[Person]]:
+    """True if these are `Person`s of whom nobody has an id."""
+    if not isinstance(people, list | tuple):
+        return False
+    return all(isinstance(person, Person) and person.id is None for person in people)
 
 
 def _rows(people: People) -> Sequence[Person | list[float]]:

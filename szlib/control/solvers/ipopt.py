@@ -78,6 +78,11 @@ class Ipopt:
         )
         return self._inputs(found), self._succeeded(self._relaxed)
 
+    @property
+    def remembered(self) -> Array:
+        """Nothing."""
+        return np.zeros(0)
+
     def reset(self) -> None:
         """Nothing is remembered from one call to the next."""
 

@@ -73,6 +73,11 @@ class Sqp:
         self._model.settings = _DAQP
         self._model.setup(np.eye(n), *self._program[1:], self._sense)
 
+    @property
+    def remembered(self) -> Array:
+        """The multipliers of the last program."""
+        return self._multipliers
+
     def reset(self) -> None:
         """Forget every multiplier and active row."""
         self._multipliers[:] = 0
@@ -186,29 +191,20 @@ def _functions(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any,
     """
     p = build_problem(settings, n_people, n_walls)
     values, n_rows = ca.vertcat(p.rows, p.terminal), p.rows.numel()
-    multipliers, step, share = (
-        ca.SX.sym("l", values.numel()),
-        ca.SX.sym("d", p.inputs.numel()),
-        ca.SX.sym("s"),
-    )
-    gradient, jacobian = ca.gradient(p.cost, p.inputs), ca.jacobian(values, p.inputs)
-    hessian = ca.hessian(p.cost + ca.dot(multipliers, values), p.inputs)[0]
+    step, share = ca.SX.sym("d", p.inputs.numel()), ca.SX.sym("s")
     violation = ca.sum1(ca.fmax(0, -p.rows)) + ca.sum1(ca.fabs(p.terminal))
-    on_rows = ca.norm_inf(multipliers[:n_rows])
+    on_rows = ca.norm_inf(p.multipliers[:n_rows])
     lower = ca.vertcat(-settings.a_max - p.inputs, -values)
     upper = ca.vertcat(settings.a_max - p.inputs, ca.inf * ca.SX.ones(n_rows), -p.terminal)
     merit = ca.vertcat(p.cost, violation, on_rows)
-    derive = p.function(
-        "derive", [p.inputs, p.parameters, multipliers], [merit, lower, upper, gradient, jacobian.T, hessian]
-    )
+    outputs = [merit, lower, upper, p.gradient, p.jacobian.T, p.hessian]
+    derive = p.function("derive", [p.inputs, p.parameters, p.multipliers], outputs)
     trial = ca.fmax(-settings.a_max, ca.fmin(p.inputs + share * step, settings.a_max))
     cost, violation, values = ca.substitute([p.cost, violation, values], [p.inputs], [trial])
-    merit = ca.vertcat(cost, violation, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
-    measure = p.function(
-        "measure", [p.inputs, p.parameters, multipliers, step, share], [merit, trial, values]
-    )
+    merit = ca.vertcat(cost, violation, ca.norm_inf(step), ca.norm_inf(p.multipliers), on_rows)
+    arguments = [p.inputs, p.parameters, p.multipliers, step, share]
+    measure = p.function("measure", arguments, [merit, trial, values])
     if p.terminal.numel():
         return derive, measure, None
-    state_and_target = p.parameters[:6]
-    curvature, pull = (np.asarray(ca.evalf(ca.jacobian(gradient, of))) for of in (p.inputs, state_and_target))
-    return derive, measure, np.asarray(-np.linalg.solve(curvature, pull), float)
+    pull = np.asarray(ca.evalf(ca.jacobian(p.gradient, p.parameters[:6])))
+    return derive, measure, np.asarray(-np.linalg.solve(np.asarray(p.curvature), pull), float)

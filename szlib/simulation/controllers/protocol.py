@@ -71,8 +71,8 @@ Factory = Callable[[Scenario, MPCSettings], Controller]
 
 def advance(state: Array, control: Array, dt: float) -> Array:
     """The state (x, y, vx, vy) one step later: a double integrator, exact (paper, eq. 8)."""
-    position, velocity = state[:2], state[2:]
-    return np.asarray(np.r_[position + dt * velocity + 0.5 * dt**2 * control, velocity + dt * control])
+    (x, y, vx, vy), (ax, ay), half = state.tolist(), control.tolist(), 0.5 * dt**2
+    return np.array([x + dt * vx + half * ax, y + dt * vy + half * ay, vx + dt * ax, vy + dt * ay])
 
 
 class DoubleIntegrator:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ...encounters.null import NullEncounters
 from ...errors import ZoneError
 from ...tracks import funnels
+from ..by_direction.radii import DIRECTIONS, Array, Radii, fit_ellipses
 from ..outliers import encounter_numbers
-from ..radii import DIRECTIONS, Array, Radii, fit_ellipses
 from .boundary import SPEED_WIDTH, respect_boundary
 from .presence import Presence
 

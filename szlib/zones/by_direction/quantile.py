@@ -16,10 +16,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..errors import DataError, ZoneError
-from ..tracks import funnels
-from ..tracks.clock import check_columns
-from .outliers import encounter_numbers
+from ...errors import DataError, ZoneError
+from ...tracks import funnels
+from ...tracks.clock import check_columns
+from ..outliers import encounter_numbers
 from .radii import DIRECTIONS, Array, Radii, closed, fit_ellipses
 
 SHARE = 0.05

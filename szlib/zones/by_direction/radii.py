@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import ZoneError
-from .ellipses import Ellipse
+from ...errors import ZoneError
+from ..ellipses import Ellipse
 
 Array = NDArray[np.float64]
 

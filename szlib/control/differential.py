@@ -1,0 +1,298 @@
+"""A differential drive: a point ahead of the axle is driven, and the wheels follow it exactly.
+
+The robot is a disc of radius r about the middle c of its axle, heading theta. It is told a speed v and a
+turning rate omega, and holds them for dt. `MPCCBF` drives the point
+
+    p = c + L e(theta),     e = (cos theta, sin theta),     L = `ahead`
+
+as a double integrator, which it can be: p moves sideways as the robot turns. The disc lies within r + L of p.
+
+*At the samples p is where the plan says.* Let the plan move p by xi ahead and eta to the left within dt, and
+let the robot turn by 2 beta = omega dt. Seen at the heading theta + beta, half way, c moves straight ahead by
+v dt sin(beta)/beta, and L e by 2 L sin(beta) to the left. Together they are to be (xi, eta):
+
+    2 L sin(beta)           = eta cos(beta) - xi sin(beta),     so  tan(beta) = eta / (2 L + xi)
+    v dt sin(beta) / beta   = xi cos(beta) + eta sin(beta)
+
+So p, with the velocity that was planned for it, is a double integrator without any error, and what
+`szlib.control.mpc` proves holds: h >= 0 at p after every step that satisfied the problem.
+
+*Limits.* Let p be no faster than V, so D = |(xi, eta)| <= V dt. By the first line 2 L sin|beta| <= D, hence
+|omega| <= omega_max where
+
+    V = min(v_max, 2 L sin(omega_max dt / 2) / dt),     omega_max dt < pi
+
+By both lines (v dt)^2 = (D^2 - 4 L^2 sin^2 beta) beta^2 / sin^2 beta <= D^2, for beta <= tan beta: |v| <= V.
+
+*Between samples* p runs along an arc that turns by 2 beta, and leaves its chord by at most
+
+    bow = V dt / 2 * tan(beta_max / 2),     sin(beta_max) = V dt / 2 L                   (5 mm by default)
+
+*From p to the disc.* The point keeps r' = r + eps + L + bow, and no margin besides. People: the focal
+distance changes by no more than the way, so h >= 0 at p is h >= 0 at c. A wall of length l: write its
+distance as d = s + s^2 / l. With t its trimming term, 0 <= t <= d, |grad d|^2 = 1 + 4 t / l, and ds/dd is
+(1 + 4 d / l)^(-1/2): s changes by no more than the way either. h >= 0 at p says s >= r' there, so
+s >= r + eps at c, which is h >= 0. So *the disc has h >= 0 after every step that said it was safe*, where
+people keep their velocity. In between, the chord of p, seen by a person at the relative speed u, cuts at
+most (u dt)^2 / 8 r' off their zone (4 mm at 1.5 m/s), as it does for any robot: eps is for that.
+
+*Not modelled*: wheels that need time to reach (v, omega). The plan bounds how p accelerates; the wheels
+follow with dv/dt = (acceleration of p along e) + L omega^2, so by up to V^2 / L more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from math import asin, atan2, cos, hypot, pi, sin, tan
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import SolverError
+from ..zones.ellipses import Ellipse
+from .barriers import Array, barrier, finite, segment_formula
+from .distances import wall_margin
+from .mpc import MPCCBF
+from .people.person import Person, PlacedZone, SpeedZone, place
+from .people.tracker import People, Tracker
+from .problem import TOLERANCE
+from .settings import MPCSettings
+from .step import Rung, Step
+
+OMEGA_MAX = 4.0
+"""Turning rate of a common indoor robot whose wheels reach 1 m/s [rad/s] (assumed)."""
+
+
+@dataclass(frozen=True)
+class Unicycle:
+    """How a differential drive moves: state (x, y, theta, v, omega) [m, rad, m/s, rad/s], told (v, omega).
+
+    `heading` [rad] is that of a robot that starts at rest; one that moves, heads where it goes.
+    """
+
+    heading: float = 0.0
+    inputs = ("v", "omega")
+
+    def start(self, state: ArrayLike) -> Array:
+        """The robot's own state, shape (5,), from (x, y, vx, vy) of its centre."""
+        x, y, vx, vy = finite("state", state, (4,)).tolist()
+        heading = atan2(vy, vx) if vx or vy else self.heading
+        return np.array([x, y, heading, hypot(vx, vy), 0.0])
+
+    def body(self, own: Array) -> Array:
+        """(x, y, vx, vy) of the disc's centre."""
+        x, y, theta, v, _ = own.tolist()
+        return np.array([x, y, v * cos(theta), v * sin(theta)])
+
+    def advance(self, own: Array, control: Array, dt: float) -> Array:
+        """The state after (v, omega) was held for dt: exact, along an arc."""
+        (x, y, theta, _, _), (v, omega) = own.tolist(), control.tolist()
+        half = omega * dt / 2
+        chord = v * dt * float(np.sinc(half / pi))
+        x, y = x + chord * cos(theta + half), y + chord * sin(theta + half)
+        return np.array([x, y, (theta + 2 * half + pi) % (2 * pi) - pi, v, omega])
+
+
+@dataclass(frozen=True)
+class DriveStep:
+    """What a differential drive is told, and how far that can be relied upon.
+
+    Attributes
+    ----------
+    control : (v, omega) to hold for the next dt, within their limits, shape (2,) [m/s, rad/s].
+    predicted : (x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s].
+    h : barriers of the disc now, people before walls, shape (people + walls,) [m].
+    safe : as `Step.safe`, of the disc: nobody is lost, the plan satisfies the hard problem, and the disc has
+        h >= 0 and overlaps no body and no wall, neither now nor dt later, if people keep their velocity.
+    point : the step of the point ahead of the axle: its plan, and all else that `Step` tells.
+    solve_time : wall-clock time of the whole step [s].
+    """
+
+    control: Array
+    predicted: Array
+    h: Array
+    safe: bool
+    point: Step = field(repr=False)
+    solve_time: float
+
+    @property
+    def rung(self) -> Rung:
+        """The rung of the ladder that gave the plan: see `Step.rung`."""
+        return self.point.rung
+
+    @property
+    def slack(self) -> float:
+        """Largest violation of a hard row by the point's plan: see `Step.slack`."""
+        return self.point.slack
+
+    @property
+    def residual(self) -> Array:
+        """The barrier conditions of the point: see `Step.residual`."""
+        return self.point.residual
+
+
+class _Point(MPCCBF):
+    """The point ahead of the axle; whether a goal can be reached, the disc decides."""
+
+    def _check_goal(self, goal: tuple[float, float]) -> None:
+        pass
+
+
+class DifferentialDrive:
+    """Drives a robot with two wheels to a goal, outside the social zones of people and clear of walls.
+
+    Parameters
+    ----------
+    zone, walls, max_people, tracker : as of `MPCCBF`.
+    settings : of the robot: `r_robot` its radius about the middle of the axle, `v_max` the limit of |v|;
+        `a_max` bounds the acceleration of the point ahead of the axle.
+    omega_max : limit of |omega| [rad/s].
+    ahead : distance of the point from the axle [m]; default: the least one at which `settings.v_max` is
+        reached, about v_max / omega_max. With less the robot is slower, with more it needs more room.
+
+    Attributes
+    ----------
+    robot : how it moves: `Unicycle`.
+    v_max : speed that it really reaches [m/s]; see `ahead`.
+    bow : how far the point leaves the straight line between two samples at most [m].
+    room : how far off walls and zones of people who stand a goal must be to be reached from any side [m]; the
+        disc's centre comes to rest there, at any heading. Nearer goals may be missed by up to 2 `ahead`.
+
+    Raises
+    ------
+    SolverError : a limit is not usable, or as of `MPCCBF`.
+    """
+
+    def __init__(
+        self,
+        zone: Ellipse | SpeedZone,
+        *,
+        walls: ArrayLike | Sequence[ArrayLike] = (),
+        settings: MPCSettings | None = None,
+        omega_max: float = OMEGA_MAX,
+        ahead: float | None = None,
+        max_people: int = 1,
+        tracker: Tracker | None = None,
+    ) -> None:
+        self.settings = s = settings or MPCSettings()
+        self.robot = Unicycle()
+        self.omega_max = float(finite("omega_max", omega_max, ()))
+        if not 0 < self.omega_max * s.dt < pi:
+            raise SolverError(f"omega_max must lie in (0, pi/dt) = (0, {pi / s.dt:g}); got {omega_max}")
+        turn = 2 * sin(self.omega_max * s.dt / 2) / s.dt
+        self.ahead = s.v_max / turn if ahead is None else float(finite("ahead", ahead, ()))
+        if not self.ahead > 0:
+            raise SolverError(f"ahead must be positive: the axle itself cannot move sideways; got {ahead}")
+        self.v_max = min(s.v_max, self.ahead * turn)
+        self.bow = self.v_max * s.dt / 2 * tan(asin(self.v_max * s.dt / 2 / self.ahead) / 2)
+        radius = s.r_robot + s.eps + self.ahead + self.bow
+        grown = replace(s, r_robot=radius, eps=0.0, margin="euclidean", v_max=self.v_max)
+        self.room = radius + self.ahead
+        self._point = _Point(zone, walls=walls, settings=grown, max_people=max_people, tracker=tracker)
+        self.zone, self.walls = self._point.zone, self._point.walls
+        self._margins = [wall_margin(wall, s) for wall in self.walls]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last plan, command and goal."""
+        self._point.reset()
+        self._told: list[float] = []
+        self._planned = [0.0, 0.0]
+
+    def step(
+        self,
+        state: ArrayLike,
+        goal: ArrayLike,
+        people: People = (),
+        *,
+        ids: Iterable[Hashable] | None = None,
+        stamps: ArrayLike | None = None,
+        now: float | None = None,
+    ) -> DriveStep:
+        """The (v, omega) to hold for the next `dt`.
+
+        Parameters
+        ----------
+        state : (x, y, theta) of the axle's middle [m, rad], or with (v, omega) as well [m/s, rad/s]. The plan
+            begins at the velocity that was planned for the point; at what (v, omega) say where that is
+            farther from the last command than a_max dt: the robot was held back, or pushed.
+        goal : (x, y) of the disc's centre [m].
+        people, ids, stamps, now : as of `MPCCBF.step`.
+
+        Raises
+        ------
+        SolverError : as of `MPCCBF.step`.
+        """
+        began = perf_counter()
+        own = finite("state", state, (5,) if np.size(state) == 5 else (3,)).tolist()
+        x, y, theta = own[:3]
+        there, lever = finite("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
+        if not self._told:
+            self._check_goal(there)
+        start = (*(own[:2] + lever).tolist(), *self._velocity(theta, own[3:]))
+        point = self._point.step(start, there + lever, people, ids=ids, stamps=stamps, now=now)
+        states, controls = self._follow(own, point.predicted[1:, :2])
+        self._told, self._planned = controls[0].tolist(), point.predicted[1, 2:].tolist()
+        scene, dt = point.scene._replace(settings=self.settings), self.settings.dt
+        h, (x1, y1) = self._barriers(scene.zones, x, y), states[1][:2].tolist()
+        least = min([*h, *self._barriers(scene.zones, x1, y1, dt)], default=0.0)
+        gap = min([*scene.gaps(x, y, 0.0), *scene.gaps(x1, y1, dt)], default=0.0)
+        return DriveStep(
+            control=controls[0],
+            predicted=np.array(states),
+            h=np.array(h),
+            safe=point.feasible and not point.lost and min(least, gap) >= -TOLERANCE,
+            point=point,
+            solve_time=perf_counter() - began,
+        )
+
+    def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
+        """h of every person and then of every wall, for the disc there, shape (people + walls,) [m]."""
+        x, y = finite("position", position, (2,)).tolist()
+        return np.array(self._barriers([place(who, self._point.zone_of(who)) for who in people], x, y))
+
+    def _barriers(self, zones: Sequence[PlacedZone], x: float, y: float, seconds: float = 0.0) -> list[float]:
+        """h of the disc at (x, y), with people so many seconds later."""
+        s = self.settings
+        seen = [(zone, x - seconds * zone.vx, y - seconds * zone.vy) for zone in zones]
+        h = [barrier(zone.distance(px, py), s.r_robot, s.eps) for zone, px, py in seen]
+        for wall, margin in zip(self.walls, self._margins, strict=True):
+            h.append(barrier(segment_formula(x, y, *wall.ravel().tolist()), s.r_robot, margin))
+        return h
+
+    def _velocity(self, theta: float, given: list[float]) -> list[float]:
+        """Velocity of the point: planned, unless the robot moves otherwise than it was told."""
+        told = self._told or [0.0, 0.0]
+        v, omega = given or told
+        off = hypot(v - told[0], self.ahead * (omega - told[1]))
+        if self._told and off <= self.settings.a_max * self.settings.dt:
+            return self._planned
+        c, s, sideways = cos(theta), sin(theta), self.ahead * omega
+        return [v * c - sideways * s, v * s + sideways * c]
+
+    def _check_goal(self, goal: Array) -> None:
+        h = self.barriers(goal)
+        if (h < 0).any():
+            raise SolverError(
+                f"the goal {goal.tolist()} cannot be reached: it lies too close to the wall "
+                f"{self.walls[int(h.argmin())].tolist()}; choose one {self.room:.2f} m off all walls"
+            )
+
+    def _follow(self, own: list[float], points: Array) -> tuple[list[Array], list[Array]]:
+        """The disc's states, now and after each of the commands that bring the point to points (N, 2)."""
+        dt, at = self.settings.dt, np.array([*own[:3], *(own[3:] or self._told or [0.0, 0.0])])
+        states, controls = [self.robot.body(at)], []
+        for px, py in points.tolist():
+            x, y, theta = at[:3].tolist()
+            c, s = cos(theta), sin(theta)
+            dx, dy = px - x - self.ahead * c, py - y - self.ahead * s
+            share = min(1.0, self.v_max * dt / (hypot(dx, dy) or 1.0))
+            xi, eta = share * (dx * c + dy * s), share * (dy * c - dx * s)
+            beta = atan2(eta, 2 * self.ahead + xi)
+            speed = (xi * cos(beta) + eta * sin(beta)) / (dt * float(np.sinc(beta / pi)))
+            controls.append(np.array([speed, 2 * beta / dt]))
+            at = self.robot.advance(at, controls[-1], dt)
+            states.append(self.robot.body(at))
+        return states, controls

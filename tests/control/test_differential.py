@@ -1,0 +1,316 @@
+"""A differential drive: what its module proves, its limits, and the true disc on a fine grid."""
+
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import szlib
+from szlib.control.barriers import ellipse_distance, segment_distance
+from szlib.control.differential import Unicycle
+from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
+from szlib.control.people import BODY_RADIUS
+from szlib.control.problem import TOLERANCE
+from szlib.simulation.scenarios.worlds import Worlds, random_zone, world
+
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
+OPEN = (6.0, 1.0)
+
+
+def drives(seed):
+    """Robots of all kinds: slow and fast, nimble and not, with a point near or far."""
+    rng = np.random.default_rng(seed)
+    while True:
+        settings = szlib.MPCSettings(
+            dt=rng.uniform(0.05, 0.3), v_max=rng.uniform(0.2, 2.0), r_robot=rng.uniform(0.1, 0.6)
+        )
+        ahead = rng.choice([None, rng.uniform(0.05, 1.0)])
+        yield szlib.DifferentialDrive(
+            ZONE, settings=settings, omega_max=rng.uniform(0.5, 8.0), ahead=ahead, max_people=0
+        )
+
+
+def integrate(own, control, dt, times):
+    """Poses (n, 3) at times, by an independent integration of the differential equation."""
+    v, omega = control
+    turn = solve_ivp(
+        lambda _, pose: [v * np.cos(pose[2]), v * np.sin(pose[2]), omega],
+        (0, dt),
+        own[:3],
+        t_eval=times,
+        rtol=1e-10,
+        atol=1e-12,
+    )
+    return turn.y.T
+
+
+def point_of(pose, ahead):
+    return pose[..., :2] + ahead * np.stack([np.cos(pose[..., 2]), np.sin(pose[..., 2])], axis=-1)
+
+
+def loop(drive, own, goal, people=(), steps=150):
+    """States and steps of a closed loop with people who walk on."""
+    states, decided, dt = [own], [], drive.settings.dt
+    for k in range(steps):
+        decided.append(drive.step(states[-1], goal, [p.after(k * dt) for p in people]))
+        states.append(drive.robot.advance(states[-1], decided[-1].control, dt))
+    return np.array(states), decided
+
+
+# --- the construction --------------------------------------------------------------------------------
+
+
+def test_the_point_lands_where_the_plan_says_near_its_chord_and_within_the_limits():
+    rng = np.random.default_rng(0)
+    for drive in islice(drives(1), 200):
+        s, own = drive.settings, np.r_[rng.uniform(-5, 5, 2), rng.uniform(-np.pi, np.pi), 0, 0]
+        way = drive.v_max * s.dt * rng.choice([1.0, rng.uniform()])
+        angle = rng.uniform(-np.pi, np.pi)
+        start = point_of(own, drive.ahead)
+        end = start + way * np.array([np.cos(angle), np.sin(angle)])
+        (_, reached), (control,) = drive._follow(own.tolist(), end[None])
+        v, omega = control
+        assert abs(v) <= s.v_max * (1 + 1e-12)
+        assert abs(omega) <= drive.omega_max * (1 + 1e-12)
+        poses = integrate(own, control, s.dt, np.linspace(0, s.dt, 21))
+        points = point_of(poses, drive.ahead)
+        assert points[-1] == pytest.approx(end, abs=1e-9)
+        assert drive.robot.advance(own, control, s.dt)[:2] == pytest.approx(poses[-1, :2], abs=1e-9)
+        assert reached[:2] == pytest.approx(poses[-1, :2], abs=1e-9)
+        across = np.array([-np.sin(angle), np.cos(angle)])
+        assert np.abs((points - start) @ across).max() <= drive.bow + 1e-12
+        assert np.hypot(*(poses[:, :2] - points).T) == pytest.approx(drive.ahead)
+
+
+def test_the_bow_and_the_limits_are_attained():
+    """No slack is left in the bounds: some motion turns at omega_max, and bows as far as allowed."""
+    for drive in islice(drives(2), 20):
+        if drive.v_max < drive.settings.v_max:  # the turning rate is what limits
+            dt, side = drive.settings.dt, np.arccos(-drive.v_max * drive.settings.dt / 2 / drive.ahead)
+            end = [drive.ahead + drive.v_max * dt * np.cos(side), drive.v_max * dt * np.sin(side)]
+            _, (control,) = drive._follow([0.0, 0.0, 0.0], np.array([end]))
+            assert control[1] == pytest.approx(drive.omega_max)
+            points = point_of(integrate(np.zeros(3), control, dt, [0, dt / 2, dt]), drive.ahead)
+            assert np.hypot(*(points[1] - points[[0, 2]].mean(axis=0))) == pytest.approx(drive.bow, rel=1e-6)
+
+
+def test_where_the_point_is_safe_the_disc_is_whatever_its_heading():
+    """For people and walls, of any length: also those so short that their own margin is more than eps."""
+    rng, near = np.random.default_rng(3), 0
+    for _ in range(400):
+        s = szlib.MPCSettings(eps=rng.choice([0.0, 0.05]), margin=rng.choice(["euclidean", "paper"]))
+        wall = rng.uniform(-2, 2, 2) + np.outer([-1, 1], rng.uniform(-1, 1, 2)) * rng.choice([0.1, 2.0])
+        drive = szlib.DifferentialDrive(
+            ZONE, walls=[wall], settings=s, ahead=rng.uniform(0.1, 0.6), max_people=0
+        )
+        zone = random_zone(rng).placed(rng.uniform(-2, 2, 2), rng.uniform(-np.pi, np.pi))
+        person = szlib.Person((0.0, 0.0), heading=0.0, zone=zone)
+        for point in rng.uniform(-5, 5, (60, 2)):
+            h = drive._point.barriers(point, [person])
+            if h.min() < 0 or h.min() > 0.2:
+                continue
+            near += 1
+            angle = rng.uniform(-np.pi, np.pi, 30)
+            discs = point - drive.ahead * np.column_stack([np.cos(angle), np.sin(angle)])
+            for disc in discs:
+                assert drive.barriers(disc, [person]).min() >= -1e-12
+            assert euclidean_to_segment(discs, *wall).min() >= s.r_robot
+            assert euclidean_to_ellipse(discs, zone).min() >= s.r_robot + s.eps - 1e-9
+    assert near > 500
+
+
+def test_the_barriers_are_those_of_the_disc():
+    wall = np.array([[3.0, -1.0], [3.0, 0.2]])
+    drive = szlib.DifferentialDrive(ZONE, walls=[wall])
+    person = szlib.Person((1.0, 2.0), (0.3, 0.1))
+    plain = szlib.MPCCBF(ZONE, walls=[wall])
+    for position in np.random.default_rng(4).uniform(-4, 4, (20, 2)):
+        assert drive.barriers(position, [person]) == pytest.approx(plain.barriers(position, [person]))
+    step = drive.step((-2.0, 0.0, 0.3), OPEN, [person])
+    assert step.h == pytest.approx(plain.barriers((-2.0, 0.0), [person]))
+    assert step.h[1] == pytest.approx(segment_distance([-2.0, 0.0], *wall) - 0.5 - 0.25 / 1.2)
+    assert step.h[0] == pytest.approx(
+        ellipse_distance([-2.0, 0.0], ZONE.placed((1.0, 2.0), person.heading)) - 0.55
+    )
+
+
+def test_the_loop_of_the_point_is_that_of_a_double_integrator():
+    """From sample to sample: the position is the planned one, and the plan begins at the planned velocity."""
+    drive = szlib.DifferentialDrive(ZONE)
+    person = szlib.Person((2.5, 0.4), (-0.3, 0.0))
+    states, steps = loop(drive, np.r_[-1.0, 0.0, 2.0, 0.0, 0.0], OPEN, [person], 60)
+    for k in range(1, 60):
+        assert point_of(states[k], drive.ahead) == pytest.approx(
+            steps[k - 1].point.predicted[1, :2], abs=1e-9
+        )
+        assert steps[k].point.predicted[0, 2:] == pytest.approx(steps[k - 1].point.predicted[1, 2:], abs=1e-9)
+        assert steps[k - 1].predicted[1, :2] == pytest.approx(states[k, :2], abs=1e-12)
+
+
+# --- the robot ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("heading", np.linspace(-3, 3, 7))
+def test_it_reaches_its_goal_past_a_person_from_any_heading(heading):
+    drive = szlib.DifferentialDrive(ZONE)
+    person = szlib.Person((3.0, 0.5), heading=np.pi)
+    states, steps = loop(drive, np.r_[0.0, 0.0, heading, 0.0, 0.0], OPEN, [person])
+    assert np.hypot(*(states[-1, :2] - OPEN)) <= 0.1
+    assert np.abs(states[-1, 3:]).max() <= 0.05
+    assert all(step.safe for step in steps)
+
+
+def test_the_disc_keeps_out_on_a_fine_grid_after_every_step_that_said_it_was_safe():
+    """People and walls, by Euclidean distance, ten times within each step; positions by integration."""
+    checked = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        zone, wall = random_zone(rng), np.array([[1.0, -4.0], [1.0 + rng.uniform(-1, 1), -1.2]])
+        people = [
+            szlib.Person(tuple(rng.uniform((2, -2), (5, 2))), tuple(rng.uniform(-0.5, 0.5, 2)), zone=zone)
+            for _ in range(3)
+        ]
+        drive = szlib.DifferentialDrive(ZONE, walls=[wall], max_people=3)
+        own = Unicycle(rng.uniform(-np.pi, np.pi)).start([-2.0, rng.uniform(-2, 2), 0.0, 0.0])
+        states, steps = loop(drive, own, OPEN, people)
+        for k, step in enumerate(steps):
+            if not step.safe:
+                continue
+            checked += 1
+            times = np.linspace(0, 0.1, 11)
+            discs = integrate(states[k], step.control, 0.1, times)[:, :2]
+            assert euclidean_to_segment(discs, *wall).min() >= 0.5
+            for person in people:
+                at = [person.after(0.1 * k + t).position for t in times]
+                gap = euclidean_to_ellipse(discs - at, zone.placed((0, 0), person.heading)) - 0.5
+                assert gap[[0, -1]].min() >= 0.05 - 2 * TOLERANCE  # eps, at the samples
+                assert gap.min() >= 0.05 - (1.5 * 0.1) ** 2 / 8 / 0.8 - drive.bow
+                assert (np.hypot(*(discs - at).T) - 0.5 - BODY_RADIUS).min() >= 0
+    assert checked > 1000
+
+
+def test_among_people_who_stand_a_plan_that_ends_at_rest_is_never_without_a_next_one():
+    """Recursive feasibility, proved of the double integrator in `szlib.control.mpc`, holds of the wheels."""
+    settings, quiet = szlib.MPCSettings(terminal="rest"), Worlds(standing=1.0, start_speed=0.0, min_h=0.6)
+    for seed in range(10):
+        scene = world(seed, quiet)
+        drive = szlib.DifferentialDrive(
+            ZONE, walls=scene.walls, settings=settings, max_people=len(scene.people)
+        )
+        own = Unicycle(np.random.default_rng(seed).uniform(-np.pi, np.pi)).start(scene.start)
+        assert drive._point.barriers(point_of(own, drive.ahead), scene.people).min() >= 0
+        states, steps = loop(drive, own, scene.goal, scene.people, 100)
+        assert all(step.safe for step in steps)
+        assert min(drive.barriers(state[:2], scene.people).min() for state in states) >= -TOLERANCE
+
+
+def test_a_robot_that_was_held_back_begins_again_where_it_is():
+    """With (v, omega) it is told; without, it believes that it did what it was told."""
+    own, held, trusted = np.zeros(5), szlib.DifferentialDrive(ZONE), szlib.DifferentialDrive(ZONE)
+    for _ in range(8):
+        fast = held.step(own, OPEN)
+        trusted.step(own[:3], OPEN)
+        own = held.robot.advance(own, fast.control, 0.1)
+    assert fast.control[0] > 0.5
+    own[3:] = 0.0
+    assert np.hypot(*held.step(own, OPEN).point.predicted[0, 2:]) == 0.0
+    assert trusted.step(own[:3], OPEN).control[0] > fast.control[0]
+
+
+def test_pose_alone_is_enough_for_a_robot_that_does_as_it_is_told():
+    person = szlib.Person((2.5, 0.4), (-0.3, 0.0))
+    drive = szlib.DifferentialDrive(ZONE)
+    states, steps = loop(drive, np.r_[0.0, 0.0, 1.0, 0.0, 0.0], OPEN, [person], 40)
+    drive.reset()
+    for k, (state, step) in enumerate(zip(states[:-1], steps, strict=True)):
+        assert drive.step(state[:3], OPEN, [person.after(0.1 * k)]).control == pytest.approx(step.control)
+
+
+def test_a_world_turned_and_moved_is_driven_through_alike():
+    """By a quarter turn: the box of accelerations is the same again."""
+    rotation, shift = np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([30.0, -8.0])
+    person = szlib.Person((2.5, 0.4), (-0.3, 0.05))
+    moved = szlib.Person(tuple(rotation @ person.position + shift), tuple(rotation @ person.velocity))
+    goal = rotation @ OPEN + shift
+    here, _ = loop(szlib.DifferentialDrive(ZONE), np.zeros(5), OPEN, [person], 100)
+    there, _ = loop(szlib.DifferentialDrive(ZONE), np.r_[shift, np.pi / 2, 0, 0], goal, [moved], 100)
+    assert there[:, :2] == pytest.approx(here[:, :2] @ rotation.T + shift, abs=1e-2)
+
+
+def test_one_who_runs_into_the_robot_is_flagged_before_it_happens():
+    person = szlib.Person((2.2, 0.0), (-2.0, 0.0))
+    drive = szlib.DifferentialDrive(ZONE)
+    own = np.zeros(5)
+    for k in range(12):
+        now = person.after(0.1 * k)
+        step = drive.step(own, OPEN, [now])
+        own = drive.robot.advance(own, step.control, 0.1)
+        if drive.barriers(own[:2], [now.after(0.1)]).min() < 0:
+            assert not step.safe
+            return
+    raise AssertionError("nobody ran into the robot: the test is void")
+
+
+# --- what it is told and given -----------------------------------------------------------------------
+
+
+def test_with_less_ahead_it_is_slower_and_by_default_it_is_not():
+    settings = szlib.MPCSettings(v_max=0.8)
+    assert szlib.DifferentialDrive(ZONE, settings=settings).v_max == pytest.approx(0.8)
+    near = szlib.DifferentialDrive(ZONE, settings=settings, ahead=0.1, omega_max=2.0)
+    assert near.v_max == pytest.approx(0.2, rel=0.01)
+    assert near.v_max < 0.2
+    assert near._point.settings.r_robot == pytest.approx(0.5 + 0.05 + 0.1 + near.bow)
+
+
+def test_people_come_as_an_array_with_ids_and_whoever_is_lost_makes_the_step_unsafe():
+    rows = np.array([[3.0, 0.4, -0.3, 0.0], [2.0, 3.0, 0.0, 0.0]])
+    by_row, by_person = szlib.DifferentialDrive(ZONE), szlib.DifferentialDrive(ZONE)
+    people = [szlib.Person((3.0, 0.4), (-0.3, 0.0)), szlib.Person((2.0, 3.0))]
+    step = by_row.step(np.zeros(3), OPEN, rows, ids=["a", "b"])
+    assert step.control == pytest.approx(by_person.step(np.zeros(3), OPEN, people).control)
+    assert step.safe
+    lost = by_row.step(np.zeros(3), OPEN, np.vstack([rows, np.full(4, np.nan)]), ids=["a", "b", "c"])
+    assert not lost.safe
+    assert lost.point.lost == 1
+
+
+def test_a_goal_that_turns_out_too_close_to_a_wall_is_a_status_of_a_moving_robot():
+    drive = szlib.DifferentialDrive(ZONE, walls=[((4.0, -3.0), (4.0, 3.0))])
+    drive.step((0.0, 0.0, 0.0), (2.0, 0.0))
+    step = drive.step((0.0, 0.0, 0.0), (3.9, 0.0))
+    assert step.point.goal_blocked
+    assert step.safe
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"omega_max": 0.0}, "omega_max must lie in"),
+        ({"omega_max": 40.0}, "omega_max must lie in"),
+        ({"omega_max": np.nan}, "omega_max must be finite"),
+        ({"ahead": 0.0}, "ahead must be positive"),
+        ({"ahead": -0.2}, "ahead must be positive"),
+    ],
+)
+def test_what_cannot_be_used_is_told(given, told):
+    with pytest.raises(szlib.SolverError, match=told):
+        szlib.DifferentialDrive(ZONE, **given)
+
+
+def test_a_state_of_the_wrong_shape_and_a_goal_inside_a_wall_are_told():
+    drive = szlib.DifferentialDrive(ZONE, walls=[((4.0, -3.0), (4.0, 3.0))])
+    with pytest.raises(szlib.SolverError, match="state must have shape"):
+        drive.step((0.0, 0.0, 0.0, 0.0), (2.0, 0.0))
+    with pytest.raises(szlib.SolverError, match="too close to the wall"):
+        drive.step((0.0, 0.0, 0.0), (3.9, 0.0))
+    drive.step((0.0, 0.0, 0.0), (3.0, 0.0))
+
+
+def test_the_robot_starts_where_it_goes_or_as_it_is_told():
+    robot = Unicycle(heading=1.0)
+    assert robot.start([1, 2, 0, 0]) == pytest.approx([1, 2, 1, 0, 0])
+    assert robot.start([1, 2, 0, -0.5]) == pytest.approx([1, 2, -np.pi / 2, 0.5, 0])
+    state = np.array([1.0, 2.0, 0.3, -0.4])
+    assert robot.body(robot.start(state)) == pytest.approx(state)

@@ -1,0 +1,235 @@
+"""Sizes: empty slots change nothing, nor does what is built ahead; walls of any shape; copies and pickles."""
+
+import copy
+import pickle
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
+
+import numpy as np
+import pytest
+import shapely
+from random_states import ZONE, questions
+
+import szlib
+from szlib.control.barriers import walls_of
+from szlib.control.solvers import sizes
+from szlib.control.solvers.sizes import UNFELT, rounded
+from szlib.simulation.closed_loop import advance
+
+GOAL = (4.0, 0.0)
+SOLVERS = ("sqp", "ipopt")
+FORMULATIONS = ({}, {"N_h": 8}, {"terminal": "rest"})
+
+
+def controller_of(solver="sqp", walls=(), max_people=None, **settings):
+    chosen = szlib.MPCSettings(solver=solver, time_limit=np.inf, **settings)
+    return szlib.MPCCBF(ZONE, walls=walls, settings=chosen, max_people=max_people)
+
+
+def crowd(n, k=0):
+    """People around the way, k steps of 0.1 s later."""
+    rng = np.random.default_rng(6)
+    rows = np.c_[
+        rng.uniform(-6, 10, 40), rng.choice([-1, 1], 40) * rng.uniform(1.8, 5, 40), np.zeros((40, 2))
+    ]
+    rows[:, 2:] = rng.uniform(-0.2, 0.2, (40, 2))
+    return (rows + 0.1 * k * np.c_[rows[:, 2:], np.zeros((40, 2))])[:n]
+
+
+def drive(controller, numbers, turn=None):
+    """The states and controls of a robot among so many people at each step."""
+    state, found = np.array([-4.0, 0.0, 0.0, 0.0]), []
+    for k, n in enumerate(numbers):
+        if turn is not None:
+            turn(controller, k)
+        step = controller.step(state, GOAL, crowd(n, k))
+        found.append(np.r_[state, step.control])
+        state = advance(state, step.control, 0.1)
+    return np.array(found)
+
+
+def wait_for_the_builder(controller, _=None):
+    if controller._sizes._builder is not None:
+        controller._sizes._builder.join()
+
+
+# empty slots
+
+
+def test_sizes_are_powers_of_two():
+    assert [rounded(n) for n in (0, 1, 2, 3, 4, 5, 8, 9, 20, 32, 33)] == [0, 1, 2, 4, 4, 8, 8, 16, 32, 32, 64]
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
+@pytest.mark.parametrize(("solver", "count"), [("sqp", 200), ("ipopt", 15)])
+def test_empty_slots_do_not_change_the_control(monkeypatch, solver, count, formulation):
+    for question in islice(questions(seed=31), count):
+        answers = []
+        for size in (lambda n: n, lambda n: 4 if n <= 4 else 8):
+            monkeypatch.setattr(sizes, "rounded", size)
+            controller = controller_of(solver, question.walls, max_people=0, **formulation)
+            steps = [controller.step(question.state, question.goal, question.people) for _ in range(2)]
+            answers.append(steps)
+        assert controller._sizes.of(len(question.people), len(question.walls)).evaluate.size == (4, 4)
+        for exact, padded in zip(*answers, strict=True):
+            assert padded.control == pytest.approx(exact.control, abs=1e-6)
+            assert padded.rung == exact.rung
+            assert padded.slack == pytest.approx(exact.slack, abs=1e-6)
+            assert padded.h == pytest.approx(exact.h) and padded.residual.shape == exact.residual.shape
+            assert padded.residual == pytest.approx(exact.residual, abs=1e-5)
+            assert max(np.abs(padded.h).max(initial=0), np.abs(padded.residual).max(initial=0)) < UNFELT / 100
+
+
+# building ahead
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_run_is_the_same_whether_or_not_a_size_was_built_ahead(monkeypatch, solver):
+    numbers = [3] * 3 + [4] * 3 + [9] * 3 + [3] * 2 + [20] * 3 + [0] * 2
+    ahead = drive(controller_of(solver), numbers, wait_for_the_builder)
+    racing = drive(controller_of(solver), numbers)
+    monkeypatch.setattr(sizes.Thread, "start", lambda _: None)
+    in_place = drive(controller_of(solver), numbers)
+    assert np.array_equal(ahead, racing) and np.array_equal(ahead, in_place)
+
+
+def test_a_controller_is_ready_for_eight_and_grows_ahead_from_when_half_of_them_are_there(caplog):
+    caplog.set_level("INFO", logger="szlib")
+    controller = controller_of()
+    built = controller._sizes._solvers
+    assert {people for people, _ in built} == {0, 1, 2, 4, 8}
+    drive(controller, [3])
+    wait_for_the_builder(controller)
+    assert max(built)[0] == 8
+    for n, largest in ((4, 16), (8, 32), (15, 32), (16, 64)):
+        drive(controller, [n])
+        wait_for_the_builder(controller)
+        assert max(built)[0] == largest
+    assert not caplog.records, "nothing had to be built in place"
+    drive(controller_of(), [20])
+    assert "built for 8 people and now grows to 32" in caplog.text
+
+
+def test_a_number_that_is_told_is_taken_at_its_word():
+    controller = controller_of(max_people=4)
+    drive(controller, [4])
+    assert controller._sizes._builder is None
+    assert {people for people, _ in controller._sizes._solvers} == {0, 1, 2, 4}
+
+
+# walls
+
+
+BOX = shapely.box(0, 0, 4, 2)
+
+
+@pytest.mark.parametrize(
+    ("walls", "count"),
+    [
+        ([], 0),
+        (np.zeros((0, 2, 2)), 0),
+        ([[(0, 0), (1, 0)], [(1, 0), (1, 1)]], 2),
+        ([(0, 0), (1, 0), (1, 1)], 2),
+        (np.array([(0, 0), (1, 0), (1, 1), (0, 1)]), 3),
+        ([[(0, 0), (1, 0), (1, 1)], [(5, 5), (6, 6)]], 3),
+        (shapely.LineString([(0, 0), (1, 0), (1, 0), (1, 1)]), 2),
+        (shapely.LineString([(0, 0, 7), (1, 0, 7)]), 1),
+        ([shapely.LineString([(0, 0), (1, 0)]), [(2, 2), (3, 3)]], 2),
+        (BOX, 4),
+        (BOX.difference(shapely.box(1, 0.5, 2, 1)), 8),
+        (shapely.MultiLineString([[(0, 0), (1, 0)], [(2, 0), (3, 0), (4, 0)]]), 3),
+        (shapely.GeometryCollection([BOX, shapely.LineString([(9, 9), (8, 8)])]), 5),
+        (shapely.union(BOX, shapely.box(8, 0, 9, 1)), 8),
+        (BOX.exterior, 4),
+    ],
+    ids=lambda each: type(each).__name__ if not isinstance(each, int) else str(each),
+)
+def test_walls_may_be_segments_lines_and_shapes(walls, count):
+    segments = walls_of(walls)
+    assert segments.shape == (count, 2, 2)
+    if hasattr(walls, "boundary") and hasattr(walls, "length"):
+        assert np.hypot(*(segments[:, 1] - segments[:, 0]).T).sum() == pytest.approx(walls.length)
+    assert np.array_equal(szlib.MPCCBF(ZONE, walls=walls, max_people=0).walls, segments)
+
+
+def test_the_same_wall_in_any_shape_gives_the_same_control():
+    rings = [BOX, BOX.exterior, list(BOX.exterior.coords), walls_of(BOX)]
+    steps = [controller_of(walls=walls).step((-1.0, 1.0, 0.4, 0), (5.0, -2.0)) for walls in rings]
+    assert all(np.array_equal(step.control, steps[0].control) for step in steps)
+    assert len(steps[0].h) == 4
+
+
+@pytest.mark.parametrize(
+    "walls",
+    [5, "wall", None, shapely.Point(0, 0), [(0, 0)], [(0, 0, 0), (1, 1, 1)], [[(0, 0), (0, 0), (0, 0)]]],
+)
+def test_what_is_no_wall_is_refused(walls):
+    with pytest.raises(szlib.SolverError, match="wall"):
+        szlib.MPCCBF(ZONE, walls=walls)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_walls_set_between_steps_are_those_of_a_controller_that_knew_them_all_along(solver):
+    some, more = [[(-6, 1.5), (6, 1.5)]], shapely.box(-8, -3, 9, 3)
+    state, controller = np.array([-4.0, 0.0, 0.0, 0.0]), controller_of(solver, some)
+    for k, walls in enumerate([some, more, [], some, more] * 3):
+        controller.set_walls(walls)
+        anew = controller_of(solver, walls)
+        step, other = (c.step(state, GOAL, crowd(2, k)) for c in (controller, anew))
+        assert step.h == pytest.approx(other.h)
+        assert step.control == pytest.approx(other.control, abs=1e-4)
+        state = advance(state, step.control, 0.1)
+
+
+def test_a_wall_set_around_the_goal_of_a_moving_robot_is_a_status():
+    controller = controller_of()
+    assert not controller.step((-4, 0, 0, 0), GOAL).goal_blocked
+    controller.set_walls([[(4, -1), (4, 1)]])
+    assert controller.step((-4, 0, 0, 0), GOAL).goal_blocked
+    with pytest.raises(szlib.SolverError, match="wall"):
+        controller.set_walls([[(0, 0), (0, 0)]])
+    assert len(controller.walls) == 1, "it keeps those that it had"
+    with pytest.raises(szlib.SolverError, match="open space"):
+        controller_of(terminal="person").set_walls(BOX)
+
+
+# copies
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda c: pickle.loads(pickle.dumps(c))])
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_copy_goes_on_as_the_original_does(solver, again):
+    original = controller_of(solver, walls=[[(-6, 2), (6, 2)]], max_people=4)
+    state = np.array([-4.0, 0.3, 0.0, 0.0])
+    rows = np.array([[0.0, 0.2, -0.3, 0.0], [2.0, -1.0, 0.0, 0.0]])
+    for k in range(25):
+        if k == 20:
+            rows[0, 2:] = 0.0
+        step = original.step(state, GOAL, rows, ids="ab")
+        state, rows = advance(state, step.control, 0.1), rows + 0.1 * np.c_[rows[:, 2:], np.zeros((2, 2))]
+    twin = again(original)
+    assert np.array_equal(twin.walls, original.walls) and twin.settings == original.settings
+    for _ in range(10):
+        step, other = (c.step(state, GOAL, rows, ids="ab") for c in (original, twin))
+        assert other.control == pytest.approx(step.control, abs=1e-7)
+        assert [p.heading for p in other.scene.people] == [p.heading for p in step.scene.people]
+        state = advance(state, step.control, 0.1)
+    assert step.scene.people[0].heading == pytest.approx(np.pi), "remembered"
+
+
+def test_a_copy_has_no_thread_yet_and_one_each_works():
+    controller = controller_of()
+    expected = drive(controller, [2] * 30)
+    with pytest.raises(szlib.SolverError, match="another thread"), ThreadPoolExecutor(1) as other:
+        other.submit(controller.step, (0, 0, 0, 0), GOAL).result()
+    controller.reset()
+    copies = [copy.deepcopy(controller) for _ in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        ready = threading.Barrier(4)
+
+        def run(each):
+            ready.wait()
+            return drive(each, [2] * 30)
+
+        assert all(np.array_equal(found, expected) for found in pool.map(run, copies))

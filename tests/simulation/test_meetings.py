@@ -1,0 +1,129 @@
+"""The eleven meetings can be driven, vary as they say, and walls hide whom they should."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import szlib
+from szlib.simulation.closed_loop import drive
+from szlib.simulation.controllers.baselines import straight
+from szlib.simulation.rollouts import identity, rollouts
+from szlib.simulation.scenarios.meetings import MEETINGS, InSight, Variations, in_sight
+
+ZONE = szlib.Ellipse((0.05, 0.0), (1.0, 0.7))
+SETTINGS = szlib.MPCSettings()
+
+
+def test_all_eleven_are_there_and_the_papers_four_keep_their_names():
+    assert list(MEETINGS) == [
+        "frontal approach", "pedestrian obstruction", "narrow hallway", "narrow doorway", "overtaking",
+        "intersection", "blind corner", "parallel traffic", "perpendicular traffic", "circular crossing",
+        "robot crowding",
+    ]  # fmt: skip
+    assert szlib.MEETINGS is MEETINGS
+    assert list(szlib.SCENARIOS) == ["passing", "corridor", "waiting", "making_room"]
+
+
+@pytest.mark.parametrize("name", MEETINGS)
+def test_alone_the_robot_drives_straight_to_the_goal(name):
+    alone = replace(MEETINGS[name], people=())
+    log = drive(alone, straight(alone, SETTINGS))
+    assert log.success and log.metrics()["overlaps"] == 0
+    assert np.abs(log.states[:, 1]).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", MEETINGS)
+def test_nobody_starts_or_walks_where_they_cannot_be(name):
+    scenario = MEETINGS[name]
+    controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
+    assert controller.barriers(scenario.start[:2], scenario.people).min() > 0.5
+    assert controller.barriers(scenario.goal).min(initial=1.0) > 0.5
+    for person in scenario.people:
+        assert np.hypot(*person.velocity) <= 0.8 + 1e-9
+        for wall in scenario.walls:
+            path = np.array([person.after(t).position for t in np.linspace(0, 40, 401)])
+            near = szlib.segment_distance(path, *wall).min()
+            assert near > 0.25, "people keep off the walls"
+
+
+@pytest.mark.parametrize("name", MEETINGS)
+def test_the_controller_arrives_and_keeps_its_promise(name):
+    scenario = Variations(MEETINGS[name], ZONE, shift=0.0, pace=(1.0, 1.0))(0)
+    controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
+    metrics = drive(scenario, controller, behaviour=InSight()).metrics()
+    assert metrics["success"] and metrics["overlaps"] == 0
+    assert metrics["unflagged_violations"] == 0
+
+
+# --- variations --------------------------------------------------------------------------------------
+
+
+def test_variations_are_close_to_the_scene_and_the_same_for_a_seed():
+    scene = MEETINGS["perpendicular traffic"]
+    vary = Variations(scene, ZONE, shift=0.3, pace=(0.9, 1.1))
+    drawn = [vary(seed) for seed in range(200)]
+    starts = np.array([each.start[:2] - scene.start[:2] for each in drawn])
+    assert 0.25 < np.abs(starts).max() <= 0.3
+    for each in drawn:
+        for now, before in zip(each.people, scene.people, strict=True):
+            assert np.abs(np.subtract(now.position, before.position)).max() <= 0.3
+            assert 0.9 <= np.hypot(*now.velocity) / np.hypot(*before.velocity) <= 1.1
+            assert now.heading == before.heading and now.zone == ZONE
+    assert vary(7).people == drawn[7].people and vary(8).people != drawn[7].people
+    assert np.array_equal(vary(7).goal, scene.goal) and np.array_equal(vary(7).walls, scene.walls)
+
+
+def test_people_keep_their_own_zones_where_none_is_given():
+    own = replace(MEETINGS["overtaking"], people=(szlib.Person((0, 0), (0.3, 0), zone=ZONE),))
+    assert Variations(own)(0).people[0].zone == ZONE
+    assert Variations(MEETINGS["overtaking"])(0).people[0].zone is None
+
+
+def test_variations_are_worlds_for_rollouts(tmp_path):
+    def run(scene, **options):
+        worlds = Variations(MEETINGS[scene], ZONE, **options)
+        return rollouts(
+            2, worlds=worlds, behaviour=InSight(), controller=straight, out=tmp_path, n_jobs=1, progress=False
+        )
+
+    first = run("overtaking")
+    assert first["seed"].tolist() == [0, 1] and len(first["path_length"].unique()) == 2
+    run("overtaking", shift=0.1)
+    run("frontal approach")
+    assert run("overtaking").equals(first)
+    assert sum(path.is_dir() for path in tmp_path.iterdir()) == 3
+
+
+# --- in sight ----------------------------------------------------------------------------------------
+
+
+def test_walls_hide_who_is_behind_them():
+    wall = np.array([[(0.0, -1.0), (0.0, 1.0)]])
+    here = np.array([-1.0, 0.0])
+    assert not in_sight(here, (1.0, 0.5), wall)
+    assert in_sight(here, (-0.5, 0.5), wall)  # before it
+    assert in_sight(here, (1.0, 2.5), wall)  # beside it
+    assert in_sight(here, (1.0, 0.5), np.zeros((0, 2, 2)))
+
+
+def test_who_is_hidden_is_there_but_not_given_to_the_controller():
+    scenario = Variations(MEETINGS["blind corner"], ZONE, shift=0.0, pace=(1.0, 1.0))(0)
+    controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
+    log = drive(scenario, controller, behaviour=InSight())
+    given = ~np.isnan(log.residual[:, 0, 0])
+    sight = [
+        in_sight(x[:2], p[:2], scenario.walls) for x, p in zip(log.states, log.people[:, 0], strict=True)
+    ]
+    assert given.tolist() == sight
+    assert 0 < given.sum() < len(given)
+    assert log.there.all() and np.isfinite(log.h).all()
+    assert np.isfinite(log.residual[:, 1:]).all()  # of the walls
+
+
+def test_what_was_seen_is_no_part_of_what_a_model_is():
+    model, used = InSight(), InSight()
+    used.crowd(MEETINGS["blind corner"], 0)(0.0, np.zeros(4))
+    assert identity(model) == identity(used)
+    assert vars(pickle.loads(pickle.dumps(used))) == {}

@@ -1,0 +1,303 @@
+"""Tables of any origin: chosen columns, DataFrames, other programs' files; all tell the same story."""
+
+from __future__ import annotations
+
+import gzip
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import make_crowd
+from test_readers import samples, write
+
+import szlib
+from szlib.tracks import funnels
+from szlib.tracks.clock import to_clock
+from szlib.tracks.interop import check_tracks
+
+RATE = 12.5
+"""Frames a second; a frame is 0.08 s."""
+
+
+def people(seed: int = 0, *, count: int = 12, begin: int = 0) -> pd.DataFrame:
+    """Who walk straight through a hall of 12 m by 8 m: id, frame, x, y [m]."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for person in range(count):
+        frame = begin + rng.integers(0, 100) + np.arange(100)
+        a, b = rng.uniform((0, 0), (12, 8), (2, 2))
+        where = a + np.linspace(0, 1, 100)[:, None] * (b - a)
+        rows.append(pd.DataFrame({"id": person + 1, "frame": frame, "x": where[:, 0], "y": where[:, 1]}))
+    return pd.concat(rows, ignore_index=True).round(4)
+
+
+def in_seconds(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.assign(t=rows["frame"] / RATE)[["t", "id", "x", "y"]]
+
+
+def expected(rows: pd.DataFrame) -> pd.DataFrame:
+    return to_clock(in_seconds(rows).assign(day="any"))
+
+
+def assert_same_people(tracks: pd.DataFrame, rows: pd.DataFrame, *, within: float = 1e-9) -> None:
+    check_tracks(tracks)
+    right = expected(rows)
+    assert tracks[["id", "t"]].to_numpy().tolist() == right[["id", "t"]].to_numpy().tolist()
+    np.testing.assert_allclose(tracks[["x", "y"]], right[["x", "y"]], atol=within)
+
+
+# --- columns, units, frames --------------------------------------------------------------------------
+
+THEIRS = {"frame": "Frame", "id": "ped", "x": "X pos", "y": "Y pos"}
+
+
+def renamed(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.rename(columns=THEIRS).assign(note="a")[["note", "Y pos", "ped", "Frame", "X pos"]]
+
+
+@pytest.mark.parametrize("form", ["frame", "csv", "semicolons", "tabs", "gz", "parquet"])
+def test_columns_may_have_any_name_and_order(tmp_path: Path, form: str) -> None:
+    table, file = renamed(people()), tmp_path / "hall.csv"
+    separator = {"semicolons": ";", "tabs": "\t"}.get(form, ",")
+    text = table.to_csv(index=False, sep=separator).encode()
+    if form == "parquet":
+        table.to_parquet(file)
+    else:
+        file.write_bytes(gzip.compress(text) if form == "gz" else text)
+    source = table if form == "frame" else file
+    assert_same_people(szlib.read_tracks(source, columns=THEIRS, frame_rate=RATE), people())
+
+
+@pytest.mark.parametrize(("unit", "metres"), {"m": 1, "cm": 0.01, "mm": 0.001}.items())
+@pytest.mark.parametrize("separator", [",", " ", ";"])
+def test_fields_without_names_have_numbers(tmp_path: Path, unit: str, metres: float, separator: str) -> None:
+    table = people().assign(x=lambda t: t["x"] / metres, y=lambda t: t["y"] / metres, z=1.7)
+    file = tmp_path / "hall.txt"
+    table.to_csv(file, index=False, header=False, sep=separator)
+    columns = {"id": 0, "frame": 1, "x": 2, "y": 3}
+    tracks = szlib.read_tracks(file, columns=columns, frame_rate=RATE, unit=unit)
+    assert_same_people(tracks, people())
+
+
+def test_a_table_with_frames_needs_no_columns() -> None:
+    assert_same_people(szlib.read_tracks(people(), frame_rate=RATE), people())
+    assert "at 12.5 frames/s" in funnels.of(szlib.read_tracks(people(), frame_rate=RATE))[0]["stage"]
+
+
+def test_a_dataframe_is_left_as_it_was() -> None:
+    table = in_seconds(people())
+    table.attrs["mine"] = 1
+    before = table.copy(deep=True)
+    szlib.read_tracks(table.sample(frac=1, random_state=0))
+    pd.testing.assert_frame_equal(table, before)
+    assert_same_people(szlib.read_tracks(table.set_index(np.arange(len(table)) % 7)), people())
+
+
+def test_what_a_table_lacks_is_set_aside_and_counted() -> None:
+    table = in_seconds(people()).astype({"x": object})
+    table.loc[[3, 40], "x"] = [None, "far"]
+    table.loc[7, "t"] = np.inf
+    with pytest.warns(szlib.DataWarning, match=r"table-1, first at line 4: rows set aside: 2 x missing"):
+        tracks = szlib.read_tracks(table)
+    assert sum(funnels.of(tracks)[0]["set_aside"].values()) == 3
+
+
+@pytest.mark.parametrize("zone", [None, "UTC", "Europe/Berlin"])
+def test_times_may_be_datetimes(zone: str | None) -> None:
+    rows = in_seconds(people())
+    moment = pd.Timestamp("2024-05-07 10:00", tz=zone or "Europe/Berlin")
+    t = moment + pd.to_timedelta(rows["t"], unit="s")
+    table = rows.assign(t=t if zone else t.dt.tz_localize(None))
+    tracks = szlib.read_tracks(table, tz="Europe/Berlin")
+    assert set(tracks["day"]) == {"2024-05-07"}
+    shifted = tracks.assign(t=(tracks["t"] - moment.timestamp()).round(1))
+    np.testing.assert_allclose(shifted[["t", "x", "y"]], expected(people())[["t", "x", "y"]], atol=1e-5)
+
+
+def test_several_tables_are_recordings_of_their_own() -> None:
+    tracks = szlib.read_tracks([in_seconds(people(0)), in_seconds(people(1))])
+    assert tracks["day"].nunique() == 2
+    assert len(tracks) == len(expected(people(0))) + len(expected(people(1)))
+
+
+def test_pedpys_own_tables_are_tables() -> None:
+    pedpy = pytest.importorskip("pedpy")
+    trajectory = pedpy.TrajectoryData(data=people(), frame_rate=RATE)
+    assert_same_people(szlib.read_tracks(trajectory), people())
+
+
+REFUSED = {
+    "counts frames; pass frame_rate": ({"columns": {"frame": "frame"}}, people),
+    "both t and frame": ({"columns": {"t": "a", "frame": "b"}}, people),
+    "none of szlib's": ({"columns": {"time": "frame"}}, people),
+    "has no column ped": ({"columns": {"id": "ped"}, "frame_rate": 10}, people),
+    "no field 9": ({"columns": {"id": 9}, "frame_rate": 10}, people),
+    "leave frame_rate out": ({"frame_rate": 25}, lambda: in_seconds(people())),
+    "names x twice": ({"frame_rate": 25}, lambda: pd.concat([people(), people()[["x"]]], axis=1)),
+    "unit must be": ({"unit": "ft"}, lambda: in_seconds(people())),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("told", REFUSED)
+def test_what_cannot_be_read_is_told(told: str) -> None:
+    options, table = REFUSED[told]
+    with pytest.raises(szlib.DataError, match=told):
+        szlib.read_tracks(table(), **options)
+
+
+def test_columns_are_for_tables(tmp_path: Path) -> None:
+    file = write(tmp_path / "a.csv", in_seconds(people()).to_csv(index=False))
+    with pytest.raises(szlib.DataError, match="leave columns out"):
+        szlib.read_tracks(file, columns={"t": "t"}, file_format="atc-1hz")
+
+
+def test_a_days_extraction_takes_columns(tmp_path: Path) -> None:
+    crowd = make_crowd(5, people=60, seconds=60)
+    table = crowd.rename(columns={"t": "time", "id": "ped"})[["time", "ped", "x", "y"]]
+    (tmp_path / "data").mkdir()
+    table.to_csv(tmp_path / "data" / "hall.csv", index=False)
+    columns = {"t": "time", "id": "ped"}
+    found = szlib.extract_days(
+        tmp_path / "data" / "hall.csv",
+        out=tmp_path / "out",
+        columns=columns,
+        square=szlib.ATC_SQUARE,
+        progress=False,
+    )
+    tracks = szlib.read_tracks(tmp_path / "data" / "hall.csv", columns=columns)
+    assert len(found.samples()) == len(szlib.find_encounters(tracks)) > 0
+    assert found.area == szlib.ATC_SQUARE
+
+
+# --- other programs ----------------------------------------------------------------------------------
+
+
+def as_juelich(
+    rows: pd.DataFrame,
+    path: Path,
+    *,
+    header: str = "#framerate: 12.5\n#ID frame x/m y/m z/m\n",
+    metres: float = 1.0,
+) -> Path:
+    lines = [f"{r.id} {r.frame} {r.x / metres:.6f} {r.y / metres:.6f} 1.7" for r in rows.itertuples()]
+    return write(path, header + "\n".join(lines) + "\n")
+
+
+def as_hdf5(rows: pd.DataFrame, path: Path) -> Path:
+    h5py = pytest.importorskip("h5py")
+    kinds = [("id", "i8"), ("frame", "i8"), ("x", "f8"), ("y", "f8"), ("z", "f8")]
+    with h5py.File(path, "w") as file:
+        table = np.array([(r.id, r.frame, r.x, r.y, 1.7) for r in rows.itertuples()], dtype=kinds)
+        file.create_dataset("trajectory", data=table).attrs["fps"] = RATE
+        file.attrs["wkt_geometry"] = "POLYGON ((0 0, 12 0, 12 8, 0 8, 0 0))"
+    return path
+
+
+def as_viswalk(rows: pd.DataFrame, path: Path) -> Path:
+    head = "$VISION\n* File: hall.inpx\n* PTV Vissim: 2022\n$PEDESTRIAN:NO;SIMSEC;COORDCENTX;COORDCENTY\n"
+    body = [f"{r.id};{r.frame / 10:.2f};{r.x:.6f};{r.y:.6f}" for r in rows.itertuples()]
+    return write(path, head + "\n".join(body) + "\n")
+
+
+def as_vadere(rows: pd.DataFrame, path: Path) -> Path:
+    head = "pedestrianId simTime endTime-PID1 startX-PID1 startY-PID1 endX-PID1 endY-PID1\n"
+    body = []
+    for _, one in rows.groupby("id"):
+        steps = one.iloc[::5]  # footsteps, each from one place to the next
+        for now, after in zip(steps.itertuples(), list(steps.itertuples())[1:], strict=False):
+            body.append((now.id, now.frame / 10, after.frame / 10, now.x, now.y, after.x, after.y))
+    body.sort(key=lambda row: (row[1], row[0]))
+    return write(path, head + "\n".join(" ".join(map(str, row)) for row in body) + "\n")
+
+
+def as_jupedsim(rows: pd.DataFrame, path: Path) -> Path:
+    with sqlite3.connect(path) as file:
+        file.execute("CREATE TABLE metadata(key TEXT NOT NULL UNIQUE PRIMARY KEY, value TEXT NOT NULL)")
+        file.executemany("INSERT INTO metadata VALUES(?, ?)", [("version", "2"), ("fps", str(RATE))])
+        file.execute(
+            "CREATE TABLE trajectory_data(frame INTEGER NOT NULL, id INTEGER NOT NULL, "
+            "pos_x REAL NOT NULL, pos_y REAL NOT NULL, ori_x REAL NOT NULL, ori_y REAL NOT NULL)"
+        )
+        table = [(int(r.frame), int(r.id), r.x, r.y, 1.0, 0.0) for r in rows.itertuples()]
+        file.executemany("INSERT INTO trajectory_data VALUES(?, ?, ?, ?, ?, ?)", table)
+    file.close()
+    return path
+
+
+OTHERS: dict[str, Callable[[pd.DataFrame, Path], Path]] = {
+    "juelich-text": as_juelich, "juelich-hdf5": as_hdf5, "jupedsim": as_jupedsim,
+}  # fmt: skip
+pedpy_closes_late = pytest.mark.filterwarnings(
+    "ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
+
+
+@pedpy_closes_late
+@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("packed", [False, True])
+def test_files_of_other_programs_are_recognised(tmp_path: Path, name: str, packed: bool) -> None:
+    pytest.importorskip("pedpy")
+    file = OTHERS[name](people(), tmp_path / "recording")
+    if packed:
+        file = write(tmp_path / "packed.gz", gzip.compress(file.read_bytes()))
+    assert_same_people(szlib.read_tracks(file), people(), within=1e-5)
+    assert_same_people(szlib.read_tracks(file, file_format=name), people(), within=1e-5)
+
+
+@pytest.mark.parametrize("name", ["viswalk", "vadere"])
+def test_files_of_simulations_are_recognised(tmp_path: Path, name: str) -> None:
+    pytest.importorskip("pedpy")
+    rows = people()  # frames are tenths of a second here
+    file = {"viswalk": as_viswalk, "vadere": as_vadere}[name](rows, tmp_path / "simulated.csv")
+    tracks = szlib.read_tracks(file)
+    check_tracks(tracks)
+    right = to_clock(rows.assign(day="any", t=rows["frame"] / 10)[["day", "id", "t", "x", "y"]])
+    both = tracks.assign(tick=tracks["t"].round(1)).merge(
+        right.assign(tick=right["t"].round(1)), on=["id", "tick"], suffixes=("", "_right")
+    )
+    assert len(both) == len(tracks) > 0.9 * len(right)
+    np.testing.assert_allclose(both[["x", "y"]], both[["x_right", "y_right"]], atol=1e-3)
+
+
+def test_a_text_of_juelich_tells_its_unit_or_is_told(tmp_path: Path) -> None:
+    pytest.importorskip("pedpy")
+    centimetres = as_juelich(
+        people(), tmp_path / "a.txt", header="# framerate: 12.5 fps\n#id frame x/cm y/cm z/cm\n", metres=0.01
+    )
+    assert_same_people(szlib.read_tracks(centimetres), people(), within=1e-5)
+    silent = as_juelich(people(), tmp_path / "b.txt", header="# a corridor\n", metres=0.01)
+    with pytest.raises(szlib.DataError, match="pass frame_rate= and unit="):
+        szlib.read_tracks(silent)
+    assert_same_people(szlib.read_tracks(silent, frame_rate=RATE, unit="cm"), people(), within=1e-5)
+    bare = as_juelich(people(), tmp_path / "c.txt", header="")
+    options = {"file_format": "juelich-text", "frame_rate": RATE, "unit": "m"}
+    assert_same_people(szlib.read_tracks(bare, **options), people(), within=1e-5)
+    with pytest.raises(szlib.DataError, match="in 'm' or 'cm'"):
+        szlib.read_tracks(bare, **{**options, "unit": "mm"})
+
+
+@pedpy_closes_late
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"SQLite format 3\0" + bytes(100),
+        b"\x89HDF\r\n\x1a\n" + bytes(50),
+        b"$VISION\n",
+        b"#framerate: 10\nx\n",
+        b"pedestrianId simTime\n1 2\n",
+    ],
+)
+def test_damaged_files_of_other_programs_are_told(tmp_path: Path, content: bytes) -> None:
+    pytest.importorskip("pedpy")
+    with pytest.raises(szlib.DataError, match=r"broken: PedPy cannot read it as"):
+        szlib.read_tracks(write(tmp_path / "broken", content))
+
+
+def test_the_formats_of_before_are_read_as_before(tmp_path: Path) -> None:
+    file = write(tmp_path / "a.csv", samples().to_csv(index=False))
+    pd.testing.assert_frame_equal(
+        szlib.read_tracks(file).drop(columns="day"), szlib.read_tracks(samples()).drop(columns="day")
+    )

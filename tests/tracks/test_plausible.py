@@ -1,0 +1,116 @@
+"""What people can do says what is wrong with a table: units, times, columns, degrees."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import make_tracks, make_walk, real_data
+from test_formats import RATE, in_seconds, people
+
+import szlib
+from szlib.plaza.people import make_plaza
+from szlib.plaza.truth import PlazaSettings
+from szlib.tracks.readers import read_raw
+
+
+def table() -> pd.DataFrame:
+    """Forty people, t in steps of 0.08 s."""
+    return in_seconds(people(3, count=40))
+
+
+def frames() -> pd.DataFrame:
+    rows = people(3, count=40)
+    return pd.DataFrame({"t": rows["frame"], "id": rows["id"], "x": rows["x"], "y": rows["y"]})
+
+
+SPOILED = {
+    "millimetres: pass unit='mm'": lambda: table().assign(x=lambda t: t["x"] * 1e3, y=lambda t: t["y"] * 1e3),
+    "centimetres: pass unit='cm'": lambda: table().assign(x=lambda t: t["x"] * 1e2, y=lambda t: t["y"] * 1e2),
+    "milliseconds: divide": lambda: table().assign(t=lambda t: t["t"] * 1e3),
+    "milliseconds: divide them": lambda: table().assign(t=lambda t: (t["t"] + 1.7e9) * 1e3),
+    "numbers of frames: pass": frames,
+    "longitude and latitude": lambda: table().assign(
+        x=lambda t: 135.5 + t["x"] / 90_000, y=lambda t: 34.7 + t["y"] / 111_000
+    ),
+    "latitude and longitude": lambda: table().assign(
+        x=lambda t: 34.7 + t["y"] / 111_000, y=lambda t: 135.5 + t["x"] / 90_000
+    ),
+    "columns={'t': 'id', 'id': 't'}": lambda: table().rename(columns={"t": "id", "id": "t"}),
+    "columns={'t': 'x', 'x': 't'}": lambda: table().rename(columns={"t": "x", "x": "t"}),
+    "columns={'t': 'y', 'y': 't'}": lambda: table().rename(columns={"t": "y", "y": "t"}),
+}
+
+
+@pytest.mark.parametrize("told", SPOILED)
+def test_what_is_wrong_is_told(told: str) -> None:
+    with pytest.raises(szlib.DataError, match=re.escape(told)):
+        read_raw(SPOILED[told]())
+
+
+@pytest.mark.parametrize("told", [t for t in SPOILED if "pass unit" in t or "columns=" in t])
+def test_the_advice_helps(told: str) -> None:
+    with pytest.raises(szlib.DataError) as error:
+        read_raw(SPOILED[told]())
+    advice = re.search(r"pass (unit|columns)=('\w+'|\{.*?\})", str(error.value))
+    options = {advice[1]: eval(advice[2])}
+    pd.testing.assert_frame_equal(read_raw(SPOILED[told](), **options), read_raw(table()))
+
+
+def test_the_advice_for_frames_helps() -> None:
+    read = szlib.read_tracks(frames(), columns={"frame": "t"}, frame_rate=RATE)
+    right = szlib.read_tracks(table())
+    pd.testing.assert_frame_equal(read, right)
+
+
+def test_the_same_is_told_of_files(tmp_path: Path) -> None:
+    spoiled = SPOILED["centimetres: pass unit='cm'"]()
+    spoiled.to_csv(tmp_path / "hall.csv", index=False)
+    with pytest.raises(szlib.DataError, match=r"hall\.csv: people move at .* m/s .* pass unit='cm'"):
+        read_raw(tmp_path / "hall.csv")
+    without = tmp_path / "public.csv"
+    spoiled.assign(v=1.0, a=0.1).to_csv(without, index=False, header=False)
+    with pytest.raises(szlib.DataError, match="pass unit='cm'"):
+        read_raw(without)
+
+
+def test_fields_without_names_are_told_by_number(tmp_path: Path) -> None:
+    wrong = table().assign(v=1.0, a=0.1)[["id", "t", "x", "y", "v", "a"]]
+    wrong.to_csv(tmp_path / "a.csv", index=False, header=False)
+    with pytest.raises(szlib.DataError, match="columns look exchanged") as error:
+        read_raw(tmp_path / "a.csv")
+    columns = eval(re.search(r"columns=(\{.*?\})", str(error.value))[1])
+    assert columns == {"t": 1, "id": 0, "x": 2, "y": 3}
+    read = read_raw(tmp_path / "a.csv", columns=columns)
+    pd.testing.assert_frame_equal(read.drop(columns="day"), read_raw(table()).drop(columns="day"))
+
+
+def test_who_insists_is_warned() -> None:
+    spoiled = SPOILED["centimetres: pass unit='cm'"]()
+    with pytest.warns(szlib.DataWarning, match="people move at"):
+        assert len(read_raw(spoiled, unit="m")) == len(spoiled)
+
+
+def test_people_who_stand_are_people() -> None:
+    crowd = make_tracks(*(make_walk((k, 0), (0.01, 0), person=k, duration=30) for k in range(9)))
+    with pytest.warns(szlib.DataWarning, match="nobody walks"):
+        read_raw(crowd[["t", "id", "x", "y"]])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_good_tables_pass_in_silence(tmp_path: Path, seed: int) -> None:
+    read_raw(in_seconds(people(seed, count=30)))
+    plaza = pd.read_csv(
+        make_plaza(tmp_path / "plaza.csv", seed=seed, settings=PlazaSettings(encounters=60)), header=None
+    )
+    read_raw(pd.DataFrame({"t": plaza[0], "id": plaza[1], "x": plaza[2] / 1e3, "y": plaza[3] / 1e3}))
+    standing = pd.DataFrame({"t": np.arange(9.0), "id": 1, "x": 0.0, "y": 0.0})
+    read_raw(standing)
+
+
+def test_real_data_passes_in_silence() -> None:
+    for file in sorted(real_data("atc-1hz").glob("*_test.csv")):
+        read_raw(file)
