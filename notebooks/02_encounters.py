@@ -55,13 +55,14 @@ parameters(
 # %% [markdown]
 # ## Four conditions
 #
-# Over a window of 3 s: (1) the space's corners stay inside the square, (2) nobody but one and the
+# Over a window of 3 s: (1) the space's corners stay inside the area, (2) nobody but one and the
 # same person is ever in it, and that person is there when the window opens, (3) at least 1 m
 # away, (4) the reference pedestrian walks at 0.4 m/s or more.
 
 # %%
 tracks = record.tracks()
-samples = szlib.find_encounters(tracks, square=szlib.ATC_SQUARE, space=space)
+square = record.square(tracks)
+samples = szlib.find_encounters(tracks, square=square, space=space)
 record.keep_encounters(samples)
 count = samples["encounter"].nunique()
 per_day = count / max(tracks["day"].nunique(), 1)
@@ -153,7 +154,7 @@ readings = {
 }
 rows = []
 for name, options in readings.items():
-    found = szlib.find_encounters(tracks, **options)
+    found = szlib.find_encounters(tracks, square=square, **options)
     close = found[found["distance"] <= 2]
     behind = (close["los_angle"].abs() > np.pi / 2).sum()
     rows.append((name, found["encounter"].nunique(), len(close), behind))

@@ -46,7 +46,7 @@ parameters(
     [
         ("standing", f"< {quality.STANDING:g} m in 1 s", MEASURED, "the sensor's noise stays below it"),
         ("gap that ends a track", "0.5 s raw, 1.6 s at 1 Hz", MEASURED, "nobody is bridged across it"),
-        ("square", szlib.ATC_SQUARE, ASSUMED, "only rows near it leave the scan"),
+        ("area", str(record.square()), ASSUMED, "only rows near it leave the scan"),
         ("excluded days", exclude or "none", ASSUMED, "event days, chosen by hand as in the paper"),
     ]
 )

@@ -69,7 +69,8 @@ parameters(
 
 # %%
 tracks = record.tracks()
-samples = szlib.find_encounters(tracks)
+square = record.square(tracks)
+samples = szlib.find_encounters(tracks, square=square)
 pairs = samples.drop_duplicates("encounter")
 counts = pairs["kind"].value_counts()
 record.key |= {"encounters": len(pairs), "companions": int(counts["companions"])}
@@ -83,7 +84,7 @@ counts.to_frame("encounters")
 # apart. Whatever is found now is what emptiness looks like.
 
 # %%
-null = szlib.null_encounters(tracks, shifts=shifts, seed=seed, progress=False)
+null = szlib.null_encounters(tracks, square=square, shifts=shifts, seed=seed, progress=False)
 by_chance = null.encounters.drop_duplicates("encounter")["kind"].value_counts() / shifts
 compared = pd.DataFrame({"seen": counts, "by chance": by_chance.round(1)})
 print(f"{len(pairs)} encounters seen, {len(null.encounters) / shifts:.0f} by chance")

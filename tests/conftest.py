@@ -66,6 +66,24 @@ def make_crowd(
     return make_tracks(*walks)
 
 
+def make_hall(
+    seed: int = 0, *, people: int = 250, pillar: tuple[float, ...] = (), size: tuple[float, float] = (12, 8)
+) -> pd.DataFrame:
+    """People who walk straight through a hall from wall to wall; who would meet the pillar stays away."""
+    rng = np.random.default_rng(seed)
+    walks = []
+    for person in range(people):
+        a, b = rng.uniform(0, size, (2, 2))
+        a[person % 2], b[person % 2] = 0, size[person % 2]
+        span = np.linspace(0, 1, 200)[:, None]
+        path = a + span * (b - a)
+        if pillar and ((path > pillar[:2]) & (path < pillar[2:])).all(axis=1).any():
+            continue
+        duration = round(float(np.hypot(*(b - a))) / 1.2, 1)
+        walks.append(make_walk(a, (b - a) / duration, person=person, begin=2.0 * person, duration=duration))
+    return make_tracks(*walks)
+
+
 def real_data(folder: str) -> Path:
     """A folder of real data; the test is skipped, saying why, where there is none."""
     root = os.environ.get("SZLIB_DATA_DIR")

@@ -35,6 +35,7 @@ ROOMS = {
         "differential",
     ],
     "control.people": ["person", "tracker", "meetings"],
+    "control.step": ["scene", "report", "decision"],
     "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
     "simulation": [
         "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
@@ -65,6 +66,7 @@ PUBLIC = [
     "PlazaSettings", "SCENARIOS", "SimulationLog", "SocialZone", "SolverError", "Square", "SzlibError",
     "ZoneError", "ellipse_distance", "extract_days", "find_encounters", "make_plaza",
     "minimum_enclosing_ellipse", "read_tracks", "remove_outliers", "rollouts", "segment_distance", "simulate",
+    "Tracker",
 ]  # fmt: skip
 PROMISED = [
     "SocialZone.fit", "SocialZone.ellipse", "SocialZone.boundary", "SocialZone.save", "SocialZone.load",

@@ -46,6 +46,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import asin, atan2, cos, hypot, pi, sin, tan
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,7 +60,7 @@ from .people.person import Person, PlacedZone, SpeedZone, place
 from .people.tracker import People, Tracker
 from .problem import TOLERANCE
 from .settings import MPCSettings
-from .step import Rung, Step
+from .step.decision import Rung, Step
 
 OMEGA_MAX = 4.0
 """Turning rate of a common indoor robot whose wheels reach 1 m/s [rad/s] (assumed)."""
@@ -150,7 +151,8 @@ class DifferentialDrive:
         `a_max` bounds the acceleration of the point ahead of the axle.
     omega_max : limit of |omega| [rad/s].
     ahead : distance of the point from the axle [m]; default: the least one at which `settings.v_max` is
-        reached, about v_max / omega_max. With less the robot is slower, with more it needs more room.
+        reached, about v_max / omega_max. With less the robot is slower, with more it needs more room: it
+        passes through what is passable for a double integrator of the radius r_robot + ahead.
 
     Attributes
     ----------
@@ -169,11 +171,11 @@ class DifferentialDrive:
         self,
         zone: Ellipse | SpeedZone,
         *,
-        walls: ArrayLike | Sequence[ArrayLike] = (),
+        walls: Any = (),
         settings: MPCSettings | None = None,
         omega_max: float = OMEGA_MAX,
         ahead: float | None = None,
-        max_people: int = 1,
+        max_people: int | None = None,
         tracker: Tracker | None = None,
     ) -> None:
         self.settings = s = settings or MPCSettings()
@@ -191,9 +193,18 @@ class DifferentialDrive:
         grown = replace(s, r_robot=radius, eps=0.0, margin="euclidean", v_max=self.v_max)
         self.room = radius + self.ahead
         self._point = _Point(zone, walls=walls, settings=grown, max_people=max_people, tracker=tracker)
-        self.zone, self.walls = self._point.zone, self._point.walls
-        self._margins = [wall_margin(wall, s) for wall in self.walls]
+        self.zone = self._point.zone
+        self._measure_walls()
         self.reset()
+
+    def set_walls(self, walls: Any) -> None:
+        """Know these walls from the next step on: as of `MPCCBF.set_walls`."""
+        self._point.set_walls(walls)
+        self._measure_walls()
+
+    def _measure_walls(self) -> None:
+        self.walls = self._point.walls
+        self._margins = [wall_margin(wall, self.settings) for wall in self.walls]
 
     def reset(self) -> None:
         """Forget the last plan, command and goal."""
@@ -219,18 +230,17 @@ class DifferentialDrive:
             begins at the velocity that was planned for the point; at what (v, omega) say where that is
             farther from the last command than a_max dt: the robot was held back, or pushed.
         goal : (x, y) of the disc's centre [m].
-        people, ids, stamps, now : as of `MPCCBF.step`.
-
-        Raises
-        ------
-        SolverError : as of `MPCCBF.step`.
+        people, ids, stamps, now : as of `MPCCBF.step`, and so is what is raised.
         """
         began = perf_counter()
         own = finite("state", state, (5,) if np.size(state) == 5 else (3,)).tolist()
         x, y, theta = own[:3]
         there, lever = finite("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
-        if not self._told:
-            self._check_goal(there)
+        if not self._told and min(self.barriers(there), default=0.0) < 0:
+            raise SolverError(
+                f"the goal {there.tolist()} cannot be reached: it lies too close to a wall; choose one "
+                f"{self.room:.2f} m off all walls"
+            )
         start = (*(own[:2] + lever).tolist(), *self._velocity(theta, own[3:]))
         point = self._point.step(start, there + lever, people, ids=ids, stamps=stamps, now=now)
         states, controls = self._follow(own, point.predicted[1:, :2])
@@ -253,11 +263,10 @@ class DifferentialDrive:
         x, y = finite("position", position, (2,)).tolist()
         return np.array(self._barriers([place(who, self._point.zone_of(who)) for who in people], x, y))
 
-    def _barriers(self, zones: Sequence[PlacedZone], x: float, y: float, seconds: float = 0.0) -> list[float]:
-        """h of the disc at (x, y), with people so many seconds later."""
+    def _barriers(self, zones: Sequence[PlacedZone], x: float, y: float, t: float = 0.0) -> list[float]:
+        """h of the disc at (x, y), with people t seconds later."""
         s = self.settings
-        seen = [(zone, x - seconds * zone.vx, y - seconds * zone.vy) for zone in zones]
-        h = [barrier(zone.distance(px, py), s.r_robot, s.eps) for zone, px, py in seen]
+        h = [barrier(z.distance(x - t * z.vx, y - t * z.vy), s.r_robot, s.eps) for z in zones]
         for wall, margin in zip(self.walls, self._margins, strict=True):
             h.append(barrier(segment_formula(x, y, *wall.ravel().tolist()), s.r_robot, margin))
         return h
@@ -271,14 +280,6 @@ class DifferentialDrive:
             return self._planned
         c, s, sideways = cos(theta), sin(theta), self.ahead * omega
         return [v * c - sideways * s, v * s + sideways * c]
-
-    def _check_goal(self, goal: Array) -> None:
-        h = self.barriers(goal)
-        if (h < 0).any():
-            raise SolverError(
-                f"the goal {goal.tolist()} cannot be reached: it lies too close to the wall "
-                f"{self.walls[int(h.argmin())].tolist()}; choose one {self.room:.2f} m off all walls"
-            )
 
     def _follow(self, own: list[float], points: Array) -> tuple[list[Array], list[Array]]:
         """The disc's states, now and after each of the commands that bring the point to points (N, 2)."""

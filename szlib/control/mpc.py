@@ -40,11 +40,12 @@ from .barriers import Array, barrier, finite, segment_formula, walls_of
 from .distances import wall_margin
 from .people.meetings import subgoal
 from .people.person import Person, SpeedZone, as_ellipse, circle_around, place
-from .people.tracker import People, Seen, Tracker
+from .people.tracker import People, Tracker
 from .settings import MPCSettings
 from .solvers.ladder import solve_with_fallbacks
 from .solvers.sizes import Sizes, slots, taken
-from .step import Scene, Step, terminal_of
+from .step.decision import Step, terminal_of
+from .step.scene import Scene
 
 
 class MPCCBF:
@@ -174,7 +175,8 @@ class MPCCBF:
         self._moved, self._n_people = True, len(seen.people)
         solver = self._sizes.of(self._n_people, len(self.walls))
         self._sizes.budget.begin()
-        placed = [place(person, self.zone_of(person)) for person in seen.people]
+        kept = [self.zone_of(person) for person in seen.people]
+        placed = [place(person, zone) for person, zone in zip(seen.people, kept, strict=True)]
         if seen.lost:
             target = self._stop(x)
         else:
@@ -195,7 +197,9 @@ class MPCCBF:
             cost=numbers.cost,
             solve_time=perf_counter() - began,
             timed_out=timed_out,
-            scene=Scene((gx, gy), seen, placed, self._segments, self._margins, self.settings),
+            scene=Scene(
+                (*x.tolist(),), (gx, gy), seen, kept, placed, self._segments, self._margins, self.settings
+            ),
         )
 
     def _clock(self, now: float | None, stamps: ArrayLike | None) -> float:
@@ -240,9 +244,9 @@ class MPCCBF:
         """True if the goal cannot be reached, h < 0 there: for a wall, or for somebody who stands."""
         x, y = finite("goal", goal, (2,)).tolist()
         placed = [place(who, self.zone_of(who)) for who in people]
-        return Scene(
-            (x, y), Seen(tuple(people)), placed, self._segments, self._margins, self.settings
-        ).goal_blocked
+        return any(zone.blocks((x, y), self.settings) for zone in placed) or bool(
+            (self.barriers(goal) < 0).any()
+        )
 
     def _check_goal(self, goal: tuple[float, float]) -> None:
         h = self.barriers(goal)

@@ -30,6 +30,9 @@ EXPECTED = (
 CELL, PEOPLE = 0.5, 3
 """People walked everywhere where on each cell so wide [m] so many walked (measured: finds the rectangle of
 the ATC mall that was found by eye, and the open hall of Grand Central; cells of 1 m overlook pillars)."""
+TYPICAL, WIDEST = 4 * PEOPLE, 2.0
+"""While the median cell where anybody walked saw no more people, cells are doubled, up to this width [m]:
+with few people a cell is empty by chance (measured on plazas of 100 to 2,600 encounters)."""
 WALKING = 0.4
 """Who is slower [m/s] stands, queues or sits (paper: 0.4 for a reference pedestrian)."""
 NARROWEST = float(np.hypot(PAPER_SPACE.length, PAPER_SPACE.width))
@@ -85,7 +88,7 @@ def area_for(tracks: pd.DataFrame, area: object) -> Area:
     return walked_area(tracks) if isinstance(area, str) and area.strip() == AUTO else as_area(area)
 
 
-def walked_area(tracks: pd.DataFrame, *, cell: float = CELL, people: int = PEOPLE) -> Square:
+def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, people: int = PEOPLE) -> Square:
     """The largest rectangle along the axes in which people walked everywhere, wide enough to watch them in.
 
     Everywhere means: on each square `cell` [m] at least `people` different people walked, at `WALKING`
@@ -97,19 +100,23 @@ def walked_area(tracks: pd.DataFrame, *, cell: float = CELL, people: int = PEOPL
     Parameters
     ----------
     tracks : a track table as from `szlib.read_tracks`.
-    cell, people : see above; the cell grows with sites wider than 200 m.
+    cell, people : see above; by default the cell is `CELL`, or wider where few people walked (`TYPICAL`);
+        it grows with sites wider than 200 m.
 
     Raises
     ------
     DataError : there is no such rectangle, or the table lacks a column.
     """
     check_columns(tracks, COLUMNS)
-    if not (0.05 <= cell < np.inf and people >= 1):
+    if not ((cell is None or 0.05 <= cell < np.inf) and people >= 1):
         raise DataError(f"expected cell >= 0.05 m and people >= 1; got {cell} m, {people}")
     walks = tracks[np.hypot(*tracks[["vx", "vy"]].to_numpy(float).T) >= WALKING]
     if len(walks) == 0:
         raise DataError(f"nobody walks at {WALKING} m/s or faster in these tracks: no area can be found")
-    walked, corner, cell = _walked(walks, cell, people)
+    count, corner, width = _counted(walks, cell or CELL)
+    while cell is None and np.median(count[count > 0]) <= TYPICAL and 2 * width <= WIDEST:
+        count, corner, width = _counted(walks, 2 * width)
+    walked, cell = count >= people, width
     side = int(np.ceil(NARROWEST / cell))
     rows, columns, share = _largest(walked, side, np.inf)
     if cell * max(rows[1] - rows[0], columns[1] - columns[0]) < SHORTEST:
@@ -133,8 +140,8 @@ def walked_area(tracks: pd.DataFrame, *, cell: float = CELL, people: int = PEOPL
     return found
 
 
-def _walked(walks: pd.DataFrame, cell: float, people: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """On which cells so many people walked, (nx, ny); the lowest corner [m]; the side of a cell [m]."""
+def _counted(walks: pd.DataFrame, cell: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """How many people walked on each cell, (nx, ny); the lowest corner [m]; the side of a cell [m]."""
     at = walks[["x", "y"]].to_numpy(float)
     low, high = np.quantile(at, [_REAL_TRACKS, 1 - _REAL_TRACKS], axis=0)
     while (high - low).max() / cell > _MOST_CELLS:
@@ -147,7 +154,7 @@ def _walked(walks: pd.DataFrame, cell: float, people: int) -> tuple[np.ndarray, 
     person = walks.groupby(["day", "id"], observed=True).ngroup().to_numpy()[within]
     visits = np.unique(person * (shape[0] * shape[1]) + spot)
     count = np.bincount(visits % (shape[0] * shape[1]), minlength=shape[0] * shape[1])
-    return count.reshape(shape) >= people, first * cell, cell
+    return count.reshape(shape), first * cell, cell
 
 
 def _largest(walked: np.ndarray, side: int, loss: float) -> tuple[tuple[int, int], tuple[int, int], float]:

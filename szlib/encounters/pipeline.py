@@ -32,6 +32,18 @@ from .kinds import KINDS
 from .search import SAMPLE_COLUMNS, find_encounters
 from .streaming import read_near_square
 
+_ADVICE = {
+    "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
+    "square": 'give an area in which people walked: four numbers or a polygon, or "auto"',
+    "slow": "are unit and frame rate right? else pass a smaller min_speed",
+    "velocity": "tracks are single points: pass a longer max_gap, or join the ids of one person",
+    "ends": "tracks are short, or torn: pass a longer max_gap, or a shorter duration",
+    "nobody": "people were never near each other: more data, or a larger space",
+    "several": "it was crowded: a smaller space",
+    "nearer": "people came into view late: pass a smaller min_distance",
+    "somebody else": "more data, or other conditions (szlib.find_encounters)",
+}
+"""What to do where a condition, known by a word of it, has turned everybody away."""
 _FORMAT, _VERSION = "szlib.extraction", 4
 
 
@@ -72,10 +84,12 @@ class Chain:
         """Every parameter as JSON values; the area as text that reads back."""
         return asdict(self) | {"square": None if self.square is None else str(self.square)}
 
-    def settled(self, files: Sequence[Path]) -> Chain:
-        """The same with the area that these files have where none was given."""
+    def settled(self, files: Sequence[Path], tracks: pd.DataFrame | None = None) -> Chain:
+        """The same with the area that these files have where none was given; `tracks`: theirs, if known."""
         if area := self._known_area(files):
             return replace(self, square=area)
+        if tracks is not None:
+            return replace(self, square=walked_area(tracks))
         with warnings.catch_warnings():  # rows set aside are told when the day itself is read
             warnings.simplefilter("ignore", DataWarning)
             tracks = to_clock(self._read(files), max_gap=self.max_gap)
@@ -113,6 +127,23 @@ class Chain:
             return read_raw(files, tz=self.tz, **given)
         of = {"square": near, "duration": self.duration, "max_gap": self.max_gap}
         return read_near_square(files[0], tz=self.tz, **of, **given)  # type: ignore[arg-type]
+
+
+def check_met(samples: pd.DataFrame) -> pd.DataFrame:
+    """The samples, where anybody met; else DataError: the stage that was emptied, by what, and what to do."""
+    if len(samples):
+        return samples
+    stages = [stage for stage in funnels.of(samples) if stage["entered"]]
+    emptied = next((stage for stage in stages if not stage["kept"]), None)
+    if emptied is None:
+        raise DataError("the table of samples is empty, and has no funnel that says why")
+    rows = ", ".join(f"{count:,} {reason}" for reason, count in emptied["set_aside"].items())
+    last = list(emptied["set_aside"])[-1]
+    advice = next((told for words, told in _ADVICE.items() if words in last), _ADVICE["somebody else"])
+    raise DataError(
+        f"nobody met in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
+        f"({emptied['stage']}) none is left: {rows}.  What emptied it: {last}; {advice}"
+    )
 
 
 def no_samples() -> pd.DataFrame:

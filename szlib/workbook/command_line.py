@@ -88,8 +88,8 @@ def _show_warning(message: Warning | str, *_: object) -> None:
         print(f"szlib: {printable(message)}", file=sys.stderr)
 
 
-def inspect(file: str | Path) -> str:
-    """The funnel of a file down to its encounters, one line for each count, as a table to read."""
+def inspect(file: str | Path, *, area: str = "") -> str:
+    """The funnel of a file down to its encounters in the area, a line for each count, as a table to read."""
     from ..encounters.pipeline import Chain
     from ..tracks import datasets, funnels
 
@@ -98,18 +98,19 @@ def inspect(file: str | Path) -> str:
         raise DataError(f"{file}: are {len(files)} files; expected one: {', '.join(map(str, files[:5]))}")
     with warnings.catch_warnings():  # the table shows what a warning would
         warnings.simplefilter("ignore", DataWarning)
-        samples = Chain().encounters(files)
+        samples = Chain(square=area or None).encounters(files)
     table = funnels.table(funnels.of(samples))
     table["stage"] = table["stage"].where(~table["stage"].duplicated(), "")
     wide = {name: int(table[name].str.len().max()) for name in ("stage", "what")}
-    return "\n".join(
+    where = f"area {samples.attrs['area']}\n" if "area" in samples.attrs else ""
+    return where + "\n".join(
         f"{row.stage:<{wide['stage']}}  {row.what:<{wide['what']}} {row.rows:>12,}"
         for row in table.itertuples()
     )
 
 
 def _inspect(options: argparse.Namespace) -> int:
-    print(inspect(options.file))
+    print(inspect(options.file, area=_area(options)))
     return 0
 
 
@@ -118,13 +119,21 @@ def _extract(options: argparse.Namespace) -> int:
     from ..parallel import cluster
 
     with cluster(options.scheduler):
-        done = extract_days(options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude)
+        done = extract_days(
+            options.data,
+            out=options.out,
+            n_jobs=options.jobs,
+            exclude=options.exclude,
+            square=_area(options) or None,
+        )
     print(done)
     return 1 if len(done.failed) else 0
 
 
 def _run(options: argparse.Namespace) -> int:
     parameters = dict(_assignment(text) for text in options.parameter)
+    if area := _area(options):
+        parameters["area"] = area
     _check_workbook()
     from . import places
     from .runner import run
@@ -144,6 +153,15 @@ def _run(options: argparse.Namespace) -> int:
         error = summary["notebooks"][refused[0]]["error"]
         raise SzlibError(f"{', '.join(refused)}: could not be run: {error}; what was finished stays")
     return 0 if summary["passed"] else 1
+
+
+def _area(options: argparse.Namespace) -> str:
+    """The area that was asked for, as it is recorded: "" for the data's own, "auto", numbers or a polygon."""
+    if options.auto or not (options.square or options.polygon):
+        return "auto" if options.auto else ""
+    from ..encounters.areas import as_area
+
+    return str(as_area(options.square or Path(options.polygon)))
 
 
 def _check_workbook() -> None:
@@ -228,6 +246,15 @@ def _parser() -> argparse.ArgumentParser:
     for command in (run, extract):
         command.add_argument("--scheduler", metavar="ADDRESS", help="hand the work to a Dask cluster")
     for command in (run, inspect, extract):
+        area = command.add_mutually_exclusive_group()
+        area.add_argument(
+            "--square", nargs=4, type=float, metavar=("X0", "X1", "Y0", "Y1"),
+            help="where encounters are found [m] (default: the mall's square for ATC files; else --auto)",
+        )  # fmt: skip
+        area.add_argument("--polygon", metavar="FILE", help="the same as a polygon: WKT or GeoJSON [m]")
+        area.add_argument(
+            "--auto", action="store_true", help="the largest rectangle in which people walked everywhere"
+        )
         command.add_argument(
             "--memory", type=_memory, metavar="SIZE",
             help="what may be used, such as 4GB (default: 80 %% of what the machine has left)",

@@ -98,7 +98,8 @@ def withdraw(folder: Path, notebooks: Iterable[str]) -> None:
             file.unlink(missing_ok=True)
         except OSError as error:
             raise _in_the_way(file, error) from error
-    for name in ("encounters.parquet", "encounters.parquet.json", "zone.json", "zone.json.json"):
+    kept = ("area.txt", "encounters.parquet", "zone.json")
+    for name in (*kept, *(f"{name}.json" for name in kept)):
         if (folder / name).is_dir():
             raise _in_the_way(folder / name, IsADirectoryError("it is a folder"))
 

@@ -12,7 +12,7 @@ import json
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,9 @@ import pandas as pd
 from pandas.io.formats.style import Styler
 
 from .. import __version__
-from ..encounters.pipeline import Chain
+from ..encounters.areas import as_area
+from ..encounters.geometry import Area
+from ..encounters.pipeline import Chain, check_met
 from ..encounters.search import find_encounters
 from ..errors import DataError, ZoneError
 from ..files import file_content, keep, kept, own_folder, sign, write_file
@@ -50,8 +52,9 @@ class NotebookRecord:
     name : of the notebook, "NN_topic".
     variables : the notebook's, `globals()`, of which these and those of its cell tagged "parameters" count:
         data: "synthetic" (the plaza, written among the results), or as in `szlib.tracks.datasets.find`;
-        area: where encounters are looked for, "" for the data's own; seed: of everything random, the
-        synthetic plaza included; results: folder of all results, `places.RESULTS` where it is not given.
+        area: where encounters are looked for, as for `szlib.as_area`, "auto", or "" for the data's own;
+        seed: of everything random, the synthetic plaza included; results: folder of all results,
+        `places.RESULTS` where it is not given.
 
     Attributes
     ----------
@@ -104,10 +107,24 @@ class NotebookRecord:
         content = kept(self.out / "encounters.parquet", self._source())
         if content is not None:
             return pd.read_parquet(io.BytesIO(content))
-        return self.keep_encounters(find_encounters(self.tracks()))
+        tracks = self.tracks()
+        return self.keep_encounters(find_encounters(tracks, square=self.square(tracks)))
+
+    def square(self, tracks: pd.DataFrame | None = None) -> Area:
+        """Where encounters are looked for: the area given, or the data's own; found once, kept in area.txt.
+
+        `tracks`, those of the data, spare reading them again where people's walks must tell the area.
+        """
+        if content := kept(self.out / "area.txt", self._source()):
+            return as_area(content.decode())
+        chain = Chain(square=self.area or None)
+        area = chain.settled(self.files(), tracks).square
+        keep(self.out / "area.txt", str(area).encode(), self._source())
+        return as_area(area)
 
     def keep_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
-        """Leave the encounters for the notebooks to come."""
+        """Leave the encounters for the notebooks to come; DataError, saying why, where there are none."""
+        check_met(samples)
         content = io.BytesIO()
         samples.to_parquet(content)
         keep(self.out / "encounters.parquet", content.getvalue(), self._source())
@@ -183,7 +200,7 @@ class NotebookRecord:
         files = [[file.name, *file_content(file)] for file in self.files()]
         made = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "area": self.area}
         made["szlib"] = __version__
-        return json.loads(json.dumps(made | {"parameters": asdict(Chain())}))  # type: ignore[no-any-return]
+        return json.loads(json.dumps(made | {"parameters": Chain().parameters()}))  # type: ignore[no-any-return]
 
 
 def data_files(data: str | Sequence[str], *, folder: Path, seed: int) -> list[Path]:

@@ -22,6 +22,7 @@ import papermill
 from tqdm import tqdm
 
 from .. import __version__, memory
+from ..encounters.areas import AUTO, as_area
 from ..errors import DataError, SzlibError
 from ..files import file_content, held, printable, sweep_temporary, temporary_folder, write_file
 from ..parallel import bounded, cluster, end_with
@@ -64,7 +65,8 @@ def run(
     Returns
     -------
     The summary: passed, and for each notebook its status ("done"; "error": the notebook broke off;
-    "refused": data, disk or memory do not allow it), seconds, checks (name, passed, value) and key figures.
+    "refused": data, disk or memory do not allow it; "not started": one that comes before was refused),
+    seconds, checks (name, passed, value) and key figures.
     It is written to ``summary.json`` in that folder, together with what earlier runs of other notebooks
     left there with the same parameters, data and version.  What a run replaces is withdrawn first.
 
@@ -76,6 +78,8 @@ def run(
     sources = _chosen(only)
     defaults = check_parameters(parameters or {}, sources)
     given = {name: value for name, value in (parameters or {}).items() if value != defaults[name]}
+    if given.get("area", AUTO) != AUTO:  # in one form, whatever file or text it came from
+        given["area"] = str(as_area(given["area"]))
     asked = places.absolute(data)
     files = [] if asked == datasets.SYNTHETIC else datasets.find(asked)
     results = places.root(out)
@@ -105,12 +109,15 @@ def _outcomes(
         rest = sources[len(first) :]
         with cluster(scheduler) as client, _pool(client, jobs) as pool:
             for batch in [*([source] for source in first), rest]:
+                if any(o["status"] == "refused" for o in outcomes.values()):
+                    break  # what comes later needs what could not be made
                 for future in as_completed(_submit(pool, batch, given, home, share)):
                     name, outcome = future.result()
                     outcomes[name] = outcome
                     bar.update()
                     bar.set_postfix_str(f"{name} {outcome['status']}")
-    return outcomes
+    left = {"status": summary.NOT_STARTED, "seconds": 0.0, **_EMPTY_RECORD}
+    return {source.stem: outcomes.get(source.stem, left) for source in sources}
 
 
 def _identity(data: str | Sequence[str], files: Sequence[Path], given: Mapping[str, Any]) -> dict[str, Any]:

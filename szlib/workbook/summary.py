@@ -10,6 +10,8 @@ from typing import Any
 from ..errors import StorageError
 from ..files import write_file
 
+NOT_STARTED = "not started"
+"""The status of a notebook that needs what another could not make."""
 PARAMETERS, SUMMARY = "parameters.json", "summary.json"
 
 
@@ -69,7 +71,7 @@ def _read(file: Path) -> dict[str, Any]:
 
 def render(summary: Mapping[str, Any]) -> str:
     """The table that ends a run: notebook, time, checks passed, key figures; then what did not hold."""
-    lines = [f"{'notebook':<20} {'seconds':>7} {'checks':>7}  key figures"]
+    lines = [f"{'notebook':<20} {'seconds':>7} {'checks':>11}  key figures"]
     notes = []
     for name, record in summary["notebooks"].items():
         checks = [c for c in record["checks"] if c["kind"] == "check"]
@@ -81,7 +83,7 @@ def render(summary: Mapping[str, Any]) -> str:
         key = ", ".join(
             f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in record["key_figures"].items()
         )
-        lines.append(f"{name:<20} {record['seconds']:>7.1f} {held:>7}  {key}")
+        lines.append(f"{name:<20} {record['seconds']:>7.1f} {held:>11}  {key}")
         notes += [
             f"{name}: {c['name']}: {c['result']} ({c['value']})" for c in record["checks"] if not c["passed"]
         ]

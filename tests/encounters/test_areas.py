@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
-from conftest import make_crowd, make_tracks, make_walk
+from conftest import make_crowd, make_hall, make_tracks, make_walk
 from hypothesis import given, strategies
 from matplotlib.path import Path as Outline
 from test_search import ROOM, assert_same_samples
@@ -251,24 +251,6 @@ def test_the_null_model_takes_any_area() -> None:
 # --- where people walked -----------------------------------------------------------------------------
 
 
-def walkers(
-    seed: int = 0, *, people: int = 250, pillar: tuple[float, ...] = (), size: tuple[float, float] = (12, 8)
-) -> pd.DataFrame:
-    """People who walk straight through a hall from wall to wall; who would meet the pillar stays away."""
-    rng = np.random.default_rng(seed)
-    walks = []
-    for person in range(people):
-        a, b = rng.uniform(0, size, (2, 2))
-        a[person % 2], b[person % 2] = 0, size[person % 2]
-        span = np.linspace(0, 1, 200)[:, None]
-        path = a + span * (b - a)
-        if pillar and ((path > pillar[:2]) & (path < pillar[2:])).all(axis=1).any():
-            continue
-        duration = round(float(np.hypot(*(b - a))) / 1.2, 1)
-        walks.append(make_walk(a, (b - a) / duration, person=person, begin=2.0 * person, duration=duration))
-    return make_tracks(*walks)
-
-
 def best(walked: np.ndarray, side: int, loss: float) -> float:
     """The most that a rectangle is worth, by trying all of them."""
     nx, ny = walked.shape
@@ -295,15 +277,15 @@ def test_the_largest_rectangle_is_the_best_of_all(loss: float, side: int) -> Non
 
 
 def test_a_hall_is_found_to_its_walls() -> None:
-    found = szlib.walked_area(walkers())
+    found = szlib.walked_area(make_hall())
     assert shapely.box(found.x[0], found.y[0], found.x[1], found.y[1]).symmetric_difference(HALL).area < 8
-    assert found == area_for(walkers(), "auto")
-    samples = find_encounters(walkers(), square="auto")
+    assert found == area_for(make_hall(), "auto")
+    samples = find_encounters(make_hall(), square="auto")
     assert samples.attrs["area"] == str(found)
 
 
 def test_a_pillar_is_left_out() -> None:
-    tracks = walkers(people=2500, pillar=(14, 9, 16, 11), size=(30, 20))
+    tracks = make_hall(people=2500, pillar=(14, 9, 16, 11), size=(30, 20))
     found = szlib.walked_area(tracks)
     around = shapely.box(found.x[0], found.y[0], found.x[1], found.y[1])
     assert around.intersection(shapely.box(14.5, 9.5, 15.5, 10.5)).area == 0
@@ -311,7 +293,7 @@ def test_a_pillar_is_left_out() -> None:
 
 
 def test_who_stands_who_jumps_and_what_they_are_called_changes_nothing() -> None:
-    tracks = walkers()
+    tracks = make_hall()
     found = szlib.walked_area(tracks)
     queue = [make_walk((-3 + 0.1 * k, 4), (0.05, 0), person=1000 + k) for k in range(20)]
     jump = [make_walk((4000, -3000), (1, 0), person=2000, duration=0.3)]
@@ -324,15 +306,15 @@ def test_who_stands_who_jumps_and_what_they_are_called_changes_nothing() -> None
 
 
 def test_the_area_moves_with_the_world() -> None:
-    found = szlib.walked_area(walkers())
-    moved = szlib.walked_area(walkers().assign(x=lambda t: t["x"] + 37.5, y=lambda t: t["y"] - 12))
+    found = szlib.walked_area(make_hall())
+    moved = szlib.walked_area(make_hall().assign(x=lambda t: t["x"] + 37.5, y=lambda t: t["y"] - 12))
     assert moved == Square(x=(found.x[0] + 37.5, found.x[1] + 37.5), y=(found.y[0] - 12, found.y[1] - 12))
-    turned_by_right_angle = szlib.walked_area(turned_tracks(walkers(), np.pi / 2, (0.0, 0.0)))
+    turned_by_right_angle = szlib.walked_area(turned_tracks(make_hall(), np.pi / 2, (0.0, 0.0)))
     assert turned_by_right_angle.area == pytest.approx(found.area, abs=8)
 
 
 def test_furniture_is_told() -> None:
-    tracks = walkers(people=900, pillar=(5.2, 3.2, 6.8, 4.8))
+    tracks = make_hall(people=900, pillar=(5.2, 3.2, 6.8, 4.8))
     with pytest.warns(szlib.DataWarning, match="of the area found .* nobody walked"):
         found = szlib.walked_area(tracks)
     assert found.area > 60
@@ -342,9 +324,9 @@ def test_where_there_is_no_area_it_is_told() -> None:
     with pytest.raises(szlib.DataError, match="nobody walks"):
         szlib.walked_area(make_tracks(make_walk((0, 0), (0.1, 0))))
     with pytest.raises(szlib.DataError, match="no area was found"):
-        szlib.walked_area(walkers(size=(30, 3)))
+        szlib.walked_area(make_hall(size=(30, 3)))
     with pytest.raises(szlib.DataError, match="people >= 1"):
-        szlib.walked_area(walkers(), people=0)
+        szlib.walked_area(make_hall(), people=0)
 
 
 def test_the_square_of_the_mall_is_found_again(real_tracks: pd.DataFrame) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import szlib
-from szlib import parallel
+from szlib import ATC_SQUARE, parallel
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.workbook.command_line import main
@@ -23,7 +23,8 @@ def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureF
     spoilt = day.with_name("spoilt.csv")
     spoilt.write_text(day.read_text() + "1,2\n")
     assert main(["inspect", str(spoilt)]) == 0
-    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    area, *lines = (line.split() for line in capsys.readouterr().out.splitlines())
+    assert area == ["area", *str(ATC_SQUARE).split()]
     counts = [int(line[-1].replace(",", "")) for line in lines]
     assert lines[0][:3] == ["read", "spoilt.csv", "entered"]
     assert counts[0] == len(spoilt.read_text().splitlines())

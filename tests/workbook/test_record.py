@@ -15,7 +15,8 @@ from szlib.workbook.record import NotebookRecord, parameters
 def record(tmp_path):
     file = tmp_path / "mine.csv"
     file.write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n")
-    return NotebookRecord("01_test", {"data": str(file), "results": tmp_path / "results"})
+    given = {"data": str(file), "results": tmp_path / "results", "area": "0 12 0 8"}
+    return NotebookRecord("01_test", given)
 
 
 def test_checks_and_claims_are_written_down(record, capsys):
@@ -35,7 +36,8 @@ def test_checks_and_claims_are_written_down(record, capsys):
 def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monkeypatch):
     made = []
 
-    def fake(tracks):
+    def fake(tracks, square):
+        assert square == szlib.Square(x=(0, 12), y=(0, 8))
         made.append(len(tracks))
         return pd.DataFrame({"encounter": [0], "distance": [1.0]})
 
@@ -43,7 +45,7 @@ def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monk
     record.encounters()
     record.encounters()
     assert len(made) == 1
-    other = {"data": record.data, "results": record.out.parents[1], "seed": 1}
+    other = {"data": record.data, "results": record.out.parents[1], "seed": 1, "area": record.area}
     NotebookRecord("02_test", other).encounters()
     assert len(made) == 2
     record.files()[0].write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n2,1,2,0\n")

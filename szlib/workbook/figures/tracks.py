@@ -11,6 +11,8 @@ from .style import BLUE, RED, SEQUENCE, axes, metres, outline
 
 _MOST_CELLS = 2000
 """Of a map, along each axis: cells grow with the site."""
+_MARGIN = 0.02
+"""Left free around a map, as a share of it: an area may end where the data ends."""
 
 
 def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes | None = None) -> Axes:
@@ -26,7 +28,9 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     ax.figure.colorbar(image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$")
     ax.add_patch(outline(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
     ax.legend(loc="lower right")
-    ax.margins(0.02)
+    for axis, edge, ends in zip("xy", edges, (area.box.x, area.box.y), strict=True):
+        low, high = min(edge[0], ends[0]), max(edge[-1], ends[1])
+        ax.set(**{f"{axis}lim": (low - _MARGIN * (high - low), high + _MARGIN * (high - low))})
     return metres(ax, "Where people were seen, and where they are watched")
 
 

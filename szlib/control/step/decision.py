@@ -2,61 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from math import hypot
-from typing import Literal, NamedTuple, cast, get_args
+from dataclasses import dataclass
+from typing import Literal, cast, get_args
 
 import numpy as np
 
-from .barriers import Array, barrier, euclidean_segment_formula, segment_formula
-from .people.person import BODY_RADIUS, Person, PlacedZone
-from .people.tracker import Seen
-from .problem import TOLERANCE
-from .settings import MPCSettings, Terminal
+from ..barriers import Array
+from ..problem import TOLERANCE
+from ..settings import MPCSettings, Terminal
+from .report import Report, described, verified
+from .scene import Scene
 
 Rung = Literal["warm", "cold", "kept", "relaxed", "braking"]
 RUNGS: tuple[Rung, ...] = get_args(Rung)
 Status = Literal["optimal", "kept", "relaxed", "braking"]
 
 
-class Scene(NamedTuple):
-    """What was asked: the goal, people as the tracker sees them, their zones, walls with their margins."""
-
-    goal: tuple[float, float]
-    seen: Seen
-    zones: Sequence[PlacedZone]
-    walls: Sequence[Sequence[float]]
-    margins: Sequence[float]
-    settings: MPCSettings
-
-    @property
-    def people(self) -> tuple[Person, ...]:
-        """Everybody to be respected, in the order of `Step.h`."""
-        return self.seen.people
-
-    @property
-    def goal_blocked(self) -> bool:
-        """True if h < 0 at the goal, for a wall or for somebody who stands there."""
-        if any(zone.blocks(self.goal, self.settings) for zone in self.zones):
-            return True
-        h = (
-            barrier(segment_formula(*self.goal, *wall), self.settings.r_robot, margin)
-            for wall, margin in zip(self.walls, self.margins, strict=True)
-        )
-        return any(each < 0 for each in h)
-
-    def gaps(self, x: float, y: float, seconds: float) -> list[float]:
-        """Euclidean gaps from the robot's disc at (x, y) to bodies, so many seconds ahead, and walls [m]."""
-        gaps = []
-        for person in self.people:
-            (px, py), (vx, vy) = person.position, person.velocity
-            gaps.append(hypot(x - px - seconds * vx, y - py - seconds * vy) - BODY_RADIUS)
-        gaps += [euclidean_segment_formula(x, y, *wall) for wall in self.walls]
-        return [gap - self.settings.r_robot for gap in gaps]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Step:
     """What the controller decided, and how far it can be relied upon.
 
@@ -87,7 +49,7 @@ class Step:
     cost: float
     solve_time: float
     timed_out: bool
-    scene: Scene = field(repr=False)
+    scene: Scene
 
     @property
     def status(self) -> Status:
@@ -145,6 +107,13 @@ class Step:
         if not self.feasible or self.scene.seen.lost or (self.h < -TOLERANCE).any():
             return False
         return min(self._gaps(0) + self._gaps(1), default=0.0) >= -TOLERANCE
+
+    def verify(self) -> Report:
+        """Check this step again, by formulas of the report's own, from the scene as it was given."""
+        return verified(self)
+
+    def __repr__(self) -> str:
+        return described(self, self.verify())
 
     def _gaps(self, k: int) -> list[float]:
         x, y = self.predicted[k, :2].tolist()

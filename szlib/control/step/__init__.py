@@ -1,0 +1,18 @@
+"""What the controller decided, and how far it can be relied upon.
+
+scene     what was asked: the robot, its goal, people and walls
+report    a step checked again by formulas of its own, and told in words: `Report`
+decision  what was decided: `Step`
+"""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach(
+    __name__,
+    submodules=["scene", "report", "decision"],
+    submod_attrs={
+        "scene": ["Scene"],
+        "report": ["Report"],
+        "decision": ["RUNGS", "Rung", "Status", "Step", "status_of", "terminal_of"],
+    },
+)

@@ -1,0 +1,158 @@
+"""The area of a run: asked for in any form, found where none is, recorded; and where nobody met."""
+
+from __future__ import annotations
+
+import json
+
+import pandas as pd
+import pytest
+import shapely
+from conftest import make_crowd, make_hall, make_tracks, make_walk
+
+import szlib
+from szlib.encounters.pipeline import check_met
+from szlib.workbook.command_line import main
+from szlib.workbook.record import NotebookRecord
+
+HALL = shapely.box(0, 0, 12, 8)
+
+
+@pytest.fixture
+def hall(tmp_path):
+    file = tmp_path / "hall.csv"
+    make_hall()[["t", "id", "x", "y"]].to_csv(file, index=False)
+    return file
+
+
+def record_of(tmp_path, file, **variables):
+    given = {"data": [str(file)], "seed": 0, "results": str(tmp_path / "out"), **variables}
+    return NotebookRecord("99_test", given)
+
+
+# --- asked for ---------------------------------------------------------------------------------------
+
+
+def test_inspect_takes_an_area_in_every_form(hall, tmp_path, capsys):
+    (tmp_path / "hall.wkt").write_text(HALL.wkt)
+    told = []
+    for options in (["--square", "0", "12", "0", "8"], ["--polygon", str(tmp_path / "hall.wkt")]):
+        assert main(["inspect", *options, str(hall)]) == 0
+        told.append(capsys.readouterr().out)
+    assert told[0] == told[1]
+    assert told[0].startswith("area 0.0 12.0 0.0 8.0\n")
+    assert main(["inspect", str(hall), "--square", "-5.5", "6", "-1", "8"]) == 0
+    assert capsys.readouterr().out.startswith("area -5.5 6.0 -1.0 8.0\n")
+
+
+def test_what_is_nobodys_is_found(hall, capsys):
+    for options in ([], ["--auto"]):
+        assert main(["inspect", *options, str(hall)]) == 0
+        found = szlib.as_area(capsys.readouterr().out.splitlines()[0].removeprefix("area "))
+        assert found == szlib.walked_area(szlib.read_tracks(hall))
+
+
+def test_extract_takes_an_area_and_tells_it(hall, tmp_path, capsys):
+    assert main(["extract", str(hall), "--out", str(tmp_path / "days"), "--square", "0", "12", "0", "8"]) == 0
+    assert "area: 0.0 12.0 0.0 8.0" in capsys.readouterr().out
+    record = json.loads((tmp_path / "days" / "hall.json").read_text())
+    assert record["parameters"]["square"] == "0.0 12.0 0.0 8.0"
+
+
+def test_one_area_only(hall, capsys):
+    with pytest.raises(SystemExit):
+        main(["inspect", str(hall), "--auto", "--square", "0", "12", "0", "8"])
+    assert "not allowed with" in capsys.readouterr().err
+    assert main(["inspect", str(hall), "--polygon", "no/such.wkt"]) == 2
+    assert "no/such.wkt" in capsys.readouterr().err
+
+
+def test_a_run_records_the_area_whatever_it_was_given_as(notebooks, tmp_path, capsys):
+    folder = notebooks(_01_a='record.key["area"] = record.area')
+    script = folder / "01_a.py"
+    script.write_text(script.read_text().replace("seed = 0\n", 'seed = 0\narea = ""\n'))
+    (tmp_path / "hall.json").write_text(
+        json.dumps({"type": "Polygon", "coordinates": [[*HALL.exterior.coords]]})
+    )
+    forms = [["--square", "0", "12", "0", "8"], ["--polygon", "hall.json"], ["-p", "area=0 12 0 8"]]
+    for options in forms:
+        assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1", *options]) == 0
+    (home,) = (path for path in (tmp_path / "out").glob("mine-*"))
+    assert json.loads((home / "parameters.json").read_text())["parameters"]["area"] == "0.0 12.0 0.0 8.0"
+    assert "area 0.0 12.0 0.0 8.0" in capsys.readouterr().out
+    assert main(["run", "--data", "mine.csv", "--out", "out", "-p", "area=1 2"]) == 2
+
+
+# --- of a notebook -----------------------------------------------------------------------------------
+
+
+def test_the_plaza_has_the_malls_square(tmp_path):
+    assert record_of(tmp_path, "", data="synthetic").square() == szlib.ATC_SQUARE
+
+
+def test_an_area_is_found_once_and_kept(hall, tmp_path, monkeypatch):
+    record = record_of(tmp_path, hall)
+    found = record.square(record.tracks())
+    assert str(found) == (record.out / "area.txt").read_text()
+    monkeypatch.setattr("szlib.encounters.pipeline.walked_area", None)
+    assert record_of(tmp_path, hall).square() == found
+    assert record.encounters().attrs["area"] == str(found)
+
+
+def test_an_area_that_is_given_is_taken(hall, tmp_path):
+    assert record_of(tmp_path, hall, area="0 6 0 8").square() == szlib.Square(x=(0, 6), y=(0, 8))
+    assert record_of(tmp_path, hall, area=HALL.buffer(1).wkt).square() == szlib.as_area(HALL.buffer(1))
+
+
+# --- where nobody met --------------------------------------------------------------------------------
+
+ROOM = szlib.Square(x=(-20, 20), y=(-20, 20))
+APART = make_tracks(make_walk((0, 0), (1, 0)), make_walk((0, 15), (1, 0), person=2))
+CROWDED = make_tracks(*(make_walk((0.3 * k, 0.2 * k), (1, 0), person=k) for k in range(8)))
+EMPTIED = {
+    "not in the square; give an area in which people walked": (APART, szlib.Square(x=(50, 60), y=(0, 9))),
+    "corner of the space outside the square; the space ahead": (APART, szlib.Square(x=(-1, 20), y=(-1, 1))),
+    "slower than 0.4 m/s; are unit": (APART.assign(vx=APART["vx"] / 10), ROOM),
+    "nobody in the space; people were never": (APART, ROOM),
+    "other person nearer than 1.0 m; people came": (
+        make_tracks(make_walk((0, 0), (1, 0)), make_walk((0.5, 0), (1, 0), person=2)),
+        ROOM,
+    ),
+    "a track ends within the window; tracks are short": (
+        make_tracks(make_walk((0, 0), (1, 0), duration=2), make_walk((4, 0), (-1, 0), person=2, duration=2)),
+        ROOM,
+    ),
+}
+
+
+@pytest.mark.parametrize("told", EMPTIED)
+def test_the_condition_that_emptied_it_is_told_with_its_funnel(told):
+    tracks, square = EMPTIED[told]
+    samples = szlib.find_encounters(tracks, square=square)
+    with pytest.raises(szlib.DataError) as error:
+        check_met(samples)
+    assert f"What emptied it: {told}" in str(error.value).replace("a corner", "corner")
+    assert str(square) in str(error.value)
+
+
+def test_where_people_met_nothing_is_said():
+    samples = szlib.find_encounters(make_crowd(77, people=160, seconds=200, square=ROOM), square=ROOM)
+    assert check_met(samples) is samples
+
+
+def test_a_run_stops_at_the_first_empty_stage(notebooks, tmp_path, capsys):
+    look = "import szlib\nrecord.keep_encounters(szlib.find_encounters(record.tracks()))"
+    notebooks(_01_fine='record.check("ok", True)', _02_nobody=look, _03_never="1 / 0", _07_never="1 / 0")
+    straight = [(k / 2, person, 30 + k / 2, person) for person in (1, 9) for k in range(40)]
+    pd.DataFrame(straight, columns=["t", "id", "x", "y"]).to_csv(tmp_path / "mine.csv", index=False)
+    assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
+    found = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
+    states = {name: notebook["status"] for name, notebook in found["notebooks"].items()}
+    assert states == {
+        "01_fine": "done",
+        "02_nobody": "refused",
+        "03_never": "not started",
+        "07_never": "not started",
+    }
+    assert not found["passed"]
+    printed = capsys.readouterr()
+    assert "What emptied it: not in the square" in printed.err
