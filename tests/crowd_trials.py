@@ -47,10 +47,10 @@ CROWDED = Worlds(
 )
 """Six to ten people in 8 m x 8 m, most of whom walk, at up to the pace of a mall."""
 WORLDS = {"orca": 250, "speed model": 250, "social force": 150}
-WALKERS = {"ATC day": 200, "plaza": 100, "ETH": 150, "Grand Central": 20}
-OTHERS, BASELINES = 40, 25
+WALKERS = {"ATC day": 200, "plaza": 100, "ETH": 150, "Grand Central": 12}
+OTHERS, BASELINES, IN_PLACE = 40, 25, 20
 """Trials of the paper's controller with each model and at each site (fewer where fewer walkers may be
-replaced), at most of it with other settings, and of each baseline."""
+replaced), at most of it with other settings, of each baseline, and of both in the place of walkers."""
 SETTINGS = {
     "MPC-CBF": szlib.MPCSettings(),
     "MPC-CBF, rest": szlib.MPCSettings(terminal="rest"),
@@ -104,20 +104,22 @@ def violated_by_who_kept(log: SimulationLog) -> int:
     return count
 
 
-def controllers(n: int, most: int) -> Iterator[tuple[str, Factory, szlib.MPCSettings, int]]:
+def controllers(
+    n: int, most: int, others: int, baselines: int
+) -> Iterator[tuple[str, Factory, szlib.MPCSettings, int]]:
     """Name, factory, settings and trials of each."""
     for name, settings in SETTINGS.items():
-        trials = min(n, most) if name == "MPC-CBF" else min(n, most, OTHERS)
+        trials = min(n, most) if name == "MPC-CBF" else min(n, most, others)
         yield name, CONTROLLERS["MPC-CBF"], settings, trials
     for name in ("straight", "social force", "dynamic window"):
-        yield name, CONTROLLERS[name], szlib.MPCSettings(), min(n, most, BASELINES)
+        yield name, CONTROLLERS[name], szlib.MPCSettings(), min(n, most, baselines)
 
 
 def reacting(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
     """Trials among people who react, or would if they saw the robot."""
     models = [model for model in WORLDS if model != "speed model" or find_spec("jupedsim")]
     for model, sees in product(models, ("robot", "nothing")):
-        for name, factory, settings, trials in controllers(n, WORLDS[model]):
+        for name, factory, settings, trials in controllers(n, WORLDS[model], OTHERS, BASELINES):
             rows = szlib.rollouts(
                 trials,
                 settings=settings,
@@ -136,8 +138,9 @@ def recorded(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
     """Trials in the place of recorded walkers, and these walkers themselves."""
     for site, most in WALKERS.items():
         load, square = SITES[site]
-        made = replays(load(), min(n, most), seed=0, area=square, zone=zone_of(site))
-        for name, factory, settings, trials in controllers(n, len(made)):
+        zone = zone_of("plaza" if site == "plaza" else "ATC day")
+        made = replays(load(), min(n, most), seed=0, area=square, zone=zone)
+        for name, factory, settings, trials in controllers(n, len(made), IN_PLACE, IN_PLACE):
             rows = szlib.rollouts(
                 trials,
                 settings=settings,
@@ -161,8 +164,8 @@ def walkers(made: Replays) -> pd.DataFrame:
 
 @lru_cache
 def zone_of(site: str) -> szlib.Ellipse:
-    """The zone at 1.1 m/s fitted to the site, to the ATC day where that has too few encounters."""
-    load, square = SITES["ATC day" if site == "ETH" else site]
+    """The zone at 1.1 m/s fitted to a site: the plaza's to itself, the ATC day's to all real people."""
+    load, square = SITES[site]
     return szlib.SocialZone.fit(szlib.find_encounters(load(), square=square)).ellipse(1.1)
 
 

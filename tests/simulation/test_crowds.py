@@ -6,6 +6,7 @@ import logging
 import os
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -165,6 +166,15 @@ def test_importing_the_social_force_leaves_no_file_and_no_logging_behind(tmp_pat
     said = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=env, check=True)
     assert said.stdout.strip() == f"{logging.WARNING} [] []\n0 FileHandler 0"
     assert said.stderr == ""
+
+
+def test_the_extra_adds_less_than_300_megabytes() -> None:
+    """What pyrvo and PySocialForce bring that szlib does not need otherwise."""
+    pytest.importorskip("numba")
+    brought = ("pyrvo", "ir-sim", "imageio", "loguru", "pysocialforce", "numba", "llvmlite", "toml")
+    files = [file for name in brought for file in metadata.files(name) or ()]
+    size = sum(Path(file.locate()).stat().st_size for file in files if Path(file.locate()).is_file())
+    assert 100e6 < size < 300e6
 
 
 # --- replay ------------------------------------------------------------------------------------------

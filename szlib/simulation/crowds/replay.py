@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import atan2, hypot
 from math import floor as whole
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -45,7 +46,7 @@ class Recorded:
     Attributes
     ----------
     id : of the track table.
-    first : tick of the first row, from time 0 of the replay; negative before.
+    first : tick of the first row, from time 0 of the replay.
     states : x, y, vx, vy, heading, shape (n, 5) [m, m/s, rad].
     """
 
@@ -198,8 +199,9 @@ def replays(
     starts = np.flatnonzero(np.r_[True, np.diff(piece) > 0])
     ends = np.r_[starts[1:], len(piece)]
     known = ends - starts > 1
-    pieces = pd.DataFrame({"from": starts[known], "to": ends[known], "day": days[starts[known]]})
-    pieces["first"], pieces["last"] = tick[pieces["from"]], tick[pieces["to"] - 1]
+    pieces = pd.DataFrame({"begin": starts[known], "end": ends[known]})
+    pieces["day"], pieces["id"] = days[pieces["begin"]], ids[pieces["begin"]]
+    pieces["first"], pieces["last"] = tick[pieces["begin"]], tick[pieces["end"] - 1]
     floor = None if area is None else area_for(tracks, area)
     ways = _ways(states, pieces, floor)
     made: list[Replay] = []
@@ -208,20 +210,9 @@ def replays(
         t0, straight = int(tick[begin]), hypot(*(states[end - 1, :2] - states[begin, :2]))
         time = round(PATIENCE * max((end - 1 - begin) / TICKS_PER_SECOND, straight / s.v_max), 1)
         until = t0 + round(time * TICKS_PER_SECOND)
-        there = (
-            (pieces["day"] == pieces["day"].iloc[number])
-            & (pieces["last"] >= t0)
-            & (pieces["first"] <= until)
-        )
-        there &= ids[pieces["from"]] != ids[begin]
-        others = []
-        for a, b, first in pieces.loc[there, ["from", "to", "first"]].itertuples(index=False):
-            early, late = max(t0 - first, 0), max(first + b - a - 1 - until, 0)
-            others.append(
-                Recorded(
-                    int(ids[a]), int(first + early - t0), _with_heading(states[a:b])[early : b - a - late]
-                )
-            )
+        there = (pieces["day"] == pieces["day"].iloc[number]) & (pieces["id"] != ids[begin])
+        there &= (pieces["last"] >= t0) & (pieces["first"] <= until)
+        others = [_cut(states, each, t0, until) for each in pieces[there].itertuples()]
         walker = Recorded(int(ids[begin]), 0, _with_heading(states[begin:end]))
         if _has_room(walker, others):
             made.append(Replay(_scenario(walker, time, s), walker, tuple(others), zone))
@@ -235,13 +226,20 @@ def replays(
     return Replays(made)
 
 
+def _cut(states: Array, piece: Any, t0: int, until: int) -> Recorded:
+    """What a piece has of the ticks from `t0` to `until`, from when they first came."""
+    rows = slice(max(t0 - piece.first, 0), until + 1 - piece.first)
+    whole_way = _with_heading(states[piece.begin : piece.end])
+    return Recorded(int(piece.id), int(max(piece.first - t0, 0)), whole_way[rows])
+
+
 def _ways(states: Array, pieces: pd.DataFrame, area: Area | None) -> list[tuple[int, int, int]]:
     """Number of the piece, first row and end of every way that is long enough."""
     inside = np.ones(len(states), bool)
     if area is not None:
         inside = np.asarray(area.contains(states[:, 0], states[:, 1]))
     ways = []
-    for number, (a, b) in enumerate(pieces[["from", "to"]].itertuples(index=False)):
+    for number, (a, b) in enumerate(pieces[["begin", "end"]].itertuples(index=False)):
         edges = np.flatnonzero(np.diff(np.r_[False, inside[a:b], False])).reshape(-1, 2) + a
         for begin, end in edges.tolist():
             if hypot(*(states[end - 1, :2] - states[begin, :2])) >= TRAVEL:
