@@ -259,7 +259,7 @@ def summarise(
     data, there = wide.fillna(0.0).to_numpy(), wide.notna().to_numpy()
     weight = counts @ there
     means = np.divide(counts @ data, weight, out=np.full(weight.shape, np.nan), where=weight > 0)
-    some = there.any(axis=0)
+    some = np.asarray(there.any(axis=0))
     low, high = bounds = np.full((2, len(some)), np.nan)
     bounds[:, some] = np.nanquantile(means[:, some], [(1 - level) / 2, (1 + level) / 2], axis=0)
     table = pd.DataFrame(wide.columns.tolist(), columns=["metric", *by])
