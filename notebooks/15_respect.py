@@ -181,9 +181,13 @@ alarms.rename(columns={"sum": "false alarms", "size": "crowds"})
 
 # %%
 def zone_at(people: pd.DataFrame, model: szlib.NullEncounters, method: str) -> pd.Series:
-    """The row of the table at 1.1 m/s."""
+    """The row of the table at 1.1 m/s; empty where there is no zone, for nobody keeps out of anything."""
     more = {"null": model} if method == "respect" else {}
-    zone = szlib.SocialZone.fit(people, method=method, speeds=(1.1,), resamples=resamples, **more)
+    try:
+        zone = szlib.SocialZone.fit(people, method=method, speeds=(1.1,), resamples=resamples, **more)
+    except szlib.ZoneError as error:
+        print(f"{method}: {error}")
+        return pd.Series({"adequate": False})
     return zone.table().iloc[0]
 
 
@@ -193,7 +197,8 @@ with warnings.catch_warnings():
     for name, people, model in (("everybody", samples, null), ("strangers", strangers, others)):
         for method in ("hull", "quantile", "respect"):
             rows[method, name] = zone_at(people, model, method)
-zones = pd.DataFrame(rows).T[["a", "a_low", "a_high", "b", "center_x", "area", "influence", "adequate"]]
+columns = ["a", "a_low", "a_high", "b", "center_x", "area", "influence", "adequate"]
+zones = pd.DataFrame(rows).T.reindex(columns=columns)
 record.table(zones.rename_axis(["method", "who"]).reset_index(), "15_zones")
 zones
 
@@ -210,7 +215,7 @@ ax.invert_yaxis()
 ax.set(xlabel="semi-major axis at 1.1 m/s [m], 95 %; hollow: too few people on some side")
 ax.set_title("Three zones of the same people")
 record.figure(fig, "zones")
-for (method, who), line in zones.iterrows():
+for (method, who), line in zones.dropna(subset="a").iterrows():
     record.key[f"a, {method}, {who}"] = float(line["a"])
 
 # %% [markdown]
