@@ -162,6 +162,7 @@ def _rollouts(_: Path, out: Path) -> None:
 
 def _notebook(data: Path, out: Path) -> None:
     record = NotebookRecord("05_attack", {"data": [str(data / "day0.csv")], "results": out})
+    record.square()
     record.check("encounters", len(record.encounters()) > 0)
     record.zone()
     record.table(pd.DataFrame({"a": [1, 2]}), "table")

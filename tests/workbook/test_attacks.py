@@ -151,12 +151,14 @@ def test_results_with_garbage_in_them(notebooks, tmp_path, capsys, garbage):
 
 def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks, tmp_path, capsys):
     full = 'from szlib.errors import StorageError\nraise StorageError("no room")'
-    notebooks(_01_full=full, _06_fine='record.check("ok", True)')
+    notebooks(_00_fine='record.check("ok", True)', _01_full=full, _06_later="")
     assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
     printed = capsys.readouterr()
     assert "01_full: could not be run: StorageError: no room; what was finished stays" in printed.err
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
-    assert {n: r["status"] for n, r in left["notebooks"].items()} == {"01_full": "refused", "06_fine": "done"}
+    assert {n: r["status"] for n, r in left["notebooks"].items()} == {
+        "00_fine": "done", "01_full": "refused", "06_later": "not started",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
