@@ -126,7 +126,7 @@ record.key["seed"] = seed
 @pytest.fixture
 def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
     """A workbook of one's own: `notebooks(name=code)` writes them and gives their folder; few data."""
-    from szlib.workbook import places
+    from szlib.workbook.record import places
 
     folder = tmp_path / "notebooks"
     folder.mkdir()

@@ -135,9 +135,9 @@ def _run(options: argparse.Namespace) -> int:
     if area := _area(options):
         parameters["area"] = area
     _check_workbook()
-    from . import places
-    from .runner import run
-    from .summary import render
+    from .record import places
+    from .runner.execution import run
+    from .runner.summary import render
 
     summary = run(
         options.data[0] if len(options.data) == 1 else options.data,

@@ -28,8 +28,8 @@ import szlib.zones.social_zone  # noqa: F401 - before the first fork
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.tracks.clock import read_tracks
-from szlib.workbook import places
 from szlib.workbook.command_line import main
+from szlib.workbook.record import places
 
 COUNT = {False: 40, True: 1000}
 LONGEST = 60

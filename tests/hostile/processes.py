@@ -26,7 +26,7 @@ GRACE = 20.0
 PROGRAM = """
 import sys
 from pathlib import Path
-from szlib.workbook import places
+from szlib.workbook.record import places
 from szlib.workbook.command_line import main
 if __name__ == "__main__":
     places.NOTEBOOKS = Path({notebooks!r})

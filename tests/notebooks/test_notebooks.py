@@ -9,8 +9,9 @@ import jupytext
 import nbformat
 import pytest
 
-from szlib.workbook import places, runner
-from szlib.workbook import summary as summaries
+from szlib.workbook.record import places
+from szlib.workbook.runner import execution
+from szlib.workbook.runner import summary as summaries
 
 SOURCES = sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
 MAX_LINES = 25
@@ -86,7 +87,7 @@ def proven(summary: dict, home: Path, without: tuple[str, ...] = ()) -> None:
 
 
 def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
-    summary = runner.run(out=tmp_path, jobs=2)
+    summary = execution.run(out=tmp_path, jobs=2)
     proven(summary, tmp_path / "synthetic")
     claims = [c for record in summary["notebooks"].values() for c in record["checks"] if c["kind"] == "claim"]
     assert sum(c["passed"] for c in claims) > len(claims) / 2
@@ -98,7 +99,7 @@ def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
 )
 def test_the_workbook_completes_on_the_real_day(tmp_path):
     of_data = [s.stem for s in SOURCES if not s.stem.startswith(OWN_WORLDS)]
-    summary = runner.run("atc-1hz", out=tmp_path, jobs=2, only=of_data)
+    summary = execution.run("atc-1hz", out=tmp_path, jobs=2, only=of_data)
     proven(summary, tmp_path / "atc-1hz", without=OWN_WORLDS)
     assert summary["notebooks"]["01_tracks"]["key_figures"]["rows"] == 624_951
     results = {c["name"]: c["result"] for record in summary["notebooks"].values() for c in record["checks"]}

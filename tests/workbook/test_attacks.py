@@ -20,10 +20,10 @@ from szlib.errors import DataError, StorageError
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.tracks import datasets
-from szlib.workbook import places, record, runner
 from szlib.workbook.command_line import main
-from szlib.workbook.parameters import check_parameters
-from szlib.workbook.record import NotebookRecord
+from szlib.workbook.record import NotebookRecord, notebook, places
+from szlib.workbook.record.validation import check_parameters
+from szlib.workbook.runner import execution
 
 HERE = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
 
@@ -94,11 +94,13 @@ def test_encounters_and_zone_of_another_day_of_the_same_name_and_size_are_not_se
 def test_a_foreign_plaza_is_not_taken_for_ours(tmp_path, monkeypatch):
     (tmp_path / "plaza-0.csv").write_text("1,2,3,4,5,6,7,8\n")
     small = PlazaSettings(encounters=3)
-    monkeypatch.setattr(record, "make_plaza", lambda file, seed: make_plaza(file, seed=seed, settings=small))
-    (file,) = record.data_files("synthetic", folder=tmp_path, seed=0)
+    monkeypatch.setattr(
+        notebook, "make_plaza", lambda file, seed: make_plaza(file, seed=seed, settings=small)
+    )
+    (file,) = notebook.data_files("synthetic", folder=tmp_path, seed=0)
     assert len(file.read_text().splitlines()) > 100
-    monkeypatch.setattr(record, "make_plaza", None)
-    assert record.data_files("synthetic", folder=tmp_path, seed=0) == [file], "ours is not made again"
+    monkeypatch.setattr(notebook, "make_plaza", None)
+    assert notebook.data_files("synthetic", folder=tmp_path, seed=0) == [file], "ours is not made again"
 
 
 def test_an_extraction_gives_its_own_samples_or_none(tmp_path):
@@ -135,7 +137,7 @@ def test_a_run_that_fails_leaves_no_summary_that_passed(notebooks, tmp_path, mon
     notebooks(_01_one='record.check("ok", True)')
     arguments = ["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]
     assert main(arguments) == 0
-    monkeypatch.setattr(runner, "_submit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(execution, "_submit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     assert main(arguments) == 130
     assert not (tmp_path / "out" / "mine" / "summary.json").exists()
     assert not list((tmp_path / "out" / "mine" / "records").iterdir())
@@ -188,7 +190,7 @@ def test_parameters_are_checked_before_any_notebook_starts(given, message):
 
 
 def test_what_the_notebooks_set_themselves_is_in_range():
-    from szlib.workbook.parameters import defaults_of
+    from szlib.workbook.record.validation import defaults_of
 
     for source in places.NOTEBOOKS.glob("[0-9][0-9]_*.py"):
         given = {n: v for n, v in defaults_of(source).items() if n not in ("data", "results")}
@@ -200,7 +202,7 @@ def test_a_parameter_is_text_to_a_notebook_and_never_code(notebooks, tmp_path):
     source = tmp_path / "notebooks" / "01_one.py"
     source.write_text(source.read_text().replace("seed = 0\n", 'seed = 0\nword = ""\n', 1))
     evil = "\"; __import__('pathlib').Path('pwned').touch(); '\"\"\""
-    summary = runner.run("mine.csv", out="out", parameters={"word": evil})
+    summary = execution.run("mine.csv", out="out", parameters={"word": evil})
     assert summary["notebooks"]["01_one"]["key_figures"]["word"] == evil
     assert not list(tmp_path.rglob("pwned"))
 
@@ -252,7 +254,7 @@ time.sleep(120)"""
     folder = notebooks(_01_sleeper=sleeper)
     program = tmp_path / "program.py"
     program.write_text(
-        "import sys\nfrom pathlib import Path\nfrom szlib.workbook import places\n"
+        "import sys\nfrom pathlib import Path\nfrom szlib.workbook.record import places\n"
         "from szlib.workbook.command_line import main\nif __name__ == '__main__':\n"
         f"    places.NOTEBOOKS = Path({str(folder)!r})\n    sys.exit(main())\n"
     )
@@ -278,7 +280,7 @@ time.sleep(120)"""
 def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypatch, capsys):
     notebooks(_01_one="", _06_two="")
     done = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
-    monkeypatch.setattr(runner, "_outcomes", lambda sources, *_: {s.stem: done for s in sources})
+    monkeypatch.setattr(execution, "_outcomes", lambda sources, *_: {s.stem: done for s in sources})
     fill, command = files._fill, ["run", "--data", "mine.csv", "--out", "out"]
     for full in itertools.count():
         shutil.rmtree(tmp_path / "out", ignore_errors=True)

@@ -10,8 +10,9 @@ import pytest
 
 from szlib.errors import StorageError
 from szlib.files import held
-from szlib.workbook import places, runner
 from szlib.workbook.command_line import main
+from szlib.workbook.record import places
+from szlib.workbook.runner import execution
 
 CHECK = 'record.key = {"gamma": gamma}\nrecord.check("ok", True)'
 
@@ -67,7 +68,7 @@ def test_a_notebook_executed_anew_leaves_the_others_in_the_summary(workbook, tmp
 
 def test_while_it_runs_no_summary_has_passed(workbook, tmp_path, monkeypatch):
     run()
-    monkeypatch.setattr(runner, "_submit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(execution, "_submit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     assert main(["run", "--data", "mine.csv", "--out", "out", "--only", "08"]) == 130
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
     assert (left["passed"], left["unfinished"], list(left["notebooks"])) == (False, ["08_two"], ["01_one"])

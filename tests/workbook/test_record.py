@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.workbook import record as records
 from szlib.workbook.record import NotebookRecord, parameters
+from szlib.workbook.record import notebook as records
 
 
 @pytest.fixture

@@ -5,8 +5,9 @@ import json
 import pytest
 
 from szlib.errors import DataError
-from szlib.workbook import command_line, runner
+from szlib.workbook import command_line
 from szlib.workbook.command_line import main
+from szlib.workbook.runner import execution
 
 
 def run(*arguments):
@@ -95,7 +96,7 @@ def test_without_the_workbooks_packages_it_says_what_to_install(monkeypatch, cap
 
 def test_without_notebooks_it_says_where_to_find_them(notebooks):
     with pytest.raises(DataError, match="they come with the repository"):
-        runner.run()
+        execution.run()
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["--version"]])
@@ -111,6 +112,6 @@ def test_ctrl_c_exits_with_130(notebooks, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     notebooks(_01_one="")
-    monkeypatch.setattr(runner, "as_completed", interrupted)
+    monkeypatch.setattr(execution, "as_completed", interrupted)
     assert run() == 130
     assert "stopped" in capsys.readouterr().err

@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..control.settings import MPCSettings
-from ..errors import DataError, SolverError
-from ..files import printable
+from ...control.settings import MPCSettings
+from ...errors import DataError, SolverError
+from ...files import printable
 
 SETTINGS = {"gamma": "gamma", "gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
 """Parameters that are settings of the controller by another name, or lists of them."""

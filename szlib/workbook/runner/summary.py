@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import StorageError
-from ..files import write_file
+from ...errors import StorageError
+from ...files import write_file
 
 NOT_STARTED = "not started"
 """The status of a notebook that needs what another could not make."""

@@ -20,25 +20,25 @@ import numpy as np
 import pandas as pd
 from pandas.io.formats.style import Styler
 
-from .. import __version__
-from ..encounters.areas import as_area
-from ..encounters.geometry import Area
-from ..encounters.pipeline import Chain, check_met
-from ..encounters.search import find_encounters
-from ..errors import DataError, ZoneError
-from ..files import file_content, keep, kept, own_folder, sign, write_file
-from ..plaza.people import make_plaza
-from ..plaza.truth import PlazaSettings
-from ..tracks import datasets
-from ..tracks.clock import read_tracks
-from ..zones.social_zone import SocialZone
+from ... import __version__
+from ...encounters.areas import as_area
+from ...encounters.geometry import Area
+from ...encounters.pipeline import Chain, check_met
+from ...encounters.search import find_encounters
+from ...errors import DataError, ZoneError
+from ...files import file_content, keep, kept, own_folder, sign, write_file
+from ...plaza.people import make_plaza
+from ...plaza.truth import PlazaSettings
+from ...tracks import datasets
+from ...tracks.clock import read_tracks
+from ...zones.social_zone import SocialZone
 from . import places
-from .parameters import FOR_OPTIONS, defaults_of
+from .validation import FOR_OPTIONS, defaults_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ..control.settings import MPCSettings
+    from ...control.settings import MPCSettings
 
 PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
 """Badges: where a parameter comes from."""

@@ -21,15 +21,16 @@ import jupytext
 import papermill
 from tqdm import tqdm
 
-from .. import __version__, memory
-from ..encounters.areas import AUTO, as_area
-from ..errors import DataError, SzlibError
-from ..files import file_content, held, printable, sweep_temporary, temporary_folder, write_file
-from ..parallel import bounded, cluster, end_with
-from ..tracks import datasets
-from . import places, summary
-from .parameters import check_parameters
-from .record import data_files
+from ... import __version__, memory
+from ...encounters.areas import AUTO, as_area
+from ...errors import DataError, SzlibError
+from ...files import file_content, held, printable, sweep_temporary, temporary_folder, write_file
+from ...parallel import bounded, cluster, end_with
+from ...tracks import datasets
+from ..record import places
+from ..record.notebook import data_files
+from ..record.validation import check_parameters
+from . import summary
 
 LAST_PRODUCER = "05"
 """Up to here each notebook needs the artefact of the one before; later ones can run side by side."""

@@ -18,11 +18,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import DataError, StorageError
-from ..files import own_folder, owner_of, printable
-from ..tracks import datasets
+from ...errors import DataError, StorageError
+from ...files import own_folder, owner_of, printable
+from ...tracks import datasets
 
-NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
+NOTEBOOKS = Path(__file__).resolve().parents[3] / "notebooks"
 """The workbook's home: beside the package in the repository."""
 RESULTS = "../results"
 """The folder of all results, from the notebooks."""
