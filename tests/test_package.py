@@ -23,6 +23,7 @@ ROOMS = {
     "encounters": [
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
+    "encounters.search": ["occupants", "windows", "samples", "finding"],
     "zones": [
         "costmap", "ellipses", "outliers", "by_direction", "hulls", "respect", "uncertainty", "zone_file",
         "social_zone",
