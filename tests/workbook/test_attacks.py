@@ -186,13 +186,13 @@ def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks
 )
 def test_parameters_are_checked_before_any_notebook_starts(given, message):
     with pytest.raises(DataError, match=message):
-        check_parameters(given, sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py")))
+        check_parameters(given, places.notebooks())
 
 
 def test_what_the_notebooks_set_themselves_is_in_range():
     from szlib.workbook.record.validation import defaults_of
 
-    for source in places.NOTEBOOKS.glob("[0-9][0-9]_*.py"):
+    for source in places.notebooks():
         given = {n: v for n, v in defaults_of(source).items() if n not in ("data", "results")}
         check_parameters(given, [source])
 

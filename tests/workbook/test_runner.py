@@ -54,6 +54,15 @@ def test_only_runs_what_is_asked_for(notebooks, tmp_path):
     assert list(summary(tmp_path)["notebooks"]) == ["07_two"]
 
 
+def test_06_is_not_06b_and_00_comes_first(notebooks):
+    names = ["00_start", "06_barriers", "06b_build", "07_passing", "10_room"]
+    notebooks(**{f"_{name}": "" for name in reversed(names)})
+    chosen = [[s.stem for s in execution._chosen(only)] for only in ([], ["06"], ["06b"], ["10_room", "00"])]
+    assert chosen == [names, ["06_barriers"], ["06b_build"], ["00_start", "10_room"]]
+    with pytest.raises(DataError, match="no notebook 0; there are 00_start"):
+        execution._chosen(["0"])
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

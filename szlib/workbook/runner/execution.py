@@ -238,18 +238,16 @@ _EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
 
 
 def _chosen(only: Iterable[str]) -> list[Path]:
-    sources = sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
+    sources = places.notebooks()
     if not sources:
         raise DataError(
             f"{places.NOTEBOOKS}: no notebooks; they come with the repository, not with the package: get a "
             "copy of it, and there `make run`, or pip install -e '.[workbook]' and `szlib run`"
         )
     wanted = list(only)
-    unknown = [name for name in wanted if not any(source.stem.startswith(name) for source in sources)]
+    unknown = [name for name in wanted if not any(places.is_called(source, name) for source in sources)]
     if unknown:
         raise DataError(
             f"no notebook {', '.join(unknown)}; there are {', '.join(source.stem for source in sources)}"
         )
-    return [
-        source for source in sources if not wanted or any(source.stem.startswith(name) for name in wanted)
-    ]
+    return [s for s in sources if not wanted or any(places.is_called(s, name) for name in wanted)]
