@@ -54,7 +54,7 @@ ROOMS = {
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation", "crowds",
     ],
-    "workbook.record": ["places", "validation", "notebook"],
+    "workbook.record": ["method", "places", "validation", "tables", "notebook"],
     "workbook.runner": ["summary", "worker", "execution"],
 }  # fmt: skip
 """From the ground up: a room imports only from rooms before it, a file only from files before it."""
