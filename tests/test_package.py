@@ -136,6 +136,17 @@ def is_public(name: str) -> bool:
     return not name.startswith("_")
 
 
+def test_the_top_level_is_fixed() -> None:
+    done = subprocess.run(["git", "ls-files"], cwd=PACKAGE.parent, capture_output=True, text=True)
+    if done.returncode:
+        pytest.skip("this is no checkout")
+    top = {name.split("/")[0] for name in done.stdout.splitlines()}
+    assert {name for name in top if not name.startswith(".")} == {
+        "CHANGELOG.md", "CITATION.cff", "Makefile", "README.md", "environment.lock", "notebooks",
+        "pyproject.toml", "szlib", "tests",
+    }  # fmt: skip
+
+
 # --- rooms -------------------------------------------------------------------------------------------
 
 
