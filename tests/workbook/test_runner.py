@@ -19,6 +19,7 @@ def summary(tmp_path, folder="mine"):
     return json.loads((tmp_path / "out" / folder / "summary.json").read_text())
 
 
+@pytest.mark.usefixtures("at_once")
 def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp_path, capsys):
     notebooks(_01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)')
     assert run() == 0
@@ -72,6 +73,7 @@ def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, t
     assert "NOT ALL CHECKS HOLD" in printed
 
 
+@pytest.mark.usefixtures("at_once")
 def test_only_runs_what_is_asked_for(notebooks, tmp_path):
     notebooks(_01_one='record.check("ok", True)', _07_two='record.check("ok", True)')
     assert run("--only", "07") == 0
