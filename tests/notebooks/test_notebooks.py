@@ -10,6 +10,8 @@ import nbformat
 import pytest
 
 from szlib.workbook.record import places
+from szlib.workbook.record.method import DEFAULTS
+from szlib.workbook.record.validation import defaults_of
 from szlib.workbook.runner import execution
 from szlib.workbook.runner import summary as summaries
 
@@ -68,6 +70,20 @@ class TestEach:
         assert {"data", "seed", "results"} <= {
             line.split("=")[0].strip() for line in tagged.source.splitlines()
         }
+
+
+def test_each_knob_of_the_method_is_a_parameter_where_it_acts_with_the_default_that_it_has_elsewhere():
+    found = [(n, v) for s in SOURCES for n, v in defaults_of(s).items() if n in DEFAULTS]
+    assert {name for name, _ in found} == set(DEFAULTS)
+    assert all(value == DEFAULTS[name] for name, value in found)
+
+
+def test_a_parameter_has_one_type_wherever_it_stands():
+    types: dict[str, set[type]] = {}
+    for source in SOURCES:
+        for name, value in defaults_of(source).items():
+            types.setdefault(name, set()).add(type(value))
+    assert all(len(found) == 1 for found in types.values()), types
 
 
 OF_DATA = ("01", "02", "03", "04", "05", "08", "14", "15", "16")
