@@ -221,10 +221,8 @@ def _write_times(ax: Axes, time: Array, at: Array, *, colour: str, above: float)
         first = row
     halo = [Stroke(linewidth=2, foreground="white"), Normal()]
     for here, told in labels:
-        label = ax.annotate(
-            ", ".join(told), (here[0], here[1]), (0, above), textcoords="offset points", color=colour
-        )
-        label.set(ha="center", va="center", fontsize=8, path_effects=halo)
+        label = ax.annotate(", ".join(told), (here[0], here[1]), (0, above), textcoords="offset points")
+        label.set(color=colour, ha="center", va="center", fontsize=8, path_effects=halo)
 
 
 def _frame(ax: Axes, shown: Sequence[tuple[SimulationLog, Any]]) -> None:
