@@ -46,8 +46,8 @@ ROOMS = {
         "walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores",
     ],
     "simulation.controllers": ["protocol", "baselines"],
-    "simulation.metrics": ["endings", "motion", "social"],
-    "simulation.scenarios": ["paper", "meetings", "worlds"],
+    "simulation.metrics": ["endings", "motion", "manners", "social"],
+    "simulation.scenarios": ["paper", "meetings", "worlds", "atlas"],
     "workbook": [
         "figures", "claims", "sensitivity", "record", "runner", "command_line",
     ],
