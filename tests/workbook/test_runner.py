@@ -32,6 +32,7 @@ def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp
     assert "1/1" in printed
     assert "not supported here" in printed
     assert "all checks hold" in printed
+    assert "report.html" in printed and (tmp_path / "out" / folder / "report.html").exists()
 
 
 def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, tmp_path, capsys):

@@ -74,6 +74,7 @@ class NotebookRecord:
         self.out = self._folder(variables)
         for part in ("records", "figures"):
             (self.out / part).mkdir(exist_ok=True)
+        _show_with_words()
 
     def _folder(self, variables: Mapping[str, Any]) -> Path:
         if run := os.environ.get(places.RUN_VARIABLE):
@@ -183,13 +184,13 @@ class NotebookRecord:
         }
         text = json.dumps(record, indent=1, default=_plain)
         write_file(self.out / "records" / f"{self.name}.json", text)
-        rows = [(c["kind"], c["name"], c["result"], _as_text(c["value"])) for c in self.checks]
+        rows = [(c["kind"], c["name"], c["result"], as_text(c["value"])) for c in self.checks]
         return _whole(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
 
     def _record(self, kind: str, name: str, passed: bool, value: object, result: str) -> None:
         value = _plain(value)
         self.checks.append({"kind": kind, "name": name, "passed": passed, "value": value, "result": result})
-        print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({_as_text(value)})"))
+        print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({as_text(value)})"))
 
     def _picture(self, content: bytes, name: str) -> None:
         write_file(self.out / "figures" / name, content, lasting=False)
@@ -249,10 +250,26 @@ def settings_table(settings: MPCSettings) -> Styler:
     )
 
 
+def _show_with_words() -> None:
+    """In a notebook, give every figure its words as alternative text, and tables three decimals."""
+    from IPython.core.getipython import get_ipython
+
+    def words(figure: Figure, **_: object) -> tuple[dict[str, str], dict[str, Any]]:
+        from ..figures.style import in_words
+
+        return {}, {"image/png": {"alt": in_words(figure)}}
+
+    shell = get_ipython()
+    if shell is not None and shell.display_formatter is not None:
+        pd.options.display.precision = 3
+        shell.display_formatter.mimebundle_formatter.for_type_by_name("matplotlib.figure", "Figure", words)
+
+
 def _whole(table: pd.DataFrame) -> Styler:
     """A table whose long texts are shown to their end, the same HTML every time."""
     left = [{"selector": "td, th", "props": "text-align: left"}]
-    return Styler(table, uuid="szlib", cell_ids=False).hide(axis="index").set_table_styles(left)  # type: ignore[arg-type]
+    styled = Styler(table, uuid="szlib", cell_ids=False).format(as_text).hide(axis="index")
+    return styled.set_table_styles(left)  # type: ignore[arg-type]
 
 
 def _plain(value: Any) -> Any:
@@ -266,9 +283,10 @@ def _plain(value: Any) -> Any:
     return round(value, 6) if isinstance(value, float) else value
 
 
-def _as_text(value: Any) -> str:
+def as_text(value: Any) -> str:
+    """A value of a check or a claim to read: four digits of a number, every entry of a table."""
     if value is None:
         return ""
     if isinstance(value, dict):
-        return ", ".join(f"{k}: {_as_text(v)}" for k, v in value.items())
+        return ", ".join(f"{k}: {as_text(v)}" for k, v in value.items())
     return f"{value:.4g}" if isinstance(value, float) else str(value)
