@@ -35,7 +35,7 @@ ROOMS = {
         "differential",
     ],
     "control.people": ["person", "tracker", "meetings"],
-    "control.step": ["scene", "report", "decision"],
+    "control.step": ["scene", "report", "decision", "polygon"],
     "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
     "simulation": [
         "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
