@@ -48,10 +48,13 @@ ROOMS = {
     "simulation.metrics": ["endings", "motion", "social"],
     "simulation.scenarios": ["paper", "meetings", "worlds"],
     "workbook": [
-        "figures", "claims", "sensitivity", "record", "runner", "command_line",
+        "figures", "claims", "sensitivity", "exercises", "record", "runner", "command_line",
     ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "simulation", "crowds",
+    ],
+    "workbook.exercises": [
+        "task", "tracks", "outliers", "zones", "certainty", "barriers", "robot", "checking",
     ],
     "workbook.record": ["places", "validation", "notebook"],
     "workbook.runner": ["summary", "execution"],

@@ -1,0 +1,129 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Sheet 6 - The robot
+#
+# Belongs to notebooks 07 to 11. Write each function, then run the cell below it: it asks your
+# function for fresh cases and says in words what is right or wrong. `exercises.hint("speed_limit",
+# 1)` prints a hint, 2 the next, 3 is nearly the solution.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+import szlib
+from szlib.workbook import exercises, figures
+
+# %% [markdown]
+# ## 6.1 The speed limit (5 min)
+#
+# The robot drives straight at a person who walks straight at the robot with `person_speed` [m/s]. The
+# barrier is at `h` [m] and may fall by the share `gamma` in a step of `dt` [s]. How fast may the
+# robot be [m/s]? (Negative: it has to go back.)
+
+
+# %%
+def speed_limit(h, gamma, dt, person_speed):
+    """Largest speed of the robot towards the person [m/s]."""
+    ### BEGIN SOLUTION
+    return gamma * h / dt - person_speed
+    ### END SOLUTION
+
+
+# %%
+exercises.check("speed_limit", speed_limit)
+
+# %% [markdown]
+# ## 6.2 gamma by experiment (40 min)
+#
+# With the paper's two barrier steps ($N_h = 2$, 0.2 s) a large gamma lets the robot find out too late
+# that it cannot brake any more: the problem has no solution, the step is *infeasible*. For the
+# scenario `szlib.SCENARIOS["passing"]` and a `zone` that you have not seen, give the largest of
+# `gammas` (ascending) up to which no run has an infeasible step. A run takes some 50 ms.
+
+# %%
+zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+controller = szlib.MPCCBF(zone, settings=szlib.MPCSettings(gamma=0.4))
+log = szlib.simulate(szlib.SCENARIOS["passing"], controller)
+print(f"gamma = 0.4: {log.metrics()['infeasible_steps']} infeasible steps")
+ax = figures.plot_speed(log)
+ax.set_title(f"gamma = 0.4 brakes from {log.speed.max():.2f} m/s")
+plt.show()
+
+
+# %%
+def largest_gamma(zone, gammas):
+    """The largest gamma, going up from the smallest, before the first with an infeasible step."""
+    ### BEGIN SOLUTION
+    scenario, kept = szlib.SCENARIOS["passing"], 0.0
+    for gamma in gammas:
+        controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=szlib.MPCSettings(gamma=gamma))
+        if szlib.simulate(scenario, controller).metrics()["infeasible_steps"]:
+            break
+        kept = gamma
+    return kept
+    ### END SOLUTION
+
+
+# %%
+exercises.check("largest_gamma", largest_gamma)
+
+# %% [markdown]
+# ## 6.3 The terminal proof (15 min)
+#
+# With `terminal="rest"` each plan ends at rest, $\mathbf{v}_N = 0$, and the barrier rows hold on the
+# whole horizon. Everybody stands. The robot has applied the first control of `plan`, shape (N, 2)
+# [m/s2]. Without solving anything: give a plan for the next step, of the same shape, that is sure to
+# satisfy every row.
+
+
+# %%
+def next_plan(plan):
+    """A plan (N, 2) that satisfies the next problem, from one that satisfied the last."""
+    ### BEGIN SOLUTION
+    return np.vstack([plan[1:], np.zeros((1, 2))])
+    ### END SOLUTION
+
+
+# %%
+exercises.check("next_plan", next_plan)
+
+# %% [markdown]
+# **Solution.** Its states are $\mathbf{x}_1, \dots, \mathbf{x}_N, \mathbf{x}_N$. All rows but the
+# last held before; the last is $h(\mathbf{x}_N) - (1-\gamma) h(\mathbf{x}_N) = \gamma
+# h(\mathbf{x}_N)$, and the old rows give $h(\mathbf{x}_N) \ge (1-\gamma)^N h(\mathbf{x}_0) \ge 0$. So
+# one solution leads to the next, for ever.
+
+# %% [markdown]
+# ## 6.4 Predict, then run (20 min)
+#
+# Before you run anything: what changes in the scenario `passing`? Put your answers in place of the
+# dots. The check then makes the runs, with a zone that is drawn anew, and compares. Where you were
+# wrong, look for the reason in notebooks 06, 07 and 11.
+
+
+# %%
+def prediction():
+    """Your answers, made before the runs."""
+    ### BEGIN SOLUTION
+    return {
+        "gamma from 0.05 to 0.1: the least h is": "smaller",  # or "larger"
+        "N_h from 2 to 8 at gamma 0.4: the infeasible steps are": "fewer",  # or "more"
+        "from the front to from behind: avoidance starts": "nearer",  # or "farther away"
+    }
+    ### END SOLUTION
+
+
+# %%
+exercises.check("prediction", prediction)
