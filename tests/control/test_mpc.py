@@ -240,6 +240,17 @@ def test_a_symmetric_meeting_at_any_angle_is_passed_on_the_chosen_side(solver, s
         assert (to_the_left > 0) == (side == "left")
 
 
+@pytest.mark.parametrize("tilt", [-0.05, 0.05])
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("gamma", [0.05, 0.4, 1.0])
+def test_the_side_is_chosen_before_the_plan_meets_the_zone_whatever_gamma(gamma, side, tilt):
+    zone = replace(ZONE, angle=tilt)
+    settings = szlib.MPCSettings(gamma=gamma, N_h=8, pass_side=side)
+    state = (-2.1, 0.0, 1.0, 0.0)  # h = 0.65 m: the last of the plan's 0.8 m lies in the zone
+    step = szlib.MPCCBF(zone, settings=settings).step(state, GOAL, [FACING])
+    assert step.target[1] * (1 if side == "left" else -1) > 1.0  # drawn around; else the tilt would decide
+
+
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_the_two_sides_are_mirror_images(solver):
     mirror = np.array([1, -1, 1, -1])

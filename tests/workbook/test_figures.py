@@ -34,6 +34,13 @@ def log():
 
 
 @pytest.fixture(scope="module")
+def step():
+    scenario = szlib.SCENARIOS["making_room"]
+    controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
+    return controller.step([1.6, -0.1, -0.07, -0.06], (6.0, 0.0), [szlib.Person((4.0, 0.0), (-0.5, 0.0))])
+
+
+@pytest.fixture(scope="module")
 def samples():
     rng = np.random.default_rng(0)
     n = 31 * 40
@@ -79,6 +86,7 @@ MAPS = {
     "ellipse": lambda f: figures.plot_distance(ZONE),
     "segment": lambda f: figures.plot_distance((np.array([-1.0, 0]), np.array([1.0, 0]))),
     "scenario": lambda f: figures.plot_scenario(f("log")),
+    "step": lambda f: figures.plot_step(f("step")),
     "robot paths": lambda f: figures.plot_robot_paths({"a": f("log"), "b": f("log")}),
 }
 GRAPHS = {
@@ -161,6 +169,16 @@ def test_a_run_shows_speed_and_every_h_to_its_greatest(log):
     assert "[m/s]" in speed.get_ylabel() and "[m]" in h.get_ylabel()
     assert len(h.lines) == 1 + log.h.shape[1]
     assert h.get_ylim()[0] <= log.h.min() and h.get_ylim()[1] >= log.h.max()
+
+
+def test_the_admissible_polygon_shows_what_is_chosen_and_who_forbids_the_rest(step):
+    ax = figures.plot_admissible(step)
+    assert ax.get_xlabel().endswith("[m/s²]") and ax.get_aspect() == 1
+    told = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"allowed", "chosen"} <= set(told)
+    assert {name.split(",")[0] for name in told} >= {"person 0", "wall 1"}
+    styles = [line.get_linestyle() for line in ax.lines if "step" in str(line.get_label())]
+    assert len(set(styles)) == len(styles) == 2  # told apart without colour
 
 
 def test_nothing_is_clipped_that_is_drawn_later(log):

@@ -18,6 +18,7 @@ def summary(tmp_path, folder="mine"):
     return json.loads((tmp_path / "out" / folder / "summary.json").read_text())
 
 
+@pytest.mark.usefixtures("at_once")
 def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp_path, capsys):
     notebooks(_01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)')
     assert run("-p", "seed=3") == 0
@@ -48,10 +49,20 @@ def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, t
     assert "NOT ALL CHECKS HOLD" in printed
 
 
+@pytest.mark.usefixtures("at_once")
 def test_only_runs_what_is_asked_for(notebooks, tmp_path):
     notebooks(_01_one='record.check("ok", True)', _07_two='record.check("ok", True)')
     assert run("--only", "07") == 0
     assert list(summary(tmp_path)["notebooks"]) == ["07_two"]
+
+
+def test_06_is_not_06b_and_00_comes_first(notebooks):
+    names = ["00_start", "06_barriers", "06b_build", "07_passing", "10_room"]
+    notebooks(**{f"_{name}": "" for name in reversed(names)})
+    chosen = [[s.stem for s in execution._chosen(only)] for only in ([], ["06"], ["06b"], ["10_room", "00"])]
+    assert chosen == [names, ["06_barriers"], ["06b_build"], ["00_start", "10_room"]]
+    with pytest.raises(DataError, match="no notebook 0; there are 00_start"):
+        execution._chosen(["0"])
 
 
 @pytest.mark.parametrize(

@@ -32,9 +32,11 @@ def subgoal(
     leaves no room beside the person on that side, the same holds for the other side, and where
     there is no room at all the goal stays the goal: then the robot yields.
 
-    Only where the barrier can be felt yet, h <= closing speed * dt / gamma, and for people who do
-    not walk across the way: those open it by themselves. Nor for who stands on the goal: there is nothing
-    behind them to go to. The nearest such person counts.
+    Only where the barrier can be felt yet, h <= closing speed * dt / gamma, or could be within the
+    horizon, h <= closing speed * dt * N: else, for gamma > 1/N, the slightest tilt of the zone would turn
+    the plan to a side before this rule does. And only for people who do not walk across the way: those
+    open it by themselves. Nor for who stands on the goal: there is nothing behind them to go to. The
+    nearest such person counts.
     """
     (x, y), way = position, (goal[0] - position[0], goal[1] - position[1])
     distance = hypot(*way)
@@ -44,7 +46,8 @@ def subgoal(
     for zone in people:
         h = barrier(zone.distance(x, y), s.r_robot, s.eps)
         pace = hypot(zone.vx, zone.vy)
-        if h > min(nearest, distance, (s.v_max + pace) * s.dt / s.gamma):
+        closing = (s.v_max + pace) * s.dt
+        if h > min(nearest, distance, max(closing / s.gamma, closing * s.N)):
             continue
         to_a, to_b = (zone.xa - x, zone.ya - y), (zone.xb - x, zone.yb - y)
         ra, rb = hypot(*to_a), hypot(*to_b)

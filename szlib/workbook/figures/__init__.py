@@ -4,7 +4,7 @@ style       colours, sizes, labels in metres
 tracks      where people were, how fast, and what became of the rows
 encounters  the attentional space and the other person
 zones       outliers, the hull, zones by speed
-control     distances and barriers
+control     distances and barriers, and what they leave to a step
 simulation  runs of the robot, animations, sweeps and comparisons
 crowds      robots among other people's crowds
 """
@@ -27,7 +27,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "plot_tornado",
             "plot_findings",
         ],
-        "control": ["plot_distance", "plot_overestimate"],
+        "control": ["plot_distance", "plot_overestimate", "plot_admissible", "plot_step"],
         "simulation": [
             "plot_scenario",
             "plot_speed",

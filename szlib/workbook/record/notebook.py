@@ -24,7 +24,7 @@ from ... import __version__
 from ...encounters.areas import as_area
 from ...encounters.geometry import Area
 from ...encounters.pipeline import Chain, check_met
-from ...encounters.search import find_encounters
+from ...encounters.search.finding import find_encounters
 from ...errors import DataError, ZoneError
 from ...files import file_content, keep, kept, own_folder, sign, write_file
 from ...plaza.people import make_plaza

@@ -1,0 +1,84 @@
+"""The admissible-control polygon, against `Step.verify`, which works every row out by formulas of its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+import szlib
+from szlib.control.step import Step, admissible
+
+ZONE = szlib.Ellipse((0.05, 0.0), (0.97, 0.75))
+PASSAGE = szlib.SCENARIOS["making_room"].walls
+MOMENTS = {
+    "backing out": ([1.6, -0.1, -0.07, -0.06], szlib.Person((4.0, 0.0), (-0.5, 0.0)), PASSAGE),
+    "waiting beside the mouth": ([-0.72, -1.5, 0.03, -0.19], szlib.Person((0.5, 0.0), (-0.5, 0.0)), PASSAGE),
+    "at full speed": ([-2.55, -0.7, 0.5, -0.86], szlib.Person((0.0, 0.0), heading=np.pi), []),
+}
+
+
+def step_at(state: list[float], person: szlib.Person, walls: object, **settings: object) -> Step:
+    controller = szlib.MPCCBF(ZONE, walls=walls, settings=szlib.MPCSettings(**settings))
+    return controller.step(state, (6.0, 0.0), [person])
+
+
+def with_first(step: Step, a: np.ndarray) -> Step:
+    """The same plan, but for its first acceleration."""
+    x, k = step.predicted.copy(), np.arange(1, len(step.predicted))[:, None]
+    dt = step.scene.settings.dt
+    x[1:, :2] += dt**2 * (k - 0.5) * (a - step.control)
+    x[1:, 2:] += dt * (a - step.control)
+    return replace(step, control=a, predicted=x)
+
+
+@pytest.mark.parametrize("n_h", [2, 8])
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_inside_every_row_is_obeyed_and_outside_one_is_not(moment: str, n_h: int) -> None:
+    step = step_at(*MOMENTS[moment], N_h=n_h)
+    polygon = admissible(step).polygon
+    edge, inside = polygon.boundary, 0
+    for a in np.random.default_rng(n_h).uniform(-1, 1, (300, 2)):
+        point = shapely.Point(a)
+        if edge.distance(point) < 2e-3:
+            continue
+        inside += polygon.covers(point)
+        assert polygon.covers(point) == with_first(step, a).verify().feasible
+    assert 5 < inside < 295
+
+
+def test_nothing_beyond_the_bounds_of_the_acceleration_is_allowed() -> None:
+    step = step_at(*MOMENTS["at full speed"])
+    assert shapely.box(-1, -1, 1, 1).buffer(1e-9).covers(admissible(step).polygon)
+
+
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_the_control_of_a_feasible_step_is_allowed(moment: str) -> None:
+    step = step_at(*MOMENTS[moment])
+    assert step.feasible
+    assert admissible(step).polygon.distance(shapely.Point(step.control)) < 1e-3
+
+
+def test_alone_at_rest_every_acceleration_is_allowed() -> None:
+    step = step_at([0.0, 0.0, 0.0, 0.0], szlib.Person((500.0, 0.0), heading=0.0), [])
+    found = admissible(step)
+    assert found.limits == ()
+    slow = szlib.MPCCBF(ZONE).step([0.0, 0.0, 0.0, 0.0], (0.0, 0.0))
+    assert admissible(slow).polygon.area == pytest.approx(4.0)
+
+
+def test_each_limit_says_who_and_has_what_is_allowed_on_its_left() -> None:
+    found = admissible(step_at(*MOMENTS["backing out"]))
+    assert {(each.kind, each.which) for each in found.limits} == {("person", 0), ("wall", 1)}
+    inner = np.array(found.polygon.representative_point().coords[0])
+    for limit in found.limits:
+        along, off = limit.curve[-1] - limit.curve[0], inner - limit.curve[0]
+        assert along[0] * off[1] - along[1] * off[0] > 0
+
+
+def test_where_no_plan_is_feasible_the_control_is_not_called_allowed() -> None:
+    step = step_at([0.0, 0.0, 1.0, 0.0], szlib.Person((1.6, 0.0), (-0.5, 0.0)), [])
+    assert not step.feasible
+    assert not admissible(step).polygon.covers(shapely.Point(step.control))
