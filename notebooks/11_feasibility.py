@@ -21,6 +21,16 @@
 # (sec. 4). But $N_h = 2$ steps see 0.2 s ahead, and braking from 1 m/s takes 1 s: with a large
 # $\gamma$ the robot must find out too late.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [10 - Yielding by making room](10_making_room.ipynb) · next: [12 -
+# The distances, audited](12_distances.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4 · 20 min
+# to read
+#
+# **Afterwards you can** say when a step has no solution, and prove when there always is one.
+#
+# **Words.** *exact penalty*: a price on violations so high that none is paid where a solution without
+# violations exists; *MPC*: model predictive control: plan some steps ahead, take the first, plan again.
+
 # %%
 from dataclasses import replace
 from itertools import product

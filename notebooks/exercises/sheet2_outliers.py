@@ -14,9 +14,14 @@
 # %% [markdown]
 # # Sheet 2 - Inside out
 #
-# Belongs to notebook 03. Write each function, then run the cell below it: it asks your function for
-# fresh cases and says in words what is right or wrong. `exercises.hint("complementary", 1)` prints a
-# hint, 2 the next, 3 is nearly the solution.
+# Write each function, then run the cell below it: it asks your function for fresh cases and says in
+# words what is right or wrong. `exercises.hint("complementary", 1)` prints a hint, 2 the next, 3 is
+# nearly the solution.
+
+# %% [markdown]
+# [Start](../00_start_here.ipynb) · before: [sheet 1](sheet1_tracks.ipynb) · next: [sheet
+# 3](sheet3_zones.ipynb) · [to do](../exercises/sheet2_outliers.ipynb) ·
+# [solved](../solutions/sheet2_outliers.ipynb) · 55 min · belongs to [03](../03_outliers.ipynb)
 
 # %%
 import matplotlib.pyplot as plt
@@ -106,6 +111,7 @@ try:
     ax.plot(*blind_spot(cloud).T, "x", color=figures.RED, markersize=4, label="your intruder")
 except NotImplementedError:
     print("your intruder appears here once blind_spot is written")
-figures.metres(ax, "Far from everybody, and in dense company").legend(loc="lower left")
+figures.metres(ax, "Far from everybody, and in dense company")
+figures.legend_below([ax])
 ax.set(xlabel="x' [m]", ylabel="y' [m]")
 plt.show()

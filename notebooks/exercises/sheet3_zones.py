@@ -14,9 +14,15 @@
 # %% [markdown]
 # # Sheet 3 - From samples to a zone
 #
-# Belongs to notebooks 04 and 05. Write each function, then run the cell below it: it asks your
-# function for fresh cases and says in words what is right or wrong. `exercises.hint("crossing", 1)`
-# prints a hint, 2 the next, 3 is nearly the solution.
+# Write each function, then run the cell below it: it asks your function for fresh cases and says in
+# words what is right or wrong. `exercises.hint("crossing", 1)` prints a hint, 2 the next, 3 is nearly
+# the solution.
+
+# %% [markdown]
+# [Start](../00_start_here.ipynb) · before: [sheet 2](sheet2_outliers.ipynb) · next: [sheet
+# 4](sheet4_certainty.ipynb) · [to do](../exercises/sheet3_zones.ipynb) ·
+# [solved](../solutions/sheet3_zones.ipynb) · 3 h 25 min · belongs to [04](../04_hull.ipynb),
+# [05](../05_zones.ipynb)
 
 # %%
 import matplotlib.pyplot as plt

@@ -14,10 +14,14 @@
 # %% [markdown]
 # # Sheet 1 - Tracks and meetings
 #
-# Belongs to notebooks 01, 02 and 14. Write each function, then run the cell below it: it asks your
-# function for fresh cases and says in words what is right or wrong. `exercises.hint("velocity", 1)`
-# prints a hint, 2 the next, 3 is nearly the solution. Units are metres, seconds and radians
-# throughout.
+# Write each function, then run the cell below it: it asks your function for fresh cases and says in
+# words what is right or wrong. `exercises.hint("velocity", 1)` prints a hint, 2 the next, 3 is nearly
+# the solution. Units are metres, seconds and radians throughout.
+
+# %% [markdown]
+# [Start](../00_start_here.ipynb) · next: [sheet 2](sheet2_outliers.ipynb) · [to
+# do](../exercises/sheet1_tracks.ipynb) · [solved](../solutions/sheet1_tracks.ipynb) · 50 min · belongs to
+# [01](../01_tracks.ipynb), [02](../02_encounters.ipynb), [14](../14_data_quality.ipynb)
 
 # %%
 import matplotlib.pyplot as plt
@@ -127,5 +131,4 @@ exercises.check("one_hertz", one_hertz)
 
 # %% [markdown]
 # **Solution.** For small angles this is (speed x interval)^2 / (8 radius): a walker at 1.2 m/s who
-# turns with a radius of 3 m is off by 6 cm at 1 Hz, and by 0.06 cm at 10 Hz. An error of the size of
-# the zone's own uncertainty, from nothing but the clock.
+# turns with a radius of 3 m is off by 6 cm at 1 Hz, and by 0.06 cm at 10 Hz.

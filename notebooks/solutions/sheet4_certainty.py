@@ -14,9 +14,15 @@
 # %% [markdown]
 # # Sheet 4 - How sure?
 #
-# Belongs to notebooks 15 and 16. Write each function, then run the cell below it: it asks your
-# function for fresh cases and says in words what is right or wrong. `exercises.hint("p_value", 1)`
-# prints a hint, 2 the next, 3 is nearly the solution.
+# Write each function, then run the cell below it: it asks your function for fresh cases and says in
+# words what is right or wrong. `exercises.hint("p_value", 1)` prints a hint, 2 the next, 3 is nearly
+# the solution.
+
+# %% [markdown]
+# [Start](../00_start_here.ipynb) · before: [sheet 3](sheet3_zones.ipynb) · next: [sheet
+# 5](sheet5_barriers.ipynb) · [to do](../exercises/sheet4_certainty.ipynb) ·
+# [solved](../solutions/sheet4_certainty.ipynb) · 50 min · belongs to [15](../15_respect.ipynb),
+# [16](../16_claims.ipynb)
 
 # %%
 import matplotlib.pyplot as plt

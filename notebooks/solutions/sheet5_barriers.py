@@ -14,9 +14,15 @@
 # %% [markdown]
 # # Sheet 5 - Barriers
 #
-# Belongs to notebooks 06, 11 and 12. Write each function, then run the cell below it: it asks your
-# function for fresh cases and says in words what is right or wrong. `exercises.hint("barrier_row",
-# 1)` prints a hint, 2 the next, 3 is nearly the solution.
+# Write each function, then run the cell below it: it asks your function for fresh cases and says in
+# words what is right or wrong. `exercises.hint("barrier_row", 1)` prints a hint, 2 the next, 3 is
+# nearly the solution.
+
+# %% [markdown]
+# [Start](../00_start_here.ipynb) · before: [sheet 4](sheet4_certainty.ipynb) · next: [sheet
+# 6](sheet6_robot.ipynb) · [to do](../exercises/sheet5_barriers.ipynb) ·
+# [solved](../solutions/sheet5_barriers.ipynb) · 1 h 00 min · belongs to [06](../06_barriers.ipynb),
+# [11](../11_feasibility.ipynb), [12](../12_distances.ipynb)
 
 # %%
 import matplotlib.pyplot as plt

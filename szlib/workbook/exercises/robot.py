@@ -15,7 +15,7 @@ from ...simulation.scenarios.paper import SCENARIOS
 from ...zones.ellipses import Ellipse
 from .task import Case, Rng, Task, formula
 
-GAMMAS = (0.05, 0.1, 0.2, 0.4, 0.8)
+GAMMAS = (0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.12, 0.15, 0.2)
 """What is tried by experiment."""
 
 
@@ -33,27 +33,30 @@ def _some_zone(rng: Rng) -> Ellipse:
 
 
 @lru_cache(maxsize=64)
-def _passing(zone: Ellipse, gamma: float, N_h: int = 2, turned: bool = False) -> dict[str, float]:
-    """The first scenario in numbers: infeasible steps, least h [m], where avoidance starts [m]."""
-    scenario = SCENARIOS["passing"].turned() if turned else SCENARIOS["passing"]
-    settings = MPCSettings(gamma=gamma, N_h=N_h)
+def _run(name: str, zone: Ellipse, settings: MPCSettings, turned: bool = False) -> dict[str, float]:
+    """A scenario of the paper in numbers: infeasible steps, least h [m], where avoidance starts [m]."""
+    scenario = SCENARIOS[name].turned() if turned else SCENARIOS[name]
     log = simulate(scenario, MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=1))
     found = log.metrics()
     return {name: found[name] for name in ("infeasible_steps", "min_h")} | {"start": avoidance_start(log)[0]}
 
 
-def _largest(zone: Ellipse, gammas: tuple[float, ...], N_h: int = 2) -> float:
+def _weak_brake(rng: Rng) -> tuple[Any, ...]:
+    return _some_zone(rng), round(rng.uniform(0.4, 0.7), 2), GAMMAS
+
+
+def _largest(zone: Ellipse, a_max: float, gammas: tuple[float, ...]) -> float:
     """The last gamma before the first one with an infeasible step."""
     kept = 0.0
     for gamma in gammas:
-        if _passing(zone, gamma, N_h)["infeasible_steps"]:
+        if _run("passing", zone, MPCSettings(gamma=gamma, a_max=a_max))["infeasible_steps"]:
             break
         kept = gamma
     return kept
 
 
-def _next_larger(zone: Ellipse, gammas: tuple[float, ...]) -> float:
-    return gammas[min(gammas.index(_largest(zone, gammas)) + 1, len(gammas) - 1)]
+def _next_larger(zone: Ellipse, a_max: float, gammas: tuple[float, ...]) -> float:
+    return gammas[min(gammas.index(_largest(zone, a_max, gammas)) + 1, len(gammas) - 1)]
 
 
 def _plan(rng: Rng) -> tuple[Any, ...]:
@@ -66,22 +69,23 @@ def _shifted(plan: Any) -> Any:
 
 
 QUESTIONS = {
-    "gamma from 0.05 to 0.1: the least h is": ("smaller", "larger"),
-    "N_h from 2 to 8 at gamma 0.4: the infeasible steps are": ("fewer", "more"),
-    "from the front to from behind: avoidance starts": ("nearer", "farther away"),
+    "passing, gamma from 0.05 to 0.1: the least h is": ("smaller", "larger"),
+    "waiting at gamma 0.2, N_h from 2 to 8: the infeasible steps are": ("fewer", "more"),
+    "passing, from the front to from behind: avoidance starts": ("nearer", "farther away"),
 }
-"""What is asked before the runs, and what the answer may be, the truth first as it has come out so far."""
+"""What is asked before the runs, and what may be answered: that the number falls, that it rises."""
 
 
 def _runs(rng: Rng) -> Case:
     """What the runs with a fresh zone say, and their numbers."""
-    zone = _some_zone(rng)
-    calm, bold, short = _passing(zone, 0.05), _passing(zone, 0.1), _passing(zone, 0.4)
-    long, behind = _passing(zone, 0.4, 8), _passing(zone, 0.05, 2, True)
-    pairs = [("min_h", calm, bold), ("infeasible_steps", short, long), ("start", calm, behind)]
+    zone, calm, bold = _some_zone(rng), MPCSettings(), MPCSettings(gamma=0.2)
+    first, sooner = _run("passing", zone, calm), _run("passing", zone, MPCSettings(gamma=0.1))
+    short, long = (_run("waiting", zone, s) for s in (bold, MPCSettings(gamma=0.2, N_h=8)))
+    behind = _run("passing", zone, calm, turned=True)
+    pairs = [("min_h", first, sooner), ("infeasible_steps", short, long), ("start", first, behind)]
     truth = {}
-    for (question, (less, more)), (name, one, other) in zip(QUESTIONS.items(), pairs, strict=True):
-        said = less if other[name] < one[name] else more if other[name] > one[name] else "the same"
+    for (question, (falls, rises)), (name, one, other) in zip(QUESTIONS.items(), pairs, strict=True):
+        said = falls if other[name] < one[name] else rises if other[name] > one[name] else "the same"
         truth[question] = (said, f"{one[name]:.3g}, then {other[name]:.3g}")
     return (), truth
 
@@ -127,16 +131,19 @@ TASKS = (
         40,
         (
             "Run szlib.SCENARIOS['passing'] with each gamma and this zone, and look at log.metrics().",
-            "controller = szlib.MPCCBF(zone, settings=szlib.MPCSettings(gamma=gamma)); what is counted in "
+            "szlib.MPCCBF(zone, settings=szlib.MPCSettings(gamma=gamma, a_max=a_max)); what is counted in "
             "metrics()['infeasible_steps']?",
             "Go through the gammas from the smallest; stop at the first with an infeasible step and return "
             "the one before.",
         ),
-        formula(lambda rng: (_some_zone(rng), GAMMAS), _largest),
+        formula(_weak_brake, _largest),
         {
             "one too far: with this gamma there are infeasible steps already": _next_larger,
-            "this is the smallest gamma; larger ones had no infeasible step": lambda z, gammas: gammas[0],
-            "this is the largest gamma of all, whatever the runs say": lambda z, gammas: gammas[-1],
+            "this is the smallest gamma; larger ones had no infeasible step": lambda z, a, gammas: gammas[0],
+            "this is the largest gamma of all, whatever the runs say": lambda z, a, gammas: gammas[-1],
+            "this is for a robot that brakes with 1 m/s2: hand a_max over": lambda z, a, gammas: _largest(
+                z, 1.0, gammas
+            ),
         },
         cases=1,
     ),
