@@ -109,8 +109,9 @@ record.key["h at worst, N_h = 2, gamma = 0.8 [m]"] = float(paper.loc[0.8, "min_h
 # %% [markdown]
 # ## One infeasible step, three answers
 #
-# The first scenario with $\gamma = 0.8$: the robot drives at full speed until, shortly before the
-# zone, two steps can no longer hold it back. Three answers:
+# The first scenario with $\gamma = 0.8$ and, as in the paper, no side chosen beforehand (`tie=0`): the
+# robot drives at full speed until, shortly before the zone, two steps can no longer hold it back. Three
+# answers:
 #
 # - **dropped**: a hard solver has no answer, and what it leaves behind is nearly the plan without
 #   the barrier; passed on, it drives through the person;
@@ -137,7 +138,7 @@ def follow(answer: str, settings: szlib.MPCSettings) -> pd.DataFrame:
 
 
 zone = record.ellipse()
-hasty = szlib.MPCSettings(gamma=0.8)
+hasty = szlib.MPCSettings(gamma=0.8, tie=0.0)
 answers = {answer: follow(answer, hasty) for answer in ("dropped", "relaxed", "braking")}
 
 # %%
