@@ -103,6 +103,7 @@ def test_an_unreadable_zone_is_fitted_again_and_said_so(record, monkeypatch, cap
 def test_badges():
     table = parameters([("gamma", 0.05, "measured", "why")])
     assert table.data.set_index("parameter").loc["gamma", "badge"] == "measured"
+    assert "gamma" in repr(table) and " at 0x" not in repr(table)
     with pytest.raises(ValueError, match="guessed"):
         parameters([("gamma", 0.05, "guessed", "")])
 
