@@ -25,7 +25,6 @@ from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import pandas as pd
-from IPython.display import Image
 
 import szlib
 from szlib.simulation.metrics import avoidance_start
@@ -84,7 +83,7 @@ record.figure(ax.figure, "scenario")
 
 # %%
 record.animation(movie := log.animate(), "run")
-Image(movie)
+movie
 
 # %% [markdown]
 # ## Did it keep its promises?
