@@ -146,7 +146,9 @@ figure, panels = plt.subplots(1, 2, figsize=size, layout="constrained", sharey=T
 labels = {"visits": "visits", "standing": "people who stand, mean"}
 for ax, (column, label) in zip(panels, labels.items(), strict=True):
     ax.barh(days.index[~event], days.loc[~event, column], color=figures.BLUE, label="usual")
-    ax.barh(days.index[event], days.loc[event, column], color=figures.RED, hatch="//", label="an event?")
+    if event.any():
+        ax.barh(days.index[event], days.loc[event, column], color=figures.RED, hatch="//", label="event?")
+    ax.locator_params(axis="x", nbins=5)
     ax.set(xlabel=label, ylim=(len(days) - 0.4, -0.6))
 panels[0].set_yticks(days.index, names)
 panels[1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
