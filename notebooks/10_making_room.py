@@ -20,11 +20,18 @@
 # **Expectation.** The paper: the robot gives way first - here it must back out - and goes on
 # afterwards.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [9 - Yielding by waiting](09_waiting.ipynb) · next: [11 -
+# Feasibility](11_feasibility.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 5 min to
+# read
+#
+# **Afterwards you can** say why the robot backs out of a passage, although no rule tells it to.
+
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from IPython.display import Image, Markdown
+from IPython.display import Markdown
 
 import szlib
 from szlib.control.step import admissible
@@ -72,7 +79,7 @@ record.figure(ax.figure, "scenario")
 
 # %%
 record.animation(movie := log.animate(), "run")
-Image(movie)
+movie
 
 # %% [markdown]
 # ## Safe, and as the paper says?

@@ -67,7 +67,7 @@ def test_knobs_of_the_method_reach_encounters_and_zone_and_their_names(record, m
     turned.zone()
     assert [each["min_speed"] for each in searched] == [0.4, 0.6]
     assert searched[1]["space"] == szlib.AttentionalSpace(length=4.0)
-    assert fitted == [{"r_max": 2.0, "q": 0.05}, {"r_max": 1.5, "q": 0.1}]
+    assert [(each["r_max"], each["q"]) for each in fitted] == [(2.0, 0.05), (1.5, 0.1)]
     assert NotebookRecord("02_test", given | {"zone_speed": 1.3}).method.zone_speed == 1.3
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import isnan
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
@@ -23,6 +24,7 @@ from ...control.barriers import Array
 from ...simulation.log import SimulationLog
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
+from .players import Movie
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, axes, metres
 
 _ROBOT = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
@@ -74,12 +76,14 @@ def plot_speed(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_barriers(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
-    """h of every person and wall over time: safe where it is not negative; logarithmic above 0.5 m."""
+    """h of every person, and of the nearest wall, over time: safe where >= 0; logarithmic above 0.5 m."""
     ax = axes(ax, size=(8, 2.5))
     n = len(log.scenario.people)
-    for i, h in enumerate(log.h.T):
-        kind, colour, line = ("person", RED, "-") if i < n else ("wall", BLACK, ":")
-        ax.plot(log.time, h, color=colour, linestyle=line, label=kind if i in (0, n) else None)
+    for i, h in enumerate(log.h[:, :n].T):
+        ax.plot(log.time, h, color=RED, label="person" if i == 0 else None)
+    if log.h.shape[1] > n:
+        walls = log.h[:, n:].min(axis=1)
+        ax.plot(log.time, walls, color=BLACK, linestyle=":", label="nearest wall")
     ax.axhline(0, color=GREY, linewidth=1)
     ax.set_yscale("symlog", linthresh=0.5, linscale=1.5)
     ax.set_yticks([0, 0.25, 0.5, 1, 2, 5, 10], ["0", "0.25", "0.5", "1", "2", "5", "10"])
@@ -104,8 +108,8 @@ def plot_robot_paths(logs: Mapping[str, SimulationLog], *, ax: Axes | None = Non
     return metres(ax, first.scenario.title)
 
 
-def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> bytes:
-    """The run as an animated GIF: a frame every so many seconds, shown at twice the speed of life."""
+def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> Movie:
+    """The run as an animated GIF, a frame every so many seconds, twice as fast; a player in notebooks."""
     step = max(1, round(every / log.settings.dt))
     rows = np.unique(np.r_[np.arange(0, len(log.states), step), len(log.states) - 1])
     figure = Figure(figsize=(width, width * 0.55), layout="constrained", dpi=70)
@@ -133,7 +137,7 @@ def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> by
     first, *others = [picture(row) for row in rows.tolist()]
     movie = io.BytesIO()
     first.save(movie, "GIF", save_all=True, append_images=others, duration=500 * every, loop=0)
-    return movie.getvalue()
+    return Movie.of(movie.getvalue(), log, (*ax.get_xlim(), *ax.get_ylim()))
 
 
 def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> Axes:
@@ -146,6 +150,25 @@ def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> 
     ax.set_xticks(range(table.shape[1]), [f"{name:g}" for name in table.columns])
     ax.set_yticks(range(table.shape[0]), [f"{name:g}" for name in table.index])
     ax.set(xlabel=str(table.columns.name), ylabel=str(table.index.name))
+    return ax
+
+
+def plot_manners(
+    table: pd.DataFrame, *, names: Sequence[str], rows: str, columns: str, ax: Axes | None = None
+) -> Axes:
+    """A map of what a robot did, as from `scenarios.atlas.chart`: one value of "manner" a cell, as a letter.
+
+    `names` are all that may occur, from pale to dark; the letter is the place in them: A, B, C, ...
+    """
+    ax = axes(ax, size=(4, 3.2))
+    found = table.pivot(index=rows, columns=columns, values="manner").sort_index(ascending=False)
+    places = found.map(list(names).index).to_numpy()
+    ax.imshow(places, cmap="YlOrBr", vmin=0, vmax=1.3 * len(names), aspect="auto")
+    for (row, column), place in np.ndenumerate(places):
+        ax.text(column, row, chr(ord("A") + place), ha="center", va="center", fontsize=9)
+    ax.set_xticks(range(found.shape[1]), [f"{value:g}" for value in found.columns])
+    ax.set_yticks(range(found.shape[0]), [f"{value:g}" for value in found.index])
+    ax.set(xlabel=columns, ylabel=rows)
     return ax
 
 
@@ -166,6 +189,29 @@ def plot_intervals(
     ax.set(xlabel=label, ylim=(len(names) - 0.5, -0.5))
     ax.grid(axis="x", color=GREY, alpha=0.3)
     return ax
+
+
+def interval_grid(
+    table: pd.DataFrame,
+    labels: Mapping[str, str],
+    *,
+    rows: str,
+    colour: str,
+    columns: int = 3,
+    title: str = "",
+) -> Figure:
+    """A panel of `plot_intervals` for each metric of `labels`, metric -> axis label, with one legend."""
+    down = -(-len(labels) // columns)
+    names = table[rows].nunique()
+    size = (4.4 * columns, down * (0.36 * names + 1.3) + 0.6)
+    figure, grid = plt.subplots(down, columns, figsize=size, layout="constrained", sharey=True, squeeze=False)
+    for ax, (metric, label) in zip(grid.flat, labels.items(), strict=False):
+        plot_intervals(table, metric, rows=rows, colour=colour, label=label, ax=ax)
+    for ax in grid.flat[len(labels) :]:
+        ax.axis("off")
+    legend_below(list(grid.flat))
+    figure.suptitle(title)
+    return figure
 
 
 def legend_below(panels: Sequence[Axes]) -> None:

@@ -14,6 +14,7 @@ from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
 from ...encounters.pipeline import Chain
 from ...zones.by_direction.quantile import SHARE
 from ...zones.outliers import R_MAX
+from ...zones.social_zone import SPEEDS
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Method:
 
     def fit(self) -> dict[str, Any]:
         """Keywords of `szlib.SocialZone.fit` for the zone that the robot keeps."""
-        return {"r_max": self.r_max, "q": self.q}
+        return {"r_max": self.r_max, "q": self.q, "speeds": sorted({*SPEEDS, self.zone_speed})}
 
 
 DEFAULTS: Mapping[str, Any] = asdict(Method())

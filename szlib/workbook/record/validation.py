@@ -21,9 +21,9 @@ SETTINGS = {"gamma": "gamma", "gammas": "gamma", "horizons": "N_h", "limits": "a
 _MANY = 2**31
 RANGES: dict[str, tuple[float, float]] = {
     "seed": (0, 2**63), "space_width": (0.1, 100), "space_length": (0.1, 100), "duration": (0.1, 60),
-    "min_distance": (0, 100), "min_speed": (0.01, 10), "q": (0.001, 0.5), "intruders": (0, 0.5),
-    "examples": (1, _MANY), "worlds": (1, _MANY), "n_jobs": (-1, _MANY),
-    "fraction": (0, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
+    "min_distance": (0, 100), "min_speed": (0.01, 10), "q": (0.001, 0.5), "zone_speed": (0.01, 10),
+    "intruders": (0, 0.5), "examples": (1, _MANY), "worlds": (1, _MANY), "n_jobs": (-1, _MANY),
+    "fraction": (1e-6, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
     "eccentricities": (0, 0.999999),
 }  # fmt: skip
 """Lowest and highest value."""
