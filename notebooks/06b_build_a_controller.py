@@ -20,6 +20,18 @@
 # plans (MPC), and both together (MPC-CBF). The last one is the controller of the paper, and must decide the
 # same as `szlib.MPCCBF`.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [6 - Barriers](06_barriers.ipynb) · next: [7 - Passing a person who
+# stands](07_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 25 min to
+# read
+#
+# **Afterwards you can** write an MPC-CBF yourself, and say what each of its terms is there for.
+#
+# **Words.** *CBF-QP*: a quadratic program for one step: as near to the wanted control as the barrier
+# allows; *IPOPT*: the solver for nonlinear optimisation that the paper uses; *MPC*: model predictive
+# control: plan some steps ahead, take the first, plan again; *slack*: by how much a row is violated; *SQP*:
+# sequential quadratic programming: solve quadratic problems in a row, each around the last answer.
+
 # %%
 import casadi as ca
 import matplotlib.pyplot as plt

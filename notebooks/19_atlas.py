@@ -22,6 +22,12 @@
 # efficiency." So there should be a land of going ahead, one of yielding, and a curve from the one to the
 # other.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [18 - Eleven meetings](18_meetings.ipynb) ·
+# [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 15 min to read
+#
+# **Afterwards you can** predict from gamma, width, speed and zone what the robot will do.
+
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
