@@ -29,7 +29,7 @@
 # **Afterwards you can** say when a step has no solution, and prove when there always is one.
 #
 # **Words.** *exact penalty*: a price on violations so high that none is paid where a solution without
-# violations exists; *MPC*: model predictive control: plan some steps ahead, take the first, plan again.
+# violations exists.
 
 # %%
 from dataclasses import replace

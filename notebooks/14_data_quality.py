@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [13 - Against everything else](13_comparison.ipynb) · next: [15 -
-# Respect or emptiness?](15_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 10 min to
+# Respect or emptiness?](15_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 15 min to
 # read
 #
 # **Afterwards you can** judge whether a file of tracks can be used, and find days unlike the others.
