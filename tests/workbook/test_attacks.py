@@ -182,7 +182,7 @@ def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks
         ({"gammas": [0.1, "x"]}, "gammas: expected float"),
         ({"horizons": [0]}, "N_h must be a whole number >= 1"),
         ({"speeds": [-1.0]}, "speeds: expected 0.01 to 10"),
-        ({"fraction": 0.9}, "fraction: expected 0 to 0.5"),
+        ({"fraction": 0.9}, "fraction: expected 1e-06 to 0.5"),
         ({"n_jobs": 0}, "n_jobs"),
         ({"results": "x"}, "is set by --out"),
     ],

@@ -7,6 +7,7 @@ import pytest
 from szlib.errors import DataError
 from szlib.workbook import command_line
 from szlib.workbook.command_line import main
+from szlib.workbook.record.validation import check_parameters
 from szlib.workbook.runner import execution
 
 
@@ -21,10 +22,9 @@ def summary(tmp_path, folder="mine"):
 @pytest.mark.usefixtures("at_once")
 def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp_path, capsys):
     notebooks(_01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)')
-    assert run("-p", "seed=3") == 0
-    (folder,) = (path.name for path in (tmp_path / "out").glob("mine-*"))
-    record = summary(tmp_path, folder)["notebooks"]["01_good"]
-    assert record["key_figures"] == {"seed": 3}
+    assert run() == 0
+    record = summary(tmp_path)["notebooks"]["01_good"]
+    assert record["key_figures"] == {"seed": 0}
     assert [(c["name"], c["passed"], c["value"]) for c in record["checks"]] == [
         ("sum", True, 2),
         ("paper", False, 0.25),
@@ -33,6 +33,30 @@ def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp
     assert "1/1" in printed
     assert "not supported here" in printed
     assert "all checks hold" in printed
+
+
+def test_a_changed_parameter_makes_observations_and_ends_with_0_but_a_promise_fails(
+    notebooks, tmp_path, capsys
+):
+    notebooks(_01_good='record.check("no infeasible step", seed == 0, 4)')
+    assert run("-p", "seed=3") == 0
+    (folder,) = (path.name for path in (tmp_path / "out").glob("mine-*"))
+    assert summary(tmp_path, folder)["passed"]
+    printed = capsys.readouterr().out
+    assert "01_good: no infeasible step: does not hold with seed = 3 (4)" in printed
+    assert "all checks hold; 1 are observations" in printed
+    notebooks(_01_good='record.check("funnel", False, always=True)')
+    assert run("-p", "seed=3") == 1
+
+
+def test_a_value_that_is_one_notebooks_default_is_given_to_the_others(notebooks):
+    folder = notebooks(_01_few="", _07_many="")
+    for name, worlds in (("01_few", 2), ("07_many", 4)):
+        script = folder / f"{name}.py"
+        script.write_text(script.read_text().replace("seed = 0\n", f"seed = 0\nworlds = {worlds}\n", 1))
+    sources = sorted(folder.glob("*.py"))
+    assert check_parameters({"worlds": 2, "seed": 0}, sources) == {"worlds": 2}
+    assert check_parameters({"worlds": 4}, sources[1:]) == {}
 
 
 def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, tmp_path, capsys):

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import isnan
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
@@ -16,8 +17,10 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patches import Ellipse as EllipsePatch
+from matplotlib.patheffects import Normal, Stroke
 from PIL import Image
 
+from ...control.barriers import Array
 from ...simulation.log import SimulationLog
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
@@ -26,11 +29,21 @@ from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, axes, metres
 _ROBOT = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
 _PADDING = 0.2
 """Room left around what is drawn [m]."""
+_STAYS = 0.35
+"""Moves no longer than this share one time label [m]."""
+_WHOLE = 3.0
+"""A wall that leads no farther than this beyond all else is drawn to its end [m]."""
+_DARK_RED = "#7A2E00"
+"""Of letters, for `RED` is too pale for them."""
 _PERSON = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
 
 
 def plot_scenario(log: SimulationLog, *, every: float = 2.0, ax: Axes | None = None) -> Axes:
-    """Robot, zones and walls, every so many seconds, colours deepening over time (paper, fig. 6)."""
+    """Robot, zones and walls, every so many seconds, colours deepening over time (paper, fig. 6).
+
+    The times [s] are written on the robot's path and on everybody's, so that they can be matched; where
+    somebody stays within `_STAYS`, from when to when.
+    """
     ax = axes(ax, size=(9, 4.5))
     step = max(1, round(every / log.settings.dt))
     shown = np.arange(0, len(log.states), step)
@@ -39,12 +52,15 @@ def plot_scenario(log: SimulationLog, *, every: float = 2.0, ax: Axes | None = N
     for row in shown.tolist():
         depth = log.time[row] / max(log.time[-1], 1e-9)
         _draw_moment(ax, log, row, robot=_ROBOT(depth), zone=_PERSON(depth))
+    _write_times(ax, log.time[shown], log.states[shown, :2], colour=BLACK, above=0)
+    for i in range(len(log.zones)):
+        _write_times(ax, log.time[shown], log.people[shown, i, :2], colour=_DARK_RED, above=8)
     ax.plot([], [], "o", color=BLUE, label="robot")
     ax.plot([], [], color=RED, label="zone")
     ax.plot([], [], marker=(3, 0, 0), color=RED, linestyle="", label="person")
     _frame(ax, [(log, shown)])
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=6, fontsize=8)
-    return metres(ax, f"{log.scenario.title} (every {every:g} s, later is darker)")
+    return metres(ax, f"{log.scenario.title} (times in s; later is darker)")
 
 
 def plot_speed(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
@@ -59,12 +75,14 @@ def plot_speed(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_barriers(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
-    """h of every person and wall over time: safe where it is not negative; logarithmic above 0.5 m."""
+    """h of every person, and of the nearest wall, over time: safe where >= 0; logarithmic above 0.5 m."""
     ax = axes(ax, size=(8, 2.5))
     n = len(log.scenario.people)
-    for i, h in enumerate(log.h.T):
-        kind, colour, line = ("person", RED, "-") if i < n else ("wall", BLACK, ":")
-        ax.plot(log.time, h, color=colour, linestyle=line, label=kind if i in (0, n) else None)
+    for i, h in enumerate(log.h[:, :n].T):
+        ax.plot(log.time, h, color=RED, label="person" if i == 0 else None)
+    if log.h.shape[1] > n:
+        walls = log.h[:, n:].min(axis=1)
+        ax.plot(log.time, walls, color=BLACK, linestyle=":", label="nearest wall")
     ax.axhline(0, color=GREY, linewidth=1)
     ax.set_yscale("symlog", linthresh=0.5, linscale=1.5)
     ax.set_yticks([0, 0.25, 0.5, 1, 2, 5, 10], ["0", "0.25", "0.5", "1", "2", "5", "10"])
@@ -153,6 +171,29 @@ def plot_intervals(
     return ax
 
 
+def interval_grid(
+    table: pd.DataFrame,
+    labels: Mapping[str, str],
+    *,
+    rows: str,
+    colour: str,
+    columns: int = 3,
+    title: str = "",
+) -> Figure:
+    """A panel of `plot_intervals` for each metric of `labels`, metric -> axis label, with one legend."""
+    down = -(-len(labels) // columns)
+    names = table[rows].nunique()
+    size = (4.4 * columns, down * (0.36 * names + 1.3) + 0.6)
+    figure, grid = plt.subplots(down, columns, figsize=size, layout="constrained", sharey=True, squeeze=False)
+    for ax, (metric, label) in zip(grid.flat, labels.items(), strict=False):
+        plot_intervals(table, metric, rows=rows, colour=colour, label=label, ax=ax)
+    for ax in grid.flat[len(labels) :]:
+        ax.axis("off")
+    legend_below(list(grid.flat))
+    figure.suptitle(title)
+    return figure
+
+
 def legend_below(panels: Sequence[Axes]) -> None:
     """One legend below several panels that show the same things: that of the first."""
     handles, names = panels[0].get_legend_handles_labels()
@@ -189,10 +230,31 @@ def _zones(log: SimulationLog, row: int) -> list[Ellipse]:
     return [zone.placed((x, y), heading) for zone, (x, y, heading) in at if not isnan(x)]
 
 
+def _write_times(ax: Axes, time: Array, at: Array, *, colour: str, above: float) -> None:
+    """Write along a path when somebody was there, shape (n,) [s] and (n, 2) [m]; NaN where they were not."""
+    labels: list[tuple[Array, list[str]]] = []
+    first = 0
+    for row in range(1, len(time) + 1):
+        if row < len(time) and np.hypot(*(at[row] - at[first])) < _STAYS:
+            continue
+        if not isnan(at[first, 0]):
+            here, until = at[first:row].mean(axis=0), f"-{time[row - 1]:.3g}" if row - 1 > first else ""
+            near = [told for place, told in labels if np.hypot(*(here - place)) < _STAYS]
+            if not near:
+                labels.append((here, []))
+                near = [labels[-1][1]]
+            near[0].append(f"{time[first]:.3g}{until}")
+        first = row
+    halo = [Stroke(linewidth=2, foreground="white"), Normal()]
+    for here, told in labels:
+        label = ax.annotate(", ".join(told), (here[0], here[1]), (0, above), textcoords="offset points")
+        label.set(color=colour, ha="center", va="center", fontsize=8, path_effects=halo)
+
+
 def _frame(ax: Axes, shown: Sequence[tuple[SimulationLog, Any]]) -> None:
     """Limits that hold all that is ever drawn of these runs: paths, goal, and zones in the rows shown.
 
-    Of walls that lead farther only the part is drawn that lies there.
+    Walls that lead much farther (`_WHOLE`) are drawn as far as that.
     """
     first = shown[0][0]
     radius = first.settings.r_robot + 0.3
@@ -202,7 +264,8 @@ def _frame(ax: Axes, shown: Sequence[tuple[SimulationLog, Any]]) -> None:
         points += [zone.curve(25) for row in rows.tolist() for zone in _zones(log, row)]
     everything = np.vstack(points)
     low, high = everything.min(axis=0) - _PADDING, everything.max(axis=0) + _PADDING
-    if len(first.scenario.walls):
-        y = first.scenario.walls[:, :, 1]
-        low[1], high[1] = min(low[1], max(y.min() - 0.2, -3.5)), max(high[1], min(y.max() + 0.2, 3.5))
+    ends = first.scenario.walls.reshape(-1, 2)
+    near = ((ends > low - _WHOLE) & (ends < high + _WHOLE)).all(axis=1)
+    low = np.minimum(low, ends[near].min(axis=0, initial=np.inf) - _PADDING)
+    high = np.maximum(high, ends[near].max(axis=0, initial=-np.inf) + _PADDING)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))

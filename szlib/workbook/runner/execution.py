@@ -67,8 +67,8 @@ def run(
     StorageError : results cannot be written there, or another run is writing there.
     """
     sources = _chosen(only)
-    defaults = check_parameters(parameters or {}, sources)
-    given = {name: value for name, value in (parameters or {}).items() if value != defaults[name]}
+    known = sorted({*sources, *(n for n in places.notebooks() if n.stem[:2] <= LAST_PRODUCER)})
+    given = check_parameters(parameters or {}, known)
     if given.get("area", AUTO) != AUTO:  # in one form, whatever file or text it came from
         given["area"] = str(as_area(given["area"]))
     asked = places.absolute(data)

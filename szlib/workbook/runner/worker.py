@@ -6,6 +6,7 @@ What a process of the run's pool loads: nothing of szlib that the kernel loads a
 from __future__ import annotations
 
 import json
+import logging
 import os
 import time
 from collections.abc import Iterator, Mapping
@@ -68,6 +69,9 @@ def _execute_in(temporary: Path, script: Path, folder: Path, given: dict[str, An
     plain, executed = temporary / f"{script.stem}.ipynb", temporary / "executed.ipynb"
     jupytext.write(jupytext.read(script), plain, fmt="ipynb")
     outcome: dict[str, Any] = {}
+    logging.getLogger("papermill").setLevel(
+        logging.ERROR
+    )  # that a notebook does not name a parameter is usual
     try:
         papermill.execute_notebook(
             plain,
