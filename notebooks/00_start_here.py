@@ -46,7 +46,6 @@
 
 # %%
 import szlib
-from szlib.workbook.exercises import SHEETS
 from szlib.workbook.record import NotebookRecord, places
 
 # %% tags=["parameters"]
@@ -57,12 +56,13 @@ results = "../results"
 
 # %%
 record = NotebookRecord("00_start_here", globals())
-tasks = [task for sheet in SHEETS.values() for task in sheet]
-print(f"szlib {szlib.__version__}: {len(places.notebooks())} notebooks, {len(tasks)} exercises")
-record.key["exercises"] = len(tasks)
-for sheet in SHEETS:
-    there = all((places.NOTEBOOKS / part / f"{sheet}.py").exists() for part in ("exercises", "solutions"))
-    record.check(f"{sheet} and its solutions are there", there)
+sheets = sorted((places.NOTEBOOKS / "exercises").glob("sheet*.py"))
+tasks = sum(sheet.read_text(encoding="utf-8").count("exercises.check(") for sheet in sheets)
+print(f"szlib {szlib.__version__}: {len(places.notebooks())} notebooks, {len(sheets)} sheets")
+record.key |= {"sheets": len(sheets), "exercises": tasks}
+for sheet in sheets:
+    solved = (places.NOTEBOOKS / "solutions" / sheet.name).exists()
+    record.check(f"the solutions of {sheet.stem} are there", solved)
 
 # %% [markdown]
 # ## The map
