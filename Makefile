@@ -8,10 +8,17 @@ BIN := $(VENV)/bin
 endif
 INSTALLED := $(VENV)/installed
 
-.PHONY: run test lab bench lock audit hostile notebooks dist clean
+.PHONY: run report docs test lab bench lock audit hostile notebooks dist clean
 
 run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza
 	$(BIN)/szlib run
+
+report: $(INSTALLED)  ## open what the last run on the plaza wrote: one HTML file
+	$(BIN)/szlib report --open
+
+docs: $(INSTALLED)  ## results/site: that report, and beside it what each name of szlib does
+	$(BIN)/pdoc --docformat numpy --output-directory results/site szlib
+	$(BIN)/python -c "import shutil; shutil.copyfile('results/synthetic/report.html', 'results/site/report.html')"
 
 test: $(INSTALLED)  ## style, types, and every test
 	$(BIN)/ruff check

@@ -32,7 +32,6 @@ from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import pandas as pd
-from IPython.display import Image
 
 import szlib
 from szlib.simulation.metrics import avoidance_start
@@ -91,7 +90,7 @@ record.figure(ax.figure, "scenario")
 
 # %%
 record.animation(movie := log.animate(), "run")
-Image(movie)
+movie
 
 # %% [markdown]
 # ## Did it keep its promises?

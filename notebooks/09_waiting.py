@@ -28,7 +28,6 @@
 # %%
 import matplotlib.pyplot as plt
 import pandas as pd
-from IPython.display import Image
 
 import szlib
 from szlib.workbook import figures
@@ -74,7 +73,7 @@ record.figure(ax.figure, "scenario")
 
 # %%
 record.animation(movie := log.animate(), "run")
-Image(movie)
+movie
 
 # %% [markdown]
 # ## Safe?

@@ -30,7 +30,6 @@
 # %%
 import matplotlib.pyplot as plt
 import pandas as pd
-from IPython.display import Image
 
 import szlib
 from szlib.workbook import figures
@@ -76,7 +75,7 @@ record.figure(ax.figure, "scenario")
 
 # %%
 record.animation(movie := log.animate(), "run")
-Image(movie)
+movie
 
 # %% [markdown]
 # ## Safe?

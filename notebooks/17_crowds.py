@@ -36,7 +36,7 @@ from importlib.util import find_spec
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from IPython.display import Image, display
+from IPython.display import display
 
 import szlib
 from szlib.simulation.closed_loop import drive
@@ -127,7 +127,7 @@ record.figure(fig, "crossing")
 # %%
 if logs:
     record.animation(movie := logs[models[0]].animate(), "crossing")
-    display(Image(movie))
+    display(movie)
 
 # %% [markdown]
 # ## Random worlds

@@ -32,7 +32,6 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pandas as pd
-from IPython.display import Image
 
 import szlib
 from szlib.simulation.closed_loop import drive
@@ -224,7 +223,7 @@ pd.DataFrame({name: log.metrics() for name, log in way.items()}).loc[["time_to_g
 
 # %%
 record.animation(movie := logs["intersection"].animate(every=0.8), "intersection")
-Image(movie)
+movie
 
 # %%
 lost = mean["MPC-CBF"]["time_to_goal"] / mean["social force"]["time_to_goal"]

@@ -49,15 +49,16 @@ ROOMS = {
     "simulation.metrics": ["endings", "motion", "manners", "social"],
     "simulation.scenarios": ["paper", "meetings", "worlds", "atlas"],
     "workbook": [
-        "figures", "claims", "sensitivity", "exercises", "record", "runner", "command_line",
+        "figures", "claims", "sensitivity", "exercises", "record", "report", "runner", "command_line",
     ],
     "workbook.figures": [
-        "style", "tracks", "encounters", "zones", "control", "simulation", "crowds",
+        "style", "tracks", "encounters", "zones", "control", "players", "simulation", "crowds",
     ],
     "workbook.exercises": [
         "task", "tracks", "outliers", "zones", "certainty", "barriers", "robot", "checking",
     ],
     "workbook.record": ["method", "places", "validation", "tables", "notebook"],
+    "workbook.report": ["front_page", "document"],
     "workbook.runner": ["summary", "worker", "execution"],
 }  # fmt: skip
 """From the ground up: a room imports only from rooms before it, a file only from files before it."""

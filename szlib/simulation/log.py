@@ -192,7 +192,7 @@ class SimulationLog:
         return plot_scenario(self, ax=ax, **options)
 
     def animate(self, **options: Any) -> bytes:
-        """The run as an animated GIF; `options` of `workbook.figures.simulation.animate`."""
+        """The run as an animated GIF, a player in notebooks; `options` as of `figures.animate`."""
         from ..workbook.figures.simulation import animate
 
         return animate(self, **options)

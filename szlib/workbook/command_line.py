@@ -1,4 +1,4 @@
-"""The command line: `szlib run` the workbook, `inspect` a file, `extract` encounters from many days.
+"""The command line: `szlib run` the workbook, `report` on it, `inspect` a file, `extract` encounters.
 
 Nothing heavy is imported before a command needs it, so that `--version`, `--help` and a typo answer at once.
 Exit codes: 0; 1 where a check does not hold or a day failed; 2 where something was asked that cannot be
@@ -25,7 +25,7 @@ from .. import __version__, memory
 from ..errors import DataError, DataWarning, SzlibError
 from ..files import printable
 
-WORKBOOK_PACKAGES = ("ipykernel", "jupytext", "papermill")
+WORKBOOK_PACKAGES = ("ipykernel", "jupytext", "nbconvert", "papermill")
 """What `szlib run` needs beside the library: the extra `workbook`."""
 
 
@@ -148,11 +148,29 @@ def _run(options: argparse.Namespace) -> int:
         scheduler=options.scheduler,
     )
     print(render(summary))
+    if "report" in summary:
+        print(f"report: {printable(os.path.relpath(summary['report']))}")
     refused = [name for name, record in summary["notebooks"].items() if record["status"] == "refused"]
     if refused:
         error = summary["notebooks"][refused[0]]["error"]
         raise SzlibError(f"{', '.join(refused)}: could not be run: {error}; what was finished stays")
     return 0 if summary["passed"] else 1
+
+
+def _report(options: argparse.Namespace) -> int:
+    _check_workbook()
+    from .record import places
+    from .report import document
+
+    home = Path(options.folder) if options.folder else places.root(places.RESULTS) / "synthetic"
+    file = document.write(home)
+    print(printable(os.path.relpath(file)))
+    if options.open:
+        import webbrowser
+
+        if not webbrowser.open(file.resolve().as_uri()):
+            raise SzlibError("no browser could be opened here; open that file in one")
+    return 0
 
 
 def _area(options: argparse.Namespace) -> str:
@@ -229,6 +247,14 @@ def _parser() -> argparse.ArgumentParser:
         help="set a notebook parameter, such as seed=1",
     )  # fmt: skip
     run.set_defaults(command=_run)
+
+    report = commands.add_parser("report", help="make the report of a run anew: one HTML file")
+    report.add_argument(
+        "folder", nargs="?", metavar="FOLDER",
+        help="the run's folder of results (default: results/synthetic, beside the notebooks)",
+    )  # fmt: skip
+    report.add_argument("--open", action="store_true", help="and open it in a browser")
+    report.set_defaults(command=_report, memory=None)
 
     inspect = commands.add_parser("inspect", help="print what becomes of the rows of a file")
     inspect.add_argument("file", help="a file of tracks: ATC, EWAP, or tidy; plain or .gz")

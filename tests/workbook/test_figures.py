@@ -234,6 +234,15 @@ def test_an_animation_has_a_frame_for_every_time_asked(log):
         assert movie.n_frames == int(np.floor(log.table["t"].iloc[-1] + 1e-9)) + 1
 
 
+def test_a_figure_in_words():
+    fig, (left, right) = plt.subplots(1, 2)
+    left.plot([0], [0], label="robot")
+    left.set(title="A run", xlabel="time [s]", ylabel="h [m]")
+    left.legend()
+    right.set(xlabel="speed\n[m/s]")
+    assert figures.in_words(fig) == "A run: h [m] over time [s], with robot; speed [m/s]"
+
+
 # --- respect, claims, what moves a zone --------------------------------------------------------------
 
 

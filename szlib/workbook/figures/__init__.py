@@ -5,6 +5,7 @@ tracks      where people were, how fast, and what became of the rows
 encounters  the attentional space and the other person
 zones       outliers, the hull, zones by speed
 control     distances and barriers, and what they leave to a step
+players     runs with controls, in a browser
 simulation  runs of the robot, animations, sweeps and comparisons
 crowds      robots among other people's crowds
 """
@@ -13,7 +14,7 @@ import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
-    submodules=["style", "tracks", "encounters", "zones", "control", "simulation", "crowds"],
+    submodules=["style", "tracks", "encounters", "zones", "control", "players", "simulation", "crowds"],
     submod_attrs={
         "tracks": ["plot_map", "plot_speeds", "plot_funnel"],
         "encounters": ["plot_space", "plot_encounter_paths", "plot_los", "plot_los_distance"],
@@ -28,6 +29,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "plot_findings",
         ],
         "control": ["plot_distance", "plot_overestimate", "plot_admissible", "plot_step"],
+        "players": ["Movie"],
         "simulation": [
             "plot_scenario",
             "plot_speed",
@@ -52,6 +54,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "metres",
             "outline",
             "colours",
+            "in_words",
         ],
     },
 )

@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
@@ -41,3 +42,16 @@ def outline(area: Area, **style: Any) -> PathPatch:
 def colours(values: Sequence[Any]) -> list[Any]:
     """One colour of the sequence for each value, dark to light, leaving out the palest."""
     return list(plt.get_cmap(SEQUENCE)(np.linspace(0, 0.85, len(values))))
+
+
+def in_words(figure: Figure) -> str:
+    """What a figure shows, for who cannot see it: titles, what is over what, and the names in legends."""
+    told = []
+    for ax in figure.axes:
+        across, up, legend = ax.get_xlabel(), ax.get_ylabel(), ax.get_legend()
+        names = [text.get_text() for text in legend.get_texts()] if legend else []
+        axes = f"{up} over {across}" if up and across else up or across
+        parts = [ax.get_title(), axes, f"with {', '.join(names)}" if names else ""]
+        told.append(": ".join(part for part in parts[:2] if part) + (f", {parts[2]}" if parts[2] else ""))
+    title = figure.get_suptitle()
+    return " ".join("; ".join(([title] if title else []) + [part for part in told if part]).split())

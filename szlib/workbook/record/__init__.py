@@ -3,7 +3,7 @@
 method      the knobs between tracks and the robot's zone, which reach every notebook
 places      the folder of results that belongs to a data set and its parameters
 validation  parameters known, of the right type and in range, before a notebook starts
-tables      parameters with badges, to read
+tables      how values, tables and figures are shown
 notebook    the record of one notebook: checks, claims, figures, artefacts
 """
 

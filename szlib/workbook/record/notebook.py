@@ -34,7 +34,7 @@ from ...zones.ellipses import Ellipse
 from ...zones.social_zone import SocialZone
 from . import places
 from .method import DEFAULTS, Method
-from .tables import whole
+from .tables import as_text, show_with_words, whole
 from .validation import FOR_OPTIONS, NEUTRAL, defaults_of
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ class NotebookRecord:
         self.out = self._folder(variables, {n: v for n, v in changed.items() if n not in FOR_OPTIONS})
         for part in ("records", "figures"):
             (self.out / part).mkdir(exist_ok=True)
+        show_with_words()
 
     def _folder(self, variables: Mapping[str, Any], given: Mapping[str, Any]) -> Path:
         if run := os.environ.get(places.RUN_VARIABLE):
@@ -201,13 +202,13 @@ class NotebookRecord:
         }
         text = json.dumps(record, indent=1, default=_plain)
         write_file(self.out / "records" / f"{self.name}.json", text)
-        rows = [(c["kind"], c["name"], c["result"], _as_text(c["value"])) for c in self.checks]
+        rows = [(c["kind"], c["name"], c["result"], as_text(c["value"])) for c in self.checks]
         return whole(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
 
     def _record(self, kind: str, name: str, passed: bool, value: object, result: str) -> None:
         value = _plain(value)
         self.checks.append({"kind": kind, "name": name, "passed": passed, "value": value, "result": result})
-        print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({_as_text(value)})"))
+        print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({as_text(value)})"))
 
     def _picture(self, content: bytes, name: str) -> None:
         write_file(self.out / "figures" / name, content, lasting=False)
@@ -252,11 +253,3 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "item"):
         value = value.item()
     return round(value, 6) if isinstance(value, float) else value
-
-
-def _as_text(value: Any) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, dict):
-        return ", ".join(f"{k}: {_as_text(v)}" for k, v in value.items())
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

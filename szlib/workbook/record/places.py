@@ -99,7 +99,7 @@ def withdraw(folder: Path, notebooks: Iterable[str]) -> None:
             (folder / name).mkdir(exist_ok=True)
         except OSError as error:
             raise _in_the_way(folder / name, error) from error
-    old = []
+    old = [folder / "report.html"]
     for name in notebooks:
         old += [folder / f"{name}.ipynb", folder / "records" / f"{name}.json"]
         old += (folder / "figures").glob(f"{name}-*")

@@ -26,6 +26,7 @@ from ...tracks import datasets
 from ..record import places
 from ..record.notebook import data_files
 from ..record.validation import check_parameters
+from ..report import document
 from . import summary, worker
 
 LAST_PRODUCER = "05"
@@ -57,9 +58,9 @@ def run(
     -------
     The summary: passed, and for each notebook its status ("done"; "error": the notebook broke off;
     "refused": data, disk or memory do not allow it; "not started": one that comes before was refused),
-    seconds, checks (name, passed, value) and key figures.
-    It is written to ``summary.json`` in that folder, together with what earlier runs of other notebooks
-    left there with the same parameters, data and version.  What a run replaces is withdrawn first.
+    seconds, checks (name, passed, value) and key figures; and the path of the `report` that was made of it.
+    The summary is written to ``summary.json`` in that folder, together with what earlier runs of other
+    notebooks left there with the same parameters, data and version.  What a run replaces is withdrawn first.
 
     Raises
     ------
@@ -84,7 +85,8 @@ def run(
         places.withdraw(home, names)
         given |= {"data": asked, "results": str(results)}
         outcomes = _outcomes(sources, given, home, jobs, scheduler)
-        return summary.finish(home, identity, earlier, {name: outcomes[name] for name in names})
+        done = summary.finish(home, identity, earlier, {name: outcomes[name] for name in names})
+        return done | ({"report": str(document.write(home))} if document.executed(home) else {})
 
 
 def _outcomes(

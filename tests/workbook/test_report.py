@@ -1,0 +1,121 @@
+"""The report: one file that needs nothing else, and says what the run said."""
+
+import json
+import re
+
+import nbformat
+import pytest
+from bs4 import BeautifulSoup
+
+import szlib
+from szlib.errors import DataError
+from szlib.workbook.command_line import main
+from szlib.workbook.record import PAPER, parameters
+from szlib.workbook.report import document
+
+PIXEL = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNkYPhfDwAChwGA60e6kgAAAABJRU5ErkJggg=="
+ZONE = szlib.Ellipse((0.05, 0.0), (0.95, 0.75))
+
+
+@pytest.fixture(scope="module")
+def movie():
+    scenario = szlib.SCENARIOS["corridor"]
+    log = szlib.simulate(scenario, szlib.MPCCBF(ZONE, walls=scenario.walls), max_time=1.0)
+    return log.animate(every=1.0, width=2.0)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory, movie):
+    """The report of one made-up notebook."""
+    home = tmp_path_factory.mktemp("run")
+    table = parameters([("gamma", 0.05, PAPER, "sec. 4")]).to_html()
+    output = nbformat.v4.new_output
+    cells = [
+        nbformat.v4.new_markdown_cell("# 8 - A corridor\n\n**Question.** Does it *barge* past?\n\nText."),
+        nbformat.v4.new_markdown_cell(
+            r"With $h \ge 0$:"
+            "\n\n"
+            r"$$\frac{r^2}{L} \tag{1}$$"
+            "\n\n[next](09_waiting.ipynb), [here](08_corridor.ipynb)"
+        ),
+        nbformat.v4.new_code_cell(
+            "x < 1",
+            outputs=[
+                output(
+                    "display_data", {"image/png": PIXEL}, metadata={"image/png": {"alt": 'h "over" time'}}
+                ),
+                output("display_data", {"image/png": PIXEL}),
+                output("display_data", {"text/html": movie._repr_html_()}),
+                output("display_data", {"text/html": table}),
+            ],
+        ),
+    ]
+    nbformat.write(nbformat.v4.new_notebook(cells=cells), home / "08_corridor.ipynb")
+    checks = [
+        {"kind": "check", "name": "h >= 0", "passed": False, "value": -0.25, "result": "FAILED"},
+        {"kind": "claim", "name": "It slows down.", "passed": True, "value": 0.123456, "result": "supported"},
+    ]
+    record = {"status": "done", "seconds": 1.2, "checks": checks, "key_figures": {}, "figures": []}
+    summary = {"data": "mine", "passed": False, "notebooks": {"08_corridor": record}}
+    (home / "summary.json").write_text(json.dumps(summary))
+    return BeautifulSoup(document.write(home).read_text(encoding="utf-8"), "html.parser")
+
+
+def test_it_needs_no_other_file_and_no_network(page):
+    asked = [tag.get(name) for tag in page.find_all(True) for name in ("src", "href") if tag.get(name)]
+    assert asked
+    assert all(address.startswith(("data:", "#")) for address in asked)
+    assert not re.search(
+        r"@import|url\((?!['\"]?data:)", " ".join(style.text for style in page.select("style"))
+    )
+
+
+def test_every_link_leads_somewhere(page):
+    places = {tag["id"] for tag in page.select("[id]")} | {"top"}
+    assert {link["href"][1:] for link in page.select("td a[href], p a[href]")} <= places
+    assert "next" in page.text and not [link for link in page.select("a") if link.text == "next"]
+
+
+def test_every_picture_says_what_it_shows(page):
+    alts = [image.get("alt") for image in page.select("img")]
+    assert 'h "over" time' in alts
+    assert all(alts)
+
+
+def test_formulas_are_drawn_by_the_browser(page):
+    assert len(page.select("math")) == 2
+    assert page.select("math[display=block] mfrac")
+
+
+def test_the_front_page_says_what_came_out(page):
+    assert "0 of 1 checks hold" in page.text
+    assert "h >= 0 (-0.25)" in page.text
+    rows = [[cell.text for cell in row.select("td")] for row in page.select("table.front tr")]
+    assert ["08", "It slows down.", "supported", "0.1235"] in rows
+    assert ["08", "gamma", "0.05", "paper", "sec. 4"] in rows
+    assert ["08 corridor", "Does it barge past?", "0/1", "1", "done"] in rows
+    assert page.text.count("Not made in this run") == 5  # funnel, zone, three scenarios
+
+
+def test_the_run_is_on_the_front_page_and_in_its_notebook_with_its_data(page, movie):
+    assert len(page.select("figure.szlib-player")) == 2
+    script = page.select("figure.szlib-player + script")[0].text
+    run = json.loads(re.search(r"const run = (.*);\n", script)[1])
+    assert run == json.loads(json.dumps(movie.run))
+    assert len(run["moments"]) == 11
+    assert run["moments"][0]["robot"] == [-4, 0]
+    assert run["moments"][10]["people"] == [[3.5, 0, 3.142]]
+
+
+def test_code_is_there_but_folded(page):
+    (code,) = page.select("details.code")
+    assert "x < 1" in code.text and not code.has_attr("open")
+
+
+def test_where_nothing_was_executed_it_says_what_to_do(tmp_path, capsys):
+    with pytest.raises(DataError, match="holds no executed notebooks; `szlib run` makes them"):
+        document.write(tmp_path)
+    assert main(["report", str(tmp_path)]) == 2
+    (tmp_path / "01_one.ipynb").write_text("{")
+    assert main(["report", str(tmp_path)]) == 2
+    assert "01_one.ipynb: cannot be read as a notebook" in capsys.readouterr().err
