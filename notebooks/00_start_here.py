@@ -21,11 +21,11 @@
 # the robot by model predictive control with a barrier around every person. This workbook follows them
 # step by step, fills what the paper leaves open, and says where data does not support a claim.
 #
-# ![The minimum social zone at 1.1 m/s, learned from synthetic people](figures/zone.png)
-# ![A robot makes room for a person in a passage, then goes on](figures/making_room.gif)
+# <img src="figures/zone.png" width="44%" alt="The minimum social zone at 1.1 m/s, learned from synthetic people">
+# <img src="figures/making_room.gif" width="50%" alt="A robot makes room for a person in a passage, then goes on">
 
 # %% [markdown]
-# next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 20 min
+# next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 25 min
 # to read
 #
 # **Afterwards you can** choose a route, and find any notebook, word or symbol again.
@@ -133,7 +133,7 @@ for sheet in sheets:
 # | IPOPT | the solver for nonlinear optimisation that the paper uses | [06b](06b_build_a_controller.ipynb) |
 # | jerk | the change of acceleration by time | [13](13_comparison.ipynb) |
 # | line-of-sight angle | LOS: where the other person is, seen from the reference pedestrian | [02](02_encounters.ipynb) |
-# | LOF | local outlier factor: how lonely a sample is, compared with its neighbours | [03](03_outliers.ipynb) |
+# | LOF | local outlier factor: how isolated a sample is, compared with its neighbours | [03](03_outliers.ipynb) |
 # | MPC | model predictive control: plan some steps ahead, take the first, plan again | [06b](06b_build_a_controller.ipynb) |
 # | null model | the same people, each moved in time, so that nobody minds anybody | [15](15_respect.ipynb) |
 # | ORCA | a model of walking: each of two people takes half of what keeps them apart | [17](17_crowds.ipynb) |
@@ -195,6 +195,12 @@ for sheet in sheets:
 #   crowds, 2009. [10.1098/rspb.2009.0405](https://doi.org/10.1098/rspb.2009.0405)
 # - A. Francis and others: Principles and guidelines for evaluating social robot navigation algorithms, 2025.
 #   [10.1145/3700599](https://doi.org/10.1145/3700599)
+# - D. Helbing, P. Molnár: Social force model for pedestrian dynamics, 1995.
+#   [10.1103/PhysRevE.51.4282](https://doi.org/10.1103/PhysRevE.51.4282)
+# - D. Fox, W. Burgard, S. Thrun: The dynamic window approach to collision avoidance, 1997.
+#   [10.1109/100.580977](https://doi.org/10.1109/100.580977)
+# - R. Kirby, R. Simmons, J. Forlizzi: Companion: a constraint-optimizing method for person-acceptable navigation,
+#   2009. [10.1109/ROMAN.2009.5326271](https://doi.org/10.1109/ROMAN.2009.5326271)
 # - E. T. Hall: The hidden dimension. Doubleday, 1966 (no DOI).
 
 # %% [markdown]
