@@ -134,7 +134,7 @@ for sheet in SHEETS:
 # | IPOPT | the solver for nonlinear optimisation that the paper uses | [06b](06b_build_a_controller.ipynb) |
 # | jerk | the change of acceleration by time | [13](13_comparison.ipynb) |
 # | line-of-sight angle | LOS: where the other person is, seen from the reference pedestrian | [02](02_encounters.ipynb) |
-# | LOF | local outlier factor: how lonely a sample is, compared with its neighbours | [03](03_outliers.ipynb) |
+# | LOF | local outlier factor: how isolated a sample is, compared with its neighbours | [03](03_outliers.ipynb) |
 # | MPC | model predictive control: plan some steps ahead, take the first, plan again | [06b](06b_build_a_controller.ipynb) |
 # | null model | the same people, each moved in time, so that nobody minds anybody | [15](15_respect.ipynb) |
 # | ORCA | a model of walking: each of two people takes half of what keeps them apart | [17](17_crowds.ipynb) |

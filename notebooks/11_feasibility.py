@@ -276,9 +276,9 @@ failed = rows[rows["outcome"] != "arrived"]
 failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]]
 
 # %% [markdown]
-# **What it means.** A small $\gamma$ hides a short horizon, at the price of a slow robot. A plan
-# that ends at rest needs no such luck: it carries its own proof, as far as people stand, and where
-# they walk, the robot is never the one who drives in.
+# **What it means.** A small $\gamma$ makes up for a short horizon, at the price of a slow robot. For a
+# plan that ends at rest there is a proof instead, as long as people stand; where they walk, the robot
+# is at rest at the first moment with $h < 0$.
 
 # %%
 record.close()
