@@ -48,12 +48,13 @@ ROOMS = {
     "simulation.metrics": ["endings", "motion", "social"],
     "simulation.scenarios": ["paper", "meetings", "worlds"],
     "workbook": [
-        "figures", "claims", "sensitivity", "record", "report", "runner", "command_line",
+        "figures", "claims", "sensitivity", "record", "laboratory", "report", "runner", "command_line",
     ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "players", "simulation", "crowds",
     ],
     "workbook.record": ["places", "validation", "notebook"],
+    "workbook.laboratory": ["bench", "page"],
     "workbook.report": ["front_page", "document"],
     "workbook.runner": ["summary", "execution"],
 }  # fmt: skip

@@ -4,6 +4,7 @@ figures       every figure, one file a room
 claims        what data says of the paper's claims: effects, intervals, verdicts
 sensitivity   what moves a zone most
 record        what a notebook writes down, and where it goes
+laboratory    a scene that can be dragged and set while it runs
 report        a run to read without running anything
 runner        the whole workbook, headless, and what came of it
 command_line  `szlib run | report | inspect | extract`
@@ -13,5 +14,14 @@ import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
-    submodules=["figures", "claims", "sensitivity", "record", "report", "runner", "command_line"],
+    submodules=[
+        "figures",
+        "claims",
+        "sensitivity",
+        "record",
+        "laboratory",
+        "report",
+        "runner",
+        "command_line",
+    ],
 )
