@@ -24,7 +24,7 @@ test: $(INSTALLED)  ## style, types, and every test
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lab: $(INSTALLED)  ## open the workbook in JupyterLab
 	$(BIN)/jupyter lab notebooks

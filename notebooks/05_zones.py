@@ -28,7 +28,7 @@ import pandas as pd
 
 import szlib
 from szlib.plaza.truth import PlazaSettings
-from szlib.workbook import claims, figures
+from szlib.workbook import claims, figures, laboratory
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
@@ -36,7 +36,10 @@ data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
-interactive = False  # True: a slider for the speed
+fraction = 0.002  # as in notebook 03, of the paper's hull
+r_max = 2.0  # as in notebook 03 [m]
+q = 0.05  # share of encounters that may enter the quantile zone
+zone_speed = 1.1  # whose zone the robot keeps [m/s]
 
 # %%
 record = NotebookRecord("05_zones", globals())
@@ -45,7 +48,9 @@ parameters(
         ("ellipse", "smallest area", PAPER, "sec. 2"),
         ("around", "the whole curve r_zone", ASSUMED, "samples of the curve would not do"),
         ("speeds", "0.5 to 1.5 m/s", ASSUMED, "what one day of data covers"),
-        ("the robot's zone", "that of 1.1 m/s", PAPER, "sec. 4"),
+        ("the robot's zone", f"that of {zone_speed:g} m/s", PAPER, "sec. 4: 1.1 m/s"),
+        ("q", q, ASSUMED, "share of encounters that may enter the quantile zone"),
+        ("outlier fraction, r_max", f"{fraction:.1%}, {r_max:g} m", PAPER, "see notebook 03"),
     ]
 )
 
@@ -58,24 +63,26 @@ parameters(
 
 # %%
 samples = record.encounters()
-paper = szlib.SocialZone.fit(samples, method="hull", outlier_fraction=0.002, neighbours=20)
+fit = record.method.fit()  # r_max, q, speeds: what the robot's zone is fitted with
+hull = {"method": "hull", "outlier_fraction": fraction, "neighbours": 20}
+paper = szlib.SocialZone.fit(samples, r_max=r_max, speeds=fit["speeds"], **hull)
 shown = ["speed", "center_x", "a", "a_low", "a_high", "b", "area", "influence", "encounters", "adequate"]
 paper.table()[shown].round(2)
 
 # %%
 settings = PlazaSettings()
 truth = {v: settings.true_zone(v) for v in paper.ellipses} if record.synthetic else {}
-ax = figures.plot_zone(paper, 1.1, truth=truth.get(1.1))
+ax = figures.plot_zone(paper, zone_speed, truth=truth.get(zone_speed))
 record.figure(ax.figure, "zone")
 
 # %%
-ellipse = paper.ellipses[1.1]
-record.key |= {"hull: a(1.1)": ellipse.semi_axes[0], "hull: b(1.1)": ellipse.semi_axes[1]}
+ellipse, at = paper.ellipse(zone_speed), f"({zone_speed:g})"
+record.key |= {f"hull: a{at}": ellipse.semi_axes[0], f"hull: b{at}": ellipse.semi_axes[1]}
 inside = {v: float(e.level(paper.boundary(v, 5000)).max()) for v, e in paper.ellipses.items()}
-record.check("each ellipse encloses its zone", max(inside.values()) <= 1 + 1e-9, max(inside.values()))
-record.check(
-    "with three to five points of support", all(3 <= len(e.support) <= 5 for e in paper.ellipses.values())
-)
+most = max(inside.values())
+record.check("each ellipse encloses its zone", most <= 1 + 1e-9, most, always=True)
+few = all(3 <= len(e.support) <= 5 for e in paper.ellipses.values())
+record.check("with three to five points of support", few, always=True)
 
 # %% [markdown]
 # Smallest? The ellipse of the support points alone is the same one, and it shrinks if any of them
@@ -83,28 +90,30 @@ record.check(
 
 # %%
 again = szlib.minimum_enclosing_ellipse(ellipse.support)
-record.check("the support alone determines it", np.allclose(again.semi_axes, ellipse.semi_axes, rtol=1e-6))
+same = np.allclose(again.semi_axes, ellipse.semi_axes, rtol=1e-6)
+record.check("the support alone determines it", same, always=True)
 if len(ellipse.support) > 3:
     without = [np.delete(ellipse.support, i, axis=0) for i in range(len(ellipse.support))]
     largest = max(szlib.minimum_enclosing_ellipse(points).area for points in without)
-    record.check("and it shrinks without any one of them", largest < ellipse.area, largest / ellipse.area)
+    share = largest / ellipse.area
+    record.check("and it shrinks without any one of them", share < 1, share, always=True)
 
 # %% [markdown]
 # ## A zone that does not shrink
 #
 # The hull is set by the nearest people ever seen, so it shrinks with every day of data (notebook 15). The
-# *quantile zone*, szlib's default, is where all but 5 % of encounters keep out, direction by direction,
-# and an ellipse fitted to that. This one is kept for the robot.
+# *quantile zone*, szlib's default, is where all but a share `q` of encounters (5 %) keep out, direction by
+# direction, and an ellipse fitted to that. This one is kept for the robot.
 
 # %%
-zone = record.keep_zone(szlib.SocialZone.fit(samples))
+zone = record.keep_zone(szlib.SocialZone.fit(samples, **fit))
 zone.table()[shown].round(2)
 
 # %%
-ax = figures.plot_zone(zone, 1.1, truth=truth.get(1.1))
+ax = figures.plot_zone(zone, zone_speed, truth=truth.get(zone_speed))
 record.figure(ax.figure, "quantile")
-kept = zone.ellipses[1.1]
-record.key |= {"a(1.1)": kept.semi_axes[0], "b(1.1)": kept.semi_axes[1], "x(1.1)": kept.center[0]}
+kept = zone.ellipse(zone_speed)
+record.key |= {f"a{at}": kept.semi_axes[0], f"b{at}": kept.semi_axes[1], f"x{at}": kept.center[0]}
 
 # %% [markdown]
 # Companions are near by choice. Everybody, as in the paper, and strangers only:
@@ -114,7 +123,9 @@ rows = {}
 for who, kinds in (("everybody", None), ("strangers", "strangers")):
     for method in ("hull", "quantile"):
         people = szlib.of_kind(samples, kinds)
-        one = szlib.SocialZone.fit(people, method=method, speeds=(1.1,), resamples=0).ellipses[1.1]
+        options = {"q": q} if method == "quantile" else {}
+        options |= {"r_max": r_max, "speeds": (zone_speed,), "resamples": 0}
+        one = szlib.SocialZone.fit(people, method=method, **options).ellipses[zone_speed]
         rows[who, method] = [people["encounter"].nunique(), *one.center, *one.semi_axes, one.area]
 pd.DataFrame(rows, index=["encounters", "center_x", "center_y", "a", "b", "area"]).T.round(2)
 
@@ -150,7 +161,7 @@ for name, found in (("quantile", zone), ("the paper's hull", paper)) if record.s
 # large for lack of data, not out of respect. So count before you believe.
 
 # %%
-near = samples.query("distance <= 2")
+near = samples[samples["distance"] <= r_max]
 sector = pd.cut(np.degrees(near["los_angle"]), range(-180, 181, 45))
 seen = near.groupby(sector, observed=False).agg(
     samples=("t", "size"), encounters=("encounter", "nunique"), nearest=("distance", "min")
@@ -159,9 +170,10 @@ seen.round(2)
 
 # %%
 few = int(seen["encounters"].iloc[[0, -1]].sum())
-ahead = claims.larger_ahead(zone)
+ahead = claims.larger_ahead(zone, speed=zone_speed)
 value = f"{ahead}; {few} encounters were in view behind"
-record.claim("the zone at 1.1 m/s reaches farther ahead than behind", ahead.verdict == "supported", value)
+claim = f"the zone at {zone_speed:g} m/s reaches farther ahead than behind"
+record.claim(claim, ahead.verdict == "supported", value)
 
 # %% [markdown]
 # On the plaza this is so by construction, and the data shows only part of it: whoever is behind
@@ -172,9 +184,10 @@ record.claim("the zone at 1.1 m/s reaches farther ahead than behind", ahead.verd
 # %%
 theta = np.linspace(-np.pi, np.pi, 361)
 fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
-for v, colour in zip((0.7, 1.1, 1.5), figures.colours((0.7, 1.1, 1.5)), strict=True):
+shown = zip((0.7, 1.1, 1.5), figures.colours((0.7, 1.1, 1.5)), ("-", "--", ":"), strict=True)
+for v, colour, line in shown:
     if v in zone.ellipses:
-        ax.plot(np.degrees(theta), np.hypot(*zone.boundary(v).T), color=colour, label=f"{v:g} m/s")
+        ax.plot(np.degrees(theta), np.hypot(*zone.boundary(v).T), line, color=colour, label=f"{v:g} m/s")
 ax.set(
     xlabel="line-of-sight angle [deg] (left is positive)", ylabel="r_zone [m]", xticks=range(-180, 181, 45)
 )
@@ -182,15 +195,12 @@ ax.set(title="How far the zone reaches in each direction", ylim=(0, None))
 ax.legend()
 record.figure(fig, "reach")
 
-# %%
-if interactive:
-    from ipywidgets import FloatSlider, interact
+# %% [markdown]
+# In JupyterLab a slider for the walking speed stands here:
 
-    low, high = (round(v, 2) for v in zone.speed_range)
-    interact(
-        lambda speed: figures.plot_zone(zone, speed),
-        speed=FloatSlider(1.1, min=low + 0.1, max=high - 0.1, step=0.05),
-    )
+# %%
+low, high = (round(v, 2) for v in zone.speed_range)
+laboratory.slide(lambda speed: figures.plot_zone(zone, speed), speed=(1.1, low + 0.1, high - 0.1, 0.05))
 
 # %% [markdown]
 # **What it means.** One small file, `zone.json`, now holds what people's distance looks like at

@@ -28,7 +28,7 @@ import pandas as pd
 
 import szlib
 from szlib.simulation.metrics import avoidance_start
-from szlib.workbook import figures
+from szlib.workbook import figures, laboratory
 from szlib.workbook.record import NotebookRecord, settings_table
 
 # %% tags=["parameters"]
@@ -37,7 +37,6 @@ area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, o
 seed = 0
 results = "../results"
 gamma = 0.05
-interactive = False  # True: a slider for gamma
 
 # %%
 record = NotebookRecord("07_passing", globals())
@@ -145,10 +144,7 @@ def run_with(gamma: float) -> None:
     szlib.simulate(scenario, other).plot()
 
 
-if interactive:
-    from ipywidgets import FloatSlider, interact
-
-    interact(run_with, gamma=FloatSlider(gamma, min=0.01, max=0.2, step=0.01))
+laboratory.slide(run_with, gamma=(gamma, 0.01, max(0.2, gamma), 0.01))
 
 # %% [markdown]
 # **What it means.** The minimum zone is a last boundary. With gamma = 0.05 the robot gives way

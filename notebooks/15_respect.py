@@ -25,6 +25,7 @@ import warnings
 
 import matplotlib.pyplot as plt
 import pandas as pd
+from IPython.display import Markdown
 
 import szlib
 from szlib.workbook import figures
@@ -35,6 +36,7 @@ data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
+zone_speed = 1.1  # of the zones compared [m/s]
 shifts = 20  # null models; the saved tables have 100
 resamples = 100  # for the intervals
 
@@ -70,7 +72,8 @@ parameters(
 # %%
 tracks = record.tracks()
 square = record.square(tracks)
-samples = szlib.find_encounters(tracks, square=square)
+search = record.method.search()  # as in notebook 02
+samples = szlib.find_encounters(tracks, square=square, **search)
 pairs = samples.drop_duplicates("encounter")
 counts = pairs["kind"].value_counts()
 record.key |= {"encounters": len(pairs), "companions": int(counts["companions"])}
@@ -84,7 +87,9 @@ counts.to_frame("encounters")
 # apart. Whatever is found now is what emptiness looks like.
 
 # %%
-null = szlib.null_encounters(tracks, square=square, shifts=shifts, seed=seed, progress=False)
+null = szlib.null_encounters(
+    tracks, square=square, shifts=shifts, seed=seed, r_max=record.method.r_max, progress=False, **search
+)
 by_chance = null.encounters.drop_duplicates("encounter")["kind"].value_counts() / shifts
 compared = pd.DataFrame({"seen": counts, "by chance": by_chance.round(1)})
 print(f"{len(pairs)} encounters seen, {len(null.encounters) / shifts:.0f} by chance")
@@ -97,6 +102,9 @@ compared
 # %%
 fig, ax = plt.subplots(figsize=(7, 3), layout="constrained")
 compared.loc[counts.index].plot.barh(ax=ax, color=[figures.BLUE, figures.GREY], width=0.75)
+for bar in ax.containers[1]:
+    bar.set_hatch("///")
+ax.legend()
 ax.set(xlabel="encounters", ylabel="", title="Who meets whom, and who would by chance")
 record.figure(fig, "kinds")
 
@@ -156,6 +164,7 @@ record.check(
     "where nobody minds anybody: at most 5 false alarms in 100 crowds",
     (singly["sum"] <= 0.05 * singly["size"]).all(),
     singly["sum"].to_dict(),
+    always=True,
 )
 in_bunches = alarms.loc[10, "sum"]
 record.claim(
@@ -181,10 +190,11 @@ alarms.rename(columns={"sum": "false alarms", "size": "crowds"})
 
 # %%
 def zone_at(people: pd.DataFrame, model: szlib.NullEncounters, method: str) -> pd.Series:
-    """The row of the table at 1.1 m/s; empty where there is no zone, for nobody keeps out of anything."""
-    more = {"null": model} if method == "respect" else {}
+    """The row of the table at `zone_speed`; empty where there is no zone."""
+    more = {"respect": {"null": model}, "quantile": {"q": record.method.q}}.get(method, {})
+    options = {"r_max": record.method.r_max, "speeds": (zone_speed,), "resamples": resamples} | more
     try:
-        zone = szlib.SocialZone.fit(people, method=method, speeds=(1.1,), resamples=resamples, **more)
+        zone = szlib.SocialZone.fit(people, method=method, **options)
     except szlib.ZoneError as error:
         print(f"{method}: {error}")
         return pd.Series({"adequate": False})
@@ -212,7 +222,7 @@ for at, (row, shade, marker) in enumerate(
     ax.plot(line["a"], at, marker, color=shade, fillstyle="full" if line["adequate"] else "none")
 ax.set_yticks(range(len(zones)), [f"{method}, {who}" for method, who in zones.index])
 ax.invert_yaxis()
-ax.set(xlabel="semi-major axis at 1.1 m/s [m], 95 %; hollow: too few people on some side")
+ax.set(xlabel=f"semi-major axis at {zone_speed:g} m/s [m], 95 %; hollow: too few people on some side")
 ax.set_title("Three zones of the same people")
 record.figure(fig, "zones")
 for (method, who), line in zones.dropna(subset="a").iterrows():
@@ -256,10 +266,12 @@ sites[
     ]
 ].round(3)
 
-# %% [markdown]
-# **What it means.** Emptiness alone makes a zone, and a method that looks for the nearest person cannot
-# tell. Held against people who take no notice of each other, a distance remains that is kept, and it is the
-# same however long one watches. Companions have to be told apart first: they are near by choice.
+# %%
+kept = f"a distance of {radius:.2f} m remains that strangers keep" if found else "no distance is shown here"
+Markdown(f"""**What it means.** Emptiness alone makes a zone, and a method that looks for the nearest person
+cannot tell. Held against people who take no notice of each other, {kept}
+(p = {tests["strangers"].p_value:.3f}). On the real day and at Grand Central it is the same however long one
+watches. Companions have to be told apart first: they are near by choice.""")
 
 # %%
 record.close()

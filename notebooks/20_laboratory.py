@@ -119,12 +119,11 @@ laboratory.Laboratory(laboratory.Bench(scene, zones, [first, second])) if labora
 
 # %%
 trial = laboratory.Bench(scene, zones, [first, second])
-driven = []
-for _ in range(60):
-    driven.append([*trial.states])
+same = []
+for k in range(min(60, *(len(log.states) for log in logs.values()))):
+    same += [np.array_equal(x, log.states[k]) for x, log in zip(trial.states, logs.values(), strict=True)]
     trial.step()
-found = [[log.states[k] for log in logs.values()] for k in range(60)]
-record.check("60 steps of the laboratory are those of szlib.simulate", np.array_equal(driven, found))
+record.check("its steps are those of szlib.simulate", all(same), f"{len(same)} states", always=True)
 
 # %% [markdown]
 # Things to try:

@@ -7,6 +7,8 @@ from pathlib import Path
 import jupytext
 from nbclient import NotebookClient
 
+from szlib.workbook.record import places
+
 HERE = Path(__file__).parent
 FIGURES = HERE.parent / "results" / "lab" / "synthetic" / "figures"
 PICTURES = {
@@ -33,8 +35,8 @@ def refresh(source: Path) -> None:
 
 
 def main(names: list[str]) -> None:
-    for source in sorted(HERE.glob("[0-9][0-9]_*.py")):
-        if not names or source.stem[:2] in names:
+    for source in places.notebooks():
+        if not names or any(places.is_called(source, name) for name in names):
             print(source.stem, flush=True)
             refresh(source)
     (HERE / "figures").mkdir(exist_ok=True)

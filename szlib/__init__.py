@@ -31,7 +31,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "encounters.geometry": ["ATC_SQUARE", "AttentionalSpace", "Region", "Square"],
         "encounters.kinds": ["encounter_kinds", "of_kind"],
         "encounters.null": ["NullEncounters", "null_encounters"],
-        "encounters.search": ["find_encounters"],
+        "encounters.search.finding": ["find_encounters"],
         "encounters.shifting": ["time_shifted"],
         "errors": ["DataError", "DataWarning", "SolverError", "SzlibError", "ZoneError"],
         "plaza.indifferent": ["indifferent_crowd"],

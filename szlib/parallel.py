@@ -78,6 +78,7 @@ def end_with(parent: int) -> None:
     """
 
     def watch() -> None:
+        """Look after the parent until it is gone."""
         while os.getppid() == parent:
             time.sleep(_HEARTBEAT)
         os._exit(1)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import warnings
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, Future
 from pathlib import Path
+from typing import Any
 
 import hypothesis
+import jupytext
 import numpy as np
 import pandas as pd
 import pytest
@@ -141,3 +146,34 @@ def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., 
         return folder
 
     return write
+
+
+@pytest.fixture
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Notebooks of a run are executed in this process, without kernels: for what a run does around them."""
+    from szlib.workbook.runner import execution, worker
+
+    class Here(Executor):
+        def submit(self, function: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
+            future: Future[Any] = Future()
+            future.set_result(function(*args, **named))
+            return future
+
+    def execute(temporary: Path, script: Path, folder: Path, given: dict[str, Any]) -> dict[str, Any]:
+        notebook, variables = jupytext.read(script), dict[str, Any]()
+        try:
+            with contextlib.chdir(script.parent), warnings.catch_warnings():
+                warnings.simplefilter("default")
+                for cell in notebook.cells:
+                    exec(cell.source, variables)
+                    if "parameters" in cell.metadata.get("tags", []):
+                        variables |= given
+        except Exception as error:
+            name = type(error).__name__
+            return {"status": "refused" if name in worker.REFUSED else "error", "error": f"{name}: {error}"}
+        finally:
+            jupytext.write(notebook, folder / f"{script.stem}.ipynb")
+        return {}
+
+    monkeypatch.setattr(execution, "_pool", lambda *_: contextlib.nullcontext(Here()))
+    monkeypatch.setattr(worker, "_execute_in", execute)

@@ -40,7 +40,7 @@ from .barriers import Array, barrier, finite, segment_formula, walls_of
 from .distances import wall_margin
 from .people.meetings import subgoal
 from .people.person import Person, SpeedZone, as_ellipse, circle_around, place
-from .people.tracker import People, Tracker
+from .people.tracker import People, Seen, Tracker
 from .settings import MPCSettings
 from .solvers.ladder import solve_with_fallbacks
 from .solvers.sizes import Sizes, slots, taken
@@ -171,21 +171,14 @@ class MPCCBF:
         if not self._moved:
             self._check_goal((gx, gy))
         self._now = self._clock(now, stamps)
-        seen = self.tracker.see(people, now=self._now, ids=ids, stamps=stamps)
-        self._moved, self._n_people = True, len(seen.people)
+        scene = self._scene(x, (gx, gy), self.tracker.see(people, now=self._now, ids=ids, stamps=stamps))
+        self._moved, self._n_people = True, len(scene.zones)
         solver = self._sizes.of(self._n_people, len(self.walls))
         self._sizes.budget.begin()
-        kept = [self.zone_of(person) for person in seen.people]
-        placed = [place(person, zone) for person, zone in zip(seen.people, kept, strict=True)]
-        if seen.lost:
-            target = self._stop(x)
-        else:
-            target = subgoal((float(x[0]), float(x[1])), (gx, gy), placed, self.walls, self.settings)
-        pace = placed[0][5:] if terminal_of(self.settings, len(placed)) == "person" else (0.0, 0.0)
         size = solver.evaluate.size
-        parameters = np.array([*x.tolist(), *target, *pace, *slots(x, placed, self._wall_numbers, size)])
+        parameters = self._parameters(x, scene, size)
         rung, plan, numbers, timed_out = solve_with_fallbacks(solver, self._plan, parameters)
-        self._plan, rows = plan, taken(len(placed), len(self.walls), size)
+        self._plan, rows = plan, taken(self._n_people, len(self.walls), size)
         return Step(
             control=plan[:2].copy(),
             predicted=numbers.states,
@@ -197,10 +190,25 @@ class MPCCBF:
             cost=numbers.cost,
             solve_time=perf_counter() - began,
             timed_out=timed_out,
-            scene=Scene(
-                (*x.tolist(),), (gx, gy), seen, kept, placed, self._segments, self._margins, self.settings
-            ),
+            scene=scene,
         )
+
+    def _scene(self, x: Array, goal: tuple[float, float], seen: Seen) -> Scene:
+        """Everything that the step is asked, with the zone that is kept of everybody."""
+        kept = [self.zone_of(person) for person in seen.people]
+        placed = [place(person, zone) for person, zone in zip(seen.people, kept, strict=True)]
+        return Scene((*x.tolist(),), goal, seen, kept, placed, self._segments, self._margins, self.settings)
+
+    def _parameters(self, x: Array, scene: Scene, size: tuple[int, int]) -> Array:
+        """The numbers of the problem of this size: state, target, the pace at its end, people and walls."""
+        if scene.seen.lost:
+            target = self._stop(x)
+        else:
+            at = float(x[0]), float(x[1])
+            target = subgoal(at, scene.goal, scene.zones, self.walls, self.settings)
+        first_pace = terminal_of(self.settings, len(scene.zones)) == "person"
+        pace = scene.zones[0][5:] if first_pace else (0.0, 0.0)
+        return np.array([*x.tolist(), *target, *pace, *slots(x, scene.zones, self._wall_numbers, size)])
 
     def _clock(self, now: float | None, stamps: ArrayLike | None) -> float:
         """The time of this step [s]: as given, or `dt` after the last."""

@@ -228,8 +228,7 @@ class Budget:
 class ProblemSolver(Protocol):
     """What the solvers of this problem have in common; inputs have shape (2N,) [m/s2].
 
-    `late` says that the last call was cut off by the `budget`, and gave what it had by then; what is
-    `remembered` from call to call saves time, and changes the answers by rounding.
+    `late` says that the last call was cut off by the `budget`, and gave what it had by then.
     """
 
     settings: MPCSettings
@@ -238,7 +237,14 @@ class ProblemSolver(Protocol):
     late: bool
 
     @property
-    def remembered(self) -> Array: ...
-    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
-    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]: ...
-    def reset(self) -> None: ...
+    def remembered(self) -> Array:
+        """What goes from call to call: it saves time, and changes the answers by rounding."""
+
+    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+        """The plan that obeys every row, from a guess; and whether one was found."""
+
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+        """The plan that violates the rows least, by the exact penalty; and whether it converged."""
+
+    def reset(self) -> None:
+        """Forget what is remembered."""

@@ -132,6 +132,7 @@ def kinds_of_pairs(
     (ax, ay), (bx, by) = np.nan_to_num(velocity[a]).T, np.nan_to_num(velocity[b]).T
 
     def over_time(values: np.ndarray) -> np.ndarray:
+        """Sum of the values of each pair, over the ticks at which both are there."""
         return np.bincount(pair, weights=values, minlength=len(pairs))
 
     ticks = over_time(np.ones(len(pair)))

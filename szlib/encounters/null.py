@@ -21,7 +21,7 @@ from ..tracks import funnels
 from .areas import area_for
 from .geometry import ATC_SQUARE
 from .kinds import of_kind
-from .search import find_encounters
+from .search.finding import find_encounters
 from .shifting import MINUTES, Crowd
 
 CLOSE = 2.0

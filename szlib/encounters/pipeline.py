@@ -29,7 +29,8 @@ from ..tracks.readers import read_raw
 from .areas import AUTO, as_area, walked_area
 from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
 from .kinds import KINDS
-from .search import SAMPLE_COLUMNS, find_encounters
+from .search.finding import find_encounters
+from .search.samples import SAMPLE_COLUMNS
 from .streaming import read_near_square
 
 _ADVICE = {

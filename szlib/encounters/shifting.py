@@ -126,6 +126,7 @@ class Crowd:
         rng = np.random.default_rng(seed)
 
         def draw(people: int) -> np.ndarray:
+            """Shifts of so many people, earlier or later by `minutes` [ticks]."""
             ticks = rng.integers(round(low * _MINUTE), round(high * _MINUTE), people, endpoint=True)
             return np.asarray(ticks * rng.choice([-1, 1], people))
 

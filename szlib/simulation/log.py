@@ -161,6 +161,22 @@ class SimulationLog:
         numbers |= {f"h_wall_{j}": self.h[:, n + j] for j in range(len(self.scenario.walls))}
         return pd.DataFrame({**columns, **words, **numbers})
 
+    def at(self, time: float) -> tuple[Array, Array, list[Person]]:
+        """What a controller was asked at a time of the run [s]: state, goal, and people with the zones kept.
+
+        So `controller.step(*log.at(5.0))` decides there anew. Who was away is left out.  Raises DataError
+        for a time that is not within the run.
+        """
+        row = round(time / self.settings.dt)
+        if not 0 <= row < len(self.states):
+            raise DataError(f"the run has times from 0 to {self.time[-1]:g} s; got {time:g}")
+        there = [
+            Person((x, y), (vx, vy), heading, zone)
+            for zone, (x, y, heading, vx, vy) in zip(self.zones, self.people[row].tolist(), strict=True)
+            if x == x
+        ]
+        return self.states[row], self.scenario.goal, there
+
     def min_h(self) -> pd.Series[float]:
         """Smallest h of each person and wall over the run [m]."""
         return self.table.filter(regex="^h_").min()

@@ -95,13 +95,14 @@ class Scenario:
 class CrowdModel(Protocol):
     """What people do, and how the controller is given them: a `Behaviour`, or anything else with these two.
 
-    `crowd` starts everybody in a scenario, whose people have the zones that are kept for them; `seen` makes
-    of those who are there what the controller gets, in the same order; None for who is not seen.
+    The people of the scenario have the zones that are kept for them.
     """
 
-    def crowd(self, scenario: Scenario, seed: int) -> Crowd: ...
+    def crowd(self, scenario: Scenario, seed: int) -> Crowd:
+        """Everybody of a scenario, from its start on."""
 
-    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> Sequence[Person | None]: ...
+    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> Sequence[Person | None]:
+        """What the controller gets of those who are there, in their order; None for who is not seen."""
 
 
 @dataclass(frozen=True)

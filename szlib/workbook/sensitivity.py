@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..encounters.geometry import Area
-from ..encounters.search import find_encounters
+from ..encounters.search.finding import find_encounters
 from ..errors import DataError, DataWarning, ZoneError
 from ..zones.social_zone import SocialZone
 

@@ -43,13 +43,22 @@ class Oval(Protocol):
     """What is asked of an `Ellipse` here."""
 
     @property
-    def center(self) -> tuple[float, float]: ...
+    def center(self) -> tuple[float, float]:
+        """(x, y) [m]."""
+
     @property
-    def semi_axes(self) -> tuple[float, float]: ...
+    def semi_axes(self) -> tuple[float, float]:
+        """The larger, the smaller [m]."""
+
     @property
-    def angle(self) -> float: ...
-    def level(self, points: Array) -> Array: ...
-    def placed(self, position: tuple[float, float], heading: float) -> Oval: ...
+    def angle(self) -> float:
+        """From x to the larger axis [rad]."""
+
+    def level(self, points: Array) -> Array:
+        """Of points (n, 2): 1 on the ellipse, less inside, more outside."""
+
+    def placed(self, position: tuple[float, float], heading: float) -> Oval:
+        """The same in the world frame, of a person there with this heading [m, rad]."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ and says how sure it is: intervals, who was seen on which side, and at which spe
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -147,22 +147,9 @@ class SocialZone(Layer):
         if method == "respect":
             options["null"] = null
         estimate = METHODS[method][0](samples, r_max=r_max, **options)
-        provenance = {
-            "szlib": __version__,
-            "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
-            "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
-            "parameters": {"method": method, "r_max": float(r_max), **estimate.parameters},
-            "funnel": estimate.funnel,
-        }
+        provenance = _provenance(samples, {"method": method, "r_max": float(r_max)}, estimate)
         zone = cls(estimate.vertices, float(r_max), {}, {}, provenance, method, estimate.radii(asked))
-        ellipses, undefined = {}, {}
-        for speed in asked:
-            try:
-                ellipses[speed] = zone._fitted(speed)
-            except ZoneError as error:
-                undefined[speed] = str(error)
-        if not ellipses:
-            raise ZoneError(f"no speed has a zone: {'; '.join(undefined.values())}")
+        ellipses, undefined = zone._fit_all(asked)
         tested = None if null is None else null_test(samples, null)
         zone = replace(zone, ellipses=ellipses, undefined=undefined, null_test=tested)
         if "encounter" in samples:
@@ -264,11 +251,34 @@ class SocialZone(Layer):
             raise ZoneError(f"a zone of method {self.method!r} has no hull; ask its boundary or ellipse")
         return self.vertices
 
+    def _fit_all(self, speeds: Sequence[float]) -> tuple[dict[float, Ellipse], dict[float, str]]:
+        """The ellipses by speed, and why there is none; ZoneError where no speed has one."""
+        ellipses, undefined = {}, {}
+        for speed in speeds:
+            try:
+                ellipses[speed] = self._fitted(speed)
+            except ZoneError as error:
+                undefined[speed] = str(error)
+        if not ellipses:
+            raise ZoneError(f"no speed has a zone: {'; '.join(undefined.values())}")
+        return ellipses, undefined
+
     def _fitted(self, speed: float) -> Ellipse:
         if self.radii is not None:
             return self.radii.ellipse(speed)
         section = self.slice(speed)
         return minimum_enclosing_ellipse_of_curve(section.boundary, section.corner_angles)
+
+
+def _provenance(samples: pd.DataFrame, parameters: Mapping[str, Any], estimate: Estimate) -> dict[str, Any]:
+    """Where a zone comes from: version, days, encounters, parameters and funnel."""
+    return {
+        "szlib": __version__,
+        "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
+        "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
+        "parameters": {**parameters, **estimate.parameters},
+        "funnel": estimate.funnel,
+    }
 
 
 def _options_of(method: str | None, given: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:

@@ -11,9 +11,8 @@ import pytest
 from conftest import DAY, make_crowd, make_tracks, make_walk
 
 import szlib
-from szlib.encounters import search as encounters
 from szlib.encounters.geometry import AttentionalSpace, Square, wrap_angle
-from szlib.encounters.search import SAMPLE_COLUMNS, find_encounters, reference_frame
+from szlib.encounters.search import SAMPLE_COLUMNS, find_encounters, occupants, reference_frame
 from szlib.tracks import funnels
 
 ROOM = Square(x=(-20, 20), y=(-20, 20))
@@ -204,7 +203,7 @@ def test_memory_is_cut_into_blocks_that_nobody_sees(
     crowd: pd.DataFrame, known: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for pairs in (40, 3001):
-        monkeypatch.setattr(encounters, "_PAIRS_AT_ONCE", pairs)
+        monkeypatch.setattr(occupants, "_PAIRS_AT_ONCE", pairs)
         pd.testing.assert_frame_equal(find_encounters(crowd, square=ROOM), known)
 
 

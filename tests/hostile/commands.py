@@ -17,6 +17,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pandas as pd
@@ -65,7 +66,8 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
     tally = Counter({"broken command lines": 0})
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        _in_a_fork(lambda: furnish(place))
+        if _in_a_fork(lambda: furnish(place)):
+            raise RuntimeError("the folder with everything could not be made")
         before = fingerprint(place)
         for number in range(COUNT[long]):
             line = draw(random.Random(f"{seed}-{number}"))
@@ -205,5 +207,7 @@ def _wait(child: int) -> int:
         if done:
             return status
         time.sleep(0.01)
-    os.killpg(child, signal.SIGKILL)
+    with suppress(ProcessLookupError):  # it may not have a group of its own yet
+        os.killpg(child, signal.SIGKILL)
+    os.kill(child, signal.SIGKILL)
     return os.waitpid(child, 0)[1]

@@ -10,10 +10,12 @@ import nbformat
 import pytest
 
 from szlib.workbook.record import places
+from szlib.workbook.record.method import DEFAULTS
+from szlib.workbook.record.validation import defaults_of
 from szlib.workbook.runner import execution
 from szlib.workbook.runner import summary as summaries
 
-SOURCES = sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
+SOURCES = places.notebooks()
 MAX_LINES = 25
 
 
@@ -25,9 +27,10 @@ def code_lines(cell: nbformat.NotebookNode) -> int:
     return sum(1 for line in cell.source.splitlines() if line.strip() and not line.strip().startswith("#"))
 
 
-def test_there_are_ten_and_no_stray_copies():
-    assert [s.stem[:2] for s in SOURCES] == [f"{n:02d}" for n in range(1, len(SOURCES) + 1)]
-    assert len(SOURCES) >= 10
+def test_none_is_missing_and_no_copy_is_stray():
+    numbers = [s.stem.split("_")[0] for s in SOURCES]
+    assert len(set(numbers)) == len(numbers)
+    assert {f"{n:02d}" for n in range(1, 19)} <= set(numbers)
     assert [p.stem for p in sorted(places.NOTEBOOKS.glob("*.ipynb"))] == [s.stem for s in SOURCES]
 
 
@@ -69,14 +72,28 @@ class TestEach:
         }
 
 
-OWN_WORLDS = ("11", "12", "13", "18")
-"""Notebooks that drive through worlds of their own: of the data only the zone reaches them."""
+def test_each_knob_of_the_method_is_a_parameter_where_it_acts_with_the_default_that_it_has_elsewhere():
+    found = [(n, v) for s in SOURCES for n, v in defaults_of(s).items() if n in DEFAULTS]
+    assert {name for name, _ in found} == set(DEFAULTS)
+    assert all(value == DEFAULTS[name] for name, value in found)
 
 
-def proven(summary: dict, home: Path, without: tuple[str, ...] = ()) -> None:
+def test_a_parameter_has_one_type_wherever_it_stands():
+    types: dict[str, set[type]] = {}
+    for source in SOURCES:
+        for name, value in defaults_of(source).items():
+            types.setdefault(name, set()).add(type(value))
+    assert all(len(found) == 1 for found in types.values()), types
+
+
+OF_DATA = ("01", "02", "03", "04", "05", "08", "14", "15", "16")
+"""Notebooks that look at the data, and one scenario; of the data only the zone reaches the others."""
+
+
+def proven(summary: dict, home: Path, only: tuple[str, ...] = ("",)) -> None:
     assert summary["passed"], summaries.render(summary)
     assert json.loads((home / "summary.json").read_text(encoding="utf-8"))["passed"]
-    assert list(summary["notebooks"]) == [s.stem for s in SOURCES if not s.stem.startswith(without)]
+    assert list(summary["notebooks"]) == [s.stem for s in SOURCES if s.stem.startswith(only)]
     for name, record in summary["notebooks"].items():
         assert record["seconds"] > 0
         assert record["checks"], name
@@ -98,9 +115,8 @@ def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
     not os.environ.get("SZLIB_DATA_DIR"), reason="SZLIB_DATA_DIR names no folder with real data"
 )
 def test_the_workbook_completes_on_the_real_day(tmp_path):
-    of_data = [s.stem for s in SOURCES if not s.stem.startswith(OWN_WORLDS)]
-    summary = execution.run("atc-1hz", out=tmp_path, jobs=2, only=of_data)
-    proven(summary, tmp_path / "atc-1hz", without=OWN_WORLDS)
+    summary = execution.run("atc-1hz", out=tmp_path, jobs=2, only=OF_DATA)
+    proven(summary, tmp_path / "atc-1hz", only=OF_DATA)
     assert summary["notebooks"]["01_tracks"]["key_figures"]["rows"] == 624_951
     results = {c["name"]: c["result"] for record in summary["notebooks"].values() for c in record["checks"]}
     assert results["the zone at 1.1 m/s reaches farther ahead than behind"] == "not supported here"

@@ -66,6 +66,7 @@ def test_one_area_only(hall, capsys):
     assert "no/such.wkt" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("at_once")
 def test_a_run_records_the_area_whatever_it_was_given_as(notebooks, tmp_path, capsys):
     folder = notebooks(_01_a='record.key["area"] = record.area')
     script = folder / "01_a.py"
@@ -139,6 +140,7 @@ def test_where_people_met_nothing_is_said():
     assert check_met(samples) is samples
 
 
+@pytest.mark.usefixtures("at_once")
 def test_a_run_stops_at_the_first_empty_stage(notebooks, tmp_path, capsys):
     look = "import szlib\nrecord.keep_encounters(szlib.find_encounters(record.tracks()))"
     notebooks(_01_fine='record.check("ok", True)', _02_nobody=look, _03_never="1 / 0", _07_never="1 / 0")

@@ -51,6 +51,7 @@ def test_results_go_nowhere_but_into_folders_of_our_own(notebooks, tmp_path, cap
     refused(["run", "--data", "mine.csv", "--out", "."], capsys, "holds what szlib did not write")
 
 
+@pytest.mark.usefixtures("at_once")
 def test_one_data_set_has_one_folder_by_whatever_name(notebooks, tmp_path):
     notebooks(_01_one='record.table(__import__("pandas").DataFrame({"a": [1]}), "table")')
     (tmp_path / "dir").mkdir()
@@ -133,6 +134,7 @@ def test_a_poisoned_day_is_a_line_and_the_others_are_done(tmp_path, monkeypatch)
     assert "rename the file" in done["why"][r"latin\xe4"]
 
 
+@pytest.mark.usefixtures("at_once")
 def test_a_run_that_fails_leaves_no_summary_that_passed(notebooks, tmp_path, monkeypatch):
     notebooks(_01_one='record.check("ok", True)')
     arguments = ["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]
@@ -151,6 +153,7 @@ def test_results_with_garbage_in_them(notebooks, tmp_path, capsys, garbage):
     refused(["run", "--data", "mine.csv", "--out", "out"], capsys, f"{garbage}: is in the way")
 
 
+@pytest.mark.usefixtures("at_once")
 def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks, tmp_path, capsys):
     full = 'from szlib.errors import StorageError\nraise StorageError("no room")'
     notebooks(_00_fine='record.check("ok", True)', _01_full=full, _06_later="")
@@ -179,20 +182,20 @@ def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks
         ({"gammas": [0.1, "x"]}, "gammas: expected float"),
         ({"horizons": [0]}, "N_h must be a whole number >= 1"),
         ({"speeds": [-1.0]}, "speeds: expected 0.01 to 10"),
-        ({"fraction": 0.9}, "fraction: expected 0 to 0.5"),
+        ({"fraction": 0.9}, "fraction: expected 1e-06 to 0.5"),
         ({"n_jobs": 0}, "n_jobs"),
         ({"results": "x"}, "is set by --out"),
     ],
 )
 def test_parameters_are_checked_before_any_notebook_starts(given, message):
     with pytest.raises(DataError, match=message):
-        check_parameters(given, sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py")))
+        check_parameters(given, places.notebooks())
 
 
 def test_what_the_notebooks_set_themselves_is_in_range():
     from szlib.workbook.record.validation import defaults_of
 
-    for source in places.NOTEBOOKS.glob("[0-9][0-9]_*.py"):
+    for source in places.notebooks():
         given = {n: v for n, v in defaults_of(source).items() if n not in ("data", "results")}
         check_parameters(given, [source])
 

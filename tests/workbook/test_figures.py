@@ -104,6 +104,18 @@ def test_maps_are_square_and_in_metres(name, request):
     ax.figure.savefig(io.BytesIO())
 
 
+def test_what_is_counted_in_cells_is_every_sample_near_enough(samples):
+    for plot in (figures.plot_los, figures.plot_los_distance):
+        (cells,) = [c for c in plot(samples).collections if c.get_array() is not None]
+        assert cells.get_array().sum() == (samples["distance"] <= 2).sum()
+
+
+def test_an_arrow_tells_where_each_path_leads():
+    ax = figures.plot_encounter_paths(paths(), count=3)
+    marks = [line for line in ax.lines if isinstance(line.get_marker(), tuple) and len(line.get_xdata())]
+    assert sorted(round(line.get_marker()[2] + 90) % 360 for line in marks) == [0] * 3 + [180] * 3
+
+
 @pytest.mark.parametrize("name", GRAPHS)
 def test_graphs_name_units(name, request):
     ax = GRAPHS[name](request.getfixturevalue)
@@ -167,7 +179,8 @@ def test_a_zone_of_another_method_has_its_radii_but_no_hull(samples):
 def test_a_run_shows_speed_and_every_h_to_its_greatest(log):
     speed, h = figures.plot_speed(log), figures.plot_barriers(log)
     assert "[m/s]" in speed.get_ylabel() and "[m]" in h.get_ylabel()
-    assert len(h.lines) == 1 + log.h.shape[1]
+    assert len(h.lines) == 3, "the person, the nearest of two walls, zero"
+    assert np.array_equal(h.lines[1].get_ydata(), log.h[:, 1:].min(axis=1))
     assert h.get_ylim()[0] <= log.h.min() and h.get_ylim()[1] >= log.h.max()
 
 
@@ -251,7 +264,7 @@ def test_sizes_by_number_have_a_band_each():
 def test_a_tornado_puts_what_moves_most_on_top():
     rows = [("default", "", 2.0), ("r_max", "1.5", 1.9), ("speed", "0.9", 0.5), ("speed", "1.3", 4.0)]
     ax = figures.plot_tornado(pd.DataFrame(rows, columns=["parameter", "value", "area"]))
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["r_max", "speed"]
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["r_max\n1.5", "speed\n0.9; 1.3"]
 
 
 def test_findings_are_told_apart_by_more_than_colour():

@@ -18,7 +18,7 @@ CHECK = 'record.key = {"gamma": gamma}\nrecord.check("ok", True)'
 
 
 @pytest.fixture
-def workbook(notebooks, tmp_path):
+def workbook(notebooks, at_once):
     """Two notebooks, one with a parameter of its own."""
     folder = notebooks(_01_one='record.check("ok", True)', _08_two=CHECK)
     script = folder / "08_two.py"

@@ -7,8 +7,9 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.workbook.record import NotebookRecord, parameters
+from szlib.workbook.record import NotebookRecord, parameters, settings_table
 from szlib.workbook.record import notebook as records
+from szlib.zones.by_direction.radii import Radii
 
 
 @pytest.fixture
@@ -33,10 +34,47 @@ def test_checks_and_claims_are_written_down(record, capsys):
     assert "FAILED" in capsys.readouterr().out
 
 
+def test_a_check_of_the_defaults_is_an_observation_elsewhere_and_a_promise_stays_one(record, capsys):
+    given = {"data": record.data, "results": record.out.parents[1], "r_max": 1.5}
+    other = NotebookRecord("01_test", given)
+    other.check("few infeasible steps", False, 4)
+    other.check("goal reached", True)
+    other.check("the funnel adds up", False, always=True)
+    kinds = [(c["kind"], c["passed"], c["result"]) for c in other.checks]
+    assert kinds == [
+        ("observation", False, "does not hold with r_max = 1.5"),
+        ("observation", True, "holds with r_max = 1.5"),
+        ("check", False, "FAILED"),
+    ]
+    assert "with r_max = 1.5: checks that were made for the defaults" in capsys.readouterr().out
+    assert not NotebookRecord("01_test", given | {"r_max": 2.0, "n_jobs": 7, "area": "auto"}).changed
+
+
+def test_knobs_of_the_method_reach_encounters_and_zone_and_their_names(record, monkeypatch):
+    searched, fitted = [], []
+    found = pd.DataFrame({"encounter": [0], "distance": [1.0]})
+    radii = Radii([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
+    zone = szlib.SocialZone(None, 1.5, {1.3: szlib.Ellipse((0, 0), (1, 1))}, method="quantile", radii=radii)
+    monkeypatch.setattr(records, "find_encounters", lambda *_, **k: searched.append(k) or found)
+    monkeypatch.setattr(records.SocialZone, "fit", lambda _, **k: fitted.append(k) or zone)
+    given = {"data": record.data, "results": record.out.parents[1], "area": record.area}
+    NotebookRecord("02_test", given).zone()
+    turned = NotebookRecord(
+        "02_test", given | {"min_speed": 0.6, "space_length": 4.0, "r_max": 1.5, "q": 0.1}
+    )
+    monkeypatch.setattr(turned, "out", record.out)
+    turned.zone()
+    turned.zone()
+    assert [each["min_speed"] for each in searched] == [0.4, 0.6]
+    assert searched[1]["space"] == szlib.AttentionalSpace(length=4.0)
+    assert [(each["r_max"], each["q"]) for each in fitted] == [(2.0, 0.05), (1.5, 0.1)]
+    assert NotebookRecord("02_test", given | {"zone_speed": 1.3}).method.zone_speed == 1.3
+
+
 def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monkeypatch):
     made = []
 
-    def fake(tracks, square):
+    def fake(tracks, square, **_):
         assert square == szlib.Square(x=(0, 12), y=(0, 8))
         made.append(len(tracks))
         return pd.DataFrame({"encounter": [0], "distance": [1.0]})
@@ -56,7 +94,7 @@ def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monk
 def test_an_unreadable_zone_is_fitted_again_and_said_so(record, monkeypatch, capsys):
     (record.out / "zone.json").write_text("{")
     monkeypatch.setattr(NotebookRecord, "encounters", lambda self: None)
-    monkeypatch.setattr(records.SocialZone, "fit", lambda samples: "zone")
+    monkeypatch.setattr(records.SocialZone, "fit", lambda samples, **_: "zone")
     monkeypatch.setattr(NotebookRecord, "keep_zone", lambda self, zone: zone)
     assert record.zone() == "zone"
     assert "fitting the zone again" in capsys.readouterr().out
@@ -70,7 +108,7 @@ def test_badges():
 
 
 def test_every_setting_of_the_controller_is_explained_and_has_a_badge():
-    table = records.settings_table(szlib.MPCSettings()).data
+    table = settings_table(szlib.MPCSettings()).data
     assert set(table["parameter"]) == set(szlib.MPCSettings.__dataclass_fields__)
     assert table["why"].str.len().min() > 5
     assert "v_max" in table.set_index("parameter").index

@@ -7,6 +7,7 @@ import pytest
 from szlib.errors import DataError
 from szlib.workbook import command_line
 from szlib.workbook.command_line import main
+from szlib.workbook.record.validation import check_parameters
 from szlib.workbook.runner import execution
 
 
@@ -18,12 +19,12 @@ def summary(tmp_path, folder="mine"):
     return json.loads((tmp_path / "out" / folder / "summary.json").read_text())
 
 
+@pytest.mark.usefixtures("at_once")
 def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp_path, capsys):
     notebooks(_01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)')
-    assert run("-p", "seed=3") == 0
-    (folder,) = (path.name for path in (tmp_path / "out").glob("mine-*"))
-    record = summary(tmp_path, folder)["notebooks"]["01_good"]
-    assert record["key_figures"] == {"seed": 3}
+    assert run() == 0
+    record = summary(tmp_path)["notebooks"]["01_good"]
+    assert record["key_figures"] == {"seed": 0}
     assert [(c["name"], c["passed"], c["value"]) for c in record["checks"]] == [
         ("sum", True, 2),
         ("paper", False, 0.25),
@@ -32,7 +33,31 @@ def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp
     assert "1/1" in printed
     assert "not supported here" in printed
     assert "all checks hold" in printed
-    assert "report.html" in printed and (tmp_path / "out" / folder / "report.html").exists()
+    assert "report.html" in printed and (tmp_path / "out" / "mine" / "report.html").exists()
+
+
+def test_a_changed_parameter_makes_observations_and_ends_with_0_but_a_promise_fails(
+    notebooks, tmp_path, capsys
+):
+    notebooks(_01_good='record.check("no infeasible step", seed == 0, 4)')
+    assert run("-p", "seed=3") == 0
+    (folder,) = (path.name for path in (tmp_path / "out").glob("mine-*"))
+    assert summary(tmp_path, folder)["passed"]
+    printed = capsys.readouterr().out
+    assert "01_good: no infeasible step: does not hold with seed = 3 (4)" in printed
+    assert "all checks hold; 1 are observations" in printed
+    notebooks(_01_good='record.check("funnel", False, always=True)')
+    assert run("-p", "seed=3") == 1
+
+
+def test_a_value_that_is_one_notebooks_default_is_given_to_the_others(notebooks):
+    folder = notebooks(_01_few="", _07_many="")
+    for name, worlds in (("01_few", 2), ("07_many", 4)):
+        script = folder / f"{name}.py"
+        script.write_text(script.read_text().replace("seed = 0\n", f"seed = 0\nworlds = {worlds}\n", 1))
+    sources = sorted(folder.glob("*.py"))
+    assert check_parameters({"worlds": 2, "seed": 0}, sources) == {"worlds": 2}
+    assert check_parameters({"worlds": 4}, sources[1:]) == {}
 
 
 def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, tmp_path, capsys):
@@ -49,10 +74,20 @@ def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, t
     assert "NOT ALL CHECKS HOLD" in printed
 
 
+@pytest.mark.usefixtures("at_once")
 def test_only_runs_what_is_asked_for(notebooks, tmp_path):
     notebooks(_01_one='record.check("ok", True)', _07_two='record.check("ok", True)')
     assert run("--only", "07") == 0
     assert list(summary(tmp_path)["notebooks"]) == ["07_two"]
+
+
+def test_06_is_not_06b_and_00_comes_first(notebooks):
+    names = ["00_start", "06_barriers", "06b_build", "07_passing", "10_room"]
+    notebooks(**{f"_{name}": "" for name in reversed(names)})
+    chosen = [[s.stem for s in execution._chosen(only)] for only in ([], ["06"], ["06b"], ["10_room", "00"])]
+    assert chosen == [names, ["06_barriers"], ["06b_build"], ["00_start", "10_room"]]
+    with pytest.raises(DataError, match="no notebook 0; there are 00_start"):
+        execution._chosen(["0"])
 
 
 @pytest.mark.parametrize(

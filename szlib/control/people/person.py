@@ -21,7 +21,8 @@ STANDS = 0.1
 class SpeedZone(Protocol):
     """Anything that has a zone for each walking speed, such as `SocialZone`."""
 
-    def ellipse(self, speed: float) -> Ellipse: ...
+    def ellipse(self, speed: float) -> Ellipse:
+        """The zone at a walking speed [m/s], in the person's frame."""
 
 
 def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:

@@ -31,7 +31,8 @@ class StepLike(Protocol):
     """
 
     @property
-    def control(self) -> Array: ...
+    def control(self) -> Array:
+        """What the robot is driven by: (ax, ay) [m/s2], or as its `Robot` takes it."""
 
 
 class Controller(Protocol):
@@ -45,24 +46,28 @@ class Controller(Protocol):
     zone of people who have none; `walls`, shape (n, 2, 2), must be those of the scenario.
     """
 
-    def reset(self) -> None: ...
+    def reset(self) -> None:
+        """Forget the run before."""
 
-    def step(self, state: Array, goal: Array, people: Sequence[Person]) -> StepLike: ...
+    def step(self, state: Array, goal: Array, people: Sequence[Person]) -> StepLike:
+        """The control to hold for the next `dt`."""
 
 
 class Robot(Protocol):
     """How a robot moves: its own state from that of the disc around it, back, and one step on.
 
-    `start` makes the robot's own state, of any shape, from the disc's (x, y, vx, vy); `body` the disc's,
-    which is what is logged and measured; `advance` drives the own state on by a control for dt [s].  An
+    Its own state has any shape; the disc's, (x, y, vx, vy) [m, m/s], is what is logged and measured.  An
     attribute `inputs`, names of the controls, gives the columns of the log's table.
     """
 
-    def start(self, state: Array) -> Array: ...
+    def start(self, state: Array) -> Array:
+        """The robot's own state from the disc's."""
 
-    def body(self, own: Array) -> Array: ...
+    def body(self, own: Array) -> Array:
+        """The disc's (x, y, vx, vy) from the robot's own state."""
 
-    def advance(self, own: Array, control: Array, dt: float) -> Array: ...
+    def advance(self, own: Array, control: Array, dt: float) -> Array:
+        """Its own state dt later [s]."""
 
 
 Factory = Callable[[Scenario, MPCSettings], Controller]

@@ -14,6 +14,7 @@ from ...control.mpc import MPCCBF
 from ...control.people import Person
 from ..closed_loop import simulate
 from ..log import SimulationLog
+from ..metrics.manners import BACKWARDS, YIELDED
 from ..metrics.motion import along_course, avoidance_start, passing_side
 from ..scenario import GOAL_RADIUS, Claim, Scenario
 
@@ -23,10 +24,6 @@ BESIDE = 1.0
 """A person no farther ahead or behind than this is being passed [m] (assumed)."""
 SLOWED = 0.8
 """Below this share of its greatest speed the robot has slowed down (assumed)."""
-YIELDED = 1.0
-"""Yielding for as long as this is waiting [s] (assumed)."""
-BACKWARDS = 0.5
-"""Going back as far as this, the robot's radius, is making room [m] (assumed)."""
 MOUTH = 0.0
 """x of the near end of the restricted pathway [m]."""
 

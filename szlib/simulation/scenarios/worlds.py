@@ -41,6 +41,7 @@ class Worlds:
     start_speed : fastest start, in any direction [m/s].
     min_h : least h of every person and wall at the start, and where full braking would end [m].
     duration : time that the robot has [s].
+    zone : everybody's, such as one that was learned; None draws one for each world (`random_zone`).
 
     Raises
     ------
@@ -58,6 +59,7 @@ class Worlds:
     start_speed: float = 1.0
     min_h: float = 0.0
     duration: float = 15.0
+    zone: Ellipse | None = None
 
     def __post_init__(self) -> None:
         for name in ("people", "pace", "wall_length", "travel"):
@@ -85,7 +87,7 @@ def world(seed: int, worlds: Worlds | None = None) -> Scenario:
 
     Start and goal are clear of walls by what a robot of the default radius requires, the goal also
     of people who stand. People keep off walls and off each other's bodies at the start, and walkers
-    never cross a wall. Each person has the zone of the world, drawn by `random_zone`.
+    never cross a wall. Each person has the zone of the world: `worlds.zone`, or one by `random_zone`.
 
     Raises
     ------
@@ -93,7 +95,8 @@ def world(seed: int, worlds: Worlds | None = None) -> Scenario:
     """
     w, rng = worlds or Worlds(), np.random.default_rng(seed)
     for _ in range(_TRIES):
-        zone, walls = random_zone(rng), _walls(rng, w)
+        drawn = random_zone(rng)  # drawn in any case: the rest of the world does not depend on it
+        zone, walls = w.zone or drawn, _walls(rng, w)
         people = _people(rng, w, walls, zone)
         x, goal = rng.uniform(-w.size / 2, w.size / 2, (2, 2))
         speed, heading = w.start_speed * rng.uniform(), rng.uniform(-pi, pi)

@@ -64,7 +64,8 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 EXPECTED = (
     "expected one of: atc-raw (8 numbers, commas, no header), atc-1hz (6 numbers, commas, no header), "
     "ewap (8 numbers, blanks), or tidy CSV with a header or Parquet with columns t, id, x, y; or, by "
-    "PedPy, texts or HDF5 of Juelich's archive, Viswalk, Vadere, JuPedSim; plain or .gz"
+    "PedPy, texts or HDF5 of Juelich's archive, Viswalk, Vadere, JuPedSim; plain or .gz; "
+    "Grand Central, Edinburgh and THOR-MAGNI are read by szlib.tracks.sites"
 )
 
 _DAY, _JAPAN = 86_400.0, ZoneInfo("Asia/Tokyo")

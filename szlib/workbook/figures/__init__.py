@@ -39,6 +39,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "animate",
             "plot_sweep",
             "plot_intervals",
+            "interval_grid",
             "legend_below",
         ],
         "crowds": ["plot_crowd", "plot_promises"],

@@ -12,13 +12,21 @@ from numpy.typing import ArrayLike
 from shapely.plotting import patch_from_polygon
 
 from ...control.barriers import Array, barrier, check_wall, ellipse_distance, segment_distance
-from ...control.distances import overestimate, required_margin, safe_edge
+from ...control.distances import (
+    euclidean_to_ellipse,
+    euclidean_to_segment,
+    overestimate,
+    required_margin,
+    safe_edge,
+)
 from ...control.step import Limit, Step, admissible
 from ...zones.ellipses import Ellipse
 from .style import BLACK, BLUE, GREEN, GREY, RED, axes, metres
 
 _DASHES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 """Of walls 0, 1, 2, 3, and so on again."""
+_NEAR = 0.9
+"""Farther away it does not matter where a distance is wrong [m]."""
 
 
 def plot_distance(
@@ -35,25 +43,36 @@ def plot_distance(
         distance, outline, name = ellipse_distance(grid, of), of.curve(), "the zone"
     else:
         distance, outline, name = segment_distance(grid, *of), np.array(of), "the wall"
-    lines = ax.contour(x, y, distance, levels=np.arange(-0.5, 3, 0.25), cmap="viridis", linewidths=0.8)
-    ax.clabel(lines, fmt="%.2f", fontsize=7)
+    levels = [d for d in np.arange(-0.5, 3, 0.25).tolist() if abs(d) > 0.1 and abs(d - margin) > 0.1]
+    lines = ax.contour(x, y, distance, levels=levels, cmap="viridis", linewidths=0.8)
+    ray = np.linspace(0, extent, 500)[:, None] * (0.6, -0.8)
+    along = ellipse_distance(ray, of) if isinstance(of, Ellipse) else segment_distance(ray, *of)
+    crossed = [d for d in levels if max(0, along.min()) < d < along.max()]
+    at = [tuple(ray[np.abs(along - d).argmin()].tolist()) for d in crossed]
+    ax.clabel(lines, fmt="%.2f", fontsize=7, manual=at)
     ax.contour(x, y, barrier(distance, margin, 0.0), levels=[0.0], colors=[RED], linewidths=2)
-    ax.plot(*outline.T, color=BLACK, linewidth=2, label=name)
-    ax.plot([], [], color=RED, linewidth=2, label="h = 0")
-    ax.legend(loc="upper right", fontsize=8)
+    ax.plot(*outline.T, color=BLACK, linewidth=2, label=f"{name}, d = 0")
+    ax.plot([], [], color=RED, linewidth=2, label=f"h = 0, d = {margin:g} m")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, fontsize=8)
     return metres(ax, f"Distance to {name} [m], and h = 0")
 
 
 def plot_overestimate(
     of: Ellipse | ArrayLike, *, r_robot: float, eps: float, extent: float = 2.0, ax: Axes | None = None
 ) -> Axes:
-    """Approximate less Euclidean distance around a zone or a wall [cm], and h = 0 with two margins."""
+    """Approximate less Euclidean distance [cm] near a zone or a wall, and h = 0 with two margins.
+
+    Dotted: where the robot's disc touches, in Euclidean distance.  An h = 0 inside of it is a collision.
+    """
     ax = axes(ax, size=(5.5, 4.5))
     ticks = np.linspace(-extent, extent, 321)
     x, y = np.meshgrid(ticks, ticks)
     grid = np.stack([x, y], axis=-1)
-    inside = of.level(grid) < 1 if isinstance(of, Ellipse) else np.zeros(x.shape, bool)
-    error = np.ma.masked_where(inside, 100 * overestimate(grid, of))
+    if isinstance(of, Ellipse):
+        true = euclidean_to_ellipse(grid, of)
+    else:
+        true = euclidean_to_segment(grid, *check_wall(of))
+    error = np.ma.masked_where((true < 0) | (true > _NEAR), 100 * overestimate(grid, of))
     image = ax.pcolormesh(x, y, error, cmap="RdBu_r", vmin=-25, vmax=25, rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.85, label="d - Euclidean [cm], red is dangerous")
     outline = of.curve() if isinstance(of, Ellipse) else check_wall(of)
@@ -62,11 +81,13 @@ def plot_overestimate(
     for margin, line in ((eps, "-"), (needed, "--")):
         edge = safe_edge(of, r_robot + margin)
         label = f"h = 0, eps = {100 * margin:.0f} cm"
-        ax.plot(*np.vstack([edge, edge[:1]]).T, line, color=GREEN, linewidth=1.8, label=label)
+        ax.plot(*np.vstack([edge, edge[:1]]).T, line, color=BLACK, linewidth=1.8, label=label)
         if needed == eps:
             break
+    ax.contour(x, y, true, levels=[r_robot], colors=[BLACK], linestyles=[":"], linewidths=1.8)
+    ax.plot([], [], ":", color=BLACK, label="the robot's disc touches")
     ax.set(xlim=(-extent, extent), ylim=(-extent, extent))
-    ax.legend(loc="upper right", fontsize=8)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), fontsize=8, ncols=2)
     return metres(ax, "Where the distance is wrong")
 
 

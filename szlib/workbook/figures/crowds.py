@@ -14,7 +14,13 @@ from .style import BLACK, BLUE, GREEN, ORANGE, RED, axes, metres
 
 _AROUND = 3.0
 """Floor that is shown around the robot's path [m]."""
-_SHADES = {"came": BLACK, "turned": RED, "slowed down": GREEN, "sped up": ORANGE, "faced elsewhere": BLUE}
+_SHADES = {
+    "came": (BLACK, ""),
+    "turned": (RED, "///"),
+    "slowed down": (GREEN, "..."),
+    "sped up": (ORANGE, "xxx"),
+    "faced elsewhere": (BLUE, "|||"),
+}
 
 
 def plot_crowd(log: SimulationLog, *, replay: Replay | None = None, ax: Axes | None = None) -> Axes:
@@ -58,8 +64,10 @@ def plot_promises(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     for did in KINDS:
         share = 1000 * table[did].to_numpy(float) / table["promised_steps"].to_numpy(float)
         if did in _SHADES or share.any():
-            ax.barh(table.index, share, left=left, color=_SHADES.get(did, "magenta"), label=did)
+            colour, hatch = _SHADES.get(did, ("magenta", "ooo"))
+            ax.barh(table.index, share, left=left, color=colour, hatch=hatch, edgecolor="white", label=did)
         left += share
+    ax.set_xlim(0, 1.08 * max(float(left.max(initial=0)), 1e-9))
     ax.set(xlabel="steps that led to h < 0, of 1,000 that said they were safe")
     ax.invert_yaxis()
     ax.legend(fontsize=8, title="what people did")

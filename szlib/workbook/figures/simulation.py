@@ -76,12 +76,14 @@ def plot_speed(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_barriers(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
-    """h of every person and wall over time: safe where it is not negative; logarithmic above 0.5 m."""
+    """h of every person, and of the nearest wall, over time: safe where >= 0; logarithmic above 0.5 m."""
     ax = axes(ax, size=(8, 2.5))
     n = len(log.scenario.people)
-    for i, h in enumerate(log.h.T):
-        kind, colour, line = ("person", RED, "-") if i < n else ("wall", BLACK, ":")
-        ax.plot(log.time, h, color=colour, linestyle=line, label=kind if i in (0, n) else None)
+    for i, h in enumerate(log.h[:, :n].T):
+        ax.plot(log.time, h, color=RED, label="person" if i == 0 else None)
+    if log.h.shape[1] > n:
+        walls = log.h[:, n:].min(axis=1)
+        ax.plot(log.time, walls, color=BLACK, linestyle=":", label="nearest wall")
     ax.axhline(0, color=GREY, linewidth=1)
     ax.set_yscale("symlog", linthresh=0.5, linscale=1.5)
     ax.set_yticks([0, 0.25, 0.5, 1, 2, 5, 10], ["0", "0.25", "0.5", "1", "2", "5", "10"])
@@ -191,6 +193,29 @@ def plot_intervals(
     return ax
 
 
+def interval_grid(
+    table: pd.DataFrame,
+    labels: Mapping[str, str],
+    *,
+    rows: str,
+    colour: str,
+    columns: int = 3,
+    title: str = "",
+) -> Figure:
+    """A panel of `plot_intervals` for each metric of `labels`, metric -> axis label, with one legend."""
+    down = -(-len(labels) // columns)
+    names = table[rows].nunique()
+    size = (4.4 * columns, down * (0.36 * names + 1.3) + 0.6)
+    figure, grid = plt.subplots(down, columns, figsize=size, layout="constrained", sharey=True, squeeze=False)
+    for ax, (metric, label) in zip(grid.flat, labels.items(), strict=False):
+        plot_intervals(table, metric, rows=rows, colour=colour, label=label, ax=ax)
+    for ax in grid.flat[len(labels) :]:
+        ax.axis("off")
+    legend_below(list(grid.flat))
+    figure.suptitle(title)
+    return figure
+
+
 def legend_below(panels: Sequence[Axes]) -> None:
     """One legend below several panels that show the same things: that of the first."""
     handles, names = panels[0].get_legend_handles_labels()
@@ -244,10 +269,8 @@ def _write_times(ax: Axes, time: Array, at: Array, *, colour: str, above: float)
         first = row
     halo = [Stroke(linewidth=2, foreground="white"), Normal()]
     for here, told in labels:
-        label = ax.annotate(
-            ", ".join(told), (here[0], here[1]), (0, above), textcoords="offset points", color=colour
-        )
-        label.set(ha="center", va="center", fontsize=8, path_effects=halo)
+        label = ax.annotate(", ".join(told), (here[0], here[1]), (0, above), textcoords="offset points")
+        label.set(color=colour, ha="center", va="center", fontsize=8, path_effects=halo)
 
 
 def _frame(ax: Axes, shown: Sequence[tuple[SimulationLog, Any]]) -> None:

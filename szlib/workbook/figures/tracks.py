@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from ...encounters.geometry import Area
-from .style import BLUE, RED, SEQUENCE, axes, metres, outline
+from .style import BLUE, GREY, RED, SEQUENCE, axes, metres, outline
 
 _MOST_CELLS = 2000
 """Of a map, along each axis: cells grow with the site."""
@@ -27,7 +27,7 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     image = ax.pcolormesh(edges[0], edges[1], shown.T, cmap=SEQUENCE, rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$")
     ax.add_patch(outline(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
-    ax.legend(loc="lower right")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12))
     for axis, edge, ends in zip("xy", edges, (area.box.x, area.box.y), strict=True):
         low, high = min(edge[0], ends[0]), max(edge[-1], ends[1])
         ax.set(**{f"{axis}lim": (low - _MARGIN * (high - low), high + _MARGIN * (high - low))})
@@ -57,13 +57,17 @@ def plot_speeds(by_column: np.ndarray, by_displacement: np.ndarray, *, ax: Axes 
 
 
 def plot_funnel(funnel: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
-    """What each stage kept, on a log scale; `funnel` as from `szlib.tracks.funnels.table`."""
+    """What each stage kept, as points on a log scale; `funnel` as from `szlib.tracks.funnels.table`.
+
+    A bar would have no length there: a log scale has no zero.
+    """
     kept = funnel[funnel["what"] == "kept"]
     ax = axes(ax, size=(8, 0.4 * len(kept) + 1))
-    ax.barh(kept["stage"], kept["rows"], color=BLUE)
+    ax.plot(kept["rows"], kept["stage"], "o-", color=BLUE, markersize=7, linewidth=1)
     for at, rows in enumerate(kept["rows"]):
-        ax.annotate(f" {rows:,}", (rows, at), va="center", fontsize=8)
+        ax.annotate(f"{rows:,}", (rows, at), (9, 0), textcoords="offset points", va="center", fontsize=8)
     ax.invert_yaxis()
-    ax.set(xscale="log", xlabel="rows kept", title="From rows of tracks to a hull")
-    ax.set_xlim(right=float(kept["rows"].max()) * 8)
+    ax.grid(axis="x", color=GREY, alpha=0.3)
+    ax.set(xscale="log", xlabel="rows kept (log scale)", title="From rows of tracks to a hull")
+    ax.set_xlim(left=max(float(kept["rows"].min()), 1) / 4, right=float(kept["rows"].max()) * 8)
     return ax

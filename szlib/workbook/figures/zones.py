@@ -23,6 +23,10 @@ from ...zones.respect.presence import PairCorrelation
 from ...zones.social_zone import SocialZone
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, axes, colours, metres
 
+_LINES = ("-", "--", ":", "-.")
+_DOTS = 4000
+"""About so many samples are drawn around a hull."""
+
 
 def plot_outliers(
     points: np.ndarray, outlier: np.ndarray, *, r_max: float = 2.0, ax: Axes | None = None
@@ -40,14 +44,20 @@ def plot_outliers(
     ax.plot(*points[outlier].T, "x", color=RED, markersize=7, mew=1.8, label=f"{outlier.sum():,} outliers")
     ax.add_patch(Circle((0, 0), r_max, fill=False, linestyle=":", color=BLACK, label="contact, r = 0"))
     ax.set(xlim=(-1.05 * r_max, 1.05 * r_max), ylim=(-1.05 * r_max, 1.05 * r_max))
-    ax.legend(loc="upper right")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=8)
     metres(ax, "Turned inside out: the nearer, the farther out")
     ax.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
     return ax
 
 
-def plot_hull(zone: SocialZone, speeds: Sequence[float] = (0.7, 0.9, 1.1, 1.3), *, ax: Any = None) -> Axes3D:
-    """The hull over (x', y', speed) with its slices (paper, fig. 4b)."""
+def plot_hull(
+    zone: SocialZone,
+    speeds: Sequence[float] = (0.7, 0.9, 1.1, 1.3),
+    *,
+    points: np.ndarray | None = None,
+    ax: Any = None,
+) -> Axes3D:
+    """The hull over (x', y', speed) with its slices (paper, fig. 4b), and the samples, `points` (n, 3)."""
     if zone.vertices is None:
         raise ZoneError(f'a zone of method {zone.method!r} has no hull to draw; fit it with method="hull"')
     if ax is None:
@@ -57,10 +67,16 @@ def plot_hull(zone: SocialZone, speeds: Sequence[float] = (0.7, 0.9, 1.1, 1.3), 
         zone.vertices[hull.simplices], facecolor=GREY, edgecolor=GREY, alpha=0.12, linewidth=0.3
     )
     ax.add_collection3d(faces)
-    for speed, colour in zip(speeds, colours(speeds), strict=True):
+    if points is not None:
+        shown = points[:: max(1, len(points) // _DOTS)]
+        ax.plot(*shown.T, ".", color=BLUE, markersize=1.5, alpha=0.35, label=f"{len(shown):,} of the samples")
+    for speed, colour, line in zip(speeds, colours(speeds), cycle(_LINES), strict=False):
         corners = zone.slice(speed).polygon
         closed = np.vstack([corners, corners[:1]])
-        ax.plot(*closed.T, np.full(len(closed), speed), color=colour, linewidth=2.5, label=f"{speed:g} m/s")
+        level = np.full(len(closed), speed)
+        ax.plot(*closed.T, level, color=colour, linestyle=line, linewidth=2.5, label=f"{speed:g} m/s")
+        right = closed[closed[:, 0].argmax()]
+        ax.text(right[0] + 0.15, right[1], speed, f"{speed:g}", color=colour, fontsize=9, weight="bold")
     ax.auto_scale_xyz(*zone.vertices.T)
     ax.set(
         xlabel="x' [m]",
@@ -104,14 +120,19 @@ def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None =
     """
     ax = axes(ax, size=(6, 5))
     shown = sorted((zones.ellipses if isinstance(zones, SocialZone) else zones).items())
-    lines = cycle(("-", "--", ":", "-."))
-    for (speed, ellipse), colour, line in zip(shown, colours(shown), lines, strict=False):
+    for (speed, ellipse), colour, line in zip(shown, colours(shown), cycle(_LINES), strict=False):
         label = f"{speed:g} m/s"
         if isinstance(zones, SocialZone):
             line = _line(zones, speed)
             label += "" if zones.adequate(speed) else " (not adequate)"
             _band(zones, speed, ax, color=colour, alpha=0.15)
         ax.plot(*ellipse.curve().T, color=colour, linestyle=line, linewidth=2, label=label)
+    angles = np.linspace(np.pi / 6, 11 * np.pi / 6, len(shown))
+    for (speed, ellipse), angle, colour in zip(shown, angles.tolist(), colours(shown), strict=True):
+        at = ellipse.curve()[round(angle / (2 * np.pi) * (len(ellipse.curve()) - 1))]
+        white = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+        name = ax.annotate(f"{speed:g}", at, ha="center", va="center", bbox=white)
+        name.set(color=colour, fontsize=7, weight="bold")
     ax.plot(0, 0, marker=(3, 0, -90), color=BLACK, markersize=10)
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     bands = " and their 95 % intervals" if getattr(zones, "uncertainty", None) else ""
@@ -166,14 +187,15 @@ def plot_tornado(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     spans = spans.loc[(spans["high"] - spans["low"]).sort_values().index]
     at = np.arange(len(spans))
     ax.barh(at, spans["high"] - spans["low"], left=spans["low"], color=BLUE, alpha=0.35, height=0.6)
-    row = dict(zip(spans.index, at.tolist(), strict=True))
-    for i, (name, value, area) in enumerate(varied[["parameter", "value", "area"]].itertuples(index=False)):
-        ax.plot(area, row[name], "o", color=BLUE, markersize=4)
-        beside = (0, 7 if i % 2 else -13)  # so that neighbours do not overlap
-        ax.annotate(value, (area, row[name]), beside, textcoords="offset points", ha="center", fontsize=7)
+    names = []
+    for row, name in zip(at, spans.index, strict=True):
+        values = varied[varied["parameter"] == name].sort_values("area")
+        ax.plot(values["area"], np.full(len(values), row), "o", color=BLUE, markersize=5)
+        names.append(f"{name}\n{'; '.join(map(str, values['value']))}")  # beside the axis: none overlap
     ax.axvline(usual, color=BLACK, linewidth=1.2, label=f"defaults: {usual:.2f} m$^2$")
-    ax.set_yticks(at, list(spans.index))
-    ax.set(xlabel="area of the zone [m$^2$]", ylim=(-0.6, len(spans) - 0.2))
+    ax.set_yticks(at, names, fontsize=8)
+    ax.set(xlabel="area of the zone [m$^2$]; values from left to right", ylim=(-0.6, len(spans) - 0.2))
+    ax.use_sticky_edges = False
     ax.margins(x=0.1)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), fontsize=8)
     return ax
@@ -200,7 +222,8 @@ def plot_findings(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     for name, (colour, marker) in styles.items():
         ax.plot([], [], marker, color=colour, label="not decidable" if name == "not" else name)
     ax.set(xlabel="against the paper < 0 < as the paper says (each scaled to its interval)", xlim=(-1.1, 1.1))
-    ax.legend(loc="upper center", bbox_to_anchor=(0.3, -0.15), ncols=3, fontsize=8)
+    below = 0.6 / (0.45 * len(table) + 0.4)  # of the axes' height: 0.6 inch
+    ax.legend(loc="upper center", bbox_to_anchor=(0.3, -below), ncols=3, fontsize=8)
     return ax
 
 

@@ -1,16 +1,15 @@
 """What a notebook writes down: its checks, its figures, its key numbers, its artefacts.
 
-A *check* must hold, or the run fails.  A *claim* of the paper is measured: where the data does not
-support it the record says "not supported here", with the numbers, and the run goes on.
+A *check* must hold, or the run fails.  It belongs to the settings it was made for: where a parameter was
+changed it becomes an *observation*, unless it holds for any setting (`always`).  A *claim* of the paper is
+measured: where the data does not support it the record says "not supported here", with the numbers.
 """
 
 from __future__ import annotations
 
-import inspect
 import io
 import json
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -24,24 +23,22 @@ from ... import __version__
 from ...encounters.areas import as_area
 from ...encounters.geometry import Area
 from ...encounters.pipeline import Chain, check_met
-from ...encounters.search import find_encounters
+from ...encounters.search.finding import find_encounters
 from ...errors import DataError, ZoneError
 from ...files import file_content, keep, kept, own_folder, sign, write_file
 from ...plaza.people import make_plaza
 from ...plaza.truth import PlazaSettings
 from ...tracks import datasets
 from ...tracks.clock import read_tracks
+from ...zones.ellipses import Ellipse
 from ...zones.social_zone import SocialZone
 from . import places
-from .validation import FOR_OPTIONS, defaults_of
+from .method import DEFAULTS, Method
+from .tables import as_text, show_with_words, whole
+from .validation import FOR_OPTIONS, NEUTRAL, defaults_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from ...control.settings import MPCSettings
-
-PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
-"""Badges: where a parameter comes from."""
 
 
 class NotebookRecord:
@@ -59,6 +56,9 @@ class NotebookRecord:
     Attributes
     ----------
     data, area, seed : these.
+    method : how the zone is made: the knobs of notebooks 02 to 05, as they were turned.
+    changed : parameters of this notebook, and knobs of the method, that are not as they were when its checks
+        were made: name and value.
     out : where its results go: into the folder of the run that executes it; executed by hand, into one
         for its data and parameters in the folder `lab` of all results.
     """
@@ -71,21 +71,21 @@ class NotebookRecord:
         self.checks: list[dict[str, Any]] = []
         self.figures: list[str] = []
         self.key: dict[str, Any] = {}
-        self.out = self._folder(variables)
+        script = places.NOTEBOOKS / f"{name}.py"
+        defaults = {**DEFAULTS, **(defaults_of(script) if script.exists() else {"area": "", "seed": 0})}
+        self.method = Method.of(variables)
+        changed = {n: variables[n] for n, v in defaults.items() if variables.get(n, v) != v}
+        self.changed = {n: v for n, v in changed.items() if n not in NEUTRAL}
+        if self.changed:
+            print(f"{self._settings()}: checks that were made for the defaults become observations")
+        self.out = self._folder(variables, {n: v for n, v in changed.items() if n not in FOR_OPTIONS})
         for part in ("records", "figures"):
             (self.out / part).mkdir(exist_ok=True)
-        _show_with_words()
+        show_with_words()
 
-    def _folder(self, variables: Mapping[str, Any]) -> Path:
+    def _folder(self, variables: Mapping[str, Any], given: Mapping[str, Any]) -> Path:
         if run := os.environ.get(places.RUN_VARIABLE):
             return Path(run)
-        script = places.NOTEBOOKS / f"{self.name}.py"
-        defaults = defaults_of(script) if script.exists() else {"area": "", "seed": 0}
-        given = {
-            name: variables[name]
-            for name, default in defaults.items()
-            if name not in FOR_OPTIONS and variables.get(name, default) != default
-        }
         results = places.root(variables.get("results", places.RESULTS))
         own_folder(results, places.ROOT)
         return places.home(results / places.LAB, self.data, given)
@@ -94,6 +94,10 @@ class NotebookRecord:
     def synthetic(self) -> bool:
         """Whether the data is the plaza, whose truth is known."""
         return self.data == datasets.SYNTHETIC
+
+    def _settings(self) -> str:
+        """What was changed, to read: "with gamma = 0.2"."""
+        return "with " + ", ".join(f"{name} = {value}" for name, value in self.changed.items())
 
     def files(self) -> list[Path]:
         """The files of the data set."""
@@ -109,7 +113,8 @@ class NotebookRecord:
         if content is not None:
             return pd.read_parquet(io.BytesIO(content))
         tracks = self.tracks()
-        return self.keep_encounters(find_encounters(tracks, square=self.square(tracks)))
+        found = find_encounters(tracks, square=self.square(tracks), **self.method.search())
+        return self.keep_encounters(found)
 
     def square(self, tracks: pd.DataFrame | None = None) -> Area:
         """Where encounters are looked for: the area given, or the data's own; found once, kept in area.txt.
@@ -136,23 +141,36 @@ class NotebookRecord:
         file = self.out / "zone.json"
         if file.exists():
             try:
-                if kept(file, self._source()) is not None:
+                if kept(file, self._source(zone=True)) is not None:
                     return SocialZone.load(file)
                 print("fitting the zone again: that in zone.json is of other data, or damaged")
             except ZoneError as error:
                 print(f"fitting the zone again: {error}")
-        return self.keep_zone(SocialZone.fit(self.encounters()))
+        return self.keep_zone(SocialZone.fit(self.encounters(), **self.method.fit()))
+
+    def ellipse(self) -> Ellipse:
+        """The zone that the robot keeps: that of `zone_speed`, in the person's frame."""
+        return self.zone().ellipse(self.method.zone_speed)
 
     def keep_zone(self, zone: SocialZone) -> SocialZone:
         """Leave the zone for the notebooks to come."""
-        zone = replace(zone, provenance={**zone.provenance, "source": self._source()})
+        source = self._source(zone=True)
+        zone = replace(zone, provenance={**zone.provenance, "source": source})
         zone.save(self.out / "zone.json")
-        sign(self.out / "zone.json", (self.out / "zone.json").read_bytes(), self._source())
+        sign(self.out / "zone.json", (self.out / "zone.json").read_bytes(), source)
         return zone
 
-    def check(self, what: str, passed: object, value: object = None) -> None:
-        """Record what must hold; a failure fails the run, after the notebook has gone to its end."""
-        self._record("check", what, bool(passed), value, "holds" if passed else "FAILED")
+    def check(self, what: str, passed: object, value: object = None, *, always: bool = False) -> None:
+        """Record what must hold; a failure fails the run, after the notebook has gone to its end.
+
+        Where a parameter was `changed` it is an observation, which fails nothing, unless it holds `always`:
+        for any setting, by construction or by proof.
+        """
+        if self.changed and not always:
+            result = f"{'holds' if passed else 'does not hold'} {self._settings()}"
+            self._record("observation", what, bool(passed), value, result)
+        else:
+            self._record("check", what, bool(passed), value, "holds" if passed else "FAILED")
 
     def claim(self, what: str, supported: object, value: object = None) -> None:
         """Record whether the data supports a claim of the paper; if not, the run goes on."""
@@ -185,7 +203,7 @@ class NotebookRecord:
         text = json.dumps(record, indent=1, default=_plain)
         write_file(self.out / "records" / f"{self.name}.json", text)
         rows = [(c["kind"], c["name"], c["result"], as_text(c["value"])) for c in self.checks]
-        return _whole(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
+        return whole(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
 
     def _record(self, kind: str, name: str, passed: bool, value: object, result: str) -> None:
         value = _plain(value)
@@ -196,12 +214,15 @@ class NotebookRecord:
         write_file(self.out / "figures" / name, content, lasting=False)
         self.figures.append(name)
 
-    def _source(self) -> dict[str, Any]:
-        """What the artefacts are made of: the content of the files, every parameter, this version."""
+    def _source(self, *, zone: bool = False) -> dict[str, Any]:
+        """What encounters, or the zone, are made of: the files' content, every parameter, this version."""
         files = [[file.name, *file_content(file)] for file in self.files()]
         made = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "area": self.area}
         made["szlib"] = __version__
-        return json.loads(json.dumps(made | {"parameters": Chain().parameters()}))  # type: ignore[no-any-return]
+        made["parameters"] = Chain(**self.method.search()).parameters()
+        if zone:
+            made["fit"] = self.method.fit()
+        return json.loads(json.dumps(made))  # type: ignore[no-any-return]
 
 
 def data_files(data: str | Sequence[str], *, folder: Path, seed: int) -> list[Path]:
@@ -223,55 +244,6 @@ def data_files(data: str | Sequence[str], *, folder: Path, seed: int) -> list[Pa
     return [file]
 
 
-def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
-    """A table of parameters for a notebook: name, value, badge (paper, assumed, measured), why."""
-    unknown = {badge for _, _, badge, _ in rows} - {PAPER, ASSUMED, MEASURED}
-    if unknown:
-        raise ValueError(f"badges must be {PAPER}, {ASSUMED} or {MEASURED}; got {sorted(unknown)}")
-    return _whole(pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"]))
-
-
-def settings_table(settings: MPCSettings) -> Styler:
-    """The controller's parameters as such a table; what each one is stands in the docstring of its class."""
-    descriptions: dict[str, str] = {}
-    names: list[str] = []
-    for line in (inspect.getdoc(type(settings)) or "").splitlines():
-        entry = re.fullmatch(r"([A-Za-z_]\w*(?:, \w+)*) : (.*)", line)
-        if entry:
-            names = entry[1].split(", ")
-            descriptions |= dict.fromkeys(names, entry[2])
-        elif line.startswith("    ") and names:
-            descriptions |= {name: f"{descriptions[name]} {line.strip()}" for name in names}
-        else:
-            names = []
-    badges = settings.badges()
-    return parameters(
-        [(name, getattr(settings, name), badge, descriptions[name]) for name, badge in badges.items()]
-    )
-
-
-def _show_with_words() -> None:
-    """In a notebook, give every figure its words as alternative text, and tables three decimals."""
-    from IPython.core.getipython import get_ipython
-
-    def words(figure: Figure, **_: object) -> tuple[dict[str, str], dict[str, Any]]:
-        from ..figures.style import in_words
-
-        return {}, {"image/png": {"alt": in_words(figure)}}
-
-    shell = get_ipython()
-    if shell is not None and shell.display_formatter is not None:
-        pd.options.display.precision = 3
-        shell.display_formatter.mimebundle_formatter.for_type_by_name("matplotlib.figure", "Figure", words)
-
-
-def _whole(table: pd.DataFrame) -> Styler:
-    """A table whose long texts are shown to their end, the same HTML every time."""
-    left = [{"selector": "td, th", "props": "text-align: left"}]
-    styled = Styler(table, uuid="szlib", cell_ids=False).format(as_text).hide(axis="index")
-    return styled.set_table_styles(left)  # type: ignore[arg-type]
-
-
 def _plain(value: Any) -> Any:
     """NumPy's numbers as Python's, rounded to what a reader can use."""
     if isinstance(value, Mapping):
@@ -281,12 +253,3 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "item"):
         value = value.item()
     return round(value, 6) if isinstance(value, float) else value
-
-
-def as_text(value: Any) -> str:
-    """A value of a check or a claim to read: four digits of a number, every entry of a table."""
-    if value is None:
-        return ""
-    if isinstance(value, dict):
-        return ", ".join(f"{k}: {as_text(v)}" for k, v in value.items())
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

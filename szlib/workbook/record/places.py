@@ -40,6 +40,16 @@ def root(results: str | Path) -> Path:
     return (start / results).resolve()
 
 
+def notebooks() -> list[Path]:
+    """The notebooks' scripts in the order of the story: 00, 01 ... 06, 06b, 07 ..."""
+    return sorted(NOTEBOOKS.glob("[0-9][0-9]*_*.py"))
+
+
+def is_called(notebook: Path, name: str) -> bool:
+    """Whether a notebook has this number ("06", which is not "06b") or this name ("06_barriers")."""
+    return f"{notebook.stem}_".startswith(f"{name}_")
+
+
 def absolute(data: str | Path | Sequence[str | Path]) -> str | list[str]:
     """The same data from wherever it is asked for: names as they are, paths and globs absolute.
 

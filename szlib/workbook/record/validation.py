@@ -17,23 +17,32 @@ from ...errors import DataError, SolverError
 from ...files import printable
 
 SETTINGS = {"gamma": "gamma", "gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
+SETTINGS |= {f"{name}_b": name for name in ("gamma", "N_h", "a_max")}
 """Parameters that are settings of the controller by another name, or lists of them."""
 _MANY = 2**31
 RANGES: dict[str, tuple[float, float]] = {
-    "seed": (0, 2**63), "examples": (1, _MANY), "worlds": (1, _MANY), "n_jobs": (-1, _MANY),
-    "fraction": (0, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
-    "eccentricities": (0, 0.999999),
+    "seed": (0, 2**63), "space_width": (0.1, 100), "space_length": (0.1, 100), "duration": (0.1, 60),
+    "min_distance": (0, 100), "min_speed": (0.01, 10), "q": (0.001, 0.5), "zone_speed": (0.01, 10),
+    "intruders": (0, 0.5), "examples": (1, _MANY), "worlds": (1, _MANY), "n_jobs": (-1, _MANY),
+    "fraction": (1e-6, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
+    "eccentricities": (0, 0.999999), "size": (0.05, 20), "size_b": (0.05, 20), "speed": (0, 10),
 }  # fmt: skip
 """Lowest and highest value."""
 FOR_OPTIONS = {"data": "--data", "results": "--out"}
 """Parameters that the command line has options for."""
+NEUTRAL = {*FOR_OPTIONS, "area", "n_jobs", "examples"}
+"""Parameters that no check was made for: which data, how it is computed, what is shown."""
 
 
 def check_parameters(given: Mapping[str, Any], sources: Sequence[Path]) -> dict[str, Any]:
-    """The defaults of these notebooks; DataError unless each parameter is known to one, and right for it."""
-    defaults: dict[str, Any] = {}
+    """Those that are not the default of every notebook that knows them.
+
+    DataError unless each is known to one of these notebooks, of its type, and in its range.
+    """
+    defaults: dict[str, list[Any]] = {}
     for source in sources:
-        defaults |= defaults_of(source)
+        for name, value in defaults_of(source).items():
+            defaults.setdefault(name, []).append(value)
     unknown = set(given) - set(defaults)
     if unknown:
         known = ", ".join(sorted(defaults))
@@ -43,7 +52,7 @@ def check_parameters(given: Mapping[str, Any], sources: Sequence[Path]) -> dict[
     for name, value in given.items():
         if name in FOR_OPTIONS:
             raise DataError(f"parameter {name}: is set by {FOR_OPTIONS[name]}")
-        default = defaults[name]
+        default = defaults[name][0]
         _check_type(name, value, default)
         if isinstance(default, list):
             if default and not value:
@@ -52,7 +61,7 @@ def check_parameters(given: Mapping[str, Any], sources: Sequence[Path]) -> dict[
                 _check_type(name, each, default[0] if default else "")
         for each in value if isinstance(value, list) else [value]:
             _check_range(name, each)
-    return defaults
+    return {name: value for name, value in given.items() if any(value != each for each in defaults[name])}
 
 
 def defaults_of(source: Path) -> dict[str, Any]:

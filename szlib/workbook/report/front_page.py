@@ -21,7 +21,7 @@ from ...plaza.truth import PlazaSettings
 from ...simulation.scenarios.paper import SCENARIOS
 from ...tracks import datasets, funnels
 from ...zones.social_zone import SocialZone
-from ..record.notebook import as_text
+from ..record.tables import as_text
 
 Notebooks = Mapping[str, Any]
 """Executed notebooks by their names, in order."""

@@ -6,9 +6,7 @@ and key figures; the run gathers them in summary.json and ends with a table.
 
 from __future__ import annotations
 
-import json
 import os
-import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -17,30 +15,22 @@ from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 
-import jupytext
-import papermill
 from tqdm import tqdm
 
 from ... import __version__, memory
 from ...encounters.areas import AUTO, as_area
 from ...errors import DataError, SzlibError
-from ...files import file_content, held, printable, sweep_temporary, temporary_folder, write_file
+from ...files import file_content, held, sweep_temporary
 from ...parallel import bounded, cluster, end_with
 from ...tracks import datasets
 from ..record import places
 from ..record.notebook import data_files
 from ..record.validation import check_parameters
 from ..report import document
-from . import summary
+from . import summary, worker
 
 LAST_PRODUCER = "05"
 """Up to here each notebook needs the artefact of the one before; later ones can run side by side."""
-REFUSED = {
-    "DataError", "StorageError", "MemoryLimitError", "ZoneError", "SolverError", "SzlibError", "MemoryError",
-    "OSError", "PermissionError", "FileNotFoundError", "IsADirectoryError", "NotADirectoryError",
-    "DeadKernelError",
-}  # fmt: skip
-"""Errors that tell of the data, of the disk or of memory, and not of a notebook."""
 
 
 def run(
@@ -78,8 +68,8 @@ def run(
     StorageError : results cannot be written there, or another run is writing there.
     """
     sources = _chosen(only)
-    defaults = check_parameters(parameters or {}, sources)
-    given = {name: value for name, value in (parameters or {}).items() if value != defaults[name]}
+    known = sorted({*sources, *(n for n in places.notebooks() if n.stem[:2] <= LAST_PRODUCER)})
+    given = check_parameters(parameters or {}, known)
     if given.get("area", AUTO) != AUTO:  # in one form, whatever file or text it came from
         given["area"] = str(as_area(given["area"]))
     asked = places.absolute(data)
@@ -119,7 +109,7 @@ def _outcomes(
                     outcomes[name] = outcome
                     bar.update()
                     bar.set_postfix_str(f"{name} {outcome['status']}")
-    left = {"status": summary.NOT_STARTED, "seconds": 0.0, **_EMPTY_RECORD}
+    left = {"status": summary.NOT_STARTED, "seconds": 0.0, **worker.EMPTY_RECORD}
     return {source.stem: outcomes.get(source.stem, left) for source in sources}
 
 
@@ -163,95 +153,20 @@ def _pool(client: Any, jobs: int) -> Iterator[Executor]:
 def _submit(
     pool: Executor, sources: Iterable[Path], given: dict[str, Any], home: Path, share: int | None
 ) -> list[Future[Any]]:
-    return [pool.submit(_execute, str(source), given, str(home), share) for source in sources]
-
-
-def _execute(source: str, given: dict[str, Any], home: str, share: int | None) -> tuple[str, dict[str, Any]]:
-    """Run one notebook in a kernel of its own, with its share of memory; its name, and what it left."""
-    script, folder = Path(source), Path(home)
-    begun = time.perf_counter()
-    outcome: dict[str, Any] = {"status": "done"}
-    try:
-        with temporary_folder() as temporary:
-            runtime = {"JUPYTER_RUNTIME_DIR": str(temporary / "runtime")}  # gone with the folder, always
-            runtime[places.RUN_VARIABLE] = str(folder)
-            with _environment(runtime | ({memory.VARIABLE: str(share)} if share else {})):
-                outcome |= _execute_in(temporary, script, folder, given)
-    except (SzlibError, OSError, MemoryError) as error:
-        outcome = {"status": "refused", "error": f"{type(error).__name__}: {error}"}
-    except Exception as error:  # of papermill, nbclient or the kernel
-        status = "refused" if type(error).__name__ in REFUSED else "error"
-        outcome = {"status": status, "error": f"{type(error).__name__}: {error}"}
-    if "error" in outcome:
-        outcome["error"] = printable(" ".join(outcome["error"].split()))
-    outcome["seconds"] = round(time.perf_counter() - begun, 2)
-    try:
-        left = json.loads((folder / "records" / f"{script.stem}.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        left = {}
-    if outcome["status"] == "done" and not left:
-        outcome = {
-            **outcome,
-            "status": "error",
-            "error": "the notebook left no record; does it end with record.close()?",
-        }
-    return script.stem, outcome | {name: left.get(name, default) for name, default in _EMPTY_RECORD.items()}
-
-
-def _execute_in(temporary: Path, script: Path, folder: Path, given: dict[str, Any]) -> dict[str, Any]:
-    """Execute a notebook in a temporary folder, and put the executed copy among the results."""
-    plain, executed = temporary / f"{script.stem}.ipynb", temporary / "executed.ipynb"
-    jupytext.write(jupytext.read(script), plain, fmt="ipynb")
-    outcome: dict[str, Any] = {}
-    try:
-        papermill.execute_notebook(
-            plain,
-            executed,
-            given,
-            kernel_name="python3",
-            language="python",
-            cwd=script.parent,
-            progress_bar=False,
-            extra_arguments=["--log-level=CRITICAL"],  # the kernel's remarks on its own transport
-        )
-    except papermill.PapermillExecutionError as error:
-        status = "refused" if error.ename in REFUSED else "error"
-        outcome = {"status": status, "error": f"{error.ename}: {error.evalue}"}
-    if executed.exists():
-        write_file(folder / plain.name, executed.read_bytes())
-    return outcome
-
-
-@contextmanager
-def _environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Environment variables for what is started inside."""
-    before = {name: os.environ.get(name) for name in variables}
-    os.environ.update(variables)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name, None)
-            if value is not None:
-                os.environ[name] = value
-
-
-_EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
+    return [pool.submit(worker.execute, str(source), given, str(home), share) for source in sources]
 
 
 def _chosen(only: Iterable[str]) -> list[Path]:
-    sources = sorted(places.NOTEBOOKS.glob("[0-9][0-9]_*.py"))
+    sources = places.notebooks()
     if not sources:
         raise DataError(
             f"{places.NOTEBOOKS}: no notebooks; they come with the repository, not with the package: get a "
             "copy of it, and there `make run`, or pip install -e '.[workbook]' and `szlib run`"
         )
     wanted = list(only)
-    unknown = [name for name in wanted if not any(source.stem.startswith(name) for source in sources)]
+    unknown = [name for name in wanted if not any(places.is_called(source, name) for source in sources)]
     if unknown:
         raise DataError(
             f"no notebook {', '.join(unknown)}; there are {', '.join(source.stem for source in sources)}"
         )
-    return [
-        source for source in sources if not wanted or any(source.stem.startswith(name) for name in wanted)
-    ]
+    return [s for s in sources if not wanted or any(places.is_called(s, name) for name in wanted)]

@@ -72,9 +72,10 @@ def _read(file: Path) -> dict[str, Any]:
 def render(summary: Mapping[str, Any]) -> str:
     """The table that ends a run: notebook, time, checks passed, key figures; then what did not hold."""
     lines = [f"{'notebook':<20} {'seconds':>7} {'checks':>11}  key figures"]
-    notes = []
+    notes, observed = [], 0
     for name, record in summary["notebooks"].items():
         checks = [c for c in record["checks"] if c["kind"] == "check"]
+        observed += sum(c["kind"] == "observation" for c in record["checks"])
         held = (
             f"{sum(c['passed'] for c in checks)}/{len(checks)}"
             if record["status"] == "done"
@@ -89,4 +90,7 @@ def render(summary: Mapping[str, Any]) -> str:
         ]
         if record.get("error"):
             notes.append(f"{name}: {record['error']}")
-    return "\n".join([*lines, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
+    ending = "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"
+    if observed:
+        ending += f"; {observed} are observations, for parameters differ from those they were made for"
+    return "\n".join([*lines, *notes, ending])

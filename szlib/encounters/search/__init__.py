@@ -1,0 +1,18 @@
+"""The four conditions of the paper, on whole days at once: `find_encounters`.
+
+occupants  who is in whose attentional space
+windows    windows of 3 s that meet a condition throughout
+samples    what is measured in a window, and both people's paths in the reference pedestrian's frame
+finding    the four conditions, one after the other
+"""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach(
+    __name__,
+    submodules=["occupants", "windows", "samples", "finding"],
+    submod_attrs={
+        "samples": ["SAMPLE_COLUMNS", "reference_frame"],
+        "finding": ["find_encounters"],
+    },
+)

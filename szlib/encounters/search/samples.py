@@ -1,0 +1,74 @@
+"""What is measured in the window of an encounter, in the reference pedestrian's frame."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from ...errors import DataError
+from ...tracks.clock import COLUMNS, TICKS_PER_SECOND, check_columns, nearest_tick
+from ..geometry import wrap_angle
+
+SAMPLE_COLUMNS = ["encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed"]
+"""What is measured; the column kind follows them."""
+
+
+def sampled(
+    tracks: pd.DataFrame, order: np.ndarray, ref: np.ndarray, other: np.ndarray, steps: int
+) -> pd.DataFrame:
+    """The samples of windows that open at rows `ref` and `other` of the tracks in `order`."""
+    window = np.arange(steps + 1)
+    of_ref = tracks.iloc[order[(ref[:, None] + window).ravel()]].reset_index(drop=True)
+    of_other = tracks.iloc[order[(other[:, None] + window).ravel()]].reset_index(drop=True)
+    dx, dy = of_other["x"] - of_ref["x"], of_other["y"] - of_ref["y"]
+    bearing = np.arctan2(dy, dx) - np.arctan2(of_ref["vy"], of_ref["vx"])
+    return pd.DataFrame(
+        {
+            "encounter": np.repeat(np.arange(len(ref)), steps + 1),
+            "day": of_ref["day"].astype("category"),
+            "ref_id": of_ref["id"],
+            "other_id": of_other["id"],
+            "t": np.rint(of_ref["t"] * TICKS_PER_SECOND) / TICKS_PER_SECOND,
+            "los_angle": wrap_angle(np.asarray(bearing)),
+            "distance": np.hypot(dx, dy),
+            "speed": np.hypot(of_ref["vx"], of_ref["vy"]),
+        }
+    )
+
+
+def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame:
+    """Both people's paths of each encounter in the reference pedestrian's frame *at the opening*.
+
+    Columns: encounter, t, ref_x, ref_y, other_x, other_y [m]: x along the motion at the opening, y
+    to the left (paper, fig. 2); a row for each of `samples`, in their order.  The opening is the first
+    sample of an encounter, so outliers must not have been removed.
+
+    Raises
+    ------
+    DataError : a table lacks a column or is empty, or a sample is not in `tracks`.
+    """
+    check_columns(tracks, COLUMNS)
+    check_columns(samples, SAMPLE_COLUMNS[:5])
+    people = tracks[tracks["id"].isin(samples["ref_id"]) | tracks["id"].isin(samples["other_id"])]
+    people = people[["day", "id", "x", "y", "vx", "vy"]].assign(
+        tick=nearest_tick(people["t"].to_numpy(float))
+    )
+    keys = samples[["encounter", "day", "ref_id", "other_id"]].assign(
+        tick=nearest_tick(samples["t"].to_numpy(float))
+    )
+    ref, oth = (
+        keys.merge(people, how="left", left_on=["day", who, "tick"], right_on=["day", "id", "tick"])
+        for who in ("ref_id", "other_id")
+    )
+    lost = ref["x"].isna() | oth["x"].isna()
+    if lost.any():
+        found = samples[SAMPLE_COLUMNS[:5]].iloc[int(np.flatnonzero(lost)[0])].to_dict()
+        raise DataError(f"sample {found} is not in these tracks; pass the tracks it was found in")
+    opening = ref.groupby("encounter")["tick"].transform("idxmin").to_numpy()
+    x, y, vx, vy = (ref[name].to_numpy()[opening] for name in ("x", "y", "vx", "vy"))
+    cos, sin = np.cos(np.arctan2(vy, vx)), np.sin(np.arctan2(vy, vx))
+    out = {"encounter": samples["encounter"].to_numpy(), "t": samples["t"].to_numpy()}
+    for who, rows in (("ref", ref), ("other", oth)):
+        dx, dy = rows["x"].to_numpy() - x, rows["y"].to_numpy() - y
+        out |= {f"{who}_x": cos * dx + sin * dy, f"{who}_y": cos * dy - sin * dx}
+    return pd.DataFrame(out)

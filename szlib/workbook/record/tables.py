@@ -1,0 +1,77 @@
+"""How a notebook shows values, tables and figures; where each parameter comes from, its badge."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+from pandas.io.formats.style import Styler
+
+from ...control.settings import MPCSettings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
+"""Badges: where a parameter comes from."""
+
+
+def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
+    """A table of parameters for a notebook: name, value, badge (paper, assumed, measured), why."""
+    unknown = {badge for _, _, badge, _ in rows} - {PAPER, ASSUMED, MEASURED}
+    if unknown:
+        raise ValueError(f"badges must be {PAPER}, {ASSUMED} or {MEASURED}; got {sorted(unknown)}")
+    return whole(pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"]))
+
+
+def settings_table(settings: MPCSettings) -> Styler:
+    """The controller's parameters as such a table; what each one is stands in the docstring of its class."""
+    descriptions: dict[str, str] = {}
+    names: list[str] = []
+    for line in (inspect.getdoc(type(settings)) or "").splitlines():
+        entry = re.fullmatch(r"([A-Za-z_]\w*(?:, \w+)*) : (.*)", line)
+        if entry:
+            names = entry[1].split(", ")
+            descriptions |= dict.fromkeys(names, entry[2])
+        elif line.startswith("    ") and names:
+            descriptions |= {name: f"{descriptions[name]} {line.strip()}" for name in names}
+        else:
+            names = []
+    badges = settings.badges()
+    return parameters(
+        [(name, getattr(settings, name), badge, descriptions[name]) for name, badge in badges.items()]
+    )
+
+
+def whole(table: pd.DataFrame) -> Styler:
+    """A table whose long texts are shown to their end, the same HTML every time."""
+    left = [{"selector": "td, th", "props": "text-align: left"}]
+    styled = Styler(table, uuid="szlib", cell_ids=False).format(as_text).hide(axis="index")
+    return styled.set_table_styles(left)  # type: ignore[arg-type]
+
+
+def as_text(value: Any) -> str:
+    """A value of a check or a claim to read: four digits of a number, every entry of a table."""
+    if value is None:
+        return ""
+    if isinstance(value, dict):
+        return ", ".join(f"{k}: {as_text(v)}" for k, v in value.items())
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def show_with_words() -> None:
+    """In a notebook, give every figure its words as alternative text, and tables three decimals."""
+    from IPython.core.getipython import get_ipython
+
+    def words(figure: Figure, **_: object) -> tuple[dict[str, str], dict[str, Any]]:
+        from ..figures.style import in_words
+
+        return {}, {"image/png": {"alt": in_words(figure)}}
+
+    shell = get_ipython()
+    if shell is not None and shell.display_formatter is not None:
+        pd.options.display.precision = 3
+        shell.display_formatter.mimebundle_formatter.for_type_by_name("matplotlib.figure", "Figure", words)

@@ -1,0 +1,116 @@
+"""The atlas: what a robot did gets one name, and a cell changes what it says and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import szlib
+from szlib.simulation.log import SimulationLog
+from szlib.simulation.metrics.manners import BACKWARDS, MANNERS, manner, retreat
+from szlib.simulation.scenarios.atlas import NO_START, REFERENCE, SCENES, Cell, chart
+
+
+def made(x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: object) -> SimulationLog:
+    """A run along x, beside somebody who stands at the origin, made by hand."""
+    n, s = len(x), szlib.MPCSettings()
+    scene = replace(szlib.SCENARIOS["passing"], start=np.array([x[0], y, 0.0, 0.0]), goal=np.array([4.0, y]))
+    states = np.column_stack([x, np.full(n, y), np.gradient(x, s.dt), np.zeros(n)])
+    log = SimulationLog(
+        scenario=scene,
+        settings=s,
+        zones=(REFERENCE,),
+        states=states,
+        controls=np.zeros((n, 2)),
+        people=np.tile([0.0, 0.0, np.pi, 0.0, 0.0], (n, 1, 1)),
+        predicted=np.zeros((n, 0, 4)),
+        residual=np.full((n, 1, 2), 0.0 if held else 1.0),
+        rung=np.full(n, "warm"),
+        safe=np.ones(n, bool),
+        slack=np.zeros(n),
+        solve_time=np.zeros(n),
+        arrived=n - 1,
+    )
+    return replace(log, **changes)
+
+
+AHEAD = np.linspace(-4, 4, 81)
+STANDS = np.concatenate([np.linspace(-4, -1, 31), np.full(20, -1.0), np.linspace(-1, 4, 51)])
+BACK = np.concatenate([np.linspace(-4, -1, 31), np.linspace(-1, -1.9, 10), np.linspace(-1.9, 4, 60)])
+RUNS = {
+    "goes ahead": made(AHEAD),
+    "waits": made(STANDS, held=True),
+    "backs out": made(BACK, held=True),
+    "passes on the other side": made(AHEAD, y=1.6),
+    "deadlock": made(STANDS, arrived=None),
+    "infeasible": made(AHEAD, slack=np.where(np.arange(81) == 5, 0.1, 0.0)),
+    "h < 0": made(AHEAD, y=-0.5, arrived=None),
+}
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_a_manner_is_what_was_done(name: str) -> None:
+    assert manner(RUNS[name]) == name
+
+
+def test_there_is_a_run_for_every_manner() -> None:
+    assert set(RUNS) == set(MANNERS)
+
+
+def test_what_is_worse_comes_first() -> None:
+    both = replace(RUNS["infeasible"], arrived=None)
+    assert manner(both) == "infeasible"
+    assert manner(replace(RUNS["backs out"], arrived=None)) == "deadlock"
+
+
+def test_standing_while_nobody_holds_the_robot_back_is_not_waiting() -> None:
+    assert manner(made(STANDS, held=False)) == "goes ahead"
+
+
+def test_retreat_is_measured_from_the_farthest_point_by_then() -> None:
+    assert retreat(RUNS["backs out"]) == pytest.approx(0.9)
+    assert retreat(RUNS["goes ahead"]) == 0.0 < BACKWARDS
+
+
+# --- cells -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_cell_of_the_paper_is_the_scenario_of_the_paper(scene: str) -> None:
+    same, own = Cell(scene, width=SCENES[scene]).scenario(), szlib.SCENARIOS[scene]
+    assert np.array_equal(same.walls, own.walls)
+    assert same.people == own.people
+
+
+def test_a_width_moves_the_walls_of_a_pathway_and_keeps_its_mouth_closed() -> None:
+    walls = Cell("waiting", width=3.0).scenario().walls
+    assert np.array_equal(np.unique(np.abs(walls[:2, :, 1])), [1.5])
+    assert np.array_equal(np.sort(np.abs(walls[2:, :, 1]), axis=1), [[1.5, 4.0]] * 2)
+
+
+def test_the_chart_has_a_row_for_each_cell_in_their_order() -> None:
+    cells = [Cell("corridor", width=6.4, size=0.5), Cell("corridor", width=1.0), Cell("corridor", size=1.25)]
+    table = chart(cells, REFERENCE)
+    assert table["width"].tolist() == [6.4, 1.0, 4.6]
+    assert table["manner"].iloc[:2].tolist() == ["goes ahead", NO_START]
+    assert table["manner"].iloc[2] != "goes ahead"  # the corridor of the paper with a larger zone
+    assert table["min_h"].iloc[[0, 2]].min() >= 0
+
+
+@pytest.mark.parametrize("wrong", [{"scene": "hall"}, {"scene": "corridor", "width": 0}])
+def test_a_cell_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(szlib.SolverError, match="must be"):
+        Cell(**wrong)  # type: ignore[arg-type]
+
+
+def test_a_run_can_be_asked_again_at_any_of_its_times() -> None:
+    log = Cell("corridor", size=0.5).run(REFERENCE)
+    controller = szlib.MPCCBF(log.zones[0], walls=log.scenario.walls)
+    for time in (0.0, 3.0):
+        controller.reset()
+        control = controller.step(*log.at(time)).control
+        assert control == pytest.approx(log.controls[round(10 * time)], abs=1e-3)
+    with pytest.raises(szlib.DataError, match="times from 0 to"):
+        log.at(1e3)
