@@ -6,6 +6,8 @@ import jupytext
 import nbformat
 import pytest
 
+from szlib.workbook.report import document
+
 MINUTES = 60_000
 COMMANDS = "window.jupyterapp.commands"
 
@@ -72,16 +74,96 @@ def in_step(file, saved):
     assert changed.stdout == ""
 
 
-def test_the_laboratory_runs_and_is_dragged(notebook):
+def picture(locator):
+    """What a canvas shows."""
+    return locator.evaluate("canvas => canvas.toDataURL()")
+
+
+def test_a_slider_of_the_zones_draws_another_speed(notebook):
+    opened = notebook("05_zones")
+    opened.run()
+    shown = opened.page.locator(
+        ".jupyter-widgets.widget-output img, .jupyter-widgets .jp-OutputArea img"
+    ).last
+    shown.wait_for(timeout=MINUTES)
+    before = shown.get_attribute("src")
+    opened.page.locator(".widget-slider .noUi-handle").last.press("ArrowRight")
+    opened.page.wait_for_function(
+        "before => [...document.querySelectorAll('.jupyter-widgets img')].some(image => image.src !== before)",
+        arg=before,
+    )
+    saved = opened.save()
+    assert errors(saved) == []
+    in_step(opened.file, saved)
+
+
+def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
+    opened = notebook("08_corridor")
+    opened.run()
+    plays(opened.page)
+    saved = opened.save()
+    assert errors(saved) == []
+    in_step(opened.file, saved)
+    home = copy.parent / "run"
+    home.mkdir()
+    nbformat.write(saved, home / "08_corridor.ipynb")
+    page, said = browser.new_page(), []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: said.append(request.url) if request.url.startswith("http") else None)
+    page.goto(document.write(home).as_uri())
+    plays(page)
+    broken = page.evaluate("[...document.images].filter((i) => !i.complete || !i.naturalWidth).length")
+    assert (said, broken) == ([], 0)
+    page.close()
+
+
+def plays(page):
+    """The first player goes on when it is asked to, stops, and shows the time it is set to."""
+    player = page.locator("figure.szlib-player").first
+    player.scroll_into_view_if_needed()
+    slider, canvas = player.locator("input[type=range]"), player.locator("canvas").first
+    begin, shown = slider.input_value(), picture(canvas)
+    player.get_by_role("button").click()
+    page.wait_for_function(
+        "begin => Number(document.querySelector('figure.szlib-player input').value) > Number(begin)",
+        arg=begin,
+    )
+    player.get_by_role("button").click()
+    assert picture(canvas) != shown
+    slider.fill("0")
+    assert "t = 0.0 s" in player.text_content()
+
+
+def test_the_laboratory_is_dragged_set_run_and_shared(notebook):
     opened = notebook("20_laboratory")
     opened.run()
-    page = opened.page
-    told = page.locator(".szlib-told")
-    assert told.count() == 2
+    page, told = opened.page, opened.page.locator(".szlib-told")
+    page.wait_for_function("[...document.querySelectorAll('.szlib-told')].every(it => it.textContent)")
+    scenes = [panel.locator("canvas").first for panel in page.locator(".szlib-panel").all()]
+    before = [picture(scene) for scene in scenes]
+    scenes[0].scroll_into_view_if_needed()
+    box = scenes[0].bounding_box()
+    page.mouse.move(box["x"] + 319, box["y"] + 90)  # the person, at (4, 0)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 240, box["y"] + 100, steps=5)
+    page.mouse.up()
+    slider = page.locator("input[name=gamma]").first
+    slider.click(position={"x": 60, "y": 8})
+    gamma = float(slider.input_value())
+    assert gamma > 0.1
+    assert all(picture(scene) != shown for scene, shown in zip(scenes, before, strict=True))
+    page.locator(".szlib-share").click()
+    page.wait_for_function("document.querySelector('.szlib-cell').value.length")
+    shared = {}
+    exec(page.locator(".szlib-cell").input_value(), shared)
+    assert shared["gamma"] == gamma
+    assert shared["person"][:2] == pytest.approx([1.34, -0.33], abs=0.1)
     page.locator(".szlib-run").click()
     page.wait_for_function("parseFloat(document.querySelector('.szlib-told').textContent.slice(4)) > 2")
-    page.screenshot(path="/tmp/lab_live.png")
     print(page.locator(".szlib-rate").text_content())
+    page.locator(".szlib-run").click()
+    assert page.locator(".szlib-refused").text_content() == "" and told.count() == 2
     saved = opened.save()
     assert errors(saved) == []
     in_step(opened.file, saved)

@@ -56,7 +56,11 @@ def slide(draw: Callable[..., object], **sliders: tuple[float, float, float, flo
         name: FloatSlider(value, min=low, max=high, step=step, continuous_update=False)
         for name, (value, low, high, step) in sliders.items()
     }
-    interact(draw, **made)
+
+    def drawn(**values: float) -> None:
+        draw(**values)
+
+    interact(drawn, **made)
 
 
 class Laboratory(anywidget.AnyWidget):

@@ -122,6 +122,7 @@ function held(it, stage, [px, py]) {
 
 function render({ model, el }) {
   const begin = structuredClone(model.get("begin")), { stage } = begin;
+  el.dataset.lmSuppressShortcuts = "true";  // keys move the slider that has the focus, not JupyterLab's cells
   let changed = {}, running = false, waiting = false, asked = 0, came = 0, alive = true, drawn = 0, steps = 0, since = 0;
 
   const bar = element(el, "div", {}, { display: "flex", gap: "10px", alignItems: "center", flexWrap: "wrap", margin: "4px 0" });
@@ -189,7 +190,10 @@ function render({ model, el }) {
   const label = () => { start.textContent = running ? "\u275a\u275a pause" : "\u25b6 run"; };
   start.onclick = () => { running = !running; label(); };
   again.onclick = () => { changed.restart = true; if (!waiting) ask("look"); };
-  share.onclick = () => model.send({ kind: "share", changed: {} });
+  share.onclick = () => {
+    model.send({ kind: "share", changed });
+    changed = {};
+  };
 
   panels.forEach((it) => {
     let grip = null;
