@@ -21,6 +21,12 @@
 # may use up a larger share of h in each step comes nearer to the zone before it gives way, and arrives
 # sooner.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [18 - Eleven meetings](18_meetings.ipynb) ·
+# [paper](https://arxiv.org/abs/2405.15101): sec. 3-4 · 10 min to read
+#
+# **Afterwards you can** try out a scene of your own, live, and hand its settings on.
+
 # %%
 import numpy as np
 import pandas as pd

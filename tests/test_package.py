@@ -49,10 +49,14 @@ ROOMS = {
     "simulation.metrics": ["endings", "motion", "manners", "social"],
     "simulation.scenarios": ["paper", "meetings", "worlds", "atlas"],
     "workbook": [
-        "figures", "claims", "sensitivity", "record", "laboratory", "report", "runner", "command_line",
+        "figures", "claims", "sensitivity", "exercises", "record", "laboratory", "report", "runner",
+        "command_line",
     ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "players", "simulation", "crowds",
+    ],
+    "workbook.exercises": [
+        "task", "tracks", "outliers", "zones", "certainty", "barriers", "robot", "checking",
     ],
     "workbook.record": ["method", "places", "validation", "tables", "notebook"],
     "workbook.laboratory": ["bench", "page"],

@@ -3,6 +3,7 @@
 figures       every figure, one file a room
 claims        what data says of the paper's claims: effects, intervals, verdicts
 sensitivity   what moves a zone most
+exercises     the tasks of the exercise sheets, with their checkers and hints
 record        what a notebook writes down, and where it goes
 laboratory    a scene that can be dragged and set while it runs
 report        a run to read without running anything
@@ -18,6 +19,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "figures",
         "claims",
         "sensitivity",
+        "exercises",
         "record",
         "laboratory",
         "report",

@@ -110,7 +110,8 @@ def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
     page, said = browser.new_page(), []
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: said.append(request.url) if request.url.startswith("http") else None)
+    fetched = lambda request: said.append(request.url) if request.url.startswith("http") else None
+    page.on("request", fetched)
     page.goto(document.write(home).as_uri())
     plays(page)
     broken = page.evaluate("[...document.images].filter((i) => !i.complete || !i.naturalWidth).length")
