@@ -89,7 +89,7 @@ def test_a_slider_of_the_zones_draws_another_speed(notebook):
     before = shown.get_attribute("src")
     opened.page.locator(".widget-slider .noUi-handle").last.press("ArrowRight")
     opened.page.wait_for_function(
-        "before => [...document.querySelectorAll('.jupyter-widgets img')].some(image => image.src !== before)",
+        "old => [...document.querySelectorAll('.jupyter-widgets img')].some(image => image.src !== old)",
         arg=before,
     )
     saved = opened.save()
@@ -110,8 +110,7 @@ def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
     page, said = browser.new_page(), []
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
-    fetched = lambda request: said.append(request.url) if request.url.startswith("http") else None
-    page.on("request", fetched)
+    page.on("request", lambda request: said.append(request.url) if request.url.startswith("http") else None)
     page.goto(document.write(home).as_uri())
     plays(page)
     broken = page.evaluate("[...document.images].filter((i) => !i.complete || !i.naturalWidth).length")
