@@ -23,6 +23,15 @@
 # social zone we know, so that every later step can be proved, and `szlib run --data atc-1hz`
 # repeats it all on a real day.
 
+# %% [markdown]
+# before: [Start here](00_start_here.ipynb) · next: [2 - Encounters of two people](02_encounters.ipynb) ·
+# [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 1 · 10 min to read
+#
+# **Afterwards you can** bring files of tracks to one clock, and say where two people can be watched.
+#
+# **Words.** *EWAP*: the walking pedestrians recorded at ETH Zürich, and the format of their files,
+# `obsmat`; *tidy*: of a table: one row for each observation, one column for each quantity.
+
 # %%
 import numpy as np
 

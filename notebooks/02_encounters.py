@@ -21,6 +21,15 @@
 # 5 m and keeps the moments in which only one other person is in it for 3 s: 16,181 trajectories
 # in 92 days, about 176 a day.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [1 - Tracks and the area](01_tracks.ipynb) · next: [3 -
+# Outliers](03_outliers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 2-3 · 15 min to
+# read
+#
+# **Afterwards you can** say when two people meet alone, and compute where one sees the other.
+#
+# **Words.** *reference pedestrian*: the one of two people from whom the other is looked at.
+
 # %%
 from dataclasses import replace
 

@@ -23,6 +23,13 @@
 # edge. And who says that it finds those who intrude? On the plaza they are known: there, what a
 # rule takes away can be counted.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [2 - Encounters of two people](02_encounters.ipynb) · next: [4 -
+# The hull and its slices](04_hull.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4a · 20
+# min to read
+#
+# **Afterwards you can** say whom a rule for outliers finds, whom it misses, and why.
+
 # %%
 import matplotlib.pyplot as plt
 import numpy as np

@@ -21,6 +21,12 @@
 # most five points of support, and contains the whole zone. According to the paper it reaches
 # farther ahead than behind.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [4 - The hull and its slices](04_hull.ipynb) · next: [6 -
+# Barriers](06_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 15 min to read
+#
+# **Afterwards you can** enclose a zone in the smallest ellipse, and say how far to trust it.
+
 # %%
 import matplotlib.pyplot as plt
 import numpy as np

@@ -21,6 +21,17 @@
 # fast. As long as each step has a solution, a robot that starts outside stays outside, and slows
 # down as it comes near.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [5 - Social zones](05_zones.ipynb) · next: [6b - Build the
+# controller yourself](06b_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3,
+# eq. 1-7 · 10 min to read
+#
+# **Afterwards you can** turn a distance into a condition on the next step, and say what gamma does.
+#
+# **Words.** *class K*: of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is
+# gamma times h; *infeasible*: of a step: no plan obeys all rows, so one that violates them least is taken,
+# and flagged.
+
 # %%
 import matplotlib.pyplot as plt
 import numpy as np

@@ -20,6 +20,16 @@
 # **Expectation.** The paper: the robot goes around in good time, and begins farther away when it
 # comes from the front than when it comes from behind, because the zone reaches farther ahead.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [6 - Barriers](06_barriers.ipynb) · next: [8 - Meeting in a narrow
+# corridor](08_corridor.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6a · 10 min to read
+#
+# **Afterwards you can** say when the robot begins to avoid a person, and what chooses the side.
+#
+# **Words.** *IPOPT*: the solver for nonlinear optimisation that the paper uses; *slack*: by how much a row
+# is violated; *SQP*: sequential quadratic programming: solve quadratic problems in a row, each around the
+# last answer.
+
 # %%
 from dataclasses import replace
 

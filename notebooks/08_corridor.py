@@ -20,6 +20,13 @@
 # **Expectation.** The paper: the robot slows down while it passes, because between the wall and
 # the zone the barrier leaves little speed.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [7 - Passing a person who stands](07_passing.ipynb) · next: [9 -
+# Yielding by waiting](09_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 5
+# min to read
+#
+# **Afterwards you can** say why the robot slows down in a corridor, and speeds up beside the person.
+
 # %%
 import matplotlib.pyplot as plt
 import pandas as pd

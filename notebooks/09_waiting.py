@@ -18,6 +18,13 @@
 #
 # **Expectation.** The paper: the robot waits outside until the person is through, then it goes.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [8 - Meeting in a narrow corridor](08_corridor.ipynb) · next: [10 -
+# Yielding by making room](10_making_room.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig.
+# 6c · 5 min to read
+#
+# **Afterwards you can** say why the robot waits, although no rule tells it to.
+
 # %%
 import matplotlib.pyplot as plt
 import pandas as pd

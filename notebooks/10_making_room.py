@@ -20,6 +20,13 @@
 # **Expectation.** The paper: the robot gives way first - here it must back out - and goes on
 # afterwards.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [9 - Yielding by waiting](09_waiting.ipynb) · next: [11 -
+# Feasibility](11_feasibility.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 5 min to
+# read
+#
+# **Afterwards you can** say why the robot backs out of a passage, although no rule tells it to.
+
 # %%
 import matplotlib.pyplot as plt
 import pandas as pd

@@ -22,6 +22,13 @@
 # error on the short side only costs room. The paper: the focal distance is adequate "when the
 # distance between the two foci is not too large"; of the segment it says nothing.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [11 - Feasibility](11_feasibility.ipynb) · next: [13 - Against
+# everything else](13_comparison.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 3-7 · 15
+# min to read
+#
+# **Afterwards you can** say where the two distances err, and which margin makes up for it.
+
 # %%
 import matplotlib.pyplot as plt
 import numpy as np

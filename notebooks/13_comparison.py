@@ -22,6 +22,16 @@
 # farther than people do. The paper: CBF's "myopic nature makes it less sensitive to uncertainties in
 # the predicted future paths of pedestrians" (sec. 1), so wrong predictions should matter little.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [12 - The distances, audited](12_distances.ipynb) · next: [14 -
+# Data quality](14_data_quality.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 1, 5 · 15 min to
+# read
+#
+# **Afterwards you can** compare zones and controllers in the same worlds, with intervals.
+#
+# **Words.** *bootstrap*: draw people anew from those there are, many times, to see how far a result moves;
+# *jerk*: the change of acceleration by time.
+
 # %%
 from dataclasses import replace
 

@@ -21,6 +21,13 @@
 # noise, and on event days people stand where they otherwise walk. None of it may be cleaned away in
 # silence: each row is used, or counted by the reason why not.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [13 - Against everything else](13_comparison.ipynb) · next: [15 -
+# Respect or emptiness?](15_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 15 min to
+# read
+#
+# **Afterwards you can** judge whether a file of tracks can be used, and find days unlike the others.
+
 # %%
 from itertools import cycle
 

@@ -20,6 +20,12 @@
 # **Expectation.** If it is respect, people must be there less often than they would be by chance. So we
 # need to know what chance gives: the same people on the same paths who take no notice of each other.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [14 - Data quality](14_data_quality.ipynb) · next: [16 - What is
+# true?](16_claims.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 20 min to read
+#
+# **Afterwards you can** tell respect from emptiness by a null model.
+
 # %%
 import warnings
 

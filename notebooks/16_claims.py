@@ -19,6 +19,12 @@
 # **Expectation.** A claim that rests on 92 days may be undecidable on one. So each becomes an effect with
 # its interval, and the verdict may be "not decidable".
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [15 - Respect or emptiness?](15_respect.ipynb) · next: [17 - Other
+# people's crowds](17_crowds.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 15 min to read
+#
+# **Afterwards you can** say which claims of the paper the data supports, and with which interval.
+
 # %%
 import warnings
 from functools import partial

@@ -22,6 +22,14 @@
 # walk at 1.2 m/s and do. A promise to people who keep their velocity should still be kept to the
 # letter; how often it is void, and what the robot's goal costs then, nobody has said.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [16 - What is true?](16_claims.ipynb) · next: [18 - Eleven
+# meetings](18_meetings.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 20 min to read
+#
+# **Afterwards you can** say which promises of the controller hold among people who react.
+#
+# **Words.** *ORCA*: a model of walking: each of two people takes half of what keeps them apart.
+
 # %%
 from importlib.util import find_spec
 

@@ -21,6 +21,12 @@
 # sooner. It looks ahead no farther than 0.8 s and plans no way, so it should lose time where a way around
 # has to be chosen.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [17 - Other people's crowds](17_crowds.ipynb) ·
+# [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 15 min to read
+#
+# **Afterwards you can** say in which meetings this controller is good, and in which it is bad.
+
 # %%
 from pathlib import Path
 

@@ -49,10 +49,13 @@ ROOMS = {
     "simulation.metrics": ["endings", "motion", "manners", "social"],
     "simulation.scenarios": ["paper", "meetings", "worlds", "atlas"],
     "workbook": [
-        "figures", "claims", "sensitivity", "record", "report", "runner", "command_line",
+        "figures", "claims", "sensitivity", "exercises", "record", "report", "runner", "command_line",
     ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "players", "simulation", "crowds",
+    ],
+    "workbook.exercises": [
+        "task", "tracks", "outliers", "zones", "certainty", "barriers", "robot", "checking",
     ],
     "workbook.record": ["method", "places", "validation", "tables", "notebook"],
     "workbook.report": ["front_page", "document"],

@@ -3,6 +3,7 @@
 figures       every figure, one file a room
 claims        what data says of the paper's claims: effects, intervals, verdicts
 sensitivity   what moves a zone most
+exercises     the tasks of the exercise sheets, with their checkers and hints
 record        what a notebook writes down, and where it goes
 report        a run to read without running anything
 runner        the whole workbook, headless, and what came of it
@@ -13,5 +14,14 @@ import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
-    submodules=["figures", "claims", "sensitivity", "record", "report", "runner", "command_line"],
+    submodules=[
+        "figures",
+        "claims",
+        "sensitivity",
+        "exercises",
+        "record",
+        "report",
+        "runner",
+        "command_line",
+    ],
 )

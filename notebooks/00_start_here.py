@@ -1,0 +1,203 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Start here
+#
+# **Question.** How near do people come to each other, and how does a robot keep out of that place?
+#
+# **Expectation.** J. Jang and M. Ghaffari answer both in *Social Zone as a Barrier Function for
+# Socially-Compliant Robot Navigation*: learn the *minimum social zone* from recorded people, then drive
+# the robot by model predictive control with a barrier around every person. This workbook follows them
+# step by step, fills what the paper leaves open, and says where data does not support a claim.
+#
+# ![The minimum social zone at 1.1 m/s, learned from synthetic people](figures/zone.png)
+# ![A robot makes room for a person in a passage, then goes on](figures/making_room.gif)
+
+# %% [markdown]
+# next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 20 min
+# to read
+#
+# **Afterwards you can** choose a route, and find any notebook, word or symbol again.
+
+# %% [markdown]
+# ## For whom, and what you need
+#
+# For students of robotics, control or pedestrian dynamics in their last year, for researchers who want to
+# use the method on their own data or robot, and for lecturers. You should read Python (NumPy, pandas) and
+# know vectors, derivatives, and what a mean and a quantile are. Control theory is explained from the
+# beginning in notebook 06. Of the tools you need only this repository: the README's two commands set it
+# up. No data has to be fetched: by default everything runs on a synthetic plaza whose true zone is known.
+#
+# Each notebook begins with a question and an expectation, asks its data, and ends with what it means. A
+# *check* must hold, or the run fails; a *claim* of the paper is measured, and may turn out "not supported
+# here". Every parameter has a badge: **paper**, **assumed** or **measured**. Change the values of the cell
+# below the imports, and run: nothing that you do here changes what `szlib run` has recorded.
+
+# %%
+import szlib
+from szlib.workbook.exercises import SHEETS
+from szlib.workbook.record import NotebookRecord, places
+
+# %% tags=["parameters"]
+data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
+seed = 0
+results = "../results"
+
+# %%
+record = NotebookRecord("00_start_here", globals())
+tasks = [task for sheet in SHEETS.values() for task in sheet]
+print(f"szlib {szlib.__version__}: {len(places.notebooks())} notebooks, {len(tasks)} exercises")
+record.key["exercises"] = len(tasks)
+for sheet in SHEETS:
+    there = all((places.NOTEBOOKS / part / f"{sheet}.py").exists() for part in ("exercises", "solutions"))
+    record.check(f"{sheet} and its solutions are there", there)
+
+# %% [markdown]
+# ## The map
+#
+# | notebook | question | to read |
+# |---|---|---|
+# | [1 - Tracks and the area](01_tracks.ipynb) | Where do people walk, how fast, and where is there open space enough to watch two of them meet without a wall or a shop in the way? | 10 min |
+# | [2 - Encounters of two people](02_encounters.ipynb) | When do two people meet with nobody else around, and what does each see of the other? | 10 min |
+# | [3 - Outliers](03_outliers.ipynb) | Some people brush past each other, and some tracks are wrong. Which samples say nothing about the distance that people keep? | 20 min |
+# | [4 - The hull and its slices](04_hull.ipynb) | From scattered samples to a boundary: how near did people come, in each direction, at each walking speed? | 10 min |
+# | [5 - Social zones](05_zones.ipynb) | Can a robot carry the zone along? | 10 min |
+# | [6 - Barriers](06_barriers.ipynb) | How does "stay out of the zone" become something that a controller can obey, ten times a second? | 10 min |
+# | [7 - Passing a person who stands](07_passing.ipynb) | A person stands in the way and looks at the robot. What does the robot do, and when does it begin? | 10 min |
+# | [8 - Meeting in a narrow corridor](08_corridor.ipynb) | A person walks towards the robot in a corridor 4.6 m wide, which leaves 0.4 m more than the robot needs on either side of the zone. Does the robot barge past, or take care? | 5 min |
+# | [9 - Yielding by waiting](09_waiting.ipynb) | A passage is too narrow for two, and a person is in it. Who goes first? | 5 min |
+# | [10 - Yielding by making room](10_making_room.ipynb) | This time the robot is *in* the passage when the person comes. It cannot wait where it is. | 5 min |
+# | [11 - Feasibility](11_feasibility.ipynb) | A hard constraint is a promise only while the problem has a solution. When does it lose it, what happens then, and can one have a promise that is kept for ever? | 20 min |
+# | [12 - The distances, audited](12_distances.ipynb) | The barriers use *approximate* distances to zones and walls, and a margin of 5 cm "since the approximated distance function contains some errors" (sec. 4). Where do they err, to which side, and is the margin enough? | 15 min |
+# | [13 - Against everything else](13_comparison.ipynb) | Is the fitted ellipse worth its trouble? | 15 min |
+# | [14 - Data quality](14_data_quality.ipynb) | Before anything is learned from a file of tracks: can it be trusted, and which days are unlike the others? | 10 min |
+# | [15 - Respect or emptiness?](15_respect.ipynb) | Around a walking person there is a place where nobody is. Do people keep out of it, or is it only rare that two of them are anywhere near each other? | 15 min |
+# | [16 - What is true?](16_claims.ipynb) | What does the paper claim, and what of it does the data at hand support? | 15 min |
+# | [17 - Other people's crowds](17_crowds.ipynb) | So far everybody walked as this workbook made them walk. What becomes of the robot among people who walk by somebody else's model and react to it - and among people who were recorded, and would have walked like that whatever it does? | 20 min |
+# | [18 - Eleven meetings](18_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 15 min |
+
+# %% [markdown]
+# ## Three routes
+#
+# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [08](08_corridor.ipynb): 35 min to read.
+# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [11](11_feasibility.ipynb), [16](16_claims.ipynb): 2 h 10 min to read.
+# - **Six weeks: the course.** One exercise sheet a week; running and looking around come on top.
+#
+# | week | topic | notebooks | to read | sheet | to do |
+# |---|---|---|---|---|---|
+# | 1 | People: who is where, who meets whom | [01](01_tracks.ipynb), [02](02_encounters.ipynb), [14](14_data_quality.ipynb) | 30 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 50 min |
+# | 2 | Which samples to believe | [03](03_outliers.ipynb) | 20 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 55 min |
+# | 3 | From samples to a zone | [04](04_hull.ipynb), [05](05_zones.ipynb) | 20 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
+# | 4 | How sure? Respect or emptiness | [15](15_respect.ipynb), [16](16_claims.ipynb) | 30 min | [sheet 4](exercises/sheet4_certainty.ipynb) | 50 min |
+# | 5 | Barriers, and a controller of your own | [06](06_barriers.ipynb), [11](11_feasibility.ipynb), [12](12_distances.ipynb) | 45 min | [sheet 5](exercises/sheet5_barriers.ipynb) | 1 h 00 min |
+# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb) | 1 h 15 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
+
+# %% [markdown]
+# **The exercises** are functions that you write. `exercises.check("velocity", velocity)` asks yours for cases
+# that it draws afresh and says in words what is right or wrong; `exercises.hint("velocity", 1)` gives a hint,
+# 3 is nearly the solution. The solutions lie apart, in `solutions/`. For a class,
+# `python notebooks/sheets.py --class FOLDER` makes a course of [nbgrader](https://nbgrader.readthedocs.io)
+# (`pip install nbgrader`): what is handed out, and checks that give points, one for each minute.
+
+# %% [markdown]
+# ## Words
+#
+# | word | meaning | first used in |
+# |---|---|---|
+# | ATC | a shopping mall in Osaka whose visitors were tracked on 92 days | [01](01_tracks.ipynb) |
+# | attentional space | the 4 m by 5 m ahead of a person that are watched for others | [02](02_encounters.ipynb) |
+# | barrier function | h: 0 at the edge of what is allowed, positive inside of it | [06](06_barriers.ipynb) |
+# | bootstrap | draw people anew from those there are, many times, to see how far a result moves | [13](13_comparison.ipynb) |
+# | class K | of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is gamma times h | [06](06_barriers.ipynb) |
+# | complementary distance | r' = r_max - r, large for who is near | [03](03_outliers.ipynb) |
+# | EWAP | the walking pedestrians recorded at ETH Zürich, and the format of their files, `obsmat` | [01](01_tracks.ipynb) |
+# | exact penalty | a price on violations so high that none is paid where a solution without violations exists | [11](11_feasibility.ipynb) |
+# | funnel | how many rows came in, went on, and why the others did not | [01](01_tracks.ipynb) |
+# | horizon | the number of steps that a plan looks ahead, N, or that obey the barrier, N_h | [11](11_feasibility.ipynb) |
+# | hull | the smallest convex body around points | [04](04_hull.ipynb) |
+# | infeasible | of a step: no plan obeys all rows, so one that violates them least is taken, and flagged | [06](06_barriers.ipynb) |
+# | IPOPT | the solver for nonlinear optimisation that the paper uses | [07](07_passing.ipynb) |
+# | jerk | the change of acceleration by time | [13](13_comparison.ipynb) |
+# | line-of-sight angle | LOS: where the other person is, seen from the reference pedestrian | [02](02_encounters.ipynb) |
+# | LOF | local outlier factor: how lonely a sample is, compared with its neighbours | [03](03_outliers.ipynb) |
+# | MPC | model predictive control: plan some steps ahead, take the first, plan again | [11](11_feasibility.ipynb) |
+# | null model | the same people, each moved in time, so that nobody minds anybody | [15](15_respect.ipynb) |
+# | ORCA | a model of walking: each of two people takes half of what keeps them apart | [17](17_crowds.ipynb) |
+# | plaza | synthetic people whose zone is known, to prove the method on | [01](01_tracks.ipynb) |
+# | precision, recall | of what was removed, the share that should be; of what should be, the share that was | [03](03_outliers.ipynb) |
+# | quantile zone | what all but a share q of encounters keep out of | [05](05_zones.ipynb) |
+# | reference pedestrian | the one of two people from whom the other is looked at | [02](02_encounters.ipynb) |
+# | respect zone | where people were half as often as by chance | [15](15_respect.ipynb) |
+# | slack | by how much a row is violated | [07](07_passing.ipynb) |
+# | social force | people who are pushed by others and by walls, and drawn to their goal | [17](17_crowds.ipynb) |
+# | SQP | sequential quadratic programming: solve quadratic problems in a row, each around the last answer | [07](07_passing.ipynb) |
+# | tidy | of a table: one row for each observation, one column for each quantity | [01](01_tracks.ipynb) |
+# | window | the 3 s for which two people are watched | [02](02_encounters.ipynb) |
+
+# %% [markdown]
+# ## Symbols
+#
+# | paper | meaning | here, in code |
+# |---|---|---|
+# | $r_{max}$ | distance within which people count, 2 m | `szlib.zones.outliers.R_MAX` |
+# | $r' = r_{max} - r$ | complementary distance | `szlib.zones.outliers.complementary_points` |
+# | 4 m x 5 m | attentional space | `szlib.AttentionalSpace` |
+# | $a, b, (m, n), \theta$ | semi-axes, centre, angle of a zone | `szlib.Ellipse` |
+# | $\mathbf{c}_a, \mathbf{c}_b$ | foci | `szlib.Ellipse.foci` |
+# | $g, t, d$ (eq. 3-5) | distance to a wall | `szlib.segment_distance` |
+# | $d$ (eq. 7) | distance to a zone | `szlib.ellipse_distance` |
+# | $h = d - r_r - \epsilon$ | barrier | `szlib.control.barriers.barrier` |
+# | $\Delta h \ge -\gamma h$ (eq. 1) | barrier condition | `szlib.control.barriers.cbf_residual` |
+# | $\gamma$ | share of h that a step may use up | `szlib.MPCSettings.gamma` |
+# | $N, N_h$ | steps of the plan; steps under barriers | `szlib.MPCSettings.N`, `szlib.MPCSettings.N_h` |
+# | $P, Q, R$ | weights of the end, the way, the control | `szlib.MPCSettings.P`, `szlib.MPCSettings.Q`, `szlib.MPCSettings.R` |
+# | $\Delta t$ | time step, 0.1 s | `szlib.MPCSettings.dt` |
+# | $r_r, \epsilon$ | robot's radius, margin | `szlib.MPCSettings.r_robot`, `szlib.MPCSettings.eps` |
+# | $\mathbf{x} = (x, y, v_x, v_y)$ | state of the robot | `szlib.SimulationLog.table` |
+# | $\mathbf{u} = (f_x, f_y)$ | control, an acceleration | `szlib.Step` |
+
+# %% [markdown]
+# ## References
+#
+# - J. Jang, M. Ghaffari: Social zone as a barrier function for socially-compliant robot navigation, 2024.
+#   [arXiv:2405.15101](https://doi.org/10.48550/arXiv.2405.15101)
+# - D. Brščić, T. Kanda, T. Ikeda, T. Miyashita: Person tracking in large public spaces using 3-D range sensors,
+#   2013. [10.1109/THMS.2013.2283945](https://doi.org/10.1109/THMS.2013.2283945)
+# - M. Breunig, H.-P. Kriegel, R. Ng, J. Sander: LOF: identifying density-based local outliers, 2000.
+#   [10.1145/342009.335388](https://doi.org/10.1145/342009.335388)
+# - B. Gärtner, S. Schönherr: Smallest enclosing ellipses - fast and exact. Report B 97-03, Freie Universität
+#   Berlin, 1997 (no DOI).
+# - V. Shapiro, I. Tsukanov: Implicit functions with guaranteed differential properties, 1999.
+#   [10.1145/304012.304038](https://doi.org/10.1145/304012.304038)
+# - A. Ames, S. Coogan, M. Egerstedt, G. Notomista, K. Sreenath, P. Tabuada: Control barrier functions: theory and
+#   applications, 2019. [10.23919/ECC.2019.8796030](https://doi.org/10.23919/ECC.2019.8796030)
+# - J. Zeng, B. Zhang, K. Sreenath: Safety-critical model predictive control with discrete-time control barrier
+#   function, 2021. [10.23919/ACC50511.2021.9483029](https://doi.org/10.23919/ACC50511.2021.9483029)
+# - A. Wächter, L. Biegler: On the implementation of an interior-point filter line-search algorithm for large-scale
+#   nonlinear programming, 2006. [10.1007/s10107-004-0559-y](https://doi.org/10.1007/s10107-004-0559-y)
+# - S. Pellegrini, A. Ess, K. Schindler, L. Van Gool: You'll never walk alone, 2009.
+#   [10.1109/ICCV.2009.5459260](https://doi.org/10.1109/ICCV.2009.5459260)
+# - M. Moussaïd and others: Experimental study of the behavioural mechanisms underlying self-organization in human
+#   crowds, 2009. [10.1098/rspb.2009.0405](https://doi.org/10.1098/rspb.2009.0405)
+# - A. Francis and others: Principles and guidelines for evaluating social robot navigation algorithms, 2025.
+#   [10.1145/3700599](https://doi.org/10.1145/3700599)
+# - E. T. Hall: The hidden dimension. Doubleday, 1966 (no DOI).
+
+# %% [markdown]
+# **What it means.** One question, a story of notebooks in order, and an exercise sheet for each part of it. Go on with
+# [notebook 01](01_tracks.ipynb), or with the route that fits your time.
+
+# %%
+record.close()

@@ -1,0 +1,349 @@
+"""The shell of the course: the navigation cell of every notebook, and the maps of 00_start_here.
+
+    python notebooks/course.py        write them anew: titles, questions and minutes are the notebooks' own
+
+What a notebook gives a reader, and the glossary, stand here.  A test holds that every cell is what this makes
+of it.
+"""
+
+import math
+import re
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+
+import jupytext
+import nbformat
+
+HERE = Path(__file__).parent
+START = "00_start_here"
+PAPER = "https://arxiv.org/abs/2405.15101"
+WORDS, LINES = 120, 15
+"""Of prose, and of code, that are read in a minute (assumed)."""
+HEADING = "**Afterwards you can** "
+
+GIVES: dict[str, tuple[str, str]] = {
+    "00": ("all", "choose a route, and find any notebook, word or symbol again."),
+    "01": ("sec. 2, fig. 1", "bring files of tracks to one clock, and say where two people can be watched."),
+    "02": ("sec. 2, fig. 2-3", "say when two people meet alone, and compute where one sees the other."),
+    "03": ("sec. 2, fig. 4a", "say whom a rule for outliers finds, whom it misses, and why."),
+    "04": (
+        "sec. 2, fig. 4b",
+        "turn samples into a hull, cut it at a speed, and read the zone off the slice.",
+    ),
+    "05": (
+        "sec. 2, fig. 5",
+        "enclose a zone in the smallest ellipse, and say how far to trust it.",
+    ),
+    "06": ("sec. 3, eq. 1-7", "turn a distance into a condition on the next step, and say what gamma does."),
+    "06b": (
+        "sec. 3-4, eq. 1-2, 8",
+        "write an MPC-CBF yourself, and say what each of its terms is there for.",
+    ),
+    "07": ("sec. 4, fig. 6a", "say when the robot begins to avoid a person, and what chooses the side."),
+    "08": ("sec. 4, fig. 6b", "say why the robot slows down in a corridor, and speeds up beside the person."),
+    "09": ("sec. 4, fig. 6c", "say why the robot waits, although no rule tells it to."),
+    "10": ("sec. 4, fig. 6d", "say why the robot backs out of a passage, although no rule tells it to."),
+    "11": ("sec. 4", "say when a step has no solution, and prove when there always is one."),
+    "12": ("sec. 3, eq. 3-7", "say where the two distances err, and which margin makes up for it."),
+    "13": ("sec. 1, 5", "compare zones and controllers in the same worlds, with intervals."),
+    "14": ("sec. 2", "judge whether a file of tracks can be used, and find days unlike the others."),
+    "15": ("sec. 2", "tell respect from emptiness by a null model."),
+    "16": ("all", "say which claims of the paper the data supports, and with which interval."),
+    "17": ("sec. 4-5", "say which promises of the controller hold among people who react."),
+    "18": ("sec. 4-5", "say in which meetings this controller is good, and in which it is bad."),
+    "19": ("sec. 4-5", "predict from gamma, width, speed and zone what the robot will do."),
+    "20": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
+}
+"""By number of the notebook: the paper's section, and what a reader is able to do after it."""
+
+
+@dataclass(frozen=True)
+class Word:
+    """A word of the glossary, what it means, and whether the first notebook to use it leaves that open."""
+
+    means: str
+    pattern: str = ""
+    new: bool = True
+
+
+GLOSSARY: dict[str, Word] = {
+    "ATC": Word("a shopping mall in Osaka whose visitors were tracked on 92 days", new=False),
+    "attentional space": Word("the 4 m by 5 m ahead of a person that are watched for others", new=False),
+    "barrier function": Word(
+        "h: 0 at the edge of what is allowed, positive inside of it", "barrier", new=False
+    ),
+    "bootstrap": Word("draw people anew from those there are, many times, to see how far a result moves"),
+    "class K": Word(
+        "of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is gamma times h",
+        r"class[ -](K\b|\$\\mathcal)|eq\. 1\b",
+    ),
+    "CBF-QP": Word("a quadratic program for one step: as near to the wanted control as the barrier allows"),
+    "complementary distance": Word("r' = r_max - r, large for who is near", new=False),
+    "EWAP": Word("the walking pedestrians recorded at ETH Zürich, and the format of their files, `obsmat`"),
+    "exact penalty": Word(
+        "a price on violations so high that none is paid where a solution without violations exists"
+    ),
+    "funnel": Word("how many rows came in, went on, and why the others did not", new=False),
+    "horizon": Word(
+        "the number of steps that a plan looks ahead, N, or that obey the barrier, N_h", new=False
+    ),
+    "hull": Word("the smallest convex body around points", "convex hull", new=False),
+    "infeasible": Word(
+        "of a step: no plan obeys all rows, so one that violates them least is taken, and flagged"
+    ),
+    "IPOPT": Word("the solver for nonlinear optimisation that the paper uses", r"\bIPOPT\b|settings_table\("),
+    "jerk": Word("the change of acceleration by time"),
+    "line-of-sight angle": Word(
+        "LOS: where the other person is, seen from the reference pedestrian", r"line.of.sight", new=False
+    ),
+    "LOF": Word(
+        "local outlier factor: how lonely a sample is, compared with its neighbours", r"\bLOF\b", new=False
+    ),
+    "MPC": Word("model predictive control: plan some steps ahead, take the first, plan again", r"\bMPC\b"),
+    "null model": Word("the same people, each moved in time, so that nobody minds anybody", new=False),
+    "ORCA": Word(
+        "a model of walking: each of two people takes half of what keeps them apart", r"\b(ORCA|orca)\b"
+    ),
+    "plaza": Word("synthetic people whose zone is known, to prove the method on", r"\bplaza\b", new=False),
+    "precision, recall": Word(
+        "of what was removed, the share that should be; of what should be, the share that was",
+        "precision",
+        new=False,
+    ),
+    "quantile zone": Word("what all but a share q of encounters keep out of", new=False),
+    "reference pedestrian": Word("the one of two people from whom the other is looked at"),
+    "respect zone": Word("where people were half as often as by chance", new=False),
+    "rung": Word("which of the controller's ways to a control was taken: hard, relaxed, shifted, braking"),
+    "slack": Word("by how much a row is violated"),
+    "social force": Word("people who are pushed by others and by walls, and drawn to their goal", new=False),
+    "SQP": Word(
+        "sequential quadratic programming: solve quadratic problems in a row, each around the last answer",
+        r"\bSQP\b|settings_table\(",
+    ),
+    "tidy": Word("of a table: one row for each observation, one column for each quantity", r"\btidy\b"),
+    "window": Word("the 3 s for which two people are watched", new=False),
+}
+"""Words that this workbook takes for granted, and what they mean."""
+
+WEEKS: list[tuple[str, tuple[str, ...], str]] = [
+    ("People: who is where, who meets whom", ("01", "02", "14"), "sheet1_tracks"),
+    ("Which samples to believe", ("03",), "sheet2_outliers"),
+    ("From samples to a zone", ("04", "05"), "sheet3_zones"),
+    ("How sure? Respect or emptiness", ("15", "16"), "sheet4_certainty"),
+    ("Barriers, and a controller of your own", ("06", "06b", "11", "12"), "sheet5_barriers"),
+    (
+        "The robot among people",
+        ("07", "08", "09", "10", "13", "17", "18", "19", "20"),
+        "sheet6_robot",
+    ),
+]
+"""Topic, notebooks and exercise sheet of each of six weeks."""
+ROUTES: list[tuple[str, tuple[str, ...]]] = [
+    ("An hour: the idea", ("02", "05", "06", "08", "20")),
+    ("A day: the method", ("01", "02", "03", "04", "05", "06", "06b", "07", "08", "09", "10", "11", "16")),
+]
+"""Shorter routes, by number of the notebook."""
+
+
+# --- what the notebooks say of themselves -------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Page:
+    """A notebook, or an exercise sheet: its script, its cells, the folder that its links start from."""
+
+    source: Path
+    cells: tuple[nbformat.NotebookNode, ...]
+
+    @property
+    def number(self) -> str:
+        """Such as "06b"; of a sheet its name."""
+        return self.source.stem.split("_")[0] if self.source.parent == HERE else self.source.stem
+
+    @property
+    def title(self) -> str:
+        """Such as "6 - Barriers"."""
+        return self.cells[0].source.splitlines()[0].removeprefix("# ")
+
+    @property
+    def question(self) -> str:
+        """The question it begins with, up to its first question mark."""
+        text = self.cells[0].source.partition("**Question.**")[2].partition("**Expectation.**")[0]
+        asked, mark, _ = " ".join(text.split()).partition("?")
+        return asked + mark
+
+    @property
+    def prose(self) -> list[str]:
+        """Its text, without the navigation."""
+        texts = [cell.source for cell in self.cells if cell.cell_type == "markdown"]
+        return [text for text in texts if HEADING not in text]
+
+    @property
+    def minutes(self) -> int:
+        """To read it, in steps of 5 [min]."""
+        words = sum(len(text.split()) for text in self.prose)
+        lines = sum(len(cell.source.splitlines()) for cell in self.cells if cell.cell_type == "code")
+        return 5 * math.ceil((words / WORDS + lines / LINES) / 5)
+
+
+def pages() -> list[Page]:
+    """The notebooks in the order of the story."""
+    return [_page(source) for source in sorted(HERE.glob("[0-9][0-9]*_*.py"))]
+
+
+def _page(source: Path) -> Page:
+    return Page(source, tuple(jupytext.read(source).cells))
+
+
+def first_uses(story: list[Page]) -> dict[str, str]:
+    """The number of the notebook that uses each word of the glossary first; words of none are left out."""
+    found: dict[str, str] = {}
+    for page in story:
+        if page.source.stem == START:
+            continue
+        code = [cell.source for cell in page.cells if cell.cell_type == "code"]
+        text = " ".join(" ".join([*page.prose, *code]).split())
+        for word, entry in GLOSSARY.items():
+            if re.search(entry.pattern or rf"\b{re.escape(word)}\b", text, 0 if word[:2].isupper() else re.I):
+                found.setdefault(word, page.number)
+    return found
+
+
+# --- what is made of it -------------------------------------------------------------------------------
+
+
+def navigation(page: Page, story: list[Page], uses: dict[str, str]) -> str:
+    """The navigation cell of a notebook."""
+    at = [each.number for each in story].index(page.number)
+    places = [f"[Start]({START}.ipynb)"] if at > 1 else []
+    places += [f"before: {_link(each)}" for each in story[max(at - 1, 0) : at]]
+    places += [f"next: {_link(each)}" for each in story[at + 1 : at + 2]]
+    section, able = GIVES[page.number]
+    places += [f"[paper]({PAPER}): {section}", f"{page.minutes} min to read"]
+    told = [_wrapped(" · ".join(places)), _wrapped(HEADING + able)]
+    new = sorted(
+        (word for word, number in uses.items() if number == page.number and GLOSSARY[word].new), key=str.lower
+    )
+    if new:
+        told.append(_wrapped(f"**Words.** {'; '.join(f'*{word}*: {GLOSSARY[word].means}' for word in new)}."))
+    return "\n\n".join(told)
+
+
+def sheet_navigation(name: str) -> str:
+    """The navigation cell of an exercise sheet, the same in both folders."""
+    from szlib.workbook.exercises import SHEETS
+
+    names, minutes = list(SHEETS), sum(task.minutes for task in SHEETS[name])
+    at = names.index(name)
+    places = [f"[Start](../{START}.ipynb)"]
+    places += [f"before: [sheet {each[5]}]({each}.ipynb)" for each in names[max(at - 1, 0) : at]]
+    places += [f"next: [sheet {each[5]}]({each}.ipynb)" for each in names[at + 1 : at + 2]]
+    places += [f"[to do](../exercises/{name}.ipynb)", f"[solved](../solutions/{name}.ipynb)", _time(minutes)]
+    (numbers,) = [numbers for _, numbers, sheet in WEEKS if sheet == name]
+    links = ", ".join(f"[{p.number}](../{p.source.stem}.ipynb)" for p in pages() if p.number in numbers)
+    return _wrapped(" · ".join([*places, f"belongs to {links}"]))
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, 106, break_long_words=False, break_on_hyphens=False)
+
+
+def _link(page: Page) -> str:
+    return f"[{page.title}]({page.source.stem}.ipynb)"
+
+
+def the_map(story: list[Page]) -> str:
+    """The cell of 00 that lists every notebook."""
+    rows = ["## The map", "", "| notebook | question | to read |", "|---|---|---|"]
+    rows += [f"| {_link(p)} | {p.question} | {p.minutes} min |" for p in story if p.source.stem != START]
+    return "\n".join(rows)
+
+
+def the_routes(story: list[Page]) -> str:
+    """The cell of 00 with the three routes."""
+    from szlib.workbook.exercises import SHEETS
+
+    rows = ["## Three routes", ""]
+    for name, numbers in ROUTES:
+        links, minutes = _chosen(story, numbers)
+        rows.append(f"- **{name}.** {links}: {minutes} to read.")
+    rows.append(
+        "- **Six weeks: the course.** One exercise sheet a week; running and looking around come on top."
+    )
+    rows += ["", "| week | topic | notebooks | to read | sheet | to do |", "|---|---|---|---|---|---|"]
+    for week, (topic, numbers, sheet) in enumerate(WEEKS, 1):
+        links, minutes = _chosen(story, numbers)
+        work = _time(sum(task.minutes for task in SHEETS[sheet]))
+        to_do = f"[sheet {sheet[5]}](exercises/{sheet}.ipynb)"
+        rows.append(f"| {week} | {topic} | {links} | {minutes} | {to_do} | {work} |")
+    return "\n".join(rows)
+
+
+def _chosen(story: list[Page], numbers: tuple[str, ...]) -> tuple[str, str]:
+    """Links to notebooks, and the time to read them."""
+    there = [page for page in story if page.number in numbers]
+    links = ", ".join(f"[{page.number}]({page.source.stem}.ipynb)" for page in there)
+    return links, _time(sum(page.minutes for page in there))
+
+
+def _time(minutes: int) -> str:
+    """In minutes, or hours and minutes."""
+    hours, left = divmod(minutes, 60)
+    return f"{hours} h {left:02} min" if hours else f"{left} min"
+
+
+def the_glossary(story: list[Page], uses: dict[str, str]) -> str:
+    """The cell of 00 with every word that is used, and where first."""
+    by = {page.number: page for page in story}
+    rows = ["## Words", "", "| word | meaning | first used in |", "|---|---|---|"]
+    for word in sorted(uses, key=str.lower):
+        page = by[uses[word]]
+        rows.append(f"| {word} | {GLOSSARY[word].means} | [{page.number}]({page.source.stem}.ipynb) |")
+    return "\n".join(rows)
+
+
+# --- writing it down ----------------------------------------------------------------------------------
+
+
+def renewed(script: str, cells: dict[str, str], navigates: str) -> str:
+    """A percent script with its second cell, the navigation, and the cells of these headings written anew."""
+    header, title, *rest = re.split(r"^(?=# %%)", script, flags=re.MULTILINE)
+    if rest and (HEADING in rest[0] or f"[Start](../{START}" in rest[0]):
+        rest = rest[1:]
+    for heading, text in cells.items():
+        (at,) = [i for i, cell in enumerate(rest) if cell.startswith(f"# %% [markdown]\n# {heading}\n")]
+        rest[at] = _cell(text)
+    return "".join([header, title, _cell(navigates), *rest])
+
+
+def _cell(text: str) -> str:
+    return "\n".join(["# %% [markdown]", *(f"# {line}".rstrip() for line in text.split("\n"))]) + "\n\n"
+
+
+def shell() -> dict[Path, str]:
+    """Every script of the course as it should be."""
+    story = pages()
+    uses, scripts = first_uses(story), {}
+    cells = {"## The map": the_map(story), "## Three routes": the_routes(story)}
+    cells["## Words"] = the_glossary(story, uses)
+    for page in story:
+        own = cells if page.source.stem == START else {}
+        text = page.source.read_text(encoding="utf-8")
+        scripts[page.source] = renewed(text, own, navigation(page, story, uses))
+    for source in sorted((HERE / "solutions").glob("*.py")):
+        scripts[source] = renewed(source.read_text(encoding="utf-8"), {}, sheet_navigation(source.stem))
+    return scripts
+
+
+def renew() -> None:
+    """Write every script as it should be; twice, for the map in 00 adds to the time to read 00."""
+    for _ in range(2):
+        for source, text in shell().items():
+            if source.read_text(encoding="utf-8") != text:
+                print(source.name)
+                source.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    renew()

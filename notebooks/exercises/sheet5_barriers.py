@@ -1,0 +1,112 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Sheet 5 - Barriers
+#
+# Write each function, then run the cell below it: it asks your function for fresh cases and says in
+# words what is right or wrong. `exercises.hint("barrier_row", 1)` prints a hint, 2 the next, 3 is
+# nearly the solution.
+
+# %% [markdown]
+# [Start](../00_start_here.ipynb) · before: [sheet 4](sheet4_certainty.ipynb) · next: [sheet
+# 6](sheet6_robot.ipynb) · [to do](../exercises/sheet5_barriers.ipynb) ·
+# [solved](../solutions/sheet5_barriers.ipynb) · 1 h 00 min · belongs to [06](../06_barriers.ipynb),
+# [11](../11_feasibility.ipynb), [12](../12_distances.ipynb)
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+import szlib
+from szlib.workbook import exercises, figures
+
+# %% [markdown]
+# ## 5.1 Focal distance (15 min)
+#
+# A zone is an ellipse with a `center` (m, n), `semi_axes` (a, b) with a >= b [m] and the `angle` of
+# its longer axis, counter-clockwise from x [rad]. Give for each of `points`, shape (n, 2), the
+# paper's distance (eq. 7): half the sum of the distances to the two foci, less a.
+
+# %%
+ax = figures.plot_distance(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+plt.show()
+
+
+# %%
+def focal_distance(points, center, semi_axes, angle):
+    """Approximate signed distance of points to the ellipse (n,) [m]."""
+    # YOUR CODE HERE
+    raise NotImplementedError()
+
+
+# %%
+exercises.check("focal_distance", focal_distance)
+
+# %% [markdown]
+# ## 5.2 The distance to a wall (15 min)
+#
+# A wall goes from `a` to `b`, shape (2,) each. Give for each of `points`, shape (n, 2), the paper's
+# distance (eq. 3-5), with $L$ the wall's length and $\mathbf{x}_c$ its middle:
+#
+# $$g = \frac{(x-x_a)(y_b-y_a)-(y-y_a)(x_b-x_a)}{L},\quad
+#   t = \frac{(L/2)^2-\|\mathbf{x}-\mathbf{x}_c\|^2}{L},\quad
+#   d = \sqrt{g^2 + \left(\tfrac{|t|-t}{2}\right)^2}$$
+
+
+# %%
+def wall_distance(points, a, b):
+    """Approximate distance of points to the wall (n,) [m]."""
+    # YOUR CODE HERE
+    raise NotImplementedError()
+
+
+# %%
+exercises.check("wall_distance", wall_distance)
+
+# %% [markdown]
+# ## 5.3 A barrier row (10 min)
+#
+# The robot's centre is at the distance `d_now` from a zone, and after the step at `d_next` [m]. With
+# the barrier $h = d - r_{robot} - \epsilon$ the step is allowed if $h_{next} - h_{now} \ge
+# -\gamma\,h_{now}$ (eq. 1). Give what this row has left over [m]: positive where the step is allowed,
+# 0 where it just is.
+
+
+# %%
+def barrier_row(d_now, d_next, gamma, r_robot, eps):
+    """What the barrier condition leaves over [m]."""
+    # YOUR CODE HERE
+    raise NotImplementedError()
+
+
+# %%
+exercises.check("barrier_row", barrier_row)
+
+# %% [markdown]
+# ## 5.4 The margin at the end of a wall (20 min)
+#
+# Straight ahead of the end of a wall the distance of 5.2 is too long. A robot of radius `r_robot` may
+# stand so that its disc just touches the end. By how much does $d$ exceed the radius there? So large
+# must the margin eps be, or $h \ge 0$ allows an overlap. `length` is the wall's [m].
+
+
+# %%
+def end_margin(r_robot, length):
+    """The least margin eps that keeps the robot off the end of the wall [m]."""
+    # YOUR CODE HERE
+    raise NotImplementedError()
+
+
+# %%
+exercises.check("end_margin", end_margin)

@@ -1,0 +1,134 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Sheet 1 - Tracks and meetings
+#
+# Write each function, then run the cell below it: it asks your function for fresh cases and says in
+# words what is right or wrong. `exercises.hint("velocity", 1)` prints a hint, 2 the next, 3 is nearly
+# the solution. Units are metres, seconds and radians throughout.
+
+# %% [markdown]
+# [Start](../00_start_here.ipynb) · next: [sheet 2](sheet2_outliers.ipynb) · [to
+# do](../exercises/sheet1_tracks.ipynb) · [solved](../solutions/sheet1_tracks.ipynb) · 50 min · belongs to
+# [01](../01_tracks.ipynb), [02](../02_encounters.ipynb), [14](../14_data_quality.ipynb)
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+import szlib
+from szlib.workbook import exercises, figures
+
+# %% [markdown]
+# ## 1.1 Velocity (5 min)
+#
+# `path` holds a person's positions, shape (n, 2) [m], one each 0.1 s. Give their velocity (vx, vy)
+# [m/s] at tick `k`: the displacement from `half` ticks before to `half` ticks after it, over the time
+# between. (szlib takes half a second to either side: a step is about as long, and shorter spans see
+# the body sway.)
+
+
+# %%
+def velocity(path, k, half):
+    """Velocity (vx, vy) [m/s] at tick k."""
+    ### BEGIN SOLUTION
+    return (path[k + half] - path[k - half]) / (2 * half * 0.1)
+    ### END SOLUTION
+
+
+# %%
+exercises.check("velocity", velocity)
+
+# %% [markdown]
+# ## 1.2 The line of sight (10 min)
+#
+# A reference pedestrian at `ref` walks in the direction `heading` (counter-clockwise from x).
+# Somebody is at `other`. Give the line-of-sight angle: their bearing in the reference pedestrian's
+# own frame, 0 straight ahead, positive to the left, in (-pi, pi].
+
+# %%
+ref, heading, other = np.array([1.0, 1.0]), 2.4, np.array([-1.5, 0.6])
+ax = figures.axes(None, size=(5, 3.6))
+ax.plot(*ref, marker=(3, 0, np.degrees(heading) - 90), color=figures.BLACK, markersize=14)
+ax.arrow(*ref, 1.5 * np.cos(heading), 1.5 * np.sin(heading), head_width=0.1, color=figures.BLACK)
+ax.plot(*other, "o", color=figures.ORANGE, markersize=10)
+ax.plot(*np.transpose([ref, other]), ":", color=figures.ORANGE)
+ax.annotate("other", (-1.5, 0.3), ha="center")
+ax.annotate("ref, with heading", (1.2, 1.1))
+figures.metres(ax, "Which angle is the line of sight?").set(xlim=(-2.5, 3.2), ylim=(0, 2.6))
+plt.show()
+
+
+# %%
+def line_of_sight(ref, heading, other):
+    """Bearing of the other in the reference pedestrian's frame [rad], in (-pi, pi]."""
+    ### BEGIN SOLUTION
+    dx, dy = other - ref
+    angle = np.arctan2(dy, dx) - heading
+    return np.angle(np.exp(1j * angle))
+    ### END SOLUTION
+
+
+# %%
+exercises.check("line_of_sight", line_of_sight)
+
+# %% [markdown]
+# ## 1.3 The attentional space (15 min)
+#
+# The paper watches a rectangle ahead of the reference pedestrian, 5 m long and 4 m wide, which turns
+# with them. `others` holds many positions in the world, shape (n, 2). Say for each whether it lies in
+# that space: booleans, shape (n,).
+
+# %%
+ax = figures.plot_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE)
+plt.show()
+
+
+# %%
+def in_space(ref, heading, others):
+    """Which of the others (n, 2) [m] are in the attentional space, shape (n,)."""
+    ### BEGIN SOLUTION
+    dx, dy = (others - ref).T
+    ahead = dx * np.cos(heading) + dy * np.sin(heading)
+    left = dy * np.cos(heading) - dx * np.sin(heading)
+    return (ahead >= 0) & (ahead <= 5) & (np.abs(left) <= 2)
+    ### END SOLUTION
+
+
+# %%
+exercises.check("in_space", in_space)
+
+# %% [markdown]
+# ## 1.4 What one sample a second loses (20 min)
+#
+# The public day of the ATC mall has one position a second. Between two of them szlib draws a straight
+# line. Somebody walks along a circle of `radius` [m] at `speed` [m/s] and is seen every `interval`
+# [s]. How far at most is the straight line from where they walked [m]?
+
+
+# %%
+def one_hertz(radius, speed, interval):
+    """Greatest distance between the arc and its chord [m]."""
+    ### BEGIN SOLUTION
+    angle = speed * interval / radius
+    return radius * (1 - np.cos(angle / 2))
+    ### END SOLUTION
+
+
+# %%
+exercises.check("one_hertz", one_hertz)
+
+# %% [markdown]
+# **Solution.** For small angles this is (speed x interval)^2 / (8 radius): a walker at 1.2 m/s who
+# turns with a radius of 3 m is off by 6 cm at 1 Hz, and by 0.06 cm at 10 Hz.

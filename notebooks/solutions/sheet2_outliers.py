@@ -1,0 +1,130 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Sheet 2 - Inside out
+#
+# Write each function, then run the cell below it: it asks your function for fresh cases and says in
+# words what is right or wrong. `exercises.hint("complementary", 1)` prints a hint, 2 the next, 3 is
+# nearly the solution.
+
+# %% [markdown]
+# [Start](../00_start_here.ipynb) · before: [sheet 1](sheet1_tracks.ipynb) · next: [sheet
+# 3](sheet3_zones.ipynb) · [to do](../exercises/sheet2_outliers.ipynb) ·
+# [solved](../solutions/sheet2_outliers.ipynb) · 55 min · belongs to [03](../03_outliers.ipynb)
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from szlib.workbook import exercises, figures
+
+# %% [markdown]
+# ## 2.1 Complementary coordinates (5 min)
+#
+# Line-of-sight angles [rad] and distances [m] of samples, both of shape (n,). Give the points $(x',
+# y')$ whose direction is the same, but whose distance from the origin is the complementary one, $r' =
+# r_{max} - r$: shape (n, 2).
+
+
+# %%
+def complementary(los_angle, distance, r_max):
+    """Points (x', y') [m], shape (n, 2)."""
+    ### BEGIN SOLUTION
+    direction = np.column_stack([np.cos(los_angle), np.sin(los_angle)])
+    return (r_max - distance)[:, None] * direction
+    ### END SOLUTION
+
+
+# %%
+exercises.check("complementary", complementary)
+
+# %% [markdown]
+# ## 2.2 The nearest approach (10 min)
+#
+# `samples` is a table as `szlib.find_encounters` gives it: columns `encounter` (its number),
+# `los_angle`, `distance`. How near did the two people of each encounter come? One number for each, in
+# the order of their numbers.
+
+
+# %%
+def nearest(samples):
+    """The least distance of each encounter [m], by number of the encounter."""
+    ### BEGIN SOLUTION
+    return samples.groupby("encounter")["distance"].min().to_numpy()
+    ### END SOLUTION
+
+
+# %%
+exercises.check("nearest", nearest)
+
+# %% [markdown]
+# ## 2.3 Who is found (10 min)
+#
+# On the plaza it is known which samples are of intruders. `removed` says which samples a rule took
+# away, `intruder` which it should have; both are booleans of shape (n,). Give *precision*, the share
+# of intruders in what was removed, and *recall*, the share of the intruders that was removed.
+
+
+# %%
+def found(removed, intruder):
+    """Precision and recall, two shares."""
+    ### BEGIN SOLUTION
+    both = (removed & intruder).sum()
+    return both / removed.sum(), both / intruder.sum()
+    ### END SOLUTION
+
+
+# %%
+exercises.check("found", found)
+
+# %% [markdown]
+# ## 2.4 LOF's blind spot (30 min)
+#
+# The local outlier factor compares how dense the data is around a sample with how dense it is around
+# the sample's 20 nearest neighbours. `cloud` holds other people's samples, shape (600, 2). Be the
+# intruder: give the 31 samples of one encounter, shape (31, 2), all of them 0.3 m or more from
+# everybody in the cloud and no two the same, of which LOF with a quota of 1 % takes away *none*.
+
+
+# %%
+def blind_spot(cloud):
+    """31 samples (31, 2) [m], far from the cloud, that LOF does not find."""
+    ### BEGIN SOLUTION
+    around = 2 * np.pi * np.arange(31) / 31
+    circle = 0.1 * np.column_stack([np.cos(around), np.sin(around)])
+    return cloud.max(axis=0) + 0.5 + circle
+    ### END SOLUTION
+
+
+# %%
+exercises.check("blind_spot", blind_spot)
+
+# %% [markdown]
+# **Solution.** Among its 20 nearest neighbours each of the 31 samples finds only samples of the same
+# intruder, so it lies in a place as dense as theirs. Lonely is the encounter, not the sample:
+# notebook 03 compares whole encounters.
+
+# %%
+direction, reach = np.random.default_rng(0).uniform([-np.pi, 0], [np.pi, 1], (600, 2)).T
+cloud = np.sqrt(reach)[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])
+ax = figures.axes(None, size=(5, 4.5))
+ax.plot(*cloud.T, ".", color=figures.GREY, markersize=3, label="everybody else")
+try:
+    ax.plot(*blind_spot(cloud).T, "x", color=figures.RED, markersize=4, label="your intruder")
+except NotImplementedError:
+    print("your intruder appears here once blind_spot is written")
+figures.metres(ax, "Far from everybody, and in dense company")
+figures.legend_below([ax])
+ax.set(xlabel="x' [m]", ylabel="y' [m]")
+plt.show()

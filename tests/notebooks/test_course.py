@@ -1,0 +1,111 @@
+"""The shell of the course: links lead somewhere, minutes are near, words are explained where first used."""
+
+import importlib.util
+import re
+from collections import Counter
+
+import jupytext
+import pytest
+
+import szlib
+from szlib.workbook.exercises import SHEETS
+from szlib.workbook.record import places
+
+
+def _course():
+    spec = importlib.util.spec_from_file_location("course", places.NOTEBOOKS / "course.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+course = _course()
+STORY = course.pages()
+START = (places.NOTEBOOKS / "00_start_here.py").read_text(encoding="utf-8")
+FOLDERS = (places.NOTEBOOKS, places.NOTEBOOKS / "exercises", places.NOTEBOOKS / "solutions")
+TIME = re.compile(r"(\d+ h )?\d+\s(#\s)?min\b")
+
+
+def told(text: str) -> str:
+    """A text with its times left out, on one line: they may be a little off."""
+    return " ".join(TIME.sub("T min", text).replace("\n#", " ").split())
+
+
+@pytest.fixture(scope="module")
+def shell():
+    return course.shell()
+
+
+# --- navigation and maps -----------------------------------------------------------------------------
+
+
+def test_every_cell_is_what_the_course_makes_of_the_notebooks(shell):
+    stale = [s.name for s, text in shell.items() if told(text) != told(s.read_text(encoding="utf-8"))]
+    assert stale == [], "python notebooks/course.py"
+
+
+@pytest.mark.parametrize("page", STORY, ids=lambda p: p.source.stem)
+def test_a_notebook_says_how_long_it_takes_and_what_it_gives(page):
+    (navigation,) = [c.source for c in page.cells if course.HEADING in c.source]
+    assert page.cells[1].source == navigation
+    (minutes,) = re.findall(r"(\d+)\s+min\s+to\s+read", navigation)
+    assert abs(int(minutes) - page.minutes) <= 5, "python notebooks/course.py"
+    assert "paper](https://arxiv.org/abs/2405.15101): " in navigation
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda f: f.name)
+def test_every_link_leads_somewhere(folder):
+    for source in folder.glob("*[0-9]*_*.py"):
+        prose = [c.source for c in jupytext.read(source).cells if c.cell_type == "markdown"]
+        links = re.findall(r"\]\(([^)#]+)\)", "\n".join(prose))
+        missing = [link for link in links if not link.startswith("http") and not (folder / link).exists()]
+        assert missing == [], source.name
+
+
+def test_the_course_reads_every_notebook_and_does_every_sheet_once():
+    numbers = Counter(number for _, numbers, _ in course.WEEKS for number in numbers)
+    assert set(numbers.values()) == {1}
+    assert {page.number for page in STORY} - {"00"} <= set(numbers)
+    assert [sheet for _, _, sheet in course.WEEKS] == list(SHEETS)
+    assert len(course.WEEKS) == 6
+    assert {page.number for page in STORY} <= set(course.GIVES)
+
+
+# --- words, symbols, references ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("word", ["class K", "SQP", "exact penalty", "EWAP", "tidy"])
+def test_a_word_is_explained_where_it_comes_first(word):
+    first = course.first_uses(STORY)[word]
+    (page,) = [page for page in STORY if page.number == first]
+    assert f"*{word}*: {course.GLOSSARY[word].means}" in " ".join(page.cells[1].source.split())
+    before = STORY[1 : STORY.index(page)]
+    assert not any(re.search(rf"\b{word}\b", text) for each in before for text in each.prose)
+
+
+def test_every_symbol_has_its_name_in_code():
+    table = START.partition("## Symbols")[2].partition("# %%")[0]
+    names = re.findall(r"`szlib\.([\w.]+)`", table)
+    assert len(names) > 15
+    for name in names:
+        found = szlib
+        for part in name.split("."):
+            found = getattr(found, part)
+
+
+def test_every_reference_has_a_doi_or_says_that_there_is_none():
+    entries = START.partition("## References")[2].partition("# %%")[0].split("\n# - ")[1:]
+    assert len(entries) >= 10
+    for entry in entries:
+        assert "https://doi.org/10." in entry or "(no DOI)" in entry, entry
+        for shown, link in re.findall(r"\[(10\.[^\]]+)\]\(https://doi\.org/([^)]+)\)", entry):
+            assert shown == link
+
+
+def test_only_the_navigation_is_written_anew():
+    script = "# ---\n# ---\n\n# %% [markdown]\n# # 1 - A\n\n# %%\nx = 1\n"
+    navigation = f"5 min\n\n{course.HEADING}x"
+    once = course.renewed(script, {}, navigation)
+    cell = f"# %% [markdown]\n# 5 min\n#\n# {course.HEADING}x\n\n"
+    assert once == script.replace("# %%\nx", f"{cell}# %%\nx")
+    assert course.renewed(once, {}, navigation.replace("5", "10")) == once.replace("5 min", "10 min")
