@@ -120,8 +120,8 @@ record.key["h at worst, N_h = 2, gamma = 0.8 [m]"] = float(paper.loc[0.8, "min_h
 # ## One infeasible step, three answers
 #
 # The first scenario with $\gamma = 0.8$ and, as in the paper, no side chosen beforehand (`tie=0`): the
-# robot drives at full speed until, shortly before the zone, two steps can no longer hold it back. Three
-# answers:
+# robot drives at full speed until, shortly before the zone, two steps can no longer hold it back. The ticks
+# are steps without a solution. Three answers:
 #
 # - **dropped**: a hard solver has no answer, and what it leaves behind is nearly the plan without
 #   the barrier; passed on, it drives through the person;
@@ -274,9 +274,9 @@ failed = rows[rows["outcome"] != "arrived"]
 failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]]
 
 # %% [markdown]
-# **What it means.** A small $\gamma$ hides a short horizon, at the price of a slow robot. A plan
-# that ends at rest needs no such luck: it carries its own proof, as far as people stand, and where
-# they walk, the robot is never the one who drives in.
+# **What it means.** A small $\gamma$ makes up for a short horizon, at the price of a slow robot. For a
+# plan that ends at rest there is a proof instead, as long as people stand; where they walk, the robot
+# is at rest at the first moment with $h < 0$.
 
 # %%
 record.close()

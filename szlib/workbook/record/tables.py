@@ -82,3 +82,5 @@ def show_with_words() -> None:
     if shell is not None and shell.display_formatter is not None:
         pd.options.display.precision = 3
         shell.display_formatter.mimebundle_formatter.for_type_by_name("matplotlib.figure", "Figure", words)
+        plain = shell.display_formatter.formatters["text/plain"]
+        plain.for_type(Styler, lambda table, printer, _: printer.text(table.data.to_string()))
