@@ -89,11 +89,12 @@ for sheet in SHEETS:
 # | [17 - Other people's crowds](17_crowds.ipynb) | So far everybody walked as this workbook made them walk. What becomes of the robot among people who walk by somebody else's model and react to it - and among people who were recorded, and would have walked like that whatever it does? | 20 min |
 # | [18 - Eleven meetings](18_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 15 min |
 # | [19 - A sensitivity atlas](19_atlas.ipynb) | Notebooks 08 to 10 show one corridor, one passage, one pace, one zone. What would the robot have done in others? | 15 min |
+# | [20 - The laboratory](20_laboratory.ipynb) | What does the robot do if *you* put the person somewhere else, move the goal, narrow the corridor, or change gamma while it drives? | 10 min |
 
 # %% [markdown]
 # ## Three routes
 #
-# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [08](08_corridor.ipynb): 50 min to read.
+# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [08](08_corridor.ipynb), [20](20_laboratory.ipynb): 1 h 00 min to read.
 # - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [11](11_feasibility.ipynb), [16](16_claims.ipynb): 3 h 05 min to read.
 # - **Six weeks: the course.** One exercise sheet a week; running and looking around come on top.
 #
@@ -104,7 +105,7 @@ for sheet in SHEETS:
 # | 3 | From samples to a zone | [04](04_hull.ipynb), [05](05_zones.ipynb) | 25 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
 # | 4 | How sure? Respect or emptiness | [15](15_respect.ipynb), [16](16_claims.ipynb) | 35 min | [sheet 4](exercises/sheet4_certainty.ipynb) | 50 min |
 # | 5 | Barriers, and a controller of your own | [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [11](11_feasibility.ipynb), [12](12_distances.ipynb) | 1 h 10 min | [sheet 5](exercises/sheet5_barriers.ipynb) | 1 h 00 min |
-# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb), [19](19_atlas.ipynb) | 1 h 50 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
+# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb), [19](19_atlas.ipynb), [20](20_laboratory.ipynb) | 2 h 00 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
 
 # %% [markdown]
 # **The exercises** are functions that you write. `exercises.check("velocity", velocity)` asks yours for cases
@@ -134,7 +135,7 @@ for sheet in SHEETS:
 # | IPOPT | the solver for nonlinear optimisation that the paper uses | [06b](06b_build_a_controller.ipynb) |
 # | jerk | the change of acceleration by time | [13](13_comparison.ipynb) |
 # | line-of-sight angle | LOS: where the other person is, seen from the reference pedestrian | [02](02_encounters.ipynb) |
-# | LOF | local outlier factor: how lonely a sample is, compared with its neighbours | [03](03_outliers.ipynb) |
+# | LOF | local outlier factor: how isolated a sample is, compared with its neighbours | [03](03_outliers.ipynb) |
 # | MPC | model predictive control: plan some steps ahead, take the first, plan again | [06b](06b_build_a_controller.ipynb) |
 # | null model | the same people, each moved in time, so that nobody minds anybody | [15](15_respect.ipynb) |
 # | ORCA | a model of walking: each of two people takes half of what keeps them apart | [17](17_crowds.ipynb) |

@@ -37,7 +37,7 @@ from IPython.display import Markdown
 
 import szlib
 from szlib.simulation.metrics import avoidance_start
-from szlib.workbook import figures
+from szlib.workbook import figures, laboratory
 from szlib.workbook.record import NotebookRecord, settings_table
 
 # %% tags=["parameters"]
@@ -49,7 +49,6 @@ gamma = 0.05
 N = 8
 N_h = 2
 a_max = 1.0  # m/s2
-interactive = False  # True: a slider for gamma
 
 # %%
 record = NotebookRecord("07_passing", globals())
@@ -232,10 +231,7 @@ def run_with(gamma: float) -> None:
     szlib.simulate(scenario, other).plot()
 
 
-if interactive:
-    from ipywidgets import FloatSlider, interact
-
-    interact(run_with, gamma=FloatSlider(gamma, min=0.01, max=0.2, step=0.01))
+laboratory.slide(run_with, gamma=(gamma, 0.01, max(0.2, gamma), 0.01))
 
 # %% [markdown]
 # **What it means.** The minimum zone is a last boundary. The robot gives way long before it, as the

@@ -23,8 +23,8 @@
 # yields, and a curve from the one to the other.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [18 - Eleven meetings](18_meetings.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 15 min to read
+# [Start](00_start_here.ipynb) · before: [18 - Eleven meetings](18_meetings.ipynb) · next: [20 - The
+# laboratory](20_laboratory.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 15 min to read
 #
 # **Afterwards you can** predict from gamma, width, speed and zone what the robot will do.
 

@@ -147,8 +147,8 @@ def _contents(out: Path) -> dict[str, bytes]:
     return {
         str(file.relative_to(out)): file.read_bytes()
         for file in sorted(out.rglob("*"))
-        if file.is_file() and f"{MARKER}-" not in file.name and file.name != "summary.json"
-        and file.suffix != ".ipynb"
+        if file.is_file() and f"{MARKER}-" not in file.name and file.suffix != ".ipynb"
+        and file.name not in ("summary.json", "report.html")
     }  # fmt: skip
 
 

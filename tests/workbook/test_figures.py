@@ -284,6 +284,15 @@ def test_findings_are_told_apart_by_more_than_colour():
     assert [label.get_text() for label in ax.get_yticklabels()] == list("abc")
 
 
+def test_a_grid_has_a_panel_for_each_metric_and_one_legend():
+    rows = [(w, c, m, 0.5, 0.4, 0.6) for w in ("a", "b") for c in ("x", "y") for m in ("s", "t", "u", "v")]
+    table = pd.DataFrame(rows, columns=["crowd", "who", "metric", "mean", "low", "high"])
+    labels = {"s": "share", "t": "time [s]", "u": "u", "v": "v"}
+    grid = figures.interval_grid(table, labels, rows="crowd", colour="who", title="A and b")
+    assert [ax.get_xlabel() for ax in grid.axes if ax.axison] == list(labels.values())
+    assert [text.get_text() for text in grid.legends[0].get_texts()] == ["x", "y"]
+
+
 def test_a_crowd_is_drawn_where_it_is_nearest(log):
     ax = figures.plot_crowd(log)
     (robot,) = ax.patches

@@ -35,6 +35,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "plot_speed",
             "plot_barriers",
             "plot_robot_paths",
+            "plot_strip",
             "animate",
             "plot_sweep",
             "plot_manners",

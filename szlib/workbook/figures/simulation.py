@@ -108,6 +108,27 @@ def plot_robot_paths(logs: Mapping[str, SimulationLog], *, ax: Axes | None = Non
     return metres(ax, first.scenario.title)
 
 
+def plot_strip(logs: Mapping[str, SimulationLog], *, every: float) -> Figure:
+    """Pictures of several runs of one scene every so many seconds: a row for each run, by name."""
+    longest = max(float(log.time[-1]) for log in logs.values())
+    times = np.arange(0.0, longest + 1e-9, every)
+    figure = plt.figure(figsize=(3.2 * len(times), 1.7 * len(logs) + 0.3), layout="constrained")
+    grid = figure.subplots(len(logs), len(times), squeeze=False, sharex=True, sharey=True)
+    for panels, (name, log) in zip(grid, logs.items(), strict=True):
+        for ax, time in zip(panels, times.tolist(), strict=True):
+            row = min(round(time / log.settings.dt), len(log.states) - 1)
+            _stage(ax, log.scenario)
+            ax.plot(*log.states[: row + 1, :2].T, color=BLUE, linewidth=1, label="robot's path")
+            _draw_moment(ax, log, row, robot=BLUE, zone=RED)
+            _frame(ax, [(each, np.arange(len(each.states))) for each in logs.values()])
+            ax.set_title(
+                f"{name}, {log.time[row]:g} s, h = {log.h[row].min(initial=np.inf):.2f} m", fontsize=9
+            )
+            metres(ax)
+            ax.label_outer()
+    return figure
+
+
 def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> Movie:
     """The run as an animated GIF, a frame every so many seconds, twice as fast; a player in notebooks."""
     step = max(1, round(every / log.settings.dt))
