@@ -17,6 +17,7 @@ report: $(INSTALLED)  ## open what the last run on the plaza wrote: one HTML fil
 	$(BIN)/szlib report --open
 
 docs: $(INSTALLED)  ## results/site: that report, and beside it what each name of szlib does
+	$(BIN)/szlib report
 	$(BIN)/pdoc --docformat numpy --output-directory results/site szlib
 	$(BIN)/python -c "import shutil; shutil.copyfile('results/synthetic/report.html', 'results/site/report.html')"
 
@@ -26,8 +27,10 @@ test: $(INSTALLED)  ## style, types, and every test
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-lab: $(INSTALLED)  ## open the workbook in JupyterLab
-	$(BIN)/jupyter lab notebooks
+# root, as in most containers, must be allowed to; there too: make lab LAB_FLAGS="--allow-root --no-browser --ip=0.0.0.0"
+LAB_FLAGS ?= $(if $(filter 0,$(shell id -u 2>/dev/null)),--allow-root)
+lab: $(INSTALLED)  ## open the workbook in JupyterLab, with its results beside it; LAB_FLAGS for a container
+	$(BIN)/jupyter lab --ServerApp.root_dir="$(CURDIR)" $(LAB_FLAGS) notebooks/00_start_here.ipynb
 
 bench: $(INSTALLED)  ## speed and memory, as ratios within one run
 	$(BIN)/python tests/bench.py

@@ -21,8 +21,8 @@
 # the robot by model predictive control with a barrier around every person. This workbook follows them
 # step by step, fills what the paper leaves open, and says where data does not support a claim.
 #
-# <img src="figures/zone.png" width="44%" alt="The minimum social zone at 1.1 m/s, learned from synthetic people">
-# <img src="figures/making_room.gif" width="50%" alt="A robot makes room for a person in a passage, then goes on">
+# ![The minimum social zone at 1.1 m/s, learned from synthetic people](figures/zone.png)
+# ![A robot makes room for a person in a passage, then goes on](figures/making_room.gif)
 
 # %% [markdown]
 # next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 25 min
@@ -46,6 +46,7 @@
 
 # %%
 import szlib
+from szlib.workbook.exercises import SHEETS
 from szlib.workbook.record import NotebookRecord, places
 
 # %% tags=["parameters"]
@@ -56,13 +57,12 @@ results = "../results"
 
 # %%
 record = NotebookRecord("00_start_here", globals())
-sheets = sorted((places.NOTEBOOKS / "exercises").glob("sheet*.py"))
-tasks = sum(sheet.read_text(encoding="utf-8").count("exercises.check(") for sheet in sheets)
-print(f"szlib {szlib.__version__}: {len(places.notebooks())} notebooks, {len(sheets)} sheets")
-record.key |= {"sheets": len(sheets), "exercises": tasks}
-for sheet in sheets:
-    solved = (places.NOTEBOOKS / "solutions" / sheet.name).exists()
-    record.check(f"the solutions of {sheet.stem} are there", solved)
+tasks = [task for sheet in SHEETS.values() for task in sheet]
+print(f"szlib {szlib.__version__}: {len(places.notebooks())} notebooks, {len(tasks)} exercises")
+record.key["exercises"] = len(tasks)
+for sheet in SHEETS:
+    there = all((places.NOTEBOOKS / part / f"{sheet}.py").exists() for part in ("exercises", "solutions"))
+    record.check(f"{sheet} and its solutions are there", there)
 
 # %% [markdown]
 # ## The map
@@ -76,10 +76,10 @@ for sheet in sheets:
 # | [5 - Social zones](05_zones.ipynb) | Can a robot carry the zone along? | 15 min |
 # | [6 - Barriers](06_barriers.ipynb) | How does "stay out of the zone" become something that a controller can obey, ten times a second? | 10 min |
 # | [6b - Build the controller yourself](06b_build_a_controller.ipynb) | What does it take to turn the barrier condition of notebook 06 into a robot that drives? | 25 min |
-# | [7 - Passing a person who stands](07_passing.ipynb) | A person stands in the way and looks at the robot. What does the robot do, and when does it begin? | 10 min |
-# | [8 - Meeting in a narrow corridor](08_corridor.ipynb) | A person walks towards the robot in a corridor 4.6 m wide, which leaves 0.4 m more than the robot needs on either side of the zone. Does the robot barge past, or take care? | 5 min |
-# | [9 - Yielding by waiting](09_waiting.ipynb) | A passage is too narrow for two, and a person is in it. Who goes first? | 5 min |
-# | [10 - Yielding by making room](10_making_room.ipynb) | This time the robot is *in* the passage when the person comes. It cannot wait where it is. | 5 min |
+# | [7 - Passing a person who stands](07_passing.ipynb) | A person stands in the way and looks at the robot. When does the robot begin to go around them, and what decides that? | 15 min |
+# | [8 - Meeting in a narrow corridor](08_corridor.ipynb) | A person walks towards the robot in a corridor. There is room for both, but not much. Who slows the robot down: the person, or the wall? | 10 min |
+# | [9 - Yielding by waiting](09_waiting.ipynb) | A passage is too narrow for two, and a person is in it. Nobody told the robot who goes first. Who decides, and what does waiting look like to a solver? | 10 min |
+# | [10 - Yielding by making room](10_making_room.ipynb) | This time the robot is *in* the passage when the person comes. It wants to go ahead. What makes it go back? | 10 min |
 # | [11 - Feasibility](11_feasibility.ipynb) | A hard constraint is a promise only while the problem has a solution. When does it lose it, what happens then, and can one have a promise that is kept for ever? | 20 min |
 # | [12 - The distances, audited](12_distances.ipynb) | The barriers use *approximate* distances to zones and walls, and a margin of 5 cm "since the approximated distance function contains some errors" (sec. 4). Where do they err, to which side, and is the margin enough? | 15 min |
 # | [13 - Against everything else](13_comparison.ipynb) | Is the fitted ellipse worth its trouble? | 15 min |
@@ -88,12 +88,14 @@ for sheet in sheets:
 # | [16 - What is true?](16_claims.ipynb) | What does the paper claim, and what of it does the data at hand support? | 15 min |
 # | [17 - Other people's crowds](17_crowds.ipynb) | So far everybody walked as this workbook made them walk. What becomes of the robot among people who walk by somebody else's model and react to it - and among people who were recorded, and would have walked like that whatever it does? | 20 min |
 # | [18 - Eleven meetings](18_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 15 min |
+# | [19 - A sensitivity atlas](19_atlas.ipynb) | Notebooks 08 to 10 show one corridor, one passage, one pace, one zone. What would the robot have done in others? | 15 min |
+# | [20 - The laboratory](20_laboratory.ipynb) | What does the robot do if *you* put the person somewhere else, move the goal, narrow the corridor, or change gamma while it drives? | 10 min |
 
 # %% [markdown]
 # ## Three routes
 #
-# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [08](08_corridor.ipynb): 45 min to read.
-# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [11](11_feasibility.ipynb), [16](16_claims.ipynb): 2 h 45 min to read.
+# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [08](08_corridor.ipynb), [20](20_laboratory.ipynb): 1 h 00 min to read.
+# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [11](11_feasibility.ipynb), [16](16_claims.ipynb): 3 h 05 min to read.
 # - **Six weeks: the course.** One exercise sheet a week; running and looking around come on top.
 #
 # | week | topic | notebooks | to read | sheet | to do |
@@ -103,7 +105,7 @@ for sheet in sheets:
 # | 3 | From samples to a zone | [04](04_hull.ipynb), [05](05_zones.ipynb) | 25 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
 # | 4 | How sure? Respect or emptiness | [15](15_respect.ipynb), [16](16_claims.ipynb) | 35 min | [sheet 4](exercises/sheet4_certainty.ipynb) | 50 min |
 # | 5 | Barriers, and a controller of your own | [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [11](11_feasibility.ipynb), [12](12_distances.ipynb) | 1 h 10 min | [sheet 5](exercises/sheet5_barriers.ipynb) | 1 h 00 min |
-# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb) | 1 h 15 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
+# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb), [19](19_atlas.ipynb), [20](20_laboratory.ipynb) | 2 h 00 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
 
 # %% [markdown]
 # **The exercises** are functions that you write. `exercises.check("velocity", velocity)` asks yours for cases
@@ -195,12 +197,6 @@ for sheet in sheets:
 #   crowds, 2009. [10.1098/rspb.2009.0405](https://doi.org/10.1098/rspb.2009.0405)
 # - A. Francis and others: Principles and guidelines for evaluating social robot navigation algorithms, 2025.
 #   [10.1145/3700599](https://doi.org/10.1145/3700599)
-# - D. Helbing, P. Molnár: Social force model for pedestrian dynamics, 1995.
-#   [10.1103/PhysRevE.51.4282](https://doi.org/10.1103/PhysRevE.51.4282)
-# - D. Fox, W. Burgard, S. Thrun: The dynamic window approach to collision avoidance, 1997.
-#   [10.1109/100.580977](https://doi.org/10.1109/100.580977)
-# - R. Kirby, R. Simmons, J. Forlizzi: Companion: a constraint-optimizing method for person-acceptable navigation,
-#   2009. [10.1109/ROMAN.2009.5326271](https://doi.org/10.1109/ROMAN.2009.5326271)
 # - E. T. Hall: The hidden dimension. Doubleday, 1966 (no DOI).
 
 # %% [markdown]

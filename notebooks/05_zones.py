@@ -34,7 +34,7 @@ import pandas as pd
 
 import szlib
 from szlib.plaza.truth import PlazaSettings
-from szlib.workbook import claims, figures
+from szlib.workbook import claims, figures, laboratory
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
@@ -46,7 +46,6 @@ fraction = 0.002  # as in notebook 03, of the paper's hull
 r_max = 2.0  # as in notebook 03 [m]
 q = 0.05  # share of encounters that may enter the quantile zone
 zone_speed = 1.1  # whose zone the robot keeps [m/s]
-interactive = False  # True: a slider for the speed
 
 # %%
 record = NotebookRecord("05_zones", globals())
@@ -202,15 +201,12 @@ ax.set(title="How far the zone reaches in each direction", ylim=(0, None))
 ax.legend()
 record.figure(fig, "reach")
 
-# %%
-if interactive:
-    from ipywidgets import FloatSlider, interact
+# %% [markdown]
+# In JupyterLab a slider for the walking speed stands here:
 
-    low, high = (round(v, 2) for v in zone.speed_range)
-    interact(
-        lambda speed: figures.plot_zone(zone, speed),
-        speed=FloatSlider(1.1, min=low + 0.1, max=high - 0.1, step=0.05),
-    )
+# %%
+low, high = (round(v, 2) for v in zone.speed_range)
+laboratory.slide(lambda speed: figures.plot_zone(zone, speed), speed=(1.1, low + 0.1, high - 0.1, 0.05))
 
 # %% [markdown]
 # **What it means.** One small file, `zone.json`, now holds what people's distance looks like at

@@ -119,8 +119,9 @@ record.key["h at worst, N_h = 2, gamma = 0.8 [m]"] = float(paper.loc[0.8, "min_h
 # %% [markdown]
 # ## One infeasible step, three answers
 #
-# The first scenario with $\gamma = 0.8$: the robot drives at full speed until, shortly before the
-# zone, it can hardly be held back; where the zone is large, some steps (the ticks) have no solution. Three
+# The first scenario with $\gamma = 0.8$ and, as in the paper, no side chosen beforehand (`tie=0`): the
+# robot drives at full speed until, shortly before the zone, it can hardly be held back; where the zone is
+# large, some steps (the ticks) have no solution. Three
 # answers:
 #
 # - **dropped**: a hard solver has no answer, and what it leaves behind is nearly the plan without
@@ -148,7 +149,7 @@ def follow(answer: str, settings: szlib.MPCSettings) -> pd.DataFrame:
 
 
 zone = record.ellipse()
-hasty = szlib.MPCSettings(gamma=0.8)
+hasty = szlib.MPCSettings(gamma=0.8, tie=0.0)
 answers = {answer: follow(answer, hasty) for answer in ("dropped", "relaxed", "braking")}
 
 # %%

@@ -49,7 +49,8 @@ ROOMS = {
     "simulation.metrics": ["endings", "motion", "manners", "social"],
     "simulation.scenarios": ["paper", "meetings", "worlds", "atlas"],
     "workbook": [
-        "figures", "claims", "sensitivity", "exercises", "record", "report", "runner", "command_line",
+        "figures", "claims", "sensitivity", "exercises", "record", "laboratory", "report", "runner",
+        "command_line",
     ],
     "workbook.figures": [
         "style", "tracks", "encounters", "zones", "control", "players", "simulation", "crowds",
@@ -58,6 +59,7 @@ ROOMS = {
         "task", "tracks", "outliers", "zones", "certainty", "barriers", "robot", "checking",
     ],
     "workbook.record": ["method", "places", "validation", "tables", "notebook"],
+    "workbook.laboratory": ["bench", "page"],
     "workbook.report": ["front_page", "document"],
     "workbook.runner": ["summary", "worker", "execution"],
 }  # fmt: skip

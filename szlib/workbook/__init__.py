@@ -5,6 +5,7 @@ claims        what data says of the paper's claims: effects, intervals, verdicts
 sensitivity   what moves a zone most
 exercises     the tasks of the exercise sheets, with their checkers and hints
 record        what a notebook writes down, and where it goes
+laboratory    a scene that can be dragged and set while it runs
 report        a run to read without running anything
 runner        the whole workbook, headless, and what came of it
 command_line  `szlib run | report | inspect | extract`
@@ -20,6 +21,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "sensitivity",
         "exercises",
         "record",
+        "laboratory",
         "report",
         "runner",
         "command_line",

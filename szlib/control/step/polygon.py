@@ -24,7 +24,7 @@ _REACH = 3
 """The box of accelerations ends within so many times its half-width of any point in it."""
 _POINTS = 49
 """Points of each curve: between two of them it is straight to 1e-3 m/s2."""
-_BISECTIONS = 40
+_BISECTIONS = 20
 """Halvings after which nothing is left of the width of the box that could be seen."""
 
 

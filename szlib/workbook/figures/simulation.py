@@ -108,6 +108,27 @@ def plot_robot_paths(logs: Mapping[str, SimulationLog], *, ax: Axes | None = Non
     return metres(ax, first.scenario.title)
 
 
+def plot_strip(logs: Mapping[str, SimulationLog], *, every: float) -> Figure:
+    """Pictures of several runs of one scene every so many seconds: a row for each run, by name."""
+    longest = max(float(log.time[-1]) for log in logs.values())
+    times = np.arange(0.0, longest + 1e-9, every)
+    figure = plt.figure(figsize=(3.2 * len(times), 1.7 * len(logs) + 0.3), layout="constrained")
+    grid = figure.subplots(len(logs), len(times), squeeze=False, sharex=True, sharey=True)
+    for panels, (name, log) in zip(grid, logs.items(), strict=True):
+        for ax, time in zip(panels, times.tolist(), strict=True):
+            row = min(round(time / log.settings.dt), len(log.states) - 1)
+            _stage(ax, log.scenario)
+            ax.plot(*log.states[: row + 1, :2].T, color=BLUE, linewidth=1, label="robot's path")
+            _draw_moment(ax, log, row, robot=BLUE, zone=RED)
+            _frame(ax, [(each, np.arange(len(each.states))) for each in logs.values()])
+            ax.set_title(
+                f"{name}, {log.time[row]:g} s, h = {log.h[row].min(initial=np.inf):.2f} m", fontsize=9
+            )
+            metres(ax)
+            ax.label_outer()
+    return figure
+
+
 def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> Movie:
     """The run as an animated GIF, a frame every so many seconds, twice as fast; a player in notebooks."""
     step = max(1, round(every / log.settings.dt))
@@ -150,6 +171,25 @@ def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> 
     ax.set_xticks(range(table.shape[1]), [f"{name:g}" for name in table.columns])
     ax.set_yticks(range(table.shape[0]), [f"{name:g}" for name in table.index])
     ax.set(xlabel=str(table.columns.name), ylabel=str(table.index.name))
+    return ax
+
+
+def plot_manners(
+    table: pd.DataFrame, *, names: Sequence[str], rows: str, columns: str, ax: Axes | None = None
+) -> Axes:
+    """A map of what a robot did, as from `scenarios.atlas.chart`: one value of "manner" a cell, as a letter.
+
+    `names` are all that may occur, from pale to dark; the letter is the place in them: A, B, C, ...
+    """
+    ax = axes(ax, size=(4, 3.2))
+    found = table.pivot(index=rows, columns=columns, values="manner").sort_index(ascending=False)
+    places = found.map(list(names).index).to_numpy()
+    ax.imshow(places, cmap="YlOrBr", vmin=0, vmax=1.3 * len(names), aspect="auto")
+    for (row, column), place in np.ndenumerate(places):
+        ax.text(column, row, chr(ord("A") + place), ha="center", va="center", fontsize=9)
+    ax.set_xticks(range(found.shape[1]), [f"{value:g}" for value in found.columns])
+    ax.set_yticks(range(found.shape[0]), [f"{value:g}" for value in found.index])
+    ax.set(xlabel=columns, ylabel=rows)
     return ax
 
 

@@ -46,10 +46,17 @@ def settings_table(settings: MPCSettings) -> Styler:
     )
 
 
+class Table(Styler):
+    """A table to look at, which is the same text and HTML every time."""
+
+    def __repr__(self) -> str:
+        return str(self.data.to_string(index=False))  # type: ignore[attr-defined]
+
+
 def whole(table: pd.DataFrame) -> Styler:
-    """A table whose long texts are shown to their end, the same HTML every time."""
+    """A table whose long texts are shown to their end."""
     left = [{"selector": "td, th", "props": "text-align: left"}]
-    styled = Styler(table, uuid="szlib", cell_ids=False).format(as_text).hide(axis="index")
+    styled = Table(table, uuid="szlib", cell_ids=False).format(as_text).hide(axis="index")
     return styled.set_table_styles(left)  # type: ignore[arg-type]
 
 
@@ -75,3 +82,5 @@ def show_with_words() -> None:
     if shell is not None and shell.display_formatter is not None:
         pd.options.display.precision = 3
         shell.display_formatter.mimebundle_formatter.for_type_by_name("matplotlib.figure", "Figure", words)
+        plain = shell.display_formatter.formatters["text/plain"]
+        plain.for_type(Styler, lambda table, printer, _: printer.text(table.data.to_string()))

@@ -17,6 +17,7 @@ from ...errors import DataError, SolverError
 from ...files import printable
 
 SETTINGS = {"gamma": "gamma", "gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
+SETTINGS |= {f"{name}_b": name for name in ("gamma", "N_h", "a_max")}
 """Parameters that are settings of the controller by another name, or lists of them."""
 _MANY = 2**31
 RANGES: dict[str, tuple[float, float]] = {
@@ -24,12 +25,12 @@ RANGES: dict[str, tuple[float, float]] = {
     "min_distance": (0, 100), "min_speed": (0.01, 10), "q": (0.001, 0.5), "zone_speed": (0.01, 10),
     "intruders": (0, 0.5), "examples": (1, _MANY), "worlds": (1, _MANY), "n_jobs": (-1, _MANY),
     "fraction": (1e-6, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
-    "eccentricities": (0, 0.999999),
+    "eccentricities": (0, 0.999999), "size": (0.05, 20), "size_b": (0.05, 20), "speed": (0, 10),
 }  # fmt: skip
 """Lowest and highest value."""
 FOR_OPTIONS = {"data": "--data", "results": "--out"}
 """Parameters that the command line has options for."""
-NEUTRAL = {*FOR_OPTIONS, "area", "n_jobs", "interactive", "examples"}
+NEUTRAL = {*FOR_OPTIONS, "area", "n_jobs", "examples"}
 """Parameters that no check was made for: which data, how it is computed, what is shown."""
 
 

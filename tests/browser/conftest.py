@@ -1,0 +1,104 @@
+"""JupyterLab on the loopback, on a copy of the repository, and a Chromium of this machine to open it in."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "microsoft-edge")
+REQUIRED = "SZLIB_BROWSER"
+"""Set where there must be a browser, as in CI: then the tests fail without one."""
+SETTINGS = {
+    "notebook-extension/tracker": {"windowingMode": "none"},
+    "apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
+}
+"""Every cell is on the page, and nothing is asked of other servers."""
+
+
+def chromium() -> str:
+    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
+    if found is None:
+        reason = f"no browser on this machine: looked for {', '.join(BROWSERS)}"
+        if os.environ.get(REQUIRED):
+            pytest.fail(f"{reason}, and {REQUIRED} is set")
+        pytest.skip(reason)
+    return found
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[object]:
+    executable = chromium()
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as driver:
+        launched = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
+        yield launched
+        launched.close()
+
+
+@pytest.fixture(scope="session")
+def copy(browser: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The package, the notebooks and their settings, as a git repository of their own."""
+    folder = tmp_path_factory.mktemp("copy") / "szlib"
+    for name in ("szlib", "notebooks"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", ".*"))
+    shutil.copy(ROOT / "pyproject.toml", folder)
+    for arguments in (["init", "-q"], ["add", "-A"]):
+        subprocess.run(["git", *arguments], cwd=folder, check=True)
+    who = ["-c", "user.name=szlib", "-c", "user.email=szlib@localhost"]
+    subprocess.run(["git", *who, "commit", "-q", "-m", "copy"], cwd=folder, check=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def lab(copy: Path) -> Iterator[str]:
+    """The address of a JupyterLab whose files are those of the copy."""
+    home = copy.parent / "jupyter"
+    for name, content in SETTINGS.items():
+        file = home / "settings" / "@jupyterlab" / f"{name}.jupyterlab-settings"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(content))
+    folders = {f"JUPYTER_{name}_DIR": str(home / name.lower()) for name in ("CONFIG", "RUNTIME")}
+    folders |= {"JUPYTERLAB_SETTINGS_DIR": str(home / "settings"), "IPYTHONDIR": str(home / "ipython")}
+    folders |= {"JUPYTERLAB_WORKSPACES_DIR": str(home / "workspaces"), "PYTHONPATH": str(copy)}
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [
+        sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--expose-app-in-browser",
+        "--ip=127.0.0.1", f"--port={port}", "--ServerApp.port_retries=0", "--IdentityProvider.token=szlib",
+        f"--ServerApp.root_dir={copy}",
+    ]  # fmt: skip
+    log = (copy.parent / "lab.log").open("wb")
+    server = subprocess.Popen(command, env=os.environ | folders, stdout=log, stderr=log, cwd=copy)
+    address = f"http://127.0.0.1:{port}"
+    try:
+        _wait(server, f"{address}/api/status?token=szlib", copy.parent / "lab.log")
+        yield address
+    finally:
+        server.terminate()
+        server.wait(30)
+        log.close()
+
+
+def _wait(server: subprocess.Popen[bytes], address: str, log: Path) -> None:
+    for _ in range(600):
+        if server.poll() is not None:
+            break
+        try:
+            with urllib.request.urlopen(address, timeout=5):
+                return
+        except (urllib.error.URLError, OSError):
+            time.sleep(0.2)
+    pytest.fail(f"JupyterLab did not start: {log.read_text(errors='replace')[-2000:]}")

@@ -1,0 +1,170 @@
+"""The notebooks in a real browser: run, moved by hand, saved; and the report made of them."""
+
+import subprocess
+
+import jupytext
+import nbformat
+import pytest
+
+from szlib.workbook.report import document
+
+MINUTES = 60_000
+COMMANDS = "window.jupyterapp.commands"
+
+
+class Notebook:
+    """A notebook in a page of JupyterLab."""
+
+    def __init__(self, page, address, copy, name):
+        self.page, self.file = page, copy / "notebooks" / f"{name}.ipynb"
+        page.goto(f"{address}/doc/tree/notebooks/{name}.ipynb?token=szlib")
+        page.wait_for_selector(".jp-Notebook .jp-CodeCell", timeout=2 * MINUTES)
+        page.wait_for_function("window.jupyterapp?.shell.currentWidget?.sessionContext?.isReady")
+
+    def command(self, name):
+        self.page.evaluate(f"{COMMANDS}.execute('{name}')")
+
+    def run(self):
+        """Run all cells, to the end."""
+        session = "window.jupyterapp.shell.currentWidget.sessionContext.session"
+        self.page.wait_for_function(f"{session}?.kernel?.status === 'idle'", timeout=MINUTES)
+        self.page.evaluate("() => { window.done = false; }")
+        finished = ".then(() => { window.done = true; })"
+        self.page.evaluate(f"() => {{ {COMMANDS}.execute('notebook:run-all-cells'){finished}; }}")
+        self.page.wait_for_function("window.done", timeout=4 * MINUTES)
+
+    def save(self):
+        """Save, and what is in the file then."""
+        self.command("docmanager:save")
+        self.page.wait_for_function("!window.jupyterapp.shell.currentWidget.context.model.dirty")
+        return nbformat.read(self.file, as_version=4)
+
+
+@pytest.fixture
+def notebook(browser, lab, copy):
+    """Opens a notebook by its name."""
+    page = browser.new_page(viewport={"width": 1400, "height": 1000})
+    page.set_default_timeout(MINUTES)
+    yield lambda name: Notebook(page, lab, copy, name)
+    page.evaluate("window.jupyterapp.serviceManager.sessions.shutdownAll()")
+    page.close()
+
+
+def errors(saved):
+    return [
+        out.evalue for cell in saved.cells for out in cell.get("outputs", ()) if out.output_type == "error"
+    ]
+
+
+def in_step(file, saved):
+    """The pair says the same, and nothing but outputs has changed since the commit."""
+    script = jupytext.read(file.with_suffix(".py"))
+    for a, b in zip(saved.cells, script.cells, strict=True):
+        assert (a.cell_type, a.source, a.metadata.get("tags")) == (
+            b.cell_type,
+            b.source,
+            b.metadata.get("tags"),
+        )
+    changed = subprocess.run(
+        ["git", "diff", "--stat", "--", "*.py", "pyproject.toml"],
+        cwd=file.parent,
+        capture_output=True,
+        text=True,
+    )
+    assert changed.stdout == ""
+
+
+def picture(locator):
+    """What a canvas shows."""
+    return locator.evaluate("canvas => canvas.toDataURL()")
+
+
+def test_a_slider_of_the_zones_draws_another_speed(notebook):
+    opened = notebook("05_zones")
+    opened.run()
+    shown = opened.page.locator(
+        ".jupyter-widgets.widget-output img, .jupyter-widgets .jp-OutputArea img"
+    ).last
+    shown.wait_for(timeout=MINUTES)
+    before = shown.get_attribute("src")
+    opened.page.locator(".widget-slider .noUi-handle").last.press("ArrowRight")
+    opened.page.wait_for_function(
+        "before => [...document.querySelectorAll('.jupyter-widgets img')].some(image => image.src !== before)",
+        arg=before,
+    )
+    saved = opened.save()
+    assert errors(saved) == []
+    in_step(opened.file, saved)
+
+
+def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
+    opened = notebook("08_corridor")
+    opened.run()
+    plays(opened.page)
+    saved = opened.save()
+    assert errors(saved) == []
+    in_step(opened.file, saved)
+    home = copy.parent / "run"
+    home.mkdir()
+    nbformat.write(saved, home / "08_corridor.ipynb")
+    page, said = browser.new_page(), []
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    fetched = lambda request: said.append(request.url) if request.url.startswith("http") else None
+    page.on("request", fetched)
+    page.goto(document.write(home).as_uri())
+    plays(page)
+    broken = page.evaluate("[...document.images].filter((i) => !i.complete || !i.naturalWidth).length")
+    assert (said, broken) == ([], 0)
+    page.close()
+
+
+def plays(page):
+    """The first player goes on when it is asked to, stops, and shows the time it is set to."""
+    player = page.locator("figure.szlib-player").first
+    player.scroll_into_view_if_needed()
+    slider, canvas = player.locator("input[type=range]"), player.locator("canvas").first
+    begin, shown = slider.input_value(), picture(canvas)
+    player.get_by_role("button").click()
+    page.wait_for_function(
+        "begin => Number(document.querySelector('figure.szlib-player input').value) > Number(begin)",
+        arg=begin,
+    )
+    player.get_by_role("button").click()
+    assert picture(canvas) != shown
+    slider.fill("0")
+    assert "t = 0.0 s" in player.text_content()
+
+
+def test_the_laboratory_is_dragged_set_run_and_shared(notebook):
+    opened = notebook("20_laboratory")
+    opened.run()
+    page, told = opened.page, opened.page.locator(".szlib-told")
+    page.wait_for_function("[...document.querySelectorAll('.szlib-told')].every(it => it.textContent)")
+    scenes = [panel.locator("canvas").first for panel in page.locator(".szlib-panel").all()]
+    before = [picture(scene) for scene in scenes]
+    scenes[0].scroll_into_view_if_needed()
+    box = scenes[0].bounding_box()
+    page.mouse.move(box["x"] + 319, box["y"] + 90)  # the person, at (4, 0)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 240, box["y"] + 100, steps=5)
+    page.mouse.up()
+    slider = page.locator("input[name=gamma]").first
+    slider.click(position={"x": 60, "y": 8})
+    gamma = float(slider.input_value())
+    assert gamma > 0.1
+    assert all(picture(scene) != shown for scene, shown in zip(scenes, before, strict=True))
+    page.locator(".szlib-share").click()
+    page.wait_for_function("document.querySelector('.szlib-cell').value.length")
+    shared = {}
+    exec(page.locator(".szlib-cell").input_value(), shared)
+    assert shared["gamma"] == gamma
+    assert shared["person"][:2] == pytest.approx([1.34, -0.33], abs=0.1)
+    page.locator(".szlib-run").click()
+    page.wait_for_function("parseFloat(document.querySelector('.szlib-told').textContent.slice(4)) > 2")
+    print(page.locator(".szlib-rate").text_content())
+    page.locator(".szlib-run").click()
+    assert page.locator(".szlib-refused").text_content() == "" and told.count() == 2
+    saved = opened.save()
+    assert errors(saved) == []
+    in_step(opened.file, saved)
