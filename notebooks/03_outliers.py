@@ -162,8 +162,8 @@ record.claim(
 )
 
 # %% [markdown]
-# Not by bad luck. An encounter has 31 samples, a tenth of a second apart; among 20 neighbours a slow
-# intruder meets nobody but themselves, and lies in good company. More neighbours help, but a quota still
+# An encounter has 31 samples, a tenth of a second apart: the 20 neighbours of a slow intruder's sample are
+# samples of the same intruder, and as dense as it is. More neighbours help, but a quota still
 # takes as much where there are many intruders as where there are none.
 #
 # ## Whole encounters
@@ -284,7 +284,7 @@ for rule, share in (("none", 0.0), ("paper", fraction), ("10 x", 10 * fraction),
 
 # %% [markdown]
 # **What it means.** LOF with a quota is a convention, not a discovery: it takes its share whatever the data,
-# and an intruder within the dense streak of their own track is not lonely. Whole encounters, judged by
+# and an intruder within the dense streak of their own track is not isolated. Whole encounters, judged by
 # their nearest approach, are found where there are enough others to compare with. A day with a few
 # hundred encounters says too little of anybody: there hardly any is taken away, and the nearest stay in.
 

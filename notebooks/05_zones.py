@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [4 - The hull and its slices](04_hull.ipynb) · next: [6 -
-# Barriers](06_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 10 min to read
+# Barriers](06_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 15 min to read
 #
 # **Afterwards you can** enclose a zone in the smallest ellipse, and say how far to trust it.
 

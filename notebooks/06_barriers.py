@@ -22,9 +22,9 @@
 # down as it comes near.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [5 - Social zones](05_zones.ipynb) · next: [7 - Passing a person
-# who stands](07_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 1-7 · 10 min to
-# read
+# [Start](00_start_here.ipynb) · before: [5 - Social zones](05_zones.ipynb) · next: [6b - Build the
+# controller yourself](06b_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3,
+# eq. 1-7 · 10 min to read
 #
 # **Afterwards you can** turn a distance into a condition on the next step, and say what gamma does.
 #

@@ -20,6 +20,18 @@
 # plans (MPC), and both together (MPC-CBF). The last one is the controller of the paper, and must decide the
 # same as `szlib.MPCCBF`.
 
+# %% [markdown]
+# [Start](00_start_here.ipynb) · before: [6 - Barriers](06_barriers.ipynb) · next: [7 - Passing a person who
+# stands](07_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 25 min to
+# read
+#
+# **Afterwards you can** write an MPC-CBF yourself, and say what each of its terms is there for.
+#
+# **Words.** *CBF-QP*: a quadratic program for one step: as near to the wanted control as the barrier
+# allows; *IPOPT*: the solver for nonlinear optimisation that the paper uses; *MPC*: model predictive
+# control: plan some steps ahead, take the first, plan again; *slack*: by how much a row is violated; *SQP*:
+# sequential quadratic programming: solve quadratic problems in a row, each around the last answer.
+
 # %%
 import casadi as ca
 import matplotlib.pyplot as plt
@@ -236,7 +248,7 @@ record.figure(fig, "weights")
 # parameters of the program, which is written down once.
 
 # %%
-zone = record.zone().ellipse(1.1)
+zone = record.ellipse()
 scene = szlib.SCENARIOS["corridor"]
 opti = ca.Opti()
 x, u = opti.variable(4, N + 1), opti.variable(2, N)
@@ -305,12 +317,19 @@ for k in range(N_h):
 opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "tol": 1e-10})
 
 
+unsolved = []
+
+
 def decide(state, person):
     opti.set_value(x0, state)
     opti.set_value(foci, zone.placed(person.position, person.heading).foci.T)
     opti.set_value(w, person.velocity)
     opti.set_initial(x, np.tile(np.reshape(state, (4, 1)), N + 1))
-    return opti.solve().value(u)[:, 0]
+    try:
+        return opti.solve().value(u)[:, 0]
+    except RuntimeError:  # no solution: IPOPT's last guess is all there is; notebook 11 does better
+        unsolved.append(tuple(state))
+        return np.clip(opti.debug.value(u)[:, 0], -a_max, a_max)
 
 
 # %% [markdown]
@@ -322,6 +341,7 @@ for k in range(140):
     states.append(state)
     controls.append(decide(state, scene.people[0].after(k * dt)))
     state = np.array(A @ state + B @ controls[-1]).ravel()
+print(f"steps without a solution: {len(unsolved)} of {len(states)}")
 
 # %%
 path = np.array(states)
@@ -347,7 +367,7 @@ record.figure(fig, "corridor")
 
 # %%
 rows = []
-for k in range(0, 100, 10):
+for k in (k for k in range(0, 100, 10) if tuple(path[k]) not in unsolved):
     for solver in ("sqp", "ipopt"):
         settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max, tie=0.0, solver=solver)
         controller = szlib.MPCCBF(zone, walls=scene.walls, settings=settings)

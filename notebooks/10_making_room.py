@@ -14,24 +14,29 @@
 # %% [markdown]
 # # 10 - Yielding by making room
 #
-# **Question.** This time the robot is *in* the passage when the person comes. It cannot wait
-# where it is.
+# **Question.** This time the robot is *in* the passage when the person comes. It wants to go ahead. What
+# makes it go back?
 #
 # **Expectation.** The paper: the robot gives way first - here it must back out - and goes on
 # afterwards.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [9 - Yielding by waiting](09_waiting.ipynb) · next: [11 -
-# Feasibility](11_feasibility.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 5 min to
-# read
+# Feasibility](11_feasibility.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 10 min
+# to read
 #
 # **Afterwards you can** say why the robot backs out of a passage, although no rule tells it to.
 
 # %%
 import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
+from IPython.display import Markdown
 
 import szlib
+from szlib.control.step import admissible
+from szlib.simulation.metrics import manner, retreat
+from szlib.simulation.scenarios import Cell
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
@@ -41,29 +46,28 @@ area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, o
 seed = 0
 results = "../results"
 gamma = 0.05
+N = 8
+N_h = 2
+a_max = 1.0  # m/s2
+width = 2.0  # of the passage, m
+pace = 0.5  # of the person, m/s
 
 # %%
 record = NotebookRecord("10_making_room", globals())
-settings = szlib.MPCSettings(gamma=gamma)
-scenario = szlib.SCENARIOS["making_room"]
-person = scenario.people[0]
+settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
+scenario = Cell("making_room", width=width, pace=pace).scenario()
 parameters(
     [
-        (
-            "person's speed",
-            f"{abs(person.velocity[0])} m/s",
-            PAPER,
-            "constant, known exactly, unaffected by the robot",
-        ),
-        ("places of robot, person, walls", "see the figure", ASSUMED, "the paper shows them without numbers"),
+        ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
+        ("passage", f"{width} m", ASSUMED, "the paper shows walls without numbers"),
         ("N, N_h, dt", f"{settings.N}, {settings.N_h}, {settings.dt} s", PAPER, "sec. 4"),
-        ("gamma", gamma, MEASURED, "see notebook 06"),
-        ("Q, R, P, a_max, tie", "as in notebook 07", ASSUMED, "the paper gives none"),
+        ("gamma", gamma, MEASURED, "notebook 07: the four scenarios against gamma"),
+        ("a_max; Q, R, P, tie", f"{a_max} m/s²; as in notebook 07", ASSUMED, "the paper gives none"),
     ]
 )
 
 # %%
-zone = record.zone().ellipse(settings.zone_speed)
+zone = record.ellipse()
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
 log = szlib.simulate(scenario, controller)
 metrics = log.metrics()
@@ -78,10 +82,9 @@ record.animation(movie := log.animate(), "run")
 movie
 
 # %% [markdown]
-# ## Safe?
+# ## Safe, and as the paper says?
 #
-# The promises that must hold with any zone that leaves the scene passable: the goal, $h \ge 0$ at
-# every step for every person and wall, no step without a solution, no speeding.
+# The promises that must hold with any zone that leaves the scene passable, and the claims of the paper.
 
 # %%
 record.check("the goal is reached", metrics["success"])
@@ -91,26 +94,111 @@ record.check("nothing is touched (Euclidean)", metrics["min_clearance"] > 0, met
 record.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metrics["max_speed"])
 record.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_speed", "time_yielding")}
 
-# %% [markdown]
-# ## As the paper says?
-
 # %%
 for claim in scenario.claims:
     record.claim(claim.text, *claim.check(log))
 
 # %%
-fig, (upper, lower) = plt.subplots(2, 1, figsize=(8, 4.5), sharex=True, layout="constrained")
-figures.plot_speed(log, ax=upper).set(title="The robot backs out, stands aside, and goes on", xlabel="")
-figures.plot_barriers(log, ax=lower)
-record.figure(fig, "run")
-
-# %%
-log.min_h().to_frame("smallest h [m]").round(3)
+fig, ax = plt.subplots(figsize=(8, 4), layout="constrained")
+ax.axhspan(0, 3, color=figures.GREY, alpha=0.25, label="inside the passage")
+ax.plot(log.time, log.states[:, 0], color=figures.BLUE, linewidth=2, label="robot")
+x = log.people[:, 0, 0]
+ax.plot(log.time, x, "--", color=figures.RED, label="person")
+reach = zone.semi_axes[0]
+ax.fill_between(log.time, x - reach, x + reach, color=figures.RED, alpha=0.15, lw=0, label="zone")
+ax.set(
+    xlabel="time [s]",
+    ylabel="x [m]",
+    title=f"It goes back by {retreat(log):.1f} m, stands aside, and goes on",
+)
+ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1))
+record.figure(fig, "space-time")
 
 # %% [markdown]
-# **What it means.** The zone moves with the person, and h falls even for a robot at rest: the
-# only controls that obey the barrier condition lead backwards. Making room needs no rule of its
-# own.
+# ## A speed limit below zero
+#
+# $h$ may fall by $\gamma h / \Delta t$ a second. The person alone uses up `pace` of that, as they come nearer
+# whatever the robot does. What is left for the robot is $\gamma h / \Delta t$ less their pace: zero at
+# $h = $ pace $\cdot\,\Delta t / \gamma$, and *negative* nearer than that. A robot that stands still there
+# breaks the condition; the least that it may do is to go back.
+
+# %%
+h, back = log.h[:, 0], -log.states[:, 2]
+until = int(np.argmax(log.states[:, 0] < 0))
+stand = pace * settings.dt / gamma
+fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
+ax.plot(h[:until], log.states[:until, 2], color=figures.BLUE, linewidth=2, label="robot, until it is out")
+line = np.array([0.0, 1.2 * h[:until].max()])
+ax.plot(line, gamma * line / settings.dt - pace, color=figures.RED, label="gamma h / dt - pace")
+ax.axhline(0, color=figures.GREY, linewidth=0.8)
+ax.axvline(stand, color=figures.GREY, linestyle=":", label=f"h = {stand:.2f} m: stand still")
+ax.set(xlabel="h to the person [m]", ylabel="speed ahead [m/s]", xlim=(0, line[1]), ylim=(-0.8, 0.8))
+ax.set_title("From right to left: on, slower, back")
+ax.legend(loc="lower right")
+record.figure(fig, "below-zero")
+
+# %% [markdown]
+# From the moment at which it turns back, one step, with all accelerations that obey every row:
+
+# %%
+turns = float(log.time[np.argmax(log.states[:, 2] < -0.02)])
+step = controller.step(*log.at(turns))
+fig, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
+figures.plot_step(step, ax=left)
+figures.plot_admissible(step, ax=right)
+record.figure(fig, "admissible")
+
+# %%
+ahead = admissible(step).polygon.bounds[2]
+record.check("as it turns back every admissible acceleration leads back", ahead < 0, ahead)
+Markdown(
+    f"At {turns:.1f} s, h = {step.h[0]:.2f} m: the gentlest of them is {ahead:.2f} m/s². "
+    f"The rule of thumb above says: back from h = {stand:.2f} m on."
+)
+
+# %% [markdown]
+# ## How fast may the person come?
+#
+# The robot must go back as fast as they come, and be out of the way in time.
+
+# %%
+rows = []
+for each in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2):
+    scene = Cell("making_room", width=width, pace=each).scenario()
+    run = szlib.simulate(scene, szlib.MPCCBF(zone, walls=scene.walls, settings=settings))
+    found = run.metrics()
+    numbers = (found[name] for name in ("min_h", "infeasible_steps", "time_to_goal"))
+    rows.append((each, manner(run), retreat(run), *numbers))
+columns = ["pace [m/s]", "robot", "goes back [m]", "least h [m]", "infeasible steps", "to goal [s]"]
+paces = pd.DataFrame(rows, columns=columns)
+paces.style.format(precision=2).hide(axis="index")
+
+# %%
+fig, ax = plt.subplots(figsize=(7, 3.4), layout="constrained")
+safe = paces["infeasible steps"] == 0
+ax.plot(paces["pace [m/s]"], paces["least h [m]"], "-", color=figures.GREY, linewidth=1)
+for some, marker, told in ((safe, "o", "every step has a plan"), (~safe, "X", "some steps have none")):
+    shown = paces[some]
+    ax.plot(shown["pace [m/s]"], shown["least h [m]"], marker, markersize=8, label=told)
+ax.axhline(0, color=figures.BLACK, linewidth=0.8)
+nearest = paces.loc[paces["least h [m]"].idxmin(), "pace [m/s]"]
+ax.set(
+    xlabel="pace of the person [m/s]", ylabel="least h [m]", title=f"Nearest to who walks at {nearest:g} m/s"
+)
+ax.legend()
+record.figure(fig, "paces")
+
+# %%
+failing = paces.loc[~safe, "pace [m/s]"]
+Markdown(
+    "Every step had a plan up to the fastest tried."
+    if failing.empty
+    else f"The slowest person for whom some step had no plan walks at {failing.min():g} m/s."
+)
+
+# %% [markdown]
+# **What it means.** Making room needs no rule of its own. The zone moves with the person, and $h$ falls even
+# for a robot at rest: near enough, the only controls that obey the barrier lead backwards.
 
 # %%
 record.close()

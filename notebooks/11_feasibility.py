@@ -29,7 +29,7 @@
 # **Afterwards you can** say when a step has no solution, and prove when there always is one.
 #
 # **Words.** *exact penalty*: a price on violations so high that none is paid where a solution without
-# violations exists; *MPC*: model predictive control: plan some steps ahead, take the first, plan again.
+# violations exists.
 
 # %%
 from dataclasses import replace
@@ -119,8 +119,9 @@ record.key["h at worst, N_h = 2, gamma = 0.8 [m]"] = float(paper.loc[0.8, "min_h
 # %% [markdown]
 # ## One infeasible step, three answers
 #
-# The first scenario with $\gamma = 0.8$: the robot drives at full speed until, shortly before the
-# zone, it can hardly be held back; where the zone is large, some steps (the ticks) have no solution. Three
+# The first scenario with $\gamma = 0.8$ and, as in the paper, no side chosen beforehand (`tie=0`): the
+# robot drives at full speed until, shortly before the zone, it can hardly be held back; where the zone is
+# large, some steps (the ticks) have no solution. Three
 # answers:
 #
 # - **dropped**: a hard solver has no answer, and what it leaves behind is nearly the plan without
@@ -148,7 +149,7 @@ def follow(answer: str, settings: szlib.MPCSettings) -> pd.DataFrame:
 
 
 zone = record.ellipse()
-hasty = szlib.MPCSettings(gamma=0.8)
+hasty = szlib.MPCSettings(gamma=0.8, tie=0.0)
 answers = {answer: follow(answer, hasty) for answer in ("dropped", "relaxed", "braking")}
 
 # %%
@@ -275,9 +276,9 @@ failed = rows[rows["outcome"] != "arrived"]
 failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]]
 
 # %% [markdown]
-# **What it means.** A small $\gamma$ hides a short horizon, at the price of a slow robot. A plan
-# that ends at rest needs no such luck: it carries its own proof, as far as people stand, and where
-# they walk, the robot is never the one who drives in.
+# **What it means.** A small $\gamma$ makes up for a short horizon, at the price of a slow robot. For a
+# plan that ends at rest there is a proof instead, as long as people stand; where they walk, the robot
+# is at rest at the first moment with $h < 0$.
 
 # %%
 record.close()

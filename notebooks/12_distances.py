@@ -194,8 +194,8 @@ record.check("and on the way around the end nothing is touched", gap >= 0, gap)
 record.key["wall of 1 m, paper's eps: gap [cm]"] = 100 * nearest
 
 # %% [markdown]
-# **What it means.** Around people the margin is not needed, and the approximation is polite: it
-# keeps the robot farther off. At the ends of walls shorter than 5 m it is not enough; the paper's
+# **What it means.** Around people the margin is not needed, and the approximation errs to the safe
+# side: it keeps the robot farther off. At the ends of walls shorter than 5 m it is not enough; the paper's
 # restricted pathway has such walls. The right margin is $r^2/L$, and that is what the controller keeps.
 # It costs at most 0.42 r of room, beside walls as long as the robot is wide: describe a row of short
 # pieces as one long wall.

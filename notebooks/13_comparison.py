@@ -155,18 +155,23 @@ record.figure(fig, "zones-and-formulations")
 
 
 # %%
-def more(paired: pd.DataFrame, metric: str) -> str:
+WORTH = {"inside fitted": "s inside zones", "time_to_goal": "s on the way", "success": "arrived"}
+WORTH["min_clearance"] = "m least gap"
+
+
+def worth(paired: pd.DataFrame) -> str:
     """What the ellipse has more than the equal circle, in words: mean [low, high], and whether it is sure."""
-    names = (paired["zone"] == "fitted") & (paired["formulation"] == "paper") & (paired["metric"] == metric)
-    mean, low, high = paired.loc[names, ["mean", "low", "high"]].iloc[0]
-    sure = "" if low > 0 or high < 0 else ", undecided"
-    return f"{mean:+.3f} [{low:+.3f}, {high:+.3f}]{sure}"
+    of = paired[(paired["zone"] == "fitted") & (paired["formulation"] == "paper")].set_index("metric")
+    words = []
+    for metric, what in WORTH.items():
+        mean, low, high = of.loc[metric, ["mean", "low", "high"]]
+        sure = "" if low > 0 or high < 0 else ", undecided"
+        words.append(f"{mean:+.2f} {what} ({low:+.2f} to {high:+.2f}{sure})")
+    shown = "It keeps" if of.loc["inside fitted", "high"] < 0 else "It is not shown that it keeps"
+    return f"{'; '.join(words)}. {shown} the robot out of the zone where such a circle lets it in."
 
 
-for name, paired in (("saved, the plaza's zone", full_paired), ("here, this zone", against_circle)):
-    print(f"{name}, {int(paired['n'].max())} worlds:")
-    for metric in ("success", "time_to_goal", "inside fitted", "min_clearance"):
-        print(f"    {labels[metric]}: {more(paired, metric)}")
+print("here, with this zone,", worlds, "worlds:", worth(against_circle))
 
 # %%
 mean = full.set_index(["behaviour", "formulation", "metric", "zone"])["mean"]
@@ -220,10 +225,8 @@ Markdown(f"""**What it means.** In the saved worlds, of the plaza's zone: withou
 {inside["equal circle"]:.2f} s, with Kirby's zone {inside["Kirby"]:.2f} s, with the fitted one
 {inside["fitted"]:.2f} s. Hall's keeps it out as well, and {arrived["Hall"]:.0%} arrive in time, with the
 fitted zone {arrived["fitted"]:.0%}. **What the ellipse is worth** against a circle of the same area:
-{more(full_paired, "inside fitted")} s inside the zones that people keep,
-{more(full_paired, "time_to_goal")} s on the way, {more(full_paired, "success")} arrived. Coming to rest at
-the end of each plan costs {rest:.1f} s. People who do what was not expected cost at most
-{max(worse.values()):.2f} s more inside zones. Where an interval holds 0, these worlds do not decide.""")
+{worth(full_paired)} Coming to rest at the end of each plan costs {rest:.1f} s. People who do what was not
+expected cost at most {max(worse.values()):.2f} s more inside zones.""")
 
 # %%
 record.close()

@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [13 - Against everything else](13_comparison.ipynb) · next: [15 -
-# Respect or emptiness?](15_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 10 min to
+# Respect or emptiness?](15_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 15 min to
 # read
 #
 # **Afterwards you can** judge whether a file of tracks can be used, and find days unlike the others.
@@ -84,10 +84,10 @@ print(f"{len(files)} files, {seconds['rows'].sum():,} rows, {len(seconds):,} per
 both = seconds.dropna(subset=["sensor_speed", "moved"])
 if len(both):
     ax = figures.plot_speeds(both["sensor_speed"].to_numpy(), both["moved"].to_numpy())
-    record.figure(ax.figure, "speeds")
     slow = both.loc[both["moved"] < quality.STANDING, "sensor_speed"].median()
     inflated = "inflates" if slow > 0.3 else "does not inflate"
     ax.set_title(f"The velocity column {inflated} the speed of who stands: {slow:.2f} m/s")
+    record.figure(ax.figure, "speeds")
     record.key["sensor speed of who stands [m/s]"] = round(float(slow), 3)
     record.claim("the velocity column is inflated for who stands", slow > 0.3, f"{slow:.2f} m/s")
 
@@ -115,8 +115,10 @@ table
 usual = float(np.median(intervals[intervals < 5]))
 record.key["median frame interval [s]"] = round(usual, 4)
 ax = figures.axes(None)
-ax.hist(1e3 * intervals[intervals < 3 * usual], bins=60, color=figures.BLUE)
-spread = np.percentile(1e3 * intervals[intervals < 3 * usual], [5, 95]).round().astype(int)
+short = 1e3 * intervals[intervals < 3 * usual]
+bins = np.arange(np.floor(short.min()) - 0.5, short.max() + 1.5)  # of 1 ms, as the files tell time
+ax.hist(short, bins=bins if len(bins) < 200 else 60, color=figures.BLUE)
+spread = np.percentile(short, [5, 95]).round().astype(int)
 ax.set(xlabel="from one frame to the next [ms]", ylabel="frames")
 ax.set_title("Nine frames in ten come after {} to {} ms".format(*spread))
 record.figure(ax.figure, "intervals")
@@ -151,7 +153,9 @@ figure, panels = plt.subplots(1, 2, figsize=size, layout="constrained", sharey=T
 labels = {"visits": "visits", "standing": "people who stand, mean"}
 for ax, (column, label) in zip(panels, labels.items(), strict=True):
     ax.barh(days.index[~event], days.loc[~event, column], color=figures.BLUE, label="usual")
-    ax.barh(days.index[event], days.loc[event, column], color=figures.RED, hatch="//", label="an event?")
+    if event.any():
+        ax.barh(days.index[event], days.loc[event, column], color=figures.RED, hatch="//", label="event?")
+    ax.locator_params(axis="x", nbins=5)
     ax.set(xlabel=label, ylim=(len(days) - 0.4, -0.6))
 panels[0].set_yticks(days.index, names)
 panels[1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5))

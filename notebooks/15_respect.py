@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [14 - Data quality](14_data_quality.ipynb) · next: [16 - What is
-# true?](16_claims.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 15 min to read
+# true?](16_claims.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 20 min to read
 #
 # **Afterwards you can** tell respect from emptiness by a null model.
 
@@ -125,7 +125,7 @@ record.figure(fig, "kinds")
 strangers, others = szlib.of_kind(samples, "strangers"), null.of_kind("strangers")
 radius = szlib.respect_radius(strangers, others)
 ax = figures.plot_pair_correlation(szlib.pair_correlation(strangers, others), radius=radius)
-ax.set_title(f"Strangers keep out of {radius:.2f} m")
+ax.set_title(f"Strangers: half as often as by chance within {radius:.2f} m")
 record.figure(ax.figure, "g")
 record.key["respect radius, strangers [m]"] = radius
 

@@ -248,7 +248,7 @@ for (name, part), (shade, line) in zip(
 ax.set(xlabel="semi-major axis of the zone [m]", ylabel="time to goal [s]")
 times = driven.groupby("scenario")["time to goal [s]"].agg(lambda t: t.max() - t.min())
 wide = driven["a [m]"].max() - driven["a [m]"].min()
-ax.set_title(f"{100 * wide:.1f} cm of uncertainty change no time by more than {times.max():.1f} s")
+ax.set_title(f"{100 * wide:.1f} cm of uncertainty changes no time by more than {times.max():.1f} s")
 ax.legend(fontsize=8)
 record.figure(fig, "robot")
 

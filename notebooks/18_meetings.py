@@ -22,8 +22,8 @@
 # has to be chosen.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [17 - Other people's crowds](17_crowds.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 15 min to read
+# [Start](00_start_here.ipynb) · before: [17 - Other people's crowds](17_crowds.ipynb) · next: [19 - A
+# sensitivity atlas](19_atlas.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 15 min to read
 #
 # **Afterwards you can** say in which meetings this controller is good, and in which it is bad.
 

@@ -22,7 +22,7 @@
 # sooner.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [18 - Eleven meetings](18_meetings.ipynb) ·
+# [Start](00_start_here.ipynb) · before: [19 - A sensitivity atlas](19_atlas.ipynb) ·
 # [paper](https://arxiv.org/abs/2405.15101): sec. 3-4 · 10 min to read
 #
 # **Afterwards you can** try out a scene of your own, live, and hand its settings on.

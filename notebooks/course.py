@@ -98,7 +98,7 @@ GLOSSARY: dict[str, Word] = {
         "LOS: where the other person is, seen from the reference pedestrian", r"line.of.sight", new=False
     ),
     "LOF": Word(
-        "local outlier factor: how lonely a sample is, compared with its neighbours", r"\bLOF\b", new=False
+        "local outlier factor: how isolated a sample is, compared with its neighbours", r"\bLOF\b", new=False
     ),
     "MPC": Word("model predictive control: plan some steps ahead, take the first, plan again", r"\bMPC\b"),
     "null model": Word("the same people, each moved in time, so that nobody minds anybody", new=False),

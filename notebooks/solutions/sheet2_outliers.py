@@ -92,9 +92,9 @@ exercises.check("found", found)
 # ## 2.4 LOF's blind spot (30 min)
 #
 # The local outlier factor compares how dense the data is around a sample with how dense it is around
-# the sample's 20 nearest neighbours. `cloud` holds other people's samples, shape (600, 2). Be the
-# intruder: give the 31 samples of one encounter, shape (31, 2), all of them 0.3 m or more from
-# everybody in the cloud and no two the same, of which LOF with a quota of 1 % takes away *none*.
+# the sample's 20 nearest neighbours. `cloud` holds other people's samples, shape (600, 2). Give the
+# 31 samples of one encounter, shape (31, 2), all of them 0.3 m or more from everybody in the cloud
+# and no two the same, of which LOF with a quota of 1 % takes away *none*.
 
 
 # %%
@@ -112,8 +112,8 @@ exercises.check("blind_spot", blind_spot)
 
 # %% [markdown]
 # **Solution.** Among its 20 nearest neighbours each of the 31 samples finds only samples of the same
-# intruder, so it lies in a place as dense as theirs. Lonely is the encounter, not the sample:
-# notebook 03 compares whole encounters.
+# intruder, so it lies in a place as dense as theirs. What lies apart is the encounter, not its
+# samples: notebook 03 compares whole encounters.
 
 # %%
 direction, reach = np.random.default_rng(0).uniform([-np.pi, 0], [np.pi, 1], (600, 2)).T

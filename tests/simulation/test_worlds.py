@@ -35,6 +35,15 @@ def test_start_is_safe_and_goal_can_be_asked_for(seed):
         assert all(euclidean_to_segment(path, *wall).min() >= 0.25 for wall in scenario.walls)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_zone_that_was_learned_is_everybodys_and_the_start_lies_outside_of_it(seed):
+    learned = szlib.Ellipse((0.3, 0.0), (1.5, 0.6))
+    scenario = world(seed, Worlds(zone=learned))
+    assert all(person.zone == learned for person in scenario.people)
+    controller = szlib.MPCCBF(learned, walls=scenario.walls)
+    assert controller.barriers(scenario.start[:2], scenario.people).min() >= 0
+
+
 @given(seeds)
 def test_one_person_in_open_space(seed):
     scenario = world(seed, ONE_PERSON)

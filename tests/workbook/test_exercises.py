@@ -213,3 +213,11 @@ class TestSheet:
             assert test.source.endswith(".require()")
             assert test.metadata["nbgrader"]["locked"]
             assert test.metadata["nbgrader"]["points"] in points.values()
+
+    def test_nbgrader_makes_the_same_stubs(self, sheet):
+        preprocessors = pytest.importorskip("nbgrader.preprocessors", reason="nbgrader is not installed")
+        solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
+        source = sheets.graded(solutions, {task.name: task.minutes for task in SHEETS[sheet]})
+        released = preprocessors.ClearSolutions().preprocess(source, {})[0].cells
+        expected = [cell.source for cell in cells(sheets.EXERCISES / f"{sheet}.py")]
+        assert [cell.source.removesuffix(".require()") for cell in released] == expected

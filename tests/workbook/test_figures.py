@@ -267,6 +267,13 @@ def test_a_tornado_puts_what_moves_most_on_top():
     assert [label.get_text() for label in ax.get_yticklabels()] == ["r_max\n1.5", "speed\n0.9; 1.3"]
 
 
+def test_a_map_of_manners_has_a_letter_for_each_cell():
+    cells = pd.DataFrame({"gamma": [0.1, 0.1, 0.2, 0.2], "width": [1.0, 2.0] * 2, "manner": list("xyyz")})
+    ax = figures.plot_manners(cells, names=["x", "y", "z"], rows="gamma", columns="width")
+    assert [text.get_text() for text in ax.texts] == ["B", "C", "A", "B"]  # the largest gamma on top
+    assert ax.get_xlabel() == "width" and [each.get_text() for each in ax.get_yticklabels()] == ["0.2", "0.1"]
+
+
 def test_findings_are_told_apart_by_more_than_colour():
     table = pd.DataFrame(
         {"claim": list("abc"), "effect": [1.0, -1.0, 0.1], "low": [0.5, -2, -1], "high": [2.0, -0.5, 1],
@@ -275,6 +282,15 @@ def test_findings_are_told_apart_by_more_than_colour():
     ax = figures.plot_findings(table)
     assert len({line.get_marker() for line in ax.lines if line.get_marker() != "None"}) == 3
     assert [label.get_text() for label in ax.get_yticklabels()] == list("abc")
+
+
+def test_a_grid_has_a_panel_for_each_metric_and_one_legend():
+    rows = [(w, c, m, 0.5, 0.4, 0.6) for w in ("a", "b") for c in ("x", "y") for m in ("s", "t", "u", "v")]
+    table = pd.DataFrame(rows, columns=["crowd", "who", "metric", "mean", "low", "high"])
+    labels = {"s": "share", "t": "time [s]", "u": "u", "v": "v"}
+    grid = figures.interval_grid(table, labels, rows="crowd", colour="who", title="A and b")
+    assert [ax.get_xlabel() for ax in grid.axes if ax.axison] == list(labels.values())
+    assert [text.get_text() for text in grid.legends[0].get_texts()] == ["x", "y"]
 
 
 def test_a_crowd_is_drawn_where_it_is_nearest(log):

@@ -46,7 +46,7 @@ def test_a_check_of_the_defaults_is_an_observation_elsewhere_and_a_promise_stays
         ("observation", True, "holds with r_max = 1.5"),
         ("check", False, "FAILED"),
     ]
-    assert "with r_max = 1.5: checks that were made for the defaults" in capsys.readouterr().out
+    assert "with r_max = 1.5: checks of the defaults are observations here" in capsys.readouterr().out
     assert not NotebookRecord("01_test", given | {"r_max": 2.0, "n_jobs": 7, "area": "auto"}).changed
 
 
@@ -103,6 +103,7 @@ def test_an_unreadable_zone_is_fitted_again_and_said_so(record, monkeypatch, cap
 def test_badges():
     table = parameters([("gamma", 0.05, "measured", "why")])
     assert table.data.set_index("parameter").loc["gamma", "badge"] == "measured"
+    assert "gamma" in repr(table) and " at 0x" not in repr(table)
     with pytest.raises(ValueError, match="guessed"):
         parameters([("gamma", 0.05, "guessed", "")])
 

@@ -13,7 +13,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
     submodules=["endings", "motion", "manners", "social"],
     submod_attrs={
         "endings": ["Outcome", "outcome", "path_exists"],
-        "manners": ["MANNERS", "Manner", "manner"],
+        "manners": ["MANNERS", "Manner", "manner", "retreat"],
         "motion": ["along_course", "avoidance_start", "metrics", "passing_side"],
     },
 )

@@ -34,7 +34,8 @@ def _focal_sum(points: Any, center: Any, axes: Any, angle: float) -> Any:
 def _around_a_wall(rng: Rng) -> tuple[Any, ...]:
     a = rng.uniform(-2, 0, 2).round(2)
     b = (a + rng.uniform(0.8, 2.0, 2)).round(2)
-    return np.vstack([b + rng.uniform(0.4, 1.5, (3, 2)), rng.uniform(-3, 3, (4, 2))]).round(2), a, b
+    beside = (a + b) / 2 + 0.3 * (b - a)[::-1] * [1, -1]
+    return np.vstack([beside, b + rng.uniform(0.4, 1.5, (3, 2)), rng.uniform(-3, 3, (3, 2))]).round(2), a, b
 
 
 def _g_and_t(points: Any, a: Any, b: Any) -> tuple[Any, Any]:

@@ -38,6 +38,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "plot_strip",
             "animate",
             "plot_sweep",
+            "plot_manners",
             "plot_intervals",
             "interval_grid",
             "legend_below",

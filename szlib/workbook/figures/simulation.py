@@ -174,6 +174,25 @@ def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> 
     return ax
 
 
+def plot_manners(
+    table: pd.DataFrame, *, names: Sequence[str], rows: str, columns: str, ax: Axes | None = None
+) -> Axes:
+    """A map of what a robot did, as from `scenarios.atlas.chart`: one value of "manner" a cell, as a letter.
+
+    `names` are all that may occur, from pale to dark; the letter is the place in them: A, B, C, ...
+    """
+    ax = axes(ax, size=(4, 3.2))
+    found = table.pivot(index=rows, columns=columns, values="manner").sort_index(ascending=False)
+    places = found.map(list(names).index).to_numpy()
+    ax.imshow(places, cmap="YlOrBr", vmin=0, vmax=1.3 * len(names), aspect="auto")
+    for (row, column), place in np.ndenumerate(places):
+        ax.text(column, row, chr(ord("A") + place), ha="center", va="center", fontsize=9)
+    ax.set_xticks(range(found.shape[1]), [f"{value:g}" for value in found.columns])
+    ax.set_yticks(range(found.shape[0]), [f"{value:g}" for value in found.index])
+    ax.set(xlabel=columns, ylabel=rows)
+    return ax
+
+
 def plot_intervals(
     table: pd.DataFrame, metric: str, *, rows: str, colour: str, label: str, ax: Axes | None = None
 ) -> Axes:

@@ -41,6 +41,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_PLAIN = "text that is not made from numbers speaks of the defaults"
+
+
 class NotebookRecord:
     """The record of one notebook.
 
@@ -77,7 +80,7 @@ class NotebookRecord:
         changed = {n: variables[n] for n, v in defaults.items() if variables.get(n, v) != v}
         self.changed = {n: v for n, v in changed.items() if n not in NEUTRAL}
         if self.changed:
-            print(f"{self._settings()}: checks that were made for the defaults become observations")
+            print(f"{self._settings()}: checks of the defaults are observations here; {_PLAIN}")
         self.out = self._folder(variables, {n: v for n, v in changed.items() if n not in FOR_OPTIONS})
         for part in ("records", "figures"):
             (self.out / part).mkdir(exist_ok=True)

@@ -47,10 +47,17 @@ def settings_table(settings: MPCSettings) -> Styler:
     )
 
 
+class Table(Styler):
+    """A table to look at, which is the same text and HTML every time."""
+
+    def __repr__(self) -> str:
+        return str(self.data.to_string(index=False))  # type: ignore[attr-defined]
+
+
 def whole(table: pd.DataFrame) -> Styler:
-    """A table whose long texts are shown to their end, the same HTML every time."""
+    """A table whose long texts are shown to their end."""
     left = [{"selector": "td, th", "props": "text-align: left"}]
-    styled = Styler(table, uuid="szlib", cell_ids=False).format(as_text).hide(axis="index")
+    styled = Table(table, uuid="szlib", cell_ids=False).format(as_text).hide(axis="index")
     return styled.set_table_styles(left)  # type: ignore[arg-type]
 
 

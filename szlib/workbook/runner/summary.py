@@ -70,27 +70,34 @@ def _read(file: Path) -> dict[str, Any]:
 
 
 def render(summary: Mapping[str, Any]) -> str:
-    """The table that ends a run: notebook, time, checks passed, key figures; then what did not hold."""
-    lines = [f"{'notebook':<20} {'seconds':>7} {'checks':>11}  key figures"]
-    notes, observed = [], 0
-    for name, record in summary["notebooks"].items():
-        checks = [c for c in record["checks"] if c["kind"] == "check"]
-        observed += sum(c["kind"] == "observation" for c in record["checks"])
-        held = (
-            f"{sum(c['passed'] for c in checks)}/{len(checks)}"
-            if record["status"] == "done"
-            else record["status"]
-        )
+    """The table that ends a run: notebook, time, checks passed, key figures; then what did not hold.
+
+    Where parameters differ from those that checks were made for, a column tells how many observations hold.
+    """
+    notebooks = summary["notebooks"].items()
+    observed = any(_held(record, "observation") for _, record in notebooks)
+    lines = [_row("notebook", "seconds", "checks", "observed" if observed else "", "key figures")]
+    notes = []
+    for name, record in notebooks:
+        held = _held(record, "check") or "-" if record["status"] == "done" else record["status"]
+        seen = (_held(record, "observation") or "-") if observed else ""
         key = ", ".join(
             f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in record["key_figures"].items()
         )
-        lines.append(f"{name:<20} {record['seconds']:>7.1f} {held:>11}  {key}")
+        lines.append(_row(name, f"{record['seconds']:.1f}", held, seen, key))
         notes += [
             f"{name}: {c['name']}: {c['result']} ({c['value']})" for c in record["checks"] if not c["passed"]
         ]
         if record.get("error"):
             notes.append(f"{name}: {record['error']}")
-    ending = "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"
-    if observed:
-        ending += f"; {observed} are observations, for parameters differ from those they were made for"
-    return "\n".join([*lines, *notes, ending])
+    return "\n".join([*lines, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
+
+
+def _row(name: str, seconds: str, checks: str, observed: str, key: str) -> str:
+    return f"{name:<20} {seconds:>7} {checks:>11}" + (f" {observed:>9}" if observed else "") + f"  {key}"
+
+
+def _held(record: Mapping[str, Any], kind: str) -> str:
+    """How many of a kind hold, of how many; "" where there are none."""
+    passed = [c["passed"] for c in record["checks"] if c["kind"] == kind]
+    return f"{sum(passed)}/{len(passed)}" if passed else ""
