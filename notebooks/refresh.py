@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import jupytext
+import nbformat
 from nbclient import NotebookClient
 
 from szlib.workbook.record import places
@@ -26,20 +27,25 @@ REAL_DAY = ("01", "02", "03", "04", "05", "16")
 """Notebooks of which a copy on the real day is kept, in the folder `real_day`: `refresh.py real_day`."""
 
 
+def on(source: Path, data: str) -> nbformat.NotebookNode:
+    """A notebook with other data than its own, its links as from the folder `real_day`."""
+    notebook = jupytext.read(source)
+    for cell in notebook.cells:
+        if "parameters" in cell.metadata.get("tags", []):
+            cell.source = re.sub(r'^data = "\w+"', f'data = "{data}"', cell.source, flags=re.MULTILINE)
+        elif cell.cell_type == "markdown":
+            cell.source = re.sub(r"\]\((?!http|#)", "](../", cell.source)
+    return notebook
+
+
 def refresh(source: Path, data: str = "") -> None:
     """Execute one notebook and store it beside its script, without times, so that copies can be compared.
 
-    With other data than its own the copy goes into `real_day`, its links as from there.
+    With other data than its own the copy goes into `real_day`.
     """
-    notebook, target = jupytext.read(source), source.with_suffix(".ipynb")
-    if data:
-        target = HERE / "real_day" / target.name
-        for cell in notebook.cells:
-            if "parameters" in cell.metadata.get("tags", []):
-                cell.source = re.sub(r'^data = "\w+"', f'data = "{data}"', cell.source, flags=re.MULTILINE)
-            elif cell.cell_type == "markdown":
-                cell.source = re.sub(r"\]\((?!http|#)", "](../", cell.source)
-        target.parent.mkdir(exist_ok=True)
+    notebook = on(source, data) if data else jupytext.read(source)
+    target = (HERE / "real_day" if data else HERE) / f"{source.stem}.ipynb"
+    target.parent.mkdir(exist_ok=True)
     NotebookClient(
         notebook,
         kernel_name="python3",
