@@ -1,10 +1,12 @@
 """Execute the committed copies of the notebooks anew, and renew the README's pictures: `make notebooks`."""
 
+import re
 import shutil
 import sys
 from pathlib import Path
 
 import jupytext
+import nbformat
 from nbclient import NotebookClient
 
 from szlib.workbook.record import places
@@ -21,9 +23,29 @@ PICTURES = {
 """The README's names of what the notebooks draw."""
 
 
-def refresh(source: Path) -> None:
-    """Execute one notebook and store it beside its script, without times, so that copies can be compared."""
+REAL_DAY = ("01", "02", "03", "04", "05", "16")
+"""Notebooks of which a copy on the real day is kept, in the folder `real_day`: `refresh.py real_day`."""
+
+
+def on(source: Path, data: str) -> nbformat.NotebookNode:
+    """A notebook with other data than its own, its links as from the folder `real_day`."""
     notebook = jupytext.read(source)
+    for cell in notebook.cells:
+        if "parameters" in cell.metadata.get("tags", []):
+            cell.source = re.sub(r'^data = "\w+"', f'data = "{data}"', cell.source, flags=re.MULTILINE)
+        elif cell.cell_type == "markdown":
+            cell.source = re.sub(r"\]\((?!http|#)", "](../", cell.source)
+    return notebook
+
+
+def refresh(source: Path, data: str = "") -> None:
+    """Execute one notebook and store it beside its script, without times, so that copies can be compared.
+
+    With other data than its own the copy goes into `real_day`.
+    """
+    notebook = on(source, data) if data else jupytext.read(source)
+    target = (HERE / "real_day" if data else HERE) / f"{source.stem}.ipynb"
+    target.parent.mkdir(exist_ok=True)
     NotebookClient(
         notebook,
         kernel_name="python3",
@@ -31,10 +53,16 @@ def refresh(source: Path) -> None:
         resources={"metadata": {"path": str(HERE)}},
         extra_arguments=["--log-level=CRITICAL"],
     ).execute()
-    jupytext.write(notebook, source.with_suffix(".ipynb"))
+    jupytext.write(notebook, target, fmt="ipynb")
 
 
 def main(names: list[str]) -> None:
+    if names == ["real_day"]:
+        for source in places.notebooks():
+            if any(places.is_called(source, name) for name in REAL_DAY):
+                print(source.stem, flush=True)
+                refresh(source, "atc-1hz")
+        return
     for source in places.notebooks():
         if not names or any(places.is_called(source, name) for name in names):
             print(source.stem, flush=True)

@@ -79,6 +79,31 @@ def picture(locator):
     return locator.evaluate("canvas => canvas.toDataURL()")
 
 
+def test_the_start_is_where_it_begins(notebook):
+    opened = notebook("00_start_here")
+    opened.run()
+    saved = opened.save()
+    assert errors(saved) == []
+    in_step(opened.file, saved)
+
+
+def test_an_exercise_is_solved(notebook, copy):
+    """What is typed in place of the stub is checked, and saved into both files of the pair."""
+    solved = jupytext.read(copy / "notebooks" / "solutions" / "sheet5_barriers.py")
+    (answer,) = (c.source for c in solved.cells if c.source.startswith("def focal_distance"))
+    opened = notebook("exercises/sheet5_barriers")
+    opened.page.locator(".jp-CodeCell .cm-content", has_text="def focal_distance").click()
+    opened.page.keyboard.press("Control+a")
+    opened.page.keyboard.insert_text(answer)
+    opened.run()
+    saved = opened.save()
+    assert errors(saved) == []
+    outputs = {c.source: str(c.outputs) for c in saved.cells if c.cell_type == "code"}
+    assert "passed - focal_distance" in outputs['exercises.check("focal_distance", focal_distance)']
+    assert "not yet - wall_distance" in outputs['exercises.check("wall_distance", wall_distance)']
+    assert answer in [cell.source for cell in jupytext.read(opened.file.with_suffix(".py")).cells]
+
+
 def test_a_slider_of_the_zones_draws_another_speed(notebook):
     opened = notebook("05_zones")
     opened.run()
@@ -89,7 +114,7 @@ def test_a_slider_of_the_zones_draws_another_speed(notebook):
     before = shown.get_attribute("src")
     opened.page.locator(".widget-slider .noUi-handle").last.press("ArrowRight")
     opened.page.wait_for_function(
-        "old => [...document.querySelectorAll('.jupyter-widgets img')].some(image => image.src !== old)",
+        "before => [...document.querySelectorAll('.jupyter-widgets img')].some((i) => i.src !== before)",
         arg=before,
     )
     saved = opened.save()
@@ -110,7 +135,7 @@ def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
     page, said = browser.new_page(), []
     page.on("console", lambda message: said.append(message.text))
     page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: said.append(request.url) if request.url.startswith("http") else None)
+    page.on("request", lambda r: said.append(r.url) if r.url.startswith("http") else None)
     page.goto(document.write(home).as_uri())
     plays(page)
     broken = page.evaluate("[...document.images].filter((i) => !i.complete || !i.naturalWidth).length")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -70,7 +71,11 @@ def as_text(value: Any) -> str:
 
 
 def show_with_words() -> None:
-    """In a notebook, give every figure its words as alternative text, and tables three decimals."""
+    """In a notebook, give every figure its words as alternative text, and tables three decimals.
+
+    And nothing is shown that another machine or another run would show otherwise: addresses of objects,
+    temporary files that warnings come from.
+    """
     from IPython.core.getipython import get_ipython
 
     def words(figure: Figure, **_: object) -> tuple[dict[str, str], dict[str, Any]]:
@@ -81,6 +86,7 @@ def show_with_words() -> None:
     shell = get_ipython()
     if shell is not None and shell.display_formatter is not None:
         pd.options.display.precision = 3
+        warnings.formatwarning = lambda message, category, *_: f"{category.__name__}: {message}\n"
         shell.display_formatter.mimebundle_formatter.for_type_by_name("matplotlib.figure", "Figure", words)
         plain = shell.display_formatter.formatters["text/plain"]
         plain.for_type(Styler, lambda table, printer, _: printer.text(table.data.to_string()))

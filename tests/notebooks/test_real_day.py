@@ -1,0 +1,47 @@
+"""The copies on the real day: of the notebooks as they are, executed, small, and of no machine."""
+
+import importlib.util
+import re
+
+import nbformat
+import pytest
+
+from szlib.workbook.record import places
+
+COPIES = sorted((places.NOTEBOOKS / "real_day").glob("*.ipynb"))
+
+
+def _refresh():
+    spec = importlib.util.spec_from_file_location("refresh", places.NOTEBOOKS / "refresh.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+refresh = _refresh()
+
+
+@pytest.mark.parametrize("copy", COPIES, ids=lambda c: c.stem)
+class TestCopy:
+    def test_it_is_of_the_notebook_as_it_is(self, copy):
+        executed = nbformat.read(copy, as_version=4)
+        now = refresh.on(places.NOTEBOOKS / f"{copy.stem}.py", "atc-1hz")
+        again = "python notebooks/refresh.py real_day"
+        assert [c.source for c in executed.cells] == [c.source for c in now.cells], again
+        code = [c for c in executed.cells if c.cell_type == "code"]
+        assert [c.execution_count for c in code] == list(range(1, len(code) + 1))
+        assert all(out.output_type != "error" for c in code for out in c.outputs)
+
+    def test_it_is_small_and_names_no_machine(self, copy):
+        text = copy.read_text(encoding="utf-8")
+        assert len(text) < 1_500_000
+        assert not re.search(r"/(home|root|work|tmp|Users)/|at 0x", text)
+
+
+def test_a_copy_has_the_data_asked_for_and_links_from_its_folder():
+    notebook = refresh.on(places.NOTEBOOKS / "01_tracks.py", "atc-1hz")
+    (tagged,) = (c.source for c in notebook.cells if "parameters" in c.metadata.get("tags", []))
+    assert tagged.startswith('data = "atc-1hz"')
+    links = re.findall(r"\]\(([^)]+)\)", notebook.cells[1].source)
+    assert links
+    assert all(link.startswith(("../", "http")) for link in links)
