@@ -46,7 +46,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "plot_speed",
             "plot_barriers",
             "plot_robot_paths",
-            "plot_strip",
+            "run_grid",
             "animate",
         ],
         "comparisons": ["plot_sweep", "plot_manners", "plot_intervals", "interval_grid", "legend_below"],

@@ -107,7 +107,7 @@ def plot_robot_paths(logs: Mapping[str, SimulationLog], *, ax: Axes | None = Non
     return metres(ax, first.scenario.title)
 
 
-def plot_strip(logs: Mapping[str, SimulationLog], *, every: float) -> Figure:
+def run_grid(logs: Mapping[str, SimulationLog], *, every: float) -> Figure:
     """Pictures of several runs of one scene every so many seconds: a row for each run, by name."""
     longest = max(float(log.time[-1]) for log in logs.values())
     times = np.arange(0.0, longest + 1e-9, every)
