@@ -6,7 +6,8 @@ encounters  the attentional space and the other person
 zones       outliers, the hull, zones by speed
 control     distances and barriers, and what they leave to a step
 players     runs with controls, in a browser
-simulation  runs of the robot, animations, sweeps and comparisons
+simulation  runs of the robot, and animations
+sweeps      many runs: sweeps, maps and comparisons
 crowds      robots among other people's crowds
 """
 
@@ -14,7 +15,17 @@ import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
-    submodules=["style", "tracks", "encounters", "zones", "control", "players", "simulation", "crowds"],
+    submodules=[
+        "style",
+        "tracks",
+        "encounters",
+        "zones",
+        "control",
+        "players",
+        "simulation",
+        "sweeps",
+        "crowds",
+    ],
     submod_attrs={
         "tracks": ["plot_map", "plot_speeds", "plot_funnel"],
         "encounters": ["plot_space", "plot_encounter_paths", "plot_los", "plot_los_distance"],
@@ -37,12 +48,8 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "plot_robot_paths",
             "plot_strip",
             "animate",
-            "plot_sweep",
-            "plot_manners",
-            "plot_intervals",
-            "interval_grid",
-            "legend_below",
         ],
+        "sweeps": ["plot_sweep", "plot_manners", "plot_intervals", "interval_grid", "legend_below"],
         "crowds": ["plot_crowd", "plot_promises"],
         "style": [
             "BLUE",
