@@ -37,7 +37,7 @@ def log():
 def step():
     scenario = szlib.SCENARIOS["making_room"]
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
-    return controller.step([1.6, -0.1, -0.07, -0.06], (6.0, 0.0), [szlib.Person((4.0, 0.0), (-0.5, 0.0))])
+    return controller.step([1.6, -0.1, -0.15, -0.16], (6.0, 0.0), [szlib.Person((4.0, 0.0), (-0.5, 0.0))])
 
 
 @pytest.fixture(scope="module")

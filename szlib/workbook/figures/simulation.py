@@ -1,4 +1,4 @@
-"""Figures of runs: scenarios with colours deepening over time, animations, sweeps and comparisons."""
+"""Figures of runs: scenarios with colours deepening over time, and animations."""
 
 from __future__ import annotations
 
