@@ -98,7 +98,7 @@ for name, choice in (("A", first), ("B", second)):
 # robot, the diamond its goal; the triangle is the person, within their zone.
 
 # %%
-fig = figures.plot_strip(logs, every=3.0)
+fig = figures.run_grid(logs, every=3.0)
 record.figure(fig, "strip")
 
 # %%

@@ -1,6 +1,7 @@
 """Make the exercise sheets from their solutions; for a class, make a course of nbgrader.
 
     python notebooks/sheets.py                 exercises/, and the executed copies of solutions/
+    python notebooks/sheets.py --text          the same where only text has changed: nothing is executed
     python notebooks/sheets.py --class FOLDER  a course of nbgrader, its sheets ready to be handed out
 
 The solutions are the source.  What stands between `### BEGIN SOLUTION` and `### END SOLUTION` becomes the
@@ -53,18 +54,33 @@ def _marked(name: str, *, solution: bool = False, grade: bool = False) -> dict[s
     return mark | {"task": False}
 
 
-def make_sheets() -> None:
-    """Write the exercises, and the executed copies of the solutions."""
+def make_sheets(*, text_only: bool = False) -> None:
+    """Write the exercises, and the executed copies of the solutions; `text_only` keeps what was executed."""
     for source in sorted(SOLUTIONS.glob("*.py")):
         print(source.stem, flush=True)
         text = source.read_text(encoding="utf-8")
         exercise = EXERCISES / source.name
         exercise.write_text(exercise_of(text), encoding="utf-8")
-        jupytext.write(jupytext.read(exercise), exercise.with_suffix(".ipynb"))
-        notebook = jupytext.reads(text, fmt="py:percent")
-        quiet = {"record_timing": False, "extra_arguments": ["--log-level=CRITICAL"]}
-        NotebookClient(notebook, kernel_name="python3", **quiet).execute(cwd=str(SOLUTIONS))
-        jupytext.write(notebook, source.with_suffix(".ipynb"))
+        sheet, solved = (jupytext.reads(each, fmt="py:percent") for each in (exercise_of(text), text))
+        jupytext.write(_kept(sheet, exercise) or sheet, exercise.with_suffix(".ipynb"))
+        kept = _kept(solved, source) if text_only else None
+        if kept is None:
+            quiet = {"record_timing": False, "extra_arguments": ["--log-level=CRITICAL"]}
+            NotebookClient(solved, kernel_name="python3", **quiet).execute(cwd=str(SOLUTIONS))
+        jupytext.write(kept or solved, source.with_suffix(".ipynb"))
+
+
+def _kept(new: nbformat.NotebookNode, script: Path) -> nbformat.NotebookNode | None:
+    """The copy beside a script with the new text; None where its code is another, or there is none."""
+    if not (file := script.with_suffix(".ipynb")).exists():
+        return None
+    copy = nbformat.read(file, as_version=4)
+    code = [[c.source for c in each.cells if c.cell_type == "code"] for each in (copy, new)]
+    if code[0] != code[1] or len(copy.cells) != len(new.cells):
+        return None
+    for cell, renewed in zip(copy.cells, new.cells, strict=True):
+        cell.source = renewed.source
+    return copy
 
 
 def make_course(folder: Path) -> None:
@@ -87,5 +103,6 @@ def make_course(folder: Path) -> None:
 if __name__ == "__main__":
     asked = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     asked.add_argument("--class", dest="folder", type=Path, help="folder of the course")
+    asked.add_argument("--text", action="store_true", help="only text has changed: execute nothing")
     given = asked.parse_args()
-    make_course(given.folder) if given.folder else make_sheets()
+    make_course(given.folder) if given.folder else make_sheets(text_only=given.text)

@@ -53,7 +53,8 @@ ROOMS = {
         "command_line",
     ],
     "workbook.figures": [
-        "style", "tracks", "encounters", "zones", "control", "players", "simulation", "crowds",
+        "style", "tracks", "encounters", "zones", "control", "players", "simulation", "comparisons",
+        "crowds",
     ],
     "workbook.exercises": [
         "task", "tracks", "outliers", "zones", "certainty", "barriers", "robot", "checking",

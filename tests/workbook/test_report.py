@@ -119,3 +119,16 @@ def test_where_nothing_was_executed_it_says_what_to_do(tmp_path, capsys):
     (tmp_path / "01_one.ipynb").write_text("{")
     assert main(["report", str(tmp_path)]) == 2
     assert "01_one.ipynb: cannot be read as a notebook" in capsys.readouterr().err
+
+
+def test_pictures_beside_the_notebooks_are_taken_along(tmp_path):
+    text = '![a zone](figures/zone.png)\n\n<img src="figures/making_room.gif" alt="a robot">'
+    cells = [nbformat.v4.new_markdown_cell(f"# 0 - Pictures\n\n{text}")]
+    nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "00_pictures.ipynb")
+    (tmp_path / "summary.json").write_text(json.dumps({"data": "mine", "passed": True, "notebooks": {}}))
+    page = BeautifulSoup(document.write(tmp_path).read_text(encoding="utf-8"), "html.parser")
+    shown = {
+        picture["alt"]: picture["src"][:14] for picture in page.find_all("img") if "alt" in picture.attrs
+    }
+    assert shown["a zone"] == "data:image/png"
+    assert shown["a robot"] == "data:image/gif"

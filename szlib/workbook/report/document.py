@@ -20,6 +20,7 @@ from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 
 from ...errors import DataError
 from ...files import write_file
+from ..record import places
 from . import front_page
 
 REPORT = "report.html"
@@ -88,7 +89,8 @@ class _Renderer(IPythonRenderer):
 class _Exporter(HTMLExporter):
     @pass_context
     def markdown2html(self, context: Any, source: str) -> str:
-        return MarkdownWithMath(renderer=_Renderer(escape=False)).render(source)
+        renderer = _Renderer(escape=False, path=str(places.NOTEBOOKS), embed_images=True)
+        return MarkdownWithMath(renderer=renderer).render(source)
 
 
 def _exporter() -> HTMLExporter:
