@@ -66,7 +66,7 @@ def in_step(file, saved):
             b.metadata.get("tags"),
         )
     changed = subprocess.run(
-        ["git", "diff", "--stat", "--", "*.py", "pyproject.toml"],
+        ["git", "diff", "--stat", "--", file.with_suffix(".py").name],
         cwd=file.parent,
         capture_output=True,
         text=True,
