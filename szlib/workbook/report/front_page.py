@@ -48,6 +48,9 @@ def _run(home: Path, made: Mapping[str, Any], records: Mapping[str, Any]) -> Ite
         f"{name}: {r.get('error', r['status'])}" for name, r in records.items() if r["status"] != "done"
     ]
     said = f"{len(checks) - len(failed)} of {len(checks)} checks hold."
+    seen = [c["passed"] for r in records.values() for c in r["checks"] if c["kind"] == "observation"]
+    if seen:
+        said += f" Of {len(seen)} that were made for the default parameters, {sum(seen)} hold here as well."
     yield _markdown("\n".join([f"**{said}**", *(f"\n- {escape(each)}" for each in failed + broken)]))
     area = home / "area.txt"
     given = made.get("parameters", {})
@@ -116,10 +119,13 @@ def _picture(zone: SocialZone, speed: float, truth: Any) -> Any:
 
 def _claims(records: Mapping[str, Any]) -> Iterator[Any]:
     rows = [
-        (f'<a href="#{name}">{name[:2]}</a>', *(escape(as_text(c[k])) for k in ("name", "result", "value")))
+        (
+            f'<a href="#{name}">{name.split("_")[0]}</a>',
+            *(escape(as_text(c[k])) for k in ("name", "result", "value")),
+        )
         for name, record in records.items()
         for c in record["checks"]
-        if c["kind"] != "check"
+        if c["kind"] == "claim"
     ]
     table = pd.DataFrame(rows, columns=["notebook", "claim", "verdict", "effect, or what was found"])
     yield _table(table) if rows else _markdown(NOT_HERE)
