@@ -12,13 +12,14 @@ from nbclient import NotebookClient
 from szlib.workbook.record import places
 
 HERE = Path(__file__).parent
-FIGURES = HERE.parent / "results" / "lab" / "synthetic" / "figures"
+LAB = HERE.parent / "results" / "lab"
 PICTURES = {
     "zone.png": "05_zones-zone.png",
     "los.png": "02_encounters-los.png",
     "hull.png": "04_hull-hull.png",
     "corridor.png": "08_corridor-scenario.png",
     "making_room.gif": "10_making_room-run.gif",
+    "laboratory.png": "20_laboratory-strip.png",
 }
 """The README's names of what the notebooks draw."""
 
@@ -62,6 +63,7 @@ def main(names: list[str]) -> None:
             if any(places.is_called(source, name) for name in REAL_DAY):
                 print(source.stem, flush=True)
                 refresh(source, "atc-1hz")
+        shutil.copyfile(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", HERE / "figures" / "mall.png")
         return
     for source in places.notebooks():
         if not names or any(places.is_called(source, name) for name in names):
@@ -69,7 +71,7 @@ def main(names: list[str]) -> None:
             refresh(source)
     (HERE / "figures").mkdir(exist_ok=True)
     for name, figure in PICTURES.items():
-        shutil.copyfile(FIGURES / figure, HERE / "figures" / name)
+        shutil.copyfile(LAB / "synthetic" / "figures" / figure, HERE / "figures" / name)
 
 
 if __name__ == "__main__":
