@@ -81,7 +81,7 @@ pd.DataFrame({name: log.metrics() for name, log in logs.items()}).T[
 ]
 
 # %%
-fig, grid = plt.subplots(4, 3, figsize=(14, 14), layout="constrained")
+fig, grid = plt.subplots(4, 3, figsize=(12, 12), layout="constrained")
 for ax, (name, log) in zip(grid.flat, logs.items(), strict=False):
     log.plot(ax=ax).set_title(f"{name}: {log.time[-1]:.0f} s", fontsize=11)
     ax.get_legend().remove()
