@@ -70,7 +70,7 @@ zone = record.ellipse()
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
 log = szlib.simulate(scenario, controller)
 metrics = log.metrics()
-pd.Series(metrics).to_frame("value")
+pd.Series(metrics).filter(regex="^(?!solve_time)").to_frame("value")  # all but the machine's times
 
 # %%
 ax = log.plot()
@@ -166,9 +166,9 @@ fig.legend(loc="outside lower center", ncols=2)
 record.figure(fig, "widths")
 
 # %% [markdown]
-# **What it means.** What looks like courtesy is a corner between two inequalities. Neither person nor wall
-# alone would slow the robot so much: beside a person in the open it only turns (notebook 07), and a wall lets
-# it drive along. Together they leave it a slow way, and once abeam, the way opens and it hurries on.
+# **What it means.** The robot slows down because two rows hold at once, the person's and the wall's. Neither
+# alone would slow it so much: beside a person in the open it only turns (notebook 07), and a wall lets
+# it drive along. Together they leave it a slow way, and once abeam, the way opens and it drives on.
 
 # %%
 record.close()
