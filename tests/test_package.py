@@ -7,6 +7,7 @@ import importlib
 import inspect
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -152,6 +153,12 @@ def test_the_top_level_is_fixed() -> None:
         "CHANGELOG.md", "CITATION.cff", "Makefile", "README.md", "environment.lock", "notebooks",
         "pyproject.toml", "szlib", "tests",
     }  # fmt: skip
+
+
+def test_no_two_test_files_have_one_name() -> None:
+    """They are imported by it, and so is conftest, from any folder."""
+    names = Counter(path.name for path in (PACKAGE.parent / "tests").rglob("*.py"))
+    assert [name for name, count in names.items() if count > 1 and name != "__main__.py"] == []
 
 
 # --- rooms -------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ import subprocess
 import jupytext
 import nbformat
 import pytest
+from jupyter_lab import browser, copy, lab
 
 from szlib.workbook.report import document
 
