@@ -8,6 +8,9 @@ BIN := $(VENV)/bin
 endif
 INSTALLED := $(VENV)/installed
 
+# Where Python is told to keep no bytecode, as in many containers, every process compiles every package anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: run report docs test lab bench lock audit hostile notebooks dist clean
 
 run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza
