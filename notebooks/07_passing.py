@@ -113,10 +113,7 @@ record.figure(fig, "limit")
 # %%
 turns = float(log.time[np.argmax(np.abs(log.controls[:, 1]) > 0.5 * a_max)])
 step = controller.step(*log.at(turns))
-fig, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
-figures.plot_step(step, ax=left)
-figures.plot_admissible(step, ax=right)
-record.figure(fig, "admissible")
+record.figure(figures.step_panels(step), "admissible")
 
 # %% [markdown]
 # This is the instant at which it begins to turn. On the right are all accelerations that obey every row of

@@ -36,7 +36,7 @@ from IPython.display import Markdown
 
 import szlib
 from szlib.control.step import admissible
-from szlib.simulation.metrics import manner
+from szlib.simulation.metrics import manner, yielding
 from szlib.simulation.scenarios import Cell
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
@@ -124,14 +124,10 @@ record.figure(fig, "space-time")
 # of it, one step:
 
 # %%
-progress = -np.diff(np.hypot(*(log.states[:, :2] - scenario.goal).T)) / settings.dt
-waits = np.flatnonzero((log.cbf_people[:-1] <= 1e-4) & (progress < 0.05) & (log.time[:-1] >= 1.0))
+waits = np.flatnonzero(yielding(log))
 middle = float(log.time[waits[len(waits) // 2] if len(waits) else log.speed[10:].argmin() + 10])
 step = controller.step(*log.at(middle))
-fig, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
-figures.plot_step(step, ax=left)
-figures.plot_admissible(step, ax=right)
-record.figure(fig, "admissible")
+record.figure(figures.step_panels(step), "admissible")
 
 # %%
 ahead = admissible(step).polygon.bounds[2]

@@ -143,10 +143,7 @@ record.figure(fig, "below-zero")
 # %%
 turns = float(log.time[np.argmax(log.states[:, 2] < -0.02)])
 step = controller.step(*log.at(turns))
-fig, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
-figures.plot_step(step, ax=left)
-figures.plot_admissible(step, ax=right)
-record.figure(fig, "admissible")
+record.figure(figures.step_panels(step), "admissible")
 
 # %%
 ahead = admissible(step).polygon.bounds[2]

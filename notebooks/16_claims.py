@@ -219,7 +219,7 @@ size = {"low": (line["a_low"] / line["a"]), "middle": 1.0, "high": (line["a_high
 rows = []
 for name in szlib.SCENARIOS:
     for end, scale in size.items():
-        metrics = claims.run_with(name, claims.scaled(zone.ellipses[zone_speed], scale))
+        metrics = claims.run_with(name, zone.ellipses[zone_speed].scaled(scale))
         rows.append(
             (
                 name,

@@ -46,6 +46,17 @@ def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["stage", "what", "rows"])
 
 
+def text(stages: Sequence[Mapping[str, Any]]) -> str:
+    """The same in columns of plain text, each stage named once."""
+    lines = table(stages)
+    lines["stage"] = lines["stage"].where(~lines["stage"].duplicated(), "")
+    wide = {name: int(lines[name].str.len().max()) for name in ("stage", "what")}
+    return "\n".join(
+        f"{row.stage:<{wide['stage']}}  {row.what:<{wide['what']}} {row.rows:>12,}"
+        for row in lines.itertuples()
+    )
+
+
 def add(funnels: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
     """One funnel of many: stages of the same name are added up, in the order in which they first come."""
     sums: dict[str, list[Mapping[str, Any]]] = {}

@@ -126,6 +126,7 @@ def as_many_a_day(encounters: int, days: float) -> Finding:
     high = chi2.ppf((1 + LEVEL) / 2, 2 * encounters + 2) / 2
 
     def within(count: float) -> float:
+        """One less the doublings between so many and the paper's."""
         return 1 - abs(log2(max(count, 1e-9) / days / PAPERS_RATE))
 
     ends = sorted(map(within, (low, high)))
@@ -140,16 +141,10 @@ def size_trades_efficiency(
     """A larger zone makes the robot later at its goal (sec. 4): least and greatest over the scenarios."""
     late = []
     for name in names:
-        times = [run_with(name, scaled(zone, scale))["time_to_goal"] for scale in scales]
+        times = [run_with(name, zone.scaled(scale))["time_to_goal"] for scale in scales]
         late.append(times[-1] - times[0])
     claim = f"a zone {scales[-1] / scales[0]:.1f} times as large makes the robot later"
     return Finding(claim, float(np.mean(late)), float(np.min(late)), float(np.max(late)), "s", len(late))
-
-
-def scaled(zone: Ellipse, scale: float) -> Ellipse:
-    """The zone made larger about its person."""
-    (m, n), (a, b) = zone.center, zone.semi_axes
-    return Ellipse((scale * m, scale * n), (scale * a, scale * b), zone.angle)
 
 
 def run_with(name: str, zone: Ellipse) -> dict[str, float]:

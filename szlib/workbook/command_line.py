@@ -25,7 +25,7 @@ from .. import __version__, memory
 from ..errors import DataError, DataWarning, SzlibError
 from ..files import printable
 
-WORKBOOK_PACKAGES = ("ipykernel", "jupytext", "nbconvert", "papermill")
+WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbconvert", "papermill")
 """What `szlib run` needs beside the library: the extra `workbook`."""
 
 
@@ -58,6 +58,7 @@ def _endings() -> Iterator[None]:
     """SIGTERM, and SIGHUP unless it is ignored, end a command as Ctrl-C does."""
 
     def stop(number: int, _frame: object) -> None:
+        """End as Ctrl-C does, with the signal's own exit code."""
         raise KeyboardInterrupt(128 + number)
 
     names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -99,14 +100,8 @@ def inspect(file: str | Path, *, area: str = "") -> str:
     with warnings.catch_warnings():  # the table shows what a warning would
         warnings.simplefilter("ignore", DataWarning)
         samples = Chain(square=area or None).encounters(files)
-    table = funnels.table(funnels.of(samples))
-    table["stage"] = table["stage"].where(~table["stage"].duplicated(), "")
-    wide = {name: int(table[name].str.len().max()) for name in ("stage", "what")}
     where = f"area {samples.attrs['area']}\n" if "area" in samples.attrs else ""
-    return where + "\n".join(
-        f"{row.stage:<{wide['stage']}}  {row.what:<{wide['what']}} {row.rows:>12,}"
-        for row in table.itertuples()
-    )
+    return where + funnels.text(funnels.of(samples))
 
 
 def _inspect(options: argparse.Namespace) -> int:
@@ -163,8 +158,7 @@ def _report(options: argparse.Namespace) -> int:
     from .report import document
 
     home = Path(options.folder) if options.folder else places.root(places.RESULTS) / "synthetic"
-    file = document.write(home)
-    print(printable(os.path.relpath(file)))
+    print(printable(os.path.relpath(file := document.write(home))))
     if options.open:
         import webbrowser
 
@@ -225,8 +219,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"szlib {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for name, add, summary in (
+        ("run", _add_run, "execute the notebooks, headless, and check their results"),
+        ("report", _add_report, "make the report of a run anew: one HTML file"),
+        ("inspect", _add_inspect, "print what becomes of the rows of a file"),
+        ("extract", _add_extract, "find the encounters of many days, resumably"),
+    ):
+        add(commands.add_parser(name, help=summary))
+    return parser
 
-    run = commands.add_parser("run", help="execute the notebooks, headless, and check their results")
+
+def _add_run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--data", nargs="+", default=["synthetic"], metavar="DATA",
         help="synthetic (default), atc-1hz, atc-10-days, or files, folders or globs of tracks",
@@ -246,9 +249,12 @@ def _parser() -> argparse.ArgumentParser:
         "-p", "--parameter", action="append", default=[], metavar="NAME=VALUE",
         help="set a notebook parameter, such as seed=1",
     )  # fmt: skip
+    _add_scheduler(run)
+    _add_limits(run)
     run.set_defaults(command=_run)
 
-    report = commands.add_parser("report", help="make the report of a run anew: one HTML file")
+
+def _add_report(report: argparse.ArgumentParser) -> None:
     report.add_argument(
         "folder", nargs="?", metavar="FOLDER",
         help="the run's folder of results (default: results/synthetic, beside the notebooks)",
@@ -256,33 +262,39 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("--open", action="store_true", help="and open it in a browser")
     report.set_defaults(command=_report, memory=None)
 
-    inspect = commands.add_parser("inspect", help="print what becomes of the rows of a file")
+
+def _add_inspect(inspect: argparse.ArgumentParser) -> None:
     inspect.add_argument("file", help="a file of tracks: ATC, EWAP, or tidy; plain or .gz")
+    _add_limits(inspect)
     inspect.set_defaults(command=_inspect)
 
-    extract = commands.add_parser("extract", help="find the encounters of many days, resumably")
+
+def _add_extract(extract: argparse.ArgumentParser) -> None:
     extract.add_argument("data", nargs="+", metavar="PATH", help="files, folders or globs of tracks")
     extract.add_argument("--out", default="results/days", metavar="FOLDER", help="a Parquet file a day")
-    extract.add_argument(
-        "--jobs", type=_jobs, default=None, metavar="N", help="days at a time (default: one)"
-    )
+    extract.add_argument("--jobs", type=_jobs, metavar="N", help="days at a time (default: one)")
     extract.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help="days to leave out")
+    _add_scheduler(extract)
+    _add_limits(extract)
     extract.set_defaults(command=_extract)
 
-    for command in (run, extract):
-        command.add_argument("--scheduler", metavar="ADDRESS", help="hand the work to a Dask cluster")
-    for command in (run, inspect, extract):
-        area = command.add_mutually_exclusive_group()
-        area.add_argument(
-            "--square", nargs=4, type=float, metavar=("X0", "X1", "Y0", "Y1"),
-            help="where encounters are found [m] (default: the mall's square for ATC files; else --auto)",
-        )  # fmt: skip
-        area.add_argument("--polygon", metavar="FILE", help="the same as a polygon: WKT or GeoJSON [m]")
-        area.add_argument(
-            "--auto", action="store_true", help="the largest rectangle in which people walked everywhere"
-        )
-        command.add_argument(
-            "--memory", type=_memory, metavar="SIZE",
-            help="what may be used, such as 4GB (default: 80 %% of what the machine has left)",
-        )  # fmt: skip
-    return parser
+
+def _add_scheduler(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--scheduler", metavar="ADDRESS", help="hand the work to a Dask cluster")
+
+
+def _add_limits(command: argparse.ArgumentParser) -> None:
+    """Where people are looked at, and how much memory that may take."""
+    area = command.add_mutually_exclusive_group()
+    area.add_argument(
+        "--square", nargs=4, type=float, metavar=("X0", "X1", "Y0", "Y1"),
+        help="where encounters are found [m] (default: the mall's square for ATC files; else --auto)",
+    )  # fmt: skip
+    area.add_argument("--polygon", metavar="FILE", help="the same as a polygon: WKT or GeoJSON [m]")
+    area.add_argument(
+        "--auto", action="store_true", help="the largest rectangle in which people walked everywhere"
+    )
+    command.add_argument(
+        "--memory", type=_memory, metavar="SIZE",
+        help="what may be used, such as 4GB (default: 80 %% of what the machine has left)",
+    )  # fmt: skip

@@ -62,6 +62,7 @@ def sensitivity(
     rows: list[tuple[str, str, int, float, float, float]] = []
 
     def add(parameter: str, value: Any, samples: pd.DataFrame, at: float = speed, **keywords: Any) -> None:
+        """One row: the zone of these samples at this speed."""
         count, sizes = int(samples["encounter"].nunique()), (np.nan, np.nan, np.nan)
         try:
             with warnings.catch_warnings():  # few encounters, told by their number here

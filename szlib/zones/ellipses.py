@@ -82,8 +82,7 @@ class Ellipse(Layer):
 
     def level(self, points: ArrayLike) -> Array:
         """Left side of the ellipse equation at points (..., 2): 1 on the curve, less inside."""
-        d = np.asarray(points, float) - self.center
-        cos, sin = np.cos(self.angle), np.sin(self.angle)
+        d, cos, sin = np.asarray(points, float) - self.center, np.cos(self.angle), np.sin(self.angle)
         u = (d[..., 0] * cos + d[..., 1] * sin) / self.semi_axes[0]
         v = (d[..., 1] * cos - d[..., 0] * sin) / self.semi_axes[1]
         return np.asarray(u**2 + v**2)
@@ -95,14 +94,15 @@ class Ellipse(Layer):
         cos, sin = np.cos(self.angle), np.sin(self.angle)
         return np.stack([self.center[0] + u * cos - v * sin, self.center[1] + u * sin + v * cos], axis=-1)
 
-    def placed(self, position: ArrayLike, heading: float) -> Ellipse:
-        """This ellipse of a person's frame, in the world frame of a person at `position` [m].
+    def scaled(self, scale: float) -> Ellipse:
+        """This ellipse of a person's frame, so many times as large about the person."""
+        (m, n), (a, b) = self.center, self.semi_axes
+        return Ellipse((scale * m, scale * n), (scale * a, scale * b), self.angle)
 
-        `heading` is the direction of motion, counter-clockwise from the world's x [rad].
-        """
-        x, y = np.asarray(position, float)
+    def placed(self, position: ArrayLike, heading: float) -> Ellipse:
+        """This ellipse of a person's frame, in the world, where they are at `position` [m] and face [rad]."""
+        (x, y), (m, n) = np.asarray(position, float), self.center
         cos, sin = np.cos(heading), np.sin(heading)
-        m, n = self.center
         return Ellipse((x + m * cos - n * sin, y + m * sin + n * cos), self.semi_axes, self.angle + heading)
 
 

@@ -100,7 +100,7 @@ def test_a_larger_zone_makes_the_robot_later() -> None:
     zone = szlib.Ellipse((0.05, 0.0), (0.9, 0.7))
     found = claims.size_trades_efficiency(zone, names=("passing", "corridor"))
     assert found.low > 0 and found.n == 2
-    assert claims.scaled(zone, 2.0) == szlib.Ellipse((0.1, 0.0), (1.8, 1.4))
+    assert zone.scaled(2.0) == szlib.Ellipse((0.1, 0.0), (1.8, 1.4))
 
 
 def test_sensitivity_varies_one_parameter_at_a_time(tmp_path) -> None:

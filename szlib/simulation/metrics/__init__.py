@@ -14,6 +14,6 @@ __getattr__, __dir__, __all__ = lazy.attach(
     submod_attrs={
         "endings": ["Outcome", "outcome", "path_exists"],
         "manners": ["MANNERS", "Manner", "manner", "retreat"],
-        "motion": ["along_course", "avoidance_start", "metrics", "passing_side"],
+        "motion": ["along_course", "avoidance_start", "metrics", "passing_side", "yielding"],
     },
 )

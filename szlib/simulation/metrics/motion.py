@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...control.barriers import Array
 from ...control.problem import TOLERANCE
@@ -67,9 +68,6 @@ def metrics(log: SimulationLog) -> dict[str, Any]:
     jolt = np.diff(np.diff(log.states[way, 2:], axis=0), axis=0) / dt**2
     cruising = np.arange(len(speed)) <= np.flatnonzero(speed >= CRUISE * speed.max())[-1]
     moved = np.maximum.accumulate(speed > STOPPED)
-    away = np.hypot(*(log.states[way, :2] - log.scenario.goal).T)
-    held = (time >= START_UP) & (away > GOAL_RADIUS) & (log.cbf_people[way] <= ACTIVE)
-    yields = held[:-1] & (-np.diff(away) / dt < STOPPED)
     told = log.residual.shape[2] > 0 or not n_people
     broken = (least(log.h, axis=1) < -TOLERANCE)[1:]
     overlap = (least(log.clearance, axis=1) < -TOLERANCE)[1:]
@@ -88,7 +86,7 @@ def metrics(log: SimulationLog) -> dict[str, Any]:
         "mean_speed": float(speed.mean()),
         "max_speed": float(speed.max()),
         "time_stopped": dt * int((moved & (speed < STOPPED))[:-1].sum()),
-        "time_yielding": dt * int(yields.sum()) if told else np.nan,
+        "time_yielding": dt * int(yielding(log).sum()) if told else np.nan,
         "passing_side": passing_side(log),
         "jerk": float((jolt**2).sum(axis=1).mean()) if len(jolt) else 0.0,
         "people": n_people,
@@ -112,6 +110,14 @@ def metrics(log: SimulationLog) -> dict[str, Any]:
 def _least(values: Array) -> float:
     smallest = float(least(values))
     return smallest if np.isfinite(smallest) else np.nan
+
+
+def yielding(log: SimulationLog) -> NDArray[np.bool_]:
+    """At which steps until the arrival the robot yields, shape (n,): see `metrics`, time_yielding."""
+    way = slice(None if log.arrived is None else log.arrived + 1)
+    away = np.hypot(*(log.states[way, :2] - log.scenario.goal).T)
+    held = (log.time[way] >= START_UP) & (away > GOAL_RADIUS) & (log.cbf_people[way] <= ACTIVE)
+    return np.asarray(held[:-1] & (-np.diff(away) / log.settings.dt < STOPPED))
 
 
 def along_course(log: SimulationLog, person: int) -> tuple[Array, Array]:

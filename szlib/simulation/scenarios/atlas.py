@@ -71,11 +71,9 @@ class Cell:
 
     def controller(self, zone: Ellipse) -> MPCCBF:
         """The controller of this cell, for a zone of size 1."""
-        (m, n), (a, b) = zone.center, zone.semi_axes
-        other = Ellipse((self.size * m, self.size * n), (self.size * a, self.size * b), zone.angle)
         # A time limit would make what happens depend on how busy the machine is.
         settings = MPCSettings(gamma=self.gamma, time_limit=np.inf)
-        return MPCCBF(other, walls=self.scenario().walls, settings=settings)
+        return MPCCBF(zone.scaled(self.size), walls=self.scenario().walls, settings=settings)
 
     def run(self, zone: Ellipse) -> SimulationLog:
         """The run of this cell, for a zone of size 1; SolverError where it starts in violation."""

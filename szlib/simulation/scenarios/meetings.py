@@ -175,6 +175,7 @@ class InSight:
         self._walls = scenario.walls
 
         def crowd(t: float, robot: Array) -> Sequence[Person | None]:
+            """Everybody at this time."""
             self._robot = robot[:2]
             return walk(t, robot)
 

@@ -135,6 +135,7 @@ def formula(draw: Callable[[Rng], tuple[Any, ...]], truth: Answer) -> Callable[[
     """Cases whose truth is a function of the arguments."""
 
     def case(rng: Rng) -> Case:
+        """Arguments, and what the formula gives for them."""
         args = draw(rng)
         return args, truth(*args)
 

@@ -39,7 +39,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
             "plot_tornado",
             "plot_findings",
         ],
-        "control": ["plot_distance", "plot_overestimate", "plot_admissible", "plot_step"],
+        "control": ["plot_distance", "plot_overestimate", "plot_admissible", "plot_step", "step_panels"],
         "players": ["Movie"],
         "simulation": [
             "plot_scenario",

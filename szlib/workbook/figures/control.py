@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from numpy.typing import ArrayLike
 from shapely.plotting import patch_from_polygon
@@ -135,6 +137,14 @@ def _tightest(limits: tuple[Limit, ...], reach: float) -> list[Limit]:
         if taken > tightest.get(of, (-1.0,))[0]:
             tightest[of] = taken, limit
     return [limit for _, limit in tightest.values()]
+
+
+def step_panels(step: Step) -> Figure:
+    """What a step was asked, beside the accelerations among which it could choose."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
+    plot_step(step, ax=left)
+    plot_admissible(step, ax=right)
+    return figure
 
 
 def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:

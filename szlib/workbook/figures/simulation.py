@@ -142,6 +142,7 @@ def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> Mo
     canvas = FigureCanvasAgg(figure)
 
     def picture(row: int) -> Image.Image:
+        """The scene at a row of the run."""
         while moving:
             moving.pop().remove()
         moving.extend(ax.plot(*log.states[: row + 1, :2].T, color=BLUE, linewidth=1))

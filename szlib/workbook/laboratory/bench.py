@@ -46,9 +46,7 @@ class Choice:
         """The zone that is kept, in the person's frame; SolverError for an estimator that is not there."""
         if self.estimator not in zones:
             raise SolverError(f"estimator must be one of {', '.join(zones)}; got {self.estimator!r}")
-        found = zones[self.estimator]
-        (x, y), (a, b) = found.center, found.semi_axes
-        return Ellipse((self.size * x, self.size * y), (self.size * a, self.size * b), found.angle)
+        return zones[self.estimator].scaled(self.size)
 
 
 class Bench:

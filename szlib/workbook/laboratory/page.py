@@ -22,6 +22,7 @@ from ...control.step import Step, admissible
 from ...errors import SzlibError
 from ...zones.ellipses import Ellipse
 from ..figures.players import Stage, moment, script
+from ..record import places
 from .bench import Bench
 
 SLIDERS = [
@@ -40,7 +41,7 @@ _FINE = 0.01
 
 def live() -> bool:
     """Whether the kernel was started by a page: JupyterLab or the classic notebook; never in `szlib run`."""
-    return "JPY_SESSION_NAME" in os.environ and "SZLIB_RUN" not in os.environ
+    return "JPY_SESSION_NAME" in os.environ and places.RUN_VARIABLE not in os.environ
 
 
 def slide(draw: Callable[..., object], **sliders: tuple[float, float, float, float]) -> None:
@@ -58,6 +59,7 @@ def slide(draw: Callable[..., object], **sliders: tuple[float, float, float, flo
     }
 
     def drawn(**values: float) -> None:
+        """What ipywidgets takes for a function of all of them."""
         draw(**values)
 
     interact(drawn, **made)

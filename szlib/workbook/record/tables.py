@@ -79,6 +79,7 @@ def show_with_words() -> None:
     from IPython.core.getipython import get_ipython
 
     def words(figure: Figure, **_: object) -> tuple[dict[str, str], dict[str, Any]]:
+        """No other form of the figure, but its words."""
         from ..figures.style import in_words
 
         return {}, {"image/png": {"alt": in_words(figure)}}

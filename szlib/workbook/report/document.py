@@ -77,18 +77,22 @@ class _Renderer(IPythonRenderer):
     """Markdown whose formulas are MathML, which browsers draw without a script."""
 
     def block_math(self, body: str) -> str:
+        """A formula on a line of its own."""
         return f"<p>{convert(body, display='block')}</p>"
 
     def inline_math(self, body: str) -> str:
+        """A formula within a line."""
         return convert(body)
 
     def multiline_math(self, text: str) -> str:
+        """A formula of several lines, its marks included."""
         return self.block_math(text.strip("$"))
 
 
 class _Exporter(HTMLExporter):
     @pass_context
     def markdown2html(self, context: Any, source: str) -> str:
+        """A markdown cell, its pictures embedded."""
         renderer = _Renderer(escape=False, path=str(places.NOTEBOOKS), embed_images=True)
         return MarkdownWithMath(renderer=renderer).render(source)
 

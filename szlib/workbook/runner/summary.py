@@ -42,19 +42,19 @@ def finish(
     home: Path, identity: Mapping[str, Any], earlier: Mapping[str, Any], outcomes: Mapping[str, Any]
 ) -> dict[str, Any]:
     """The summary of this run; in the folder, with the outcomes that stayed."""
+    write_file(home / SUMMARY, json.dumps(_summary(identity, {**earlier, **outcomes}), indent=1))
+    return _summary(identity, outcomes)
 
-    def summary(notebooks: Mapping[str, Any]) -> dict[str, Any]:
-        return {
-            "szlib": identity["szlib"],
-            "data": identity["data"],
-            "seed": identity["parameters"].get("seed", 0),
-            "parameters": identity["parameters"],
-            "passed": all(_passed(outcome) for outcome in notebooks.values()),
-            "notebooks": dict(sorted(notebooks.items())),
-        }
 
-    write_file(home / SUMMARY, json.dumps(summary({**earlier, **outcomes}), indent=1))
-    return summary(outcomes)
+def _summary(identity: Mapping[str, Any], notebooks: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "szlib": identity["szlib"],
+        "data": identity["data"],
+        "seed": identity["parameters"].get("seed", 0),
+        "parameters": identity["parameters"],
+        "passed": all(_passed(outcome) for outcome in notebooks.values()),
+        "notebooks": dict(sorted(notebooks.items())),
+    }
 
 
 def _passed(outcome: Mapping[str, Any]) -> bool:

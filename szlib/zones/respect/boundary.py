@@ -147,6 +147,7 @@ def _fit(real: Array, null: Array, r_max: float) -> Respect:
     seen, n = real.sum(axis=1), real.sum()
 
     def cost(p: Array) -> tuple[float, Array]:
+        """Negative log likelihood a sample, held back towards the round, and its slope by p."""
         (rho, by_q), w, f = _edge(theta, p[:size]), np.exp(p[size]), expit(p[size + 1])
         z = (r - rho[:, None]) / w
         s = expit(z)
