@@ -1,13 +1,17 @@
 """Kernels of a run: forked where they can be, and like any other kernel all the same."""
 
+import io
 import os
 import sys
+from base64 import b64decode
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
 from nbclient import NotebookClient
 from nbclient.exceptions import DeadKernelError
+from PIL import Image
 
 from szlib.workbook.runner import kernels
 
@@ -44,6 +48,20 @@ def test_figures_are_shown_and_nothing_is_imported_twice(tmp_path):
     printed, shown = execute(tmp_path, loaded, draw)
     assert printed == ["True True"]
     assert "image/png" in shown[-1]
+
+
+def test_a_figure_that_is_recorded_is_shown_once_as_it_was_drawn(tmp_path):
+    record = "from szlib.workbook.record import NotebookRecord\n"
+    record += (
+        f"record = NotebookRecord('99_test', {{'data': 'synthetic', 'results': {str(tmp_path / 'out')!r}}})"
+    )
+    draw = "import matplotlib.pyplot as plt\nfig, ax = plt.subplots()\nax.set_title('a line')\n"
+    _, (shown,) = execute(tmp_path, record, draw + "record.figure(fig, 'line')")
+    (saved,) = tmp_path.rglob("99_test-line.png")
+    small, large = Image.open(io.BytesIO(b64decode(shown["image/png"]))), Image.open(saved)
+    assert small.width == round(large.width * 2 / 3)
+    small, large = (np.asarray(each.convert("L").resize((60, 50)), float) for each in (small, large))
+    assert np.abs(small - large).mean() < 2
 
 
 def test_what_was_to_be_done_at_the_end_is_done(tmp_path):
