@@ -78,7 +78,8 @@ class Respect:
         if self.careless >= 0.5:
             return np.zeros(theta.shape)
         half = self.softness * logit((0.5 - self.careless) / (1 - self.careless))
-        return np.asarray(np.clip(_edge(theta, self.edge)[0] + half, 0.0, self.r_max))
+        rho, _ = _edge(_waves(theta, len(self.edge)), self.edge)
+        return np.asarray(np.clip(rho + half, 0.0, self.r_max))
 
 
 def fit_respect(
@@ -142,13 +143,14 @@ def _fit(real: Array, null: Array, r_max: float) -> Respect:
     theta = (np.arange(directions) + 0.5) * 2 * np.pi / directions
     r = (np.arange(distances) + 0.5) * r_max / distances
     size = 1 + (_WAVES if directions > 1 else 0)
+    waves = _waves(theta, size)
     model = null + null.sum(axis=0) / null.sum()  # one sample of any direction: no direction is without
     model /= model.sum(axis=1, keepdims=True)
     seen, n = real.sum(axis=1), real.sum()
 
     def cost(p: Array) -> tuple[float, Array]:
         """Negative log likelihood a sample, held back towards the round, and its slope by p."""
-        (rho, by_q), w, f = _edge(theta, p[:size]), np.exp(p[size]), expit(p[size + 1])
+        (rho, by_q), w, f = _edge(waves, p[:size]), np.exp(p[size]), expit(p[size + 1])
         z = (r - rho[:, None]) / w
         s = expit(z)
         g = f + (1 - f) * s
@@ -169,10 +171,14 @@ def _fit(real: Array, null: Array, r_max: float) -> Respect:
     return Respect(np.asarray(p[:size]), float(np.exp(p[size])), float(expit(p[size + 1])), r_max)
 
 
-def _edge(theta: Array, q: Array) -> tuple[Array, Array]:
-    """rho(theta) (...) [m], and its derivatives by q (..., len(q))."""
-    turns = [wave(k * theta) for k in range(1, (len(q) - 1) // 2 + 1) for wave in (np.cos, np.sin)]
-    waves = np.stack([np.zeros_like(theta), *turns], axis=-1)
+def _waves(theta: Array, size: int) -> Array:
+    """What the coefficients of rho(theta) (...) are of, shape (..., size): nothing of the first."""
+    turns = [wave(k * theta) for k in range(1, (size - 1) // 2 + 1) for wave in (np.cos, np.sin)]
+    return np.stack([np.zeros_like(theta), *turns], axis=-1)
+
+
+def _edge(waves: Array, q: Array) -> tuple[Array, Array]:
+    """rho (...) [m] of waves (..., len(q)), and its derivatives by q (..., len(q))."""
     under = 1 + waves @ np.r_[0.0, q[1:]]
     shape = np.maximum(under, _THINNEST) ** -0.5
     by_q = np.where(under > _THINNEST, -q[0] / 2 * shape**3, 0.0)[..., None] * waves
