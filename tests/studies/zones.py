@@ -2,15 +2,16 @@
 
     python tests/studies/zones.py coverage 200 quantile centred default > notebooks/tables/16_coverage.csv
     python tests/studies/zones.py coverage 200 hull centred > notebooks/tables/16_coverage_hull.csv  (plazas)
+    python tests/studies/zones.py coverage 40 respect centred > notebooks/tables/16_coverage_respect.csv
     python tests/studies/zones.py errors 3 > notebooks/tables/16_estimators.csv           (plazas a case)
     python tests/studies/zones.py sizes 8 > notebooks/tables/16_sizes.csv                 (plazas pooled)
     python tests/studies/zones.py subsets 20 FILE... > notebooks/tables/16_subsets.csv    (subsets of a size)
     python tests/studies/zones.py two_sided 3 > notebooks/tables/16_two_sided.csv         (plazas a truth)
 
 Coverage: share of the 95 % intervals, from 600 pairs, that hold the truth of the plaza, and the limit: what
-the quantile gives for the people of all these plazas together (a hull has no limit: it shrinks).  The column
-plazas says how many are in the table kept: for time, only 110 of the default truth.  Files of subsets are a
-day of tracks, as `szlib.read_tracks` reads them.
+the quantile gives for the people of all these plazas together (a hull has no limit: it shrinks; respect is
+held against the truth alone, at one speed).  Files of subsets are a day of tracks, as `szlib.read_tracks`
+reads them.
 """
 
 from __future__ import annotations
@@ -82,9 +83,13 @@ def coverage(plazas: int, method: str, *truths: str) -> pd.DataFrame:
     for truth in truths:
         zones, everybody = [], []
         for seed in range(plazas):
-            samples, _, known = people(seed, encounters=600, **TRUTHS[truth])
+            samples, tracks, known = people(seed, encounters=600, **TRUTHS[truth])
             everybody.append(samples)
-            zones.append(szlib.SocialZone.fit(samples, speeds=SPEEDS, **METHODS[method]))
+            options: dict[str, Any] = {"speeds": SPEEDS, "method": method}
+            if method == "respect":
+                null = szlib.null_encounters(tracks, shifts=20, seed=seed, progress=False)
+                options |= {"speeds": (1.1,), "resamples": 40, "null": null}
+            zones.append(szlib.SocialZone.fit(samples, **options))
             print(truth, seed, file=sys.stderr, flush=True)
         intervals = pd.concat([zone.uncertainty.intervals for zone in zones])
         intervals["truth"] = _holds(intervals, {v: known.true_zone(v) for v in SPEEDS})
