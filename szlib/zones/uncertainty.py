@@ -12,6 +12,13 @@ Samples of one encounter are no independent evidence, nor are two encounters of 
   replacement, differ from the hull of all by (share^-RATE - 1) times what that one still differs from its
   limit: the interval is where the differences, divided by this and taken back, lead (subsampling with a
   finite share; Politis & Romano, Ann. Statist. 22, 1994; for a quarter and rate 1/2 the factor is 1).
+
+What an interval is to hold is the *limit*: the zone that the same method would give of all the people there
+are. Those of the quantile do in 90 to 98 % of 400 plazas of 600 pairs, each quantity at each speed (notebook
+16). They hold the edge that the plaza's people keep to less often: the limit lies up to 2 cm outside of it,
+by how much hangs on how far people keep clear of it, which no data tells; and its centre up to 3 cm behind,
+for both people's zones mix. A hull's limit is that edge itself; its intervals hold it in 91 to 100 % of 200
+centred plazas.
 """
 
 from __future__ import annotations
