@@ -283,19 +283,21 @@ ax.set_yticks(range(len(part)), part["change"])
 ax.invert_yaxis()
 ax.set(xlabel="radius of the respect zone, all bearings [m]", ylabel="changed")
 ax.legend(loc="upper left", bbox_to_anchor=(1, 1))
-ax.set_title("Grand Central: who counts moves the radius most")
+ax.set_title("Grand Central: one thing changed at a time")
 record.figure(fig, "changes")
 
 # %%
 by = changes.pivot(index="change", columns="kinds", values="fitted")
 moved = (by.drop(index="nothing") / by.loc["nothing"] - 1).abs().max(axis=1)
-told = changes[changes["change"] == "nothing"].set_index("kinds").round(2)
-some, fewer = told.loc["strangers"], told.loc["not in the same direction"]
-Markdown(f"""Strangers keep {some["fitted"]} m ({some["fitted_low"]} to {some["fitted_high"]}). Without those who
-walk in the same direction it is {fewer["fitted"]} m ({fewer["fitted_low"]} to {fewer["fitted_high"]}), in bins
-{fewer["binned"]} m ({fewer["binned_low"]} to {fewer["binned_high"]}): people who walk the same way in a stream are
-kept apart by condition 3 as well. Of everything else {moved.idxmax()} moves it most, by
-{100 * moved.max():.0f} %.""")
+usual = changes[changes["change"] == "nothing"].set_index("kinds")
+fitted, binned = (
+    usual.agg(lambda row, how=how: "{:.2f} m ({:.2f} to {:.2f})".format(*row.filter(like=how)), axis=1)
+    for how in ("fitted", "binned")
+)
+fewer = "not in the same direction"
+Markdown(f"""Strangers keep {fitted["strangers"]}. Without those who walk in the same direction it is
+{fitted[fewer]}, in bins {binned[fewer]}: people of one stream are kept apart by condition 3 as well. Of
+everything else, "{moved.idxmax()}" moves the radius most, by {100 * moved.max():.0f} %.""")
 
 # %%
 kept = f"a distance of {radius:.2f} m remains that strangers keep" if found else "no distance is shown here"
