@@ -167,10 +167,11 @@ record.figure(fig, "test")
 nobody = pd.read_csv("tables/15_nobody.csv")
 nobody["alarm"] = nobody["p_value"] <= 0.05
 alarms = nobody.groupby(["bunch", "kinds"])["alarm"].agg(["sum", "size"])
+every_kind = alarms.xs("all", level="kinds")
 record.check(
     "where nobody minds anybody: at most 5 false alarms in 100 crowds, singly or in bunches",
-    (alarms["sum"] <= 0.05 * alarms["size"]).all(),
-    alarms["sum"].unstack().to_dict(),
+    (every_kind["sum"] <= 0.05 * every_kind["size"]).all(),
+    every_kind["sum"].to_dict(),
     always=True,
 )
 alarms.rename(columns={"sum": "false alarms", "size": "crowds"})
@@ -297,7 +298,7 @@ fitted, binned = (
 fewer = "not in the same direction"
 Markdown(f"""Strangers keep {fitted["strangers"]}. Without those who walk in the same direction it is
 {fitted[fewer]}, in bins {binned[fewer]}: people of one stream are kept apart by condition 3 as well. Of
-everything else, "{moved.idxmax()}" moves the radius most, by {100 * moved.max():.0f} %.""")
+the other changes "{moved.idxmax()}" moves the radius most, by {100 * moved.max():.0f} %.""")
 
 # %%
 kept = f"a distance of {radius:.2f} m remains that strangers keep" if found else "no distance is shown here"
