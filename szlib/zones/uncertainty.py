@@ -90,8 +90,13 @@ class Estimate(Protocol):
         """By direction at speeds, ascending [m/s]; None where the vertices tell all."""
         ...
 
-    def others(self, weights: Array, speeds: Sequence[float]) -> Array:
-        """Ellipses (k, s, 5) for weights (k, n) of the encounters: centre, semi-axes, angle; NaN: none."""
+    def others(
+        self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None
+    ) -> Array:
+        """Ellipses (k, s, 5) for weights (k, n) of the encounters: centre, semi-axes, angle; NaN: none.
+
+        What else is known from a draw only (a null model's shifts) is drawn anew by rng, if there is one.
+        """
         ...
 
     def without_each(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
@@ -187,7 +192,7 @@ def measure(estimate: Estimate, speeds: Sequence[float], *, resamples: int, seed
         drawn = rng.multinomial(n, np.full(n, 1 / n), size=resamples)
         back, how = 0.0, f"bootstrap: {n} of {n} {unit}, bias-corrected percentiles"
     ellipses = estimate.others(np.ones((1, len(member))), speeds)
-    others = estimate.others(drawn[:, member].astype(float), speeds)
+    others = estimate.others(drawn[:, member].astype(float), speeds, rng)
     reach = ellipse_reach(ellipses)
     known = _quantities(ellipses)
     away = _quantities(others) - known
