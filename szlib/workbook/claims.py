@@ -28,6 +28,8 @@ LEVEL = 0.95
 """Of every interval here."""
 LARGER_AHEAD = "the zone reaches farther ahead than behind"
 GROWS = "the zone grows with walking speed"
+AS_MANY = "as many encounters a day as in the paper, within a factor of two"
+LATER = "a larger zone makes the robot later"
 OPPOSITE = "opposite"
 """The kind of encounter in which people pass each other."""
 
@@ -131,8 +133,7 @@ def as_many_a_day(encounters: int, days: float) -> Finding:
 
     ends = sorted(map(within, (low, high)))
     top = 1.0 if low / days <= PAPERS_RATE <= high / days else ends[1]
-    claim = "as many encounters a day as in the paper, within a factor of two"
-    return Finding(claim, within(encounters), ends[0], top, "doublings", encounters)
+    return Finding(AS_MANY, within(encounters), ends[0], top, "doublings", encounters)
 
 
 def size_trades_efficiency(
