@@ -20,7 +20,7 @@ ROOMS = {
     "tracks": [
         "funnels", "formats", "plausible", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
-    "tracks.formats": ["frame_rates", "plain", "foreign", "layouts", "tables"],
+    "tracks.formats": ["frame_rates", "plain", "foreign", "layouts", "tables", "rows"],
     "encounters": [
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],

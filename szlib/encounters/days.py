@@ -29,7 +29,8 @@ from ..parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.formats.layouts import layout_of, start_of_day
 from ..tracks.formats.plain import first_line
-from ..tracks.readers import CALENDAR_BEGINS, recording_names
+from ..tracks.formats.rows import CALENDAR_BEGINS
+from ..tracks.readers import recording_names
 from .geometry import Area
 from .pipeline import Chain, day_key, finished_record, write_record
 

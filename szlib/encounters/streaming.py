@@ -40,8 +40,9 @@ from ..tracks import funnels
 from ..tracks.clock import VELOCITY_SPAN
 from ..tracks.formats.layouts import Columns, Format, readable, recognise
 from ..tracks.formats.plain import plain_file
+from ..tracks.formats.rows import fault, faults, in_metres
 from ..tracks.plausible import check_unit
-from ..tracks.readers import fault, faults, in_metres, merge, read_raw, read_stage
+from ..tracks.readers import merge, read_raw, read_stage
 from .geometry import Area, Square
 from .kinds import REACH
 
