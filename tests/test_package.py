@@ -24,6 +24,7 @@ ROOMS = {
     "encounters": [
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
+    "encounters.streaming": ["blocks", "cells", "kept_rows", "reading"],
     "encounters.search": ["occupants", "windows", "samples", "finding"],
     "zones": [
         "costmap", "ellipses", "outliers", "by_direction", "hulls", "respect", "uncertainty", "zone_file",

@@ -93,16 +93,19 @@ def merge(
 
 
 def _sorted(rows: pl.DataFrame) -> pl.DataFrame:
-    """Rows by day, id and t.  Those of one day in the order of time are sorted by person alone, and that by
-    numbers of 16 bits, in linear time; those in order are left as they are."""
+    """Rows by day, id and t; those of one day in the order of time need sorting by person only."""
     if rows.height and rows["day"].n_unique() == 1:
-        person = rows["id"].to_numpy()
-        if is_sorted(person, rows["t"].to_numpy()):
+        if is_sorted(rows["id"].to_numpy(), rows["t"].to_numpy()):
             return rows
         if rows["t"].is_sorted():
-            number, people = pd.factorize(person, sort=True)
-            return rows[np.argsort(number.astype(np.min_scalar_type(len(people))), kind="stable")]
+            return rows[person_order(rows["id"].to_numpy())]
     return rows.sort("day", "id", "t", maintain_order=True)
+
+
+def person_order(person: np.ndarray) -> np.ndarray:
+    """The order of rows by person, stable: by numbers of 16 bits where they suffice, in linear time."""
+    number, people = pd.factorize(person, sort=True)
+    return np.argsort(number.astype(np.min_scalar_type(len(people))), kind="stable")
 
 
 def is_sorted(person: np.ndarray, time: np.ndarray) -> bool:
