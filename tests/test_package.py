@@ -20,10 +20,11 @@ ROOMS = {
     "tracks": [
         "funnels", "formats", "plausible", "readers", "clock", "quality", "interop", "sites", "datasets",
     ],
-    "tracks.formats": ["frame_rates", "plain", "foreign", "layouts", "tables"],
+    "tracks.formats": ["frame_rates", "plain", "foreign", "layouts", "tables", "rows"],
     "encounters": [
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
+    "encounters.streaming": ["blocks", "cells", "kept_rows", "reading"],
     "encounters.search": ["occupants", "windows", "samples", "finding"],
     "zones": [
         "costmap", "ellipses", "outliers", "by_direction", "hulls", "respect", "uncertainty", "zone_file",
