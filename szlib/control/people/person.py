@@ -89,8 +89,13 @@ class Person:
     def after(self, seconds: float) -> Person:
         """The same person, so many seconds later."""
         (x, y), (vx, vy) = self.position, self.velocity
-        there = (x + vx * seconds, y + vy * seconds)
-        return Person(there, self.velocity, self.heading, self.zone, self.id, self.heading_unknown)
+        return self.at((x + vx * seconds, y + vy * seconds))
+
+    def at(self, position: tuple[float, float]) -> Person:
+        """The same person elsewhere [m]; what else they are was checked before, and is not again."""
+        there = object.__new__(type(self))
+        there.__dict__.update(self.__dict__, position=pair("a person's position", position))
+        return there
 
 
 class PlacedZone(NamedTuple):

@@ -94,7 +94,8 @@ class Sqp:
     def _solve(self, guess: Array, parameters: Array, share: float) -> tuple[Array, Outcome]:
         self._parameters[:] = parameters
         outcome: Outcome = "converged"
-        if not self._is_free():
+        # Who was held by a row is held still, nearly always: then the program finds it out by itself.
+        if self._multipliers.any() or not self._is_free():
             self._inputs[:] = guess
             outcome = self._iterate(self._weigh(slack_weight(self.settings, parameters)), share)
             if outcome == "failed":
