@@ -12,6 +12,7 @@ from random_states import ZONE, meetings, questions
 
 import szlib
 from szlib.control.problem import TOLERANCE, build_problem
+from szlib.control.solvers import sqp
 from szlib.control.solvers.program import build_program
 from szlib.simulation.closed_loop import advance
 
@@ -97,6 +98,19 @@ def test_derivatives_by_structure_are_those_of_the_whole_expressions(formulation
         found = [np.asarray(each) for each in derive(*at)[3:]]
         for one, other in zip(found, (gradient, jacobian.T, hessian, gauss), strict=True):
             assert one == pytest.approx(other, rel=1e-11, abs=1e-11)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
+def test_steps_that_raise_the_merit_for_a_while_end_in_the_same_plan(monkeypatch, formulation):
+    asked = list(islice(questions(seed=9), 60))
+    answers = []
+    for rises in (0, 1, sqp.RISES):
+        monkeypatch.setattr(sqp, "RISES", rises)
+        answers.append([question.ask(settings_of("sqp", **formulation)) for question in asked])
+    for steps in zip(*answers, strict=True):
+        assert len({step.rung for step in steps}) == 1
+        for step in steps[1:]:
+            assert step.control == pytest.approx(steps[0].control, abs=1e-5)
 
 
 # the ladder

@@ -8,9 +8,11 @@ The unknowns are the 2 N inputs. Each iteration solves
 with the exact Hessian H of the Lagrangian where it is positive definite; else without the curvature
 of the barriers (Gauss-Newton). Rows are soft, by an exact penalty, so that every program has a
 solution. A step has to lower cost + price * violation, with a price just above the largest multiplier so
-far; one that does not is corrected to second order, then shortened. Where no row has a multiplier, the
-program's cost is exact, and the first solution that satisfies the true rows is the answer. Where not
-even a bound is met, the answer is a linear feedback of the error, K (x - g), without any program.
+far. Near the solution a full step may miss that and still be good, so up to `RISES` in a row are taken all
+the same (a watchdog: R. Chamberlain et al., Math. Programming Study 16, 1982). After that, back where they
+began, a step is corrected to second order, then shortened. Where no row has a multiplier, the program's cost
+is exact, and the first solution that satisfies the true rows is the answer. Where not even a bound is met,
+the answer is a linear feedback of the error, K (x - g), without any program.
 """
 
 from __future__ import annotations
@@ -37,6 +39,8 @@ SHORTEST = 1e-3
 """A step that must be cut to less than this share of its length leads nowhere."""
 ROUNDING = 1e-12
 """Share by which the merit may rise from rounding alone."""
+RISES = 2
+"""Full steps in a row that need not lower the merit."""
 _HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
 _DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3}
 """Convex programs as they stand; next to the exact penalty, a quadratic one too small to matter."""
@@ -123,7 +127,7 @@ class Sqp:
 
     def _iterate(self, limit: float, share: float) -> Outcome:
         """Improve `_inputs`; no price above `limit`, the weight of slack; within this share of the budget."""
-        price = 0.0
+        price, rises, least = 0.0, 0, (0.0, 0.0)
         for _ in range(self.settings.max_iterations):
             if self.budget.spent(share):
                 return "late"
@@ -138,10 +142,24 @@ class Sqp:
             price = max(price, min(PRICE * steepest, limit))
             cost_before, violation_before, on_rows_before, on_speed = self._before.tolist()
             curved = on_rows_before if exact else on_speed
-            before, after = cost_before + price * violation_before, cost + price * violation
+            if rises == 0:
+                least = cost_before, violation_before
+            before, after = least[0] + price * least[1], cost + price * violation
             settled = violation <= VIOLATED or steepest >= limit
             solved = curved == on_rows == violation == 0 or (size <= CONVERGED[exact] and settled)
-            if not solved and after > before * (1 + ROUNDING) and not self._lower_merit(price, before):
+            if solved or after <= before * (1 + ROUNDING):
+                rises = 0
+            elif rises < RISES:
+                if rises == 0:
+                    began = self._inputs.copy(), self._multipliers.copy()
+                rises += 1
+            elif rises == RISES > 0:
+                self._inputs[:], self._multipliers[:] = began
+                rises += 1
+                continue
+            elif self._lower_merit(price, before):
+                rises = 0
+            else:
                 return "converged" if size <= CONVERGED[False] else "stalled"
             self._inputs[:] = self._trial
             if solved:
