@@ -2,7 +2,7 @@
 
 Prints a table and writes it to results/bench.json.  Bare seconds depend on the machine; ratios hardly.
 `--long` adds 4,000 states on which both solvers must agree, and 1,000 meetings head-on.  Names of
-cases after the options choose among them.
+cases after the options choose among them.  $SZLIB_BEFORE names a clone of an earlier commit to compare with.
 """
 
 import importlib.util
@@ -19,6 +19,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import bench_control
 import bench_data
 import numpy as np
 import pandas as pd
@@ -241,6 +242,7 @@ def main() -> None:
         "5 people, 4 walls": lambda: bench_solvers(CROWD),
         "IPOPT": bench_build,
         "cruel states": lambda: bench_cruel(3000 if "--long" in sys.argv else 200),
+        **bench_control.CASES,
         "import szlib": bench_import,
         "plaza": bench_plaza,
     }

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from ..barriers import cbf_residual
 from ..problem import Problem, build_problem, function
 from ..settings import MPCSettings
 
@@ -82,13 +83,16 @@ def build_program(settings: MPCSettings, n_people: int, n_walls: int) -> Program
 
 def _jacobian(p: Problem, s: MPCSettings, to_position: Any, to_velocity: Any) -> Any:
     """Of rows and terminal condition by the inputs, shape (rows, 2N)."""
-    change, to_xy = _change(s), _both(to_position)
-    blocks = []
-    for i in range(p.h.shape[0]):
-        slopes = [ca.horzcat(*(of[i, k] for of in p.slope)) for k in range(s.N_h + 1)]
-        blocks.append(change @ ca.diagcat(*slopes) @ to_xy)
+    maps, n = [ca.sparsify(ca.DM(row[None])) for row in to_position], p.h.shape[0]
+    by_axis = []
+    for of in p.slope:
+        slopes = ca.horzsplit(of)
+        ends = [cbf_residual(slopes[k + 1] @ maps[k + 1], slopes[k] @ maps[k], s.gamma) for k in range(s.N_h)]
+        by_axis.append(ca.vertcat(*ends))
+    rows = np.arange(s.N_h * n).reshape(s.N_h, n).T.ravel()
+    columns = np.arange(2 * s.N).reshape(2, s.N).T.ravel()
     velocities = ca.diagcat(*(-2 * p.states[2:, k].T for k in range(1, s.N + 1)))
-    blocks.append(velocities @ _both(to_velocity))
+    blocks = [ca.horzcat(*by_axis)[rows.tolist(), columns.tolist()], velocities @ _both(to_velocity)]
     if p.terminal.numel():
         blocks.append(_both(to_velocity[-1:]))
     return ca.vertcat(*blocks)
