@@ -77,7 +77,7 @@ def build_program(settings: MPCSettings, n_people: int, n_walls: int) -> Program
     pull = ca.evalf(ca.jacobian(ca.gradient(p.cost, u), given))
     least = -ca.solve(curvature, pull) @ given
     beyond = ca.sum1(ca.fmax(0, ca.fabs(least) - s.a_max))
-    free = function("free", [p.parameters], [least, beyond + there(least, p.parameters)[1]])
+    free = function("unbound", [p.parameters], [least, beyond + there(least, p.parameters)[1]])
     return Program(derive, measure, free)
 
 
