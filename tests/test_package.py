@@ -39,7 +39,7 @@ ROOMS = {
     ],
     "control.people": ["person", "tracker", "meetings"],
     "control.step": ["scene", "report", "decision", "polygon"],
-    "control.solvers": ["ipopt", "sqp", "sizes", "ladder"],
+    "control.solvers": ["ipopt", "program", "sqp", "sizes", "ladder"],
     "simulation": [
         "scenario", "crowds", "controllers", "metrics", "log", "closed_loop", "scenarios", "rollouts",
         "comparisons",
