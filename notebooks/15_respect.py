@@ -94,7 +94,7 @@ counts.to_frame("encounters")
 
 # %%
 null = szlib.null_encounters(
-    tracks, square=square, shifts=shifts, seed=seed, r_max=record.method.r_max, progress=False, **search
+    tracks, square=square, shifts=shifts, seed=seed, r_max=record.method.r_max, progress=shifts > 20, **search
 )
 by_chance = null.encounters.drop_duplicates("encounter")["kind"].value_counts() / shifts
 compared = pd.DataFrame({"seen": counts, "by chance": by_chance.round(1)})

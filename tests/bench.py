@@ -1,8 +1,10 @@
 """Speed, as ratios of two things run in turn in this one process: `make bench`.
 
-Prints a table and writes it to results/bench.json.  Bare seconds depend on the machine; ratios hardly.
-`--long` adds 4,000 states on which both solvers must agree, and 1,000 meetings head-on.  Names of
-cases after the options choose among them.
+Prints each number, beside it its bar and what it was when it was saved last, and writes all to
+results/bench.json.  Bare seconds depend on the machine; ratios hardly: `--save` appends these to
+tests/ratios.csv.  `--long` adds 4,000 states on which both solvers must agree, and 1,000 meetings head-on.
+Names of cases after the options choose among them.  $SZLIB_BEFORE names a clone of an earlier commit to
+compare with.
 """
 
 import importlib.util
@@ -19,7 +21,9 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import bench_control
 import bench_data
+import growth
 import numpy as np
 import pandas as pd
 from random_states import meetings, questions
@@ -231,7 +235,11 @@ def bench_import() -> dict[str, float]:
         lambda: subprocess.run([sys.executable, "-c", "pass"], check=True),
         repeats=5,
     )
-    return {"s more than bare Python": ours - bare, "ratio": ours / bare}
+    return {"s more than bare Python": ours - bare, "szlib / bare Python": ours / bare}
+
+
+BARS: dict[str, growth.Bars] = {}
+"""Of a case: what its numbers are held against."""
 
 
 def main() -> None:
@@ -241,6 +249,7 @@ def main() -> None:
         "5 people, 4 walls": lambda: bench_solvers(CROWD),
         "IPOPT": bench_build,
         "cruel states": lambda: bench_cruel(3000 if "--long" in sys.argv else 200),
+        **bench_control.CASES,
         "import szlib": bench_import,
         "plaza": bench_plaza,
     }
@@ -255,15 +264,15 @@ def main() -> None:
     if "--long" in sys.argv or os.environ.get(bench_data.RAW_DAY_VARIABLE):
         cases |= bench_data.CASES
     wanted = [name for name in sys.argv[1:] if not name.startswith("--")] or list(cases)
-    found = {}
+    found: dict[str, dict[str, float]] = {}
     for name in wanted:
         bench = cases[name]
         found[name] = {key: float(f"{value:.4g}") for key, value in bench().items()}
-        print(
-            f"{name:<24}", ", ".join(f"{key}: {value:.3g}" for key, value in found[name].items()), flush=True
-        )
+        print(growth.told(name, found[name], (BARS | bench_data.BARS).get(name)), flush=True)
     Path("results").mkdir(exist_ok=True)
     Path("results/bench.json").write_text(json.dumps(found, indent=1))
+    if "--save" in sys.argv:
+        growth.save(found)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 
+import growth
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -197,7 +198,5 @@ CASES: dict[str, Callable[[], dict[str, float]]] = {
     "zone, paper size": bench_zone,
 }
 
-
-if __name__ == "__main__":
-    for name, bench in CASES.items():
-        print(f"{name:<24}", ", ".join(f"{key}: {value:.3g}" for key, value in bench().items()), flush=True)
+BARS: dict[str, growth.Bars] = {"raw day to encounters": {"ours / bare scan": ("<=", 1.95)}}
+"""Of a case: what its numbers are held against."""

@@ -20,6 +20,7 @@ import szlib
 
 DAY = "2012-10-24"
 
+os.environ["SZLIB_CACHE"] = "off"  # nor do tests leave anything in the user's cache
 hypothesis.settings.register_profile("szlib", deadline=None)  # tests are never timed
 hypothesis.settings.load_profile("szlib")
 

@@ -29,9 +29,10 @@ from ..parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.formats.layouts import layout_of, start_of_day
 from ..tracks.formats.plain import first_line
-from ..tracks.readers import CALENDAR_BEGINS, recording_names
+from ..tracks.formats.rows import CALENDAR_BEGINS
+from ..tracks.readers import recording_names
 from .geometry import Area
-from .pipeline import Chain, day_key, finished_record, write_record
+from .pipeline import Chain, contents, day_key, finished_record, write_record
 
 PURPOSE = "encounters by day"
 """What the folder of an extraction is marked as."""
@@ -130,6 +131,10 @@ def extract_days(
         a square the ATC mall's files have `ATC_SQUARE`, others "auto": the `szlib.walked_area` of the first
         day, the same for all.
 
+    Of a raw day the rows near the square, some 2 % of the file, are kept in the user's cache, so that other
+    conditions are asked of them without reading it again (`szlib.encounters.streaming.kept_rows`):
+    $SZLIB_CACHE names the folder, or is "off".
+
     Returns
     -------
     An `Extraction`: its table says what became of each day; a day that fails does not stop the others.
@@ -179,14 +184,16 @@ def extract_day(day: str, files: Sequence[str], out: str, chain: Chain) -> dict[
     begun = time.perf_counter()
     row, folder = _row(day, files, status="failed"), Path(out)
     try:
-        key = day_key(files, chain)
-        record = finished_record(folder, day, key)
-        status = "kept" if record else "done"
-        if record is None:
-            with warnings.catch_warnings():  # the table and the funnel tell of rows set aside
-                warnings.simplefilter("ignore", DataWarning)
-                samples = chain.encounters([Path(file) for file in files])
-            record = write_record(folder, day, key, samples, files, chain)
+        with contents(files) as content:
+            record, status = None, "done"
+            if (folder / f"{day}.json").is_file():
+                record = finished_record(folder, day, day_key(files, content, chain))
+                status = "kept" if record else "done"
+            if record is None:
+                with warnings.catch_warnings():  # the table and the funnel tell of rows set aside
+                    warnings.simplefilter("ignore", DataWarning)
+                    samples = chain.encounters([Path(file) for file in files], content)
+                record = write_record(folder, day, day_key(files, content, chain), samples, files, chain)
         row |= {name: record[name] for name in ("key", "rows", "unusable", "encounters", "samples")}
         row["status"] = status
     except SzlibError as error:

@@ -9,7 +9,9 @@ import hashlib
 import io
 import json
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,7 +33,7 @@ from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, S
 from .kinds import KINDS
 from .search.finding import find_encounters
 from .search.samples import SAMPLE_COLUMNS
-from .streaming import read_near_square
+from .streaming.reading import Content, read_near_square
 
 _ADVICE = {
     "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
@@ -96,10 +98,13 @@ class Chain:
             tracks = to_clock(self._read(files), max_gap=self.max_gap)
         return replace(self, square=walked_area(tracks))
 
-    def encounters(self, files: Sequence[Path]) -> pd.DataFrame:
-        """The encounters of one day's files: identical to those found from `szlib.read_tracks(files)`."""
+    def encounters(self, files: Sequence[Path], content: Sequence[Content] = ()) -> pd.DataFrame:
+        """The encounters of one day's files: identical to those found from `szlib.read_tracks(files)`.
+
+        With the `contents` of the files, rows near the area are kept for next time, in the user's cache.
+        """
         area = self._known_area(files)
-        raw = self._read(files, area)
+        raw = self._read(files, area, content)
         tracks = to_clock(raw, max_gap=self.max_gap) if len(raw) else raw
         if len(tracks) == 0:
             return funnels.carry(no_samples(), funnels.of(tracks))
@@ -121,13 +126,16 @@ class Chain:
         layouts = {layout_of(first_line(file), name).name for file in files}
         return ATC_SQUARE if self.square is None and layouts <= {"atc-raw", "atc-1hz"} else None
 
-    def _read(self, files: Sequence[Path], near: Area | None = None) -> pd.DataFrame:
+    def _read(
+        self, files: Sequence[Path], near: Area | None = None, content: Sequence[Content] = ()
+    ) -> pd.DataFrame:
         """Rows of the files; of a single one, where an area is given, those near it."""
         given = {name: getattr(self, name) for name in ("file_format", "unit", "frame_rate", "columns")}
         if near is None or len(files) > 1:
             return read_raw(files, tz=self.tz, **given)
         of = {"square": near, "duration": self.duration, "max_gap": self.max_gap}
-        return read_near_square(files[0], tz=self.tz, **of, **given)  # type: ignore[arg-type]
+        known = content[0] if content else None
+        return read_near_square(files[0], tz=self.tz, content=known, **of, **given)  # type: ignore[arg-type]
 
 
 def check_met(samples: pd.DataFrame) -> pd.DataFrame:
@@ -157,10 +165,17 @@ def no_samples() -> pd.DataFrame:
     return samples.assign(kind=pd.Categorical([], categories=list(KINDS)))
 
 
-def day_key(files: Sequence[str], chain: Chain) -> str:
+@contextmanager
+def contents(files: Sequence[str]) -> Iterator[list[Content]]:
+    """What gives the content of each file; a thread looks for it from now on, while the files are read."""
+    with ThreadPoolExecutor(1) as thread:
+        yield [thread.submit(file_content, Path(file)).result for file in files]
+
+
+def day_key(files: Sequence[str], content: Sequence[Content], chain: Chain) -> str:
     """Names the result: the content of the files, every parameter, and this version of szlib."""
-    content = sorted((Path(file).name, *file_content(Path(file))) for file in files)
-    named = {"format": [_FORMAT, _VERSION, __version__], "files": content, "parameters": chain.parameters()}
+    found = sorted((Path(file).name, *known()) for file, known in zip(files, content, strict=True))
+    named = {"format": [_FORMAT, _VERSION, __version__], "files": found, "parameters": chain.parameters()}
     return hashlib.sha256(json.dumps(named, sort_keys=True).encode()).hexdigest()
 
 

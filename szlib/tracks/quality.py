@@ -15,7 +15,7 @@ from ..errors import DataError
 from .clock import TICKS_PER_SECOND, clock_index, nearest_tick, to_clock
 from .formats.layouts import Format, readable, recognise
 from .formats.plain import plain_file
-from .readers import fault
+from .formats.rows import fault
 
 STANDING = 0.1
 """Who moves less than that within a second is standing [m] (measured: sensor noise stays below it)."""

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import polars as pl
 
@@ -19,15 +20,10 @@ from ..files import printable
 from . import funnels
 from .formats.layouts import EXPECTED, FORMATS, UNITS, Columns, Format, readable, recognise
 from .formats.plain import check_rows, plain_file
+from .formats.rows import fault, in_metres, stem
 from .formats.tables import is_table, recognise_table
 from .plausible import check_people, check_unit, suggestion
 
-_LAST_SECOND = 4_102_444_800.0
-"""2100-01-01; later time stamps are not seconds since 1970."""
-_FARTHEST = 2e7
-"""Farther [m] from the origin of any grid is no place on Earth."""
-CALENDAR_BEGINS = 1e8
-"""A clock that has not come so far (1973) does not count from 1970: it tells no calendar day."""
 _FASTEST, _BLUR, _SOON = 5.0, 0.5, 5.0
 """Who is in two files walks from the one's place to the other's at most so fast [m/s], up to so much [m];
 rows farther apart than that [s] tell nothing."""
@@ -61,7 +57,7 @@ def read_raw(
     given = {"name": file_format, "unit": unit, "frame_rate": frame_rate, "tz": tz, "columns": columns}
     read = [_read(source, file, **given) for source, file in zip(sources, files, strict=True)]  # type: ignore[arg-type]
     parts, stages, layouts = zip(*read, strict=True)
-    _check_sequences([_stem(f) for f, layout in zip(files, layouts, strict=True) if layout.name == "ewap"])
+    _check_sequences([stem(f) for f, layout in zip(files, layouts, strict=True) if layout.name == "ewap"])
     return merge(told_apart(files, parts, layouts), stages, layouts, excluded)
 
 
@@ -77,8 +73,10 @@ def merge(
     merged = pl.concat(parts)
     wanted = merged.filter(~pl.col("day").cast(pl.String).is_in(excluded)) if excluded else merged
     keys = ["day", "id", "t"]
-    rows = wanted.sort(keys, maintain_order=True)
-    rows = rows.filter(pl.any_horizontal(pl.col(keys).ne_missing(pl.col(keys).shift())))
+    rows = _sorted(wanted)
+    again = pl.all_horizontal(pl.col(keys).eq_missing(pl.col(keys).shift()))
+    if rows.select(again.any()).item():
+        rows = rows.filter(~again)
     doubled = {"duplicate (day, id, t)": wanted.height - rows.height}
     _warn("all files", doubled)
     if rows.height == 0:
@@ -92,6 +90,28 @@ def merge(
     frame.attrs["max_gap"] = max(gaps) if len(gaps) == len(layouts) else None
     reasons = {"excluded day": merged.height - wanted.height, **doubled}
     return funnels.carry(frame, [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)])
+
+
+def _sorted(rows: pl.DataFrame) -> pl.DataFrame:
+    """Rows by day, id and t; those of one day in the order of time need sorting by person only."""
+    if rows.height and rows["day"].n_unique() == 1:
+        if is_sorted(rows["id"].to_numpy(), rows["t"].to_numpy()):
+            return rows
+        if rows["t"].is_sorted():
+            return rows[person_order(rows["id"].to_numpy())]
+    return rows.sort("day", "id", "t", maintain_order=True)
+
+
+def person_order(person: np.ndarray) -> np.ndarray:
+    """The order of rows by person, stable: by numbers of 16 bits where they suffice, in linear time."""
+    number, people = pd.factorize(person, sort=True)
+    return np.argsort(number.astype(np.min_scalar_type(len(people))), kind="stable")
+
+
+def is_sorted(person: np.ndarray, time: np.ndarray) -> bool:
+    """Whether rows are in the order of person, then time."""
+    same = person[1:] == person[:-1]
+    return bool(((person[1:] > person[:-1]) | (same & (time[1:] >= time[:-1]))).all())
 
 
 def _read(
@@ -155,49 +175,6 @@ def read_stage(
     return funnels.stage(f"read {path.name}{rate}", good + bad, good, reasons)
 
 
-def in_metres(good: pl.DataFrame, path: Path, layout: Format, metres: float, tz: str) -> pl.DataFrame:
-    """Usable rows as day, id, t [s], x, y [m]."""
-    if "day" not in good.columns:
-        # the name stands for the day where frames are counted, or seconds since some other moment than 1970
-        last = good["t"].max()
-        named = layout.name == "ewap" or (isinstance(last, float) and last * layout.seconds < CALENDAR_BEGINS)
-        try:
-            good = good.with_columns(day=pl.lit(_stem(path)) if named else _calendar_day(tz))
-        except pl.exceptions.PolarsError as error:
-            raise DataError(f"unknown time zone {tz!r} ({error}); expected one like 'Asia/Tokyo'") from error
-    return good.select(
-        "day",
-        pl.col("id").cast(pl.Int64),
-        pl.col("t") * layout.seconds,
-        pl.col("x") * metres,
-        pl.col("y") * metres,
-    )
-
-
-def faults(metres: float, seconds: float, with_day: bool) -> dict[str, pl.Expr]:
-    """Why a row cannot be used: reasons, and where each holds; the first one counts."""
-    numbers, position, person = ["t", "id", "x", "y"], pl.col("x", "y"), pl.col("id")
-    found = {
-        "missing or extra fields": pl.col("ragged"),
-        "missing or not a number": pl.any_horizontal(pl.col(numbers).is_null()),
-        "not finite": ~pl.all_horizontal(pl.col(numbers).is_finite()),
-        "id not a whole number": (person != person.floor()) | (person.abs() > 2**53),
-        "time not in seconds since 1970": pl.col("t").abs() * seconds > _LAST_SECOND,
-        "position not on Earth": pl.any_horizontal(position.abs() * metres > _FARTHEST),
-    }
-    return found | ({"no day": pl.col("day").is_null()} if with_day else {})
-
-
-def fault(metres: float, seconds: float, with_day: bool) -> pl.Expr:
-    """Why a row cannot be used; null where it can."""
-    reasons = faults(metres, seconds, with_day).items()
-    return pl.coalesce(pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons)
-
-
-def _stem(path: Path) -> str:
-    return path.name.split(".")[0]
-
-
 def told_apart(
     files: Sequence[Path], parts: Sequence[pl.DataFrame], layouts: Sequence[Format]
 ) -> list[pl.DataFrame]:
@@ -212,7 +189,7 @@ def told_apart(
         return list(parts)
     texts = [part["day"].dtype == pl.String for part in parts]
     named = [
-        text and part["day"].unique().to_list() == [_stem(f)]
+        text and part["day"].unique().to_list() == [stem(f)]
         for f, part, text in zip(files, parts, texts, strict=True)
     ]
     kept, names = list(parts), recording_names(files)
@@ -264,7 +241,7 @@ def _shared(parts: Sequence[pl.DataFrame]) -> list[tuple[int, int, int, int, int
 
 def recording_names(files: Sequence[Path]) -> list[str]:
     """A name for each file: without its ending, with its folder's where two are called the same."""
-    names = [_stem(file) for file in files]
+    names = [stem(file) for file in files]
     names = [
         f"{file.parent.name}-{name}" if names.count(name) > 1 else name
         for file, name in zip(files, names, strict=True)
@@ -279,11 +256,6 @@ def _check_sequences(names: list[str]) -> None:
             f"several EWAP files are called {', '.join(doubled)}: their people would be mixed; "
             "pass each file once, and rename those that are other recordings"
         )
-
-
-def _calendar_day(tz: str) -> pl.Expr:
-    local = pl.from_epoch(pl.col("t").floor().cast(pl.Int64), time_unit="s").dt.convert_time_zone(tz)
-    return local.dt.date()
 
 
 def _warn(where: str, reasons: dict[str, int]) -> None:

@@ -155,7 +155,9 @@ def run_with(name: str, zone: Ellipse) -> dict[str, float]:
 
 
 def _interval(zone: SocialZone, speed: float, quantity: str) -> tuple[float, float, float]:
-    """Value, low and high of a quantity at a fitted speed; ZoneError where they are not known."""
+    """Value, low, high of a quantity at a speed, NaN where there is no zone; ZoneError if not asked for."""
+    if speed in zone.undefined:
+        return np.nan, np.nan, np.nan
     table = zone.table().set_index("speed")
     if speed not in table.index or zone.uncertainty is None:
         raise ZoneError(f"no interval at {speed:g} m/s; fit with speeds that hold it, and with resamples > 0")

@@ -11,8 +11,7 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.encounters import streaming as nearby
-from szlib.encounters.streaming import read_near_square
+from szlib.encounters.streaming import blocks, cells, read_near_square
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.tracks import funnels
@@ -89,7 +88,7 @@ def test_the_encounters_are_those_of_the_whole_day(
     max_gap: float | None,
     rows_at_once: int,
 ) -> None:
-    monkeypatch.setattr(nearby, "_ROWS_AT_ONCE", rows_at_once)
+    monkeypatch.setattr(blocks, "_ROWS_AT_ONCE", rows_at_once)
     found = 0
     for seed in range(4):
         path = write(tmp_path / "day.csv", make_raw(seed, wild=seed % 2 == 0))
@@ -98,7 +97,7 @@ def test_the_encounters_are_those_of_the_whole_day(
 
 
 def test_rows_in_any_order_give_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(nearby, "_ROWS_AT_ONCE", 1000)
+    monkeypatch.setattr(blocks, "_ROWS_AT_ONCE", 1000)
     rows = make_raw(1, wild=False)
     shuffled = write(tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0))
     assert same(shuffled, square=szlib.ATC_SQUARE, duration=1.0) > 0
@@ -111,7 +110,7 @@ def test_rows_in_any_order_give_the_same(tmp_path: Path, monkeypatch: pytest.Mon
 def test_slots_that_are_shared_only_keep_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "day.csv", make_raw(3))
     apart = len(read_near_square(path, square=szlib.ATC_SQUARE, duration=1.0))
-    monkeypatch.setattr(nearby, "_CELLS", 64)
+    monkeypatch.setattr(cells, "_CELLS", 64)
     assert len(read_near_square(path, square=szlib.ATC_SQUARE, duration=1.0)) > apart
     assert same(path, square=szlib.ATC_SQUARE, duration=1.0) > 0
 

@@ -283,6 +283,17 @@ def test_unsorted_rows_are_sorted(tmp_path: Path, name: str) -> None:
     pd.testing.assert_frame_equal(read_raw(write(tmp_path / "rec.csv", WRITERS[name](shuffled))), expected)
 
 
+def test_rows_by_person_by_time_and_in_any_order_give_one_table(tmp_path: Path) -> None:
+    rows = samples(people=5)
+    tables = [
+        read_raw(write(tmp_path / "rec.csv", as_raw(rows.sort_values(by, kind="stable", ascending=way))))
+        for by in (["id", "t"], ["t", "id"])
+        for way in (True, False)
+    ]
+    for table in tables[1:]:
+        pd.testing.assert_frame_equal(table, tables[0], check_exact=True)
+
+
 # --- files that cannot be used -----------------------------------------------------------------------
 
 TIDY_ROWS = "1351040400.0,7,5.0,5.0\n1351040400.4,7,5.4,5.0\n"

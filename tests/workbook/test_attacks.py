@@ -121,10 +121,10 @@ def test_a_poisoned_day_is_a_line_and_the_others_are_done(tmp_path, monkeypatch)
 
     real = days.day_key
 
-    def poisoned(files, chain):
+    def poisoned(files, content, chain):
         if files[0].endswith("other.csv"):
             raise KeyError("foreign")
-        return real(files, chain)
+        return real(files, content, chain)
 
     monkeypatch.setattr(days, "day_key", poisoned)
     monkeypatch.setattr(days, "_day_of", lambda file, chain: None)

@@ -1,0 +1,114 @@
+"""The rows of a file near the square, as a table: `read_near_square`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import polars as pl
+
+from ... import memory
+from ...tracks import funnels
+from ...tracks.formats.layouts import Columns, Format, readable, recognise
+from ...tracks.formats.plain import plain_file
+from ...tracks.formats.rows import in_metres
+from ...tracks.plausible import check_unit
+from ...tracks.readers import merge, person_order, read_raw, read_stage
+from ..geometry import Area
+from ..kinds import REACH
+from . import kept_rows
+from .blocks import Blocks, Rows, Tally
+from .cells import Cells, Unsorted, one_pass, two_passes
+
+Content = Callable[[], tuple[int, str]]
+"""Gives size and checksum of a file, once they are known."""
+_NEAR_ROW = 180
+"""Bytes that a row near the square takes until its day is done (15.6 million of them: 2.7 GB)."""
+
+
+def read_near_square(
+    path: str | Path,
+    *,
+    square: Area,
+    duration: float,
+    file_format: str | None = None,
+    unit: str | None = None,
+    frame_rate: float | None = None,
+    max_gap: float | None = None,
+    tz: str = "Asia/Tokyo",
+    columns: Columns | None = None,
+    content: Content | None = None,
+) -> pd.DataFrame:
+    """The rows of a file that encounters in the square can depend on, as from `tracks.readers.read_raw`.
+
+    Only ATC raw files are streamed; others are small, and are read whole.  `square` and `duration` [s] are
+    those of `szlib.find_encounters`, the others those of `szlib.read_tracks`.  The table is empty where
+    nobody came near; its funnel counts every row of the file.  With `content`, which gives that of the file
+    as `szlib.files.file_content`, the rows are kept in the user's cache (`kept_rows`), and taken from it.
+
+    Raises
+    ------
+    DataError : as `szlib.read_tracks`.
+    """
+    path = Path(path)
+    if path.is_file():
+        with plain_file(path) as plain:
+            layout, scan = recognise(plain, path, file_format, frame_rate, columns=columns, unit=unit)
+            if layout.name == "atc-raw":
+                metres = layout.metres_in(unit)
+                cells = Cells(square.grown(REACH).box, duration, max_gap or layout.max_gap or 0.0, metres)
+                rows, seen = _near(scan, path, layout, cells, content)
+                return _table(rows, seen, path, layout, metres, unit=unit, tz=tz)
+    given = {"file_format": file_format, "unit": unit, "frame_rate": frame_rate, "columns": columns}
+    return read_raw(path, tz=tz, **given)  # type: ignore[arg-type]
+
+
+def _near(
+    scan: pl.LazyFrame, path: Path, layout: Format, cells: Cells, content: Content | None
+) -> tuple[Rows, Tally]:
+    """The rows near the square, from the cache where they are kept, and what was seen of the file."""
+    which = {"format": asdict(layout), "cells": asdict(cells)}
+    if content and kept_rows.may_be_kept(path.stat().st_size, which):
+        known = kept_rows.find(content(), which)
+        if known:
+            return known
+    with readable(path, layout):
+        blocks = Blocks(scan, cells.metres, layout.seconds)
+        try:
+            parts = _gather(one_pass(cells, blocks), path)
+        except Unsorted:
+            parts = _gather(two_passes(cells, blocks), path)
+    near = Rows(*map(np.concatenate, zip(*parts, strict=True)))
+    near = near.at(person_order(near.id))
+    if content:
+        kept_rows.remember(content(), which, near, blocks.tally)
+    return near, blocks.tally
+
+
+def _table(
+    rows: Rows, seen: Tally, path: Path, layout: Format, metres: float, *, unit: str | None, tz: str
+) -> pd.DataFrame:
+    """The rows as from `read_raw`, with the funnel of the whole file."""
+    stage = read_stage(path, layout, seen.good, dict(seen.reasons), seen.first)
+    if unit is None:
+        check_unit(pl.DataFrame({"x": [seen.reach], "y": [0.0]}), layout, path)
+    near = pl.DataFrame(rows._asdict())
+    far = {"never near the square": seen.good - near.height}
+    stages = [stage, funnels.stage("near the square", seen.good, near.height, far)]
+    if near.height == 0:
+        empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
+        return funnels.carry(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
+    return merge([in_metres(near, path, layout, metres, tz)], stages, [layout], [])
+
+
+def _gather(blocks: Iterator[Rows], path: Path) -> list[Rows]:
+    """The rows of all blocks; raises MemoryLimitError as soon as they are too many."""
+    parts, count = [], 0
+    for rows in blocks:
+        parts.append(rows)
+        count += len(rows.t)
+        memory.require(count * _NEAR_ROW, f"{path}: to keep {count:,} rows near the square, or more,")
+    return parts
