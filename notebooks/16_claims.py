@@ -39,6 +39,7 @@ from szlib.workbook import claims, figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 from szlib.workbook.sensitivity import sensitivity
 from szlib.zones.outliers import is_outlier
+from szlib.zones.zone_file import THINNEST_ZONE
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -228,7 +229,8 @@ record.figure(fig, "tornado")
 # %%
 zone = zones["quantile"]
 line = zone.table().set_index("speed").loc[zone_speed]
-size = {"low": (line["a_low"] / line["a"]), "middle": 1.0, "high": (line["a_high"] / line["a"])}
+low = max(line["a_low"], THINNEST_ZONE)  # nobody is thinner
+size = {"low": low / line["a"], "middle": 1.0, "high": line["a_high"] / line["a"]}
 rows = []
 for name in szlib.SCENARIOS:
     for end, scale in size.items():

@@ -198,12 +198,15 @@ def measure(estimate: Estimate, speeds: Sequence[float], *, resamples: int, seed
     away = _quantities(others) - known
     angle = QUANTITIES.index("angle_deg")
     away[..., angle] = (away[..., angle] + 90) % 180 - 90
+    intervals = _interval(known, away, back)
+    sizes = [QUANTITIES.index(name) for name in ("a", "b", "area")]
+    intervals[..., sizes] = np.maximum(intervals[..., sizes], 0)
     return Uncertainty(
         LEVEL,
         int(resamples),
         unit,
         how,
-        _table(speeds, "quantity", QUANTITIES, _interval(known, away, back)),
+        _table(speeds, "quantity", QUANTITIES, intervals),
         _table(
             speeds,
             "direction",
