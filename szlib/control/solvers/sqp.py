@@ -17,6 +17,7 @@ the answer is a linear feedback of the error, K (x - g), without any program.
 
 from __future__ import annotations
 
+from math import isnan
 from typing import Literal
 
 import daqp
@@ -145,6 +146,8 @@ class Sqp:
             if rises == 0:
                 least = cost_before, violation_before
             before, after = least[0] + price * least[1], cost + price * violation
+            if isnan(before):
+                return "failed"
             settled = violation <= VIOLATED or steepest >= limit
             solved = curved == on_rows == violation == 0 or (size <= CONVERGED[exact] and settled)
             if solved or after <= before * (1 + ROUNDING):
