@@ -2,7 +2,7 @@
 
     python tests/studies/zones.py coverage 200 quantile centred default > notebooks/tables/16_coverage.csv
     python tests/studies/zones.py coverage 200 hull centred > notebooks/tables/16_coverage_hull.csv  (plazas)
-    python tests/studies/zones.py coverage 40 respect centred > notebooks/tables/16_coverage_respect.csv
+    python tests/studies/zones.py coverage 20 respect centred > notebooks/tables/16_coverage_respect.csv
     python tests/studies/zones.py levels 3 > notebooks/tables/16_levels.csv               (plazas a case)
     python tests/studies/zones.py errors 3 > notebooks/tables/16_estimators.csv           (plazas a case)
     python tests/studies/zones.py sizes 8 > notebooks/tables/16_sizes.csv                 (plazas pooled)

@@ -11,6 +11,7 @@ import pytest
 import szlib
 from szlib.errors import ZoneError
 from szlib.zones.respect.boundary import fit_respect, respect_boundary, respect_radius
+from szlib.zones.respect.estimate import RespectZones
 from szlib.zones.respect.presence import Presence, pair_correlation
 
 R_MAX = 2.0
@@ -166,6 +167,18 @@ def test_what_is_far_does_not_matter(null: szlib.NullEncounters) -> None:
     far = data.assign(distance=data["distance"] + 2.0)
     found = respect_boundary(pd.concat([data, far]), null, THETA)
     np.testing.assert_array_equal(found, respect_boundary(data, null, THETA))
+
+
+def test_a_null_of_few_shifts_is_drawn_anew_as_well(null: szlib.NullEncounters) -> None:
+    few = szlib.NullEncounters(null.samples[:2000], null.encounters[:2000], 11, R_MAX)  # nobody in the last
+    data = kept_out(scattered(1, 2000), szlib.Ellipse((0, 0), (0.9, 0.7)))
+    zones = RespectZones.of(data, r_max=R_MAX, null=few)
+    alike = np.ones((5, len(zones.encounters)))
+    same = zones.others(alike, [1.0])
+    assert np.ptp(same, axis=0).max() == 0
+    drawn = zones.others(alike, [1.0], np.random.default_rng(0))
+    assert np.ptp(drawn[:, 0, 2]) > 0.005
+    np.testing.assert_allclose(zones.shifts.sum(axis=0), zones.null.counts)
 
 
 def test_shapes(null: szlib.NullEncounters) -> None:

@@ -75,11 +75,12 @@ class RespectZones:
             "shifts": null.shifts,
             "null": null.parameters,
         }
+        whole = Presence.of(null.samples, r_max=r_max)
         return cls(
             close,
             *encounter_numbers(close),
-            Presence.of(null.samples, r_max=r_max),
-            np.stack([Presence.of(null.one(k), r_max=r_max).counts for k in range(null.shifts)], dtype="f4"),
+            whole,
+            _by_shift(null, whole),
             float(speed_width),
             parameters,
             [*funnels.of(samples), funnels.stage("samples: close", len(samples), len(close), far)],
@@ -122,3 +123,11 @@ class RespectZones:
             respect_boundary(data, null, DIRECTIONS, speed=v, speed_width=self.speed_width) for v in asked
         ]
         return np.broadcast_to(lines, (len(speeds), len(DIRECTIONS)))
+
+
+def _by_shift(null: NullEncounters, whole: Presence) -> NDArray[np.float32]:
+    """How often each shift was where, shape (shifts, speeds, directions, distances)."""
+    counts = np.zeros((null.shifts, *whole.counts.shape), np.float32)
+    for k in null.samples["shift"].unique():
+        counts[k] = Presence.of(null.one(k), r_max=null.r_max).counts
+    return counts
