@@ -76,10 +76,10 @@ parameters(
 # relaxed plan is applied.
 
 # %%
-cells = []
+cells, long = [], worlds > 3  # a bar where it takes long
 for gamma, N_h, a_max in product(gammas, horizons, limits):
     settings = szlib.MPCSettings(gamma=gamma, N_h=N_h, a_max=a_max)
-    rows = szlib.rollouts(worlds, seed=seed, settings=settings, worlds=crowd, n_jobs=n_jobs, progress=False)
+    rows = szlib.rollouts(worlds, seed=seed, settings=settings, worlds=crowd, n_jobs=n_jobs, progress=long)
     numbers = (rows["infeasible_steps"].mean(), rows["min_h"].min(), rows["unflagged_violations"].sum())
     cells.append((gamma, N_h, a_max, worlds, *numbers))
 mine = pd.DataFrame(
@@ -205,7 +205,7 @@ kept = szlib.rollouts(
     settings=szlib.MPCSettings(terminal="rest"),
     worlds=still,
     n_jobs=n_jobs,
-    progress=False,
+    progress=long,
 )
 steps = 150 * len(kept)
 none, lowest = kept["infeasible_steps"].sum() == 0, float(kept["min_h"].min())

@@ -162,7 +162,7 @@ for name in models:
             behaviour=Reacting(name, sees=sees),
             measure=measure,
             n_jobs=1,
-            progress=False,
+            progress=worlds > 2,
         )
         parts.append(rows.assign(crowd=name, sees=sees))
 mine = pd.concat(parts) if parts else pd.DataFrame(columns=["unexplained"])

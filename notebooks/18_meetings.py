@@ -120,7 +120,7 @@ def meet(controller: str, settings: szlib.MPCSettings) -> pd.DataFrame:
             controller=CONTROLLERS[controller],
             measure=social,
             n_jobs=n_jobs,
-            progress=False,
+            progress=variations > 2,
         )
         tables.append(rows.assign(meeting=name, controller=controller))
     return pd.concat(tables)

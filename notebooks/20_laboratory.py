@@ -79,8 +79,9 @@ parameters(
 
 # %%
 samples = record.encounters()
-hull = szlib.SocialZone.fit(samples, method="hull", speeds=(1.1,), resamples=0)
-zones = {"quantile": record.zone().ellipse(1.1), "hull": hull.ellipse(1.1)}
+pace = record.method.zone_speed
+hull = szlib.SocialZone.fit(samples, method="hull", speeds=(pace,), resamples=0)
+zones = {"quantile": record.ellipse(), "hull": hull.ellipse(pace)}
 first = laboratory.Choice(gamma, N_h, a_max, size, estimator)
 second = laboratory.Choice(gamma_b, N_h_b, a_max_b, size_b, estimator_b)
 

@@ -3,7 +3,8 @@
 Prints each number, beside it its bar and what it was when it was saved last, and writes all to
 results/bench.json.  Bare seconds depend on the machine; ratios hardly: `--save` appends these to
 tests/ratios.csv.  `--long` adds 4,000 states on which both solvers must agree, and 1,000 meetings head-on.
-Names of cases after the options choose among them.
+Names of cases after the options choose among them.  $SZLIB_BEFORE names a clone of an earlier commit to
+compare with.
 """
 
 import importlib.util
@@ -20,6 +21,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import bench_control
 import bench_data
 import bench_growth
 import growth
@@ -248,6 +250,7 @@ def main() -> None:
         "5 people, 4 walls": lambda: bench_solvers(CROWD),
         "IPOPT": bench_build,
         "cruel states": lambda: bench_cruel(3000 if "--long" in sys.argv else 200),
+        **bench_control.CASES,
         "import szlib": bench_import,
         "plaza": bench_plaza,
         **bench_growth.CASES,

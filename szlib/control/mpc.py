@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .barriers import Array, barrier, finite, segment_formula, walls_of
+from .barriers import Array, barrier, finite, pair, segment_formula, walls_of
 from .distances import wall_margin
 from .people.meetings import subgoal
 from .people.person import Person, SpeedZone, as_ellipse, circle_around, place
@@ -166,12 +166,11 @@ class MPCCBF:
         """
         began = perf_counter()
         self._own()
-        x = finite("state", state, (4,))
-        gx, gy = finite("goal", goal, (2,)).tolist()
+        x, towards = finite("state", state, (4,)).tolist(), pair("goal", goal)
         if not self._moved:
-            self._check_goal((gx, gy))
+            self._check_goal(towards)
         self._now = self._clock(now, stamps)
-        scene = self._scene(x, (gx, gy), self.tracker.see(people, now=self._now, ids=ids, stamps=stamps))
+        scene = self._scene(x, towards, self.tracker.see(people, now=self._now, ids=ids, stamps=stamps))
         self._moved, self._n_people = True, len(scene.zones)
         solver = self._sizes.of(self._n_people, len(self.walls))
         self._sizes.budget.begin()
@@ -193,22 +192,23 @@ class MPCCBF:
             scene=scene,
         )
 
-    def _scene(self, x: Array, goal: tuple[float, float], seen: Seen) -> Scene:
+    def _scene(self, x: list[float], goal: tuple[float, float], seen: Seen) -> Scene:
         """Everything that the step is asked, with the zone that is kept of everybody."""
         kept = [self.zone_of(person) for person in seen.people]
         placed = [place(person, zone) for person, zone in zip(seen.people, kept, strict=True)]
-        return Scene((*x.tolist(),), goal, seen, kept, placed, self._segments, self._margins, self.settings)
+        return Scene(tuple(x), goal, seen, kept, placed, self._segments, self._margins, self.settings)
 
-    def _parameters(self, x: Array, scene: Scene, size: tuple[int, int]) -> Array:
+    def _parameters(self, x: list[float], scene: Scene, size: tuple[int, int]) -> Array:
         """The numbers of the problem of this size: state, target, the pace at its end, people and walls."""
         if scene.seen.lost:
             target = self._stop(x)
         else:
-            at = float(x[0]), float(x[1])
-            target = subgoal(at, scene.goal, scene.zones, self.walls, self.settings)
+            target = subgoal(
+                (x[0], x[1]), scene.goal, scene.zones, self._segments, self._margins, self.settings
+            )
         first_pace = terminal_of(self.settings, len(scene.zones)) == "person"
         pace = scene.zones[0][5:] if first_pace else (0.0, 0.0)
-        return np.array([*x.tolist(), *target, *pace, *slots(x, scene.zones, self._wall_numbers, size)])
+        return np.array([*x, *target, *pace, *slots(x, scene.zones, self._wall_numbers, size)])
 
     def _clock(self, now: float | None, stamps: ArrayLike | None) -> float:
         """The time of this step [s]: as given, or `dt` after the last."""
@@ -222,9 +222,9 @@ class MPCCBF:
             raise SolverError(f"now must be a finite time [s]; got {now!r}")
         return float(now)
 
-    def _stop(self, x: Array) -> tuple[float, float]:
+    def _stop(self, x: list[float]) -> tuple[float, float]:
         """Where full braking along the way ends [m]."""
-        px, py, vx, vy = x.tolist()
+        px, py, vx, vy = x
         time = max(abs(vx), abs(vy)) / self.settings.a_max
         return px + vx * time / 2, py + vy * time / 2
 
@@ -233,7 +233,9 @@ class MPCCBF:
 
         Of somebody whose heading is unknown it is `circle_around` that.
         """
-        zone = self.zone if person.zone is None else as_ellipse(person.zone, self.settings.zone_speed)
+        zone = self.zone if person.zone is None else person.zone
+        if not isinstance(zone, Ellipse):
+            zone = as_ellipse(zone, self.settings.zone_speed)
         return circle_around(zone) if person.heading is None else zone
 
     def placed_zones(self, people: Sequence[Person]) -> list[Ellipse]:

@@ -25,7 +25,7 @@ from functools import lru_cache
 from math import hypot
 from threading import RLock
 from time import perf_counter, thread_time
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
@@ -49,104 +49,94 @@ class Problem:
 
     `rows` are meant >= 0: the `n_cbf` barrier conditions, person by person, then wall by wall, and
     the N speed limits. `terminal` is meant to be 0, and empty without a terminal condition. `h` has a
-    row for each person and wall, a column for each of the states x_0 .. x_N. `parameters` stacks the
+    row for each person and wall, a column for each of the states x_0 .. x_{N_h}; so have its derivatives
+    by the position in that state, `slope` (h_x, h_y) and `bend` (h_xx, h_xy, h_yy). `parameters` stacks the
     state (4), the target (2), the terminal velocity w (2), then for each person the foci and a of the
     zone and the velocity (7), then for each wall its end points and its margin (5).
-
-    `jacobian` is of rows and terminal condition by the inputs; `curvature` is the Hessian of the cost, and
-    `hessian` that of cost + `multipliers`' (rows, terminal).
     """
 
     inputs: Any
     parameters: Any
-    multipliers: Any
     states: Any
     cost: Any
-    gradient: Any
     rows: Any
     terminal: Any
-    jacobian: Any
-    curvature: Any
-    hessian: Any
     h: Any
+    slope: Sequence[Any]
+    bend: Sequence[Any]
     n_cbf: int
-
-    def function(self, name: str, inputs: Sequence[Any], outputs: Sequence[Any]) -> Any:
-        """A CasADi function of these expressions, all dense."""
-        return ca.Function(name, list(inputs), [ca.densify(output) for output in outputs])
 
 
 @lru_cache(maxsize=256)
 def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem:
-    """Write down the problem of this module's docstring; once for each size and settings.
-
-    The states are linear in the inputs, x = M u + (what the start gives), so derivatives by the inputs are
-    those by the states, of which a row has two, times M. This saves most of the time of differentiating, and
-    of evaluating the derivatives.
-    """
+    """Write down the problem of this module's docstring; once for each size and settings."""
     s = settings
     inputs, start, target = ca.SX.sym("u", 2, s.N), ca.SX.sym("x0", 4), ca.SX.sym("target", 2)
     people, walls, w = ca.SX.sym("person", 7, n_people), ca.SX.sym("wall", 5, n_walls), ca.SX.sym("w", 2)
-    u, x = ca.vec(inputs), ca.SX.sym("x", 4, s.N + 1)
 
     states = [start]
     for k in range(s.N):
         position, velocity, a = states[-1][:2], states[-1][2:], inputs[:, k]
         states.append(ca.vertcat(position + s.dt * velocity + 0.5 * s.dt**2 * a, velocity + s.dt * a))
-    motion = ca.horzcat(*states)
+    x = ca.horzcat(*states)
 
     weights = ca.DM([[0.0] * 4, *[s.Q] * (s.N - 1), s.P]).T
     error = x - ca.repmat(ca.vertcat(target, 0, 0), 1, s.N + 1)
     cost = ca.dot(weights, error**2) + ca.dot(ca.repmat(ca.DM(s.R), 1, s.N), inputs**2)
 
-    h = _barriers(s, x, people, walls)
-    cbf = ca.vec(cbf_residual(h[:, 1 : s.N_h + 1], h[:, : s.N_h], s.gamma).T)
+    h, h_x, h_y, h_xx, h_xy, h_yy = _barriers(s, x[:2, : s.N_h + 1], people, walls)
+    cbf = ca.vec(cbf_residual(h[:, 1:], h[:, :-1], s.gamma).T)
     speed = s.v_max**2 - ca.sum1(x[2:, 1:] ** 2).T
-    terminal = ca.SX(0, 1) if s.terminal == "none" else x[2:, s.N] - w
-
-    rows = ca.vertcat(cbf, speed)
-    values = ca.vertcat(rows, terminal)
-    multipliers = ca.SX.sym("multiplier", values.numel())
-    m = ca.evalf(ca.jacobian(ca.vec(motion), u))
-    gradient = m.T @ ca.gradient(cost, ca.vec(x)) + ca.gradient(cost, u)
-    jacobian = ca.jacobian(values, ca.vec(x)) @ m
-    curvature = ca.evalf(m.T @ ca.hessian(cost, ca.vec(x))[0] @ m + ca.hessian(cost, u)[0])
-    hessian = m.T @ ca.hessian(ca.dot(multipliers, values), ca.vec(x))[0] @ m + curvature
-    moved = ca.substitute([cost, gradient, rows, terminal, jacobian, hessian, h], [x], [motion])
-    cost, gradient, rows, terminal, jacobian, hessian, h = moved
     return Problem(
-        inputs=u,
+        inputs=ca.vec(inputs),
         parameters=ca.vertcat(start, target, w, ca.vec(people), ca.vec(walls)),
-        multipliers=multipliers,
-        states=motion,
+        states=x,
         cost=cost,
-        gradient=gradient,
-        rows=rows,
-        terminal=terminal,
-        jacobian=jacobian,
-        curvature=curvature,
-        hessian=hessian,
+        rows=ca.vertcat(cbf, speed),
+        terminal=ca.SX(0, 1) if s.terminal == "none" else x[2:, s.N] - w,
         h=h,
+        slope=(h_x, h_y),
+        bend=(h_xx, h_xy, h_yy),
         n_cbf=cbf.numel(),
     )
 
 
-def _barriers(s: MPCSettings, x: Any, people: Any, walls: Any) -> Any:
-    """h of every person and then of every wall in each state, shape (people + walls, N+1)."""
-    steps, n_people, n_walls = x.shape[1], people.shape[1], walls.shape[1]
-    xa, ya, xb, yb, a, vx, vy = (ca.repmat(row.T, 1, steps) for row in ca.vertsplit(people))
-    time = ca.repmat(s.dt * ca.DM(range(steps)).T, n_people, 1)
-    seen = (ca.repmat(x[0, :], n_people, 1) - time * vx, ca.repmat(x[1, :], n_people, 1) - time * vy)
-    of_people = barrier(ellipse_formula(*seen, xa, ya, xb, yb, a), s.r_robot, s.eps)
-    *ends, margin = (ca.repmat(row.T, 1, steps) for row in ca.vertsplit(walls))
-    here = (ca.repmat(x[0, :], n_walls, 1), ca.repmat(x[1, :], n_walls, 1))
-    return ca.vertcat(of_people, barrier(segment_formula(*here, *ends), s.r_robot, margin))
+def _barriers(s: MPCSettings, at: Any, people: Any, walls: Any) -> list[Any]:
+    """h and its derivatives at positions (2, n), one step apart, each of shape (people + walls, n)."""
+    x, y, time = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("t")
+    xa, ya, xb, yb, a, vx, vy = person = ca.vertsplit(ca.SX.sym("person", 7))
+    distance = ellipse_formula(x - time * vx, y - time * vy, xa, ya, xb, yb, a)
+    of_person = _differentiated(barrier(distance, s.r_robot, s.eps), x, y, person, time)
+    *ends, margin = wall = ca.vertsplit(ca.SX.sym("wall", 5))
+    of_wall = _differentiated(barrier(segment_formula(x, y, *ends), s.r_robot, margin), x, y, wall, time)
+
+    n, found = at.shape[1], [[ca.SX(0, at.shape[1])] for _ in range(6)]
+    for function, numbers in ((of_person, people), (of_wall, walls)):
+        if count := numbers.shape[1]:
+            times = ca.repmat(s.dt * ca.DM(range(n)).T, 1, count)
+            everywhere = ca.repmat(at, 1, count), ca.kron(numbers, ca.DM.ones(1, n)), times
+            for parts, values in zip(found, function.map(n * count)(*everywhere), strict=True):
+                parts.append(ca.reshape(values, n, count).T)
+    return [ca.vertcat(*parts) for parts in found]
+
+
+def _differentiated(h: Any, x: Any, y: Any, numbers: Sequence[Any], time: Any) -> Any:
+    """A function of (x, y), numbers and time: h, h_x, h_y, h_xx, h_xy, h_yy."""
+    by = ca.vertcat(x, y)
+    hessian, gradient = ca.hessian(h, by)
+    outputs = [h, gradient[0], gradient[1], hessian[0, 0], hessian[0, 1], hessian[1, 1]]
+    return ca.Function("h", [by, ca.vertcat(*numbers), time], ca.cse(outputs))
 
 
 def slack_weight(settings: MPCSettings, parameters: Array) -> float:
     """Cost of a metre of slack: `settings.slack_weight` for each metre to the target, and at least one."""
     x, y, _, _, gx, gy = parameters[:6].tolist()
     return settings.slack_weight * max(1.0, hypot(gx - x, gy - y))
+
+
+def function(name: str, arguments: Sequence[Any], outputs: Sequence[Any]) -> Any:
+    """A CasADi function of expressions, all dense."""
+    return ca.Function(name, list(arguments), [ca.densify(output) for output in outputs])
 
 
 class Buffered:
@@ -164,9 +154,8 @@ class Buffered:
             self._buffer.set_res(i, array.data)
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """A plan in numbers: see `Problem` for rows and h; states have shape (N+1, 4).
+class Numbers(NamedTuple):
+    """A plan in numbers: see `Problem` for rows and h, shape (people + walls, N_h+1); states are (N+1, 4).
 
     `slack` is the largest violation of a row or of the terminal condition, 0 if none.
     """
@@ -186,11 +175,11 @@ class Evaluator:
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
         with BUILDING:
-            function, self.n_cbf = _evaluation(settings, n_people, n_walls)
-            self.n_rows = function.nnz_out(1)
-            self._inputs, self._parameters = np.zeros(function.nnz_in(0)), np.zeros(function.nnz_in(1))
-            self._function = Buffered(function, self._inputs, self._parameters)
-        self.size, self._shape = (n_people, n_walls), (n_people + n_walls, settings.N + 1)
+            evaluate, self.n_cbf = _evaluation(settings, n_people, n_walls)
+            self.n_rows = evaluate.nnz_out(1)
+            self._inputs, self._parameters = np.zeros(evaluate.nnz_in(0)), np.zeros(evaluate.nnz_in(1))
+            self._function = Buffered(evaluate, self._inputs, self._parameters)
+        self.size, self._shape = (n_people, n_walls), (n_people + n_walls, settings.N_h + 1)
 
     def __call__(self, plan: Array, parameters: Array) -> Numbers:
         self._inputs[:], self._parameters[:] = plan, parameters
@@ -205,7 +194,7 @@ def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any
     p = build_problem(settings, n_people, n_walls)
     slack = ca.mmax(ca.vertcat(0, -p.rows, ca.fabs(p.terminal)))
     outputs = [ca.vertcat(p.cost, slack), p.rows, p.states, p.h.T]
-    return p.function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
+    return function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
 
 
 class Budget:

@@ -159,8 +159,7 @@ class Behaviour:
             return people
         off = rng.normal(0.0, self.noise, (len(people), 2)).tolist()
         return tuple(
-            replace(p, position=(p.position[0] + dx, p.position[1] + dy))
-            for p, (dx, dy) in zip(people, off, strict=True)
+            p.at((p.position[0] + dx, p.position[1] + dy)) for p, (dx, dy) in zip(people, off, strict=True)
         )
 
 

@@ -28,6 +28,8 @@ LEVEL = 0.95
 """Of every interval here."""
 LARGER_AHEAD = "the zone reaches farther ahead than behind"
 GROWS = "the zone grows with walking speed"
+AS_MANY = "as many encounters a day as in the paper, within a factor of two"
+LATER = "a larger zone makes the robot later"
 OPPOSITE = "opposite"
 """The kind of encounter in which people pass each other."""
 
@@ -131,8 +133,7 @@ def as_many_a_day(encounters: int, days: float) -> Finding:
 
     ends = sorted(map(within, (low, high)))
     top = 1.0 if low / days <= PAPERS_RATE <= high / days else ends[1]
-    claim = "as many encounters a day as in the paper, within a factor of two"
-    return Finding(claim, within(encounters), ends[0], top, "doublings", encounters)
+    return Finding(AS_MANY, within(encounters), ends[0], top, "doublings", encounters)
 
 
 def size_trades_efficiency(
@@ -154,7 +155,9 @@ def run_with(name: str, zone: Ellipse) -> dict[str, float]:
 
 
 def _interval(zone: SocialZone, speed: float, quantity: str) -> tuple[float, float, float]:
-    """Value, low and high of a quantity at a fitted speed; ZoneError where they are not known."""
+    """Value, low, high of a quantity at a speed, NaN where there is no zone; ZoneError if not asked for."""
+    if speed in zone.undefined:
+        return np.nan, np.nan, np.nan
     table = zone.table().set_index("speed")
     if speed not in table.index or zone.uncertainty is None:
         raise ZoneError(f"no interval at {speed:g} m/s; fit with speeds that hold it, and with resamples > 0")

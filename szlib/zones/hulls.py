@@ -199,10 +199,12 @@ class HullZones:
     def radii(self, speeds: Sequence[float]) -> None:
         """None: the vertices tell all."""
 
-    def others(self, weights: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
+    def others(
+        self, weights: np.ndarray, speeds: Sequence[float], rng: np.random.Generator | None = None
+    ) -> np.ndarray:
         """Ellipses (k, s, 5) of the encounters whose weights (k, n) are above 0; NaN: no zone.
 
-        Straight from the hull's faces, around the boundary in 72 directions.
+        Straight from the hull's faces, around the boundary in 72 directions.  Nothing else is drawn.
         """
         ellipses = np.full((len(weights), len(speeds), 5), np.nan)
         unit = np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])

@@ -150,6 +150,10 @@ class SocialZone(Layer):
         provenance = _provenance(samples, {"method": method, "r_max": float(r_max)}, estimate)
         zone = cls(estimate.vertices, float(r_max), {}, {}, provenance, method, estimate.radii(asked))
         ellipses, undefined = zone._fit_all(asked)
+        if not ellipses:
+            half = f"half of the samples are slower than {samples['speed'].median():.1f} m/s"
+            why = "; ".join(undefined.values())
+            raise ZoneError(f"no speed has a zone: {why}; {half}: ask for a speed near that, or add data")
         tested = None if null is None else null_test(samples, null)
         zone = replace(zone, ellipses=ellipses, undefined=undefined, null_test=tested)
         if "encounter" in samples:
@@ -252,15 +256,13 @@ class SocialZone(Layer):
         return self.vertices
 
     def _fit_all(self, speeds: Sequence[float]) -> tuple[dict[float, Ellipse], dict[float, str]]:
-        """The ellipses by speed, and why there is none; ZoneError where no speed has one."""
+        """The ellipses by speed, and why there is none."""
         ellipses, undefined = {}, {}
         for speed in speeds:
             try:
                 ellipses[speed] = self._fitted(speed)
             except ZoneError as error:
                 undefined[speed] = str(error)
-        if not ellipses:
-            raise ZoneError(f"no speed has a zone: {'; '.join(undefined.values())}")
         return ellipses, undefined
 
     def _fitted(self, speed: float) -> Ellipse:

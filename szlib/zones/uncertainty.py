@@ -4,13 +4,21 @@ Samples of one encounter are no independent evidence, nor are two encounters of 
 *pairs of people* are drawn anew (or whole days, where there are many), and the zone is estimated again.
 
 - A quantile moves to both sides: drawn with replacement, as many as there are, the middle 95 % of the
-  zones are the interval (bootstrap, percentiles; Efron 1979).
+  zones are the interval, moved against their bias: the zone itself is to be their median (bootstrap, BC
+  percentiles; Efron, J. Am. Stat. Assoc. 82, 1987).
 - An extreme does not: no resample of the hull's people has nearer ones than they had, so the bootstrap's
   zones all lie on one side, and so does the hull of all people seen of the one of all people there are.
   A hull's distance from its limit falls as n^-`RATE`.  So the hulls of a share of the pairs, drawn without
   replacement, differ from the hull of all by (share^-RATE - 1) times what that one still differs from its
   limit: the interval is where the differences, divided by this and taken back, lead (subsampling with a
   finite share; Politis & Romano, Ann. Statist. 22, 1994; for a quarter and rate 1/2 the factor is 1).
+
+What an interval is to hold is the *limit*: the zone that the same method would give of all the people there
+are. Those of the quantile do in 90 to 98 % of 400 plazas of 600 pairs, each quantity at each speed (notebook
+16). They hold the edge that the plaza's people keep to less often: the limit lies up to 2 cm outside of it,
+by how much hangs on how far people keep clear of it, which no data tells; and its centre up to 3 cm behind,
+for both people's zones mix. A hull's limit is that edge itself; its intervals hold it in 91 to 100 % of 200
+centred plazas.
 """
 
 from __future__ import annotations
@@ -22,6 +30,7 @@ from typing import Any, Protocol
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from ..errors import DataError
 from .by_direction.quantile import BAND
@@ -81,8 +90,13 @@ class Estimate(Protocol):
         """By direction at speeds, ascending [m/s]; None where the vertices tell all."""
         ...
 
-    def others(self, weights: Array, speeds: Sequence[float]) -> Array:
-        """Ellipses (k, s, 5) for weights (k, n) of the encounters: centre, semi-axes, angle; NaN: none."""
+    def others(
+        self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None
+    ) -> Array:
+        """Ellipses (k, s, 5) for weights (k, n) of the encounters: centre, semi-axes, angle; NaN: none.
+
+        What else is known from a draw only (a null model's shifts) is drawn anew by rng, if there is one.
+        """
         ...
 
     def without_each(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
@@ -176,9 +190,9 @@ def measure(estimate: Estimate, speeds: Sequence[float], *, resamples: int, seed
         how = f"subsampling: {size} of {n} {unit}; {back:.2f} of the differences taken back (rate {RATE:g})"
     else:
         drawn = rng.multinomial(n, np.full(n, 1 / n), size=resamples)
-        back, how = 0.0, f"bootstrap: {n} of {n} {unit}, percentiles"
+        back, how = 0.0, f"bootstrap: {n} of {n} {unit}, bias-corrected percentiles"
     ellipses = estimate.others(np.ones((1, len(member))), speeds)
-    others = estimate.others(drawn[:, member].astype(float), speeds)
+    others = estimate.others(drawn[:, member].astype(float), speeds, rng)
     reach = ellipse_reach(ellipses)
     known = _quantities(ellipses)
     away = _quantities(others) - known
@@ -218,11 +232,15 @@ def _quantities(ellipses: Array) -> Array:
 def _interval(known: Array, away: Array, back: float) -> Array:
     """Low and high (2, s, k) of what is known (1, s, k), from how far away (r, s, k) others are.
 
-    `back` 0: where the others are.  Else: as far on the other side, times `back`.
+    `back` 0: bias-corrected percentiles.  Else: as far on the other side, times `back`.
     """
     enough = np.isnan(away).mean(axis=0) <= _FAILED
-    tails = np.full((2, *enough.shape), np.nan)
-    tails[:, enough] = np.nanquantile(away[:, enough], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
+    tails, ends = np.full((2, *enough.shape), np.nan), np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    for at in zip(*np.nonzero(enough), strict=True):
+        others = away[:, *at][~np.isnan(away[:, *at])]
+        below = np.mean(others < 0) + np.mean(others == 0) / 2
+        bias = 0.0 if back else norm.ppf(np.clip(below, 0.5 / len(others), 1 - 0.5 / len(others)))
+        tails[:, *at] = np.quantile(others, norm.cdf(2 * bias + norm.ppf(ends)))
     return np.asarray(known - back * tails[::-1] if back else known + tails)
 
 

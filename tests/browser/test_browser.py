@@ -170,10 +170,20 @@ def test_the_laboratory_is_dragged_set_run_and_shared(notebook):
     before = [picture(scene) for scene in scenes]
     scenes[0].scroll_into_view_if_needed()
     box = scenes[0].bounding_box()
-    page.mouse.move(box["x"] + 319, box["y"] + 90)  # the person, at (4, 0)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 240, box["y"] + 100, steps=5)
-    page.mouse.up()
+
+    def drag(start, end):
+        """With the mouse, from one place of the scene to another [m]; 29.7 pixels are a metre."""
+        (x0, y0), (x1, y1) = (
+            (box["x"] + 200.2 + 29.7 * x, box["y"] + 90 - 29.7 * y) for x, y in (start, end)
+        )
+        page.mouse.move(x0, y0)
+        page.mouse.down()
+        page.mouse.move(x1, y1, steps=5)
+        page.mouse.up()
+
+    drag((4, 0), (1.34, -0.33))  # the person, who stands before the goal
+    drag((4, 0), (5, -1))  # the goal
+    drag((7, 2.3), (6, 1.5))  # a wall's end
     slider = page.locator("input[name=gamma]").first
     slider.click(position={"x": 60, "y": 8})
     gamma = float(slider.input_value())
@@ -185,6 +195,8 @@ def test_the_laboratory_is_dragged_set_run_and_shared(notebook):
     exec(page.locator(".szlib-cell").input_value(), shared)
     assert shared["gamma"] == gamma
     assert shared["person"][:2] == pytest.approx([1.34, -0.33], abs=0.1)
+    assert shared["goal"] == pytest.approx([5, -1], abs=0.1)
+    assert shared["walls"][:4] == pytest.approx([-6, 2.3, 6, 1.5], abs=0.1)
     page.locator(".szlib-run").click()
     page.wait_for_function("parseFloat(document.querySelector('.szlib-told').textContent.slice(4)) > 2")
     print(page.locator(".szlib-rate").text_content())

@@ -5,12 +5,15 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 from random_states import ZONE, meetings, questions
 
 import szlib
-from szlib.control.problem import TOLERANCE
+from szlib.control.problem import TOLERANCE, build_problem
+from szlib.control.solvers import sqp
+from szlib.control.solvers.program import build_program
 from szlib.simulation.closed_loop import advance
 
 SOLVERS = ("sqp", "ipopt")
@@ -56,7 +59,9 @@ def test_the_scenarios_of_the_paper_run_the_same_with_both(name):
     assert sqp.metrics()["time_to_goal"] == pytest.approx(ipopt.metrics()["time_to_goal"], abs=0.2)
 
 
-@pytest.mark.parametrize(("package", "where"), [("casadi", {"problem", "ipopt", "sqp"}), ("daqp", {"sqp"})])
+@pytest.mark.parametrize(
+    ("package", "where"), [("casadi", {"problem", "ipopt", "program"}), ("daqp", {"sqp"})]
+)
 def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
     found = set()
     for file in Path(szlib.__file__).parent.rglob("*.py"):
@@ -66,6 +71,46 @@ def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
             if any(name.split(".")[0] == package for name in names):
                 found.add(file.stem)
     assert found == where
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
+def test_derivatives_by_structure_are_those_of_the_whole_expressions(formulation):
+    settings = szlib.MPCSettings(**formulation)
+    p, derive = build_problem(settings, 2, 1), build_program(settings, 2, 1).derive
+    values = ca.vertcat(p.rows, p.terminal)
+    multipliers = ca.SX.sym("multipliers", values.numel())
+    arguments = [p.inputs, p.parameters, multipliers]
+    on_speed = ca.dot(multipliers[p.n_cbf : p.rows.numel()], p.rows[p.n_cbf :])
+    expected = ca.Function(
+        "expected",
+        arguments,
+        [
+            ca.gradient(p.cost, p.inputs),
+            ca.jacobian(values, p.inputs),
+            ca.hessian(p.cost + ca.dot(multipliers, values), p.inputs)[0],
+            ca.hessian(p.cost + on_speed, p.inputs)[0],
+        ],
+    )
+    rng = np.random.default_rng(8)
+    for _ in range(5):
+        at = [rng.normal(size=symbols.numel()) for symbols in arguments]
+        gradient, jacobian, hessian, gauss = (np.asarray(each) for each in expected(*at))
+        found = [np.asarray(each) for each in derive(*at)[3:]]
+        for one, other in zip(found, (gradient, jacobian.T, hessian, gauss), strict=True):
+            assert one == pytest.approx(other, rel=1e-11, abs=1e-11)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
+def test_steps_that_raise_the_merit_for_a_while_end_in_the_same_plan(monkeypatch, formulation):
+    asked = list(islice(questions(seed=9), 60))
+    answers = []
+    for rises in (0, 1, sqp.RISES):
+        monkeypatch.setattr(sqp, "RISES", rises)
+        answers.append([question.ask(settings_of("sqp", **formulation)) for question in asked])
+    for steps in zip(*answers, strict=True):
+        assert len({step.rung for step in steps}) == 1
+        for step in steps[1:]:
+            assert step.control == pytest.approx(steps[0].control, abs=1e-5)
 
 
 # the ladder

@@ -78,6 +78,14 @@ def test_each_knob_of_the_method_is_a_parameter_where_it_acts_with_the_default_t
     assert all(value == DEFAULTS[name] for name, value in found)
 
 
+def test_parameters_are_read_as_papermill_finds_them():
+    for source in SOURCES:
+        (tagged,) = [c for c in cells(source) if "parameters" in c.metadata.get("tags", [])]
+        variables: dict[str, object] = {}
+        exec(tagged.source, variables)
+        assert variables == defaults_of(source) | {"__builtins__": variables["__builtins__"]}
+
+
 def test_a_parameter_has_one_type_wherever_it_stands():
     types: dict[str, set[type]] = {}
     for source in SOURCES:

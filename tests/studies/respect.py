@@ -3,6 +3,7 @@
 python tests/studies/respect.py nobody      15_nobody.csv     the test where nobody minds anybody, 100 seeds
 python tests/studies/respect.py sites       15_sites.csv      radii, intervals and p-values on the real data
 python tests/studies/respect.py n-curve     15_n_curve.csv    hull and respect zone by number of encounters
+python tests/studies/respect.py changes     15_changes.csv    the radius at Grand Central, one thing changed
 
 They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/ and gc/).
 """
@@ -21,6 +22,8 @@ import pandas as pd
 
 import szlib
 from szlib.parallel import run_tasks
+from szlib.tracks.clock import to_clock
+from szlib.tracks.sites import GRAND_CENTRAL_RATE, read_grand_central
 from szlib.zones.ellipses import minimum_enclosing_ellipse_of_curve
 from szlib.zones.hulls import hull_vertices, slice_hull
 from szlib.zones.outliers import complementary_points
@@ -46,13 +49,13 @@ SIZES = (36, 72, 150, 300, 600, 1200, 2400, 4800)
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("study", choices=["nobody", "sites", "n-curve"])
+    parser.add_argument("study", choices=["nobody", "sites", "n-curve", "changes"])
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--sites", nargs="+", default=["atc-1hz", "grand-central"])
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--cache", type=Path, default=Path("results/null"), help="where null models are kept")
     asked = parser.parse_args()
-    study = {"nobody": nobody, "sites": sites, "n-curve": n_curve}[asked.study]
+    study = {"nobody": nobody, "sites": sites, "n-curve": n_curve, "changes": changes}[asked.study]
     table = pd.DataFrame(study(asked))
     TABLES.mkdir(exist_ok=True)
     table.to_csv(TABLES / f"15_{asked.study.replace('-', '_')}.csv", index=False, float_format="%.4g")
@@ -90,8 +93,6 @@ def load(site: str) -> tuple[pd.DataFrame, szlib.Square, int]:
     root = Path(os.environ.get("SZLIB_DATA_DIR", "."))
     if site == "atc-1hz":
         return szlib.read_tracks(sorted((root / "atc-1hz").glob("*.csv"))), szlib.ATC_SQUARE, 100
-    from szlib.tracks.sites import read_grand_central
-
     return read_grand_central(root / "gc" / "Annotation.zip"), GRAND_CENTRAL, 20
 
 
@@ -210,6 +211,88 @@ def draws(
             "respect": szlib.respect_radius(part, against),
             "null_respect": szlib.respect_radius(chosen, rest) if len(chosen) else np.nan,
         }
+
+
+# --- what the radius at Grand Central depends on -----------------------------------------------------
+
+WHO = {
+    "all": None,
+    "strangers": "strangers",
+    "not in the same direction": ("opposite", "crossing", "standing"),
+}
+CHANGES: dict[str, dict[str, object]] = {
+    "nothing": {},
+    "shifts of 0.2 to 2 min": {"minutes": (0.2, 2.0)},
+    "shifts of 2 to 20 min": {"minutes": (2.0, 20.0)},
+    "area 3 m narrower on each side": {"square": GRAND_CENTRAL.grown(-3.0)},
+    "area 3 m wider on each side": {"square": GRAND_CENTRAL.grown(3.0)},
+    "everything 5 % larger": {"scale": 1.05},
+    "24 frames a second, not 25": {"rate": 24.0},
+}
+FEW = 5
+"""Shifts where something is changed."""
+
+
+def changes(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
+    """One row a change, a set of kinds: the fitted radius, its interval, and where bins of g cross 1/2."""
+    for change, how in CHANGES.items():
+        found = changed(asked, **how) if how else data_and_null("grand-central", 1.0, asked)
+        for name, kinds in WHO.items():
+            data, null = szlib.of_kind(found[0], kinds), found[1].of_kind(kinds)
+            data = data[data["distance"] < null.r_max]
+            against = szlib.Presence.of(null.samples, r_max=null.r_max)
+            pair = pairs(data)
+            rng, drawn = np.random.default_rng(0), [np.ones(len(data))]
+            drawn += [
+                rng.multinomial(pair.max() + 1, np.full(pair.max() + 1, 1 / (pair.max() + 1)))[pair]
+                for _ in range(RESAMPLES)
+            ]
+            weighted = [szlib.Presence.of(data, r_max=null.r_max, weights=weights) for weights in drawn]
+            row = {
+                "change": change,
+                "kinds": name,
+                "shifts": null.shifts,
+                "encounters": data["encounter"].nunique(),
+            }
+            for how_told, radius in (("fitted", szlib.respect_radius), ("binned", half_in_bins)):
+                told = [radius(each, against) for each in weighted]
+                row[how_told] = told[0]
+                row[f"{how_told}_low"], row[f"{how_told}_high"] = np.percentile(told[1:], [2.5, 97.5])
+            print(row, file=sys.stderr, flush=True)
+            yield row
+
+
+def changed(
+    asked: argparse.Namespace, *, scale: float = 1.0, rate: float = GRAND_CENTRAL_RATE, **how: object
+) -> tuple[pd.DataFrame, szlib.NullEncounters]:
+    """Samples and null model of Grand Central with one thing changed."""
+    tracks, square, _ = load("grand-central")
+    if scale != 1 or rate != GRAND_CENTRAL_RATE:
+        (x0, x1), (y0, y1) = square.x, square.y
+        square = szlib.Square(x=(scale * x0, scale * x1), y=(scale * y0, scale * y1))
+        slower = GRAND_CENTRAL_RATE / rate
+        rows = tracks[["day", "id", "t", "x", "y"]]
+        rows = rows.assign(t=slower * rows["t"], x=scale * rows["x"], y=scale * rows["y"])
+        rows.attrs.clear()
+        tracks = to_clock(rows, max_gap=0.15)
+    square = how.pop("square", square)
+    samples = szlib.find_encounters(tracks, square=square)
+    return samples, szlib.null_encounters(
+        tracks, shifts=FEW, square=square, n_jobs=asked.jobs, progress=False, **how
+    )
+
+
+def half_in_bins(data: szlib.Presence, null: szlib.Presence) -> float:
+    """Where g in bins of 0.1 m, all bearings, is 1/2 of that beyond 1.2 m, seen from there [m]; plain."""
+    real, model = (each.counts.sum(axis=(0, 1)).reshape(20, -1).sum(axis=1) for each in (data, null))
+    middle = (np.arange(20) + 0.5) * data.r_max / 20
+    far = middle > 1.2
+    g = real / model * model[far].sum() / real[far].sum()
+    inside = np.flatnonzero(g < 0.5)
+    if not len(inside):
+        return 0.0
+    k = int(inside[inside < np.argmax(far)][-1])
+    return float(np.interp(0.5, g[k : k + 2], middle[k : k + 2]))
 
 
 if __name__ == "__main__":

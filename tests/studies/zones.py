@@ -2,15 +2,17 @@
 
     python tests/studies/zones.py coverage 200 quantile centred default > notebooks/tables/16_coverage.csv
     python tests/studies/zones.py coverage 200 hull centred > notebooks/tables/16_coverage_hull.csv  (plazas)
+    python tests/studies/zones.py coverage 40 respect centred > notebooks/tables/16_coverage_respect.csv
+    python tests/studies/zones.py levels 3 > notebooks/tables/16_levels.csv               (plazas a case)
     python tests/studies/zones.py errors 3 > notebooks/tables/16_estimators.csv           (plazas a case)
     python tests/studies/zones.py sizes 8 > notebooks/tables/16_sizes.csv                 (plazas pooled)
     python tests/studies/zones.py subsets 20 FILE... > notebooks/tables/16_subsets.csv    (subsets of a size)
     python tests/studies/zones.py two_sided 3 > notebooks/tables/16_two_sided.csv         (plazas a truth)
 
 Coverage: share of the 95 % intervals, from 600 pairs, that hold the truth of the plaza, and the limit: what
-the quantile gives for the people of all these plazas together (a hull has no limit: it shrinks).  The column
-plazas says how many are in the table kept: for time, only 110 of the default truth.  Files of subsets are a
-day of tracks, as `szlib.read_tracks` reads them.
+the quantile gives for the people of all these plazas together (a hull has no limit: it shrinks; respect is
+held against the truth alone, at one speed).  Files of subsets are a day of tracks, as `szlib.read_tracks`
+reads them.
 """
 
 from __future__ import annotations
@@ -82,9 +84,13 @@ def coverage(plazas: int, method: str, *truths: str) -> pd.DataFrame:
     for truth in truths:
         zones, everybody = [], []
         for seed in range(plazas):
-            samples, _, known = people(seed, encounters=600, **TRUTHS[truth])
+            samples, tracks, known = people(seed, encounters=600, **TRUTHS[truth])
             everybody.append(samples)
-            zones.append(szlib.SocialZone.fit(samples, speeds=SPEEDS, **METHODS[method]))
+            options: dict[str, Any] = {"speeds": SPEEDS, "method": method}
+            if method == "respect":
+                null = szlib.null_encounters(tracks, shifts=20, seed=seed, progress=False)
+                options |= {"speeds": (1.1,), "resamples": 40, "null": null}
+            zones.append(szlib.SocialZone.fit(samples, **options))
             print(truth, seed, file=sys.stderr, flush=True)
         intervals = pd.concat([zone.uncertainty.intervals for zone in zones])
         intervals["truth"] = _holds(intervals, {v: known.true_zone(v) for v in SPEEDS})
@@ -98,6 +104,22 @@ def coverage(plazas: int, method: str, *truths: str) -> pd.DataFrame:
     return pd.concat(tables)[
         ["plaza", "method", "quantity", "speed", "truth", "limit", "half_width", "plazas"]
     ]
+
+
+def levels(plazas: int) -> pd.DataFrame:
+    """How far the quantile's semi-axes lie outside of the truth [m], by how far people keep clear, and q."""
+    rows = []
+    for clearance in (0.05, 0.1, 0.2):
+        settings = {"clearance": clearance, **TRUTHS["centred"]}
+        samples, _, known = zip(*(people(seed, **settings) for seed in range(plazas)), strict=True)
+        for q in (0.02, 0.03, 0.05):
+            zone = szlib.SocialZone.fit(pooled(list(samples)), speeds=SPEEDS, q=q, resamples=0)
+            outside = [
+                np.subtract(zone.ellipses[v].semi_axes, known[0].true_zone(v).semi_axes) for v in SPEEDS
+            ]
+            rows.append((clearance, q, *np.mean(outside, axis=0), plazas))
+            print(rows[-1], file=sys.stderr, flush=True)
+    return pd.DataFrame(rows, columns=["clearance", "q", "a", "b", "plazas"])
 
 
 def _holds(intervals: pd.DataFrame, ellipses: dict[float, Ellipse]) -> np.ndarray:
@@ -265,6 +287,6 @@ def _ellipse(row: np.ndarray) -> Ellipse:
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", szlib.DataWarning)
-    studies = {f.__name__: f for f in (coverage, errors, sizes, subsets, two_sided)}
+    studies = {f.__name__: f for f in (coverage, levels, errors, sizes, subsets, two_sided)}
     table = studies[sys.argv[1]](int(sys.argv[2]), *sys.argv[3:])
     sys.stdout.write(table.to_csv(index=False, float_format="%.4g", lineterminator="\n"))

@@ -111,3 +111,19 @@ def test_sensitivity_varies_one_parameter_at_a_time(tmp_path) -> None:
     assert {"min_distance", "duration", "kinds", "square", "r_max", "speed"} <= set(table["parameter"])
     assert (table.loc[table["parameter"] == "r_max", "encounters"] == table.loc[0, "encounters"]).all()
     assert table.loc[table["parameter"] == "min_distance", "encounters"].is_monotonic_decreasing
+
+
+def test_where_there_is_no_zone_nothing_is_decided() -> None:
+    rng = np.random.default_rng(0)
+    fast = pd.DataFrame(
+        {
+            "encounter": np.repeat(np.arange(200), 5),
+            "speed": rng.normal(1.5, 0.05, 1000),
+            "los_angle": rng.uniform(-np.pi, np.pi, 1000),
+            "distance": rng.uniform(0.8, 2.5, 1000),
+        }
+    )
+    with pytest.warns(szlib.DataWarning):
+        zone = szlib.SocialZone.fit(fast, method="hull", speeds=(0.7, 1.5), resamples=5)
+    found = claims.grows_with_speed(zone, slow=0.7, fast=1.5)
+    assert np.isnan(found.effect) and found.verdict.startswith("not decidable")

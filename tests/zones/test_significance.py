@@ -53,6 +53,31 @@ def test_a_crowd_that_minds_nobody_is_found_out() -> None:
     assert np.median(p) > 0.15
 
 
+def test_another_mix_of_kinds_is_no_respect() -> None:
+    """In a bunch most walk the same way, and farther apart by condition 3; shifted, most of them cross."""
+
+    def mixed(seed: int, shift: int, crossing: float) -> pd.DataFrame:
+        """Encounters of two kinds, a share of them crossing, which come nearer."""
+        table = encounters(seed, shift)
+        cross = np.random.default_rng([seed, shift, 1]).uniform(size=len(table)) < crossing
+        table["kind"] = pd.Categorical(
+            np.where(cross, "crossing", "same direction"), categories=["crossing", "same direction"]
+        )
+        return table.assign(distance=np.where(cross, table["distance"], 1 + table["distance"] / 2))
+
+    by_kind, in_one = [], []
+    for seed in range(20):
+        rows = pd.concat([mixed(seed, k, 0.8) for k in range(SHIFTS)])
+        found = rows[["shift", "encounter", "kind"]].assign(nearest=rows["distance"])
+        null = szlib.NullEncounters(rows[rows["distance"] <= 2], found, SHIFTS, 2.0)
+        data = mixed(seed, SHIFTS, 0.2)
+        by_kind.append(null_test(data, null, radii=False).p_value)
+        in_one.append(null_test(data.drop(columns="kind"), null, radii=False).p_value)
+    assert max(in_one) <= 0.05
+    assert np.sum(np.array(by_kind) <= 0.05) <= 3  # 4 and more of 20: 2 %
+    assert np.median(by_kind) > 0.3
+
+
 def test_people_drawn_to_each_other_show_no_respect(tmp_path: Path) -> None:
     """A plaza without clearance whose zones are tiny: everybody walks right at everybody."""
     tiny = szlib.Ellipse((0, 0), (0.15, 0.15))

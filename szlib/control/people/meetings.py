@@ -7,20 +7,25 @@ from math import acos, atan2, cos, hypot, inf, sin, sqrt
 
 import numpy as np
 
-from ..barriers import Array, barrier, segment_formula
-from ..distances import wall_margin
+from ..barriers import barrier, segment_formula
 from ..settings import MPCSettings
 from .person import PlacedZone
+
+_ALONG = np.linspace(0, 1, 20)
+"""Where room is looked for, from the zone's centre to where the robot passes."""
 
 
 def subgoal(
     position: tuple[float, float],
     goal: tuple[float, float],
     people: Sequence[PlacedZone],
-    walls: Array,
+    walls: Sequence[Sequence[float]],
+    margins: Sequence[float],
     s: MPCSettings,
 ) -> tuple[float, float]:
     """Where to be drawn to [m]: the goal, or around a person whom the robot meets head-on.
+
+    Walls are given by their ends (xa, ya, xb, yb), each with its margin [m].
 
     A person blocks the way where the line to the goal enters the set h < 0, itself an ellipse with
     the foci of the zone. Its two tangents from the robot lie at the angles +-w about -grad h, the
@@ -64,7 +69,9 @@ def subgoal(
             continue
         for left in (s.pass_side == "left", s.pass_side != "left"):
             lead = (b if left else -b) / (s.tie * w)
-            if -1 <= lead < 2 and _has_room(zone, reach, way, left, walls, s) and not zone.blocks(goal, s):
+            if not -1 <= lead < 2:
+                continue
+            if _has_room(zone, reach, way, left, walls, margins, s) and not zone.blocks(goal, s):
                 turn = ((w if left else -w) - b) * min(1.0, 2 - lead)
                 c, d = cos(turn), sin(turn)
                 target = (x + c * way[0] - d * way[1], y + d * way[0] + c * way[1])
@@ -73,21 +80,36 @@ def subgoal(
 
 
 def _has_room(
-    zone: PlacedZone, reach: float, way: tuple[float, float], left: bool, walls: Array, s: MPCSettings
+    zone: PlacedZone,
+    reach: float,
+    way: tuple[float, float],
+    left: bool,
+    walls: Sequence[Sequence[float]],
+    margins: Sequence[float],
+    s: MPCSettings,
 ) -> bool:
-    """True if no wall stands between the zone's centre and where the robot passes on that side."""
-    if not len(walls):
+    """True if no wall stands between the zone's centre and where the robot passes on that side.
+
+    The distance to a wall is never less than the Euclidean one, so most walls are plainly too far to count.
+    """
+    if not walls:
         return True
     length = hypot(*way) if left else -hypot(*way)
     beside = (-way[1] / length, way[0] / length)
     half = ((zone.xa - zone.xb) / 2, (zone.ya - zone.yb) / 2)
     width = sqrt(reach**2 - _cross(half, beside) ** 2)
-    center = np.array([(zone.xa + zone.xb) / 2, (zone.ya + zone.yb) / 2])
-    points = center + np.linspace(0, width, 20)[:, None] * np.array(beside)
-    h = (
-        barrier(segment_formula(*points.T, *wall.ravel()), s.r_robot, wall_margin(wall, s)) for wall in walls
-    )
-    return all((each >= 0).all() for each in h)
+    along = width * beside[0], width * beside[1]
+    x, y = (zone.xa + zone.xb) / 2, (zone.ya + zone.yb) / 2
+    middle, near = (x + along[0] / 2, y + along[1] / 2), []
+    for (xa, ya, xb, yb), margin in zip(walls, margins, strict=True):
+        apart = hypot((xa + xb) / 2 - middle[0], (ya + yb) / 2 - middle[1])
+        if apart <= (hypot(xb - xa, yb - ya) + width) / 2 + s.r_robot + margin:
+            near.append((xa, ya, xb, yb, margin))
+    if not near:
+        return True
+    *ends, margin_of = np.array(near).T[:, :, None]
+    distances = segment_formula(x + along[0] * _ALONG, y + along[1] * _ALONG, *ends)
+    return bool((barrier(distances, s.r_robot, margin_of) >= 0).all())
 
 
 def _cross(u: tuple[float, float], v: tuple[float, float]) -> float:

@@ -11,7 +11,7 @@ from ...errors import SolverError, ZoneError
 from ...zones.costmap import BODY_RADIUS as BODY_RADIUS
 from ...zones.costmap import circle_around as circle_around
 from ...zones.ellipses import Ellipse
-from ..barriers import LARGEST, barrier, ellipse_formula, finite
+from ..barriers import LARGEST, barrier, ellipse_formula, number, pair
 from ..settings import MPCSettings
 
 STANDS = 0.1
@@ -66,12 +66,12 @@ class Person:
     heading_unknown: bool = False
 
     def __post_init__(self) -> None:
-        x, y = finite("a person's position", self.position, (2,)).tolist()
-        vx, vy = finite("a person's velocity", self.velocity, (2,)).tolist()
-        object.__setattr__(self, "position", (x, y))
-        object.__setattr__(self, "velocity", (vx, vy))
+        x, y = position = pair("a person's position", self.position)
+        vx, vy = velocity = pair("a person's velocity", self.velocity)
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "velocity", velocity)
         if self.heading is not None:
-            object.__setattr__(self, "heading", float(finite("a person's heading", self.heading, ())))
+            object.__setattr__(self, "heading", number("a person's heading", self.heading))
             if self.heading_unknown:
                 raise SolverError(
                     f"a heading is given or unknown; got {self.heading} for the one at {(x, y)}"
@@ -89,8 +89,13 @@ class Person:
     def after(self, seconds: float) -> Person:
         """The same person, so many seconds later."""
         (x, y), (vx, vy) = self.position, self.velocity
-        there = (x + vx * seconds, y + vy * seconds)
-        return Person(there, self.velocity, self.heading, self.zone, self.id, self.heading_unknown)
+        return self.at((x + vx * seconds, y + vy * seconds))
+
+    def at(self, position: tuple[float, float]) -> Person:
+        """The same person elsewhere [m]; what else they are was checked before, and is not again."""
+        there = object.__new__(type(self))
+        there.__dict__.update(self.__dict__, position=pair("a person's position", position))
+        return there
 
 
 class PlacedZone(NamedTuple):

@@ -29,7 +29,8 @@ def solve_with_fallbacks(
     Plans are inputs, shape (2N,) [m/s2]; `parameters` as in `Problem`.
     """
     ends = solver.settings.terminal != "none"
-    shifted = start = np.concatenate([last_plan[2:], (0.0, 0.0)])
+    shifted = start = np.zeros(last_plan.size)
+    shifted[:-2] = last_plan[2:]
     late = False
     rung: Rung
     for rung in ("warm", "cold"):

@@ -17,7 +17,9 @@ from functools import lru_cache
 from threading import Thread
 from typing import Any
 
-from ..barriers import Array
+import numpy as np
+from numpy.typing import NDArray
+
 from ..problem import BUILDING, Budget, ProblemSolver
 from ..settings import MPCSettings
 from .ipopt import Ipopt
@@ -111,13 +113,13 @@ class Sizes:
 
 
 def slots(
-    x: Array, zones: Sequence[Sequence[float]], walls: Sequence[float], size: tuple[int, int]
+    x: Sequence[float], zones: Sequence[Sequence[float]], walls: Sequence[float], size: tuple[int, int]
 ) -> list[float]:
     """Zones (7 numbers each) and walls (5) as in `Problem.parameters`, with empty slots up to `size`.
 
     `x` is the state of the robot, (x, y, vx, vy) [m, m/s]; the walls come one after another.
     """
-    there, y = float(x[0]) + _AWAY, float(x[1])
+    there, y = x[0] + _AWAY, x[1]
     numbers: list[float] = []
     for zone in zones:
         numbers += zone
@@ -128,8 +130,8 @@ def slots(
 
 
 @lru_cache
-def taken(n_people: int, n_walls: int, size: tuple[int, int]) -> slice | list[int]:
+def taken(n_people: int, n_walls: int, size: tuple[int, int]) -> slice | NDArray[np.intp]:
     """Which rows of people and walls are those of slots that are taken."""
     if n_people == size[0] or n_walls == 0:
         return slice(n_people + n_walls)
-    return [*range(n_people), *range(size[0], size[0] + n_walls)]
+    return np.array([*range(n_people), *range(size[0], size[0] + n_walls)])

@@ -8,23 +8,24 @@ The unknowns are the 2 N inputs. Each iteration solves
 with the exact Hessian H of the Lagrangian where it is positive definite; else without the curvature
 of the barriers (Gauss-Newton). Rows are soft, by an exact penalty, so that every program has a
 solution. A step has to lower cost + price * violation, with a price just above the largest multiplier so
-far; one that does not is corrected to second order, then shortened. Where no row has a multiplier, the
-program's cost is exact, and the first solution that satisfies the true rows is the answer. Where not
-even a bound is met, the answer is a linear feedback of the error, K (x - g), without any program.
+far. Near the solution a full step may miss that and still be good, so up to `RISES` in a row are taken all
+the same (a watchdog: R. Chamberlain et al., Math. Programming Study 16, 1982). After that, back where they
+began, a step is corrected to second order, then shortened. Where no row has a multiplier, the program's cost
+is exact, and the first solution that satisfies the true rows is the answer. Where not even a bound is met,
+the answer is a linear feedback of the error, K (x - g), without any program.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal
 
-import casadi as ca
 import daqp
 import numpy as np
 
 from ..barriers import Array
-from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, build_problem, slack_weight
+from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, slack_weight
 from ..settings import MPCSettings
+from .program import Program, build_program
 
 Outcome = Literal["converged", "stalled", "late", "failed"]
 CONVERGED = {True: 1e-2, False: 1e-5}
@@ -38,6 +39,8 @@ SHORTEST = 1e-3
 """A step that must be cut to less than this share of its length leads nowhere."""
 ROUNDING = 1e-12
 """Share by which the merit may rise from rounding alone."""
+RISES = 2
+"""Full steps in a row that need not lower the merit."""
 _HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
 _DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3}
 """Convex programs as they stand; next to the exact penalty, a quadratic one too small to matter."""
@@ -50,25 +53,24 @@ class Sqp:
         self.settings, self.budget, self.late = settings, Budget(settings.time_limit), False
         self.evaluate = Evaluator(settings, n_people, n_walls)
         with BUILDING:
-            derive, measure, self._gain = _functions(settings, n_people, n_walls)
-            self._allocate(derive, measure)
+            self._allocate(build_program(settings, n_people, n_walls))
 
-    def _allocate(self, derive: Any, measure: Any) -> None:
-        """Memory for the compiled functions and for the program."""
-        n, m, n_rows = derive.nnz_in(0), derive.nnz_in(2), self.evaluate.n_rows
+    def _allocate(self, of: Program) -> None:
+        """Memory for the functions and for the program."""
+        n, m, n_rows = of.derive.nnz_in(0), of.derive.nnz_in(2), self.evaluate.n_rows
         self._inputs, self._step, self._share = np.zeros(n), np.zeros(n), np.ones(1)
-        self._parameters, self._multipliers = np.zeros(derive.nnz_in(1)), np.zeros(m)
-        self._on_cbf = self._multipliers[: self.evaluate.n_cbf]
-        self._derive = Buffered(derive, self._inputs, self._parameters, self._multipliers)
-        self._measure = Buffered(
-            measure, self._inputs, self._parameters, self._multipliers, self._step, self._share
-        )
-        self._before, self._lower, self._upper, gradient, jacobian, hessian = self._derive.results
+        self._parameters, self._multipliers = np.zeros(of.derive.nnz_in(1)), np.zeros(m)
+        arguments = self._inputs, self._parameters, self._multipliers
+        self._derive = Buffered(of.derive, *arguments)
+        self._measure = Buffered(of.measure, *arguments, self._step, self._share)
+        self._free = of.free and Buffered(of.free, self._parameters)
+        self._before, self._lower, self._upper, gradient, jacobian, exact, gauss = self._derive.results
         self._after, self._trial, self._values = self._measure.results
         self._jacobian = jacobian.reshape(m, n)
-        self._program = (hessian.reshape(n, n), gradient, self._jacobian, self._upper, self._lower)
+        self._program = (exact.reshape(n, n), gradient, self._jacobian, self._upper, self._lower)
+        self._gauss_newton = (gauss.reshape(n, n), *self._program[1:])
         self._sense = np.repeat(np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows])
-        self._weights = np.zeros(n + m)
+        self._weight, self._weights = 0.0, np.zeros(n + m)
         self._model = daqp.Model()
         self._model.settings = _DAQP
         self._model.setup(np.eye(n), *self._program[1:], self._sense)
@@ -96,30 +98,36 @@ class Sqp:
     def _solve(self, guess: Array, parameters: Array, share: float) -> tuple[Array, Outcome]:
         self._parameters[:] = parameters
         outcome: Outcome = "converged"
-        if not self._is_free():
+        # Who was held by a row is held still, nearly always: then the program finds it out by itself.
+        if self._multipliers.any() or not self._is_free():
             self._inputs[:] = guess
-            self._weights[:] = limit = slack_weight(self.settings, parameters)
-            self._model.soft_weights(w_l=self._weights, w_u=self._weights)
-            outcome = self._iterate(limit, share)
+            outcome = self._iterate(self._weigh(slack_weight(self.settings, parameters)), share)
             if outcome == "failed":
                 self.reset()
         self.late = outcome == "late"
         return self._inputs.copy(), outcome
 
     def _is_free(self) -> bool:
-        """True if the minimum of the cost alone, now `_inputs`, satisfies everything."""
-        if self._gain is None:
+        """True if the minimum of the cost alone satisfies everything; then it is in `_inputs`."""
+        if self._free is None:
             return False
-        np.dot(self._gain, self._parameters[:6], out=self._inputs)
-        if not -self.settings.a_max <= self._inputs.min() <= self._inputs.max() <= self.settings.a_max:
+        self._free.call()
+        least, violation = self._free.results
+        if violation[0] != 0:
             return False
-        self._step[:] = self._multipliers[:] = 0
-        self._measure.call()
-        return bool(self._after[1] == 0)
+        self._inputs[:], self._multipliers[:] = least, 0
+        return True
+
+    def _weigh(self, weight: float) -> float:
+        """Hand over the weight of slack where it is another than before, and return it."""
+        if weight != self._weight:
+            self._weight = self._weights[:] = weight
+            self._model.soft_weights(w_l=self._weights, w_u=self._weights)
+        return weight
 
     def _iterate(self, limit: float, share: float) -> Outcome:
         """Improve `_inputs`; no price above `limit`, the weight of slack; within this share of the budget."""
-        price = curved = 0.0
+        price, rises, least = 0.0, 0, (0.0, 0.0)
         for _ in range(self.settings.max_iterations):
             if self.budget.spent(share):
                 return "late"
@@ -132,11 +140,26 @@ class Sqp:
             self._measure.call()
             cost, violation, size, steepest, on_rows = self._after.tolist()
             price = max(price, min(PRICE * steepest, limit))
-            cost_before, violation_before, curved = self._before.tolist()
-            before, after = cost_before + price * violation_before, cost + price * violation
+            cost_before, violation_before, on_rows_before, on_speed = self._before.tolist()
+            curved = on_rows_before if exact else on_speed
+            if rises == 0:
+                least = cost_before, violation_before
+            before, after = least[0] + price * least[1], cost + price * violation
             settled = violation <= VIOLATED or steepest >= limit
             solved = curved == on_rows == violation == 0 or (size <= CONVERGED[exact] and settled)
-            if not solved and after > before * (1 + ROUNDING) and not self._lower_merit(price, before):
+            if solved or after <= before * (1 + ROUNDING):
+                rises = 0
+            elif rises < RISES:
+                if rises == 0:
+                    began = self._inputs.copy(), self._multipliers.copy()
+                rises += 1
+            elif rises == RISES > 0:
+                self._inputs[:], self._multipliers[:] = began
+                rises += 1
+                continue
+            elif self._lower_merit(price, before):
+                rises = 0
+            else:
                 return "converged" if size <= CONVERGED[False] else "stalled"
             self._inputs[:] = self._trial
             if solved:
@@ -148,9 +171,7 @@ class Sqp:
         self._derive.call()
         exact = bool(self._model.update(*self._program) >= 0)
         if not exact:
-            self._on_cbf[:] = 0
-            self._derive.call()
-            self._model.update(*self._program)
+            self._model.update(*self._gauss_newton)
         return exact
 
     def _merit(self, price: float, share: float) -> float:
@@ -176,35 +197,3 @@ class Sqp:
                 return True
             share /= 2
         return False
-
-
-@lru_cache(maxsize=256)
-def _functions(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any, Array | None]:
-    """The program at the inputs, the merit after a step, and the minimum of the cost as a matrix.
-
-    derive : (inputs, parameters, multipliers) -> (cost, violation, largest multiplier of a row), lower
-        and upper bounds, gradient, Jacobian, Hessian of the Lagrangian.
-    measure : (inputs, parameters, multipliers, step, share) -> (cost, violation, largest element of
-        the step, largest multiplier, largest of a row) there, the inputs there, the values of rows
-        and terminal condition there.
-    The matrix takes state and target to inputs; there is none if there is a terminal condition.
-    """
-    p = build_problem(settings, n_people, n_walls)
-    values, n_rows = ca.vertcat(p.rows, p.terminal), p.rows.numel()
-    step, share = ca.SX.sym("d", p.inputs.numel()), ca.SX.sym("s")
-    violation = ca.sum1(ca.fmax(0, -p.rows)) + ca.sum1(ca.fabs(p.terminal))
-    on_rows = ca.norm_inf(p.multipliers[:n_rows])
-    lower = ca.vertcat(-settings.a_max - p.inputs, -values)
-    upper = ca.vertcat(settings.a_max - p.inputs, ca.inf * ca.SX.ones(n_rows), -p.terminal)
-    merit = ca.vertcat(p.cost, violation, on_rows)
-    outputs = [merit, lower, upper, p.gradient, p.jacobian.T, p.hessian]
-    derive = p.function("derive", [p.inputs, p.parameters, p.multipliers], outputs)
-    trial = ca.fmax(-settings.a_max, ca.fmin(p.inputs + share * step, settings.a_max))
-    cost, violation, values = ca.substitute([p.cost, violation, values], [p.inputs], [trial])
-    merit = ca.vertcat(cost, violation, ca.norm_inf(step), ca.norm_inf(p.multipliers), on_rows)
-    arguments = [p.inputs, p.parameters, p.multipliers, step, share]
-    measure = p.function("measure", arguments, [merit, trial, values])
-    if p.terminal.numel():
-        return derive, measure, None
-    pull = np.asarray(ca.evalf(ca.jacobian(p.gradient, p.parameters[:6])))
-    return derive, measure, np.asarray(-np.linalg.solve(np.asarray(p.curvature), pull), float)

@@ -133,28 +133,32 @@ def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> Mo
     step = max(1, round(every / log.settings.dt))
     rows = np.unique(np.r_[np.arange(0, len(log.states), step), len(log.states) - 1])
     figure = Figure(figsize=(width, width * 0.55), layout="constrained", dpi=70)
-    ax = figure.subplots()
-
+    canvas, ax = FigureCanvasAgg(figure), figure.subplots()
     _stage(ax, log.scenario)
     _frame(ax, [(log, rows)])
-    moving: list[Artist] = []
-
-    canvas = FigureCanvasAgg(figure)
+    metres(ax, "t")
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # settled
+    standing: list[Artist] = [*ax.lines, ax.title]
+    for artist in standing:
+        artist.set_animated(True)  # left out of what is drawn once: axes, and nothing in them
+    canvas.draw()  # type: ignore[no-untyped-call]
+    empty = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
 
     def picture(row: int) -> Image.Image:
         """The scene at a row of the run."""
-        while moving:
-            moving.pop().remove()
-        moving.extend(ax.plot(*log.states[: row + 1, :2].T, color=BLUE, linewidth=1))
-        moving.extend(ax.plot(*log.predicted[row, :, :2].T, ".", color=GREEN, markersize=3))
-        moving.extend(_draw_moment(ax, log, row, robot=BLUE, zone=RED))
-        metres(ax, f"t = {log.time[row]:4.1f} s, robot at {log.speed[row]:.2f} m/s (shown twice as fast)")
-        canvas.draw()  # type: ignore[no-untyped-call]
+        moving: list[Artist] = [*ax.plot(*log.states[: row + 1, :2].T, color=BLUE, linewidth=1)]
+        moving += ax.plot(*log.predicted[row, :, :2].T, ".", color=GREEN, markersize=3)
+        moving += _draw_moment(ax, log, row, robot=BLUE, zone=RED)
+        ax.set_title(f"t = {log.time[row]:4.1f} s, robot at {log.speed[row]:.2f} m/s (shown twice as fast)")
+        canvas.restore_region(empty)  # type: ignore[no-untyped-call]
+        for artist in sorted((*standing, *moving), key=Artist.get_zorder):
+            ax.draw_artist(artist)
+        for artist in moving:
+            artist.remove()
         drawn = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
         return Image.fromarray(drawn).convert("RGB")
 
-    picture(0)
-    figure.set_layout_engine("none")  # settled by the first picture
     first, *others = [picture(row) for row in rows.tolist()]
     movie = io.BytesIO()
     first.save(movie, "GIF", save_all=True, append_images=others, duration=500 * every, loop=0)

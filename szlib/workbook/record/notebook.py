@@ -34,7 +34,7 @@ from ...zones.ellipses import Ellipse
 from ...zones.social_zone import SocialZone
 from . import places
 from .method import DEFAULTS, Method
-from .tables import as_text, show_with_words, whole
+from .tables import as_text, show_drawn, show_with_words, whole
 from .validation import FOR_OPTIONS, NEUTRAL, defaults_of
 
 if TYPE_CHECKING:
@@ -182,10 +182,11 @@ class NotebookRecord:
         )
 
     def figure(self, figure: Figure, name: str) -> None:
-        """Save a figure among the results as NN_topic-name.png."""
+        """Save a figure among the results as NN_topic-name.png, and show it."""
         content = io.BytesIO()
         figure.savefig(content, dpi=150, bbox_inches="tight")
         self._picture(content.getvalue(), f"{self.name}-{name}.png")
+        show_drawn(figure, content.getvalue())
 
     def animation(self, content: bytes, name: str) -> None:
         """Save an animated picture among the results as NN_topic-name.gif."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import io
 import re
 import warnings
 from collections.abc import Sequence
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
 """Badges: where a parameter comes from."""
+_SHOWN = 2 / 3
+"""Of the width of a figure that is saved."""
 
 
 def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
@@ -68,6 +71,29 @@ def as_text(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{k}: {as_text(v)}" for k, v in value.items())
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def show_drawn(figure: Figure, picture: bytes) -> None:
+    """Show a figure as it was drawn to be saved, smaller and in 256 colours, in place of drawing it again.
+
+    Where figures are not shown inline, as by ipympl, nothing is done.
+    """
+    import matplotlib.pyplot as plt
+    from IPython.display import display
+    from PIL import Image
+
+    from ..figures.style import in_words
+
+    if "inline" not in plt.get_backend():
+        return
+    drawn = Image.open(io.BytesIO(picture)).convert("RGB")
+    size = round(drawn.width * _SHOWN), round(drawn.height * _SHOWN)
+    shown = io.BytesIO()
+    drawn.resize(size, Image.Resampling.LANCZOS).quantize(dither=Image.Dither.NONE).save(shown, "PNG")
+    content = {"image/png": shown.getvalue(), "text/plain": repr(figure)}
+    told = {"image/png": {"alt": in_words(figure)}}
+    display(content, raw=True, metadata=told)  # type: ignore[no-untyped-call]
+    plt.close(figure)
 
 
 def show_with_words() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -65,14 +66,13 @@ def check_parameters(given: Mapping[str, Any], sources: Sequence[Path]) -> dict[
 
 
 def defaults_of(source: Path) -> dict[str, Any]:
-    """What the cell tagged "parameters" of a notebook sets."""
-    import jupytext
-
+    """What the cell tagged "parameters" of a notebook, a percent script, sets."""
+    cells = re.split(r"^# %%", source.read_text(encoding="utf-8"), flags=re.MULTILINE)
     return {
         node.targets[0].id: ast.literal_eval(node.value)
-        for cell in jupytext.read(source).cells
-        if "parameters" in cell.metadata.get("tags", [])
-        for node in ast.parse(cell.source).body
+        for head, _, body in (cell.partition("\n") for cell in cells)
+        if re.search(r'tags=\[[^]]*"parameters"', head)
+        for node in ast.parse(body).body
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
     }
 

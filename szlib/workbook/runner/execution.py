@@ -26,7 +26,6 @@ from ...tracks import datasets
 from ..record import places
 from ..record.notebook import data_files
 from ..record.validation import check_parameters
-from ..report import document
 from . import summary, worker
 
 LAST_PRODUCER = "05"
@@ -86,6 +85,8 @@ def run(
         given |= {"data": asked, "results": str(results)}
         outcomes = _outcomes(sources, given, home, jobs, scheduler)
         done = summary.finish(home, identity, earlier, {name: outcomes[name] for name in names})
+        from ..report import document  # takes longer to load than all the rest
+
         return done | ({"report": str(document.write(home))} if document.executed(home) else {})
 
 

@@ -14,13 +14,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import jupytext
-import papermill
-
 from ... import memory
 from ...errors import SzlibError
 from ...files import printable, temporary_folder, write_file
 from ..record import places
+from . import kernels
 
 REFUSED = {
     "DataError", "StorageError", "MemoryLimitError", "ZoneError", "SolverError", "SzlibError", "MemoryError",
@@ -66,6 +64,9 @@ def execute(source: str, given: dict[str, Any], home: str, share: int | None) ->
 
 def _execute_in(temporary: Path, script: Path, folder: Path, given: dict[str, Any]) -> dict[str, Any]:
     """Execute a notebook in a temporary folder, and put the executed copy among the results."""
+    import jupytext  # here, where they are needed: the process that waits for notebooks loads neither
+    import papermill
+
     plain, executed = temporary / f"{script.stem}.ipynb", temporary / "executed.ipynb"
     jupytext.write(jupytext.read(script), plain, fmt="ipynb")
     outcome: dict[str, Any] = {}
@@ -77,6 +78,7 @@ def _execute_in(temporary: Path, script: Path, folder: Path, given: dict[str, An
             plain,
             executed,
             given,
+            kernel_manager_class=kernels.KernelManager,
             kernel_name="python3",
             language="python",
             cwd=script.parent,

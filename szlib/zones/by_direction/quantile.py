@@ -182,8 +182,10 @@ class QuantileZones:
         lines = [quantile_radii(self.known, speed, self.q)[0] for speed in speeds]
         return Radii(np.array(speeds), DIRECTIONS, np.array(lines))
 
-    def others(self, weights: Array, speeds: Sequence[float]) -> Array:
-        """Ellipses (k, s, 5) for weights (k, n) of the encounters; NaN: no zone."""
+    def others(
+        self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None
+    ) -> Array:
+        """Ellipses (k, s, 5) for weights (k, n) of the encounters; NaN: no zone.  Nothing else is drawn."""
         radii = np.stack([quantile_radii(self.known, v, self.q, weights) for v in speeds], axis=1)
         return fit_ellipses(closed(radii.reshape(-1, radii.shape[-1]))).reshape(*radii.shape[:2], 5)
 

@@ -32,6 +32,7 @@ class RespectZones:
     encounter : which of `encounters` each belongs to, shape (n,).
     encounters : the first of each encounter's samples.
     null : how often the null model was where.
+    shifts : the same by shift, shape (shifts, speeds, directions, distances).
     speed_width : standard deviation of the weight of other speeds [m/s]; inf: all speeds alike.
     parameters, funnel : for the provenance.
     """
@@ -40,6 +41,7 @@ class RespectZones:
     encounter: NDArray[np.intp]
     encounters: pd.DataFrame
     null: Presence
+    shifts: NDArray[np.float32]
     speed_width: float
     parameters: dict[str, Any]
     funnel: list[dict[str, Any]]
@@ -77,6 +79,7 @@ class RespectZones:
             close,
             *encounter_numbers(close),
             Presence.of(null.samples, r_max=r_max),
+            np.stack([Presence.of(null.one(k), r_max=r_max).counts for k in range(null.shifts)], dtype="f4"),
             float(speed_width),
             parameters,
             [*funnels.of(samples), funnels.stage("samples: close", len(samples), len(close), far)],
@@ -84,14 +87,17 @@ class RespectZones:
 
     def radii(self, speeds: Sequence[float]) -> Radii:
         """Radii at speeds, ascending [m/s]; ZoneError where there is nothing to compare."""
-        return Radii(np.array(speeds), DIRECTIONS, self._lines(None, speeds))
+        return Radii(np.array(speeds), DIRECTIONS, self._lines(None, speeds, self.null))
 
-    def others(self, weights: Array, speeds: Sequence[float]) -> Array:
-        """Ellipses (k, s, 5) for weights (k, n) of the encounters; NaN: no zone."""
+    def others(
+        self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None
+    ) -> Array:
+        """Ellipses (k, s, 5) for weights (k, n) of the encounters, shifts drawn anew by rng; NaN: no zone."""
         lines = np.full((len(weights), len(speeds), len(DIRECTIONS)), np.nan)
         for i, weight in enumerate(weights):
+            null = self.null if rng is None else self._other_null(rng)
             with suppress(ZoneError):
-                lines[i] = self._lines(weight[self.encounter], speeds)
+                lines[i] = self._lines(weight[self.encounter], speeds, null)
         return fit_ellipses(lines.reshape(-1, len(DIRECTIONS))).reshape(*lines.shape[:2], 5)
 
     def without_each(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
@@ -103,12 +109,16 @@ class RespectZones:
         weights[np.arange(len(nearest)), nearest] = 0
         return nearest, self.others(weights, speeds)
 
-    def _lines(self, weights: Array | None, speeds: Sequence[float]) -> Array:
-        """Radii (s, 72) [m] for weights (n,) of the samples."""
+    def _other_null(self, rng: np.random.Generator) -> Presence:
+        """The null model of as many shifts, drawn with replacement: it is known from so many only."""
+        drawn = rng.multinomial(len(self.shifts), np.full(len(self.shifts), 1 / len(self.shifts)))
+        return Presence(np.tensordot(drawn.astype(float), self.shifts, axes=1), self.null.r_max)
+
+    def _lines(self, weights: Array | None, speeds: Sequence[float], null: Presence) -> Array:
+        """Radii (s, 72) [m] for weights (n,) of the samples, against a null model."""
         data = Presence.of(self.samples, r_max=self.null.r_max, weights=weights)
         asked = speeds[:1] if np.isinf(self.speed_width) else speeds
         lines = [
-            respect_boundary(data, self.null, DIRECTIONS, speed=v, speed_width=self.speed_width)
-            for v in asked
+            respect_boundary(data, null, DIRECTIONS, speed=v, speed_width=self.speed_width) for v in asked
         ]
         return np.broadcast_to(lines, (len(speeds), len(DIRECTIONS)))

@@ -1,0 +1,123 @@
+"""What the SQP works with, in CasADi: the program at a plan, the merit of a step, and the unconstrained plan.
+
+The derivatives follow from the structure of the problem. Positions and velocities are constant linear maps
+of the inputs, p = P u + ... and v = V u + ...; a barrier row depends on two positions, a speed row on one
+velocity. So with g_k and S_k the gradient and the Hessian of h by the position in state k,
+
+    row of the Jacobian    g_{k+1}' P_{k+1} - (1 - gamma) g_k' P_k,       -2 v_k' V_k
+    Hessian                curvature of the cost + sum_k -2 lambda_k V_k' V_k + sum_k P_k' S_k P_k
+
+with S_k summed over people and walls, weighted by their multipliers. Without its last sum it is that of a
+Gauss-Newton step.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ..barriers import cbf_residual
+from ..problem import Problem, build_problem, function
+from ..settings import MPCSettings
+
+
+class Program(NamedTuple):
+    """Three functions of CasADi.
+
+    derive : (inputs, parameters, multipliers) -> (cost, violation, largest multiplier of a row, of a speed
+        row), lower and upper bounds, gradient, Jacobian, Hessian of the Lagrangian, and the same without the
+        curvature of the barriers.
+    measure : (inputs, parameters, multipliers, step, share) -> (cost, violation, largest element of
+        the step, largest multiplier, largest of a row) there, the inputs there, the values of rows
+        and terminal condition there.
+    free : parameters -> the inputs of least cost alone, and by how much they violate bounds and rows in sum;
+        None if there is a terminal condition.
+    """
+
+    derive: Any
+    measure: Any
+    free: Any
+
+
+@lru_cache(maxsize=256)
+def build_program(settings: MPCSettings, n_people: int, n_walls: int) -> Program:
+    """Write down the functions; once for each size and settings."""
+    p, s = build_problem(settings, n_people, n_walls), settings
+    u, n_rows = p.inputs, p.rows.numel()
+    values = ca.vertcat(p.rows, p.terminal)
+    violation = ca.sum1(ca.fmax(0, -p.rows)) + ca.sum1(ca.fabs(p.terminal))
+    multipliers = ca.SX.sym("multiplier", values.numel())
+    on_rows = ca.norm_inf(multipliers[:n_rows])
+    arguments = [u, p.parameters, multipliers]
+
+    map_of = np.asarray(ca.evalf(ca.jacobian(ca.vec(p.states), u))).reshape(s.N + 1, 4, s.N, 2)
+    to_position, to_velocity = map_of[: s.N_h + 1, 0, :, 0], map_of[1:, 2, :, 0]
+    curvature = ca.evalf(ca.hessian(p.cost, u)[0])
+    of_speed, of_barriers = _hessians(p, s, multipliers, to_position)
+    gauss = curvature + of_speed
+    merit = ca.vertcat(p.cost, violation, on_rows, ca.norm_inf(multipliers[p.n_cbf : n_rows]))
+    lower = ca.vertcat(-s.a_max - u, -values)
+    upper = ca.vertcat(s.a_max - u, ca.inf * ca.SX.ones(n_rows), -p.terminal)
+    jacobian = _jacobian(p, s, to_position, to_velocity)
+    outputs = [merit, lower, upper, ca.gradient(p.cost, u), jacobian.T, gauss + of_barriers, gauss]
+    derive = function("derive", arguments, outputs)
+
+    step, share = ca.SX.sym("d", u.numel()), ca.SX.sym("s")
+    trial = ca.fmax(-s.a_max, ca.fmin(u + share * step, s.a_max))
+    there = ca.Function("there", [u, p.parameters], [p.cost, violation, values])
+    cost, violated, values = there(trial, p.parameters)
+    merit = ca.vertcat(cost, violated, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
+    measure = function("measure", [*arguments, step, share], [merit, trial, values])
+    if p.terminal.numel():
+        return Program(derive, measure, None)
+    given = p.parameters[:6]
+    pull = ca.evalf(ca.jacobian(ca.gradient(p.cost, u), given))
+    least = -ca.solve(curvature, pull) @ given
+    beyond = ca.sum1(ca.fmax(0, ca.fabs(least) - s.a_max))
+    free = function("unbound", [p.parameters], [least, beyond + there(least, p.parameters)[1]])
+    return Program(derive, measure, free)
+
+
+def _jacobian(p: Problem, s: MPCSettings, to_position: Any, to_velocity: Any) -> Any:
+    """Of rows and terminal condition by the inputs, shape (rows, 2N)."""
+    maps, n = [ca.sparsify(ca.DM(row[None])) for row in to_position], p.h.shape[0]
+    by_axis = []
+    for of in p.slope:
+        slopes = ca.horzsplit(of)
+        ends = [cbf_residual(slopes[k + 1] @ maps[k + 1], slopes[k] @ maps[k], s.gamma) for k in range(s.N_h)]
+        by_axis.append(ca.vertcat(*ends))
+    rows = np.arange(s.N_h * n).reshape(s.N_h, n).T.ravel()
+    columns = np.arange(2 * s.N).reshape(2, s.N).T.ravel()
+    velocities = ca.diagcat(*(-2 * p.states[2:, k].T for k in range(1, s.N + 1)))
+    blocks = [ca.horzcat(*by_axis)[rows.tolist(), columns.tolist()], velocities @ _both(to_velocity)]
+    if p.terminal.numel():
+        blocks.append(_both(to_velocity[-1:]))
+    return ca.vertcat(*blocks)
+
+
+def _hessians(p: Problem, s: MPCSettings, multipliers: Any, to_position: Any) -> tuple[Any, Any]:
+    """Of multipliers' rows by the inputs: what comes from the speed limits, and from the barriers."""
+    # V_k' V_k is dt^2 for any two inputs before k: the later of the two says which rows have both.
+    later = np.maximum.outer(range(s.N), range(s.N)).ravel(order="F")
+    on_speed = multipliers[p.n_cbf : p.n_cbf + s.N]
+    after = ca.DM(np.triu(np.ones((s.N, s.N)))) @ on_speed
+    of_speed = ca.kron(ca.reshape((-2 * s.dt**2 * after)[later.tolist()], s.N, s.N), ca.DM.eye(2))
+    weights = (_change(s).T @ ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0])).T
+    xx, xy, yy = (ca.sum1(weights * bend) for bend in p.bend)
+    bends = [ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h + 1)]
+    to_xy = _both(to_position)
+    return of_speed, ca.tril2symm(ca.tril(to_xy.T @ ca.diagcat(*bends) @ to_xy))
+
+
+def _change(s: MPCSettings) -> Any:
+    """The matrix that takes h_0 .. h_{N_h} to the rows h_{k+1} - (1 - gamma) h_k."""
+    rows = np.eye(s.N_h, s.N_h + 1, 1) - (1 - s.gamma) * np.eye(s.N_h, s.N_h + 1)
+    return ca.sparsify(ca.DM(rows))
+
+
+def _both(of_one: Any) -> Any:
+    """The same linear map for x and for y, in turn."""
+    return ca.kron(ca.sparsify(ca.DM(of_one)), ca.DM.eye(2))
