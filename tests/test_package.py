@@ -68,7 +68,7 @@ ROOMS = {
 }  # fmt: skip
 """From the ground up: a room imports only from rooms before it, a file only from files before it."""
 MOST_FILES, LONGEST = 9, 300
-CASADI = {"control.problem", "control.solvers.ipopt", "control.solvers.sqp"}
+CASADI = {"control.problem", "control.solvers.ipopt", "control.solvers.program"}
 HANDED_OVER = {("simulation.log", "workbook.figures.simulation")}
 """What a log draws of itself, it asks of the workbook when it is called; nothing else looks up."""
 

@@ -17,6 +17,7 @@ the answer is a linear feedback of the error, K (x - g), without any program.
 
 from __future__ import annotations
 
+from math import isnan
 from typing import Literal
 
 import daqp
@@ -31,8 +32,9 @@ Outcome = Literal["converged", "stalled", "late", "failed"]
 CONVERGED = {True: 1e-2, False: 1e-5}
 """The last step of the SQP moves no input by more than this [m/s2]: with the exact Hessian, when the
 error is of the order of its square, and without."""
-VIOLATED = 5e-7
-"""Nor does it leave the rows violated by more than this in sum, unless all of it is slack."""
+VIOLATED = 1e-8
+"""Nor does it leave the rows violated by more than this in sum, unless all of it is slack; an input that
+violates a row by so much is 2 / dt^2 times as much off, 2e-6 m/s2."""
 PRICE = 1.1
 """Price of violation in the merit, as a multiple of the largest multiplier: exact above 1."""
 SHORTEST = 1e-3
@@ -145,6 +147,8 @@ class Sqp:
             if rises == 0:
                 least = cost_before, violation_before
             before, after = least[0] + price * least[1], cost + price * violation
+            if isnan(before):
+                return "failed"
             settled = violation <= VIOLATED or steepest >= limit
             solved = curved == on_rows == violation == 0 or (size <= CONVERGED[exact] and settled)
             if solved or after <= before * (1 + ROUNDING):
