@@ -23,6 +23,7 @@ from typing import Any
 
 import bench_control
 import bench_data
+import bench_growth
 import growth
 import numpy as np
 import pandas as pd
@@ -252,6 +253,7 @@ def main() -> None:
         **bench_control.CASES,
         "import szlib": bench_import,
         "plaza": bench_plaza,
+        **bench_growth.CASES,
     }
     if importlib.util.find_spec("do_mpc"):
         cases["do-mpc"] = bench_rival
@@ -263,12 +265,13 @@ def main() -> None:
         cases["1 Hz day, files to zone"] = bench_day
     if "--long" in sys.argv or os.environ.get(bench_data.RAW_DAY_VARIABLE):
         cases |= bench_data.CASES
+    bars = BARS | bench_data.BARS | bench_growth.BARS
     wanted = [name for name in sys.argv[1:] if not name.startswith("--")] or list(cases)
     found: dict[str, dict[str, float]] = {}
     for name in wanted:
         bench = cases[name]
         found[name] = {key: float(f"{value:.4g}") for key, value in bench().items()}
-        print(growth.told(name, found[name], (BARS | bench_data.BARS).get(name)), flush=True)
+        print(growth.told(name, found[name], bars.get(name)), flush=True)
     Path("results").mkdir(exist_ok=True)
     Path("results/bench.json").write_text(json.dumps(found, indent=1))
     if "--save" in sys.argv:

@@ -28,14 +28,17 @@ def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
 
 
 def grow(work: Mapping[float, Callable[[], object]], repeats: int = 3) -> dict[float, float]:
-    """Median seconds of each size's work: the sizes in turn, after one lap that does not count."""
+    """Median seconds of each size's work: the sizes in turn, after one lap that does not count.
+
+    Seconds of this process's processors: what else the machine does hardly matters.
+    """
     laps: list[dict[float, float]] = []
     for _ in range(repeats + 1):
         lap = {}
         for size, call in work.items():
-            begun = time.perf_counter()
+            begun = time.process_time()
             call()
-            lap[size] = time.perf_counter() - begun
+            lap[size] = time.process_time() - begun
         laps.append(lap)
     return {size: median(lap[size] for lap in laps[1:]) for size in work}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +50,10 @@ class Blocks:
     seconds: float
     tally: Tally = field(default_factory=Tally)
 
+    @cached_property
+    def _fault(self) -> pl.Expr:
+        return fault(self.metres, self.seconds, False)
+
     def __iter__(self) -> Iterator[Rows]:
         self.tally, seen = Tally(), 0
         wanted = self.scan.select("ragged", *Rows._fields)  # not the lines: to number them takes long
@@ -67,8 +72,7 @@ class Blocks:
         rows = Rows(*(block[name].to_numpy() for name in Rows._fields))  # NaN where there is no number
         if self._spotless(block, rows):
             return rows
-        reason = fault(self.metres, self.seconds, False)
-        block = block.with_row_index("line", offset=seen + 1).with_columns(reason=reason)
+        block = block.with_row_index("line", offset=seen + 1).with_columns(reason=self._fault)
         bad = block.filter(pl.col("reason").is_not_null())
         if bad.height:
             self.tally.first = self.tally.first or bad.select("line", "reason").row(0)
@@ -81,4 +85,4 @@ class Blocks:
             return False
         ends = {name: [values.min(), values.max()] for name, values in rows._asdict().items()}
         found = pl.DataFrame({"ragged": [False, False], **ends})
-        return found.select(fault(self.metres, self.seconds, False)).to_series().null_count() == 2
+        return found.select(self._fault).to_series().null_count() == 2

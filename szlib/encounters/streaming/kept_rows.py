@@ -62,9 +62,9 @@ def find(content: tuple[int, str], which: dict[str, Any]) -> tuple[Rows, Tally] 
         return None
     with suppress(OSError):  # only the order in which entries give way depends on it
         os.utime(path)
-    table = pq.read_table(io.BytesIO(found))
-    told = json.loads(table.schema.metadata[b"szlib"])
-    rows = (table[name].to_numpy() / told["scales"][name] for name in Rows._fields)
+    with pq.ParquetFile(io.BytesIO(found)) as file:  # column by column, as memory is short
+        told = json.loads(file.schema_arrow.metadata[b"szlib"])
+        rows = [file.read([name])[name].to_numpy() / told["scales"][name] for name in Rows._fields]
     seen = told["tally"]
     first = tuple(seen["first"]) if seen["first"] else None
     return Rows(*rows), Tally(seen["good"], seen["reach"], Counter(seen["reasons"]), first)

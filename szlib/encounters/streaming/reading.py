@@ -60,21 +60,21 @@ def read_near_square(
             if layout.name == "atc-raw":
                 metres = layout.metres_in(unit)
                 cells = Cells(square.grown(REACH).box, duration, max_gap or layout.max_gap or 0.0, metres)
-                rows, seen = _near(scan, path, layout, cells, content)
-                return _table(rows, seen, path, layout, metres, unit=unit, tz=tz)
+                near, seen = _near(scan, path, layout, cells, content)
+                return _table(near, seen, path, layout, metres, unit=unit, tz=tz)
     given = {"file_format": file_format, "unit": unit, "frame_rate": frame_rate, "columns": columns}
     return read_raw(path, tz=tz, **given)  # type: ignore[arg-type]
 
 
 def _near(
     scan: pl.LazyFrame, path: Path, layout: Format, cells: Cells, content: Content | None
-) -> tuple[Rows, Tally]:
+) -> tuple[pl.DataFrame, Tally]:
     """The rows near the square, from the cache where they are kept, and what was seen of the file."""
     which = {"format": asdict(layout), "cells": asdict(cells)}
     if content and kept_rows.may_be_kept(path.stat().st_size, which):
         known = kept_rows.find(content(), which)
         if known:
-            return known
+            return pl.DataFrame(known[0]._asdict()), known[1]
     with readable(path, layout):
         blocks = Blocks(scan, cells.metres, layout.seconds)
         try:
@@ -85,17 +85,16 @@ def _near(
     near = near.at(person_order(near.id))
     if content:
         kept_rows.remember(content(), which, near, blocks.tally)
-    return near, blocks.tally
+    return pl.DataFrame(near._asdict()), blocks.tally
 
 
 def _table(
-    rows: Rows, seen: Tally, path: Path, layout: Format, metres: float, *, unit: str | None, tz: str
+    near: pl.DataFrame, seen: Tally, path: Path, layout: Format, metres: float, *, unit: str | None, tz: str
 ) -> pd.DataFrame:
     """The rows as from `read_raw`, with the funnel of the whole file."""
     stage = read_stage(path, layout, seen.good, dict(seen.reasons), seen.first)
     if unit is None:
         check_unit(pl.DataFrame({"x": [seen.reach], "y": [0.0]}), layout, path)
-    near = pl.DataFrame(rows._asdict())
     far = {"never near the square": seen.good - near.height}
     stages = [stage, funnels.stage("near the square", seen.good, near.height, far)]
     if near.height == 0:
