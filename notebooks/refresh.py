@@ -45,6 +45,8 @@ def refresh(source: Path, data: str = "") -> None:
     With other data than its own the copy goes into `real_day`.
     """
     notebook = on(source, data) if data else jupytext.read(source)
+    for number, cell in enumerate(notebook.cells):  # no other names each time
+        cell.id = f"{source.stem[:2]}-{number}"
     target = (HERE / "real_day" if data else HERE) / f"{source.stem}.ipynb"
     target.parent.mkdir(exist_ok=True)
     NotebookClient(
