@@ -267,6 +267,8 @@ def main() -> None:
         cases |= bench_data.CASES
     bars = BARS | bench_data.BARS | bench_growth.BARS
     wanted = [name for name in sys.argv[1:] if not name.startswith("--")] or list(cases)
+    if unknown := set(wanted) - set(cases):
+        sys.exit(f"no such case: {', '.join(sorted(unknown))}; there are {', '.join(cases)}")
     found: dict[str, dict[str, float]] = {}
     for name in wanted:
         bench = cases[name]

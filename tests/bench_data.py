@@ -23,6 +23,7 @@ import polars as pl
 from sklearn.neighbors import LocalOutlierFactor
 
 import szlib
+from szlib.encounters.streaming import kept_rows
 from szlib.plaza.people import make_plaza
 from szlib.zones import outliers
 
@@ -79,10 +80,10 @@ print(time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_m
 """
 
 
-def run(program: str, *files: Path) -> tuple[float, float]:
-    """Seconds, without imports, and peak memory [MB] of a program in a process of its own."""
+def run(program: str, *files: Path, cache: str = "off") -> tuple[float, float]:
+    """Seconds, without imports, and peak memory [MB] of a program in a process of its own with this cache."""
     imports, program = program.split("# begin")
-    environment = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
+    environment = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1]), kept_rows.VARIABLE: cache}
     done = subprocess.run(
         [sys.executable, "-c", _TIMED.format(imports=imports, program=program), *map(str, files)],
         capture_output=True,
@@ -123,15 +124,17 @@ def raw_day() -> Iterator[Path]:
 
 
 def bench_raw_day(repeats: int = 5) -> dict[str, float]:
-    """A full raw day, file to encounters, against a bare streaming scan; and the most direct pandas."""
-    with raw_day() as day:
-        run(BARE, day), run(OURS, day)
+    """A full raw day to encounters, also asked again, against a bare streaming scan; and direct pandas."""
+    with raw_day() as day, tempfile.TemporaryDirectory() as cache:
+        run(BARE, day), run(OURS, day, cache=cache)
         pairs = [(run(OURS, day), run(BARE, day)) for _ in range(repeats)]
+        again = median(run(OURS, day, cache=cache)[0] for _ in range(repeats))
         pandas = run(PANDAS, day)
     ours, bare = median(p[0][0] for p in pairs), median(p[1][0] for p in pairs)
     return {
         "s": ours,
         "ours / bare scan": ours / bare,
+        "asked again / bare scan": again / bare,
         "least ratio": min(p[0][0] / p[1][0] for p in pairs),
         "peak MB": max(p[0][1] for p in pairs),
         "pandas s": pandas[0],
@@ -198,5 +201,7 @@ CASES: dict[str, Callable[[], dict[str, float]]] = {
     "zone, paper size": bench_zone,
 }
 
-BARS: dict[str, growth.Bars] = {"raw day to encounters": {"ours / bare scan": ("<=", 1.95)}}
+BARS: dict[str, growth.Bars] = {
+    "raw day to encounters": {"ours / bare scan": ("<=", 1.95), "asked again / bare scan": ("<=", 0.7)}
+}
 """Of a case: what its numbers are held against."""
