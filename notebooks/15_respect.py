@@ -278,8 +278,8 @@ looks = zip((figures.GREY, figures.BLUE, figures.ORANGE), "os^", (-0.2, 0.0, 0.2
 for (who, part), (shade, marker, up) in zip(changes.groupby("kinds", sort=False), looks, strict=True):
     at = [up + k for k in range(len(part))]
     ax.hlines(at, part["fitted_low"], part["fitted_high"], color=shade, linewidth=2)
-    ax.plot(part["fitted"], at, marker, color=shade, label=who)
-    ax.plot(part["binned"], at, "x", color=shade)
+    ax.plot(part["fitted"], at, marker, color=shade, label=f"{who}: fitted")
+    ax.plot(part["binned"], at, "x", color=shade, label="counted in bins")
 ax.set_yticks(range(len(part)), part["change"])
 ax.invert_yaxis()
 ax.set(xlabel="radius of the respect zone, all bearings [m]", ylabel="changed")

@@ -14,7 +14,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -38,16 +37,10 @@ from szlib.plaza.people import make_plaza
 from szlib.tracks import datasets
 
 
-def seconds(call: Callable[[], object]) -> float:
-    begun = time.perf_counter()
-    call()
-    return time.perf_counter() - begun
-
-
 def in_turn(first: Callable[[], object], second: Callable[[], object], repeats: int) -> tuple[float, float]:
     """Medians of both, run alternately after one warm-up each."""
     first(), second()
-    pairs = [(seconds(first), seconds(second)) for _ in range(repeats)]
+    pairs = [(growth.seconds(first), growth.seconds(second)) for _ in range(repeats)]
     return median(p[0] for p in pairs), median(p[1] for p in pairs)
 
 
@@ -99,7 +92,7 @@ def race(
     asked = way(scenario)
     for _ in range(repeats):
         for name, step in baselines.items():
-            laps[name].append([seconds(lambda: step(*each)) for each in asked][3:])  # noqa: B023 - at once
+            laps[name].append([growth.seconds(lambda: step(*each)) for each in asked][3:])  # noqa: B023 - at once
     return {name: np.median(lap, axis=0) for name, lap in laps.items()}
 
 
@@ -224,8 +217,8 @@ def bench_plaza() -> dict[str, float]:
     """The synthetic plaza: made, written; and read back to its zone."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "plaza.csv"
-        made = seconds(lambda: make_plaza(file, seed=0))
-        fitted = seconds(lambda: szlib.SocialZone.fit(szlib.find_encounters(szlib.read_tracks(file))))
+        made = growth.seconds(lambda: make_plaza(file, seed=0))
+        fitted = growth.seconds(lambda: szlib.SocialZone.fit(szlib.find_encounters(szlib.read_tracks(file))))
         return {"made and written s": made, "MB": file.stat().st_size / 1e6, "read to zone s": fitted}
 
 

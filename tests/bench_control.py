@@ -17,6 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import growth
 import numpy as np
 from random_states import ZONE
 
@@ -82,11 +83,6 @@ def laps(
     return took[:, :, 3:], apart
 
 
-def exponent(sizes: Sequence[int], values: Sequence[float]) -> float:
-    """The slope of a line through the values over the sizes, both as logarithms."""
-    return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
-
-
 GROWTH: dict[str, tuple[tuple[int, ...], Callable[[int], dict[str, Any]]]] = {
     "people": ((1, 2, 4, 8, 16, 20), lambda n: {"people": n, "n_walls": 0}),
     "walls": ((1, 5, 10, 20, 50), lambda n: {"people": 1, "n_walls": n}),
@@ -104,7 +100,7 @@ def bench_growth(of: str) -> dict[str, float]:
         controller = (szlib, controller_of(szlib, **case(n)))
         took, _ = laps([controller], way(**case(n), steps=60), 5)
         found[f"{of} = {n}: ms"] = 1e3 * float(np.median(took))
-    return found | {"exponent": exponent(sizes, list(found.values()))}
+    return found | {"exponent": growth.exponent(sizes, list(found.values()))}
 
 
 def bench_build() -> dict[str, float]:
@@ -116,7 +112,9 @@ def bench_build() -> dict[str, float]:
         name = f"{people} + {n_walls}"
         found |= {f"{name}: first ms": first, f"{name}: another ms": again, f"{name}: first MB": megabytes}
     slots = [people + n_walls for people, n_walls in sizes]
-    return found | {"exponent": exponent(slots, [v for k, v in found.items() if k.endswith("first ms")])}
+    return found | {
+        "exponent": growth.exponent(slots, [v for k, v in found.items() if k.endswith("first ms")])
+    }
 
 
 def build(people: int, n_walls: int) -> tuple[float, float, float]:
@@ -157,7 +155,7 @@ def jump(ahead: bool) -> tuple[float, float, float]:
     """The first step with 20 people, the longest step while sizes are built, and the longest after [ms]."""
     controller = szlib.MPCCBF(ZONE, walls=walls(4))
     x, longest, usual = np.array([-4.0, 0.0, 0.0, 0.0]), 0.0, 0.0
-    ask = lambda n: _timed(lambda: controller.step(x, GOAL, crowd(n)))  # noqa: E731
+    ask = lambda n: 1e3 * growth.seconds(lambda: controller.step(x, GOAL, crowd(n)))  # noqa: E731
     for n in (1, 1, 1):
         ask(n)
     for n in (4, 8, 16) if ahead else ():
@@ -169,12 +167,6 @@ def jump(ahead: bool) -> tuple[float, float, float]:
     begun = time.thread_time()
     ask(20)
     return 1e3 * (time.thread_time() - begun), longest, usual
-
-
-def _timed(call: Callable[[], object]) -> float:
-    begun = time.perf_counter()
-    call()
-    return 1e3 * (time.perf_counter() - begun)
 
 
 def earlier(clone: str) -> ModuleType:

@@ -27,6 +27,13 @@ def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
     return float(np.polyfit(np.log(sizes), np.log(costs), 1)[0])
 
 
+def seconds(call: Callable[[], object]) -> float:
+    """How long a call takes, by the clock [s]."""
+    begun = time.perf_counter()
+    call()
+    return time.perf_counter() - begun
+
+
 def grow(work: Mapping[float, Callable[[], object]], repeats: int = 3) -> dict[float, float]:
     """Median seconds of each size's work: the sizes in turn, after one lap that does not count.
 

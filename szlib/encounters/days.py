@@ -149,11 +149,9 @@ def extract_days(
         raise DataError(f"unknown parameter {unknown}; expected some of {list(Chain.__dataclass_fields__)}")
     chain, folder = Chain(**parameters), Path(out)
     excluded = (exclude,) if isinstance(exclude, str) else tuple(sorted(map(str, exclude)))
-    days: dict[str, list[str]] = {}
     files = sorted({file.resolve() for file in datasets.find(paths)})
     own_folder(folder, PURPOSE, inputs=files)
-    for file, name in zip(files, recording_names(files), strict=True):
-        days.setdefault(_day_of(file, chain) or printable(name), []).append(str(file))
+    days = _by_day(files, chain)
     chain = _settled(chain, [files for day, files in sorted(days.items()) if day not in excluded])
     rows = [_row(day, files, status="excluded") for day, files in days.items() if day in excluded]
     tasks = [
@@ -169,6 +167,14 @@ def extract_days(
     keys = {row["day"]: row.pop("key") for row in rows}
     table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
     return Extraction(folder, table, excluded, keys, chain.square if isinstance(chain.square, Area) else None)
+
+
+def _by_day(files: Sequence[Path], chain: Chain) -> dict[str, list[str]]:
+    """The files of each day, or of each recording that has no calendar day."""
+    days: dict[str, list[str]] = {}
+    for file, name in zip(files, recording_names(files), strict=True):
+        days.setdefault(_day_of(file, chain) or printable(name), []).append(str(file))
+    return days
 
 
 def _settled(chain: Chain, days: Iterable[Sequence[str]]) -> Chain:

@@ -54,34 +54,63 @@ def subgoal(
         closing = (s.v_max + pace) * s.dt
         if h > min(nearest, distance, max(closing / s.gamma, closing * s.N)):
             continue
-        to_a, to_b = (zone.xa - x, zone.ya - y), (zone.xb - x, zone.yb - y)
-        ra, rb = hypot(*to_a), hypot(*to_b)
-        across = abs(_cross(way, (zone.vx, zone.vy))) > s.tie * pace * distance
-        if across or ra * rb == 0:
+        if abs(_cross(way, (zone.vx, zone.vy))) > s.tie * pace * distance:
             continue
-        inward = (to_a[0] / ra + to_b[0] / rb, to_a[1] / ra + to_b[1] / rb)
-        reach = zone.a + s.r_robot + s.eps
-        cosine = (ra**2 + rb**2 - 4 * reach**2) / (2 * ra * rb)
-        w = acos(max(-1.0, min(1.0, cosine))) / 2
-        b = atan2(_cross(inward, way), inward[0] * way[0] + inward[1] * way[1])
+        angles = _angles(zone, position, way, s)
+        if angles is None:
+            continue
         nearest, target = h, goal
-        if s.tie * w == 0:
-            continue
-        for left in (s.pass_side == "left", s.pass_side != "left"):
-            lead = (b if left else -b) / (s.tie * w)
-            if not -1 <= lead < 2:
-                continue
-            if _has_room(zone, reach, way, left, walls, margins, s) and not zone.blocks(goal, s):
-                turn = ((w if left else -w) - b) * min(1.0, 2 - lead)
-                c, d = cos(turn), sin(turn)
-                target = (x + c * way[0] - d * way[1], y + d * way[0] + c * way[1])
-                break
+        turn = _turn(zone, goal, way, *angles, walls, margins, s)
+        if turn is not None:
+            c, d = cos(turn), sin(turn)
+            target = (x + c * way[0] - d * way[1], y + d * way[0] + c * way[1])
     return target
+
+
+def _angles(
+    zone: PlacedZone, position: tuple[float, float], way: tuple[float, float], s: MPCSettings
+) -> tuple[float, float] | None:
+    """w, half the angle between the tangents, and b, that of the way from their middle; None on a focus."""
+    x, y = position
+    to_a, to_b = (zone.xa - x, zone.ya - y), (zone.xb - x, zone.yb - y)
+    ra, rb = hypot(*to_a), hypot(*to_b)
+    if ra * rb == 0:
+        return None
+    inward = (to_a[0] / ra + to_b[0] / rb, to_a[1] / ra + to_b[1] / rb)
+    cosine = (ra**2 + rb**2 - 4 * _reach(zone, s) ** 2) / (2 * ra * rb)
+    w = acos(max(-1.0, min(1.0, cosine))) / 2
+    return w, atan2(_cross(inward, way), inward[0] * way[0] + inward[1] * way[1])
+
+
+def _turn(
+    zone: PlacedZone,
+    goal: tuple[float, float],
+    way: tuple[float, float],
+    w: float,
+    b: float,
+    walls: Sequence[Sequence[float]],
+    margins: Sequence[float],
+    s: MPCSettings,
+) -> float | None:
+    """By how much the way is turned to a side with room, the one to pass on first; None where it is not."""
+    if s.tie * w == 0:
+        return None
+    for left in (s.pass_side == "left", s.pass_side != "left"):
+        lead = (b if left else -b) / (s.tie * w)
+        if not -1 <= lead < 2:
+            continue
+        if _has_room(zone, way, left, walls, margins, s) and not zone.blocks(goal, s):
+            return ((w if left else -w) - b) * min(1.0, 2 - lead)
+    return None
+
+
+def _reach(zone: PlacedZone, s: MPCSettings) -> float:
+    """The semi-major axis of the set h < 0 [m]."""
+    return zone.a + s.r_robot + s.eps
 
 
 def _has_room(
     zone: PlacedZone,
-    reach: float,
     way: tuple[float, float],
     left: bool,
     walls: Sequence[Sequence[float]],
@@ -97,7 +126,7 @@ def _has_room(
     length = hypot(*way) if left else -hypot(*way)
     beside = (-way[1] / length, way[0] / length)
     half = ((zone.xa - zone.xb) / 2, (zone.ya - zone.yb) / 2)
-    width = sqrt(reach**2 - _cross(half, beside) ** 2)
+    width = sqrt(_reach(zone, s) ** 2 - _cross(half, beside) ** 2)
     along = width * beside[0], width * beside[1]
     x, y = (zone.xa + zone.xb) / 2, (zone.ya + zone.yb) / 2
     middle, near = (x + along[0] / 2, y + along[1] / 2), []
