@@ -25,8 +25,8 @@ from typing import Any
 
 from .errors import StorageError
 
-MARKER = ".szlib"
-"""In a folder: that it is szlib's to write into, and what for."""
+CACHE, MARKER = "SZLIB_CACHE", ".szlib"
+"""Names the folder of the user's cache, or is "off"; in a folder: that it is szlib's to write, what for."""
 _UNFINISHED, _TEMPORARY = ".szlib-", "szlib-"
 _BLOCK, _AT_ONCE, _READERS = 1 << 20, 1 << 26, 2
 """Bytes of a file whose checksum is taken at a time, bytes that a thread takes, and threads."""
@@ -56,6 +56,14 @@ def write_file(path: str | Path, content: bytes | str, *, lasting: bool = True) 
             f"{path}: cannot be written ({error.strerror or error}); make room, or choose a folder that is "
             "writable; what was finished before is intact"
         ) from error
+
+
+def cache_folder(name: str) -> Path | None:
+    """A folder of the user's cache, made or not; None where that is off (see `CACHE`)."""
+    import pooch
+
+    named = os.environ.get(CACHE) or pooch.os_cache("szlib")
+    return None if named == "off" else Path(named) / name
 
 
 def keep(path: Path, content: bytes, made_of: Any) -> None:

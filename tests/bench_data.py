@@ -23,7 +23,7 @@ import polars as pl
 from sklearn.neighbors import LocalOutlierFactor
 
 import szlib
-from szlib.encounters.streaming import kept_rows
+from szlib.files import CACHE
 from szlib.plaza.people import make_plaza
 from szlib.zones import outliers
 
@@ -83,7 +83,7 @@ print(time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_m
 def run(program: str, *files: Path, cache: str = "off") -> tuple[float, float]:
     """Seconds, without imports, and peak memory [MB] of a program in a process of its own with this cache."""
     imports, program = program.split("# begin")
-    environment = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1]), kept_rows.VARIABLE: cache}
+    environment = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1]), CACHE: cache}
     done = subprocess.run(
         [sys.executable, "-c", _TIMED.format(imports=imports, program=program), *map(str, files)],
         capture_output=True,

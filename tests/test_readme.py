@@ -12,7 +12,7 @@ import szlib
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.simulation.controllers.protocol import advance
-from szlib.workbook import command_line
+from szlib.workbook.command_line import main, options
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -117,6 +117,6 @@ def test_make_verbs_exist():
 
 def test_options_exist():
     with pytest.raises(SystemExit):
-        command_line.main(["run", "--help"])
+        main(["run", "--help"])
     for line in re.findall(r"^szlib run.*?(?=\s+#|$)", TEXT, flags=re.MULTILINE):
-        command_line._parser().parse_args(line.split()[1:])
+        options.parser().parse_args(line.split()[1:])

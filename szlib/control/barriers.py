@@ -103,8 +103,7 @@ def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
     Distances, shape (...) [m].
     """
     xy = finite("points", points, (..., 2))
-    (xa, ya), (xb, yb) = ellipse.foci
-    return np.asarray(ellipse_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb, ellipse.semi_axes[0]))
+    return np.asarray(ellipse_formula(xy[..., 0], xy[..., 1], *ellipse.numbers))
 
 
 def check_wall(wall: ArrayLike) -> Array:

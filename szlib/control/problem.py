@@ -22,7 +22,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import hypot
 from threading import RLock
 from time import perf_counter, thread_time
 from typing import Any, NamedTuple, Protocol
@@ -67,9 +66,9 @@ class Problem:
     n_cbf: int
 
     @property
-    def slack(self) -> Any:
-        """The largest violation of a row or of the terminal condition, 0 if none."""
-        return ca.mmax(ca.vertcat(0, -self.rows, ca.fabs(self.terminal)))
+    def violations(self) -> Any:
+        """By how much each row is violated, and the terminal condition missed; 0 where they hold."""
+        return ca.vertcat(ca.fmax(0, -self.rows), ca.fabs(self.terminal))
 
 
 @lru_cache(maxsize=256)
@@ -108,35 +107,40 @@ def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem
 
 def _barriers(s: MPCSettings, at: Any, people: Any, walls: Any) -> list[Any]:
     """h and its derivatives at positions (2, n), one step apart, each of shape (people + walls, n)."""
-    x, y, time = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("t")
+    x, y, time = (ca.SX.sym(name) for name in ("x", "y", "t"))
     xa, ya, xb, yb, a, vx, vy = person = ca.vertsplit(ca.SX.sym("person", 7))
     distance = ellipse_formula(x - time * vx, y - time * vy, xa, ya, xb, yb, a)
-    of_person = _differentiated(barrier(distance, s.r_robot, s.eps), x, y, person, time)
     *ends, margin = wall = ca.vertsplit(ca.SX.sym("wall", 5))
-    of_wall = _differentiated(barrier(segment_formula(x, y, *ends), s.r_robot, margin), x, y, wall, time)
-
+    of_person, of_wall = barrier(distance, s.r_robot, s.eps), segment_formula(x, y, *ends)
     n, found = at.shape[1], [[ca.SX(0, at.shape[1])] for _ in range(6)]
-    for function, numbers in ((of_person, people), (of_wall, walls)):
+    for h, of, numbers in (
+        (of_person, person, people),
+        (barrier(of_wall, s.r_robot, margin), wall, walls),
+    ):
         if count := numbers.shape[1]:
-            times = ca.repmat(s.dt * ca.DM(range(n)).T, 1, count)
-            everywhere = ca.repmat(at, 1, count), ca.kron(numbers, ca.DM.ones(1, n)), times
-            for parts, values in zip(found, function.map(n * count)(*everywhere), strict=True):
-                parts.append(ca.reshape(values, n, count).T)
+            values = _differentiated(h, x, y, time, of, s.dt, n).map(count)(ca.repmat(at, 1, count), numbers)
+            for parts, value in zip(found, values, strict=True):
+                parts.append(ca.reshape(value, n, count).T)
     return [ca.vertcat(*parts) for parts in found]
 
 
-def _differentiated(h: Any, x: Any, y: Any, numbers: Sequence[Any], time: Any) -> Any:
-    """A function of (x, y), numbers and time: h, h_x, h_y, h_xx, h_xy, h_yy."""
-    by = ca.vertcat(x, y)
+def _differentiated(h: Any, x: Any, y: Any, time: Any, of: Sequence[Any], dt: float, n: int) -> Any:
+    """A function of n positions, dt apart, and of numbers: h, h_x, h_y, h_xx, h_xy, h_yy, of shape (1, n)."""
+    by, numbers, at = ca.vertcat(x, y), ca.vertcat(*of), ca.SX.sym("at", 2, n)
     hessian, gradient = ca.hessian(h, by)
     outputs = [h, gradient[0], gradient[1], hessian[0, 0], hessian[0, 1], hessian[1, 1]]
-    return ca.Function("h", [by, ca.vertcat(*numbers), time], ca.cse(outputs))
+    once = ca.Function("h", [by, numbers, time], outputs)
+    everywhere = zip(*(once(at[:, k], numbers, dt * k) for k in range(n)), strict=True)
+    return ca.Function("h", [at, numbers], ca.cse([ca.horzcat(*values) for values in everywhere]))
 
 
-def slack_weight(settings: MPCSettings, parameters: Array) -> float:
-    """Cost of a metre of slack: `settings.slack_weight` for each metre to the target, and at least one."""
-    x, y, _, _, gx, gy = parameters[:6].tolist()
-    return settings.slack_weight * max(1.0, hypot(gx - x, gy - y))
+def way_left(x: Any, y: Any, gx: Any, gy: Any) -> Any:
+    """Distance from (x, y) to the target (gx, gy) [m], and at least 1 m.
+
+    The cost of a metre of slack is `MPCSettings.slack_weight` for each of its metres.
+    """
+    distance = ((gx - x) ** 2 + (gy - y) ** 2) ** 0.5
+    return (distance + 1 + abs(distance - 1)) / 2
 
 
 def function(name: str, arguments: Sequence[Any], outputs: Sequence[Any]) -> Any:
@@ -151,12 +155,18 @@ class Buffered:
     """
 
     def __init__(self, function: Any, *arguments: Array) -> None:
-        self._buffer, self.call = function.buffer()
+        self.function, self._arguments = function, arguments
         self.results = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
-        for i, array in enumerate(arguments):
-            self._buffer.set_arg(i, array.data)
+        self.become(function)
+
+    def become(self, function: Any) -> None:
+        """From the next call on ask this function, which gives the same."""
+        buffer, call = function.buffer()
+        for i, array in enumerate(self._arguments):
+            buffer.set_arg(i, array.data)
         for i, array in enumerate(self.results):
-            self._buffer.set_res(i, array.data)
+            buffer.set_res(i, array.data)
+        self._buffer, self.call = buffer, call
 
 
 class Numbers(NamedTuple):
@@ -166,9 +176,9 @@ class Numbers(NamedTuple):
     violation of a row or of the terminal condition, 0 if none.
     """
 
-    inputs: Array
     cost: float
     slack: float
+    inputs: Array
     rows: Array
     states: Array
     h: Array
@@ -185,28 +195,25 @@ class Evaluator:
             evaluate, self.n_cbf = _evaluation(settings, n_people, n_walls)
             self.n_rows = evaluate.nnz_out(1)
             self._inputs, self._parameters = np.zeros(evaluate.nnz_in(0)), np.zeros(evaluate.nnz_in(1))
-            self._function = Buffered(evaluate, self._inputs, self._parameters)
+            self.function = Buffered(evaluate, self._inputs, self._parameters)
         self.size, self._shape = (n_people, n_walls), (n_people + n_walls, settings.N_h + 1)
+        self._numbers = (self._inputs, *self.shaped(*self.function.results[1:]))
+
+    def shaped(self, rows: Array, states: Array, h: Array) -> tuple[Array, Array, Array]:
+        """Views of buffers as `Numbers` has them."""
+        return rows[: self.n_rows], states.reshape(-1, 4), h.reshape(self._shape)
 
     def __call__(self, plan: Array, parameters: Array) -> Numbers:
         self._inputs[:], self._parameters[:] = plan, parameters
-        self._function.call()
-        totals, rows, states, h = self._function.results
-        cost, slack = totals.tolist()
-        return self.numbers(self._inputs, cost, slack, rows, states, h)
-
-    def numbers(
-        self, inputs: Array, cost: float, slack: float, rows: Array, states: Array, h: Array
-    ) -> Numbers:
-        """Copies of what stands in buffers, each in its shape."""
-        states, h = states.reshape(-1, 4), h.reshape(self._shape)
-        return Numbers(inputs.copy(), cost, slack, rows.copy(), states.copy(), h.copy())
+        self.function.call()
+        cost, slack = self.function.results[0].tolist()
+        return Numbers(cost, slack, *[array.copy() for array in self._numbers])
 
 
 @lru_cache(maxsize=256)
 def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, int]:
     p = build_problem(settings, n_people, n_walls)
-    outputs = [ca.vertcat(p.cost, p.slack), p.rows, p.states, p.h.T]
+    outputs = [ca.vertcat(p.cost, ca.mmax(p.violations)), p.rows, p.states, p.h.T]
     return function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
 
 
@@ -238,6 +245,8 @@ class ProblemSolver(Protocol):
     budget: Budget
     late: bool
 
+    functions: Sequence[Buffered]
+    """What may be compiled."""
     remembered: Array
     """What goes from call to call: it saves time, and changes the answers by rounding."""
 

@@ -80,6 +80,11 @@ class Ellipse(Layer):
         c = np.sqrt((a - b) * (a + b)) * np.array([np.cos(self.angle), np.sin(self.angle)])
         return np.array([self.center + c, self.center - c])
 
+    @cached_property
+    def numbers(self) -> tuple[float, ...]:
+        """The foci and the semi-major axis, (xa, ya, xb, yb, a) [m]: all that a distance to it needs."""
+        return (*self.foci.ravel().tolist(), self.semi_axes[0])
+
     def level(self, points: ArrayLike) -> Array:
         """Left side of the ellipse equation at points (..., 2): 1 on the curve, less inside."""
         d, cos, sin = np.asarray(points, float) - self.center, np.cos(self.angle), np.sin(self.angle)
@@ -89,9 +94,8 @@ class Ellipse(Layer):
 
     def curve(self, n: int = 200) -> Array:
         """n points on the curve, shape (n, 2), the first repeated at the end [m]."""
-        phi = np.linspace(0, 2 * np.pi, n)
+        phi, cos, sin = np.linspace(0, 2 * np.pi, n), np.cos(self.angle), np.sin(self.angle)
         u, v = self.semi_axes[0] * np.cos(phi), self.semi_axes[1] * np.sin(phi)
-        cos, sin = np.cos(self.angle), np.sin(self.angle)
         return np.stack([self.center[0] + u * cos - v * sin, self.center[1] + u * sin + v * cos], axis=-1)
 
     def scaled(self, scale: float) -> Ellipse:
@@ -200,8 +204,7 @@ def _enclose(points: Array, support: list[int] | None = None) -> tuple[Ellipse, 
         seen.add(frozenset(support))
         joined, weights = [*support, farthest], np.append(weights, 0.0)
     axes, semi_axes, _ = np.linalg.svd(np.sqrt(2) * frame @ root[1:, 1:])
-    center = origin + frame @ root[1:, 0]
-    angle = np.arctan2(axes[1, 0], axes[0, 0])
+    center, angle = origin + frame @ root[1:, 0], np.arctan2(axes[1, 0], axes[0, 0])
     ellipse = Ellipse((center[0], center[1]), (semi_axes[0], semi_axes[1]), angle, points[support])
     return _touching(ellipse, points), support
 
@@ -216,8 +219,7 @@ def _large_triangle(points: Array) -> list[int]:
     rounding = 64 * np.finfo(float).eps * np.max(np.abs(points))
     if doubled[apex] > length * max(THINNEST * length, rounding):
         return [first, last, apex]
-    distinct = len(np.unique(points, axis=0))
-    if distinct < 3:
+    if (distinct := len(np.unique(points, axis=0))) < 3:
         raise ZoneError(f"an ellipse encloses at least 3 distinct points; got {distinct}: add points")
     raise ZoneError(
         f"the {distinct} distinct points lie on a line: {length:.3g} m long and at most "
@@ -274,9 +276,7 @@ def _on_curve(curve: Curve, angles: Array) -> Array:
     """Points of the curve at angles (...), shape (..., 2)."""
     points = np.asarray(curve(angles.ravel()), float)
     if points.shape != (angles.size, 2):
-        raise ZoneError(
-            f"curve must turn angles (n,) into points (n, 2); got {points.shape} for n = {angles.size}"
-        )
+        raise ZoneError(f"curve must turn angles ({angles.size},) into points (n, 2); got {points.shape}")
     for i in np.flatnonzero(~np.all(np.isfinite(points), axis=1))[:1]:
         raise ZoneError(f"the curve must be finite; at {angles.ravel()[i]} rad it is {points[i].tolist()}")
     return points.reshape(*angles.shape, 2)

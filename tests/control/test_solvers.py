@@ -11,7 +11,7 @@ import pytest
 from random_states import ZONE, meetings, questions
 
 import szlib
-from szlib.control.problem import TOLERANCE, build_problem
+from szlib.control.problem import TOLERANCE, build_problem, way_left
 from szlib.control.solvers import sqp
 from szlib.control.solvers.program import build_program
 from szlib.simulation.closed_loop import advance
@@ -60,7 +60,7 @@ def test_the_scenarios_of_the_paper_run_the_same_with_both(name):
 
 
 @pytest.mark.parametrize(
-    ("package", "where"), [("casadi", {"problem", "ipopt", "program"}), ("daqp", {"sqp"})]
+    ("package", "where"), [("casadi", {"problem", "compiled", "ipopt", "program"}), ("daqp", {"sqp"})]
 )
 def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
     found = set()
@@ -80,15 +80,16 @@ def test_derivatives_by_structure_are_those_of_the_whole_expressions(formulation
     values = ca.vertcat(p.rows, p.terminal)
     multipliers = ca.SX.sym("multipliers", values.numel())
     arguments = [p.inputs, p.parameters, multipliers]
+    cost = p.cost / way_left(*(p.parameters[i] for i in (0, 1, 4, 5)))
     on_speed = ca.dot(multipliers[p.n_cbf : p.rows.numel()], p.rows[p.n_cbf :])
     expected = ca.Function(
         "expected",
         arguments,
         [
-            ca.gradient(p.cost, p.inputs),
+            ca.gradient(cost, p.inputs),
             ca.jacobian(values, p.inputs),
-            ca.hessian(p.cost + ca.dot(multipliers, values), p.inputs)[0],
-            ca.hessian(p.cost + on_speed, p.inputs)[0],
+            ca.hessian(cost + ca.dot(multipliers, values), p.inputs)[0],
+            ca.hessian(cost + on_speed, p.inputs)[0],
         ],
     )
     rng = np.random.default_rng(8)

@@ -13,7 +13,7 @@ from test_streaming import make_raw, write
 import szlib
 from szlib.encounters.pipeline import Chain
 from szlib.encounters.streaming import blocks, kept_rows
-from szlib.files import file_content
+from szlib.files import CACHE, file_content
 from szlib.tracks import funnels
 
 pytestmark = pytest.mark.filterwarnings("ignore::szlib.DataWarning")  # one row is set aside
@@ -22,7 +22,7 @@ SPACE = szlib.AttentionalSpace(length=2.5, width=2.0)
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv(kept_rows.VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setenv(CACHE, str(tmp_path / "cache"))
     return tmp_path / "cache" / "near-rows"
 
 
@@ -53,10 +53,10 @@ def test_other_conditions_are_asked_of_what_is_kept(
     cache: Path, day: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[dict] = [{}, {"min_speed": 0.2}, {"min_distance": 0.3}, {"space": szlib.AttentionalSpace()}]
-    monkeypatch.setenv(kept_rows.VARIABLE, "off")
+    monkeypatch.setenv(CACHE, "off")
     fresh = [found(day, **conditions) for conditions in asked]
     assert not cache.exists(), "off is off"
-    monkeypatch.setenv(kept_rows.VARIABLE, str(cache.parent))
+    monkeypatch.setenv(CACHE, str(cache.parent))
     found(day)
     monkeypatch.setattr(blocks, "Blocks", None)  # the file is not read again
     monkeypatch.setattr("szlib.encounters.streaming.reading.Blocks", None)

@@ -5,8 +5,7 @@ import json
 import pytest
 
 from szlib.errors import DataError
-from szlib.workbook import command_line
-from szlib.workbook.command_line import main
+from szlib.workbook.command_line import commands, main
 from szlib.workbook.record.validation import check_parameters
 from szlib.workbook.runner import execution
 
@@ -126,7 +125,7 @@ def test_a_number_of_jobs_that_is_none_is_refused_at_once(jobs, capsys):
 
 
 def test_without_the_workbooks_packages_it_says_what_to_install(monkeypatch, capsys):
-    monkeypatch.setattr(command_line, "WORKBOOK_PACKAGES", ("papermill", "no_such_package"))
+    monkeypatch.setattr(commands, "WORKBOOK_PACKAGES", ("papermill", "no_such_package"))
     assert main(["run"]) == 2
     assert "needs no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
 

@@ -124,6 +124,8 @@ def place(person: Person, zone: Ellipse) -> PlacedZone:
     if heading is None:
         zone, heading = circle_around(zone), 0.0
     c, s = cos(heading), sin(heading)
-    (ma, na), (mb, nb) = zone.foci.tolist()
-    foci = (x + ma * c - na * s, y + ma * s + na * c, x + mb * c - nb * s, y + mb * s + nb * c)
-    return PlacedZone(*foci, zone.semi_axes[0], *person.velocity)
+    ma, na, mb, nb, a = zone.numbers
+    xa, ya = x + ma * c - na * s, y + ma * s + na * c
+    xb, yb = x + mb * c - nb * s, y + mb * s + nb * c
+    # The constructor of a named tuple would take as long as all of this.
+    return tuple.__new__(PlacedZone, (xa, ya, xb, yb, a, *person.velocity))

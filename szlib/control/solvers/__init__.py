@@ -1,14 +1,15 @@
 """How the problem is solved, and what is done where it is not.
 
-ipopt    by IPOPT, as in the paper
-program  what the SQP works with: derivatives by the structure of the problem
-sqp      by a condensed SQP
-sizes    a solver for any number of people and walls, built ahead of the need
-ladder   what is tried one after another, down to full braking
+compiled  the functions of a solver as machine code, where that is asked for
+ipopt     by IPOPT, as in the paper
+program   what the SQP works with: derivatives by the structure of the problem
+sqp       by a condensed SQP
+sizes     a solver for any number of people and walls, built ahead of the need
+ladder    what is tried one after another, down to full braking
 """
 
 import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["ipopt", "program", "sqp", "sizes", "ladder"]
+    __name__, submodules=["compiled", "ipopt", "program", "sqp", "sizes", "ladder"]
 )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import weakref
 from collections import deque
+from collections.abc import Sequence
 from math import inf
 from typing import Any
 
@@ -15,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from ..barriers import Array
-from ..problem import BUILDING, HARD_SHARE, Budget, Evaluator, Numbers, build_problem, slack_weight
+from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, Numbers, build_problem, way_left
 from ..settings import MPCSettings
 
 _OPTIONS = {
@@ -54,6 +55,7 @@ class Ipopt:
         solvers = _borrow(key)
         weakref.finalize(self, _give_back, key, solvers).atexit = False
         self._hard, self._relaxed, self._n_terminal = solvers
+        self.functions: Sequence[Buffered] = [self.evaluate.function]
         self.remembered = np.zeros(0)
 
     def hard(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
@@ -68,7 +70,7 @@ class Ipopt:
         rows = self.evaluate(guess, parameters).rows
         free = np.ones(rows.size)
         free[self.evaluate.n_cbf :] = np.hypot(*parameters[2:4]) > s.v_max
-        weight = slack_weight(s, parameters)
+        weight = s.slack_weight * way_left(*parameters[[0, 1, 4, 5]])
         found = self._relaxed(
             x0=np.r_[guess, np.maximum(-rows, 0) * free * weight],
             p=np.r_[parameters, weight],

@@ -20,19 +20,19 @@ import casadi as ca
 import numpy as np
 
 from ..barriers import cbf_residual
-from ..problem import Problem, build_problem, function
+from ..problem import Problem, build_problem, function, way_left
 from ..settings import MPCSettings
 
 
 class Program(NamedTuple):
-    """Three functions of CasADi.
+    """Three functions of CasADi; the scaled cost is that for each metre to the target, at least one.
 
-    derive : (inputs, parameters, multipliers) -> (cost, violation, largest multiplier of a row, of a speed
-        row), lower and upper bounds, gradient, Jacobian, Hessian of the Lagrangian, and the same without the
-        curvature of the barriers.
-    measure : (inputs, parameters, multipliers, step, share) -> (cost, violation, slack, largest element of
-        the step, largest multiplier, largest of a row) there, the inputs there, the values of rows and
-        terminal condition there, the states and h.
+    derive : (inputs, parameters, multipliers) -> (scaled cost, violation, largest multiplier of a row, of a
+        speed row), lower and upper bounds, gradient, Jacobian, Hessian of the Lagrangian, and the same
+        without the curvature of the barriers.
+    measure : (inputs, parameters, multipliers, step, share) -> (scaled cost, violation, cost, slack, largest
+        element of the step, largest multiplier, largest of a row) there, the inputs there, the values of
+        rows and terminal condition there, the states and h.
     free : parameters -> the inputs of least cost alone, and by how much they violate bounds and rows in sum;
         None if there is a terminal condition.
     """
@@ -46,36 +46,41 @@ class Program(NamedTuple):
 def build_program(settings: MPCSettings, n_people: int, n_walls: int) -> Program:
     """Write down the functions; once for each size and settings."""
     p, s = build_problem(settings, n_people, n_walls), settings
-    u, n_rows = p.inputs, p.rows.numel()
+    u, n_rows, scale = p.inputs, p.rows.numel(), 1 / way_left(*(p.parameters[i] for i in (0, 1, 4, 5)))
+    cost, gradient = scale * p.cost, ca.gradient(p.cost, u)
     values = ca.vertcat(p.rows, p.terminal)
-    violation = ca.sum1(ca.fmax(0, -p.rows)) + ca.sum1(ca.fabs(p.terminal))
+    violations = p.violations
+    violation, slack = ca.sum1(violations), ca.mmax(violations)
     multipliers = ca.SX.sym("multiplier", values.numel())
     on_rows = ca.norm_inf(multipliers[:n_rows])
     arguments = [u, p.parameters, multipliers]
 
     map_of = np.asarray(ca.evalf(ca.jacobian(ca.vec(p.states), u))).reshape(s.N + 1, 4, s.N, 2)
     to_position, to_velocity = map_of[: s.N_h + 1, 0, :, 0], map_of[1:, 2, :, 0]
-    curvature = ca.evalf(ca.hessian(p.cost, u)[0])
+    curvature = scale * ca.evalf(ca.jacobian(gradient, u))
     of_speed, of_barriers = _hessians(p, s, multipliers, to_position)
-    gauss = curvature + of_speed
-    merit = ca.vertcat(p.cost, violation, on_rows, ca.norm_inf(multipliers[p.n_cbf : n_rows]))
+    gauss = ca.cse(ca.tril(curvature + of_speed))
+    exact = gauss + ca.tril(of_barriers)
+    merit = ca.vertcat(cost, violation, on_rows, ca.norm_inf(multipliers[p.n_cbf : n_rows]))
     lower = ca.vertcat(-s.a_max - u, -values)
     upper = ca.vertcat(s.a_max - u, ca.inf * ca.SX.ones(n_rows), -p.terminal)
     jacobian = _jacobian(p, s, to_position, to_velocity)
-    outputs = [merit, lower, upper, ca.gradient(p.cost, u), jacobian.T, gauss + of_barriers, gauss]
+    hessians = ca.tril2symm(exact), ca.tril2symm(gauss)
+    outputs = [merit, lower, upper, scale * gradient, jacobian.T, *hessians]
     derive = function("derive", arguments, outputs)
 
     step, share = ca.SX.sym("d", u.numel()), ca.SX.sym("s")
     trial = ca.fmax(-s.a_max, ca.fmin(u + share * step, s.a_max))
-    there = ca.Function("there", [u, p.parameters], [p.cost, violation, p.slack, values, p.states, p.h.T])
+    found = [cost, violation, p.cost, slack, values, p.states, p.h.T]
+    there = ca.Function("there", [u, p.parameters], found)
     *totals, values, states, h = there(trial, p.parameters)
     merit = ca.vertcat(*totals, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
     measure = function("measure", [*arguments, step, share], [merit, trial, values, states, h])
     if p.terminal.numel():
         return Program(derive, measure, None)
     given = p.parameters[:6]
-    pull = ca.evalf(ca.jacobian(ca.gradient(p.cost, u), given))
-    least = -ca.solve(curvature, pull) @ given
+    to_inputs, to_given = (ca.evalf(ca.jacobian(gradient, by)) for by in (u, given))
+    least = -ca.solve(to_inputs, to_given) @ given
     beyond = ca.sum1(ca.fmax(0, ca.fabs(least) - s.a_max))
     free = function("unbound", [p.parameters], [least, beyond + there(least, p.parameters)[1]])
     return Program(derive, measure, free)
@@ -92,7 +97,7 @@ def _jacobian(p: Problem, s: MPCSettings, to_position: Any, to_velocity: Any) ->
     rows = np.arange(s.N_h * n).reshape(s.N_h, n).T.ravel()
     columns = np.arange(2 * s.N).reshape(2, s.N).T.ravel()
     velocities = ca.diagcat(*(-2 * p.states[2:, k].T for k in range(1, s.N + 1)))
-    blocks = [ca.horzcat(*by_axis)[rows.tolist(), columns.tolist()], velocities @ _both(to_velocity)]
+    blocks = [ca.horzcat(*by_axis)[rows.tolist(), columns.tolist()], ca.cse(velocities @ _both(to_velocity))]
     if p.terminal.numel():
         blocks.append(_both(to_velocity[-1:]))
     return ca.vertcat(*blocks)
@@ -109,7 +114,7 @@ def _hessians(p: Problem, s: MPCSettings, multipliers: Any, to_position: Any) ->
     xx, xy, yy = (ca.sum1(weights * bend) for bend in p.bend)
     bends = [ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h + 1)]
     to_xy = _both(to_position)
-    return of_speed, ca.tril2symm(ca.tril(to_xy.T @ ca.diagcat(*bends) @ to_xy))
+    return of_speed, to_xy.T @ ca.diagcat(*bends) @ to_xy
 
 
 def _change(s: MPCSettings) -> Any:

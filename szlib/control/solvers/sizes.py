@@ -12,7 +12,7 @@ needed is built in place.
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from threading import Thread
 from typing import Any
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..problem import BUILDING, Budget, ProblemSolver
 from ..settings import MPCSettings
+from .compiled import Compiled, compile_now
 from .ipopt import Ipopt
 from .sqp import Sqp
 
@@ -41,6 +42,14 @@ def rounded(n: int) -> int:
     return power - power // 4 if n <= power - power // 4 else power
 
 
+def up_to(largest: int) -> Iterator[int]:
+    """Every size up to this one."""
+    size = 0
+    while size <= largest:
+        yield size
+        size = rounded(size + 1)
+
+
 class Sizes:
     """The solvers of one controller, by how many people and walls there are.
 
@@ -57,6 +66,7 @@ class Sizes:
         self._solvers: dict[tuple[int, int], ProblemSolver] = {}
         self._begun = {(self.ready, rounded(n_walls))}
         self._builder: Thread | None = None
+        self._compiled = Compiled(settings.compile)
         self._build(self.ready, rounded(n_walls))
 
     def of(self, n_people: int, n_walls: int) -> ProblemSolver:
@@ -67,6 +77,8 @@ class Sizes:
             self.ready, self._grows = people, True
         if size not in self._solvers:
             self._add(people, walls)
+            self._compiled.begin()
+        self._compiled.look()
         if self._builder is None or not self._builder.is_alive():
             if self._grows and 2 * n_people >= self.ready:
                 self.ready *= 2
@@ -95,22 +107,39 @@ class Sizes:
 
     def _build(self, largest: int, walls: int) -> None:
         """Every size up to the largest number of people."""
-        people = 0
-        while people <= largest:
+        for people in up_to(largest):
             self._add(people, walls)
-            people = rounded(people + 1)
+        self._compiled.begin()
 
     def _add(self, people: int, walls: int) -> None:
         """One size, unless it is there already: who comes second waits for who came first."""
         with BUILDING:
             if (people, walls) not in self._solvers:
-                solver: ProblemSolver = self._kind(self.settings, people, walls)
+                solver = _solver(self.settings, people, walls)
                 solver.budget = self.budget
+                self._compiled.take(solver.functions)
                 self._solvers[people, walls] = solver
 
-    @property
-    def _kind(self) -> type[Sqp] | type[Ipopt]:
-        return Sqp if self.settings.solver == "sqp" else Ipopt
+
+def _solver(settings: MPCSettings, n_people: int, n_walls: int) -> ProblemSolver:
+    return (Sqp if settings.solver == "sqp" else Ipopt)(settings, n_people, n_walls)
+
+
+def compile_ahead(
+    settings: MPCSettings, max_people: int = READY, n_walls: int = 0
+) -> Iterator[tuple[int, int, float]]:
+    """Compile now what controllers with `compile = "auto"` would have compiled in the background.
+
+    Yields each size, people and walls, and how long it took [s]: 0 where it was in the cache.
+
+    Raises
+    ------
+    SolverError : there is no C compiler, or it failed.
+    StorageError : the user's cache is off or cannot be written.
+    """
+    walls = rounded(n_walls)
+    for people in up_to(rounded(max_people)):
+        yield people, walls, compile_now(_solver(settings, people, walls).functions)
 
 
 def slots(

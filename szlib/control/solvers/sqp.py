@@ -2,9 +2,10 @@
 
 The unknowns are the 2 N inputs. Each iteration solves
 
-    min over d   1/2 d' H d + grad(cost)' d + weight * sum(s)
+    min over d   1/2 d' H d + grad(scaled cost)' d + slack_weight * sum(s)
     subject to   -a_max - u <= d <= a_max - u,   rows + J d + s >= 0,  s >= 0,   terminal + T d = 0
 
+where the scaled cost is that for each metre to the target (at least 1 m), so that the weight stays the same,
 with the exact Hessian H of the Lagrangian where it is positive definite; else without the curvature
 of the barriers (Gauss-Newton). Rows are soft, by an exact penalty, so that every program has a
 solution. A step has to lower cost + price * violation, with a price just above the largest multiplier so
@@ -17,6 +18,7 @@ the answer is a linear feedback of the error, K (x - g), without any program.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isnan
 from typing import Literal
 
@@ -24,7 +26,7 @@ import daqp
 import numpy as np
 
 from ..barriers import Array
-from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, Numbers, slack_weight
+from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, Numbers
 from ..settings import MPCSettings
 from .program import Program, build_program
 
@@ -65,17 +67,21 @@ class Sqp:
         arguments = self._inputs, self._parameters, self._multipliers
         self._derive = Buffered(of.derive, *arguments)
         self._measure = Buffered(of.measure, *arguments, self._step, self._share)
-        self._free = of.free and Buffered(of.free, self._parameters)
+        self._free = None if of.free is None else Buffered(of.free, self._parameters)
+        ours = (self.evaluate.function, self._derive, self._measure, self._free)
+        self.functions: Sequence[Buffered] = [function for function in ours if function is not None]
         self._before, self._lower, self._upper, gradient, jacobian, exact, gauss = self._derive.results
-        self._after, self._trial, self._values, self._states, self._h = self._measure.results
+        self._after, self._trial, self._values, states, h = self._measure.results
         self._jacobian = jacobian.reshape(m, n)
         self._program = (exact.reshape(n, n), gradient, self._jacobian, self._upper, self._lower)
         self._gauss_newton = (gauss.reshape(n, n), *self._program[1:])
         self._sense = np.repeat(np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows])
-        self._weight, self._weights, self._held = 0.0, np.zeros(n + m), False
-        self._model = daqp.Model()
+        self._found = (self._trial, *self.evaluate.shaped(self._values, states, h))
+        self._held, self._model = False, daqp.Model()
         self._model.settings = _DAQP
         self._model.setup(np.eye(n), *self._program[1:], self._sense)
+        weights = np.full(n + m, self.settings.slack_weight)
+        self._model.soft_weights(w_l=weights, w_u=weights)
 
     @property
     def remembered(self) -> Array:
@@ -84,6 +90,7 @@ class Sqp:
 
     @remembered.setter
     def remembered(self, multipliers: Array) -> None:
+        """Go on from these."""
         self._multipliers[:], self._held = multipliers, bool(multipliers.any())
 
     def reset(self) -> None:
@@ -108,7 +115,7 @@ class Sqp:
         # Who was held by a row is held still, nearly always: then the program finds it out by itself.
         if self._held or not self._is_free():
             self._inputs[:] = guess
-            outcome = self._iterate(self._weigh(slack_weight(self.settings, parameters)), share)
+            outcome = self._iterate(share)
             if outcome == "failed":
                 self.reset()
             if outcome != "converged":
@@ -118,9 +125,8 @@ class Sqp:
 
     def _plan(self) -> Numbers:
         """What stands in the buffers."""
-        cost, _, slack = self._after[:3].tolist()
-        rows = self._values[: self.evaluate.n_rows]
-        return self.evaluate.numbers(self._trial, cost, slack, rows, self._states, self._h)
+        cost, slack = self._after[2:4].tolist()
+        return Numbers(cost, slack, *[array.copy() for array in self._found])
 
     def _is_free(self) -> bool:
         """True if the minimum of the cost alone satisfies everything; then it is the plan."""
@@ -134,16 +140,9 @@ class Sqp:
         self._stay()
         return True
 
-    def _weigh(self, weight: float) -> float:
-        """Hand over the weight of slack where it is another than before, and return it."""
-        if weight != self._weight:
-            self._weight = self._weights[:] = weight
-            self._model.soft_weights(w_l=self._weights, w_u=self._weights)
-        return weight
-
-    def _iterate(self, limit: float, share: float) -> Outcome:
-        """Improve `_inputs`; no price above `limit`, the weight of slack; within this share of the budget."""
-        price, rises, least = 0.0, 0, (0.0, 0.0)
+    def _iterate(self, share: float) -> Outcome:
+        """Improve `_inputs`, within this share of the budget; no price goes above the weight of slack."""
+        price, rises, least, limit = 0.0, 0, (0.0, 0.0), self.settings.slack_weight
         for _ in range(self.settings.max_iterations):
             if self.budget.spent(share):
                 return "late"
@@ -154,7 +153,7 @@ class Sqp:
             self._step[:], self._multipliers[:] = step, info["lam"][step.size :]
             self._share[0] = 1.0
             self._measure.call()
-            cost, violation, _, size, steepest, on_rows = self._after.tolist()
+            cost, violation, _, _, size, steepest, on_rows = self._after.tolist()
             self._held = steepest > 0
             price = max(price, min(PRICE * steepest, limit))
             cost_before, violation_before, on_rows_before, on_speed = self._before.tolist()

@@ -19,16 +19,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pooch
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from ...errors import StorageError
-from ...files import MARKER, keep, kept, own_folder
+from ...files import CACHE, MARKER, cache_folder, keep, kept, own_folder
 from .blocks import Rows, Tally
 
-VARIABLE = "SZLIB_CACHE"
-"""Names the folder of the cache, or is "off"."""
 PURPOSE = "rows near a square"
 """What the folder of the entries is marked as."""
 LIMIT = 2_000_000_000
@@ -41,8 +38,7 @@ _SCALES = (1, 1000)
 
 def folder() -> Path | None:
     """Where entries are; None where they are off."""
-    named = os.environ.get(VARIABLE)
-    return None if named == "off" else Path(named or pooch.os_cache("szlib")) / "near-rows"
+    return cache_folder("near-rows")
 
 
 def may_be_kept(size: int, which: dict[str, Any]) -> bool:
@@ -91,8 +87,7 @@ def remember(content: tuple[int, str], which: dict[str, Any], rows: Rows, seen: 
         _make_room(home, LIMIT)
     except (StorageError, OSError) as error:
         warnings.warn(
-            f"rows near the square are not kept ({error}); name another folder in ${VARIABLE}, or set it to "
-            "off",
+            f"rows near the square are not kept ({error}); name another folder in ${CACHE}, or set it to off",
             RuntimeWarning,
             stacklevel=2,
         )
