@@ -10,6 +10,8 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: threads of BLAS that wait take a core
+
 import hypothesis
 import jupytext
 import numpy as np

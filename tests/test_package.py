@@ -25,7 +25,7 @@ ROOMS = {
         "geometry", "areas", "kinds", "search", "streaming", "pipeline", "days", "shifting", "null",
     ],
     "encounters.streaming": ["blocks", "cells", "kept_rows", "reading"],
-    "encounters.search": ["occupants", "windows", "samples", "finding"],
+    "encounters.search": ["occupants", "windows", "samples", "nearby", "finding"],
     "zones": [
         "costmap", "ellipses", "outliers", "by_direction", "hulls", "respect", "uncertainty", "zone_file",
         "social_zone",

@@ -23,9 +23,10 @@ from scipy.spatial import cKDTree
 
 from ..errors import DataError
 from ..tracks import funnels
-from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN, clock_index, to_clock
+from ..tracks.clock import TICKS_PER_SECOND, clock_index, to_clock
 from .geometry import Area
-from .kinds import NEAR, REACH, TOGETHER, number_people
+from .kinds import NEAR, TOGETHER, number_people
+from .search.nearby import may_matter
 
 MINUTES = (1.0, 10.0)
 """Shortest and longest shift [min]: longer than a meeting, shorter than the day's ups and downs (assumed)."""
@@ -95,17 +96,9 @@ class Crowd:
         return cls(table, person, tick, days[begins], first, period, _companions(table, person, days, tick))
 
     def near(self, square: Area, duration: float) -> Crowd:
-        """Only the rows that `find_encounters` can depend on, whatever the shifts: of people who are in the
-        square at all, those in the square grown by `REACH` (kinds), half a second around (velocity), and the
-        `duration` [s] after (both people must be tracked)."""
+        """Only the rows that `find_encounters` can depend on, whatever the shifts."""
         x, y = self.table["x"].to_numpy(), self.table["y"].to_numpy()
-        came = np.zeros(len(self.day), bool)
-        came[self.person[square.contains(x, y)]] = True
-        there = square.grown(REACH).contains(x, y) & came[self.person]
-        so_far, row = np.r_[0, np.cumsum(there)], np.arange(len(there))
-        after = row + round(VELOCITY_SPAN * TICKS_PER_SECOND)
-        before = row - round(max(duration, VELOCITY_SPAN) * TICKS_PER_SECOND)
-        kept = so_far[np.minimum(after + 1, len(row))] > so_far[np.maximum(before, 0)]
+        kept = may_matter(x, y, self.person, square, duration)
         stage = funnels.stage("near the square", len(kept), kept.sum(), {"elsewhere": (~kept).sum()})
         table = funnels.carry(self.table[kept].reset_index(drop=True), [stage])
         return replace(self, table=table, person=self.person[kept], tick=self.tick[kept])

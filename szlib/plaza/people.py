@@ -200,13 +200,15 @@ def _possible(
     where, moves = offset + passing * since + swerve * until**2 / 2, velocity + swerve * until
     x, y = where[:, 0].T
     seen = (x >= MARGIN) & (x <= SPACE.length - MARGIN) & (np.abs(y) <= SPACE.width / 2 - MARGIN)
-    pace, course = np.linalg.norm(moves, axis=-1), np.arctan2(moves[..., 1], moves[..., 0])
-    standing = plan == "standing"
+    pace, standing, minds = np.linalg.norm(moves, axis=-1), plan == "standing", plan != "intruder"
     natural = ((pace <= settings.fastest) & ((pace >= SLOWEST) | standing[:, None])).all(axis=1)
-    kept = _keeps_out(settings, where, np.broadcast_to(speed[:, None], pace.shape))
-    kept &= _keeps_out(settings, turned(-where, -course), pace) | standing
-    allowed = natural & (kept | (plan == "intruder"))
-    return np.asarray(seen & (np.hypot(x, y) >= 1 + MARGIN) & allowed)
+    possible = seen & (np.hypot(x, y) >= 1 + MARGIN) & natural
+    some = np.flatnonzero(possible & minds)  # most are out already: to ask for zones takes longest
+    possible[some] = _keeps_out(settings, where[some], np.broadcast_to(speed[some, None], pace[some].shape))
+    some = np.flatnonzero(possible & minds & ~standing)
+    course = np.arctan2(moves[some, :, 1], moves[some, :, 0])
+    possible[some] = _keeps_out(settings, turned(-where[some], -course), pace[some])
+    return np.asarray(possible)
 
 
 def _keeps_out(settings: PlazaSettings, points: Array, speed: Array) -> NDArray[np.bool_]:

@@ -12,6 +12,7 @@ import pandas as pd
 
 from ..encounters.geometry import Area
 from ..encounters.search.finding import find_encounters
+from ..encounters.search.nearby import near_square
 from ..errors import DataError, DataWarning, ZoneError
 from ..zones.social_zone import SocialZone
 
@@ -76,6 +77,7 @@ def sensitivity(
         text = ", ".join(value) if isinstance(value, tuple) else str(value)
         rows.append((parameter, text, count, *sizes))
 
+    tracks = near_square(tracks, square, max(SEARCH["duration"]))  # searched many times
     usual = find_encounters(tracks, square=square)
     add("default", "", usual)
     for name, values in SEARCH.items():

@@ -19,6 +19,7 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -30,6 +31,7 @@ from szlib.plaza.truth import PlazaSettings
 from szlib.simulation.rollouts import rollouts
 from szlib.simulation.scenarios.worlds import Worlds
 from szlib.workbook.record import NotebookRecord
+from szlib.workbook.record.method import Method
 
 DAMAGES = {False: 6, True: 300}
 JUMPS = {False: 2, True: 40}
@@ -160,8 +162,16 @@ def _rollouts(_: Path, out: Path) -> None:
     rollouts(2, worlds=Worlds(duration=0.5), out=out, progress=False)
 
 
+class _Quick(Method):
+    """One speed, few intervals: it is files that are attacked."""
+
+    def fit(self) -> dict[str, Any]:
+        return super().fit() | {"speeds": [self.zone_speed], "resamples": 10}
+
+
 def _notebook(data: Path, out: Path) -> None:
     record = NotebookRecord("05_attack", {"data": [str(data / "day0.csv")], "results": out})
+    record.method = _Quick()
     record.square()
     record.check("encounters", len(record.encounters()) > 0)
     record.zone()

@@ -73,6 +73,14 @@ def test_the_error_is_the_largest_of_centre_and_axes(plazas: list[pd.DataFrame])
 # --- what they say -----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_pipeline_finds_the_true_zone(plazas: list[pd.DataFrame], seed: int) -> None:
+    zone = szlib.SocialZone.fit(plazas[seed], method="hull", speeds=scores.SPEEDS, resamples=0)
+    assert scores.largest_error(zone) < 0.05
+    turned = [zone.ellipse(v).angle - szlib.PlazaSettings().true_zone(v).angle for v in scores.SPEEDS]
+    assert np.abs((np.degrees(turned) + 90) % 180 - 90).max() < 10
+
+
 @pytest.mark.parametrize(
     ("share", "pace"), [(0.0, "rushing"), (0.01, "slow"), (0.02, "slow"), (0.02, "rushing")]
 )

@@ -1,13 +1,14 @@
 """The command line: what it runs, what it tells, and with which exit code."""
 
 import json
+import os
 
 import pytest
 
 from szlib.errors import DataError
 from szlib.workbook.command_line import commands, main
 from szlib.workbook.record.validation import check_parameters
-from szlib.workbook.runner import execution
+from szlib.workbook.runner import execution, worker
 
 
 def run(*arguments):
@@ -88,6 +89,27 @@ def test_06_is_not_06b_and_00_comes_first(notebooks):
     assert chosen == [names, ["06_barriers"], ["06b_build"], ["00_start", "10_room"]]
     with pytest.raises(DataError, match="no notebook 0; there are 00_start"):
         execution._chosen(["0"])
+
+
+def test_notebooks_wait_for_the_encounters_and_the_zone_and_for_nothing_else(notebooks):
+    names = ["00_start", "01_tracks", "02_met", "03_far", "05_zone", "06_robot", "06b_build", "15_respect"]
+    notebooks(**{f"_{name}": "" for name in names})
+    stems = [[s.stem for s in batch] for batch in execution._batches(execution._chosen([]))]
+    assert stems == [names[:3], names[3:5], names[5:]]
+    assert execution._batches(execution._chosen(["06"])) == [[], [], execution._chosen(["06"])]
+
+
+@pytest.mark.parametrize(("jobs", "threads"), [(1, "6"), (2, "3"), (4, "1"), (8, "1")])
+def test_notebooks_side_by_side_share_the_cores(monkeypatch, jobs, threads):
+    ended = []
+    monkeypatch.setattr(worker, "end_with", ended.append)
+    monkeypatch.setattr(os, "cpu_count", lambda: 6)
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    worker.begin(7, jobs)
+    assert (os.environ["OMP_NUM_THREADS"], ended) == (threads, [7])
+    monkeypatch.setenv("OMP_NUM_THREADS", "5")
+    worker.begin(7, jobs)
+    assert os.environ["OMP_NUM_THREADS"] == "5", "what the user asked for stays"
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 occupants  who is in whose attentional space
 windows    windows of 3 s that meet a condition throughout
 samples    what is measured in a window, and both people's paths in the reference pedestrian's frame
+nearby     the rows that encounters in a square can depend on
 finding    the four conditions, one after the other
 """
 
@@ -10,7 +11,7 @@ import lazy_loader as lazy
 
 __getattr__, __dir__, __all__ = lazy.attach(
     __name__,
-    submodules=["occupants", "windows", "samples", "finding"],
+    submodules=["occupants", "windows", "samples", "nearby", "finding"],
     submod_attrs={
         "samples": ["SAMPLE_COLUMNS", "reference_frame"],
         "finding": ["find_encounters"],

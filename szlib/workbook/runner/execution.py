@@ -21,15 +21,15 @@ from ... import __version__, memory
 from ...encounters.areas import AUTO, as_area
 from ...errors import DataError, SzlibError
 from ...files import file_content, held, sweep_temporary
-from ...parallel import bounded, cluster, end_with
+from ...parallel import bounded, cluster
 from ...tracks import datasets
 from ..record import places
 from ..record.notebook import data_files
 from ..record.validation import check_parameters
 from . import summary, worker
 
-LAST_PRODUCER = "05"
-"""Up to here each notebook needs the artefact of the one before; later ones can run side by side."""
+PRODUCERS = ("02", "05")
+"""Later notebooks need what these leave, encounters and zone; all others can run side by side."""
 
 
 def run(
@@ -67,7 +67,7 @@ def run(
     StorageError : results cannot be written there, or another run is writing there.
     """
     sources = _chosen(only)
-    known = sorted({*sources, *(n for n in places.notebooks() if n.stem[:2] <= LAST_PRODUCER)})
+    known = sorted({*sources, *(n for n in places.notebooks() if n.stem[:2] <= PRODUCERS[-1])})
     given = check_parameters(parameters or {}, known)
     if given.get("area", AUTO) != AUTO:  # in one form, whatever file or text it came from
         given["area"] = str(as_area(given["area"]))
@@ -98,20 +98,24 @@ def _outcomes(
     limit = None if scheduler else memory.ceiling()
     share = None if limit is None else limit // max(jobs, 1)
     outcomes: dict[str, dict[str, Any]] = {}
-    with tqdm(total=len(sources), unit="notebook", desc=datasets.label(given["data"])) as bar:
-        first = [source for source in sources if source.stem[:2] <= LAST_PRODUCER]
-        rest = sources[len(first) :]
-        with cluster(scheduler) as client, _pool(client, jobs) as pool:
-            for batch in [*([source] for source in first), rest]:
-                if any(o["status"] == "refused" for o in outcomes.values()):
-                    break  # what comes later needs what could not be made
-                for future in as_completed(_submit(pool, batch, given, home, share)):
-                    name, outcome = future.result()
-                    outcomes[name] = outcome
-                    bar.update()
-                    bar.set_postfix_str(f"{name} {outcome['status']}")
+    bar = tqdm(total=len(sources), unit="notebook", desc=datasets.label(given["data"]))
+    with bar, cluster(scheduler) as client, _pool(client, jobs) as pool:
+        for batch in _batches(sources):
+            if any(o["status"] == "refused" for o in outcomes.values()):
+                break  # what comes later needs what could not be made
+            for future in as_completed(_submit(pool, batch, given, home, share)):
+                name, outcome = future.result()
+                outcomes[name] = outcome
+                bar.update()
+                bar.set_postfix_str(f"{name} {outcome['status']}")
     left = {"status": summary.NOT_STARTED, "seconds": 0.0, **worker.EMPTY_RECORD}
     return {source.stem: outcomes.get(source.stem, left) for source in sources}
+
+
+def _batches(sources: Sequence[Path]) -> list[list[Path]]:
+    """Notebooks that can run side by side, in their order: up to each of `PRODUCERS`, and the rest."""
+    after = [sum(source.stem[:2] > producer for producer in PRODUCERS) for source in sources]
+    return [[s for s, n in zip(sources, after, strict=True) if n == k] for k in range(len(PRODUCERS) + 1)]
 
 
 def _identity(data: str | Sequence[str], files: Sequence[Path], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -133,7 +137,7 @@ def _pool(client: Any, jobs: int) -> Iterator[Executor]:
         return
     others = set(active_children())
     pool = ProcessPoolExecutor(
-        max(jobs, 1), mp_context=get_context("spawn"), initializer=end_with, initargs=(os.getpid(),)
+        max(jobs, 1), mp_context=get_context("spawn"), initializer=worker.begin, initargs=(os.getpid(), jobs)
     )
     try:
         yield pool

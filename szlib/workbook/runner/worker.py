@@ -17,6 +17,7 @@ from typing import Any
 from ... import memory
 from ...errors import SzlibError
 from ...files import printable, temporary_folder, write_file
+from ...parallel import end_with
 from ..record import places
 from . import kernels
 
@@ -28,6 +29,12 @@ REFUSED = {
 """Errors that tell of the data, of the disk or of memory, and not of a notebook."""
 EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
 """What a notebook leaves that leaves nothing."""
+
+
+def begin(parent: int, jobs: int) -> None:
+    """What a process of the pool does first: end with its parent, and leave the others their cores."""
+    end_with(parent)
+    os.environ.setdefault("OMP_NUM_THREADS", str(max(1, (os.cpu_count() or 1) // jobs)))
 
 
 def execute(source: str, given: dict[str, Any], home: str, share: int | None) -> tuple[str, dict[str, Any]]:

@@ -128,18 +128,21 @@ def fit_ellipses(radii: Array, directions: Array = DIRECTIONS) -> Array:
     damping = np.full(len(rows), 1e-3)
     miss, slope = _reach(p, unit)
     miss -= target
+    todo = np.arange(len(rows))
     for _ in range(_ROUNDS):
-        normal = np.einsum("kni,knj->kij", slope, slope)
+        back = slope[todo].transpose(0, 2, 1)
+        normal = back @ slope[todo]
         diagonal = np.einsum("kii->ki", normal)
-        damped = normal + (damping[:, None] * diagonal)[:, :, None] * np.eye(5)
-        step = -np.linalg.solve(damped, np.einsum("kni,kn->ki", slope, miss)[..., None])[..., 0]
-        missed, sloped = _reach(p + step, unit)
-        missed -= target
-        better = (missed**2).sum(axis=1) <= (miss**2).sum(axis=1)  # False where the origin has left (NaN)
-        p[better] += step[better]
-        miss[better], slope[better] = missed[better], sloped[better]
-        damping = np.where(better, damping / 10, damping * 10)
-        if (np.abs(step).max(axis=1) < _SETTLED).all():
+        damped = normal + (damping[todo, None] * diagonal)[:, :, None] * np.eye(5)
+        step = -np.linalg.solve(damped, back @ miss[todo, :, None])[..., 0]
+        missed, sloped = _reach(p[todo] + step, unit)
+        missed -= target[todo]
+        better = (missed**2).sum(axis=1) <= (miss[todo] ** 2).sum(axis=1)  # False: the origin has left (NaN)
+        p[todo[better]] += step[better]
+        miss[todo[better]], slope[todo[better]] = missed[better], sloped[better]
+        damping[todo] *= np.where(better, 0.1, 10)
+        todo = todo[~(np.abs(step).max(axis=1) < _SETTLED)]
+        if not len(todo):
             break
     root = p[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
     values, vectors = np.linalg.eigh(root)

@@ -1,0 +1,46 @@
+"""Rows that encounters can depend on: the same encounters in a fraction of the rows, and none lost unsaid."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+from conftest import make_crowd, make_tracks, make_walk
+
+import szlib
+from szlib.encounters.search.nearby import near_square
+from szlib.tracks import funnels
+
+SQUARE = szlib.Square(x=(0, 14), y=(0, 14))
+
+
+@pytest.fixture(scope="module")
+def crowd() -> pd.DataFrame:
+    """People in the square and far from it, in any row order, on two days."""
+    days = [make_crowd(seed, people=160, seconds=200, square=SQUARE) for seed in (77, 78)]
+    far = days[0].assign(id=days[0]["id"] + 1000, x=days[0]["x"] + 100)
+    rows = pd.concat([days[0], far, days[1].assign(day="2012-10-28")], ignore_index=True)
+    return rows.astype({"day": "category"}).sample(frac=1, random_state=0)
+
+
+@pytest.mark.parametrize("asked", [{}, {"duration": 1.0}, {"kinds": "strangers"}, {"throughout": True}])
+@pytest.mark.parametrize("narrower", [0.0, 1.0])
+def test_they_are_those_of_all_rows(crowd: pd.DataFrame, asked: dict[str, object], narrower: float) -> None:
+    near = near_square(crowd, SQUARE, 3.0)
+    square = SQUARE.grown(-narrower)
+    found, whole = (szlib.find_encounters(rows, square=square, **asked) for rows in (near, crowd))
+    assert len(whole) > 100
+    assert (near["id"] >= 1000).sum() <= 30 + 5  # nobody far away, but for who is next in the table
+    pd.testing.assert_frame_equal(found, whole)
+
+
+def test_those_who_never_come_and_what_is_long_after_are_elsewhere(crowd: pd.DataFrame) -> None:
+    through = make_walk((-20, 4), (1, 0), duration=60)  # inside from 20 to 34 s, within 5 m from 15 to 39 s
+    near = near_square(make_tracks(through, make_walk((-3, 26), (1, 0), person=2)), SQUARE, 3.0)
+    assert near["id"].unique().tolist() == [1]
+    assert near["t"].min() == pytest.approx(15 - 0.5)
+    assert near["t"].max() == pytest.approx(39 + 3)
+    (stage,) = funnels.of(near)
+    assert (stage["entered"], stage["kept"]) == (601 + 41, len(near))
+    assert len(near_square(crowd, SQUARE.grown(-6), 3.0)) < len(near_square(crowd, SQUARE, 3.0)) / 2
+    with pytest.raises(szlib.DataError, match="the table is empty"):
+        near_square(crowd.iloc[:0], SQUARE, 3.0)
