@@ -88,6 +88,8 @@ class Person:
 
     def after(self, seconds: float) -> Person:
         """The same person, so many seconds later."""
+        if self.stands:
+            return self
         (x, y), (vx, vy) = self.position, self.velocity
         return self.at((x + vx * seconds, y + vy * seconds))
 
