@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import FunctionType
 from typing import Any, get_args
@@ -26,6 +26,7 @@ from .. import __version__
 from ..control.mpc import MPCCBF
 from ..control.problem import TOLERANCE
 from ..control.settings import MPCSettings
+from ..control.solvers.sizes import rounded
 from ..errors import SolverError, SzlibError
 from ..files import keep, kept, own_folder, write_file
 from ..parallel import run_tasks
@@ -121,6 +122,23 @@ def mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = CIRCLE) -
     return MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
 
 
+class OneOfEachSize:
+    """As `mpc_cbf`, but the worlds of a size, as of `control.solvers.sizes`, take one controller in turn.
+
+    The loop resets it before each, so that nothing is left of the world before.
+    """
+
+    def __init__(self) -> None:
+        self._made: dict[tuple[int, int], MPCCBF] = {}
+
+    def __call__(self, scenario: Scenario, settings: MPCSettings) -> MPCCBF:
+        size = rounded(len(scenario.people)), rounded(len(scenario.walls))
+        if size not in self._made:
+            self._made[size] = mpc_cbf(scenario, settings)
+        self._made[size].set_walls(scenario.walls)
+        return self._made[size]
+
+
 @dataclass(frozen=True)
 class Setup:
     """Everything but the seed that decides what a row says; parameters as of `rollouts`."""
@@ -213,6 +231,8 @@ def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
     made = {"rollouts": file and setup.describe(), "seeds": [seeds.start, seeds.stop]}
     if file is not None and (content := kept(file, made)) is not None:
         return pd.read_parquet(io.BytesIO(content))
+    if setup.controller is mpc_cbf:
+        setup = replace(setup, controller=OneOfEachSize())
     rows = []
     for seed in seeds:
         log = setup.run(seed)
