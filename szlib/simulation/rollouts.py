@@ -13,7 +13,9 @@ import hashlib
 import io
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from pathlib import Path
+from threading import get_ident
 from types import FunctionType
 from typing import Any, get_args
 
@@ -26,7 +28,6 @@ from .. import __version__
 from ..control.mpc import MPCCBF
 from ..control.problem import TOLERANCE
 from ..control.settings import MPCSettings
-from ..control.solvers.sizes import rounded
 from ..errors import SolverError, SzlibError
 from ..files import keep, kept, own_folder, write_file
 from ..parallel import run_tasks
@@ -123,20 +124,25 @@ def mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = CIRCLE) -
 
 
 class OneOfEachSize:
-    """As `mpc_cbf`, but the worlds of a size, as of `control.solvers.sizes`, take one controller in turn.
-
-    The loop resets it before each, so that nothing is left of the world before.
+    """As `mpc_cbf`, but worlds with as many people and walls take one controller in turn: to build one takes
+    as long as ten steps. The loop resets it before each, so that nothing is left of the world before.
     """
 
     def __init__(self) -> None:
         self._made: dict[tuple[int, int], MPCCBF] = {}
 
     def __call__(self, scenario: Scenario, settings: MPCSettings) -> MPCCBF:
-        size = rounded(len(scenario.people)), rounded(len(scenario.walls))
+        size = len(scenario.people), len(scenario.walls)
         if size not in self._made:
             self._made[size] = mpc_cbf(scenario, settings)
         self._made[size].set_walls(scenario.walls)
         return self._made[size]
+
+
+@lru_cache(maxsize=1)
+def _in_turn(settings: MPCSettings, thread: int) -> OneOfEachSize:
+    """The controllers of a worker, from chunk to chunk: of these settings, and its own thread's."""
+    return OneOfEachSize()
 
 
 @dataclass(frozen=True)
@@ -232,7 +238,7 @@ def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
     if file is not None and (content := kept(file, made)) is not None:
         return pd.read_parquet(io.BytesIO(content))
     if setup.controller is mpc_cbf:
-        setup = replace(setup, controller=OneOfEachSize())
+        setup = replace(setup, controller=_in_turn(setup.settings, get_ident()))
     rows = []
     for seed in seeds:
         log = setup.run(seed)

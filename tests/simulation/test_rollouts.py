@@ -61,7 +61,7 @@ def test_jobs_and_interruptions_change_nothing(tmp_path, monkeypatch):
 
 
 def test_a_row_can_be_replayed_to_the_last_bit_though_its_controller_drove_before():
-    alike = Worlds(people=(3, 4), walls=1.0, max_walls=1, duration=3.0)  # of one size: they share one
+    alike = Worlds(people=(3, 3), walls=1.0, max_walls=1, duration=3.0)  # of one size: they share one
     rows = rollouts(3, seed=7, worlds=alike, n_jobs=1, progress=False)
     again = pd.DataFrame([replay(seed, worlds=alike).metrics() for seed in rows["seed"]])
     pd.testing.assert_frame_equal(
