@@ -53,7 +53,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .barriers import Array, barrier, finite, segment_formula
+from .barriers import Array, barrier, finite, floats, pair, segment_formula
 from .distances import wall_margin
 from .mpc import MPCCBF
 from .people.person import Person, PlacedZone, SpeedZone, place
@@ -78,7 +78,7 @@ class Unicycle:
 
     def start(self, state: ArrayLike) -> Array:
         """The robot's own state, shape (5,), from (x, y, vx, vy) of its centre."""
-        x, y, vx, vy = finite("state", state, (4,)).tolist()
+        x, y, vx, vy = floats("state", state, 4)
         heading = atan2(vy, vx) if vx or vy else self.heading
         return np.array([x, y, heading, hypot(vx, vy), 0.0])
 
@@ -260,7 +260,7 @@ class DifferentialDrive:
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h of every person and then of every wall, for the disc there, shape (people + walls,) [m]."""
-        x, y = finite("position", position, (2,)).tolist()
+        x, y = pair("position", position)
         return np.array(self._barriers([place(who, self._point.zone_of(who)) for who in people], x, y))
 
     def _barriers(self, zones: Sequence[PlacedZone], x: float, y: float, t: float = 0.0) -> list[float]:

@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .barriers import Array, barrier, finite, pair, segment_formula, walls_of
+from .barriers import Array, barrier, floats, pair, segment_formula, walls_of
 from .distances import wall_margin
 from .people.meetings import subgoal
 from .people.person import Person, SpeedZone, as_ellipse, circle_around, place
@@ -103,7 +103,7 @@ class MPCCBF:
     def set_walls(self, walls: Any) -> None:
         """Know these walls from the next step on, in place of those before; given as to the controller.
 
-        Where their number takes another size (1, 2, 4, 8, ...), that is built here: see `solvers.sizes`.
+        Where their number takes another size (1, 2, 3, 4, 6, ...), that is built here: see `solvers.sizes`.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class MPCCBF:
         """
         began = perf_counter()
         self._own()
-        x, towards = finite("state", state, (4,)).tolist(), pair("goal", goal)
+        x, towards = floats("state", state, 4), pair("goal", goal)
         if not self._moved:
             self._check_goal(towards)
         self._now = self._clock(now, stamps)
@@ -176,10 +176,10 @@ class MPCCBF:
         self._sizes.budget.begin()
         size = solver.evaluate.size
         parameters = self._parameters(x, scene, size)
-        rung, plan, numbers, timed_out = solve_with_fallbacks(solver, self._plan, parameters)
-        self._plan, rows = plan, taken(self._n_people, len(self.walls), size)
+        rung, numbers, timed_out = solve_with_fallbacks(solver, self._plan, parameters)
+        self._plan, rows = numbers.inputs, taken(self._n_people, len(self.walls), size)
         return Step(
-            control=plan[:2].copy(),
+            control=self._plan[:2].copy(),
             predicted=numbers.states,
             rung=rung,
             slack=numbers.slack,
@@ -244,7 +244,7 @@ class MPCCBF:
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h of every person and then of every wall at a position, shape (people + walls,) [m]."""
-        x, y = finite("position", position, (2,)).tolist()
+        x, y = pair("position", position)
         distances = [place(person, self.zone_of(person)).distance(x, y) for person in people]
         distances += [segment_formula(x, y, *segment) for segment in self._segments]
         margins = [self.settings.eps] * len(people) + self._margins
@@ -252,7 +252,7 @@ class MPCCBF:
 
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
         """True if the goal cannot be reached, h < 0 there: for a wall, or for somebody who stands."""
-        x, y = finite("goal", goal, (2,)).tolist()
+        x, y = pair("goal", goal)
         placed = [place(who, self.zone_of(who)) for who in people]
         return any(zone.blocks((x, y), self.settings) for zone in placed) or bool(
             (self.barriers(goal) < 0).any()

@@ -66,6 +66,11 @@ class Problem:
     bend: Sequence[Any]
     n_cbf: int
 
+    @property
+    def slack(self) -> Any:
+        """The largest violation of a row or of the terminal condition, 0 if none."""
+        return ca.mmax(ca.vertcat(0, -self.rows, ca.fabs(self.terminal)))
+
 
 @lru_cache(maxsize=256)
 def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem:
@@ -155,11 +160,13 @@ class Buffered:
 
 
 class Numbers(NamedTuple):
-    """A plan in numbers: see `Problem` for rows and h, shape (people + walls, N_h+1); states are (N+1, 4).
+    """A plan, its inputs, shape (2N,), in numbers.
 
-    `slack` is the largest violation of a row or of the terminal condition, 0 if none.
+    See `Problem` for rows and h, shape (people + walls, N_h+1); states are (N+1, 4). `slack` is the largest
+    violation of a row or of the terminal condition, 0 if none.
     """
 
+    inputs: Array
     cost: float
     slack: float
     rows: Array
@@ -186,14 +193,20 @@ class Evaluator:
         self._function.call()
         totals, rows, states, h = self._function.results
         cost, slack = totals.tolist()
-        return Numbers(cost, slack, rows.copy(), states.reshape(-1, 4).copy(), h.reshape(self._shape).copy())
+        return self.numbers(self._inputs, cost, slack, rows, states, h)
+
+    def numbers(
+        self, inputs: Array, cost: float, slack: float, rows: Array, states: Array, h: Array
+    ) -> Numbers:
+        """Copies of what stands in buffers, each in its shape."""
+        states, h = states.reshape(-1, 4), h.reshape(self._shape)
+        return Numbers(inputs.copy(), cost, slack, rows.copy(), states.copy(), h.copy())
 
 
 @lru_cache(maxsize=256)
 def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, int]:
     p = build_problem(settings, n_people, n_walls)
-    slack = ca.mmax(ca.vertcat(0, -p.rows, ca.fabs(p.terminal)))
-    outputs = [ca.vertcat(p.cost, slack), p.rows, p.states, p.h.T]
+    outputs = [ca.vertcat(p.cost, p.slack), p.rows, p.states, p.h.T]
     return function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
 
 
@@ -225,14 +238,13 @@ class ProblemSolver(Protocol):
     budget: Budget
     late: bool
 
-    @property
-    def remembered(self) -> Array:
-        """What goes from call to call: it saves time, and changes the answers by rounding."""
+    remembered: Array
+    """What goes from call to call: it saves time, and changes the answers by rounding."""
 
-    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+    def hard(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
         """The plan that obeys every row, from a guess; and whether one was found."""
 
-    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
         """The plan that violates the rows least, by the exact penalty; and whether it converged."""
 
     def reset(self) -> None:

@@ -57,8 +57,9 @@ def wait_for_the_builder(controller, _=None):
 # empty slots
 
 
-def test_sizes_are_powers_of_two():
-    assert [rounded(n) for n in (0, 1, 2, 3, 4, 5, 8, 9, 20, 32, 33)] == [0, 1, 2, 4, 4, 8, 8, 16, 32, 32, 64]
+def test_sizes_are_powers_of_two_and_three_quarters_of_them():
+    assert sorted({rounded(n) for n in range(49)}) == [0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48]
+    assert all(n <= rounded(n) < 1.5 * n for n in range(1, 1000))
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
@@ -98,7 +99,7 @@ def test_a_controller_is_ready_for_eight_and_grows_ahead_from_when_half_of_them_
     caplog.set_level("INFO", logger="szlib")
     controller = controller_of()
     built = controller._sizes._solvers
-    assert {people for people, _ in built} == {0, 1, 2, 4, 8}
+    assert {people for people, _ in built} == {0, 1, 2, 3, 4, 6, 8}
     drive(controller, [3])
     wait_for_the_builder(controller)
     assert max(built)[0] == 8
@@ -108,14 +109,14 @@ def test_a_controller_is_ready_for_eight_and_grows_ahead_from_when_half_of_them_
         assert max(built)[0] == largest
     assert not caplog.records, "nothing had to be built in place"
     drive(controller_of(), [20])
-    assert "built for 8 people and now grows to 32" in caplog.text
+    assert "built for 8 people and now grows to 24" in caplog.text
 
 
 def test_a_number_that_is_told_is_taken_at_its_word():
     controller = controller_of(max_people=4)
     drive(controller, [4])
     assert controller._sizes._builder is None
-    assert {people for people, _ in controller._sizes._solvers} == {0, 1, 2, 4}
+    assert {people for people, _ in controller._sizes._solvers} == {0, 1, 2, 3, 4}
 
 
 # walls

@@ -49,12 +49,11 @@ def subgoal(
         return goal
     nearest, target = inf, goal
     for zone in people:
-        h = barrier(zone.distance(x, y), s.r_robot, s.eps)
         pace = hypot(zone.vx, zone.vy)
-        closing = (s.v_max + pace) * s.dt
-        if h > min(nearest, distance, max(closing / s.gamma, closing * s.N)):
+        if abs(way[0] * zone.vy - way[1] * zone.vx) > s.tie * pace * distance:
             continue
-        if abs(_cross(way, (zone.vx, zone.vy))) > s.tie * pace * distance:
+        h, closing = barrier(zone.distance(x, y), s.r_robot, s.eps), (s.v_max + pace) * s.dt
+        if h > min(nearest, distance, max(closing / s.gamma, closing * s.N)):
             continue
         angles = _angles(zone, position, way, s)
         if angles is None:

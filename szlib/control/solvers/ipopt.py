@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..barriers import Array
-from ..problem import BUILDING, HARD_SHARE, Budget, Evaluator, build_problem, slack_weight
+from ..problem import BUILDING, HARD_SHARE, Budget, Evaluator, Numbers, build_problem, slack_weight
 from ..settings import MPCSettings
 
 _OPTIONS = {
@@ -54,14 +54,15 @@ class Ipopt:
         solvers = _borrow(key)
         weakref.finalize(self, _give_back, key, solvers).atexit = False
         self._hard, self._relaxed, self._n_terminal = solvers
+        self.remembered = np.zeros(0)
 
-    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
-        """Inputs, shape (2N,), and whether IPOPT says that it converged."""
+    def hard(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
+        """The plan, and whether IPOPT says that it converged."""
         a_max, upper = self.settings.a_max, self._row_bounds()
         found = self._hard(x0=guess, p=parameters, lbx=-a_max, ubx=a_max, lbg=0, ubg=upper)
-        return self._inputs(found), self._succeeded(self._hard)
+        return self.evaluate(self._inputs(found), parameters), self._succeeded(self._hard)
 
-    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
         """The same for the problem with penalised slack."""
         s = self.settings
         rows = self.evaluate(guess, parameters).rows
@@ -76,12 +77,7 @@ class Ipopt:
             lbg=0,
             ubg=self._row_bounds(),
         )
-        return self._inputs(found), self._succeeded(self._relaxed)
-
-    @property
-    def remembered(self) -> Array:
-        """Nothing."""
-        return np.zeros(0)
+        return self.evaluate(self._inputs(found), parameters), self._succeeded(self._relaxed)
 
     def reset(self) -> None:
         """Nothing is remembered from one call to the next."""

@@ -23,8 +23,8 @@ from ..step.decision import Rung
 
 def solve_with_fallbacks(
     solver: ProblemSolver, last_plan: Array, parameters: Array
-) -> tuple[Rung, Array, Numbers, bool]:
-    """The first rung that holds, its plan, the plan's numbers, and whether the time was up.
+) -> tuple[Rung, Numbers, bool]:
+    """The first rung that holds, its plan in numbers, and whether the time was up.
 
     Plans are inputs, shape (2N,) [m/s2]; `parameters` as in `Problem`.
     """
@@ -39,29 +39,25 @@ def solve_with_fallbacks(
             break
         guess = shifted if rung == "warm" else _brake(solver.settings, parameters[2:4])
         plan, converged = solver.hard(guess, parameters)
-        if converged:
-            numbers = solver.evaluate(plan, parameters)
-            if numbers.slack <= TOLERANCE:
-                return rung, plan, numbers, late
+        if converged and plan.slack <= TOLERANCE:
+            return rung, plan, late
         late |= solver.late
-        start = plan if solver.late and np.isfinite(plan).all() else start
+        start = plan.inputs if solver.late and np.isfinite(plan.inputs).all() else start
     kept = solver.evaluate(shifted, parameters)
     if ends and kept.slack <= TOLERANCE:
-        return "kept", shifted, kept, late
+        return "kept", kept, late
     safe_end = ends and _safe_to_its_end(kept, parameters)
     plan, converged = solver.relaxed(start, parameters)
     late |= solver.late
-    brake = _brake(solver.settings, parameters[2:4])
-    braking = solver.evaluate(brake, parameters)
-    if (converged or solver.late) and np.isfinite(plan).all():
-        numbers = solver.evaluate(plan, parameters)
-        better = converged or numbers.slack <= braking.slack
-        if better and (not safe_end or _safe_to_its_end(numbers, parameters)):
-            rung = "warm" if converged and numbers.slack <= TOLERANCE else "relaxed"
-            return rung, plan, numbers, late
+    braking = solver.evaluate(_brake(solver.settings, parameters[2:4]), parameters)
+    if (converged or solver.late) and np.isfinite(plan.inputs).all():
+        better = converged or plan.slack <= braking.slack
+        if better and (not safe_end or _safe_to_its_end(plan, parameters)):
+            rung = "warm" if converged and plan.slack <= TOLERANCE else "relaxed"
+            return rung, plan, late
     if safe_end:
-        return "kept", shifted, kept, late
-    return "braking", brake, braking, late
+        return "kept", kept, late
+    return "braking", braking, late
 
 
 def _brake(s: MPCSettings, velocity: Array) -> Array:

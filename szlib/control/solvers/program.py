@@ -30,9 +30,9 @@ class Program(NamedTuple):
     derive : (inputs, parameters, multipliers) -> (cost, violation, largest multiplier of a row, of a speed
         row), lower and upper bounds, gradient, Jacobian, Hessian of the Lagrangian, and the same without the
         curvature of the barriers.
-    measure : (inputs, parameters, multipliers, step, share) -> (cost, violation, largest element of
-        the step, largest multiplier, largest of a row) there, the inputs there, the values of rows
-        and terminal condition there.
+    measure : (inputs, parameters, multipliers, step, share) -> (cost, violation, slack, largest element of
+        the step, largest multiplier, largest of a row) there, the inputs there, the values of rows and
+        terminal condition there, the states and h.
     free : parameters -> the inputs of least cost alone, and by how much they violate bounds and rows in sum;
         None if there is a terminal condition.
     """
@@ -67,10 +67,10 @@ def build_program(settings: MPCSettings, n_people: int, n_walls: int) -> Program
 
     step, share = ca.SX.sym("d", u.numel()), ca.SX.sym("s")
     trial = ca.fmax(-s.a_max, ca.fmin(u + share * step, s.a_max))
-    there = ca.Function("there", [u, p.parameters], [p.cost, violation, values])
-    cost, violated, values = there(trial, p.parameters)
-    merit = ca.vertcat(cost, violated, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
-    measure = function("measure", [*arguments, step, share], [merit, trial, values])
+    there = ca.Function("there", [u, p.parameters], [p.cost, violation, p.slack, values, p.states, p.h.T])
+    *totals, values, states, h = there(trial, p.parameters)
+    merit = ca.vertcat(*totals, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
+    measure = function("measure", [*arguments, step, share], [merit, trial, values, states, h])
     if p.terminal.numel():
         return Program(derive, measure, None)
     given = p.parameters[:6]

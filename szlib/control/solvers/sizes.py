@@ -1,4 +1,4 @@
-"""Solvers for any number of people and walls: sizes are powers of two, built before they are needed.
+"""Solvers for any number of people and walls: some sizes are built before they are needed, for all others.
 
 A slot that is not taken holds a zone, or a wall, far away, and of a size so far below zero that its h is
 `UNFELT` or more in every state: its rows never bind, and their multipliers stay zero. So the solution is that
@@ -36,8 +36,9 @@ _AWAY = 1e6
 
 
 def rounded(n: int) -> int:
-    """The size for so many: 0, 1, 2, 4, 8, ..."""
-    return 1 << (n - 1).bit_length() if n else 0
+    """The size for so many: 0, 1, 2, 3, 4, 6, 8, 12, ..., so that at most a third of the slots is empty."""
+    power = 1 << (n - 1).bit_length() if n else 0
+    return power - power // 4 if n <= power - power // 4 else power
 
 
 class Sizes:
@@ -85,7 +86,7 @@ class Sizes:
         self.ready, self._grows = state["ready"], state["grows"]
         for size, remembered in state["solvers"].items():
             self._add(*size)
-            self._solvers[size].remembered[:] = remembered
+            self._solvers[size].remembered = remembered
 
     def reset(self) -> None:
         """Let every solver forget what it remembers from call to call."""
@@ -97,7 +98,7 @@ class Sizes:
         people = 0
         while people <= largest:
             self._add(people, walls)
-            people = max(1, 2 * people)
+            people = rounded(people + 1)
 
     def _add(self, people: int, walls: int) -> None:
         """One size, unless it is there already: who comes second waits for who came first."""

@@ -24,7 +24,7 @@ import daqp
 import numpy as np
 
 from ..barriers import Array
-from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, slack_weight
+from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, Numbers, slack_weight
 from ..settings import MPCSettings
 from .program import Program, build_program
 
@@ -67,12 +67,12 @@ class Sqp:
         self._measure = Buffered(of.measure, *arguments, self._step, self._share)
         self._free = of.free and Buffered(of.free, self._parameters)
         self._before, self._lower, self._upper, gradient, jacobian, exact, gauss = self._derive.results
-        self._after, self._trial, self._values = self._measure.results
+        self._after, self._trial, self._values, self._states, self._h = self._measure.results
         self._jacobian = jacobian.reshape(m, n)
         self._program = (exact.reshape(n, n), gradient, self._jacobian, self._upper, self._lower)
         self._gauss_newton = (gauss.reshape(n, n), *self._program[1:])
         self._sense = np.repeat(np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows])
-        self._weight, self._weights = 0.0, np.zeros(n + m)
+        self._weight, self._weights, self._held = 0.0, np.zeros(n + m), False
         self._model = daqp.Model()
         self._model.settings = _DAQP
         self._model.setup(np.eye(n), *self._program[1:], self._sense)
@@ -82,42 +82,56 @@ class Sqp:
         """The multipliers of the last program."""
         return self._multipliers
 
+    @remembered.setter
+    def remembered(self, multipliers: Array) -> None:
+        self._multipliers[:], self._held = multipliers, bool(multipliers.any())
+
     def reset(self) -> None:
         """Forget every multiplier and active row."""
-        self._multipliers[:] = 0
+        self._multipliers[:], self._held = 0, False
         self._model.update(sense=self._sense)
 
-    def hard(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
-        """Inputs, shape (2N,), and whether they converged; if rows stay violated, to the relaxed problem."""
-        plan, outcome = self._solve(guess, parameters, HARD_SHARE)
-        return plan, outcome == "converged"
+    def hard(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
+        """The plan, and whether it converged; if rows stay violated, to that of the relaxed problem."""
+        outcome = self._solve(guess, parameters, HARD_SHARE)
+        return self._plan(), outcome == "converged"
 
-    def relaxed(self, guess: Array, parameters: Array) -> tuple[Array, bool]:
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
         """The same, where it is enough that no step lowers the merit any more."""
-        plan, outcome = self._solve(guess, parameters, 1.0)
-        return plan, outcome in ("converged", "stalled")
+        outcome = self._solve(guess, parameters, 1.0)
+        return self._plan(), outcome in ("converged", "stalled")
 
-    def _solve(self, guess: Array, parameters: Array, share: float) -> tuple[Array, Outcome]:
+    def _solve(self, guess: Array, parameters: Array, share: float) -> Outcome:
+        """Leave the plan in `_trial`, and what was measured of it in the buffers beside that."""
         self._parameters[:] = parameters
         outcome: Outcome = "converged"
         # Who was held by a row is held still, nearly always: then the program finds it out by itself.
-        if self._multipliers.any() or not self._is_free():
+        if self._held or not self._is_free():
             self._inputs[:] = guess
             outcome = self._iterate(self._weigh(slack_weight(self.settings, parameters)), share)
             if outcome == "failed":
                 self.reset()
+            if outcome != "converged":
+                self._stay()
         self.late = outcome == "late"
-        return self._inputs.copy(), outcome
+        return outcome
+
+    def _plan(self) -> Numbers:
+        """What stands in the buffers."""
+        cost, _, slack = self._after[:3].tolist()
+        rows = self._values[: self.evaluate.n_rows]
+        return self.evaluate.numbers(self._trial, cost, slack, rows, self._states, self._h)
 
     def _is_free(self) -> bool:
-        """True if the minimum of the cost alone satisfies everything; then it is in `_inputs`."""
+        """True if the minimum of the cost alone satisfies everything; then it is the plan."""
         if self._free is None:
             return False
         self._free.call()
         least, violation = self._free.results
         if violation[0] != 0:
             return False
-        self._inputs[:], self._multipliers[:] = least, 0
+        self._inputs[:] = least
+        self._stay()
         return True
 
     def _weigh(self, weight: float) -> float:
@@ -140,7 +154,8 @@ class Sqp:
             self._step[:], self._multipliers[:] = step, info["lam"][step.size :]
             self._share[0] = 1.0
             self._measure.call()
-            cost, violation, size, steepest, on_rows = self._after.tolist()
+            cost, violation, _, size, steepest, on_rows = self._after.tolist()
+            self._held = steepest > 0
             price = max(price, min(PRICE * steepest, limit))
             cost_before, violation_before, on_rows_before, on_speed = self._before.tolist()
             curved = on_rows_before if exact else on_speed
@@ -158,17 +173,23 @@ class Sqp:
                     began = self._inputs.copy(), self._multipliers.copy()
                 rises += 1
             elif rises == RISES > 0:
-                self._inputs[:], self._multipliers[:] = began
+                self._inputs[:], self.remembered = began
                 rises += 1
                 continue
             elif self._lower_merit(price, before):
                 rises = 0
             else:
+                self._stay()
                 return "converged" if size <= CONVERGED[False] else "stalled"
-            self._inputs[:] = self._trial
             if solved:
                 return "converged"
+            self._inputs[:] = self._trial
         return "failed"
+
+    def _stay(self) -> None:
+        """Leave the plan as it is in `_inputs`, and measure it."""
+        self._step[:] = 0
+        self._measure.call()
 
     def _linearise(self) -> bool:
         """Hand over the program at `_inputs`; True if with the exact Hessian."""
