@@ -126,11 +126,12 @@ def drive(
         known = tuple([p for p in seen if p is not None])
         began = perf_counter()
         step = controller.step(own, goal, known)
-        rows.append((state, given, *_told(step, perf_counter() - began)))
+        told = _told(step, perf_counter() - began)
+        rows.append((state, given, *told))
         x, y, vx, vy = state.tolist()
         if until_arrival and hypot(vx, vy) <= STOPPED and hypot(x - gx, y - gy) <= GOAL_RADIUS:
             break
-        control = np.asarray(step.control, float)
+        control = told[0]
         if not all(map(isfinite, control.tolist())):
             raise SolverError(f"{scenario.name!r}: the controller gave {control.tolist()} at {k * dt:g} s")
         own = robot.advance(own, control, dt)
