@@ -43,7 +43,7 @@ PURPOSE = "rollouts"
 """What the folder of finished chunks is marked as."""
 
 CHUNK = 50
-"""Worlds in one file and in one task: about a second of work."""
+"""Worlds in one file and in one task: half a second of work."""
 
 CIRCLE = Ellipse((0.0, 0.0), (1.0, 1.0))
 """The zone of people without one [m] (assumed); in random worlds everybody has one of their own."""
