@@ -122,10 +122,10 @@ class PlacedZone(NamedTuple):
 
 def place(person: Person, zone: Ellipse) -> PlacedZone:
     """The zone, of the person's own frame, around a person; of unknown heading: `circle_around` it."""
-    (x, y), heading = person.position, person.heading
+    (x, y), (vx, vy), heading = person.position, person.velocity, person.heading
     if heading is None:
         zone, heading = circle_around(zone), 0.0
-    c, s = cos(heading), sin(heading)
+    c, s, a = cos(heading), sin(heading), zone.semi_axes[0]
     (ma, na), (mb, nb) = zone.foci.tolist()
-    foci = (x + ma * c - na * s, y + ma * s + na * c, x + mb * c - nb * s, y + mb * s + nb * c)
-    return PlacedZone(*foci, zone.semi_axes[0], *person.velocity)
+    xa, ya, xb, yb = x + ma * c - na * s, y + ma * s + na * c, x + mb * c - nb * s, y + mb * s + nb * c
+    return PlacedZone(xa, ya, xb, yb, a, vx, vy)

@@ -23,8 +23,8 @@ _DRIVER = MPCSettings()
 """Of the robot for which there has to be room."""
 _TRIES = 5_000
 """Draws after which a world is given up as impossible; a usual one takes fewer than a hundred."""
-_PATH_SAMPLES = 31
-"""Points of a person's path at which it is held clear of walls."""
+_ALONG = np.linspace(0, 1, 31)[:, None]
+"""Where a person's path is held clear of walls, from its start to its end."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def _walls(rng: np.random.Generator, w: Worlds) -> Array:
 def _people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellipse) -> list[Person]:
     """People one by one, each off the walls and off those before; fewer where there is no room."""
     people: list[Person] = []
-    times, ends = np.linspace(0, w.duration, _PATH_SAMPLES)[:, None], walls.reshape(-1, 4).T
+    times, ends = w.duration * _ALONG, walls.reshape(-1, 4).T
     for _ in range(int(rng.integers(*w.people, endpoint=True))):
         for _ in range(100):
             x, y = rng.uniform(-w.size / 2, w.size / 2, 2).tolist()
@@ -153,8 +153,8 @@ def _people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellipse) ->
             vx, vy = pace * cos(heading), pace * sin(heading)
             if any(dist((x, y), other.position) < 2 * BODY_RADIUS for other in people):
                 continue
-            to_walls = euclidean_segment_formula(x + vx * times, y + vy * times, *ends)
-            if (to_walls >= BODY_RADIUS).all():
+            path = x + vx * times, y + vy * times
+            if not len(walls) or (euclidean_segment_formula(*path, *ends) >= BODY_RADIUS).all():
                 people.append(Person((x, y), (vx, vy), heading, zone))
                 break
     return people
