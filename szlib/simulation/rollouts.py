@@ -76,7 +76,8 @@ def rollouts(
     n, seed : how many worlds, and the first one's seed.
     settings, worlds, behaviour : of the controller, of the worlds, and of the people in them: a `Worlds` or
         another function of the seed, a `Behaviour` or another `CrowdModel`.
-    controller : makes the controller for a world, from its scenario and the settings; default: `mpc_cbf`.
+    controller : makes the controller for a world, from its scenario and the settings; default: `mpc_cbf`,
+        of which worlds with as many people and walls take one in turn.
     zones : what is kept in place of a person's own zone, made from it.
     measure : further columns from each run.
     out : folder for finished chunks, to go on from; default: none is kept. Parameters and szlib's
