@@ -11,7 +11,6 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
@@ -199,17 +198,29 @@ def bench_before(people: int, n_walls: int) -> dict[str, float]:
 
 
 def bench_worlds(count: int) -> dict[str, float]:
-    """Random worlds, one core: CPU time of the earlier commit over this one's; rows that differ by 1e-5."""
+    """Random worlds, one core: CPU time of the earlier commit over this one's; rows that differ by 1e-5.
+
+    Each commit has a process of its own, or it would collect the other's garbage.
+    """
+    took, rows = np.zeros((2, count // 10)), dict[tuple[int, int], list[dict[str, Any]]]()
+    spawn = get_context("spawn")
+    with spawn.Pool(1) as before, spawn.Pool(1) as now:
+        for first in 2 * [*range(0, count, 10)]:  # the first lap builds what the second times
+            for i, pool in enumerate((before, now)):
+                took[i, first // 10], rows[i, first] = pool.apply(ten_worlds, (i, first))
+    pairs = (zip(rows[0, first], rows[1, first], strict=True) for first in range(0, count, 10))
+    differ = sum(not _same(*pair) for ten in pairs for pair in ten)
+    return {"before / now": float(took[0].sum() / took[1].sum()), "rows that differ": differ}
+
+
+def ten_worlds(which: int, first: int) -> tuple[float, list[dict[str, Any]]]:
+    """CPU time and rows of ten worlds, by the earlier commit (0) or this one (1)."""
     before = sys.modules.get("szlib_before") or earlier(os.environ[BEFORE_VARIABLE])
-    took, rows = np.zeros((2, count)), {}
-    for seed in islice(range(-1, count), count + 1):  # the first one warms up
-        for i, of in enumerate((before, szlib)):
-            replay = importlib.import_module(f"{of.__name__}.simulation.rollouts").replay
-            begun = time.process_time()
-            rows[i] = replay(max(seed, 0), settings=of.MPCSettings(time_limit=np.inf)).metrics()
-            took[i, seed] = time.process_time() - begun
-        rows["differ"] = rows.get("differ", 0) + (seed >= 0 and not _same(rows[0], rows[1]))
-    return {"before / now": float(took[0].sum() / took[1].sum()), "rows that differ": rows["differ"]}
+    of = (before, szlib)[which]
+    module = importlib.import_module(f"{of.__name__}.simulation.rollouts")
+    setup, begun = module.setup_of(settings=of.MPCSettings(time_limit=np.inf)), time.process_time()
+    table = module._chunk(setup, range(first, first + 10), None)
+    return time.process_time() - begun, table.to_dict("records")
 
 
 def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:

@@ -34,6 +34,7 @@ Zones = Callable[[Ellipse], Ellipse]
 BODY = Ellipse((0.0, 0.0), (BODY_RADIUS, BODY_RADIUS))
 """The zone of people for whom neither they nor the controller have one: their body alone."""
 _ABSENT = (np.nan,) * 5
+_NO_PLAN = np.zeros((0, 4))
 
 
 def simulate(
@@ -112,30 +113,30 @@ def drive(
     goal, dt, rng = scenario.goal, s.dt, np.random.default_rng([seed, 2])
     gx, gy = goal.tolist()
     controller.reset()
-    own, states, steps, true = robot.start(scenario.start), [], [], []
-    given: list[list[int]] = []
-    took: list[float] = []
+    own, numbers = robot.start(scenario.start), list[float | None]()
+    rows: list[tuple[Any, ...]] = []
     for k in range(round(end / dt) + 1):
         state = robot.body(own)
         everybody = cast.zoned(crowd(k * dt, state))
-        there = {i: person for i, person in enumerate(everybody) if person is not None}
-        seen = behaviour.seen(tuple(there.values()), rng)
-        known = {i: person for i, person in zip(there, seen, strict=True) if person is not None}
-        given.append(list(known))
+        for p in everybody:
+            numbers += _ABSENT if p is None else (*p.position, p.heading, *p.velocity)
+        there = [i for i, p in enumerate(everybody) if p is not None]
+        seen = behaviour.seen(tuple([p for p in everybody if p is not None]), rng)
+        given = [i for i, p in zip(there, seen, strict=True) if p is not None]
+        known = tuple([p for p in seen if p is not None])
         began = perf_counter()
-        steps.append(controller.step(own, goal, tuple(known.values())))
-        took.append(perf_counter() - began)
-        states.append(state)
-        true.append([_ABSENT if p is None else (*p.position, p.heading, *p.velocity) for p in everybody])
+        step = controller.step(own, goal, known)
+        told = _told(step, perf_counter() - began)
+        rows.append((state, given, *told))
         x, y, vx, vy = state.tolist()
         if until_arrival and hypot(vx, vy) <= STOPPED and hypot(x - gx, y - gy) <= GOAL_RADIUS:
             break
-        control = np.asarray(steps[-1].control, float)
+        control = told[0]
         if not all(map(isfinite, control.tolist())):
             raise SolverError(f"{scenario.name!r}: the controller gave {control.tolist()} at {k * dt:g} s")
         own = robot.advance(own, control, dt)
-    at = _facing(np.reshape(np.array(true, float), (len(states), len(everybody), 5)))
-    return _log(scenario, s, cast.kept(len(everybody)), np.array(states), at, steps, took, given, robot)
+    true = _facing(np.reshape(np.array(numbers, float), (len(rows), len(everybody), 5)))
+    return _log(scenario, s, cast.kept(len(everybody)), rows, true, robot)
 
 
 def _facing(people: Array) -> Array:
@@ -193,60 +194,73 @@ class _Cast:
         return tuple(self.zone(i, None) for i in range(size))
 
 
+def _told(step: StepLike, took: float) -> tuple[Any, ...]:
+    """What is logged of a step, empty where it does not tell it: control, plan, conditions, rung, whether it
+    is safe, slack, time. The step itself is let go: a thousand objects that stay cost a garbage collection.
+    """
+    return (
+        np.asarray(step.control, float),
+        np.asarray(getattr(step, "predicted", _NO_PLAN), float),
+        getattr(step, "residual", None),
+        getattr(step, "rung", ""),
+        getattr(step, "safe", None),
+        getattr(step, "slack", np.nan),
+        getattr(step, "solve_time", took),
+    )
+
+
 def _log(
     scenario: Scenario,
     settings: MPCSettings,
     kept: tuple[Ellipse, ...],
-    states: Array,
+    rows: list[tuple[Any, ...]],
     people: Array,
-    steps: list[StepLike],
-    took: list[float],
-    given: list[list[int]],
     robot: Robot,
 ) -> SimulationLog:
-    """What the run was, with what the controller does not tell left empty."""
+    """What the run was: a row is a state, who was given to the controller, and what the step told."""
+    way, given, *told = zip(*rows, strict=True)
+    controls, plans, residual, rung, safe, slack, solve_time = told
+    states = np.array(way)
     away = states - np.r_[scenario.goal, 0.0, 0.0]
     there = (np.hypot(*away[:, :2].T) <= GOAL_RADIUS) & (np.hypot(*away[:, 2:].T) <= STOPPED)
-    controls = np.array([step.control for step in steps], float)
-    inputs = getattr(robot, "inputs", None) or [f"control_{i}" for i in range(controls.shape[1])]
-    times = [getattr(step, "solve_time", time) for step, time in zip(steps, took, strict=True)]
+    inputs = getattr(robot, "inputs", None) or [f"control_{i}" for i in range(len(controls[0]))]
     return SimulationLog(
         scenario=scenario,
         settings=settings,
         zones=kept,
         states=states,
-        controls=controls,
+        controls=np.array(controls),
         people=people,
-        predicted=_plans(steps),
-        residual=_residuals(steps, given, people.shape[1], len(scenario.walls)),
-        rung=np.array([getattr(step, "rung", "") for step in steps]),
-        safe=np.array([bool(getattr(step, "safe", False)) for step in steps]),
-        slack=np.array([getattr(step, "slack", np.nan) for step in steps]),
-        solve_time=np.array(times),
+        predicted=_plans(plans),
+        residual=_residuals(residual, given, people.shape[1], len(scenario.walls)),
+        rung=np.array(rung),
+        safe=np.array(safe, bool),
+        slack=np.array(slack),
+        solve_time=np.array(solve_time),
         arrived=int(there.argmax()) if there.any() else None,
-        promises=hasattr(steps[0], "safe"),
+        promises=safe[0] is not None,
         inputs=tuple(inputs),
     )
 
 
-def _plans(steps: list[StepLike]) -> Array:
+def _plans(plans: Sequence[Array]) -> Array:
     """The plan of each step, shape (n, N+1, 4); (n, 0, 4) if there is none, NaN after the shorter ones."""
-    plans = [np.asarray(getattr(step, "predicted", np.zeros((0, 4))), float) for step in steps]
     longest = max(map(len, plans))
     if all(len(plan) == longest for plan in plans):
         return np.array(plans)
     return np.array([np.pad(p, ((0, longest - len(p)), (0, 0)), constant_values=np.nan) for p in plans])
 
 
-def _residuals(steps: list[StepLike], given: list[list[int]], people: int, walls: int) -> Array:
+def _residuals(rows: Sequence[Any], given: Sequence[list[int]], people: int, walls: int) -> Array:
     """The conditions of each step, shape (n, P+W, N_h), NaN for whom it was not given; else (n, P+W, 0).
 
     A step has a row for everybody it was given, then for whoever it remembers besides, then for each wall.
     """
-    rows: list[Any] = [getattr(step, "residual", None) for step in steps]
     if any(row is None for row in rows):
-        return np.zeros((len(steps), people + walls, 0))
-    full = np.full((len(steps), people + walls, rows[0].shape[1]), np.nan)
+        return np.zeros((len(rows), people + walls, 0))
+    if all(len(row) == len(of) + walls == people + walls for row, of in zip(rows, given, strict=True)):
+        return np.array(rows)
+    full = np.full((len(rows), people + walls, rows[0].shape[1]), np.nan)
     for each, row, of in zip(full, rows, given, strict=True):
         if len(row) < len(of) + walls:
             raise SolverError(

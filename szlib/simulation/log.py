@@ -6,7 +6,7 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +15,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..control.barriers import Array, barrier, ellipse_distance, segment_distance
-from ..control.distances import euclidean_to_segment, wall_margin
+from ..control.barriers import (
+    Array,
+    barrier,
+    ellipse_formula,
+    euclidean_segment_formula,
+    segment_formula,
+)
+from ..control.distances import wall_margin
 from ..control.people import BODY_RADIUS, Person
 from ..control.settings import MPCSettings
 from ..control.step import status_of
@@ -121,19 +127,23 @@ class SimulationLog:
     @cached_property
     def h(self) -> Array:
         """Barriers with people as they truly were, people before walls, shape (n, P+W) [m]."""
-        d = [self.to_person(i, partial(ellipse_distance, ellipse=z)) for i, z in enumerate(self.zones)]
-        d += [segment_distance(self.states[:, :2], *wall) for wall in self.scenario.walls]
-        distances, s = np.reshape(d, (len(d), len(self.states))).T, self.settings
-        margins = [s.eps] * len(self.zones) + [wall_margin(wall, s) for wall in self.scenario.walls]
+        s, walls = self.settings, self.scenario.walls
+        zones = np.reshape([(*zone.foci.flat, zone.semi_axes[0]) for zone in self.zones], (-1, 5))
+        to_people = ellipse_formula(self.relative[..., 0], self.relative[..., 1], *zones.T)
+        margins = [s.eps] * len(zones) + [wall_margin(wall, s) for wall in walls]
+        distances = np.hstack([to_people, self._to_walls(segment_formula)])
         return np.asarray(barrier(distances, s.r_robot, np.array(margins)))
 
     @cached_property
     def clearance(self) -> Array:
         """Euclidean gaps from the robot's disc to bodies (of `BODY_RADIUS`) and walls, (n, P+W) [m]."""
         to_people = np.hypot(self.relative[..., 0], self.relative[..., 1]) - BODY_RADIUS
-        to_walls = [euclidean_to_segment(self.states[:, :2], *wall) for wall in self.scenario.walls]
-        gaps = [*to_people.T, *to_walls]
-        return np.reshape(gaps, (len(gaps), len(self.states))).T - self.settings.r_robot
+        return np.hstack([to_people, self._to_walls(euclidean_segment_formula)]) - self.settings.r_robot
+
+    def _to_walls(self, distance: Callable[..., Array]) -> Array:
+        """A distance of the robot to each wall, shape (n, W) [m]."""
+        x, y = self.states[:, :1], self.states[:, 1:2]
+        return distance(x, y, *self.scenario.walls.reshape(-1, 4).T)
 
     @cached_property
     def cbf_people(self) -> Array:

@@ -88,6 +88,8 @@ class Person:
 
     def after(self, seconds: float) -> Person:
         """The same person, so many seconds later."""
+        if self.stands:
+            return self
         (x, y), (vx, vy) = self.position, self.velocity
         return self.at((x + vx * seconds, y + vy * seconds))
 
@@ -120,12 +122,10 @@ class PlacedZone(NamedTuple):
 
 def place(person: Person, zone: Ellipse) -> PlacedZone:
     """The zone, of the person's own frame, around a person; of unknown heading: `circle_around` it."""
-    (x, y), heading = person.position, person.heading
+    (x, y), (vx, vy), heading = person.position, person.velocity, person.heading
     if heading is None:
         zone, heading = circle_around(zone), 0.0
-    c, s = cos(heading), sin(heading)
-    ma, na, mb, nb, a = zone.numbers
-    xa, ya = x + ma * c - na * s, y + ma * s + na * c
-    xb, yb = x + mb * c - nb * s, y + mb * s + nb * c
+    c, s, (ma, na, mb, nb, a) = cos(heading), sin(heading), zone.numbers
+    xa, ya, xb, yb = x + ma * c - na * s, y + ma * s + na * c, x + mb * c - nb * s, y + mb * s + nb * c
     # The constructor of a named tuple would take as long as all of this.
-    return tuple.__new__(PlacedZone, (xa, ya, xb, yb, a, *person.velocity))
+    return tuple.__new__(PlacedZone, (xa, ya, xb, yb, a, vx, vy))

@@ -48,9 +48,10 @@ class Scene(NamedTuple):
 
     def gaps(self, x: float, y: float, seconds: float) -> list[float]:
         """Euclidean gaps from the robot's disc at (x, y) to bodies, so many seconds ahead, and walls [m]."""
-        gaps = []
+        gaps, radius = [], self.settings.r_robot
         for person in self.people:
             (px, py), (vx, vy) = person.position, person.velocity
-            gaps.append(hypot(x - px - seconds * vx, y - py - seconds * vy) - BODY_RADIUS)
-        gaps += [euclidean_segment_formula(x, y, *wall) for wall in self.walls]
-        return [gap - self.settings.r_robot for gap in gaps]
+            gaps.append(hypot(x - px - seconds * vx, y - py - seconds * vy) - BODY_RADIUS - radius)
+        for xa, ya, xb, yb in self.walls:
+            gaps.append(euclidean_segment_formula(x, y, xa, ya, xb, yb) - radius)
+        return gaps

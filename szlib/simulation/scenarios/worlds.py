@@ -6,22 +6,25 @@ A world is a `Scenario` like the paper's four. World frame, metres and seconds.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, pi, sin
+from math import cos, dist, pi, sin
 
 import numpy as np
 
-from ...control.barriers import Array, barrier, ellipse_distance, segment_distance
-from ...control.distances import euclidean_to_segment, with_margin
+from ...control.barriers import Array, barrier, euclidean_segment_formula, segment_formula
+from ...control.distances import required_margin
 from ...control.people import BODY_RADIUS, Person
+from ...control.people.person import PlacedZone, place
 from ...control.settings import MPCSettings
 from ...errors import SolverError
 from ...zones.ellipses import Ellipse
 from ..scenario import Scenario
 
+_DRIVER = MPCSettings()
+"""Of the robot for which there has to be room."""
 _TRIES = 5_000
 """Draws after which a world is given up as impossible; a usual one takes fewer than a hundred."""
-_PATH_SAMPLES = 31
-"""Points of a person's path at which it is held clear of walls."""
+_ALONG = np.linspace(0, 1, 31)[:, None]
+"""Where a person's path is held clear of walls, from its start to its end."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +106,12 @@ def world(seed: int, worlds: Worlds | None = None) -> Scenario:
         velocity = speed * np.array([cos(heading), sin(heading)])
         if not w.travel[0] <= np.hypot(*(goal - x)) <= w.travel[1]:
             continue
-        s = with_margin(MPCSettings(), walls)
-        stop = x + velocity * speed / (2 * s.a_max)
-        standing = [person for person in people if person.stands]
-        if min(_h(x, people, walls, s), _h(stop, people, walls, s), _h(goal, standing, walls, s)) >= w.min_h:
+        eps = max([_DRIVER.eps, *(required_margin(wall, _DRIVER.r_robot) for wall in walls)])
+        everybody = [place(person, zone) for person in people]
+        standing = [where for where, person in zip(everybody, people, strict=True) if person.stands]
+        stop = x + velocity * speed / (2 * _DRIVER.a_max)
+        held = ((x, everybody), (stop, everybody), (goal, standing))
+        if all(_h(point, zones, walls, eps) >= w.min_h for point, zones in held):
             return Scenario(
                 name=f"world {seed}",
                 title=f"World {seed}",
@@ -139,29 +144,25 @@ def _walls(rng: np.random.Generator, w: Worlds) -> Array:
 def _people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellipse) -> list[Person]:
     """People one by one, each off the walls and off those before; fewer where there is no room."""
     people: list[Person] = []
+    times, ends = w.duration * _ALONG, walls.reshape(-1, 4).T
     for _ in range(int(rng.integers(*w.people, endpoint=True))):
         for _ in range(100):
-            position, heading = rng.uniform(-w.size / 2, w.size / 2, 2), rng.uniform(-pi, pi)
+            x, y = rng.uniform(-w.size / 2, w.size / 2, 2).tolist()
+            heading = rng.uniform(-pi, pi)
             pace = 0.0 if rng.uniform() < w.standing else rng.uniform(*w.pace)
-            velocity = pace * np.array([cos(heading), sin(heading)])
-            path = position + np.linspace(0, w.duration, _PATH_SAMPLES)[:, None] * velocity
-            off_walls = all(euclidean_to_segment(path, *wall).min() >= BODY_RADIUS for wall in walls)
-            apart = all(np.hypot(*(position - p.position)) >= 2 * BODY_RADIUS for p in people)
-            if off_walls and apart:
-                at, moves = (float(position[0]), float(position[1])), (float(velocity[0]), float(velocity[1]))
-                people.append(Person(at, moves, heading, zone))
+            vx, vy = pace * cos(heading), pace * sin(heading)
+            if any(dist((x, y), other.position) < 2 * BODY_RADIUS for other in people):
+                continue
+            path = x + vx * times, y + vy * times
+            if not len(walls) or (euclidean_segment_formula(*path, *ends) >= BODY_RADIUS).all():
+                people.append(Person((x, y), (vx, vy), heading, zone))
                 break
     return people
 
 
-def _h(point: Array, people: list[Person], walls: Array, s: MPCSettings) -> float:
+def _h(point: Array, zones: list[PlacedZone], walls: Array, eps: float) -> float:
     """Smallest h of anybody or any wall [m]."""
-    distances = [ellipse_distance(point, _placed(person)) for person in people]
-    distances += [segment_distance(point, *wall) for wall in walls]
-    return float(barrier(min(distances, default=np.inf), s.r_robot, s.eps))
-
-
-def _placed(person: Person) -> Ellipse:
-    if not isinstance(person.zone, Ellipse):
-        raise SolverError(f"a person of a random world needs an Ellipse as zone; got {person.zone!r}")
-    return person.zone.placed(person.position, person.heading or 0.0)
+    x, y = point.tolist()
+    distances = [zone.distance(x, y) for zone in zones]
+    distances += [segment_formula(x, y, *ends) for ends in walls.reshape(-1, 4).tolist()]
+    return float(barrier(min(distances, default=np.inf), _DRIVER.r_robot, eps))
