@@ -20,7 +20,7 @@ from ...tracks.readers import merge, person_order, read_raw, read_stage
 from ..geometry import Area
 from ..kinds import REACH
 from . import kept_rows
-from .blocks import Blocks, Rows, Tally
+from .blocks import Blocks, Rows, Tally, quick_scan
 from .cells import Cells, Unsorted, one_pass, two_passes
 
 Content = Callable[[], tuple[int, str]]
@@ -60,14 +60,15 @@ def read_near_square(
             if layout.name == "atc-raw":
                 metres = layout.metres_in(unit)
                 cells = Cells(square.grown(REACH).box, duration, max_gap or layout.max_gap or 0.0, metres)
-                near, seen = _near(scan, path, layout, cells, content)
+                blocks = Blocks(quick_scan(plain, layout), scan, metres, layout.seconds)
+                near, seen = _near(blocks, path, layout, cells, content)
                 return _table(near, seen, path, layout, metres, unit=unit, tz=tz)
     given = {"file_format": file_format, "unit": unit, "frame_rate": frame_rate, "columns": columns}
     return read_raw(path, tz=tz, **given)  # type: ignore[arg-type]
 
 
 def _near(
-    scan: pl.LazyFrame, path: Path, layout: Format, cells: Cells, content: Content | None
+    blocks: Blocks, path: Path, layout: Format, cells: Cells, content: Content | None
 ) -> tuple[pl.DataFrame, Tally]:
     """The rows near the square, from the cache where they are kept, and what was seen of the file."""
     which = {"format": asdict(layout), "cells": asdict(cells)}
@@ -76,7 +77,6 @@ def _near(
         if known:
             return pl.DataFrame(known[0]._asdict()), known[1]
     with readable(path, layout):
-        blocks = Blocks(scan, cells.metres, layout.seconds)
         try:
             parts = _gather(one_pass(cells, blocks), path)
         except Unsorted:
