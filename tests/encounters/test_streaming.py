@@ -16,7 +16,7 @@ from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
-from szlib.tracks.formats.layouts import recognise
+from szlib.tracks.formats.layouts import quick_scan, recognise
 from szlib.tracks.readers import read_raw
 
 SPACE = szlib.AttentionalSpace(length=2.5, width=2.0)
@@ -164,7 +164,7 @@ def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.Monk
     lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
     path.write_bytes("\n".join(lines).encode("latin-1"))
     layout, scan = recognise(path, path, None)
-    found = blocks.Blocks(blocks.quick_scan(path, layout), scan, layout.metres, layout.seconds)
+    found = blocks.Blocks(quick_scan(path, layout), scan, layout.metres, layout.seconds)
     rows = blocks.Rows(*map(np.concatenate, zip(*found, strict=True)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)

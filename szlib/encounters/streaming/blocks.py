@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import polars as pl
 
-from ...tracks.formats.layouts import Format
-from ...tracks.formats.plain import LONGEST_LINE
 from ...tracks.formats.rows import fault, limits
 
 _ROWS_AT_ONCE = 1 << 17
@@ -44,31 +40,11 @@ class Tally:
     first: tuple[int, str] | None = None
 
 
-def quick_scan(plain: Path, layout: Format) -> pl.LazyFrame:
-    """The rows of a CSV file as from `recognise`, in two thirds of the time, up to one that is not clean.
-
-    Fields are read as what they are in the first row, whole numbers or others.  A row has null where one is
-    missing, and `ragged` where the last one is; one that has other fields, or more, is an error of Polars.
-    """
-    with plain.open("rb") as stream:
-        first = stream.readline(LONGEST_LINE).decode("utf-8", errors="replace").split(layout.separator)
-    whole = [text.lstrip("-").isdecimal() for text in first] + [False] * layout.fields
-    types = {f"f{k}": pl.Int64 if whole[k] else pl.Float64 for k in range(layout.fields)}
-    scan = pl.scan_csv(
-        plain, schema={**types, "extra": pl.Boolean}, has_header=False, quote_char=None,
-        truncate_ragged_lines=True, missing_columns="insert", extra_columns="ignore",
-        raise_if_empty=False, glob=False,
-    )  # fmt: skip
-    ragged = pl.col("extra").is_not_null() | pl.col(f"f{layout.fields - 1}").is_null()
-    numbers = {name: pl.col(f"f{k}").cast(pl.Float64) for name, k in layout.columns.items()}
-    return scan.select(ragged=ragged, **numbers)
-
-
 @dataclass
 class Blocks:
     """A scan's usable rows, block by block in the order of the file; `tally` counts what was seen.
 
-    `quick` is that of `quick_scan`, and is read as far as every row of it is usable.
+    `quick` is a faster scan of the same file, which is read as far as every row of it is usable.
     """
 
     quick: pl.LazyFrame
@@ -79,15 +55,14 @@ class Blocks:
 
     def __iter__(self) -> Iterator[Rows]:
         self.tally, seen = Tally(), 0
-        with suppress(pl.exceptions.PolarsError):
-            for block in _batches(self.quick):
-                rows = _numbers(block)
-                if not self._spotless(block, rows):
-                    break
-                seen += block.height
-                yield self._counted(rows)
-            else:
-                return
+        for block in _batches(self.quick):
+            rows = _numbers(block)
+            if not self._spotless(block, rows):
+                break
+            seen += block.height
+            yield self._counted(rows)
+        else:
+            return
         for block in _batches(self.scan.slice(seen)):
             if len((rows := self._usable(block, seen)).t):
                 yield self._counted(rows)
@@ -125,7 +100,8 @@ def _batches(scan: pl.LazyFrame) -> Iterator[pl.DataFrame]:
 
 
 def _numbers(block: pl.DataFrame) -> Rows:
-    return Rows(*(block[name].to_numpy() for name in Rows._fields))  # NaN where there is no number
+    """Its numbers; NaN where there is none."""
+    return Rows(*(block[name].to_numpy().astype(float, copy=False) for name in Rows._fields))
 
 
 def _farthest(values: np.ndarray) -> float:

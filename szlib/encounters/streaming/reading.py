@@ -12,7 +12,7 @@ import polars as pl
 
 from ... import memory
 from ...tracks import funnels
-from ...tracks.formats.layouts import Columns, Format, readable, recognise
+from ...tracks.formats.layouts import Columns, Format, quick_scan, readable, recognise
 from ...tracks.formats.plain import plain_file
 from ...tracks.formats.rows import in_metres
 from ...tracks.plausible import check_unit
@@ -20,7 +20,7 @@ from ...tracks.readers import merge, person_order, read_raw, read_stage
 from ..geometry import Area
 from ..kinds import REACH
 from . import kept_rows
-from .blocks import Blocks, Rows, Tally, quick_scan
+from .blocks import Blocks, Rows, Tally
 from .cells import Cells, Unsorted, one_pass, two_passes
 
 Content = Callable[[], tuple[int, str]]
@@ -69,38 +69,41 @@ def read_near_square(
 
 def _near(
     blocks: Blocks, path: Path, layout: Format, cells: Cells, content: Content | None
-) -> tuple[pl.DataFrame, Tally]:
+) -> tuple[Rows, Tally]:
     """The rows near the square, from the cache where they are kept, and what was seen of the file."""
     which = {"format": asdict(layout), "cells": asdict(cells)}
     if content and kept_rows.may_be_kept(path.stat().st_size, which):
         known = kept_rows.find(content(), which)
         if known:
-            return pl.DataFrame(known[0]._asdict()), known[1]
+            return known
     with readable(path, layout):
         try:
             parts = _gather(one_pass(cells, blocks), path)
         except Unsorted:
             parts = _gather(two_passes(cells, blocks), path)
-    near = Rows(*map(np.concatenate, zip(*parts, strict=True)))
-    near = near.at(person_order(near.id))
+    order = person_order(np.concatenate([rows.id for rows in parts]))
+    near = Rows(*(np.concatenate(values)[order] for values in zip(*parts, strict=True)))
     if content:
         kept_rows.remember(content(), which, near, blocks.tally)
-    return pl.DataFrame(near._asdict()), blocks.tally
+    return near, blocks.tally
 
 
 def _table(
-    near: pl.DataFrame, seen: Tally, path: Path, layout: Format, metres: float, *, unit: str | None, tz: str
+    near: Rows, seen: Tally, path: Path, layout: Format, metres: float, *, unit: str | None, tz: str
 ) -> pd.DataFrame:
-    """The rows as from `read_raw`, with the funnel of the whole file."""
+    """The rows, whose memory it takes, as from `read_raw`, with the funnel of the whole file."""
     stage = read_stage(path, layout, seen.good, dict(seen.reasons), seen.first)
     if unit is None:
         check_unit(pl.DataFrame({"x": [seen.reach], "y": [0.0]}), layout, path)
-    far = {"never near the square": seen.good - near.height}
-    stages = [stage, funnels.stage("near the square", seen.good, near.height, far)]
-    if near.height == 0:
+    far = {"never near the square": seen.good - len(near.t)}
+    stages = [stage, funnels.stage("near the square", seen.good, len(near.t), far)]
+    if len(near.t) == 0:
         empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
         return funnels.carry(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
-    return merge([in_metres(near, path, layout, metres, tz)], stages, [layout], [])
+    for values in (near.x, near.y):
+        values *= metres
+    rows = in_metres(pl.DataFrame(near._asdict()), path, layout, 1.0, tz)
+    return merge([rows], stages, [layout], [], copy=False)
 
 
 def _gather(blocks: Iterator[Rows], path: Path) -> list[Rows]:

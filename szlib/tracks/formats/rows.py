@@ -32,9 +32,10 @@ def in_metres(good: pl.DataFrame, path: Path, layout: Format, metres: float, tz:
     return good.select(
         "day",
         pl.col("id").cast(pl.Int64),
-        pl.col("t") * layout.seconds,
-        pl.col("x") * metres,
-        pl.col("y") * metres,
+        *(
+            pl.col(name) if unit == 1 else pl.col(name) * unit
+            for name, unit in (("t", layout.seconds), ("x", metres), ("y", metres))
+        ),
     )
 
 
