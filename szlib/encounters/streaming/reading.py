@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -23,8 +23,6 @@ from . import kept_rows
 from .blocks import Blocks, Rows, Tally
 from .cells import Cells, Unsorted, one_pass, two_passes
 
-Content = Callable[[], tuple[int, str]]
-"""Gives size and checksum of a file, once they are known."""
 _NEAR_ROW = 180
 """Bytes that a row near the square takes until its day is done (15.6 million of them: 2.7 GB)."""
 
@@ -40,7 +38,7 @@ def read_near_square(
     max_gap: float | None = None,
     tz: str = "Asia/Tokyo",
     columns: Columns | None = None,
-    content: Content | None = None,
+    content: kept_rows.Content | None = None,
 ) -> pd.DataFrame:
     """The rows of a file that encounters in the square can depend on, as from `tracks.readers.read_raw`.
 
@@ -68,14 +66,12 @@ def read_near_square(
 
 
 def _near(
-    blocks: Blocks, path: Path, layout: Format, cells: Cells, content: Content | None
+    blocks: Blocks, path: Path, layout: Format, cells: Cells, content: kept_rows.Content | None
 ) -> tuple[Rows, Tally]:
     """The rows near the square, from the cache where they are kept, and what was seen of the file."""
     which = {"format": asdict(layout), "cells": asdict(cells)}
-    if content and kept_rows.may_be_kept(path.stat().st_size, which):
-        known = kept_rows.find(content(), which)
-        if known:
-            return known
+    if content and (known := kept_rows.find(path.stat().st_size, which, content)):
+        return known
     with readable(path, layout):
         try:
             parts = _gather(one_pass(cells, blocks), path)
