@@ -145,15 +145,14 @@ def _on_clock(t: np.ndarray, x: np.ndarray, y: np.ndarray, within: np.ndarray) -
     """The ticks of whole pieces: t, x, y, vx, vy, the row just before each; and how many rows are covered."""
     piece = np.cumsum(~within) - 1
     row, tick = _ticks(t, piece)
-    after = np.where(np.r_[within[1:], False][row], row + 1, row)
-    span = np.where(after > row, t[after] - t[row], 1.0)
-    weight = np.clip((tick / TICKS_PER_SECOND - t[row]) / span, 0.0, 1.0)
+    after = row + np.r_[within[1:], False][row]
+    moment, before, of = tick / TICKS_PER_SECOND, t[row], piece[row]
+    weight = np.clip((moment - before) / np.where(after > row, t[after] - before, 1.0), 0.0, 1.0)
     x, y = (values[row] + weight * (values[after] - values[row]) for values in (x, y))
-    vx, vy = _velocities(piece[row], x, y)
+    vx, vy = _velocities(of, x, y)
     any_tick = np.zeros(piece[-1] + 1, bool)
-    any_tick[piece[row]] = True
-    moved = {"x": x, "y": y, "vx": vx, "vy": vy}
-    return {"row": row, "t": tick / TICKS_PER_SECOND, **moved, "covered": any_tick[piece].sum()}
+    any_tick[of] = True
+    return {"row": row, "t": moment, "x": x, "y": y, "vx": vx, "vy": vy, "covered": any_tick[piece].sum()}
 
 
 def check_columns(frame: pd.DataFrame, needed: Sequence[str]) -> None:
@@ -240,10 +239,10 @@ def _ticks(t: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
     count = np.maximum(end - first, 0)
     row = np.repeat(np.arange(len(t)), count)
-    tick = first[row] + np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    tick = np.arange(len(row)) + np.repeat(first - np.cumsum(count) + count, count)
     # the row just before a tick must not be the last of its piece, or there is nothing to interpolate to
     alone = last_of_piece & np.r_[True, last_of_piece[:-1]]
-    return np.where(last_of_piece[row] & ~alone[row], row - 1, row), tick
+    return row - (last_of_piece & ~alone)[row], tick
 
 
 def _velocities(piece: np.ndarray, *positions: np.ndarray) -> Iterator[np.ndarray]:
