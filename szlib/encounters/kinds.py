@@ -79,7 +79,7 @@ def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, square: object
         found = pairs[["day", "ref_id", "other_id"]].iloc[int(np.flatnonzero(lost)[0])].to_dict()
         raise DataError(f"{found}: not in these tracks; pass the tracks in which the pairs were found")
     there = np.ones(len(x), bool) if square is None else as_area(square).grown(REACH).contains(x, y)
-    return kinds_of_pairs(ref, other, person, tick, np.column_stack([x, y]), np.column_stack([vx, vy]), there)
+    return kinds_of_pairs(ref, other, person, tick, (x, y), (vx, vy), there)
 
 
 def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.DataFrame:
@@ -115,21 +115,21 @@ def kinds_of_pairs(
     second: np.ndarray,
     person: np.ndarray,
     tick: np.ndarray,
-    position: np.ndarray,
-    velocity: np.ndarray,
+    position: tuple[np.ndarray, np.ndarray],
+    velocity: tuple[np.ndarray, np.ndarray],
     there: np.ndarray,
 ) -> pd.Categorical:
     """The kinds of pairs of people (numbers, each (n,)) from rows sorted by person and tick.
 
-    `person`, `tick` and `there` (whether the row counts) have shape (rows,), `position` [m] and `velocity`
-    [m/s] (rows, 2).
+    `person`, `tick`, `there` (whether the row counts), and x and y of `position` [m] and `velocity` [m/s]
+    have shape (rows,).
     """
     pairs, of = np.unique(np.sort(np.column_stack([first, second]), axis=1), axis=0, return_inverse=True)
     pair, a, b = _common_track(pairs, person, tick, there)
-    apart = np.hypot(*(position[a] - position[b]).T)
-    relative = np.hypot(*(velocity[a] - velocity[b]).T)
-    slow = [np.hypot(*velocity[rows].T) < WALKING for rows in (a, b)]
-    (ax, ay), (bx, by) = np.nan_to_num(velocity[a]).T, np.nan_to_num(velocity[b]).T
+    apart = np.hypot(*(each[a] - each[b] for each in position))
+    relative = np.hypot(*(each[a] - each[b] for each in velocity))
+    slow = [np.hypot(*(each[rows] for each in velocity)) < WALKING for rows in (a, b)]
+    (ax, ay), (bx, by) = ([np.nan_to_num(each[rows]) for each in velocity] for rows in (a, b))
 
     def over_time(values: np.ndarray) -> np.ndarray:
         """Sum of the values of each pair, over the ticks at which both are there."""

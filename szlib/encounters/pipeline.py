@@ -33,7 +33,8 @@ from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, S
 from .kinds import KINDS
 from .search.finding import find_encounters
 from .search.samples import SAMPLE_COLUMNS
-from .streaming.reading import Content, read_near_square
+from .streaming.kept_rows import Content
+from .streaming.reading import read_near_square
 
 _ADVICE = {
     "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',

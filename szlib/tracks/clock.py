@@ -111,16 +111,16 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
     if not is_sorted(person, t):
         order = np.lexsort((t, person))
         raw, person, t = raw.iloc[order], person[order], t[order]
-    same, step = np.r_[False, person[1:] == person[:-1]], np.diff(t, prepend=np.nan)
+    same, step = person[1:] == person[:-1], np.diff(t)  # of each row but the first, after the one before
     if (doubled := same & (step <= 0)).any():
-        at = int(np.flatnonzero(doubled)[0])
+        at = int(np.flatnonzero(doubled)[0]) + 1
         raise DataError(f"person {raw['id'].iloc[at]} has two rows at t = {t[at]} s; keep one of them")
     if max_gap is None:
         max_gap = _usual_gap(step[same], raw.attrs.get("max_gap"))
     if not max_gap > 1 / TICKS_PER_SECOND:
         raise DataError(f"max_gap must be a time in seconds, longer than the clock's 0.1 s; got {max_gap}")
-    within = same & (step <= max_gap + _ROUNDING)
-    ticks = float(step[within].sum()) * TICKS_PER_SECOND
+    within = np.r_[False, same & (step <= max_gap + _ROUNDING)]
+    ticks = float(step.sum(where=within[1:])) * TICKS_PER_SECOND
     memory.require(ticks * _TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows")
     x, y = raw["x"].to_numpy(float), raw["y"].to_numpy(float)
     blocks = [(_on_clock(t[rows], x[rows], y[rows], within[rows]), rows.start) for rows in _blocks(within)]
@@ -145,15 +145,14 @@ def _on_clock(t: np.ndarray, x: np.ndarray, y: np.ndarray, within: np.ndarray) -
     """The ticks of whole pieces: t, x, y, vx, vy, the row just before each; and how many rows are covered."""
     piece = np.cumsum(~within) - 1
     row, tick = _ticks(t, piece)
-    after = np.where(np.r_[within[1:], False][row], row + 1, row)
-    span = np.where(after > row, t[after] - t[row], 1.0)
-    weight = np.clip((tick / TICKS_PER_SECOND - t[row]) / span, 0.0, 1.0)
+    after = row + np.r_[within[1:], False][row]
+    moment, before, of = tick / TICKS_PER_SECOND, t[row], piece[row]
+    weight = np.clip((moment - before) / np.where(after > row, t[after] - before, 1.0), 0.0, 1.0)
     x, y = (values[row] + weight * (values[after] - values[row]) for values in (x, y))
-    vx, vy = _velocities(piece[row], x, y)
+    vx, vy = _velocities(of, x, y)
     any_tick = np.zeros(piece[-1] + 1, bool)
-    any_tick[piece[row]] = True
-    moved = {"x": x, "y": y, "vx": vx, "vy": vy}
-    return {"row": row, "t": tick / TICKS_PER_SECOND, **moved, "covered": any_tick[piece].sum()}
+    any_tick[of] = True
+    return {"row": row, "t": moment, "x": x, "y": y, "vx": vx, "vy": vy, "covered": any_tick[piece].sum()}
 
 
 def check_columns(frame: pd.DataFrame, needed: Sequence[str]) -> None:
@@ -203,7 +202,8 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
 def _check_values(frame: pd.DataFrame) -> None:
     """Raise DataError where a row has no person, or no finite time and position."""
     good = frame["day"].notna().to_numpy() & frame["id"].notna().to_numpy()
-    good &= np.abs(frame["t"].to_numpy(float)) < _LAST_SECOND
+    t = frame["t"].to_numpy(float)
+    good &= (t > -_LAST_SECOND) & (t < _LAST_SECOND)
     for name in ("x", "y"):
         good &= np.isfinite(frame[name].to_numpy(float))
     if not good.all():
@@ -239,10 +239,10 @@ def _ticks(t: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
     count = np.maximum(end - first, 0)
     row = np.repeat(np.arange(len(t)), count)
-    tick = first[row] + np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    tick = np.arange(len(row)) + np.repeat(first - np.cumsum(count) + count, count)
     # the row just before a tick must not be the last of its piece, or there is nothing to interpolate to
     alone = last_of_piece & np.r_[True, last_of_piece[:-1]]
-    return np.where(last_of_piece[row] & ~alone[row], row - 1, row), tick
+    return row - (last_of_piece & ~alone)[row], tick
 
 
 def _velocities(piece: np.ndarray, *positions: np.ndarray) -> Iterator[np.ndarray]:
@@ -258,10 +258,12 @@ def _velocities(piece: np.ndarray, *positions: np.ndarray) -> Iterator[np.ndarra
 
 
 def _person_codes(frame: pd.DataFrame) -> np.ndarray:
-    """One integer for each (day, id), ordered by day, then id."""
-    day = pd.factorize(frame["day"], sort=True)[0].astype(np.int64)
-    person, people = pd.factorize(frame["id"], sort=True)
-    return np.asarray(day * len(people) + person)
+    """One integer for each (day, id), ordered by day, then id; looked up once for rows in succession."""
+    days, ids = frame["day"].array, frame["id"].to_numpy()
+    begins = np.flatnonzero(np.r_[True, (ids[1:] != ids[:-1]) | np.asarray(days[1:] != days[:-1])])
+    day = pd.factorize(days[begins], sort=True)[0].astype(np.int64)
+    person, people = pd.factorize(ids[begins], sort=True)
+    return np.repeat(day * len(people) + person, np.diff(begins, append=len(ids)))
 
 
 def _order(person: np.ndarray, time: np.ndarray) -> np.ndarray:

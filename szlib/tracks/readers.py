@@ -66,8 +66,13 @@ def merge(
     stages: Sequence[dict[str, Any]],
     layouts: Sequence[Format],
     excluded: Sequence[str],
+    *,
+    copy: bool = True,
 ) -> pd.DataFrame:
-    """Rows (day, id, t, x, y) of all files as one table as from `read_raw`: sorted, without duplicates."""
+    """Rows (day, id, t, x, y) of all files as one table as from `read_raw`: sorted, without duplicates.
+
+    Without `copy` it may have the memory of `parts`, which nobody may write to.
+    """
     if len({part.schema["day"] for part in parts}) > 1:
         parts = [part.with_columns(pl.col("day").cast(pl.String)) for part in parts]
     merged = pl.concat(parts)
@@ -81,7 +86,7 @@ def merge(
     _warn("all files", doubled)
     if rows.height == 0:
         raise DataError(f"all {merged.height} rows lie on excluded days {excluded}; check `exclude`")
-    frame = pd.DataFrame({name: rows[name].to_numpy() for name in ("id", "t", "x", "y")})
+    frame = pd.DataFrame({name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}, copy=copy)
     days = rows["day"].unique().sort()
     codes = rows["day"].replace_strict(days, range(len(days)), return_dtype=pl.Int32).to_numpy()
     names = pd.Index(days.cast(pl.String).to_list())

@@ -16,6 +16,7 @@ from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
+from szlib.tracks.formats.layouts import quick_scan, recognise
 from szlib.tracks.readers import read_raw
 
 SPACE = szlib.AttentionalSpace(length=2.5, width=2.0)
@@ -131,6 +132,48 @@ def test_packed_files_and_bad_rows(tmp_path: Path) -> None:
     assert [str(each.message) for each in told] == [str(each.message) for each in expected]
     assert funnels.of(raw)[0] == funnels.of(whole)[0]
     assert sum(funnels.of(raw)[0]["set_aside"].values()) == 3
+
+
+GOOD = "1351038629.042,{id},-12040,1562,1665.970,945.190,-2.794,-2.906"
+DAMAGED = {
+    "too few": "1,2",
+    "text": "no row at all",
+    "blank": "",
+    "one more": GOOD + ",9",
+    "one more, a truth": GOOD + ",true",
+    "an empty one more": GOOD + ",",
+    "two more": GOOD + ",9,9",
+    "the last is missing": GOOD.replace("-2.906", ""),
+    "the last is a text": GOOD.replace("-2.906", "x"),
+    "a place with decimals": GOOD.replace("1562", "1562.5"),
+    "no place": GOOD.replace("1562", ""),
+    "a place in words": GOOD.replace("1562", "nan"),
+    "a place beyond integers": GOOD.replace("1562", "99999999999999999999"),
+    "a place off Earth": GOOD.replace("1562", "99999999999"),
+    "half a person": GOOD.replace("{id}", "{id}.5"),
+    "no such time": GOOD.replace("1351038629.042", "1e11"),
+    "quotes": GOOD.replace("1562", '"1562"'),
+    "not UTF-8": GOOD.replace("1665.970", "\xff"),
+}
+
+
+@pytest.mark.parametrize("bad", DAMAGED.values(), ids=DAMAGED.keys())
+def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bad: str) -> None:
+    monkeypatch.setattr(blocks, "_ROWS_AT_ONCE", 7)
+    path = tmp_path / "day.csv"
+    lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
+    path.write_bytes("\n".join(lines).encode("latin-1"))
+    layout, scan = recognise(path, path, None)
+    found = blocks.Blocks(quick_scan(path, layout), scan, layout.metres, layout.seconds)
+    rows = blocks.Rows(*map(np.concatenate, zip(*found, strict=True)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", szlib.DataWarning)
+        whole = read_raw(path)
+    read = funnels.of(whole)[0]
+    assert (found.tally.good, dict(found.tally.reasons)) == (read["kept"], read["set_aside"])
+    assert found.tally.first is None or found.tally.first[0] == 31
+    np.testing.assert_array_equal(rows.id, whole["id"])
+    np.testing.assert_array_equal(rows.y * layout.metres, whole["y"])
 
 
 def test_the_plaza_and_a_place_where_nobody_is(tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def find_encounters(
     samples = sampled(tracks, rows.order, ref, other, steps)
     number, _ = number_people(rows.day, rows.person)
     near = area.grown(REACH).contains(rows.x, rows.y)
-    position, velocity = np.column_stack([rows.x, rows.y]), np.column_stack([rows.vx, rows.vy])
+    position, velocity = (rows.x, rows.y), (rows.vx, rows.vy)
     kind = kinds_of_pairs(number[ref], number[other], number, rows.tick, position, velocity, near)
     samples["kind"] = kind.repeat(steps + 1)
     samples.attrs["area"] = str(area)

@@ -14,6 +14,7 @@ import json
 import os
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,8 @@ from ...errors import StorageError
 from ...files import CACHE, MARKER, cache_folder, keep, kept, own_folder
 from .blocks import Rows, Tally
 
+Content = Callable[[], tuple[int, str]]
+"""Gives size and checksum of a file, once they are known."""
 PURPOSE = "rows near a square"
 """What the folder of the entries is marked as."""
 LIMIT = 2_000_000_000
@@ -41,24 +44,25 @@ def folder() -> Path | None:
     return cache_folder("near-rows")
 
 
-def may_be_kept(size: int, which: dict[str, Any]) -> bool:
-    """Whether there is an entry of a file of this size [bytes]: only then its content must be known first."""
+def find(size: int, which: dict[str, Any], content: Content) -> tuple[Rows, Tally] | None:
+    """The rows of a file of this size [bytes] and content, and what was seen of it; None if not kept whole.
+
+    An entry that may be the file's is read before its content is asked for, which takes a while to be known.
+    """
     home = folder()
-    return home is not None and any(home.glob(f"{_name(size, which)}-*.parquet"))
+    for path in home.glob(f"{_name(size, which)}-*.parquet") if home else ():
+        kept_of = size, path.stem.rpartition("-")[2]
+        entry = kept(path, _made_of(kept_of, which))
+        found = _read(entry) if entry else None
+        if found and kept_of == content():
+            with suppress(OSError):  # only the order in which entries give way depends on it
+                os.utime(path)
+            return found
+    return None
 
 
-def find(content: tuple[int, str], which: dict[str, Any]) -> tuple[Rows, Tally] | None:
-    """The rows of a file of this content, and what was seen of it; None where they are not there whole."""
-    home = folder()
-    if home is None:
-        return None
-    path = _path(home, content, which)
-    found = kept(path, _made_of(content, which))
-    if found is None:
-        return None
-    with suppress(OSError):  # only the order in which entries give way depends on it
-        os.utime(path)
-    with pq.ParquetFile(io.BytesIO(found)) as file:  # column by column, as memory is short
+def _read(entry: bytes) -> tuple[Rows, Tally]:
+    with pq.ParquetFile(io.BytesIO(entry)) as file:  # column by column, as memory is short
         told = json.loads(file.schema_arrow.metadata[b"szlib"])
         rows = [file.read([name])[name].to_numpy() / told["scales"][name] for name in Rows._fields]
     seen = told["tally"]
@@ -120,7 +124,7 @@ def _name(size: int, which: dict[str, Any]) -> str:
 
 
 def _path(home: Path, content: tuple[int, str], which: dict[str, Any]) -> Path:
-    return home / f"{_name(content[0], which)}-{content[1][:16]}.parquet"
+    return home / f"{_name(content[0], which)}-{content[1]}.parquet"
 
 
 def _make_room(home: Path, limit: int) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import polars as pl
 
 from ... import memory
 from ...tracks import funnels
-from ...tracks.formats.layouts import Columns, Format, readable, recognise
+from ...tracks.formats.layouts import Columns, Format, quick_scan, readable, recognise
 from ...tracks.formats.plain import plain_file
 from ...tracks.formats.rows import in_metres
 from ...tracks.plausible import check_unit
@@ -23,8 +23,6 @@ from . import kept_rows
 from .blocks import Blocks, Rows, Tally
 from .cells import Cells, Unsorted, one_pass, two_passes
 
-Content = Callable[[], tuple[int, str]]
-"""Gives size and checksum of a file, once they are known."""
 _NEAR_ROW = 180
 """Bytes that a row near the square takes until its day is done (15.6 million of them: 2.7 GB)."""
 
@@ -40,7 +38,7 @@ def read_near_square(
     max_gap: float | None = None,
     tz: str = "Asia/Tokyo",
     columns: Columns | None = None,
-    content: Content | None = None,
+    content: kept_rows.Content | None = None,
 ) -> pd.DataFrame:
     """The rows of a file that encounters in the square can depend on, as from `tracks.readers.read_raw`.
 
@@ -60,47 +58,48 @@ def read_near_square(
             if layout.name == "atc-raw":
                 metres = layout.metres_in(unit)
                 cells = Cells(square.grown(REACH).box, duration, max_gap or layout.max_gap or 0.0, metres)
-                near, seen = _near(scan, path, layout, cells, content)
+                blocks = Blocks(quick_scan(plain, layout), scan, metres, layout.seconds)
+                near, seen = _near(blocks, path, layout, cells, content)
                 return _table(near, seen, path, layout, metres, unit=unit, tz=tz)
     given = {"file_format": file_format, "unit": unit, "frame_rate": frame_rate, "columns": columns}
     return read_raw(path, tz=tz, **given)  # type: ignore[arg-type]
 
 
 def _near(
-    scan: pl.LazyFrame, path: Path, layout: Format, cells: Cells, content: Content | None
-) -> tuple[pl.DataFrame, Tally]:
+    blocks: Blocks, path: Path, layout: Format, cells: Cells, content: kept_rows.Content | None
+) -> tuple[Rows, Tally]:
     """The rows near the square, from the cache where they are kept, and what was seen of the file."""
     which = {"format": asdict(layout), "cells": asdict(cells)}
-    if content and kept_rows.may_be_kept(path.stat().st_size, which):
-        known = kept_rows.find(content(), which)
-        if known:
-            return pl.DataFrame(known[0]._asdict()), known[1]
+    if content and (known := kept_rows.find(path.stat().st_size, which, content)):
+        return known
     with readable(path, layout):
-        blocks = Blocks(scan, cells.metres, layout.seconds)
         try:
             parts = _gather(one_pass(cells, blocks), path)
         except Unsorted:
             parts = _gather(two_passes(cells, blocks), path)
-    near = Rows(*map(np.concatenate, zip(*parts, strict=True)))
-    near = near.at(person_order(near.id))
+    order = person_order(np.concatenate([rows.id for rows in parts]))
+    near = Rows(*(np.concatenate(values)[order] for values in zip(*parts, strict=True)))
     if content:
         kept_rows.remember(content(), which, near, blocks.tally)
-    return pl.DataFrame(near._asdict()), blocks.tally
+    return near, blocks.tally
 
 
 def _table(
-    near: pl.DataFrame, seen: Tally, path: Path, layout: Format, metres: float, *, unit: str | None, tz: str
+    near: Rows, seen: Tally, path: Path, layout: Format, metres: float, *, unit: str | None, tz: str
 ) -> pd.DataFrame:
-    """The rows as from `read_raw`, with the funnel of the whole file."""
+    """The rows, whose memory it takes, as from `read_raw`, with the funnel of the whole file."""
     stage = read_stage(path, layout, seen.good, dict(seen.reasons), seen.first)
     if unit is None:
         check_unit(pl.DataFrame({"x": [seen.reach], "y": [0.0]}), layout, path)
-    far = {"never near the square": seen.good - near.height}
-    stages = [stage, funnels.stage("near the square", seen.good, near.height, far)]
-    if near.height == 0:
+    far = {"never near the square": seen.good - len(near.t)}
+    stages = [stage, funnels.stage("near the square", seen.good, len(near.t), far)]
+    if len(near.t) == 0:
         empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
         return funnels.carry(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
-    return merge([in_metres(near, path, layout, metres, tz)], stages, [layout], [])
+    for values in (near.x, near.y):
+        values *= metres
+    rows = in_metres(pl.DataFrame(near._asdict()), path, layout, 1.0, tz)
+    return merge([rows], stages, [layout], [], copy=False)
 
 
 def _gather(blocks: Iterator[Rows], path: Path) -> list[Rows]:

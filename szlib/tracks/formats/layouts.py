@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
+from types import MappingProxyType
 from zoneinfo import ZoneInfo
 
 import polars as pl
@@ -17,7 +18,7 @@ from ... import memory
 from ...errors import DataError
 from .foreign import LOADERS, foreign_format, load
 from .frame_rates import FRAME_RATES, frame_clock
-from .plain import LONGEST_LINE, ROW
+from .plain import LONGEST_LINE, ROW, first_line
 
 
 @dataclass(frozen=True)
@@ -220,11 +221,27 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _scan_csv(plain: Path, layout: Format) -> pl.LazyFrame:
+def quick_scan(plain: Path, layout: Format) -> pl.LazyFrame:
+    """A scan as from `recognise`, in two thirds of the time, of a file whose rows are all like its first one.
+
+    Numbers are read as whole ones where they are whole in the first row, and the last field as a number.  A
+    row has null where it is no such number, and is `ragged` where its last field is none.
+    """
+    first = first_line(plain).split(layout.separator) + [""] * layout.fields
+    numbers = {*layout.columns.values(), layout.fields - 1}
+    types = {f"f{k}": pl.Int64 if first[k].lstrip("-").isdecimal() else pl.Float64 for k in numbers}
+    return _scan_csv(plain, layout, types)
+
+
+def _scan_csv(
+    plain: Path, layout: Format, types: Mapping[str, pl.datatypes.DataTypeClass] = MappingProxyType({})
+) -> pl.LazyFrame:
+    """A scan of fields parted by one character; `types` of some of f0, f1, ..., if not the usual ones."""
     numbers = {index for name, index in layout.columns.items() if name != "day"}
     fields = {f"f{i}": pl.Float64 if i in numbers else pl.String for i in range(layout.fields)}
+    schema: dict[str, pl.datatypes.DataTypeClass] = {**fields, **types, "extra": pl.String}
     scan = pl.scan_csv(
-        plain, schema={**fields, "extra": pl.String}, has_header=False, skip_lines=int(layout.header),
+        plain, schema=schema, has_header=False, skip_lines=int(layout.header),
         separator=layout.separator, quote_char=None, encoding="utf8-lossy", ignore_errors=True,
         truncate_ragged_lines=True,
         missing_columns="insert", extra_columns="ignore", raise_if_empty=False, glob=False,

@@ -32,24 +32,33 @@ def in_metres(good: pl.DataFrame, path: Path, layout: Format, metres: float, tz:
     return good.select(
         "day",
         pl.col("id").cast(pl.Int64),
-        pl.col("t") * layout.seconds,
-        pl.col("x") * metres,
-        pl.col("y") * metres,
+        *(
+            pl.col(name) if unit == 1 else pl.col(name) * unit
+            for name, unit in (("t", layout.seconds), ("x", metres), ("y", metres))
+        ),
     )
 
 
 def faults(metres: float, seconds: float, with_day: bool) -> dict[str, pl.Expr]:
     """Why a row cannot be used: reasons, and where each holds; the first one counts."""
-    numbers, position, person = ["t", "id", "x", "y"], pl.col("x", "y"), pl.col("id")
+    limit, person = limits(metres, seconds), pl.col("id")
+    numbers = list(limit)
+    beyond = {name: pl.col(name).abs() * unit > most for name, (unit, most) in limit.items()}
     found = {
         "missing or extra fields": pl.col("ragged"),
         "missing or not a number": pl.any_horizontal(pl.col(numbers).is_null()),
         "not finite": ~pl.all_horizontal(pl.col(numbers).is_finite()),
-        "id not a whole number": (person != person.floor()) | (person.abs() > 2**53),
-        "time not in seconds since 1970": pl.col("t").abs() * seconds > _LAST_SECOND,
-        "position not on Earth": pl.any_horizontal(position.abs() * metres > _FARTHEST),
+        "id not a whole number": (person != person.floor()) | beyond["id"],
+        "time not in seconds since 1970": beyond["t"],
+        "position not on Earth": beyond["x"] | beyond["y"],
     }
     return found | ({"no day": pl.col("day").is_null()} if with_day else {})
+
+
+def limits(metres: float, seconds: float) -> dict[str, tuple[float, float]]:
+    """Of each number of a row: its unit, in s, 1 or m, and how far from 0 it may be, in these."""
+    place = (metres, _FARTHEST)
+    return {"t": (seconds, _LAST_SECOND), "id": (1.0, 2.0**53), "x": place, "y": place}
 
 
 def fault(metres: float, seconds: float, with_day: bool) -> pl.Expr:
