@@ -8,6 +8,7 @@ import gc
 import importlib
 import importlib.util
 import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -22,6 +23,7 @@ from random_states import ZONE
 
 import szlib
 from szlib.control.barriers import Array
+from szlib.control.solvers.sizes import compile_ahead
 from szlib.simulation.closed_loop import advance
 
 BEFORE_VARIABLE = "SZLIB_BEFORE"
@@ -47,6 +49,16 @@ def controller_of(of: ModuleType, people: int, n_walls: int, **settings: Any) ->
     """A controller of this szlib, or of an earlier one."""
     zone = of.Ellipse(ZONE.center, ZONE.semi_axes, ZONE.angle)
     return of.MPCCBF(zone, walls=walls(n_walls), settings=of.MPCSettings(**settings), max_people=people)
+
+
+def compiled_controller(people: int, n_walls: int) -> list[Any]:
+    """The same, with compiled functions: one, or none where there is no C compiler."""
+    if shutil.which("cc") is None:
+        return []
+    settings = szlib.MPCSettings(compile="auto")
+    for _ in compile_ahead(settings, people, n_walls):
+        continue
+    return [controller_of(szlib, people, n_walls, compile="auto")]
 
 
 def way(people: int, n_walls: int, steps: int = 120, **settings: Any) -> list[tuple[Array, Array]]:
@@ -182,19 +194,20 @@ def earlier(clone: str) -> ModuleType:
 
 
 def bench_before(people: int, n_walls: int) -> dict[str, float]:
-    """This step over the earlier commit's, in turn: median, p95 and p99.9; and how far they differ."""
+    """This step over the earlier commit's, in turn: median, p95 and p99.9; compiled as well; how far they
+    differ."""
     before = sys.modules.get("szlib_before") or earlier(os.environ[BEFORE_VARIABLE])
     rivals = [(of, controller_of(of, people, n_walls)) for of in (before, szlib)]
+    rivals += [(szlib, controller) for controller in compiled_controller(people, n_walls)]
     gc.collect()
     took, apart = laps(rivals, way(people, n_walls), 15)
-    then, now = np.median(took, axis=1)
-    return {
-        "ms": 1e3 * float(np.median(now)),
-        "now / before median": float(np.median(now) / np.median(then)),
-        "p95": float(np.quantile(now, 0.95) / np.quantile(then, 0.95)),
-        "p99.9": float(np.quantile(took[1], 0.999) / np.quantile(took[0], 0.999)),
-        "largest |du|": apart,
-    }
+    then, *others = np.median(took, axis=1)
+    found = {"ms": 1e3 * float(np.median(others[0]))}
+    for i, (name, now) in enumerate(zip(("now", "compiled"), others, strict=False), start=1):
+        found[f"{name} / before median"] = float(np.median(now) / np.median(then))
+        found[f"{name} / before p95"] = float(np.quantile(now, 0.95) / np.quantile(then, 0.95))
+        found[f"{name} / before p99.9"] = float(np.quantile(took[i], 0.999) / np.quantile(took[0], 0.999))
+    return found | {"largest |du|": apart}
 
 
 def bench_worlds(count: int) -> dict[str, float]:
@@ -243,3 +256,17 @@ if os.environ.get(BEFORE_VARIABLE):
         for n, m in ((1, 0), (5, 4), (10, 12))
     }
     CASES["worlds against before"] = lambda: bench_worlds(100)
+
+BARS: dict[str, growth.Bars] = {
+    "crowd comes": {"built ahead CPU ms": ("<=", 5), "at once CPU ms": ("<=", 150)},
+    "worlds against before": {"before / now": (">=", 2.1)},
+} | {
+    f"{size} against before": {
+        "now / before median": ("<=", 0.8),
+        "now / before p95": ("<=", 0.75),
+        "compiled / before median": ("<=", bar),
+        "compiled / before p99.9": ("<=", 1.0),
+    }
+    for size, bar in (("1 + 0", 0.62), ("5 + 4", 0.47), ("10 + 12", 0.42))
+}
+"""Of a case: what its numbers are held against."""

@@ -104,7 +104,8 @@ class Step:
         may still bring about h < 0 after a step that was safe (notebook 13 counts them); the next step then
         says so.
         """
-        if not self.feasible or self.scene.seen.lost or (self.h < -TOLERANCE).any():
+        least_h = min(self.h.tolist(), default=0.0)
+        if not self.feasible or self.scene.seen.lost or least_h < -TOLERANCE:
             return False
         return min(self._gaps(0) + self._gaps(1), default=0.0) >= -TOLERANCE
 
