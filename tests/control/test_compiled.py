@@ -1,6 +1,7 @@
 """Compiled functions: the same numbers to the last bit, in the place of the others; and what goes wrong."""
 
 import logging
+import os
 import shutil
 import time
 
@@ -16,7 +17,10 @@ from szlib.control.solvers.sqp import Sqp
 from szlib.simulation.closed_loop import advance
 from szlib.workbook.command_line import main
 
-pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler cc")
+pytestmark = [
+    pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler cc"),
+    pytest.mark.skipif("SZLIB_COMPILED" in os.environ, reason="everything is compiled already"),
+]
 FORMULATIONS = ({}, {"N_h": 8}, {"terminal": "rest"})
 
 
