@@ -33,6 +33,7 @@ if COMPILED := os.environ.get("SZLIB_COMPILED"):  # a folder: every controller o
         take_what_is_there(self, functions)
 
     compiled.cache_folder = lambda name: Path(COMPILED) / name
+    compiled.FLAGS = ("-O0", *compiled.FLAGS[1:])
     take_what_is_there, compiled.Compiled.take = compiled.Compiled.take, take
 hypothesis.settings.register_profile("szlib", deadline=None)  # tests are never timed
 hypothesis.settings.load_profile("szlib")

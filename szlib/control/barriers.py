@@ -198,7 +198,10 @@ def floats(name: str, value: ArrayLike, n: int) -> list[float]:
     """As `finite` of shape (n,), in a list: several times as fast for an array of floats."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE and value.shape == (n,):
         numbers: list[float] = value.tolist()
-        if all(map(_usable, numbers)):
+        for each in numbers:  # all() takes three times as long
+            if not -LARGEST <= each <= LARGEST:
+                break
+        else:
             return numbers
     return cast(list[float], finite(name, value, (n,)).tolist())
 
@@ -207,7 +210,7 @@ def pair(name: str, value: ArrayLike) -> tuple[float, float]:
     """As `finite` of shape (2,), for Python's own floats: ten times as fast where they are that already."""
     if isinstance(value, tuple) and len(value) == 2:
         x, y = value
-        if type(x) is float and type(y) is float and _usable(x) and _usable(y):
+        if type(x) is float and type(y) is float and abs(x) <= LARGEST and abs(y) <= LARGEST:
             return x, y
     x, y = floats(name, value, 2)
     return x, y
@@ -215,10 +218,6 @@ def pair(name: str, value: ArrayLike) -> tuple[float, float]:
 
 def number(name: str, value: ArrayLike) -> float:
     """As `finite` of shape (), as Python's own float."""
-    if type(value) is float and _usable(value):
+    if type(value) is float and abs(value) <= LARGEST:
         return value
     return float(finite(name, value, ()))
-
-
-def _usable(number: float) -> bool:
-    return -LARGEST <= number <= LARGEST

@@ -104,10 +104,11 @@ class Step:
         may still bring about h < 0 after a step that was safe (notebook 13 counts them); the next step then
         says so.
         """
-        least_h = min(self.h.tolist(), default=0.0)
-        if not self.feasible or self.scene.seen.lost or least_h < -TOLERANCE:
+        if not self.feasible or self.scene.seen.lost or min(self.h.tolist(), default=0.0) < -TOLERANCE:
             return False
-        return min(self._gaps(0) + self._gaps(1), default=0.0) >= -TOLERANCE
+        (x, y), (x_next, y_next) = self.predicted[:2, :2].tolist()
+        gaps = self.scene.gaps(x, y, 0.0) + self.scene.gaps(x_next, y_next, self.scene.settings.dt)
+        return min(gaps, default=0.0) >= -TOLERANCE
 
     def verify(self) -> Report:
         """Check this step again, by formulas of the report's own, from the scene as it was given."""
