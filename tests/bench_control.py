@@ -12,6 +12,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
@@ -211,27 +212,39 @@ def bench_before(people: int, n_walls: int) -> dict[str, float]:
 
 
 def bench_worlds(count: int) -> dict[str, float]:
-    """Random worlds, one core: CPU time of the earlier commit over this one's; rows that differ by 1e-5.
+    """Random worlds, one core: CPU time of the earlier commit over this one's, and over that of compiled
+    controllers; rows that differ by 1e-5.
 
-    Each commit has a process of its own, or it would collect the other's garbage.
+    Each has a process of its own, or it would collect the others' garbage.
     """
-    took, rows = np.zeros((2, count // 10)), dict[tuple[int, int], list[dict[str, Any]]]()
-    spawn = get_context("spawn")
-    with spawn.Pool(1) as before, spawn.Pool(1) as now:
+    rivals = ["before", "off", *(["auto"] if shutil.which("cc") else [])]
+    for walls in (0, 1, 2, 3, 4) if "auto" in rivals else ():
+        for _ in compile_ahead(szlib.MPCSettings(), 6, walls):
+            continue
+    took, rows = np.zeros((len(rivals), count // 10)), dict[tuple[int, int], list[dict[str, Any]]]()
+    with ExitStack() as open_pools:
+        pools = [open_pools.enter_context(get_context("spawn").Pool(1)) for _ in rivals]
         for first in 2 * [*range(0, count, 10)]:  # the first lap builds what the second times
-            for i, pool in enumerate((before, now)):
-                took[i, first // 10], rows[i, first] = pool.apply(ten_worlds, (i, first))
+            for i, (rival, pool) in enumerate(zip(rivals, pools, strict=True)):
+                took[i, first // 10], rows[i, first] = pool.apply(ten_worlds, (rival, first))
     pairs = (zip(rows[0, first], rows[1, first], strict=True) for first in range(0, count, 10))
     differ = sum(not _same(*pair) for ten in pairs for pair in ten)
-    return {"before / now": float(took[0].sum() / took[1].sum()), "rows that differ": differ}
+    before, now, *compiled = took.sum(axis=1)
+    found = {"before / now": before / now, "rows that differ": differ}
+    return found | ({"before / compiled": before / compiled[0]} if compiled else {})
 
 
-def ten_worlds(which: int, first: int) -> tuple[float, list[dict[str, Any]]]:
-    """CPU time and rows of ten worlds, by the earlier commit (0) or this one (1)."""
-    before = sys.modules.get("szlib_before") or earlier(os.environ[BEFORE_VARIABLE])
-    of = (before, szlib)[which]
+def ten_worlds(rival: str, first: int) -> tuple[float, list[dict[str, Any]]]:
+    """CPU time and rows of ten worlds, by the earlier commit ("before") or this one (`compile`)."""
+    of = (
+        sys.modules.get("szlib_before") or earlier(os.environ[BEFORE_VARIABLE])
+        if rival == "before"
+        else szlib
+    )
+    given = {} if rival == "before" else {"compile": rival}
     module = importlib.import_module(f"{of.__name__}.simulation.rollouts")
-    setup, begun = module.setup_of(settings=of.MPCSettings(time_limit=np.inf)), time.process_time()
+    setup = module.setup_of(settings=of.MPCSettings(time_limit=np.inf, **given))
+    begun = time.process_time()
     table = module._chunk(setup, range(first, first + 10), None)
     return time.process_time() - begun, table.to_dict("records")
 
