@@ -164,3 +164,20 @@ def test_the_oldest_give_way(monkeypatch, tmp_path):
         compiled.compile_now(solver.functions)
         paths.append(compiled.library(solver.functions))
     assert [path.exists() for path in paths] == [False, True]
+
+
+def test_a_damaged_file_is_compiled_anew(monkeypatch, tmp_path):
+    monkeypatch.setenv("SZLIB_CACHE", str(tmp_path))
+    functions = Ipopt(settings_of(), 0, 0).functions
+    compiled.compile_now(functions)
+    path = compiled.library(functions)
+    whole = path.read_bytes()
+    for damaged in (b"", whole[: len(whole) // 2], whole[:5000] + b"?" + whole[5001:]):
+        path.unlink()  # what is loaded stays as it is
+        path.write_bytes(damaged)
+        waits = compiled.Compiled("auto")
+        waits.take(functions)
+        assert waits._waiting, "it is not used"
+        assert compiled.compile_now(functions) > 0
+        waits.look()
+        assert not waits._waiting

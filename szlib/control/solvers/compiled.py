@@ -29,7 +29,7 @@ from typing import Any
 import casadi as ca
 
 from ...errors import SolverError, StorageError
-from ...files import cache_folder, own_folder, temporary_folder, write_file
+from ...files import cache_folder, keep, kept, own_folder, temporary_folder
 from ..problem import BUILDING, Buffered
 from ..settings import Compile
 
@@ -84,9 +84,10 @@ class Compiled:
         if not self._waiting or perf_counter() < self._looked + _LOOK or not BUILDING.acquire(blocking=False):
             return
         try:
-            ended = [path for path in self._waiting if _processes[path].poll() is not None]
+            asked = self._waiting.keys() & _processes.keys()
+            ended = {path for path in asked if _processes[path].poll() is not None}
             self._replace()
-            for path in set(ended).intersection(self._waiting):
+            for path in ended & self._waiting.keys():
                 del self._waiting[path]
                 _log.warning("%s could not be compiled; `szlib compile` says why", path)
             self._looked = perf_counter()
@@ -94,7 +95,7 @@ class Compiled:
             BUILDING.release()
 
     def _replace(self) -> None:
-        for path in [path for path in self._waiting if path.exists()]:
+        for path in [path for path in self._waiting if _is_there(path)]:
             for function in self._waiting.pop(path):
                 function.become(loaded(function.function, path))
 
@@ -113,15 +114,17 @@ def library(functions: Sequence[Buffered]) -> Path:
     if home is None:
         raise StorageError("the cache is off ($SZLIB_CACHE); name a folder, or unset it")
     known_by = "\0".join([*_said(functions), *_compiler(), *FLAGS, platform.machine(), version("casadi")])
-    return home / f"{hashlib.sha256(known_by.encode()).hexdigest()[:32]}.so"
+    return home.absolute() / f"{hashlib.sha256(known_by.encode()).hexdigest()[:32]}.so"
 
 
 def compile_now(functions: Sequence[Buffered]) -> float:
     """Have these functions in the cache; how long it took to compile them [s], 0 where they were there."""
-    path, began = library(functions), perf_counter()
-    if path.exists():
+    began = perf_counter()
+    with BUILDING:
+        path, said = library(functions), _said(functions)
+    if _is_there(path):
         return 0.0
-    compile_library(path, _said(functions))
+    compile_library(path, said)
     return perf_counter() - began
 
 
@@ -132,17 +135,24 @@ def compile_library(path: Path, functions: Sequence[str]) -> None:
     """
     own_folder(path.parent, PURPOSE)
     with temporary_folder() as place:
-        code = ca.CodeGenerator("functions.c")
-        for each in functions:
-            code.add(ca.Function.deserialize(each))
-        code.generate(f"{place}{os.sep}")
+        with BUILDING:
+            code = ca.CodeGenerator("functions.c")
+            for each in functions:
+                code.add(ca.Function.deserialize(each))
+            code.generate(f"{place}{os.sep}")
         command = [*_compiler()[:-1], *FLAGS, "functions.c", "-o", "functions.so", "-lm"]
         done = subprocess.run(command, cwd=place, capture_output=True, text=True)
         if done.returncode:
             raise SolverError(f"{' '.join(command)} failed ({done.returncode}): {done.stderr.strip()[:500]}")
-        write_file(path, (place / "functions.so").read_bytes())
+        keep(path, (place / "functions.so").read_bytes(), path.stem)
     for old in sorted(path.parent.glob("*.so"), key=lambda file: file.stat().st_mtime)[:-MOST]:
         old.unlink(missing_ok=True)
+        old.with_name(f"{old.name}.json").unlink(missing_ok=True)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether a file of the cache is there, and whole: what is damaged is compiled anew."""
+    return kept(path, path.stem) is not None
 
 
 def _said(functions: Sequence[Buffered]) -> list[str]:
