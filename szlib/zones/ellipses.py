@@ -276,7 +276,7 @@ def _on_curve(curve: Curve, angles: Array) -> Array:
     """Points of the curve at angles (...), shape (..., 2)."""
     points = np.asarray(curve(angles.ravel()), float)
     if points.shape != (angles.size, 2):
-        raise ZoneError(f"curve must turn angles ({angles.size},) into points (n, 2); got {points.shape}")
+        raise ZoneError(f"curve must give points (n, 2); got {points.shape} for n = {angles.size} angles")
     for i in np.flatnonzero(~np.all(np.isfinite(points), axis=1))[:1]:
         raise ZoneError(f"the curve must be finite; at {angles.ravel()[i]} rad it is {points[i].tolist()}")
     return points.reshape(*angles.shape, 2)
