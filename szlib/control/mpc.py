@@ -123,7 +123,7 @@ class MPCCBF:
 
     def reset(self) -> None:
         """Forget the last plan and everybody: what follows depends on nothing that went before."""
-        self._plan, self._now = np.zeros(2 * self.settings.N), 0.0
+        self._plan, self._change, self._now = *np.zeros((2, 2 * self.settings.N)), 0.0
         self._moved, self._n_people = False, 0
         self.tracker.reset()
         self._sizes.reset()
@@ -171,12 +171,13 @@ class MPCCBF:
             self._check_goal(towards)
         self._now = self._clock(now, stamps)
         scene = self._scene(x, towards, self.tracker.see(people, now=self._now, ids=ids, stamps=stamps))
-        self._moved, self._n_people = True, len(scene.zones)
+        first, self._moved, self._n_people = not self._moved, True, len(scene.zones)
         solver = self._sizes.of(self._n_people, len(self.walls))
         self._sizes.budget.begin()
         size = solver.evaluate.size
         parameters = self._parameters(x, scene, size)
-        rung, numbers, timed_out = solve_with_fallbacks(solver, self._plan, parameters)
+        rung, numbers, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
+        self._change = np.zeros(numbers.inputs.size) if first else numbers.inputs - self._plan
         self._plan, rows = numbers.inputs, taken(self._n_people, len(self.walls), size)
         return Step(
             control=self._plan[:2].copy(),
