@@ -134,7 +134,7 @@ def _differentiated(h: Any, x: Any, y: Any, time: Any, of: Sequence[Any], dt: fl
     return ca.Function("h", [at, numbers], ca.cse([ca.horzcat(*values) for values in everywhere]))
 
 
-def way_left(x: Any, y: Any, gx: Any, gy: Any) -> Any:
+def remaining_distance(x: Any, y: Any, gx: Any, gy: Any) -> Any:
     """Distance from (x, y) to the target (gx, gy) [m], and at least 1 m.
 
     The cost of a metre of slack is `MPCSettings.slack_weight` for each of its metres.

@@ -1,5 +1,6 @@
 """Compiled functions: the same numbers to the last bit, in the place of the others; and what goes wrong."""
 
+import copy
 import logging
 import os
 import shutil
@@ -145,6 +146,17 @@ def test_the_command_compiles_every_size_once(capsys, cache):
     assert capsys.readouterr().out.count("was there already") == 2
     assert main(["compile", "-p", "gama=0.3"]) == 2
     assert "gama: is none of MPCSettings; expected one of dt, N," in capsys.readouterr().err
+
+
+def test_a_copy_has_compiled_what_it_builds_anew(monkeypatch):
+    original = szlib.MPCCBF(ZONE, settings=settings_of(gamma=0.07, compile="auto"), max_people=1)
+    for process in compiled._processes.values():
+        process.wait()
+    monkeypatch.setenv("CC", "cc -g0")  # another compiler, of which nothing is in the cache
+    monkeypatch.setattr(compiled, "_processes", {})
+    compiled._compiler.cache_clear()
+    copied = copy.deepcopy(original)._sizes._compiled
+    assert copied._waiting and copied._waiting.keys() <= compiled._processes.keys()
 
 
 def test_another_compiler_or_other_settings_have_a_file_of_their_own(monkeypatch):

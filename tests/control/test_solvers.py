@@ -11,7 +11,7 @@ import pytest
 from random_states import ZONE, meetings, questions
 
 import szlib
-from szlib.control.problem import TOLERANCE, build_problem, way_left
+from szlib.control.problem import TOLERANCE, build_problem, remaining_distance
 from szlib.control.solvers import sqp
 from szlib.control.solvers.program import build_program
 from szlib.simulation.closed_loop import advance
@@ -80,7 +80,7 @@ def test_derivatives_by_structure_are_those_of_the_whole_expressions(formulation
     values = ca.vertcat(p.rows, p.terminal)
     multipliers = ca.SX.sym("multipliers", values.numel())
     arguments = [p.inputs, p.parameters, multipliers]
-    cost = p.cost / way_left(*(p.parameters[i] for i in (0, 1, 4, 5)))
+    cost = p.cost / remaining_distance(*(p.parameters[i] for i in (0, 1, 4, 5)))
     on_speed = ca.dot(multipliers[p.n_cbf : p.rows.numel()], p.rows[p.n_cbf :])
     expected = ca.Function(
         "expected",

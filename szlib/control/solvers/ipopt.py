@@ -16,13 +16,22 @@ import casadi as ca
 import numpy as np
 
 from ..barriers import Array
-from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, Numbers, build_problem, way_left
+from ..problem import (
+    BUILDING,
+    HARD_SHARE,
+    Budget,
+    Buffered,
+    Evaluator,
+    Numbers,
+    build_problem,
+    remaining_distance,
+)
 from ..settings import MPCSettings
 
 _OPTIONS = {
     "print_level": 0,
     "sb": "yes",
-    # The start is close to the solution: the plan of the step before, shifted.
+    # The start is close to the solution: the plan of the step before, by its trend.
     "mu_init": 1e-2,
     "bound_push": 1e-3,
     "bound_frac": 1e-3,
@@ -70,7 +79,7 @@ class Ipopt:
         rows = self.evaluate(guess, parameters).rows
         free = np.ones(rows.size)
         free[self.evaluate.n_cbf :] = np.hypot(*parameters[2:4]) > s.v_max
-        weight = s.slack_weight * way_left(*parameters[[0, 1, 4, 5]])
+        weight = s.slack_weight * remaining_distance(*parameters[[0, 1, 4, 5]])
         found = self._relaxed(
             x0=np.r_[guess, np.maximum(-rows, 0) * free * weight],
             p=np.r_[parameters, weight],

@@ -20,7 +20,7 @@ import casadi as ca
 import numpy as np
 
 from ..barriers import cbf_residual
-from ..problem import Problem, build_problem, function, way_left
+from ..problem import Problem, build_problem, function, remaining_distance
 from ..settings import MPCSettings
 
 
@@ -46,7 +46,11 @@ class Program(NamedTuple):
 def build_program(settings: MPCSettings, n_people: int, n_walls: int) -> Program:
     """Write down the functions; once for each size and settings."""
     p, s = build_problem(settings, n_people, n_walls), settings
-    u, n_rows, scale = p.inputs, p.rows.numel(), 1 / way_left(*(p.parameters[i] for i in (0, 1, 4, 5)))
+    u, n_rows, scale = (
+        p.inputs,
+        p.rows.numel(),
+        1 / remaining_distance(*(p.parameters[i] for i in (0, 1, 4, 5))),
+    )
     cost, gradient = scale * p.cost, ca.gradient(p.cost, u)
     values = ca.vertcat(p.rows, p.terminal)
     violations = p.violations

@@ -99,6 +99,7 @@ class Sizes:
         for size, remembered in state["solvers"].items():
             self._add(*size)
             self._solvers[size].remembered = remembered
+        self._compiled.begin()
 
     def reset(self) -> None:
         """Let every solver forget what it remembers from call to call."""
