@@ -7,7 +7,8 @@ import do_mpc
 import numpy as np
 
 import szlib
-from szlib.control.barriers import Array, barrier, cbf_residual, ellipse_formula
+from szlib.checks import Array
+from szlib.control.barriers import barrier, cbf_residual, ellipse_formula
 from szlib.control.people import place
 
 

@@ -31,8 +31,8 @@ from random_states import meetings, questions
 from tqdm import tqdm
 
 import szlib
+from szlib.checks import Array
 from szlib.control import problem
-from szlib.control.barriers import Array
 from szlib.control.solvers import ipopt
 from szlib.control.solvers.sizes import compile_ahead
 from szlib.files import CACHE

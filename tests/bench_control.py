@@ -23,7 +23,7 @@ import numpy as np
 from random_states import ZONE
 
 import szlib
-from szlib.control.barriers import Array
+from szlib.checks import Array
 from szlib.control.solvers.sizes import compile_ahead
 from szlib.simulation.closed_loop import advance
 

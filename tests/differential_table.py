@@ -16,7 +16,8 @@ import pandas as pd
 from rollout_table import interval
 
 import szlib
-from szlib.control.barriers import Array, ellipse_distance
+from szlib.checks import Array
+from szlib.control.barriers import ellipse_distance
 from szlib.control.differential import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
 from szlib.control.people import BODY_RADIUS

@@ -10,20 +10,3 @@ solvers       a condensed SQP, or IPOPT as in the paper; and what is done where 
 mpc           the controller: `MPCCBF`
 differential  a robot with two wheels: `DifferentialDrive`
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=[
-        "barriers",
-        "settings",
-        "distances",
-        "people",
-        "problem",
-        "step",
-        "solvers",
-        "mpc",
-        "differential",
-    ],
-)

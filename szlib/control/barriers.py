@@ -14,20 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..checks import Array, check_array
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 
-Array = NDArray[np.float64]
-
-LARGEST = 1e8
-"""Greatest coordinate, speed or parameter that can be used [m, m/s, ...]: the double next to it is 1.5e-8
-away, well below the tolerance of the controller. Any map projection on Earth stays below it."""
-_DOUBLE = np.dtype(float)
 SHORTEST_WALL = 1e-3
 """Length below which the direction of a wall is not usable [m]; a pillar may be a wall of a millimetre."""
 
@@ -83,7 +78,7 @@ def segment_distance(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
     ------
     SolverError : the segment has no length, or a shape or a number is not usable.
     """
-    xy = finite("points", points, (..., 2))
+    xy = check_array("points", points, (..., 2))
     (xa, ya), (xb, yb) = check_wall([np.asarray(a), np.asarray(b)])
     return np.asarray(segment_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb))
 
@@ -102,13 +97,13 @@ def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
     -------
     Distances, shape (...) [m].
     """
-    xy = finite("points", points, (..., 2))
+    xy = check_array("points", points, (..., 2))
     return np.asarray(ellipse_formula(xy[..., 0], xy[..., 1], *ellipse.numbers))
 
 
 def check_wall(wall: ArrayLike) -> Array:
     """A wall's end points, shape (2, 2) [m]; SolverError unless usable and not below `SHORTEST_WALL`."""
-    ends = finite("wall", wall, (2, 2))
+    ends = check_array("wall", wall, (2, 2))
     length = np.hypot(*(ends[1] - ends[0]))
     if length == 0:
         raise SolverError(f"a wall needs two different end points; got {ends[0].tolist()} twice")
@@ -163,7 +158,7 @@ def _is_corner(part: Any) -> bool:
 
 def _pieces(line: Any) -> list[Array]:
     """The segments of a line."""
-    corners = finite("a wall", line, (..., 2))
+    corners = check_array("a wall", line, (..., 2))
     if len(corners) < 2:
         raise SolverError(f"a wall needs two end points; got {corners.tolist()}")
     if len(corners) == 2:
@@ -173,51 +168,3 @@ def _pieces(line: Any) -> list[Array]:
         if np.hypot(*(corner - kept[-1])) >= SHORTEST_WALL:
             kept.append(corner)
     return [np.array(ends) for ends in pairwise(kept)] or [corners[[0, -1]]]
-
-
-def finite(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
-    """A copy of `value` as floats of this shape (a leading ... for any) in +-`LARGEST`; else SolverError."""
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise SolverError(f"{name} must have shape {shape}; got {value!r}") from error
-    if array.dtype.kind not in "iuf":
-        raise SolverError(f"{name} must be numbers of shape {shape}; got {value!r}")
-    fits = array.shape[-1:] == shape[1:] if ... in shape else array.shape == shape
-    if not fits:
-        raise SolverError(f"{name} must have shape {shape}; got {array.shape}")
-    array = array.astype(float)
-    if not np.abs(array).max(initial=0.0) <= LARGEST:
-        if not np.isfinite(array).all():
-            raise SolverError(f"{name} must be finite; got {array.tolist()}")
-        raise SolverError(f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin")
-    return array
-
-
-def floats(name: str, value: ArrayLike, n: int) -> list[float]:
-    """As `finite` of shape (n,), in a list: several times as fast for an array of floats."""
-    if type(value) is np.ndarray and value.dtype is _DOUBLE and value.shape == (n,):
-        numbers: list[float] = value.tolist()
-        for each in numbers:  # all() takes three times as long
-            if not -LARGEST <= each <= LARGEST:
-                break
-        else:
-            return numbers
-    return cast(list[float], finite(name, value, (n,)).tolist())
-
-
-def pair(name: str, value: ArrayLike) -> tuple[float, float]:
-    """As `finite` of shape (2,), for Python's own floats: ten times as fast where they are that already."""
-    if isinstance(value, tuple) and len(value) == 2:
-        x, y = value
-        if type(x) is float and type(y) is float and abs(x) <= LARGEST and abs(y) <= LARGEST:
-            return x, y
-    x, y = floats(name, value, 2)
-    return x, y
-
-
-def number(name: str, value: ArrayLike) -> float:
-    """As `finite` of shape (), as Python's own float."""
-    if type(value) is float and abs(value) <= LARGEST:
-        return value
-    return float(finite(name, value, ()))

@@ -51,9 +51,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import Array, check_array, check_point, check_vector
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .barriers import Array, barrier, finite, floats, pair, segment_formula
+from .barriers import barrier, segment_formula
 from .distances import wall_margin
 from .mpc import MPCCBF
 from .people.person import Person, PlacedZone, SpeedZone, place
@@ -78,7 +79,7 @@ class Unicycle:
 
     def start(self, state: ArrayLike) -> Array:
         """The robot's own state, shape (5,), from (x, y, vx, vy) of its centre."""
-        x, y, vx, vy = floats("state", state, 4)
+        x, y, vx, vy = check_vector("state", state, 4)
         heading = atan2(vy, vx) if vx or vy else self.heading
         return np.array([x, y, heading, hypot(vx, vy), 0.0])
 
@@ -180,11 +181,11 @@ class DifferentialDrive:
     ) -> None:
         self.settings = s = settings or MPCSettings()
         self.robot = Unicycle()
-        self.omega_max = float(finite("omega_max", omega_max, ()))
+        self.omega_max = float(check_array("omega_max", omega_max, ()))
         if not 0 < self.omega_max * s.dt < pi:
             raise SolverError(f"omega_max must lie in (0, pi/dt) = (0, {pi / s.dt:g}); got {omega_max}")
         turn = 2 * sin(self.omega_max * s.dt / 2) / s.dt
-        self.ahead = s.v_max / turn if ahead is None else float(finite("ahead", ahead, ()))
+        self.ahead = s.v_max / turn if ahead is None else float(check_array("ahead", ahead, ()))
         if not self.ahead > 0:
             raise SolverError(f"ahead must be positive: the axle itself cannot move sideways; got {ahead}")
         self.v_max = min(s.v_max, self.ahead * turn)
@@ -233,9 +234,9 @@ class DifferentialDrive:
         people, ids, stamps, now : as of `MPCCBF.step`, and so is what is raised.
         """
         began = perf_counter()
-        own = finite("state", state, (5,) if np.size(state) == 5 else (3,)).tolist()
+        own = check_array("state", state, (5,) if np.size(state) == 5 else (3,)).tolist()
         x, y, theta = own[:3]
-        there, lever = finite("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
+        there, lever = check_array("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
         if not self._told and min(self.barriers(there), default=0.0) < 0:
             raise SolverError(
                 f"the goal {there.tolist()} cannot be reached: it lies too close to a wall; choose one "
@@ -260,7 +261,7 @@ class DifferentialDrive:
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h of every person and then of every wall, for the disc there, shape (people + walls,) [m]."""
-        x, y = pair("position", position)
+        x, y = check_point("position", position)
         return np.array(self._barriers([place(who, self._point.zone_of(who)) for who in people], x, y))
 
     def _barriers(self, zones: Sequence[PlacedZone], x: float, y: float, t: float = 0.0) -> list[float]:

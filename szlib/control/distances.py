@@ -27,15 +27,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import Array, check_array
 from ..zones.ellipses import Ellipse
-from .barriers import (
-    Array,
-    check_wall,
-    ellipse_distance,
-    euclidean_segment_formula,
-    finite,
-    segment_distance,
-)
+from .barriers import check_wall, ellipse_distance, euclidean_segment_formula, segment_distance
 from .settings import MPCSettings
 
 _BISECTIONS = 60
@@ -44,7 +38,7 @@ _BISECTIONS = 60
 
 def euclidean_to_segment(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
     """Euclidean distance of points (..., 2) to the segment from a to b, shape (...) [m]."""
-    xy = finite("points", points, (..., 2))
+    xy = check_array("points", points, (..., 2))
     (xa, ya), (xb, yb) = check_wall([np.asarray(a), np.asarray(b)])
     return np.asarray(euclidean_segment_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb))
 
@@ -59,7 +53,7 @@ def euclidean_to_ellipse(points: ArrayLike, ellipse: Ellipse) -> Array:
 
     which is negative below the one root inside the quadrant and positive above it, changes its sign.
     """
-    offset = finite("points", points, (..., 2)) - ellipse.center
+    offset = check_array("points", points, (..., 2)) - ellipse.center
     (a, b), cos, sin = ellipse.semi_axes, np.cos(ellipse.angle), np.sin(ellipse.angle)
     p = np.abs(offset[..., 0] * cos + offset[..., 1] * sin)
     q = np.abs(offset[..., 1] * cos - offset[..., 0] * sin)

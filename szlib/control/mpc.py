@@ -34,9 +34,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import Array, check_point, check_vector
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .barriers import Array, barrier, floats, pair, segment_formula, walls_of
+from .barriers import barrier, segment_formula, walls_of
 from .distances import wall_margin
 from .people.meetings import subgoal
 from .people.person import Person, SpeedZone, as_ellipse, circle_around, place
@@ -166,7 +167,7 @@ class MPCCBF:
         """
         began = perf_counter()
         self._own()
-        x, towards = floats("state", state, 4), pair("goal", goal)
+        x, towards = check_vector("state", state, 4), check_point("goal", goal)
         if not self._moved:
             self._check_goal(towards)
         self._now = self._clock(now, stamps)
@@ -245,7 +246,7 @@ class MPCCBF:
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h of every person and then of every wall at a position, shape (people + walls,) [m]."""
-        x, y = pair("position", position)
+        x, y = check_point("position", position)
         distances = [place(person, self.zone_of(person)).distance(x, y) for person in people]
         distances += [segment_formula(x, y, *segment) for segment in self._segments]
         margins = [self.settings.eps] * len(people) + self._margins
@@ -253,7 +254,7 @@ class MPCCBF:
 
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
         """True if the goal cannot be reached, h < 0 there: for a wall, or for somebody who stands."""
-        x, y = pair("goal", goal)
+        x, y = check_point("goal", goal)
         placed = [place(who, self.zone_of(who)) for who in people]
         return any(zone.blocks((x, y), self.settings) for zone in placed) or bool(
             (self.barriers(goal) < 0).any()

@@ -29,7 +29,8 @@ from typing import Any, NamedTuple, Protocol
 import casadi as ca
 import numpy as np
 
-from .barriers import Array, barrier, cbf_residual, ellipse_formula, segment_formula
+from ..checks import Array
+from .barriers import barrier, cbf_residual, ellipse_formula, segment_formula
 from .settings import MPCSettings
 
 TOLERANCE = 1e-6

@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from ..checks import check_array
 from ..errors import SolverError
-from .barriers import finite
 
 Compile = Literal["auto", "off"]
 Margin = Literal["euclidean", "paper"]
@@ -86,13 +86,13 @@ class MPCSettings:
 
     def __post_init__(self) -> None:
         for name, length in (("Q", 4), ("R", 2), ("P", 4)):
-            weights = finite(name, getattr(self, name), (length,))
+            weights = check_array(name, getattr(self, name), (length,))
             object.__setattr__(self, name, tuple(weights.tolist()))
         for name in ("N", "N_h", "max_iterations"):
             value = getattr(self, name)
             _require(isinstance(value, int | np.integer) and value >= 1, name, value, "a whole number >= 1")
         for name in ("dt", "gamma", "a_max", "v_max", "r_robot", "eps", "zone_speed", "tie", "slack_weight"):
-            object.__setattr__(self, name, float(finite(name, getattr(self, name), ())))
+            object.__setattr__(self, name, float(check_array(name, getattr(self, name), ())))
         for name in ("dt", "a_max", "v_max", "zone_speed", "slack_weight"):
             _require(getattr(self, name) > 0, name, getattr(self, name), "a positive number")
         for name in ("r_robot", "eps"):

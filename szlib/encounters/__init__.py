@@ -10,20 +10,3 @@ days       many days, resumable, on one machine or many: `extract_days`
 shifting   the same people, each moved in time alone: `time_shifted`
 null       the null model, encounters where nobody minds anybody: `null_encounters`
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=[
-        "geometry",
-        "areas",
-        "kinds",
-        "search",
-        "streaming",
-        "pipeline",
-        "days",
-        "shifting",
-        "null",
-    ],
-)

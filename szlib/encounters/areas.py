@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from ..checks import check_columns
 from ..errors import DataError, DataWarning
 from ..files import printable
-from ..tracks.clock import COLUMNS, check_columns
+from ..tracks.clock import COLUMNS
 from .geometry import PAPER_SPACE, Area, Region, Square
 
 if TYPE_CHECKING:

@@ -28,9 +28,10 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
+from ..checks import check_columns
 from ..errors import DataError
 from ..tracks import funnels
-from ..tracks.clock import TICKS_PER_SECOND, check_columns, clock_index
+from ..tracks.clock import TICKS_PER_SECOND, clock_index
 from .areas import as_area
 
 COMPANIONS, STANDING, SAME, OPPOSITE, CROSSING = KINDS = (

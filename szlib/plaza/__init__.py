@@ -5,7 +5,3 @@ people       who walks there, and what a sensor records of them: `make_plaza`
 scores       how near to the truth: whom a rule for outliers found, how far a zone is off
 indifferent  a plaza on which nobody minds anybody: `indifferent_crowd`
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(__name__, submodules=["truth", "people", "scores", "indifferent"])

@@ -21,13 +21,13 @@ import polars as pl
 from numpy.typing import NDArray
 
 from ..encounters.geometry import wrap_angle
+from ..checks import Array
 from ..errors import ZoneError
 from ..files import write_file
 from .truth import (
     MARGIN,
     SLOWEST,
     SPACE,
-    Array,
     PlazaSettings,
     direction,
     first_moment,

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ..checks import check_columns
 from ..errors import DataError
-from ..tracks.clock import check_columns
 from ..zones.social_zone import SocialZone
 from .people import FIRST_ID, ID_STEP, stage_encounters
 from .truth import PlazaSettings

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..checks import Array
 from ..encounters.geometry import ATC_SQUARE, AttentionalSpace, Square
 from ..errors import DataError, ZoneError
 from ..zones.ellipses import Ellipse
 from ..zones.outliers import R_MAX
-
-Array = NDArray[np.float64]
 
 SLOWEST = 0.45
 """Who walks, walks at least that fast [m/s]; the paper looks at speeds from 0.4 m/s."""

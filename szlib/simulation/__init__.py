@@ -10,20 +10,3 @@ scenarios    the paper's four scenarios, eleven meetings, random worlds: `SCENAR
 rollouts     thousands of them, in parallel: `rollouts`
 comparisons  zones, formulations, behaviours and controllers on identical worlds
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=[
-        "scenario",
-        "crowds",
-        "controllers",
-        "metrics",
-        "log",
-        "closed_loop",
-        "scenarios",
-        "rollouts",
-        "comparisons",
-    ],
-)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..control.barriers import Array
+from ..checks import Array
 from ..control.mpc import MPCCBF
 from ..control.people.person import BODY_RADIUS, Person, SpeedZone, as_ellipse, circle_around
 from ..control.settings import MPCSettings

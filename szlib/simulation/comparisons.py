@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..control.barriers import Array
+from ..checks import Array
 from ..control.distances import euclidean_to_ellipse
 from ..control.people import BODY_RADIUS, as_ellipse
 from ..control.settings import MPCSettings

@@ -15,13 +15,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..control.barriers import (
-    Array,
-    barrier,
-    ellipse_formula,
-    euclidean_segment_formula,
-    segment_formula,
-)
+from ..checks import Array
+from ..control.barriers import barrier, ellipse_formula, euclidean_segment_formula, segment_formula
 from ..control.distances import wall_margin
 from ..control.people import BODY_RADIUS, Person
 from ..control.settings import MPCSettings

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from ..control.barriers import Array, check_wall, finite
+from ..checks import Array, check_array
+from ..control.barriers import check_wall
 from ..control.people import Person
 from ..errors import SolverError
 
@@ -74,8 +75,8 @@ class Scenario:
     def __post_init__(self) -> None:
         walls = np.array([check_wall(wall) for wall in self.walls]).reshape(-1, 2, 2)
         given = {
-            "start": finite("start", self.start, (4,)),
-            "goal": finite("goal", self.goal, (2,)),
+            "start": check_array("start", self.start, (4,)),
+            "goal": check_array("goal", self.goal, (2,)),
             "walls": walls,
         }
         for name, value in given.items():

@@ -10,20 +10,3 @@ interop    the contract of a loader, groups, PedPy
 sites      Grand Central, Edinburgh's Informatics Forum, THOR-MAGNI
 datasets   named data and paths, downloads verified by hash
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=[
-        "funnels",
-        "formats",
-        "plausible",
-        "readers",
-        "clock",
-        "quality",
-        "interop",
-        "sites",
-        "datasets",
-    ],
-)

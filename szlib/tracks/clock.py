@@ -14,13 +14,14 @@ mean that the person was lost in between: nobody is bridged across a gap.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from .. import memory
+from ..checks import check_columns
 from ..errors import DataError
 from . import funnels
 from .formats.layouts import Columns
@@ -153,17 +154,6 @@ def _on_clock(t: np.ndarray, x: np.ndarray, y: np.ndarray, within: np.ndarray) -
     any_tick = np.zeros(piece[-1] + 1, bool)
     any_tick[of] = True
     return {"row": row, "t": moment, "x": x, "y": y, "vx": vx, "vy": vy, "covered": any_tick[piece].sum()}
-
-
-def check_columns(frame: pd.DataFrame, needed: Sequence[str]) -> None:
-    """Raise DataError where a table lacks a column, or has no row."""
-    missing = [name for name in needed if name not in frame.columns]
-    if missing:
-        raise DataError(
-            f"columns {missing} are missing; found {list(map(str, frame.columns))}, expected {list(needed)}"
-        )
-    if len(frame) == 0:
-        raise DataError(f"the table is empty; expected rows of {list(needed)}")
 
 
 def nearest_tick(t: np.ndarray) -> np.ndarray:

@@ -27,9 +27,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from ..checks import check_columns
 from ..errors import DataError
 from . import funnels
-from .clock import check_columns, to_clock
+from .clock import to_clock
 
 GRAND_CENTRAL_RATE = 25.0
 """Frames a second of the video of Grand Central; every 20th is annotated."""

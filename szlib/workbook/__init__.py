@@ -10,20 +10,3 @@ report        a run to read without running anything
 runner        the whole workbook, headless, and what came of it
 command_line  `szlib run | report | inspect | extract | compile`
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=[
-        "figures",
-        "claims",
-        "sensitivity",
-        "exercises",
-        "record",
-        "laboratory",
-        "report",
-        "runner",
-        "command_line",
-    ],
-)

@@ -14,11 +14,11 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest, chi2
 
+from ..checks import check_columns
 from ..control.mpc import MPCCBF
 from ..errors import DataError, ZoneError
 from ..simulation.closed_loop import simulate
 from ..simulation.scenarios.paper import SCENARIOS
-from ..tracks.clock import check_columns
 from ..zones.ellipses import Ellipse
 from ..zones.social_zone import SocialZone
 

@@ -10,20 +10,3 @@ uncertainty   who was seen on which side; intervals from other draws of the same
 zone_file     versioned JSON
 social_zone   all of it behind one name, by speed, saved as JSON: `SocialZone`
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=[
-        "costmap",
-        "ellipses",
-        "outliers",
-        "by_direction",
-        "hulls",
-        "respect",
-        "uncertainty",
-        "zone_file",
-        "social_zone",
-    ],
-)

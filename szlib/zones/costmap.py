@@ -20,6 +20,7 @@ from typing import Any, Protocol, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import Array
 from ..errors import ZoneError
 
 BODY_RADIUS = 0.25
@@ -34,9 +35,6 @@ BODY, CENTRE, BOUNDARY = 100, 99, 50
 """Costs of a body, at the centre of a zone, and at its boundary."""
 _BISECTIONS = 60
 """Halvings of a quarter turn until nothing is left of it in double precision."""
-
-
-Array = NDArray[np.float64]
 
 
 class Oval(Protocol):

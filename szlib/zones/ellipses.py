@@ -20,10 +20,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import Array
 from ..errors import ZoneError
 from .costmap import Layer
 
-Array = NDArray[np.float64]
 Curve = Callable[[Array], Array]
 
 THINNEST = 1e-9  # width over length below which points count as collinear: a choice, far from any zone

@@ -19,9 +19,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ..checks import check_columns
 from ..errors import DataError, DataWarning
 from ..tracks import funnels
-from ..tracks.clock import check_columns
 
 R_MAX = 2.0
 """Longest distance that counts as close [m] (paper, sec. 2)."""

@@ -21,9 +21,9 @@ import numpy as np
 import pandas as pd
 
 from .. import __version__
+from ..checks import check_columns
 from ..encounters.null import NullEncounters
 from ..errors import DataWarning, ZoneError
-from ..tracks.clock import check_columns
 from .by_direction.quantile import QuantileZones
 from .by_direction.radii import Radii
 from .costmap import Layer

@@ -33,9 +33,10 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import norm
 
+from ..checks import Array
 from ..errors import DataError
 from .by_direction.quantile import BAND
-from .by_direction.radii import DIRECTIONS, Array, Radii, ellipse_reach
+from .by_direction.radii import DIRECTIONS, Radii, ellipse_reach
 from .outliers import encounter_numbers
 
 SECTORS = (

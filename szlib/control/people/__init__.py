@@ -5,14 +5,8 @@ tracker   headings by id, people brought forward to now, and those not seen any 
 meetings  on which side one who is met head-on is passed
 """
 
-import lazy_loader as lazy
+from .meetings import subgoal
+from .person import BODY_RADIUS, Person, PlacedZone, SpeedZone, as_ellipse, place
+from .tracker import Tracker
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["person", "tracker", "meetings"],
-    submod_attrs={
-        "person": ["BODY_RADIUS", "Person", "PlacedZone", "SpeedZone", "as_ellipse", "place"],
-        "tracker": ["Tracker"],
-        "meetings": ["subgoal"],
-    },
-)
+__all__ = ["BODY_RADIUS", "Person", "PlacedZone", "SpeedZone", "Tracker", "as_ellipse", "place", "subgoal"]

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
 from typing import NamedTuple, Protocol
 
+from ...checks import LARGEST, check_number, check_point
 from ...errors import SolverError, ZoneError
 from ...zones.costmap import BODY_RADIUS as BODY_RADIUS
 from ...zones.costmap import circle_around as circle_around
 from ...zones.ellipses import Ellipse
-from ..barriers import LARGEST, barrier, ellipse_formula, number, pair
+from ..barriers import barrier, ellipse_formula
 from ..settings import MPCSettings
 
 STANDS = 0.1
@@ -66,12 +67,12 @@ class Person:
     heading_unknown: bool = False
 
     def __post_init__(self) -> None:
-        x, y = position = pair("a person's position", self.position)
-        vx, vy = velocity = pair("a person's velocity", self.velocity)
+        x, y = position = check_point("a person's position", self.position)
+        vx, vy = velocity = check_point("a person's velocity", self.velocity)
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "velocity", velocity)
         if self.heading is not None:
-            object.__setattr__(self, "heading", number("a person's heading", self.heading))
+            object.__setattr__(self, "heading", check_number("a person's heading", self.heading))
             if self.heading_unknown:
                 raise SolverError(
                     f"a heading is given or unknown; got {self.heading} for the one at {(x, y)}"
@@ -96,7 +97,7 @@ class Person:
     def at(self, position: tuple[float, float]) -> Person:
         """The same person elsewhere [m]; what else they are was checked before, and is not again."""
         there = object.__new__(type(self))
-        there.__dict__.update(self.__dict__, position=pair("a person's position", position))
+        there.__dict__.update(self.__dict__, position=check_point("a person's position", position))
         return there
 
 

@@ -7,9 +7,3 @@ sqp       by a condensed SQP
 sizes     a solver for any number of people and walls, built ahead of the need
 ladder    what is tried one after another, down to full braking
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["compiled", "ipopt", "program", "sqp", "sizes", "ladder"]
-)

@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ..barriers import Array
+from ...checks import Array
 from ..problem import (
     BUILDING,
     HARD_SHARE,

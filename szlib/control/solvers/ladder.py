@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..barriers import Array
+from ...checks import Array
 from ..problem import HARD_SHARE, TOLERANCE, Numbers, ProblemSolver
 from ..settings import MPCSettings
 from ..step.decision import Rung

@@ -25,7 +25,7 @@ from typing import Literal
 import daqp
 import numpy as np
 
-from ..barriers import Array
+from ...checks import Array
 from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, Numbers
 from ..settings import MPCSettings
 from .program import Program, build_program

@@ -6,15 +6,21 @@ decision  what was decided: `Step`
 polygon   what could have been chosen: the polygon of accelerations that obey every row: `admissible`
 """
 
-import lazy_loader as lazy
+from .decision import RUNGS, Rung, Status, Step, status_of, terminal_of
+from .polygon import Admissible, Limit, admissible
+from .report import Report
+from .scene import Scene
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["scene", "report", "decision", "polygon"],
-    submod_attrs={
-        "scene": ["Scene"],
-        "report": ["Report"],
-        "polygon": ["Admissible", "Limit", "admissible"],
-        "decision": ["RUNGS", "Rung", "Status", "Step", "status_of", "terminal_of"],
-    },
-)
+__all__ = [
+    "RUNGS",
+    "Admissible",
+    "Limit",
+    "Report",
+    "Rung",
+    "Scene",
+    "Status",
+    "Step",
+    "admissible",
+    "status_of",
+    "terminal_of",
+]

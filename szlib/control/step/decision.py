@@ -7,7 +7,7 @@ from typing import Literal, cast, get_args
 
 import numpy as np
 
-from ..barriers import Array
+from ...checks import Array
 from ..problem import TOLERANCE
 from ..settings import MPCSettings, Terminal
 from .report import Report, described, verified

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 import shapely
 
-from ..barriers import Array, barrier, cbf_residual, ellipse_formula, segment_formula
+from ...checks import Array
+from ..barriers import barrier, cbf_residual, ellipse_formula, segment_formula
 
 if TYPE_CHECKING:
     from .decision import Step

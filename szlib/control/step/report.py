@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from ..barriers import Array
+from ...checks import Array
 from ..people.person import BODY_RADIUS
 from ..problem import TOLERANCE
 from .scene import Scene

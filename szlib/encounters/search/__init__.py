@@ -7,13 +7,7 @@ nearby     the rows that encounters in a square can depend on
 finding    the four conditions, one after the other
 """
 
-import lazy_loader as lazy
+from .finding import find_encounters
+from .samples import SAMPLE_COLUMNS, reference_frame
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["occupants", "windows", "samples", "nearby", "finding"],
-    submod_attrs={
-        "samples": ["SAMPLE_COLUMNS", "reference_frame"],
-        "finding": ["find_encounters"],
-    },
-)
+__all__ = ["SAMPLE_COLUMNS", "find_encounters", "reference_frame"]

@@ -22,9 +22,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ...checks import check_columns
 from ...errors import DataError
 from ...tracks import funnels
-from ...tracks.clock import COLUMNS, TICKS_PER_SECOND, check_columns
+from ...tracks.clock import COLUMNS, TICKS_PER_SECOND
 from ..areas import area_for
 from ..geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace
 from ..kinds import REACH, kinds_of_pairs, number_people, of_kind

@@ -6,10 +6,6 @@ kept_rows  the user's cache of them
 reading    `read_near_square`
 """
 
-import lazy_loader as lazy
+from .reading import read_near_square
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["blocks", "cells", "kept_rows", "reading"],
-    submod_attrs={"reading": ["read_near_square"]},
-)
+__all__ = ["read_near_square"]

@@ -4,13 +4,16 @@ protocol   what a controller, its steps and a robot must have: `Controller`, `St
 baselines  what people would otherwise use: straight ahead with stop, social force, dynamic window
 """
 
-import lazy_loader as lazy
+from .baselines import dynamic_window, social_force, straight
+from .protocol import Controller, DoubleIntegrator, Factory, Robot, StepLike
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["protocol", "baselines"],
-    submod_attrs={
-        "protocol": ["Controller", "DoubleIntegrator", "Factory", "Robot", "StepLike"],
-        "baselines": ["dynamic_window", "social_force", "straight"],
-    },
-)
+__all__ = [
+    "Controller",
+    "DoubleIntegrator",
+    "Factory",
+    "Robot",
+    "StepLike",
+    "dynamic_window",
+    "social_force",
+    "straight",
+]

@@ -22,7 +22,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...control.barriers import Array, euclidean_segment_formula
+from ...checks import Array
+from ...control.barriers import euclidean_segment_formula
 from ...control.people import BODY_RADIUS, Person
 from ...control.settings import MPCSettings
 from ..scenario import Scenario

@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...control.people import Person
 from ...control.settings import MPCSettings
 from ..scenario import Scenario

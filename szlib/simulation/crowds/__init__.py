@@ -9,10 +9,3 @@ replay        the robot in the place of a recorded walker: `Replay`, `replays`
 promises      steps that said they were safe and led to h < 0, and why: `broken_promises`
 scores        one set of numbers for robots and for the people they replace: `score`
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["walkers", "orca", "social_force", "speed_model", "reacting", "replay", "promises", "scores"],
-)

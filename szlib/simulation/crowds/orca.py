@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...control.people import BODY_RADIUS
 from .walkers import CROWDS, FASTER, Walkers, package
 

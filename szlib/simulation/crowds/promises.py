@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ...control.barriers import Array, barrier, ellipse_distance
+from ...checks import Array
+from ...control.barriers import barrier, ellipse_distance
 from ...control.problem import TOLERANCE
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ...control.barriers import Array, finite
+from ...checks import Array, check_array
 from ...control.people import BODY_RADIUS, Person
 from ...control.settings import MPCSettings
 from ...errors import SolverError
@@ -93,7 +93,7 @@ class Reacting:
             goals = list(self.goals)
         if len(goals) != len(people):
             raise SolverError(f"{len(people)} people need a goal each; got {len(goals)}")
-        exact = finite("goals", np.reshape(goals, (-1, 2)), (len(people), 2))
+        exact = check_array("goals", np.reshape(goals, (-1, 2)), (len(people), 2))
         stay = np.array([self.goals is None and person.stands for person in people], bool)
         moved = rng.normal(0.0, self.jitter, exact.shape)
         return exact + np.where(stay[:, None], 0.0, moved)
@@ -124,5 +124,6 @@ def _moved(person: Person, at: list[float], velocity: list[float]) -> Person:
     """The same person elsewhere, who faces where they walk, or, below `FACES`, where they faced."""
     (x, y), (vx, vy) = at, velocity
     heading = atan2(vy, vx) if hypot(vx, vy) >= FACES else person.heading
-    moved = {"position": (x, y), "velocity": (vx, vy), "heading": heading}
-    return replace(person, **moved, heading_unknown=heading is None)
+    return replace(
+        person, position=(x, y), velocity=(vx, vy), heading=heading, heading_unknown=heading is None
+    )

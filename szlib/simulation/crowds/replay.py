@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...control.people import Person
 from ...control.settings import MPCSettings
 from ...encounters.areas import area_for

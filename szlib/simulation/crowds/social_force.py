@@ -15,7 +15,7 @@ from types import ModuleType
 
 import numpy as np
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...errors import SolverError
 from .walkers import CROWDS, Walkers, package
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...errors import SolverError
 from .walkers import Walkers, package
 

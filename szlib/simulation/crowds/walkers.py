@@ -8,7 +8,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import Protocol
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...errors import SolverError
 
 FASTER = 1.3

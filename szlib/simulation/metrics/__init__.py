@@ -6,14 +6,21 @@ manners  what the robot did: went ahead, waited, backed out, ...: `manner`
 social   what people would notice, after HuNavSim: `social`
 """
 
-import lazy_loader as lazy
+from .endings import Outcome, outcome, path_exists
+from .manners import MANNERS, Manner, manner, retreat
+from .motion import along_course, avoidance_start, metrics, passing_side, yielding
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["endings", "motion", "manners", "social"],
-    submod_attrs={
-        "endings": ["Outcome", "outcome", "path_exists"],
-        "manners": ["MANNERS", "Manner", "manner", "retreat"],
-        "motion": ["along_course", "avoidance_start", "metrics", "passing_side", "yielding"],
-    },
-)
+__all__ = [
+    "MANNERS",
+    "Manner",
+    "Outcome",
+    "along_course",
+    "avoidance_start",
+    "manner",
+    "metrics",
+    "outcome",
+    "passing_side",
+    "path_exists",
+    "retreat",
+    "yielding",
+]

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from scipy.ndimage import label
 
-from ...control.barriers import Array, barrier, ellipse_distance, segment_distance
+from ...checks import Array
+from ...control.barriers import barrier, ellipse_distance, segment_distance
 from ...control.distances import wall_margin
 from ...control.problem import TOLERANCE
 from ..scenario import STOPPED

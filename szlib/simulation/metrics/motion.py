@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...control.problem import TOLERANCE
 from ...control.step import RUNGS
 from ..scenario import GOAL_RADIUS, STOPPED

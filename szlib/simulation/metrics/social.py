@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...control.distances import euclidean_to_segment
 from ...control.people import BODY_RADIUS
 from ..scenario import STOPPED

@@ -6,15 +6,20 @@ worlds    random worlds, each from its seed
 atlas     the paper's scenarios stretched, and what the robot does in them: `chart`
 """
 
-import lazy_loader as lazy
+from .atlas import Cell, chart
+from .meetings import MEETINGS, InSight, Variations
+from .paper import SCENARIOS
+from .worlds import ONE_PERSON, Worlds, random_zone, world
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["paper", "meetings", "worlds", "atlas"],
-    submod_attrs={
-        "atlas": ["Cell", "chart"],
-        "paper": ["SCENARIOS"],
-        "meetings": ["MEETINGS", "InSight", "Variations"],
-        "worlds": ["ONE_PERSON", "Worlds", "random_zone", "world"],
-    },
-)
+__all__ = [
+    "MEETINGS",
+    "ONE_PERSON",
+    "SCENARIOS",
+    "Cell",
+    "InSight",
+    "Variations",
+    "Worlds",
+    "chart",
+    "random_zone",
+    "world",
+]

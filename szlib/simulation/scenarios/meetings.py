@@ -16,7 +16,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...control.people import Person
 from ...zones.ellipses import Ellipse
 from ..scenario import UNAFFECTED, Crowd, Scenario

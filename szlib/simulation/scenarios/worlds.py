@@ -10,7 +10,8 @@ from math import cos, dist, pi, sin
 
 import numpy as np
 
-from ...control.barriers import Array, barrier, euclidean_segment_formula, segment_formula
+from ...checks import Array
+from ...control.barriers import barrier, euclidean_segment_formula, segment_formula
 from ...control.distances import required_margin
 from ...control.people import BODY_RADIUS, Person
 from ...control.people.person import PlacedZone, place

@@ -7,9 +7,3 @@ layouts      which column is what, and how a file is recognised by its first lin
 tables       tables in memory: DataFrames, and PedPy's TrajectoryData
 rows         why some rows cannot be used, and the others in seconds and metres
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["frame_rates", "plain", "foreign", "layouts", "tables", "rows"]
-)

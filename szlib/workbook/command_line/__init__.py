@@ -6,8 +6,6 @@ options   what may be said to each
 entry     the way in: `main`
 """
 
-import lazy_loader as lazy
+from .entry import main
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["endings", "commands", "options", "entry"], submod_attrs={"entry": ["main"]}
-)
+__all__ = ["main"]

@@ -10,10 +10,7 @@ robot      sheet 6: speed limit, gamma by experiment, the terminal proof, predic
 checking   `check` and `hint`, over all sheets
 """
 
-import lazy_loader as lazy
+from .checking import SHEETS, check, hint
+from .task import Task, Verdict
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["task", "tracks", "outliers", "zones", "certainty", "barriers", "robot", "checking"],
-    submod_attrs={"checking": ["SHEETS", "check", "hint"], "task": ["Task", "Verdict"]},
-)
+__all__ = ["SHEETS", "Task", "Verdict", "check", "hint"]

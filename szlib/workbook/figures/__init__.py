@@ -11,59 +11,70 @@ comparisons  many runs: sweeps, manners, intervals side by side
 crowds       robots among other people's crowds
 """
 
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=[
-        "style",
-        "tracks",
-        "encounters",
-        "zones",
-        "control",
-        "players",
-        "simulation",
-        "comparisons",
-        "crowds",
-    ],
-    submod_attrs={
-        "tracks": ["plot_map", "plot_speeds", "plot_funnel"],
-        "encounters": ["plot_space", "plot_encounter_paths", "plot_los", "plot_los_distance"],
-        "zones": [
-            "plot_outliers",
-            "plot_hull",
-            "plot_zone",
-            "plot_zones",
-            "plot_pair_correlation",
-            "plot_by_number",
-            "plot_tornado",
-            "plot_findings",
-        ],
-        "control": ["plot_distance", "plot_overestimate", "plot_admissible", "plot_step", "step_panels"],
-        "players": ["Movie"],
-        "simulation": [
-            "plot_scenario",
-            "plot_speed",
-            "plot_barriers",
-            "plot_robot_paths",
-            "run_grid",
-            "animate",
-        ],
-        "comparisons": ["plot_sweep", "plot_manners", "plot_intervals", "interval_grid", "legend_below"],
-        "crowds": ["plot_crowd", "plot_promises"],
-        "style": [
-            "BLUE",
-            "ORANGE",
-            "GREEN",
-            "RED",
-            "GREY",
-            "BLACK",
-            "SEQUENCE",
-            "axes",
-            "metres",
-            "outline",
-            "colours",
-            "in_words",
-        ],
-    },
+from .comparisons import interval_grid, legend_below, plot_intervals, plot_manners, plot_sweep
+from .control import plot_admissible, plot_distance, plot_overestimate, plot_step, step_panels
+from .crowds import plot_crowd, plot_promises
+from .encounters import plot_encounter_paths, plot_los, plot_los_distance, plot_space
+from .players import Movie
+from .simulation import animate, plot_barriers, plot_robot_paths, plot_scenario, plot_speed, run_grid
+from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, SEQUENCE, axes, colours, in_words, metres, outline
+from .tracks import plot_funnel, plot_map, plot_speeds
+from .zones import (
+    plot_by_number,
+    plot_findings,
+    plot_hull,
+    plot_outliers,
+    plot_pair_correlation,
+    plot_tornado,
+    plot_zone,
+    plot_zones,
 )
+
+__all__ = [
+    "BLACK",
+    "BLUE",
+    "GREEN",
+    "GREY",
+    "ORANGE",
+    "RED",
+    "SEQUENCE",
+    "Movie",
+    "animate",
+    "axes",
+    "colours",
+    "in_words",
+    "interval_grid",
+    "legend_below",
+    "metres",
+    "outline",
+    "plot_admissible",
+    "plot_barriers",
+    "plot_by_number",
+    "plot_crowd",
+    "plot_distance",
+    "plot_encounter_paths",
+    "plot_findings",
+    "plot_funnel",
+    "plot_hull",
+    "plot_intervals",
+    "plot_los",
+    "plot_los_distance",
+    "plot_manners",
+    "plot_map",
+    "plot_outliers",
+    "plot_overestimate",
+    "plot_pair_correlation",
+    "plot_promises",
+    "plot_robot_paths",
+    "plot_scenario",
+    "plot_space",
+    "plot_speed",
+    "plot_speeds",
+    "plot_step",
+    "plot_sweep",
+    "plot_tornado",
+    "plot_zone",
+    "plot_zones",
+    "run_grid",
+    "step_panels",
+]

@@ -13,7 +13,8 @@ from matplotlib.patches import Circle, Rectangle
 from numpy.typing import ArrayLike
 from shapely.plotting import patch_from_polygon
 
-from ...control.barriers import Array, barrier, check_wall, ellipse_distance, segment_distance
+from ...checks import Array
+from ...control.barriers import barrier, check_wall, ellipse_distance, segment_distance
 from ...control.distances import (
     euclidean_to_ellipse,
     euclidean_to_segment,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...simulation.log import SimulationLog
 from ...zones.ellipses import Ellipse
 from .style import BLUE, GREEN, RED

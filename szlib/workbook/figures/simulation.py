@@ -19,7 +19,7 @@ from matplotlib.patches import Ellipse as EllipsePatch
 from matplotlib.patheffects import Normal, Stroke
 from PIL import Image
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...simulation.log import SimulationLog
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse

@@ -4,10 +4,7 @@ bench  the scene, its robots, and the parameter cell that begins with them
 page   the same on a page: sliders, canvases, and what is shown where no page is open: nothing
 """
 
-import lazy_loader as lazy
+from .bench import Bench, Choice, scene
+from .page import Laboratory, live, slide
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["bench", "page"],
-    submod_attrs={"bench": ["Bench", "Choice", "scene"], "page": ["Laboratory", "live", "slide"]},
-)
+__all__ = ["Bench", "Choice", "Laboratory", "live", "scene", "slide"]

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...control.barriers import Array, check_wall, finite
+from ...checks import Array, check_array
+from ...control.barriers import check_wall
 from ...control.mpc import MPCCBF
 from ...control.people import Person
 from ...control.settings import MPCSettings
@@ -111,14 +112,14 @@ class Bench:
         """
         moved = self.people
         for i, place in (people or {}).items():
-            x, y = finite("a person's position", place, (2,)).tolist()
+            x, y = check_array("a person's position", place, (2,)).tolist()
             moved[i] = replace(moved[i], position=(x, y))
         if speed is not None:
             moved = [_walking(person, speed) for person in moved]
         segments = [np.reshape(wall, (2, 2)) for wall in (self.scenario.walls if walls is None else walls)]
         changed = replace(
             self.scenario,
-            goal=self.scenario.goal if goal is None else finite("goal", goal, (2,)),
+            goal=self.scenario.goal if goal is None else check_array("goal", goal, (2,)),
             walls=np.reshape([check_wall(wall) for wall in segments], (-1, 2, 2)),
             people=tuple(moved) if self._step == 0 else self.scenario.people,
         )

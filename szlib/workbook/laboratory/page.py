@@ -16,7 +16,7 @@ import anywidget
 import numpy as np
 import traitlets
 
-from ...control.barriers import Array
+from ...checks import Array
 from ...control.people import Person
 from ...control.step import Step, admissible
 from ...errors import SzlibError
@@ -94,7 +94,7 @@ class Laboratory(anywidget.AnyWidget):
     def _stage(self) -> dict[str, Any]:
         scene, settings = self.bench.scenario, self.bench.choices[0].settings()
         places = [scene.start[:2], scene.goal, *(person.position for person in scene.people)]
-        points = np.vstack([*places, scene.walls.reshape(-1, 2)])
+        points = np.vstack([np.array(places), scene.walls.reshape(-1, 2)])
         low, high = points.min(axis=0) - _AROUND, points.max(axis=0) + _AROUND
         limits = [low[0], high[0], min(low[1], -2.0), max(high[1], 2.0)]
         walls = scene.walls.reshape(-1, 4).tolist()

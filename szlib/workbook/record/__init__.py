@@ -7,13 +7,7 @@ tables      how values, tables and figures are shown
 notebook    the record of one notebook: checks, claims, figures, artefacts
 """
 
-import lazy_loader as lazy
+from .notebook import NotebookRecord
+from .tables import ASSUMED, MEASURED, PAPER, parameters, settings_table
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=["method", "places", "validation", "tables", "notebook"],
-    submod_attrs={
-        "notebook": ["NotebookRecord"],
-        "tables": ["PAPER", "ASSUMED", "MEASURED", "parameters", "settings_table"],
-    },
-)
+__all__ = ["ASSUMED", "MEASURED", "PAPER", "NotebookRecord", "parameters", "settings_table"]

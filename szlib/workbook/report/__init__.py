@@ -3,7 +3,3 @@
 front_page  what was run, the funnel, the zone, claims, the four scenarios, parameters
 document    the front page and every executed notebook, as one page
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(__name__, submodules=["front_page", "document"])

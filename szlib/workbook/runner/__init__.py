@@ -6,8 +6,6 @@ worker     one notebook, executed by papermill in a kernel of its own
 execution  all of them, in their order and side by side
 """
 
-import lazy_loader as lazy
+from .execution import run
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["summary", "kernels", "worker", "execution"], submod_attrs={"execution": ["run"]}
-)
+__all__ = ["run"]

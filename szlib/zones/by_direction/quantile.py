@@ -16,11 +16,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ...checks import Array, check_columns
 from ...errors import DataError, ZoneError
 from ...tracks import funnels
-from ...tracks.clock import check_columns
 from ..outliers import encounter_numbers
-from .radii import DIRECTIONS, Array, Radii, closed, fit_ellipses
+from .radii import DIRECTIONS, Radii, closed, fit_ellipses
 
 SHARE = 0.05
 """Share q of encounters that may enter the zone (assumed)."""

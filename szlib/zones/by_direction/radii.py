@@ -10,12 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...checks import Array
 from ...errors import ZoneError
 from ..ellipses import Ellipse
-
-Array = NDArray[np.float64]
 
 DIRECTIONS: Array = np.radians(np.arange(-180.0, 180.0, 5.0))
 """Directions in which a radius is told, counter-clockwise from ahead [rad]."""

@@ -5,9 +5,3 @@ boundary      the contour within which they were half as often: `respect_boundar
 significance  is it respect at all: `null_test`
 estimate      its way to zones, to go again with other people
 """
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__, submodules=["presence", "boundary", "significance", "estimate"]
-)

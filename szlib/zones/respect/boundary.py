@@ -38,9 +38,10 @@ from scipy.optimize import minimize
 from scipy.special import expit, logit
 from threadpoolctl import ThreadpoolController
 
+from ...checks import Array
 from ...encounters.null import NullEncounters
 from ...errors import ZoneError
-from .presence import Array, Presence
+from .presence import Presence
 
 SPEED_WIDTH = 0.2
 """Standard deviation of the Gaussian that weighs samples of other speeds than the one asked for [m/s]."""

@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ...checks import Array
 from ...encounters.null import NullEncounters
 from ...errors import ZoneError
 from ...tracks import funnels
-from ..by_direction.radii import DIRECTIONS, Array, Radii, fit_ellipses
+from ..by_direction.radii import DIRECTIONS, Radii, fit_ellipses
 from ..outliers import encounter_numbers
 from .boundary import SPEED_WIDTH, respect_boundary
 from .presence import Presence

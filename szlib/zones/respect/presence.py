@@ -6,14 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter
 
+from ...checks import Array, check_columns
 from ...encounters.null import NullEncounters
 from ...errors import ZoneError
-from ...tracks.clock import check_columns
-
-Array = NDArray[np.float64]
 
 _DISTANCES, _DIRECTIONS = 80, 36
 _SPEED_STEP, _SPEEDS = 0.1, 40  # [m/s]; faster samples count as of the last bin

@@ -28,10 +28,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ...checks import check_columns
 from ...encounters.kinds import COMPANIONS
 from ...encounters.null import NullEncounters
 from ...errors import DataWarning, ZoneError
-from ...tracks.clock import check_columns
 from .boundary import respect_radius
 from .presence import Presence
 
