@@ -20,8 +20,8 @@ import pandas as pd
 import polars as pl
 from numpy.typing import NDArray
 
-from ..encounters.geometry import wrap_angle
 from ..checks import Array
+from ..encounters.geometry import wrap_angle
 from ..errors import ZoneError
 from ..files import write_file
 from .truth import (
