@@ -37,7 +37,7 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.encounters.search import reference_frame
+from szlib.encounters.samples import reference_frame
 from szlib.tracks import funnels
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters

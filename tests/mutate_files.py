@@ -19,7 +19,7 @@ from pathlib import Path
 from test_readers import WRITERS, lines_of, mutate, samples
 
 import szlib
-from szlib.encounters.streaming import read_near_square
+from szlib.encounters.near_rows import read_near_square
 from szlib.tracks import funnels
 
 LONGEST = 20

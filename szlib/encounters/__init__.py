@@ -1,12 +1,48 @@
-"""Who met whom, alone: windows in which two people share the attentional space.
+"""Encounters: windows in which two people share the attentional space, alone.
 
-geometry   the area and the attentional space
-areas      an area as it is written, or as people walked: `as_area`, `walked_area`
-kinds      companions, same direction, opposite, crossing, standing: on the whole common track
-search     the four conditions of the paper: `find_encounters`
-streaming  of a raw day only the rows near the square
-pipeline   every parameter from the files of a day to its encounters, and how these are stored
-days       many days, resumable, on one machine or many: `extract_days`
-shifting   the same people, each moved in time alone: `time_shifted`
-null       the null model, encounters where nobody minds anybody: `null_encounters`
+geometry         the area and the attentional space
+areas            an area in any form, or found from walking people: `as_area`, `walked_area`
+kinds            companions, same direction, opposite, crossing, standing, decided on the common track
+occupants        the people inside the attentional space of each row of a track table
+windows          windows of ticks that meet a condition throughout
+finding          the four conditions of the paper: `find_encounters`
+samples          what is measured in a window: `reference_frame`
+nearby           the rows of a track table that encounters in an area can depend on
+near_rows        the rows of a file that encounters in an area can depend on
+near_rows_cache  the user's cache of these rows
+one_day          from the files of a day to its encounters
+days             many days, resumable, on one machine or many: `extract_days`
+time_shift       the same people, each moved in time: `time_shifted`
+null_model       encounters of people who do not interact: `null_encounters`
 """
+
+from .areas import as_area, walked_area
+from .days import Extraction, extract_days
+from .finding import find_encounters
+from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
+from .kinds import KINDS, encounter_kinds, of_kind
+from .null_model import NullEncounters, null_encounters
+from .samples import SAMPLE_COLUMNS, reference_frame
+from .time_shift import time_shifted
+
+__all__ = [
+    "ATC_SQUARE",
+    "KINDS",
+    "PAPER_SPACE",
+    "SAMPLE_COLUMNS",
+    "Area",
+    "AttentionalSpace",
+    "Extraction",
+    "NullEncounters",
+    "Region",
+    "Square",
+    "as_area",
+    "encounter_kinds",
+    "extract_days",
+    "find_encounters",
+    "null_encounters",
+    "of_kind",
+    "reference_frame",
+    "time_shifted",
+    "walked_area",
+]

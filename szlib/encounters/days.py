@@ -32,7 +32,7 @@ from ..tracks.formats.plain import first_line
 from ..tracks.formats.rows import CALENDAR_BEGINS
 from ..tracks.readers import recording_names
 from .geometry import Area
-from .pipeline import Chain, contents, day_key, finished_record, write_record
+from .one_day import Chain, contents, day_key, finished_record, write_record
 
 PURPOSE = "encounters by day"
 """What the folder of an extraction is marked as."""
@@ -132,7 +132,7 @@ def extract_days(
         day, the same for all.
 
     Of a raw day the rows near the square, some 2 % of the file, are kept in the user's cache, so that other
-    conditions are asked of them without reading it again (`szlib.encounters.streaming.kept_rows`):
+    conditions are asked of them without reading it again (`szlib.encounters.near_rows_cache`):
     $SZLIB_CACHE names the folder, or is "off".
 
     Returns

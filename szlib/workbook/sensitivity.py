@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..encounters.finding import find_encounters
 from ..encounters.geometry import Area
-from ..encounters.search.finding import find_encounters
-from ..encounters.search.nearby import near_square
+from ..encounters.nearby import near_square
 from ..errors import DataError, DataWarning, ZoneError
 from ..zones.social_zone import SocialZone
 

@@ -22,7 +22,7 @@ import pandas as pd
 
 from .. import __version__
 from ..checks import check_columns
-from ..encounters.null import NullEncounters
+from ..encounters.null_model import NullEncounters
 from ..errors import DataWarning, ZoneError
 from .by_direction.quantile import QuantileZones
 from .by_direction.radii import Radii

@@ -20,9 +20,9 @@ from test_streaming import make_raw, same, write
 
 import szlib
 from szlib.encounters.areas import _largest, area_for
+from szlib.encounters.finding import find_encounters
 from szlib.encounters.geometry import Region, Square
-from szlib.encounters.null import null_encounters
-from szlib.encounters.search import find_encounters
+from szlib.encounters.null_model import null_encounters
 
 ATC_POLYGON = shapely.box(-18.5, -10, -7.5, 8)
 HALL = shapely.Polygon([(0, 0), (12, 0), (12, 8), (0, 8)])

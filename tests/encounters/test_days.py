@@ -74,7 +74,7 @@ def test_the_result_depends_neither_on_order_nor_on_processes_nor_on_blocks(
 ) -> None:
     extract(days[::-1], tmp_path / "reversed")
     extract(str(days[0].parent / "*.csv"), tmp_path / "two", n_jobs=2)
-    monkeypatch.setattr("szlib.encounters.streaming.blocks._ROWS_AT_ONCE", 700)
+    monkeypatch.setattr("szlib.encounters.blocks._ROWS_AT_ONCE", 700)
     extract([days[0].parent], tmp_path / "blocks")
     for name in ("reversed", "two", "blocks"):
         assert contents(tmp_path / name) == reference

@@ -11,8 +11,9 @@ import pytest
 from test_streaming import make_raw, write
 
 import szlib
-from szlib.encounters.pipeline import Chain
-from szlib.encounters.streaming import blocks, kept_rows
+from szlib.encounters import blocks
+from szlib.encounters import near_rows_cache as kept_rows
+from szlib.encounters.one_day import Chain
 from szlib.files import CACHE, file_content
 from szlib.tracks import funnels
 

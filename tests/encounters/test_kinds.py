@@ -10,8 +10,8 @@ import pytest
 from conftest import DAY, make_crowd, make_tracks, make_walk, real_data
 
 import szlib
+from szlib.encounters.finding import find_encounters
 from szlib.encounters.kinds import COMPANIONS, KINDS, REACH, encounter_kinds, of_kind
-from szlib.encounters.search import find_encounters
 from szlib.tracks import funnels, sites
 from szlib.tracks.interop import read_groups
 

@@ -7,7 +7,7 @@ import pytest
 from conftest import make_crowd, make_tracks, make_walk
 
 import szlib
-from szlib.encounters.search.nearby import near_square
+from szlib.encounters.nearby import near_square
 from szlib.tracks import funnels
 
 SQUARE = szlib.Square(x=(0, 14), y=(0, 14))

@@ -11,8 +11,10 @@ import pytest
 from conftest import DAY, make_crowd, make_tracks, make_walk
 
 import szlib
+from szlib.encounters import occupants
+from szlib.encounters.finding import find_encounters
 from szlib.encounters.geometry import AttentionalSpace, Square, wrap_angle
-from szlib.encounters.search import SAMPLE_COLUMNS, find_encounters, occupants, reference_frame
+from szlib.encounters.samples import SAMPLE_COLUMNS, reference_frame
 from szlib.tracks import funnels
 
 ROOM = Square(x=(-20, 20), y=(-20, 20))

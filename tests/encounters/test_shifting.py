@@ -8,7 +8,7 @@ import pytest
 from conftest import DAY, make_tracks, make_walk
 
 import szlib
-from szlib.encounters.shifting import APART, Crowd
+from szlib.encounters.time_shift import APART, Crowd
 from szlib.errors import DataError
 from szlib.tracks import funnels
 from szlib.tracks.clock import nearest_tick

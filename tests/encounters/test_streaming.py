@@ -11,7 +11,8 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.encounters.streaming import blocks, cells, read_near_square
+from szlib.encounters import blocks, cells
+from szlib.encounters.near_rows import read_near_square
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.tracks import funnels

@@ -11,7 +11,7 @@ import pytest
 from conftest import real_data
 
 import szlib
-from szlib.encounters.pipeline import Chain
+from szlib.encounters.one_day import Chain
 from szlib.tracks import funnels, quality
 
 HABITS = {"to the next": (0, 1), "from the last": (-1, 0), "over both": (-1, 1)}

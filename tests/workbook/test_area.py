@@ -10,7 +10,7 @@ import shapely
 from conftest import make_crowd, make_hall, make_tracks, make_walk
 
 import szlib
-from szlib.encounters.pipeline import check_met
+from szlib.encounters.one_day import check_met
 from szlib.workbook.command_line import main
 from szlib.workbook.record import NotebookRecord
 
@@ -94,7 +94,7 @@ def test_an_area_is_found_once_and_kept(hall, tmp_path, monkeypatch):
     record = record_of(tmp_path, hall)
     found = record.square(record.tracks())
     assert str(found) == (record.out / "area.txt").read_text()
-    monkeypatch.setattr("szlib.encounters.pipeline.walked_area", None)
+    monkeypatch.setattr("szlib.encounters.one_day.walked_area", None)
     assert record_of(tmp_path, hall).square() == found
     assert record.encounters().attrs["area"] == str(found)
 

@@ -19,7 +19,7 @@ WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbco
 
 def inspect(file: str | Path, *, area: str = "") -> str:
     """The funnel of a file down to its encounters in the area, a line for each count, as a table to read."""
-    from ...encounters.pipeline import Chain
+    from ...encounters.one_day import Chain
     from ...tracks import datasets, funnels
 
     files = datasets.find([file])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...encounters.search import find_encounters
+from ...encounters.finding import find_encounters
 from ...plaza.people import make_plaza
 from ...plaza.truth import SLOW, PlazaSettings
 from ...tracks.clock import read_tracks

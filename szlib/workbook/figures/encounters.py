@@ -46,7 +46,7 @@ def plot_space(
 def plot_encounter_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | None = None) -> Axes:
     """Paths of the other person in the reference pedestrian's frame at the opening (paper, fig. 2).
 
-    `paths` as from `szlib.encounters.search.reference_frame`; `count` encounters, evenly spread, are drawn,
+    `paths` as from `szlib.encounters.samples.reference_frame`; `count` encounters, evenly spread, are drawn,
     from a dot at the opening to an arrow's head, in the direction of the last half second, at the end.
     """
     ax = axes(ax, size=(7, 5.5))

@@ -21,9 +21,9 @@ from pandas.io.formats.style import Styler
 
 from ... import __version__
 from ...encounters.areas import as_area
+from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
-from ...encounters.pipeline import Chain, check_met
-from ...encounters.search.finding import find_encounters
+from ...encounters.one_day import Chain, check_met
 from ...errors import DataError, ZoneError
 from ...files import file_content, keep, kept, own_folder, sign, write_file
 from ...plaza.people import make_plaza

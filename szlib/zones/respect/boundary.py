@@ -39,7 +39,7 @@ from scipy.special import expit, logit
 from threadpoolctl import ThreadpoolController
 
 from ...checks import Array
-from ...encounters.null import NullEncounters
+from ...encounters.null_model import NullEncounters
 from ...errors import ZoneError
 from .presence import Presence
 

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...checks import Array
-from ...encounters.null import NullEncounters
+from ...encounters.null_model import NullEncounters
 from ...errors import ZoneError
 from ...tracks import funnels
 from ..by_direction.radii import DIRECTIONS, Radii, fit_ellipses

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter
 
 from ...checks import Array, check_columns
-from ...encounters.null import NullEncounters
+from ...encounters.null_model import NullEncounters
 from ...errors import ZoneError
 
 _DISTANCES, _DIRECTIONS = 80, 36

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from ...checks import check_columns
 from ...encounters.kinds import COMPANIONS
-from ...encounters.null import NullEncounters
+from ...encounters.null_model import NullEncounters
 from ...errors import DataWarning, ZoneError
 from .boundary import respect_radius
 from .presence import Presence

@@ -19,10 +19,10 @@ from ..errors import DataError
 from ..parallel import run_tasks
 from ..tracks import funnels
 from .areas import area_for
+from .finding import find_encounters
 from .geometry import ATC_SQUARE
 from .kinds import of_kind
-from .search.finding import find_encounters
-from .shifting import MINUTES, Crowd
+from .time_shift import MINUTES, Crowd
 
 CLOSE = 2.0
 """Samples farther than that [m] bear on no zone (paper: r_max)."""

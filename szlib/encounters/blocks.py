@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from ...tracks.formats.rows import fault, limits
+from ..tracks.formats.rows import fault, limits
 
 _ROWS_AT_ONCE = 1 << 17
 """Rows of one block [about 5 minutes of a raw day]."""

@@ -26,7 +26,7 @@ from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, clock_index, to_clock
 from .geometry import Area
 from .kinds import NEAR, TOGETHER, number_people
-from .search.nearby import may_matter
+from .nearby import may_matter
 
 MINUTES = (1.0, 10.0)
 """Shortest and longest shift [min]: longer than a meeting, shorter than the day's ups and downs (assumed)."""

@@ -30,9 +30,9 @@ from math import ceil
 
 import numpy as np
 
-from ...tracks.clock import VELOCITY_SPAN
-from ..geometry import Square
+from ..tracks.clock import VELOCITY_SPAN
 from .blocks import Rows
+from .geometry import Square
 
 _CELLS, _ALL_CELLS = 1 << 16, 1 << 24
 """Slots of the table of cells: for one block, and for a whole day that is not sorted by time."""

@@ -10,18 +10,18 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
-from ... import memory
-from ...tracks import funnels
-from ...tracks.formats.layouts import Columns, Format, quick_scan, readable, recognise
-from ...tracks.formats.plain import plain_file
-from ...tracks.formats.rows import in_metres
-from ...tracks.plausible import check_unit
-from ...tracks.readers import merge, person_order, read_raw, read_stage
-from ..geometry import Area
-from ..kinds import REACH
-from . import kept_rows
+from .. import memory
+from ..tracks import funnels
+from ..tracks.formats.layouts import Columns, Format, quick_scan, readable, recognise
+from ..tracks.formats.plain import plain_file
+from ..tracks.formats.rows import in_metres
+from ..tracks.plausible import check_unit
+from ..tracks.readers import merge, person_order, read_raw, read_stage
+from . import near_rows_cache as kept_rows
 from .blocks import Blocks, Rows, Tally
 from .cells import Cells, Unsorted, one_pass, two_passes
+from .geometry import Area
+from .kinds import REACH
 
 _NEAR_ROW = 180
 """Bytes that a row near the square takes until its day is done (15.6 million of them: 2.7 GB)."""

@@ -22,13 +22,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...checks import check_columns
-from ...errors import DataError
-from ...tracks import funnels
-from ...tracks.clock import COLUMNS, TICKS_PER_SECOND
-from ..areas import area_for
-from ..geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace
-from ..kinds import REACH, kinds_of_pairs, number_people, of_kind
+from ..checks import check_columns
+from ..errors import DataError
+from ..tracks import funnels
+from ..tracks.clock import COLUMNS, TICKS_PER_SECOND
+from .areas import area_for
+from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace
+from .kinds import REACH, kinds_of_pairs, number_people, of_kind
 from .occupants import Rows, changes_of_occupant, occupants
 from .samples import sampled
 from .windows import always, sift, without_overlap

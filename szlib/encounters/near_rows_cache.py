@@ -23,8 +23,8 @@ import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
-from ...errors import StorageError
-from ...files import CACHE, MARKER, cache_folder, keep, kept, own_folder
+from ..errors import StorageError
+from ..files import CACHE, MARKER, cache_folder, keep, kept, own_folder
 from .blocks import Rows, Tally
 
 Content = Callable[[], tuple[int, str]]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from ...tracks.clock import clock_index
-from ..geometry import AttentionalSpace
+from ..tracks.clock import clock_index
+from .geometry import AttentionalSpace
 
 _PAIRS_AT_ONCE = 4_000_000
 """Pairs of people held in memory at a time."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from ...checks import check_columns
-from ...errors import DataError
-from ...tracks.clock import COLUMNS, TICKS_PER_SECOND, nearest_tick
-from ..geometry import wrap_angle
+from ..checks import check_columns
+from ..errors import DataError
+from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, nearest_tick
+from .geometry import wrap_angle
 
 SAMPLE_COLUMNS = ["encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed"]
 """What is measured; the column kind follows them."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from ...tracks import funnels
-from ...tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
-from ..geometry import Area
-from ..kinds import REACH, number_people
+from ..tracks import funnels
+from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
+from .geometry import Area
+from .kinds import REACH, number_people
 from .occupants import Rows
 
 

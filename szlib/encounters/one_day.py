@@ -29,12 +29,12 @@ from ..tracks.formats.layouts import FORMATS, UNITS, Columns, layout_of
 from ..tracks.formats.plain import first_line
 from ..tracks.readers import read_raw
 from .areas import AUTO, as_area, walked_area
+from .finding import find_encounters
 from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
 from .kinds import KINDS
-from .search.finding import find_encounters
-from .search.samples import SAMPLE_COLUMNS
-from .streaming.kept_rows import Content
-from .streaming.reading import read_near_square
+from .near_rows import read_near_square
+from .near_rows_cache import Content
+from .samples import SAMPLE_COLUMNS
 
 _ADVICE = {
     "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
