@@ -132,11 +132,11 @@ record.figure(ax.figure, "space")
 # not.
 
 # %%
-stages = funnels.of(people)
-lost = {reason: n for s in stages for reason, n in s["set_aside"].items()}
+stages = funnels.get(people)
+lost = {reason: n for s in stages for reason, n in s["rejected"].items()}
 record.check(
     "the funnel adds up",
-    all(s["entered"] == s["kept"] + sum(s["set_aside"].values()) for s in stages),
+    all(s["entered"] == s["kept"] + sum(s["rejected"].values()) for s in stages),
     lost or "no row set aside",
     always=True,
 )

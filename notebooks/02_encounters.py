@@ -199,8 +199,8 @@ record.check(
 # Third people come with the real day, and with the tests.)
 
 # %%
-stages = funnels.of(samples)
-adds_up = all(s["entered"] == s["kept"] + sum(s["set_aside"].values()) for s in stages)
+stages = funnels.get(samples)
+adds_up = all(s["entered"] == s["kept"] + sum(s["rejected"].values()) for s in stages)
 record.check("the funnel adds up", adds_up, always=True)
 funnels.table(stages).tail(15)
 

@@ -196,14 +196,14 @@ extraction.table.drop(columns="seconds")
 
 # %%
 samples = extraction.samples()
-stages = funnels.of(samples)
+stages = funnels.get(samples)
 ax = figures.plot_funnel(funnels.table(stages))
 ax.set_title("From rows of files to encounters")
 record.figure(ax.figure, "funnel")
 
 # %%
 read = [stage for stage in stages if stage["stage"].startswith("read ")]
-unusable = sum(sum(stage["set_aside"].values()) for stage in read)
+unusable = sum(sum(stage["rejected"].values()) for stage in read)
 record.key |= {"rows": sum(stage["entered"] for stage in read), "encounters": samples["encounter"].nunique()}
 counted = all(s["entered"] >= s["kept"] for s in stages)
 record.check("every file was read", len(extraction.failed) == 0, len(extraction.table), always=True)

@@ -50,11 +50,11 @@ def survive(folder: Path, seed: int) -> str:
 
 
 def _whole(path: Path) -> list[dict[str, object]]:
-    return funnels.of(szlib.tracks.readers.read_raw(path))
+    return funnels.get(szlib.tracks.readers.read_raw(path))
 
 
 def _streamed(path: Path) -> list[dict[str, object]]:
-    return funnels.of(read_near_square(path, square=szlib.ATC_SQUARE, duration=3.0))
+    return funnels.get(read_near_square(path, square=szlib.ATC_SQUARE, duration=3.0))
 
 
 def _outcome(path: Path, read: object) -> tuple[str, str]:
@@ -67,10 +67,10 @@ def _outcome(path: Path, read: object) -> tuple[str, str]:
     entered = lines_of(path)
     assert stages[0]["entered"] in (entered, entered - 1), "a header is no row"
     for stage in stages:
-        assert stage["entered"] == stage["kept"] + sum(stage["set_aside"].values())
+        assert stage["entered"] == stage["kept"] + sum(stage["rejected"].values())
     for before, after in zip(stages, stages[1:], strict=False):
         assert before["kept"] == after["entered"]
-    return "read with rows set aside" if stages[0]["set_aside"] else "read", str(stages[0])
+    return "read with rows set aside" if stages[0]["rejected"] else "read", str(stages[0])
 
 
 def main() -> None:

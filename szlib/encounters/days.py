@@ -85,7 +85,7 @@ class Extraction:
                 )
             part = pd.read_parquet(self.out / f"{day}.parquet")
             stages.append(
-                [s | {"stage": _READ} if s["stage"].startswith("read ") else s for s in funnels.of(part)]
+                [s | {"stage": _READ} if s["stage"].startswith("read ") else s for s in funnels.get(part)]
             )
             part = part[~part["day"].isin(self.exclude)]
             numbers, found = pd.factorize(part["encounter"])
@@ -97,7 +97,7 @@ class Extraction:
             parts[k] = part.assign(day=part["day"].where(~twice, part["day"] + " (" + part["file"] + ")"))
         parts = [part.drop(columns="file") for part in parts]
         samples = pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
-        return funnels.carry(samples.astype({"day": "category"}), funnels.add(stages))
+        return funnels.attach(samples.astype({"day": "category"}), funnels.add(stages))
 
     def __str__(self) -> str:
         shown = self.table.to_string(index=False, float_format="{:.1f}".format)

@@ -89,7 +89,7 @@ def find_encounters(
     kind = kinds_of_pairs(number[ref], number[other], number, rows.tick, position, velocity, near)
     samples["kind"] = kind.repeat(steps + 1)
     samples.attrs["area"] = str(area)
-    return of_kind(funnels.carry(samples, [*funnels.of(tracks), opening.stage, windows]), kinds)
+    return of_kind(funnels.attach(samples, [*funnels.get(tracks), opening.stage, windows]), kinds)
 
 
 def _steps(duration: float, min_distance: float, min_speed: float) -> int:

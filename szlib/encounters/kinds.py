@@ -102,7 +102,7 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
     counts = samples["kind"].value_counts()
     dropped = {kind: int(counts[kind]) for kind in KINDS if kind not in wanted}
     stage = funnels.stage(f"samples: {', '.join(asked)}", len(samples), len(kept), dropped)
-    return funnels.carry(kept, [*funnels.of(samples), stage])
+    return funnels.attach(kept, [*funnels.get(samples), stage])
 
 
 def number_people(days: np.ndarray, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

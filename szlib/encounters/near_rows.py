@@ -95,7 +95,7 @@ def _table(
     stages = [stage, funnels.stage("near the square", seen.good, len(near.t), far)]
     if len(near.t) == 0:
         empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
-        return funnels.carry(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
+        return funnels.attach(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
     for values in (near.x, near.y):
         values *= metres
     rows = in_metres(pl.DataFrame(near._asdict()), path, layout, 1.0, tz)

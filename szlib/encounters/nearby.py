@@ -22,7 +22,7 @@ def near_square(tracks: pd.DataFrame, square: Area, duration: float) -> pd.DataF
     kept = may_matter(rows.x, rows.y, number_people(rows.day, rows.person)[0], square, duration)
     stage = funnels.stage("near the square", len(kept), kept.sum(), {"elsewhere": (~kept).sum()})
     table = tracks.iloc[rows.order[kept]].reset_index(drop=True)
-    return funnels.carry(table, [*funnels.of(tracks), stage])
+    return funnels.attach(table, [*funnels.get(tracks), stage])
 
 
 def may_matter(x: np.ndarray, y: np.ndarray, person: np.ndarray, square: Area, duration: float) -> np.ndarray:

@@ -131,7 +131,7 @@ def _shift_and_find(
         close = samples[samples["distance"] <= r_max].copy()
         far = {f"farther than {r_max} m": len(samples) - len(close)}
         stage = funnels.stage("samples: close", len(samples), len(close), far)
-        found[k] = funnels.carry(close, [*funnels.of(samples), stage]), encounters.reset_index()
+        found[k] = funnels.attach(close, [*funnels.get(samples), stage]), encounters.reset_index()
     return found
 
 
@@ -146,4 +146,4 @@ def _in_one(found: dict[int, tuple[pd.DataFrame, pd.DataFrame]]) -> tuple[pd.Dat
         for side in zip(*parts, strict=True)
     ]
     samples, encounters = (table.reset_index(drop=True) for table in tables)
-    return funnels.carry(samples, funnels.add([funnels.of(part) for part, _ in parts])), encounters
+    return funnels.attach(samples, funnels.add([funnels.get(part) for part, _ in parts])), encounters

@@ -48,7 +48,7 @@ _ADVICE = {
     "somebody else": "more data, or other conditions (szlib.find_encounters)",
 }
 """What to do where a condition, known by a word of it, has turned everybody away."""
-_FORMAT, _VERSION = "szlib.extraction", 4
+_FORMAT, _VERSION = "szlib.extraction", 5
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Chain:
         raw = self._read(files, area, content)
         tracks = to_clock(raw, max_gap=self.max_gap) if len(raw) else raw
         if len(tracks) == 0:
-            return funnels.carry(no_samples(), funnels.of(tracks))
+            return funnels.attach(no_samples(), funnels.get(tracks))
         return find_encounters(
             tracks,
             square=area or walked_area(tracks),
@@ -143,12 +143,12 @@ def check_met(samples: pd.DataFrame) -> pd.DataFrame:
     """The samples, where anybody met; else DataError: the stage that was emptied, by what, and what to do."""
     if len(samples):
         return samples
-    stages = [stage for stage in funnels.of(samples) if stage["entered"]]
+    stages = [stage for stage in funnels.get(samples) if stage["entered"]]
     emptied = next((stage for stage in stages if not stage["kept"]), None)
     if emptied is None:
         raise DataError("the table of samples is empty, and has no funnel that says why")
-    rows = ", ".join(f"{count:,} {reason}" for reason, count in emptied["set_aside"].items())
-    last = list(emptied["set_aside"])[-1]
+    rows = ", ".join(f"{count:,} {reason}" for reason, count in emptied["rejected"].items())
+    last = list(emptied["rejected"])[-1]
     advice = next((told for words, told in _ADVICE.items() if words in last), _ADVICE["somebody else"])
     raise DataError(
         f"nobody met in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
@@ -197,7 +197,7 @@ def write_record(
     """Write the samples of a day, then its record."""
     content = io.BytesIO()
     samples.to_parquet(content, index=False)
-    stages = funnels.of(samples)
+    stages = funnels.get(samples)
     read = [stage for stage in stages if stage["stage"].startswith("read ")]
     record = {
         "format": _FORMAT,

@@ -100,7 +100,7 @@ class Crowd:
         x, y = self.table["x"].to_numpy(), self.table["y"].to_numpy()
         kept = may_matter(x, y, self.person, square, duration)
         stage = funnels.stage("near the square", len(kept), kept.sum(), {"elsewhere": (~kept).sum()})
-        table = funnels.carry(self.table[kept].reset_index(drop=True), [stage])
+        table = funnels.attach(self.table[kept].reset_index(drop=True), [stage])
         return replace(self, table=table, person=self.person[kept], tick=self.tick[kept])
 
     def shifts(self, seed: int | Sequence[int], minutes: tuple[float, float]) -> np.ndarray:
@@ -156,7 +156,7 @@ class Crowd:
             ].to_numpy()
         lost = {"on the seam of the day": len(since) - len(kept)}
         stage = funnels.stage("time shifted: ticks", len(since), len(kept), lost)
-        return funnels.carry(table, [*funnels.of(self.table), stage])
+        return funnels.attach(table, [*funnels.get(self.table), stage])
 
 
 def _companions(table: pd.DataFrame, person: np.ndarray, days: np.ndarray, tick: np.ndarray) -> np.ndarray:

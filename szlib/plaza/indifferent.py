@@ -70,7 +70,7 @@ def indifferent_crowd(
     rows = pd.DataFrame({"day": _DAY, "id": person, "t": tick / TICKS_PER_SECOND})
     rows[["x", "y"]] = where
     stage = funnels.stage("indifferent crowd", len(rows), len(rows), {})
-    return to_clock(funnels.carry(rows, [stage]), max_gap=1.5 / TICKS_PER_SECOND)
+    return to_clock(funnels.attach(rows, [stage]), max_gap=1.5 / TICKS_PER_SECOND)
 
 
 def _on_edge(square: Square, side: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -131,8 +131,8 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
     columns = {name: np.concatenate([block[name] for block, _ in blocks]) for name in COLUMNS[2:]}
     table = pd.DataFrame({"day": day, "id": raw["id"].to_numpy()[row], **columns}, copy=False)
     lost = {"in a gap-free piece that covers no tick": len(t) - covered}
-    stages = [*funnels.of(raw), funnels.stage("clock: samples", len(t), covered, lost)]
-    return funnels.carry(table, stages)
+    stages = [*funnels.get(raw), funnels.stage("clock: samples", len(t), covered, lost)]
+    return funnels.attach(table, stages)
 
 
 def _blocks(within: np.ndarray) -> Iterator[slice]:

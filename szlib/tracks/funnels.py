@@ -17,20 +17,20 @@ from ..errors import SzlibError
 KEY = "funnel"
 
 
-def stage(name: str, entered: int, kept: int, set_aside: Mapping[str, int]) -> dict[str, Any]:
+def stage(name: str, entered: int, kept: int, rejected: Mapping[str, int]) -> dict[str, Any]:
     """One stage of a funnel; raises SzlibError where entered != kept + set aside."""
-    reasons = {reason: int(count) for reason, count in set_aside.items() if count}
+    reasons = {reason: int(count) for reason, count in rejected.items() if count}
     if int(entered) != int(kept) + sum(reasons.values()):
         raise SzlibError(f"funnel stage '{name}' does not add up: {entered} != {kept} + {reasons}")
-    return {"stage": name, "entered": int(entered), "kept": int(kept), "set_aside": reasons}
+    return {"stage": name, "entered": int(entered), "kept": int(kept), "rejected": reasons}
 
 
-def of(frame: pd.DataFrame) -> list[dict[str, Any]]:
+def get(frame: pd.DataFrame) -> list[dict[str, Any]]:
     """The stages a table has gone through so far (a copy; empty for a table made by hand)."""
     return list(frame.attrs.get(KEY, []))
 
 
-def carry(frame: pd.DataFrame, stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+def attach(frame: pd.DataFrame, stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """Attach the stages to a table and return it."""
     frame.attrs[KEY] = [dict(s) for s in stages]
     return frame
@@ -41,7 +41,7 @@ def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     rows: list[tuple[str, str, int]] = []
     for s in stages:
         rows.append((s["stage"], "entered", s["entered"]))
-        rows += [(s["stage"], f"- {reason}", count) for reason, count in s["set_aside"].items()]
+        rows += [(s["stage"], f"- {reason}", count) for reason, count in s["rejected"].items()]
         rows.append((s["stage"], "kept", s["kept"]))
     return pd.DataFrame(rows, columns=["stage", "what", "rows"])
 
@@ -67,6 +67,6 @@ def add(funnels: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
     for name, parts in sums.items():
         reasons: Counter[str] = Counter()
         for part in parts:
-            reasons.update(part["set_aside"])
+            reasons.update(part["rejected"])
         added.append(stage(name, sum(p["entered"] for p in parts), sum(p["kept"] for p in parts), reasons))
     return added

@@ -49,11 +49,11 @@ def check_tracks(tracks: pd.DataFrame) -> None:
     if not pd.api.types.is_integer_dtype(tracks["id"]):
         raise DataError(f"id is {tracks['id'].dtype}; expected whole numbers")
     _check_velocities(tracks, tick, piece)
-    stages = funnels.of(tracks)
+    stages = funnels.get(tracks)
     if not stages:
         raise DataError('the table has no funnel; expected its stages in .attrs["funnel"]')
     for stage in stages:
-        funnels.stage(stage["stage"], stage["entered"], stage["kept"], stage["set_aside"])
+        funnels.stage(stage["stage"], stage["entered"], stage["kept"], stage["rejected"])
 
 
 def _check_velocities(tracks: pd.DataFrame, tick: np.ndarray, piece: np.ndarray) -> None:
@@ -121,8 +121,8 @@ def without_companions(samples: pd.DataFrame, groups: pd.DataFrame) -> pd.DataFr
     together = (ref == other).to_numpy()
     kept = samples[~together].copy()
     reasons = {"walk together": int(together.sum())}
-    return funnels.carry(
-        kept, [*funnels.of(samples), funnels.stage("samples: strangers", len(samples), len(kept), reasons)]
+    return funnels.attach(
+        kept, [*funnels.get(samples), funnels.stage("samples: strangers", len(samples), len(kept), reasons)]
     )
 
 
@@ -155,5 +155,5 @@ def from_pedpy(
     data = trajectory.data
     raw = pd.DataFrame({"day": day, "id": data["id"].to_numpy(), "t": data["frame"] / trajectory.frame_rate})
     raw[["x", "y"]] = data[["x", "y"]].to_numpy(float)
-    funnels.carry(raw, [funnels.stage("read from PedPy", len(raw), len(raw), {})])
+    funnels.attach(raw, [funnels.stage("read from PedPy", len(raw), len(raw), {})])
     return to_clock(raw, max_gap=max_gap)

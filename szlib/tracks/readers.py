@@ -94,7 +94,7 @@ def merge(
     gaps = [layout.max_gap for layout in layouts if layout.max_gap is not None]
     frame.attrs["max_gap"] = max(gaps) if len(gaps) == len(layouts) else None
     reasons = {"excluded day": merged.height - wanted.height, **doubled}
-    return funnels.carry(frame, [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)])
+    return funnels.attach(frame, [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)])
 
 
 def _sorted(rows: pl.DataFrame) -> pl.DataFrame:

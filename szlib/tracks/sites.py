@@ -242,7 +242,7 @@ def _magni(path: Path) -> pd.DataFrame:
     return people.assign(id=100 * (session + 1) + helmet.astype(int))
 
 
-def _on_the_clock(raw: pd.DataFrame, name: str, max_gap: float, set_aside: Mapping[str, int]) -> pd.DataFrame:
+def _on_the_clock(raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str, int]) -> pd.DataFrame:
     """Rows as read, less some that were set aside before, to a track table."""
     finite = np.isfinite(raw[["t", "x", "y"]].to_numpy(float)).all(axis=1)
     doubled = raw.duplicated(["day", "id", "t"]).to_numpy() & finite
@@ -250,9 +250,9 @@ def _on_the_clock(raw: pd.DataFrame, name: str, max_gap: float, set_aside: Mappi
     if len(kept) == 0:
         raise DataError(f"{name}: holds no row that can be used")
     reasons = {
-        **set_aside,
+        **rejected,
         "not finite": int((~finite).sum()),
         "second position at a time": int(doubled.sum()),
     }
-    stage = funnels.stage(f"read {name}", len(raw) + sum(set_aside.values()), len(kept), reasons)
-    return to_clock(funnels.carry(kept, [stage]), max_gap=max_gap)
+    stage = funnels.stage(f"read {name}", len(raw) + sum(rejected.values()), len(kept), reasons)
+    return to_clock(funnels.attach(kept, [stage]), max_gap=max_gap)

@@ -188,7 +188,7 @@ class HullZones:
             "speed_scale": None if speed_scale is None else float(speed_scale),
         }
         inside = {"inside the hull": len(points) - count}
-        funnel = [*funnels.of(inliers), funnels.stage("hull", len(points), count, inside)]
+        funnel = [*funnels.get(inliers), funnels.stage("hull", len(points), count, inside)]
         return cls(points, *encounter_numbers(inliers), float(r_max), parameters, funnel)
 
     @property

@@ -165,13 +165,13 @@ def remove_outliers(
     kept = close[~outlier].copy()
     why = "outlier (LOF)" if fraction is not None else "of an outlying encounter (LOF)"
     stages = [
-        *funnels.of(samples),
+        *funnels.get(samples),
         funnels.stage(
             "samples: close", len(samples), len(close), {f"farther than {r_max} m": len(samples) - len(close)}
         ),
         funnels.stage("samples: inliers", len(close), len(kept), {why: int(outlier.sum())}),
     ]
-    return funnels.carry(kept, stages)
+    return funnels.attach(kept, stages)
 
 
 def _factors(points: np.ndarray, neighbours: int, fraction: float | str = "auto") -> tuple[np.ndarray, float]:

@@ -63,10 +63,10 @@ def test_days_are_those_of_the_whole_table(days: list[Path], tmp_path: Path) -> 
     whole = szlib.find_encounters(szlib.read_tracks(days))
     pd.testing.assert_frame_equal(ours, whole, check_exact=True, check_categorical=False)
     assert len(ours) > 0
-    read = [stage for stage in funnels.of(ours) if stage["stage"].startswith("read ")]
+    read = [stage for stage in funnels.get(ours) if stage["stage"].startswith("read ")]
     entered, kept = sum(s["entered"] for s in read), sum(s["kept"] for s in read)
     assert entered == sum(len(day.read_text().splitlines()) for day in days)
-    assert kept == next(s["entered"] for s in funnels.of(ours) if s["stage"] == "near the square")
+    assert kept == next(s["entered"] for s in funnels.get(ours) if s["stage"] == "near the square")
 
 
 def test_the_result_depends_neither_on_order_nor_on_processes_nor_on_blocks(

@@ -43,7 +43,7 @@ def found(day: Path, **parameters: object) -> pd.DataFrame:
 
 def same(ours: pd.DataFrame, theirs: pd.DataFrame) -> bool:
     pd.testing.assert_frame_equal(ours, theirs, check_exact=True)
-    return len(ours) > 0 and funnels.of(ours) == funnels.of(theirs)
+    return len(ours) > 0 and funnels.get(ours) == funnels.get(theirs)
 
 
 def entries(cache: Path) -> list[Path]:

@@ -153,9 +153,9 @@ def test_one_keyword_keeps_some_kinds_and_counts_the_others(crowd: pd.DataFrame)
     pd.testing.assert_frame_equal(everybody, of_kind(everybody, None))
     parts = [of_kind(everybody, kind) for kind in KINDS]
     assert sum(map(len, parts)) == len(everybody)
-    stage = funnels.of(parts[2])[-1]
+    stage = funnels.get(parts[2])[-1]
     assert stage["stage"] == "samples: same direction"
-    assert stage["set_aside"] == {
+    assert stage["rejected"] == {
         kind: int(n) for kind, n in everybody["kind"].value_counts().items() if n and kind != "same direction"
     }
 

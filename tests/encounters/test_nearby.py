@@ -39,7 +39,7 @@ def test_those_who_never_come_and_what_is_long_after_are_elsewhere(crowd: pd.Dat
     assert near["id"].unique().tolist() == [1]
     assert near["t"].min() == pytest.approx(15 - 0.5)
     assert near["t"].max() == pytest.approx(39 + 3)
-    (stage,) = funnels.of(near)
+    (stage,) = funnels.get(near)
     assert (stage["entered"], stage["kept"]) == (601 + 41, len(near))
     assert len(near_square(crowd, SQUARE.grown(-6), 3.0)) < len(near_square(crowd, SQUARE, 3.0)) / 2
     with pytest.raises(szlib.DataError, match="the table is empty"):

@@ -45,7 +45,7 @@ def test_numbers_are_unique_and_the_funnel_adds_up(null: szlib.NullEncounters) -
     assert null.encounters["encounter"].is_unique
     assert (null.samples.groupby("encounter")["shift"].nunique() == 1).all()
     assert set(null.samples["encounter"]) <= set(null.encounters["encounter"])
-    stages = funnels.of(null.samples)
+    stages = funnels.get(null.samples)
     for before, after in zip(stages, stages[1:], strict=False):
         if "windows" not in before["stage"]:  # of a window, 31 samples
             assert before["kept"] == after["entered"]

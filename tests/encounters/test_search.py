@@ -228,19 +228,19 @@ def test_what_is_true_of_every_encounter(crowd: pd.DataFrame, known: pd.DataFram
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_the_funnel_adds_up(crowd: pd.DataFrame, variant: str) -> None:
     samples = find_encounters(crowd, square=ROOM, **VARIANTS[variant])
-    ticks, windows = funnels.of(samples)
+    ticks, windows = funnels.get(samples)
     assert ticks["entered"] == len(crowd)
     assert ticks["kept"] == windows["entered"]
     assert windows["kept"] == samples["encounter"].nunique()
     for stage in (ticks, windows):
-        assert stage["entered"] == stage["kept"] + sum(stage["set_aside"].values())
+        assert stage["entered"] == stage["kept"] + sum(stage["rejected"].values())
 
 
 # --- scenes made by hand -----------------------------------------------------------------------------
 
 
 def reasons(samples: pd.DataFrame) -> dict[str, int]:
-    return {reason: count for stage in funnels.of(samples) for reason, count in stage["set_aside"].items()}
+    return {reason: count for stage in funnels.get(samples) for reason, count in stage["rejected"].items()}
 
 
 def test_two_people_who_meet_are_seen_from_both_sides() -> None:
@@ -395,7 +395,7 @@ def test_no_encounter_is_an_empty_table_like_any_other() -> None:
         empty = find_encounters(tracks, square=ROOM)
         assert len(empty) == 0
         assert empty.dtypes.astype(str).to_dict() == full.dtypes.astype(str).to_dict()
-        assert funnels.of(empty)[-1]["kept"] == 0
+        assert funnels.get(empty)[-1]["kept"] == 0
     with pytest.raises(szlib.DataError, match="the table is empty"):
         szlib.SocialZone.fit(empty)
 
@@ -503,7 +503,7 @@ def test_the_real_day_has_about_as_many_encounters_as_the_paper(real_samples: pd
     """The paper: 16,181 in 92 days, 176 a day."""
     assert 100 <= real_samples["encounter"].nunique() <= 400
     assert (real_samples["los_angle"].abs() > np.pi / 2).any()
-    for earlier, later in pairwise(funnels.of(real_samples)[-3:]):
+    for earlier, later in pairwise(funnels.get(real_samples)[-3:]):
         assert later["entered"] == earlier["kept"] or earlier["stage"] == "clock: samples"
 
 

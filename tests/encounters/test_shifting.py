@@ -53,8 +53,8 @@ def test_every_path_stays_but_for_a_tick_on_the_seam(tracks: pd.DataFrame, shift
     lost = [len(before[k]) - len(after[k]) for k in before]
     assert all(after[k] <= before[k] for k in before)
     assert set(lost) == {0, 1}
-    stage = funnels.of(shifted)[-1]
-    assert stage["set_aside"] == {"on the seam of the day": sum(lost)}
+    stage = funnels.get(shifted)[-1]
+    assert stage["rejected"] == {"on the seam of the day": sum(lost)}
 
 
 def test_each_person_moves_by_one_time_of_their_own(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:

@@ -61,10 +61,10 @@ def same(path: Path, *, square: szlib.Square, duration: float, max_gap: float | 
     given = {"square": square, "duration": duration, "max_gap": max_gap, "space": SPACE}
     streamed, whole = encounters(near, **given), encounters(read_raw(path), **given)
     pd.testing.assert_frame_equal(streamed, whole, check_exact=True)
-    ours, theirs = funnels.of(streamed), funnels.of(whole)
+    ours, theirs = funnels.get(streamed), funnels.get(whole)
     assert ours[-1] == theirs[-1], "windows are turned away for the same reasons"
-    assert {k: v for k, v in ours[-2]["set_aside"].items() if k != "not in the square"} == {
-        k: v for k, v in theirs[-2]["set_aside"].items() if k != "not in the square"
+    assert {k: v for k, v in ours[-2]["rejected"].items() if k != "not in the square"} == {
+        k: v for k, v in theirs[-2]["rejected"].items() if k != "not in the square"
     }
     assert ours[0] == theirs[0], "every row of the file is counted"
     for before, after in zip(ours[:3], ours[1:4], strict=True):
@@ -131,8 +131,8 @@ def test_packed_files_and_bad_rows(tmp_path: Path) -> None:
         whole = read_raw(path)
     assert "first at line 6: rows set aside" in str(told[0].message)
     assert [str(each.message) for each in told] == [str(each.message) for each in expected]
-    assert funnels.of(raw)[0] == funnels.of(whole)[0]
-    assert sum(funnels.of(raw)[0]["set_aside"].values()) == 3
+    assert funnels.get(raw)[0] == funnels.get(whole)[0]
+    assert sum(funnels.get(raw)[0]["rejected"].values()) == 3
 
 
 GOOD = "1351038629.042,{id},-12040,1562,1665.970,945.190,-2.794,-2.906"
@@ -170,8 +170,8 @@ def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.Monk
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)
         whole = read_raw(path)
-    read = funnels.of(whole)[0]
-    assert (found.tally.good, dict(found.tally.reasons)) == (read["kept"], read["set_aside"])
+    read = funnels.get(whole)[0]
+    assert (found.tally.good, dict(found.tally.reasons)) == (read["kept"], read["rejected"])
     assert found.tally.first is None or found.tally.first[0] == 31
     np.testing.assert_array_equal(rows.id, whole["id"])
     np.testing.assert_array_equal(rows.y * layout.metres, whole["y"])
@@ -183,8 +183,8 @@ def test_the_plaza_and_a_place_where_nobody_is(tmp_path: Path) -> None:
     elsewhere = read_near_square(path, square=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0)
     assert len(elsewhere) == 0
     assert list(elsewhere.columns) == ["day", "id", "t", "x", "y"]
-    read, near = funnels.of(elsewhere)
-    assert near["set_aside"] == {"never near the square": read["kept"]}
+    read, near = funnels.get(elsewhere)
+    assert near["rejected"] == {"never near the square": read["kept"]}
 
 
 def test_what_cannot_be_read_is_told_as_by_read_tracks(tmp_path: Path) -> None:

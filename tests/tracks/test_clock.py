@@ -183,12 +183,12 @@ def test_samples_that_cover_no_tick_are_counted() -> None:
     alone = make_raw([7.03], person=3)
     pair = make_raw([8.01, 8.05], person=4)
     raw = pd.concat([make_raw(np.arange(10) / 10), alone, pair], ignore_index=True)
-    stage = funnels.of(to_clock(raw))[-1]
+    stage = funnels.get(to_clock(raw))[-1]
     assert stage == {
         "stage": "clock: samples",
         "entered": 13,
         "kept": 10,
-        "set_aside": {"in a gap-free piece that covers no tick": 3},
+        "rejected": {"in a gap-free piece that covers no tick": 3},
     }
 
 
@@ -290,9 +290,9 @@ def test_clock_index_parts_pieces_as_they_are() -> None:
 
 
 def test_the_real_day_on_the_clock(real_tracks: pd.DataFrame) -> None:
-    *_, merged, clock = funnels.of(real_tracks)
+    *_, merged, clock = funnels.get(real_tracks)
     assert merged["kept"] == clock["entered"] == 624_951
-    assert clock["kept"] + sum(clock["set_aside"].values()) == clock["entered"]
+    assert clock["kept"] + sum(clock["rejected"].values()) == clock["entered"]
     assert set(real_tracks["day"]) == {"2012-10-24"}
     order, _, piece = clock_index(real_tracks)
     assert (np.diff(order) == 1).all()

@@ -84,7 +84,7 @@ def test_fields_without_names_have_numbers(tmp_path: Path, unit: str, metres: fl
 
 def test_a_table_with_frames_needs_no_columns() -> None:
     assert_same_people(szlib.read_tracks(people(), frame_rate=RATE), people())
-    assert "at 12.5 frames/s" in funnels.of(szlib.read_tracks(people(), frame_rate=RATE))[0]["stage"]
+    assert "at 12.5 frames/s" in funnels.get(szlib.read_tracks(people(), frame_rate=RATE))[0]["stage"]
 
 
 def test_a_dataframe_is_left_as_it_was() -> None:
@@ -102,7 +102,7 @@ def test_what_a_table_lacks_is_set_aside_and_counted() -> None:
     table.loc[7, "t"] = np.inf
     with pytest.warns(szlib.DataWarning, match=r"table-1, first at line 4: rows set aside: 2 x missing"):
         tracks = szlib.read_tracks(table)
-    assert sum(funnels.of(tracks)[0]["set_aside"].values()) == 3
+    assert sum(funnels.get(tracks)[0]["rejected"].values()) == 3
 
 
 @pytest.mark.parametrize("zone", [None, "UTC", "Europe/Berlin"])

@@ -46,7 +46,7 @@ def ewap(
 
 
 def told(tracks: pd.DataFrame) -> str:
-    return str(funnels.of(tracks)[0]["stage"])
+    return str(funnels.get(tracks)[0]["stage"])
 
 
 def pace(tracks: pd.DataFrame) -> float:

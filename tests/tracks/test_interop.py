@@ -60,7 +60,7 @@ def test_a_loader_must_count() -> None:
     tracks.attrs.clear()
     with pytest.raises(szlib.DataError, match="no funnel"):
         check_tracks(tracks)
-    tracks.attrs[funnels.KEY] = [{"stage": "read", "entered": 9, "kept": 7, "set_aside": {"bad": 1}}]
+    tracks.attrs[funnels.KEY] = [{"stage": "read", "entered": 9, "kept": 7, "rejected": {"bad": 1}}]
     with pytest.raises(szlib.SzlibError, match="does not add up"):
         check_tracks(tracks)
 
@@ -112,7 +112,7 @@ def test_companions_are_set_aside_and_counted() -> None:
     groups = pd.DataFrame({"group": [0, 0, 1, 1], "id": [1, 2, 3, 4]})
     kept = without_companions(samples, groups)
     assert kept[["ref_id", "other_id"]].to_numpy().tolist() == [list(pair) for pair in strangers]
-    assert funnels.of(kept)[-1]["set_aside"] == {"walk together": 3}
+    assert funnels.get(kept)[-1]["rejected"] == {"walk together": 3}
 
 
 def test_to_pedpy_and_back() -> None:

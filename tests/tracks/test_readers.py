@@ -86,7 +86,7 @@ def read_quietly(path: Path, **options: object) -> tuple[pd.DataFrame, str]:
 
 
 def stage_of(frame: pd.DataFrame, name: str) -> dict:
-    return next(s for s in funnels.of(frame) if s["stage"].startswith(name))
+    return next(s for s in funnels.get(frame) if s["stage"].startswith(name))
 
 
 def without_day(frame: pd.DataFrame) -> pd.DataFrame:
@@ -167,7 +167,7 @@ def test_the_pieces_of_a_day_make_one_day(tmp_path: Path) -> None:
     pieces = [write(tmp_path / f"{k}.csv", as_raw(rows.iloc[k::3])) for k in (2, 0, 1)]
     together = read_raw(pieces)
     pd.testing.assert_frame_equal(together, whole)
-    assert [s["entered"] for s in funnels.of(together)] == [30, 30, 30, 90]
+    assert [s["entered"] for s in funnels.get(together)] == [30, 30, 30, 90]
 
 
 def test_the_day_is_that_of_the_calendar_in_tokyo(tmp_path: Path) -> None:
@@ -186,7 +186,7 @@ def test_excluded_days_are_counted(tmp_path: Path) -> None:
     for exclude in (["2012-10-24"], "2012-10-24", iter([pd.Timestamp("2012-10-24").date()])):
         frame = read_raw(path, exclude=exclude)
         assert set(frame["day"]) == {"2012-10-25"}
-        assert stage_of(frame, "merge")["set_aside"] == {"excluded day": len(first)}
+        assert stage_of(frame, "merge")["rejected"] == {"excluded day": len(first)}
     with pytest.raises(szlib.DataError, match=r"excluded days .*2012-10-24.*2012-10-25"):
         read_raw(path, exclude=["2012-10-25", "2012-10-24"])
 
@@ -237,7 +237,7 @@ def test_a_bad_row_is_set_aside_and_told_with_its_line(tmp_path: Path, bad: str,
         "stage": "read a.csv",
         "entered": len(GOOD) + 2,
         "kept": len(GOOD),
-        "set_aside": {reason: 2},
+        "rejected": {reason: 2},
     }
     pd.testing.assert_frame_equal(frame, read_raw(write(tmp_path / "a.csv", "\n".join(GOOD))))
 
@@ -270,7 +270,7 @@ def test_duplicate_rows_are_counted_and_the_first_one_stays(tmp_path: Path) -> N
     again = rows.assign(x=rows["x"] + 1).iloc[:4]
     frame, told = read_quietly(write(tmp_path / "a.csv", as_1hz(pd.concat([rows, again]))))
     assert told == "all files: rows set aside: 4 x duplicate (day, id, t)"
-    assert stage_of(frame, "merge")["set_aside"] == {"duplicate (day, id, t)": 4}
+    assert stage_of(frame, "merge")["rejected"] == {"duplicate (day, id, t)": 4}
     alone = read_raw(write(tmp_path / "a.csv", as_1hz(rows)))
     pd.testing.assert_frame_equal(frame, alone)
 
@@ -476,7 +476,7 @@ def test_any_accident_is_read_with_a_funnel_or_refused(
         if tracks is None:
             continue
         usable += 1
-        read, merged, clock = funnels.of(tracks)
+        read, merged, clock = funnels.get(tracks)
         assert read["entered"] == lines_of(path) - (name == "tidy")
         assert (read["kept"], merged["kept"]) == (merged["entered"], clock["entered"])
         assert np.isfinite(tracks[["t", "x", "y"]].to_numpy()).all()
@@ -506,7 +506,7 @@ def test_the_real_day_is_read_whole(real_day: pd.DataFrame) -> None:
     assert len(real_day) == 624_951
     assert real_day["id"].nunique() == 15_066
     assert list(real_day["day"].cat.categories) == ["2012-10-24"]
-    *files, merged = funnels.of(real_day)
+    *files, merged = funnels.get(real_day)
     assert len(files) == 23
     assert sum(f["entered"] for f in files) == sum(f["kept"] for f in files) == merged["kept"] == 624_951
     opened, closed = (pd.Timestamp(t, unit="s", tz="Asia/Tokyo") for t in real_day["t"].agg(["min", "max"]))

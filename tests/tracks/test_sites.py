@@ -129,8 +129,8 @@ def test_blobs_of_several_tracks_stay_with_the_first(tmp_path: Path) -> None:
     ghost = [(100 + 6 * k, 260 - 4 * k if k < 15 else 200, k) for k in range(30)]
     twice = [*[(300, 50 + k, k) for k in range(20)], (310, 69, 19)]
     tracks = sites.read_edinburgh(edinburgh(tmp_path / "tracks.Aug02.txt", {1: walk, 2: ghost, 5: twice}))
-    stage = funnels.of(tracks)[0]
-    assert stage["set_aside"] == {"a blob of an earlier track": 15, "second position at a time": 1}
+    stage = funnels.get(tracks)[0]
+    assert stage["rejected"] == {"a blob of an earlier track": 15, "second position at a time": 1}
     assert stage["entered"] == 81
     assert tracks.groupby("id")["t"].max().round(1).to_dict() == {1: 3.2, 2: 1.5, 5: 2.1}
     np.testing.assert_allclose(tracks[tracks["id"] == 5]["x"], 300 * 0.0247, err_msg="the first one counts")
@@ -142,7 +142,7 @@ def test_recordings_of_edinburgh_stay_apart(tmp_path: Path) -> None:
     tracks = sites.read_edinburgh(files)
     check_tracks(tracks)
     assert tracks["day"].unique().tolist() == ["tracks.Aug01", "tracks.Aug02"]
-    assert funnels.of(tracks)[0]["set_aside"] == {}, "the same blob on another day is another one"
+    assert funnels.get(tracks)[0]["rejected"] == {}, "the same blob on another day is another one"
     with pytest.raises(szlib.DataError, match="several files are called"):
         sites.read_edinburgh([files[0], files[0]])
 
@@ -219,7 +219,7 @@ def test_magni_that_is_not_is_refused(tmp_path: Path) -> None:
         sites.read_magni(tmp_path / "missing.csv")
     bad = rows.index % 100 == 3
     rows.assign(x=np.where(bad, np.nan, rows["x"])).to_csv(file, index=False)
-    assert funnels.of(sites.read_magni(file))[0]["set_aside"] == {"not finite": bad.sum()}
+    assert funnels.get(sites.read_magni(file))[0]["rejected"] == {"not finite": bad.sum()}
 
 
 # --- the real files ----------------------------------------------------------------------------------
@@ -229,7 +229,7 @@ def test_the_real_grand_central() -> None:
     tracks = sites.read_grand_central(real_data("gc") / "Annotation.zip")
     check_tracks(tracks)
     assert tracks["id"].nunique() == 12_684
-    assert funnels.of(tracks)[0]["entered"] == 456_410
+    assert funnels.get(tracks)[0]["entered"] == 456_410
     assert tracks["t"].max() == pytest.approx(80 * 60, abs=10)
     pace = np.hypot(tracks["vx"], tracks["vy"]).dropna()
     assert 1.0 < pace.median() < 1.3, "swapped, row and column would give absurd speeds"

@@ -223,9 +223,9 @@ def test_a_speed_that_nobody_else_walks_at_sets_apart_where_speed_counts() -> No
 def test_the_funnel_counts_the_samples_of_outlying_encounters() -> None:
     samples = make_encounters(intruders=4)
     kept = remove_outliers(samples)
-    *_, inliers = funnels.of(kept)
+    *_, inliers = funnels.get(kept)
     gone = close(samples)["encounter"].isin(removed_encounters(samples)).sum()
-    assert inliers["set_aside"] == {"of an outlying encounter (LOF)": gone}
+    assert inliers["rejected"] == {"of an outlying encounter (LOF)": gone}
     pd.testing.assert_frame_equal(kept, samples.loc[kept.index])
 
 
@@ -318,17 +318,17 @@ def test_row_order_and_turning_the_world_change_nothing() -> None:
 
 def test_rows_come_as_they_are_and_the_input_stays() -> None:
     samples = make_samples().assign(note="x")
-    funnels.carry(samples, [funnels.stage("before", 1000, 1000, {})])
+    funnels.attach(samples, [funnels.stage("before", 1000, 1000, {})])
     before = samples.copy(deep=True)
     kept = remove_outliers(samples, FRACTION)
     pd.testing.assert_frame_equal(samples, before)
     pd.testing.assert_frame_equal(kept, samples.loc[kept.index])
-    first, near, inliers = funnels.of(kept)
+    first, near, inliers = funnels.get(kept)
     assert first["stage"] == "before"
     assert (near["entered"], near["kept"]) == (1000, len(close(samples)))
-    assert near["set_aside"] == {"farther than 2.0 m": 1000 - near["kept"]}
+    assert near["rejected"] == {"farther than 2.0 m": 1000 - near["kept"]}
     assert (inliers["entered"], inliers["kept"]) == (near["kept"], len(kept))
-    assert len(funnels.of(samples)) == 1
+    assert len(funnels.get(samples)) == 1
 
 
 def test_identical_samples_are_told_and_parted() -> None:
@@ -392,5 +392,5 @@ def test_samples_that_cannot_be_used() -> None:
 
 def test_the_real_day_keeps_its_quota(real_samples: pd.DataFrame) -> None:
     kept = remove_outliers(real_samples, FRACTION)
-    *_, near, inliers = funnels.of(kept)
-    assert inliers["set_aside"]["outlier (LOF)"] == math.ceil(0.002 * (near["kept"] - 1))
+    *_, near, inliers = funnels.get(kept)
+    assert inliers["rejected"]["outlier (LOF)"] == math.ceil(0.002 * (near["kept"] - 1))

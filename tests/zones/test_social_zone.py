@@ -219,7 +219,7 @@ def test_the_provenance_counts_every_sample(samples: pd.DataFrame, zone: SocialZ
 def test_a_stage_that_does_not_add_up_is_refused() -> None:
     with pytest.raises(szlib.SzlibError, match="funnel stage 'sieve' does not add up: 10 != 7"):
         funnels.stage("sieve", 10, 7, {"too long": 2})
-    assert funnels.stage("sieve", 10, 7, {"too long": 3, "too short": 0})["set_aside"] == {"too long": 3}
+    assert funnels.stage("sieve", 10, 7, {"too long": 3, "too short": 0})["rejected"] == {"too long": 3}
 
 
 @pytest.mark.parametrize(
@@ -570,7 +570,7 @@ def test_the_real_day_has_zones_at_walking_speeds(real_samples: pd.DataFrame, tm
         assert 0.3 < ellipse.semi_axes[1] <= ellipse.semi_axes[0] < 2.0
     stages = zone.provenance["funnel"]
     assert sum(stage["entered"] for stage in stages if stage["stage"].startswith("read ")) == 624_951
-    assert all(s["entered"] == s["kept"] + sum(s["set_aside"].values()) for s in stages)
+    assert all(s["entered"] == s["kept"] + sum(s["rejected"].values()) for s in stages)
     assert not any(map(zone.adequate, SPEEDS))  # hardly anybody is seen behind
     zone.save(tmp_path / "zone.json")
     assert SocialZone.load(tmp_path / "zone.json").provenance == zone.provenance

@@ -29,7 +29,7 @@ def inspect(file: str | Path, *, area: str = "") -> str:
         warnings.simplefilter("ignore", DataWarning)
         samples = Chain(square=area or None).encounters(files)
     where = f"area {samples.attrs['area']}\n" if "area" in samples.attrs else ""
-    return where + funnels.text(funnels.of(samples))
+    return where + funnels.text(funnels.get(samples))
 
 
 def inspect_command(options: argparse.Namespace) -> int:

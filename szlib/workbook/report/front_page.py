@@ -81,7 +81,7 @@ def _funnel(home: Path) -> Iterator[Any]:
     if not file.exists():
         yield _markdown(NOT_HERE)
         return
-    table = funnels.table(funnels.of(pd.read_parquet(file)))
+    table = funnels.table(funnels.get(pd.read_parquet(file)))
     table["stage"] = table["stage"].where(~table["stage"].duplicated(), "")
     table["rows"] = [f"{rows:,}" for rows in table["rows"]]
     yield _table(table)

@@ -170,7 +170,7 @@ class QuantileZones:
         near = funnels.stage("encounters: near", entered, kept, {f"never within {r_max} m": entered - kept})
         sector = 360 * SECTOR / len(DIRECTIONS)
         parameters = {"q": float(q), "sector_deg": sector, "speed_band": BAND, "smoothing": SMOOTHING}
-        return cls(known, float(q), parameters, [*funnels.of(samples), near])
+        return cls(known, float(q), parameters, [*funnels.get(samples), near])
 
     @property
     def encounters(self) -> pd.DataFrame:

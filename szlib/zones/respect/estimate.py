@@ -84,7 +84,7 @@ class RespectZones:
             _by_shift(null, whole),
             float(speed_width),
             parameters,
-            [*funnels.of(samples), funnels.stage("samples: close", len(samples), len(close), far)],
+            [*funnels.get(samples), funnels.stage("samples: close", len(samples), len(close), far)],
         )
 
     def radii(self, speeds: Sequence[float]) -> Radii:
