@@ -36,7 +36,7 @@ lab: $(INSTALLED)  ## open the workbook in JupyterLab, with its results beside i
 	$(BIN)/jupyter lab --ServerApp.root_dir="$(CURDIR)" $(LAB_FLAGS) notebooks/00_start_here.ipynb
 
 bench: $(INSTALLED)  ## speed and memory, as ratios within one run
-	$(BIN)/python tests/bench.py
+	$(BIN)/python tests/benchmarks
 
 notebooks: $(INSTALLED)  ## execute the committed copies anew, and renew the README's pictures
 	$(BIN)/python notebooks/refresh.py

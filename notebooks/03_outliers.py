@@ -230,7 +230,7 @@ record.claim(
 # ## At the size of the paper
 #
 # The paper has 16,181 encounters. Plazas of several seeds in one table come as far; that takes half an
-# hour (`python tests/pooled_plazas.py`), so it is saved beside the notebooks:
+# hour (`python tests/studies/pooled_plazas.py`), so it is saved beside the notebooks:
 
 # %%
 table = pd.read_csv("tables/03_outliers.csv")

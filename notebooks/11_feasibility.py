@@ -234,8 +234,8 @@ record.check("once there is a solution there always is one", start_only, 4 * wor
 #
 # 150 steps each: 1-5 people who walk or stand, walls in half of the worlds, any start, heading and goal;
 # and one person in open space with a robot that starts at rest, $h \ge 0.3$ m. The table is saved beside
-# the notebooks; `python tests/rollout_table.py` makes it anew, from blocks of seeds far apart, with 95 %
-# Clopper-Pearson intervals (`low`, `high`). *Unflagged violations* are steps that called themselves safe
+# the notebooks; `python tests/studies/rollout_table.py` makes it anew, from blocks of seeds far apart, with
+# 95 % Clopper-Pearson intervals (`low`, `high`). *Unflagged violations* are steps that called themselves safe
 # and led to $h < 0$, *unflagged overlaps* those that led the robot's disc into a wall or a body, by
 # Euclidean distance. "paper, margin = paper" is the paper's eps of 5 cm around every wall; all others give
 # each wall the margin that it requires (notebook 12).

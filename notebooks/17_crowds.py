@@ -173,7 +173,7 @@ formatted(
 ) if parts else "no model is installed"
 
 # %% [markdown]
-# `tests/crowd_trials.py` does this with hundreds of worlds, and with what people would otherwise use:
+# `tests/studies/crowd_trials.py` does this with hundreds of worlds, and with what people would otherwise use:
 # straight ahead with a stop, the social force, a dynamic window. Its tables are committed beside the
 # notebooks.
 

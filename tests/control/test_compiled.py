@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 import pytest
-from random_states import ZONE
+from helpers.random_states import ZONE
 
 import szlib
 from szlib.control.problem import Buffered

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.random_states import ZONE, questions
 from hostile.controller import cruel_states
-from random_states import ZONE, questions
 
 import szlib
 from szlib.control.step import report

@@ -8,7 +8,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from random_states import ZONE, meetings, questions
+from helpers.random_states import ZONE, meetings, questions
 
 import szlib
 from szlib.control.problem import TOLERANCE, build_problem, remaining_distance

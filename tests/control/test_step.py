@@ -9,7 +9,7 @@ from itertools import count, islice
 import numpy as np
 import pytest
 import shapely
-from random_states import ZONE, questions
+from helpers.random_states import ZONE, questions
 
 import szlib
 from szlib.control import problem

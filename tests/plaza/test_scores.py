@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from pooled_plazas import PACES, TABLE, judged, plaza_samples, pooled
+from studies.pooled_plazas import PACES, TABLE, judged, plaza_samples, pooled
 
 import szlib
 from szlib.plaza import scores

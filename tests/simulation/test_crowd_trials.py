@@ -1,4 +1,4 @@
-"""Robots among other people's crowds: what is promised is kept.  In full: `tests/crowd_trials.py`."""
+"""Robots among other people's crowds: what is promised is kept.  In full: `tests/studies/crowd_trials.py`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from conftest import make_tracks, make_walk
-from crowd_trials import CROWDED, measure, violated_by_who_kept
+from studies.crowd_trials import CROWDED, measure, violated_by_who_kept
 from test_crowds import PACKAGES, model, scene
 
 import szlib

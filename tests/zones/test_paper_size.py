@@ -10,7 +10,7 @@ from contextlib import nullcontext
 import numpy as np
 import pandas as pd
 import pytest
-from bench_data import paper_samples
+from helpers.paper_samples import paper_samples
 from sklearn.neighbors import LocalOutlierFactor
 
 import szlib

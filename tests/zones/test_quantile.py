@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from passers import TRUTH, passers
+from helpers.passers import TRUTH, passers
 
 import szlib
 from szlib.zones.by_direction.quantile import BAND, approaches, encounter_numbers, quantile_radii, smoothed

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from passers import TRUTH, passers, wanderers
+from helpers.passers import TRUTH, passers, wanderers
 
 import szlib
 from szlib.tracks import funnels

@@ -1,10 +1,9 @@
 """Speed, as ratios of two things run in turn in this one process: `make bench`.
 
-Prints each number, beside it its bar and what it was when it was saved last, and writes all to
-results/bench.json.  Bare seconds depend on the machine; ratios hardly: `--save` appends these to
-tests/ratios.csv.  `--long` adds 4,000 states on which both solvers must agree, and 1,000 meetings head-on.
-Names of cases after the options choose among them.  $SZLIB_BEFORE names a clone of an earlier commit to
-compare with.
+Prints each number with its bar and its last saved value, and writes all numbers to results/bench.json.
+Seconds depend on the machine; ratios hardly do: `--save` appends the ratios to tests/benchmarks/ratios.csv.
+`--long` adds 4,000 states on which both solvers must agree, and 1,000 head-on meetings.  Names of cases
+after the options select these cases.  $SZLIB_BEFORE names a clone of an earlier commit to compare with.
 """
 
 import importlib.util
@@ -21,14 +20,14 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import bench_control
-import bench_data
-import bench_growth
-import growth
 import numpy as np
 import pandas as pd
-from random_states import meetings, questions
 from tqdm import tqdm
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
+
+from benchmarks import data_growth, data_sizes, measuring, steps
+from helpers.random_states import meetings, questions
 
 import szlib
 from szlib.checks import Array
@@ -43,7 +42,7 @@ from szlib.tracks import datasets
 def in_turn(first: Callable[[], object], second: Callable[[], object], repeats: int) -> tuple[float, float]:
     """Medians of both, run alternately after one warm-up each."""
     first(), second()
-    pairs = [(growth.seconds(first), growth.seconds(second)) for _ in range(repeats)]
+    pairs = [(measuring.seconds(first), measuring.seconds(second)) for _ in range(repeats)]
     return median(p[0] for p in pairs), median(p[1] for p in pairs)
 
 
@@ -95,7 +94,7 @@ def race(
     asked = way(scenario)
     for _ in range(repeats):
         for name, step in baselines.items():
-            laps[name].append([growth.seconds(lambda: step(*each)) for each in asked][3:])  # noqa: B023 - at once
+            laps[name].append([measuring.seconds(lambda: step(*each)) for each in asked][3:])  # noqa: B023 - at once
     return {name: np.median(lap, axis=0) for name, lap in laps.items()}
 
 
@@ -139,7 +138,7 @@ def asking(controller: szlib.MPCCBF, scenario: szlib.Scenario) -> Callable[..., 
 
 def bench_rival() -> dict[str, float]:
     """The same problem in do-mpc: the same controls, and how much longer they take."""
-    from baselines import do_mpc_step
+    from benchmarks.do_mpc_controller import do_mpc_step
 
     scenario = szlib.SCENARIOS["passing"]
     step, rival = asking(controller_of(scenario), scenario), do_mpc_step(szlib.MPCSettings(), ZONE)
@@ -154,8 +153,7 @@ def bench_rival() -> dict[str, float]:
 
 def bench_cruel(count: int) -> dict[str, float]:
     """Steps from inside zones and walls, at speed: here solvers take longest, and the time limit counts."""
-    sys.path.insert(0, str(Path(__file__).parent / "hostile"))
-    from controller import attack_time
+    from hostile.controller import attack_time
 
     tally: Counter[str] = Counter()
     for solver in ("sqp", "ipopt"):
@@ -227,8 +225,10 @@ def bench_plaza() -> dict[str, float]:
     """The synthetic plaza: made, written; and read back to its zone."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "plaza.csv"
-        made = growth.seconds(lambda: make_plaza(file, seed=0))
-        fitted = growth.seconds(lambda: szlib.SocialZone.fit(szlib.find_encounters(szlib.read_tracks(file))))
+        made = measuring.seconds(lambda: make_plaza(file, seed=0))
+        fitted = measuring.seconds(
+            lambda: szlib.SocialZone.fit(szlib.find_encounters(szlib.read_tracks(file)))
+        )
         return {"made and written s": made, "MB": file.stat().st_size / 1e6, "read to zone s": fitted}
 
 
@@ -242,7 +242,7 @@ def bench_import() -> dict[str, float]:
     return {"s more than bare Python": ours - bare, "szlib / bare Python": ours / bare}
 
 
-BARS: dict[str, growth.Bars] = {
+BARS: dict[str, measuring.Bars] = {
     "one person": {"ipopt / compiled median": (">=", 38), "ipopt / sqp p95": (">=", 20)},
     "5 people, 4 walls": {"ipopt / sqp median": (">=", 10), "sqp p99 ms": ("<=", 5)},
 }
@@ -256,10 +256,10 @@ def main() -> None:
         "5 people, 4 walls": lambda: bench_solvers(CROWD),
         "IPOPT": bench_build,
         "cruel states": lambda: bench_cruel(3000 if "--long" in sys.argv else 200),
-        **bench_control.CASES,
+        **steps.CASES,
         "import szlib": bench_import,
         "plaza": bench_plaza,
-        **bench_growth.CASES,
+        **data_growth.CASES,
     }
     if importlib.util.find_spec("do_mpc"):
         cases["do-mpc"] = bench_rival
@@ -269,9 +269,9 @@ def main() -> None:
         cases["head-on, ipopt"] = lambda: check_meetings(100, "ipopt")
     if os.environ.get(datasets.DATA_DIR_VARIABLE):
         cases["1 Hz day, files to zone"] = bench_day
-    if "--long" in sys.argv or os.environ.get(bench_data.RAW_DAY_VARIABLE):
-        cases |= bench_data.CASES
-    bars = BARS | bench_control.BARS | bench_data.BARS | bench_growth.BARS
+    if "--long" in sys.argv or os.environ.get(data_sizes.RAW_DAY_VARIABLE):
+        cases |= data_sizes.CASES
+    bars = BARS | steps.BARS | data_sizes.BARS | data_growth.BARS
     wanted = [name for name in sys.argv[1:] if not name.startswith("--")] or list(cases)
     if unknown := set(wanted) - set(cases):
         sys.exit(f"no such case: {', '.join(sorted(unknown))}; there are {', '.join(cases)}")
@@ -281,11 +281,11 @@ def main() -> None:
         for name in wanted:
             bench = cases[name]
             found[name] = {key: float(f"{value:.4g}") for key, value in bench().items()}
-            print(growth.told(name, found[name], bars.get(name)), flush=True)
+            print(measuring.told(name, found[name], bars.get(name)), flush=True)
     Path("results").mkdir(exist_ok=True)
     Path("results/bench.json").write_text(json.dumps(found, indent=1))
     if "--save" in sys.argv:
-        growth.save(found)
+        measuring.save(found)
 
 
 if __name__ == "__main__":

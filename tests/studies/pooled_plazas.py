@@ -1,4 +1,4 @@
-"""Outliers of pooled plazas, for notebook 03: `python tests/pooled_plazas.py` (about half an hour).
+"""Outliers of pooled plazas, for notebook 03: `python tests/studies/pooled_plazas.py` (about half an hour).
 
 Writes notebooks/tables/03_outliers.csv: one row for each share and pace of intruders, family of seeds,
 number of plazas pooled, and rule; with what the rule removed, its precision and recall for samples of
@@ -18,7 +18,7 @@ import szlib
 from szlib.errors import ZoneError
 from szlib.plaza import scores, truth
 
-TABLE = Path(__file__).parents[1] / "notebooks" / "tables" / "03_outliers.csv"
+TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "03_outliers.csv"
 RULES: dict[str, dict[str, float | None]] = {
     "encounters": {"fraction": None, "neighbours": None},
     "0.2 %, 20 neighbours": {"fraction": 0.002, "neighbours": 20},

@@ -1,4 +1,6 @@
-"""The table of random worlds, with intervals: `python tests/rollout_table.py [--blocks 4] [--worlds 2000]`.
+"""The table of random worlds, with intervals.
+
+    python tests/studies/rollout_table.py [--blocks 4] [--worlds 2000]
 
 Writes notebooks/tables/11_rollouts.csv: a row for each set of worlds and formulation, over blocks of seeds
 far apart, each share with its 95 % Clopper-Pearson interval, and the counts of the single blocks. Finished
@@ -17,7 +19,7 @@ from szlib.control.problem import TOLERANCE
 from szlib.simulation.rollouts import rollouts, tally
 from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds
 
-TABLE = Path(__file__).parent.parent / "notebooks" / "tables" / "11_rollouts.csv"
+TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "11_rollouts.csv"
 APART = 1_000_000
 """Seeds between the first ones of two blocks; block 0 starts at this as well."""
 FORMULATIONS = {

@@ -1,7 +1,7 @@
 """Robots among other people's crowds, real and simulated: the tables of notebook 17.
 
-python tests/crowd_trials.py           both tables, as they are saved: some 15 min on one core
-python tests/crowd_trials.py --n 10    at most 10 trials of each kind
+python tests/studies/crowd_trials.py           both tables, as they are saved: some 15 min on one core
+python tests/studies/crowd_trials.py --n 10    at most 10 trials of each kind
 
 17_crowds.csv     means with 95 % intervals: crowd by what people see by controller
 17_promises.csv   steps that said they were safe, how many led to h < 0, and what people did meanwhile
@@ -13,6 +13,7 @@ eth/); JuPedSim is left out where it is not installed.  An exception in any tria
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator
 from functools import lru_cache
 from importlib.util import find_spec
@@ -21,7 +22,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from studies.claims import SITES, TABLES
 
 import szlib
 from szlib.simulation.closed_loop import drive
@@ -34,6 +34,10 @@ from szlib.simulation.crowds.scores import score
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.worlds import Worlds
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
+
+from studies.claims import SITES, TABLES
 
 CROWDED = Worlds(
     people=(6, 10),

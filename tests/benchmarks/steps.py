@@ -1,4 +1,4 @@
-"""The step at its limits (see bench.py): how it grows with people, walls and horizons, what a controller
+"""The step at its limits (see `make bench`): how it grows with people, walls and horizons, what a controller
 costs to build, what happens when a crowd comes, and how a commit compares with an earlier one.
 
 $SZLIB_BEFORE is a clone of an earlier commit: its step is then run in turn with this one's.
@@ -18,9 +18,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import growth
 import numpy as np
-from random_states import ZONE
+from benchmarks import measuring
+from helpers.random_states import ZONE
 
 import szlib
 from szlib.checks import Array
@@ -112,7 +112,7 @@ def bench_growth(of: str) -> dict[str, float]:
         controller = (szlib, controller_of(szlib, **case(n)))
         took, _ = laps([controller], way(**case(n), steps=60), 5)
         found[f"{of} = {n}: ms"] = 1e3 * float(np.median(took))
-    return found | {"exponent": growth.exponent(sizes, list(found.values()))}
+    return found | {"exponent": measuring.exponent(sizes, list(found.values()))}
 
 
 def bench_build() -> dict[str, float]:
@@ -125,7 +125,7 @@ def bench_build() -> dict[str, float]:
         found |= {f"{name}: first ms": first, f"{name}: another ms": again, f"{name}: first MB": megabytes}
     slots = [people + n_walls for people, n_walls in sizes]
     return found | {
-        "exponent": growth.exponent(slots, [v for k, v in found.items() if k.endswith("first ms")])
+        "exponent": measuring.exponent(slots, [v for k, v in found.items() if k.endswith("first ms")])
     }
 
 
@@ -167,7 +167,7 @@ def jump(ahead: bool) -> tuple[float, float, float]:
     """The first step with 20 people, the longest step while sizes are built, and the longest after [ms]."""
     controller = szlib.MPCCBF(ZONE, walls=walls(4))
     x, longest, usual = np.array([-4.0, 0.0, 0.0, 0.0]), 0.0, 0.0
-    ask = lambda n: 1e3 * growth.seconds(lambda: controller.step(x, GOAL, crowd(n)))  # noqa: E731
+    ask = lambda n: 1e3 * measuring.seconds(lambda: controller.step(x, GOAL, crowd(n)))  # noqa: E731
     for n in (1, 1, 1):
         ask(n)
     for n in (4, 8, 16) if ahead else ():
@@ -270,7 +270,7 @@ if os.environ.get(BEFORE_VARIABLE):
     }
     CASES["worlds against before"] = lambda: bench_worlds(100)
 
-BARS: dict[str, growth.Bars] = {
+BARS: dict[str, measuring.Bars] = {
     "crowd comes": {"built ahead CPU ms": ("<=", 5), "at once CPU ms": ("<=", 150)},
     "worlds against before": {"before / now": (">=", 2.1)},
 } | {

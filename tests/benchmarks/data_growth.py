@@ -1,4 +1,4 @@
-"""How the data half grows with its rows, 1x to 8x, each with its exponent: 1 is linear (see bench.py)."""
+"""How the data half grows with its rows, 1x to 8x, each with its exponent: 1 is linear (see `make bench`)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from multiprocessing import get_context
 from pathlib import Path
 
-import growth
 import pandas as pd
-from bench_data import PAPER_SAMPLES, paper_samples
+from benchmarks import measuring
+from helpers.paper_samples import PAPER_SAMPLES, paper_samples
 
 import szlib
 from szlib.plaza.people import make_plaza
@@ -20,7 +20,7 @@ from szlib.zones import outliers
 
 TIMES = (1, 2, 4, 8)
 SPEEDS = (0.9, 1.1, 1.3)
-LINEAR: growth.Bars = {"exponent": ("<=", 1.15)}
+LINEAR: measuring.Bars = {"exponent": ("<=", 1.15)}
 """As good as linear: a cache that overflows on the way costs a little."""
 
 
@@ -48,13 +48,13 @@ def told(rows: Mapping[int, int], seconds: Mapping[float, float]) -> dict[str, f
         "rows 1x": rows[1],
         "s 1x": seconds[1],
         f"s {most}x / s 1x": seconds[most] / seconds[1],
-        "exponent": growth.exponent(list(rows.values()), [seconds[n] for n in rows]),
+        "exponent": measuring.exponent(list(rows.values()), [seconds[n] for n in rows]),
     }
 
 
 def over(tables: Mapping[int, pd.DataFrame], work: Callable[[pd.DataFrame], object]) -> dict[str, float]:
     """How a function's time grows with its table."""
-    seconds = growth.grow({n: lambda table=table: work(table) for n, table in tables.items()})
+    seconds = measuring.grow({n: lambda table=table: work(table) for n, table in tables.items()})
     return told({n: len(table) for n, table in tables.items()}, seconds)
 
 
@@ -97,7 +97,7 @@ def bench_respect() -> dict[str, float]:
     for n in TIMES:
         rows = longer(tracks, n)
         of[n] = szlib.find_encounters(rows), shifted(rows, 5)
-    seconds = growth.grow({n: lambda pair=pair: szlib.fit_respect(*pair) for n, pair in of.items()})
+    seconds = measuring.grow({n: lambda pair=pair: szlib.fit_respect(*pair) for n, pair in of.items()})
     return told({n: len(samples) for n, (samples, _) in of.items()}, seconds)
 
 
@@ -127,4 +127,4 @@ CASES: dict[str, Callable[[], dict[str, float]]] = {
     "growth: respect": alone(bench_respect),
     "growth: LOF": alone(bench_lof),
 }
-BARS: dict[str, growth.Bars] = dict.fromkeys(CASES, LINEAR)
+BARS: dict[str, measuring.Bars] = dict.fromkeys(CASES, LINEAR)

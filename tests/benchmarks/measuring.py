@@ -1,4 +1,4 @@
-"""How time grows with size, bars beside numbers, and ratios kept from one commit to the next (see bench.py).
+"""Measure how time grows with size, print numbers beside their bars, and save ratios (for `make bench`).
 
 A case of the bench is a dictionary of numbers.  Those whose name holds " / " or "exponent" do not depend on
 the machine: `save` appends them to ratios.csv, and `told` prints beside each what it was there last.

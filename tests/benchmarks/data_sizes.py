@@ -1,4 +1,4 @@
-"""Speed and memory of the data half at full size, as ratios within one run (see bench.py).
+"""Speed and memory of the data half at full size, as ratios within one run (see `make bench`).
 
 The raw day is $SZLIB_RAW_DAY, a file in the raw ATC format, else one made of the plaza, repeated until it
 is as large as a real one.
@@ -17,10 +17,9 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-import growth
-import numpy as np
-import pandas as pd
 import polars as pl
+from benchmarks import measuring
+from helpers.paper_samples import paper_samples
 from sklearn.neighbors import LocalOutlierFactor
 
 import szlib
@@ -31,8 +30,6 @@ from szlib.zones import outliers
 RAW_DAY_VARIABLE = "SZLIB_RAW_DAY"
 ROWS = 15_000_000
 """Of a real day."""
-PAPER_SAMPLES = 16_181 * 31
-"""Encounters in the paper, 31 samples each."""
 
 BARE = """
 import sys, polars as pl
@@ -67,7 +64,7 @@ ZONE = """
 import sys
 sys.path.insert(0, sys.argv[1])
 import szlib
-from bench_data import paper_samples
+from helpers.paper_samples import paper_samples
 samples = paper_samples()
 # begin
 szlib.SocialZone.fit(samples)
@@ -167,21 +164,6 @@ def bench_days(repeats: int = 3) -> dict[str, float]:
     return found
 
 
-def paper_samples(n: int = PAPER_SAMPLES, seed: int = 0) -> pd.DataFrame:
-    """Samples as many as in the paper, all around the zone of a person, at speeds from 0.4 to 1.8 m/s."""
-    rng = np.random.default_rng(seed)
-    angle, speed = rng.uniform(-np.pi, np.pi, n), rng.uniform(0.4, 1.8, n)
-    nearest = 0.5 + 0.2 * speed + 0.1 * np.cos(angle)
-    return pd.DataFrame(
-        {
-            "encounter": np.arange(n) // 31,
-            "los_angle": angle,
-            "distance": np.minimum(nearest + rng.exponential(0.5, n), 1.99),
-            "speed": speed,
-        }
-    )
-
-
 def bench_lof() -> dict[str, float]:
     """LOF on as many samples as the paper's, against scikit-learn's own; and by whole encounters."""
     samples = paper_samples()
@@ -202,7 +184,7 @@ def bench_lof() -> dict[str, float]:
 
 def bench_zone() -> dict[str, float]:
     """From as many samples as the paper's to zones: outliers, hull, slices, ellipses."""
-    zone = run(ZONE, Path(__file__).parent)
+    zone = run(ZONE, Path(__file__).parents[1])
     return {"s": zone.seconds, "peak MB": zone.memory}
 
 
@@ -213,7 +195,7 @@ CASES: dict[str, Callable[[], dict[str, float]]] = {
     "zone, paper size": bench_zone,
 }
 
-BARS: dict[str, growth.Bars] = {
+BARS: dict[str, measuring.Bars] = {
     "raw day to encounters": {"ours / bare scan": ("<=", 1.95), "asked again / bare scan": ("<=", 0.7)}
 }
 """Of a case: what its numbers are held against."""

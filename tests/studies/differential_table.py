@@ -1,4 +1,6 @@
-"""The table of robots with two wheels in random worlds: `python tests/differential_table.py [--worlds 2000]`.
+"""The table of robots with two wheels in random worlds.
+
+    python tests/studies/differential_table.py [--worlds 2000]
 
 Writes notebooks/tables/17_differential.csv: a row for each robot, all of them in the same worlds, by
 `szlib.rollouts`. Beside its metrics, which are about the robot's disc at the samples, the disc is followed
@@ -7,13 +9,13 @@ there. Finished worlds are kept in results/rollouts, so that a run that was stop
 """
 
 import argparse
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from rollout_table import interval
 
 import szlib
 from szlib.checks import Array
@@ -26,7 +28,11 @@ from szlib.simulation.rollouts import CIRCLE, mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS
 from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds
 
-TABLE = Path(__file__).parent.parent / "notebooks" / "tables" / "17_differential.csv"
+sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
+
+from studies.rollout_table import interval
+
+TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "17_differential.csv"
 FIRST = 1_000_000
 """Seed of the first world: that of the first block of rollout_table."""
 SUBSTEPS = 10
