@@ -1,4 +1,4 @@
-"""The errors of szlib: one root, so that ``except SzlibError`` catches them all."""
+"""The errors of szlib. ``except SzlibError`` catches them all."""
 
 
 class SzlibError(Exception):
@@ -10,20 +10,20 @@ class DataError(SzlibError, ValueError):
 
 
 class StorageError(DataError):
-    """A file or a folder cannot be written: no room, no permission, or it is not szlib's to replace."""
+    """A file or a folder cannot be written: no room, no permission, or it holds files of others."""
 
 
 class MemoryLimitError(DataError):
-    """Data needs more memory than there is, or than was granted."""
+    """Data needs more memory than is available or allowed."""
 
 
 class ZoneError(SzlibError, ValueError):
-    """A social zone or an ellipse is undefined for what was given."""
+    """A social zone or an ellipse is undefined for the given data or parameters."""
 
 
 class SolverError(SzlibError, RuntimeError):
-    """The controller was set up or asked in a way that has no meaning."""
+    """The controller was set up or called with invalid arguments."""
 
 
 class DataWarning(UserWarning):
-    """Rows or speeds were set aside; the message counts them by reason."""
+    """Rows were rejected, or a zone is unreliable; the message counts the rows by reason."""

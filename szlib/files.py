@@ -1,8 +1,8 @@
-"""The one door through which files are written: each whole or not at all, into folders that are szlib's own.
+"""Atomic files, folders that belong to szlib, and cached results.
 
-A folder of results holds a marker, `.szlib`, that says what it is for.  One that holds anything else and no
-marker is never written into, nor one that holds the data read.  What is unfinished, or temporary, bears
-the name of its process; where that is dead, the next call removes it.
+Every file is written here: completely, or not at all. A folder of results holds a marker file, `.szlib`. Its
+first line says what the folder is for. A folder that holds other files and no marker is never written into.
+Neither is a folder that holds the input data.
 """
 
 from __future__ import annotations
@@ -10,11 +10,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 import shutil
-import socket
-import sys
 import tempfile
+import time
 import uuid
 import zlib
 from collections.abc import Iterable, Iterator
@@ -23,235 +21,56 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 from .errors import StorageError
 
-CACHE, MARKER = "SZLIB_CACHE", ".szlib"
-"""Names the folder of the user's cache, or is "off"; in a folder: that it is szlib's to write, what for."""
-_UNFINISHED, _TEMPORARY = ".szlib-", "szlib-"
-_BLOCK, _AT_ONCE, _READERS = 1 << 20, 1 << 26, 2
-"""Bytes of a file whose checksum is taken at a time, bytes that a thread takes, and threads."""
+CACHE = "SZLIB_CACHE"
+"""Environment variable: the folder of the user's cache, or "off"."""
+MARKER = ".szlib"
+"""Name of the file that marks a folder as szlib's."""
+_LOCK, _UNFINISHED, _TEMPORARY = ".szlib-lock", ".szlib-part-", "szlib-"
+_ABANDONED = 3600.0
+"""Age at which an unfinished file is removed [s]: no write takes so long."""
+_BLOCK, _SPAN, _N_READERS = 1 << 20, 1 << 26, 2
+"""Bytes of one checksum, bytes that one thread reads at a time, and the number of threads."""
 
 
-def write_file(path: str | Path, content: bytes | str, *, lasting: bool = True) -> None:
-    """Write a file as a whole or not at all, in place of what was there; folders are not made.
+def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) -> None:
+    """Write `content` to `path` completely, or leave the file as it was.
 
-    With `lasting` it outlives a power failure (fsync of the file and of its folder).  Two processes may write
-    the same file: it is the one's or the other's.  Raises StorageError, and leaves what was there.
+    With `durable` the file survives a power failure (fsync of the file and of its folder). Two processes may
+    write the same file: one of them wins. The folder must exist. Raises StorageError.
     """
     path = Path(path)
-    unfinished = path.parent / f"{_UNFINISHED}{_process()}-{uuid.uuid4().hex[:8]}"
+    unfinished = path.parent / f"{_UNFINISHED}{uuid.uuid4().hex}"
     try:
         try:
-            _fill(unfinished, content.encode() if isinstance(content, str) else content, lasting)
+            _fill(unfinished, content.encode() if isinstance(content, str) else content, durable)
             unfinished.replace(path)
-            if lasting:
+            if durable:
                 _sync(path.parent)
         except BaseException:
-            with suppress(OSError):  # what could not be written may not be there to be removed
+            with suppress(OSError):  # a file that could not be created cannot be removed
                 unfinished.unlink()
             raise
-        _sweep(path.parent, _UNFINISHED)
     except OSError as error:
         raise StorageError(
             f"{path}: cannot be written ({error.strerror or error}); make room, or choose a folder that is "
-            "writable; what was finished before is intact"
+            "writable; files that were finished before are intact"
         ) from error
 
 
-def cache_folder(name: str) -> Path | None:
-    """A folder of the user's cache, made or not; None where that is off (see `CACHE`)."""
-    import pooch
-
-    named = os.environ.get(CACHE) or pooch.os_cache("szlib")
-    return None if named == "off" else Path(named) / name
-
-
-def keep(path: Path, content: bytes, made_of: Any) -> None:
-    """Write a file, then beside it (``NAME.json``) of what it was made, in JSON values, and its checksum."""
-    write_file(path, content)
-    sign(path, content, made_of)
-
-
-def sign(path: Path, content: bytes, made_of: Any) -> None:
-    """The second half of `keep`, for a file that has been written."""
-    record = {"made_of": made_of, "sha256": hashlib.sha256(content).hexdigest()}
-    write_file(path.with_name(f"{path.name}.json"), json.dumps(record, indent=1))
-
-
-def kept(path: Path, made_of: Any) -> bytes | None:
-    """The content of a file from `keep`; None where it is not there, not whole, or made of something else."""
-    try:
-        record = json.loads(path.with_name(f"{path.name}.json").read_text(encoding="utf-8"))
-        content = path.read_bytes()
-        right = record["made_of"] == json.loads(json.dumps(made_of))
-        return content if right and record["sha256"] == hashlib.sha256(content).hexdigest() else None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-
-
-def own_folder(folder: str | Path, purpose: str, *, inputs: Iterable[Path] = ()) -> Path:
-    """Make a folder, or take it if it is empty or has been this one's; mark it as szlib's, and return it.
-
-    `purpose` is one line: a folder for something else is not taken, nor one that holds any of `inputs`.
-    Raises StorageError, with the reason.
-    """
-    folder = Path(folder)
-    try:
-        place = folder.resolve()
-        if inside := [file for file in inputs if place in file.resolve().parents]:
-            raise StorageError(
-                f"{folder}: holds data that is to be read, {inside[0].name}; choose a folder of its own"
-            )
-        folder.mkdir(parents=True, exist_ok=True)
-        others = sorted(each.name for each in folder.iterdir() if not _is_ours(each))
-        owner = owner_of(folder)
-        if owner is None and others:
-            raise StorageError(
-                f"{folder}: holds what szlib did not write, such as {others[0]!r}; choose a folder that is "
-                "new or empty (or remove what an earlier szlib has left there)"
-            )
-        if owner is None:
-            _claim(folder / MARKER, purpose)
-            owner = owner_of(folder)
-    except OSError as error:
-        raise StorageError(
-            f"{folder}: cannot be made or read ({error.strerror or error}); choose another folder"
-        ) from error
-    if owner != purpose:
-        raise StorageError(f"{folder}: holds {owner}; {purpose} need another folder")
-    _sweep(folder, _UNFINISHED)
-    return folder
-
-
-def owner_of(folder: str | Path) -> str | None:
-    """For what szlib has marked a folder, or None."""
-    try:
-        return (Path(folder) / MARKER).read_text(encoding="utf-8").splitlines()[0]
-    except (OSError, ValueError, IndexError):
-        return None
-
-
-@contextmanager
-def held(folder: str | Path) -> Iterator[None]:
-    """Keep a folder of szlib's to this process; it is free again however the process ends.
-
-    Raises StorageError where another process has it.
-    """
-    with (Path(folder) / MARKER).open("r+b") as marker:
-        try:
-            _lock(marker.fileno())
-        except OSError as error:
-            raise StorageError(
-                f"{folder}: another process is writing there; wait for its end, or choose another folder"
-            ) from error
-        yield
-
-
-def _lock(file: int) -> None:
-    if sys.platform == "win32":
-        import msvcrt
-
-        os.lseek(file, _BLOCK, os.SEEK_SET)  # beyond what is read of it
-        msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-@contextmanager
-def temporary_folder() -> Iterator[Path]:
-    """A folder for what is temporary; gone at the end, or with the next call where this process is killed.
-
-    Raises StorageError where there is no room for it.
-    """
-    try:
-        place = Path(tempfile.gettempdir())
-        _sweep(place, _TEMPORARY)
-        folder = Path(tempfile.mkdtemp(prefix=f"{_TEMPORARY}{_process()}-", dir=place))
-    except OSError as error:
-        raise StorageError(
-            f"no temporary folder ({error.strerror or error}); make room, or name another in $TMPDIR"
-        ) from error
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def sweep_temporary() -> None:
-    """Remove what processes that are dead have left in the temporary folder."""
-    with suppress(OSError):
-        _sweep(Path(tempfile.gettempdir()), _TEMPORARY)
-
-
-def file_content(file: Path) -> tuple[int, str]:
-    """Size of a file, and the SHA-256 over the CRC-32 of each of its MiB.
-
-    It reads the whole file, at 5 to 10 times the speed of a SHA-256 over all of it; a block that has
-    changed by accident goes unnoticed with a probability of 2**-32, a short burst of errors never.
-    """
-    size = file.stat().st_size
-    digest, read = hashlib.sha256(), 0
-    with ThreadPoolExecutor(_READERS) as readers:
-        for count, checksums in readers.map(lambda at: _checksums(file, at), range(0, size, _AT_ONCE)):
-            digest.update(checksums)
-            read += count
-    return read, digest.hexdigest()
-
-
-def _checksums(file: Path, begin: int) -> tuple[int, bytes]:
-    """Bytes read from there on, at most `_AT_ONCE`, and the CRC-32 of each of their MiB."""
-    found, read, block = [], 0, bytearray(_BLOCK)
-    with file.open("rb", buffering=0) as stream:
-        stream.seek(begin)
-        while read < _AT_ONCE and (count := stream.readinto(block)):
-            read += count
-            found.append(zlib.crc32(memoryview(block)[:count]).to_bytes(4, "big"))
-    return read, b"".join(found)
-
-
-def printable(name: object) -> str:
-    """A file's name as text that any file and any terminal takes: bytes that are no UTF-8 are spelled out."""
-    text = str(name).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
-    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
-
-
-def _fill(unfinished: Path, content: bytes, lasting: bool) -> None:
-    """Every byte that szlib writes goes through here."""
+def _fill(unfinished: Path, content: bytes, durable: bool) -> None:
     with unfinished.open("xb") as stream:
         stream.write(content)
-        if lasting:
+        if durable:
             stream.flush()
             os.fsync(stream.fileno())
 
 
-def _claim(marker: Path, purpose: str) -> None:
-    """Write the marker unless somebody has: of two processes one comes first."""
-    unfinished = marker.with_name(f"{_UNFINISHED}{_process()}-{uuid.uuid4().hex[:8]}")
-    try:
-        _fill(
-            unfinished, f"{purpose}\nWritten by szlib, which may replace all that is here.\n".encode(), True
-        )
-        with suppress(FileExistsError):
-            try:
-                os.link(unfinished, marker)
-            except FileExistsError:
-                raise
-            except (OSError, AttributeError):  # a file system without hard links
-                unfinished.replace(marker)
-    finally:
-        with suppress(OSError):
-            unfinished.unlink()
-
-
-def _is_ours(entry: Path) -> bool:
-    """A marker, an unfinished file, or a folder with a marker."""
-    return entry.name.startswith(MARKER) or (entry / MARKER).is_file()
-
-
 def _sync(folder: Path) -> None:
-    """Make the names in a folder last; where folders cannot be opened (Windows) nothing is needed."""
+    """Make the names in a folder durable; Windows cannot open folders, and needs nothing."""
     try:
         handle = os.open(folder, os.O_RDONLY)
     except OSError:
@@ -265,35 +84,182 @@ def _sync(folder: Path) -> None:
         os.close(handle)
 
 
-def _process() -> str:
-    """This process among all machines that share a folder."""
-    return f"{re.sub(r'[^A-Za-z0-9]', '', socket.gethostname())[:32]}-{os.getpid()}"
+def cache_folder(name: str) -> Path | None:
+    """The folder `name` of the user's cache, which may not exist yet; None if the cache is off (`CACHE`)."""
+    import pooch
+
+    root = os.environ.get(CACHE) or pooch.os_cache("szlib")
+    return None if root == "off" else Path(root) / name
 
 
-def _sweep(folder: Path, prefix: str) -> None:
-    """Remove what processes of this machine that are dead have left."""
-    host, own = _process().split("-")
-    with os.scandir(folder) as entries:
-        left = [entry.path for entry in entries if entry.name.startswith(f"{prefix}{host}-")]
-    for path in left:
-        number = Path(path).name.removeprefix(f"{prefix}{host}-").split("-")[0]
-        if number == own or not number.isdecimal() or _alive(int(number)):
-            continue
-        if Path(path).is_dir() and not Path(path).is_symlink():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            with suppress(OSError):
-                Path(path).unlink()
+def store_cached(path: Path, content: bytes, made_of: Any) -> None:
+    """Write `content` to `path`, and beside it a checksum and `made_of` (JSON values); see `load_cached`."""
+    write_file(path, content)
+    write_checksum(path, content, made_of)
 
 
-def _alive(process: int) -> bool:
-    """Whether a process of this machine lives; True where that cannot be asked without harm (Windows)."""
-    if os.name != "posix":
-        return True
+def write_checksum(path: Path, content: bytes, made_of: Any) -> None:
+    """Write ``NAME.json`` beside the file `path`: the checksum of `content` and `made_of` (JSON values)."""
+    record = {"made_of": made_of, "sha256": hashlib.sha256(content).hexdigest()}
+    write_file(path.with_name(f"{path.name}.json"), json.dumps(record, indent=1))
+
+
+def load_cached(path: Path, made_of: Any) -> bytes | None:
+    """The content of `path` from `store_cached`; None if missing, damaged, or not made of `made_of`."""
     try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
-    return True
+        record = json.loads(path.with_name(f"{path.name}.json").read_text(encoding="utf-8"))
+        content = path.read_bytes()
+        matches = record["made_of"] == json.loads(json.dumps(made_of))
+        return content if matches and record["sha256"] == hashlib.sha256(content).hexdigest() else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def claim_folder(folder: str | Path, purpose: str, *, inputs: Iterable[Path] = ()) -> Path:
+    """Make `folder`, or reuse it if it is empty or was claimed for the same `purpose`; return its path.
+
+    Parameters
+    ----------
+    folder : the folder; its parents are made too.
+    purpose : one line, such as "days"; a folder with another purpose is refused.
+    inputs : files of input data; a folder that holds one of them is refused.
+
+    Raises
+    ------
+    StorageError : the folder is refused, or cannot be made or read.
+    """
+    folder = Path(folder)
+    try:
+        place = folder.resolve()
+        if inside := [file for file in inputs if place in file.resolve().parents]:
+            raise StorageError(
+                f"{folder}: holds input data, {inside[0].name}; choose a folder without input data"
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        owner = folder_purpose(folder)
+        foreign = sorted(entry.name for entry in folder.iterdir() if not _is_ours(entry))
+        if owner is None and foreign:
+            raise StorageError(
+                f"{folder}: holds files that szlib did not write, such as {foreign[0]!r}; choose a new or "
+                "empty folder (or remove the results of an older szlib)"
+            )
+        if owner is None:
+            with FileLock(folder / _LOCK):  # of two processes one comes first
+                owner = folder_purpose(folder) or _mark(folder, purpose)
+        _remove_abandoned(folder)
+    except OSError as error:
+        raise StorageError(
+            f"{folder}: cannot be made or read ({error.strerror or error}); choose another folder"
+        ) from error
+    if owner != purpose:
+        raise StorageError(f"{folder}: holds {owner}; {purpose} need another folder")
+    return folder
+
+
+def _mark(folder: Path, purpose: str) -> str:
+    write_file(folder / MARKER, f"{purpose}\nWritten by szlib, which may replace every file here.\n")
+    return purpose
+
+
+def folder_purpose(folder: str | Path) -> str | None:
+    """The purpose for which `folder` was claimed, or None."""
+    try:
+        return (Path(folder) / MARKER).read_text(encoding="utf-8").splitlines()[0]
+    except (OSError, ValueError, IndexError):
+        return None
+
+
+def _is_ours(entry: Path) -> bool:
+    """Whether it is a marker, a lock, an unfinished file, or a claimed folder."""
+    return entry.name.startswith(MARKER) or (entry / MARKER).is_file()
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove unfinished files of processes that were killed."""
+    for entry in folder.glob(f"{_UNFINISHED}*"):
+        with suppress(OSError):
+            if _is_abandoned(entry):
+                entry.unlink()
+
+
+def _is_abandoned(entry: Path) -> bool:
+    return time.time() - entry.stat().st_mtime > _ABANDONED
+
+
+@contextmanager
+def folder_lock(folder: str | Path) -> Iterator[None]:
+    """Reserve a claimed `folder` for this process; the lock ends with the process.
+
+    Raises StorageError where another process has reserved it.
+    """
+    try:
+        with FileLock(Path(folder) / f"{_LOCK}-run", timeout=0):
+            yield
+    except Timeout as error:
+        raise StorageError(
+            f"{folder}: another process is writing there; wait until it ends, or choose another folder"
+        ) from error
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A temporary folder, removed at the end; a later call removes it where this process is killed.
+
+    A lock in the folder says that its process lives, also if that runs in another container.
+    Raises StorageError where there is no room for it.
+    """
+    remove_abandoned_temporary()
+    try:
+        folder = Path(tempfile.mkdtemp(prefix=_TEMPORARY))
+        lock = FileLock(folder / _LOCK)
+        lock.acquire()
+    except OSError as error:
+        raise StorageError(
+            f"no temporary folder ({error.strerror or error}); make room, or name another one in $TMPDIR"
+        ) from error
+    try:
+        yield folder
+    finally:
+        lock.release()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def remove_abandoned_temporary() -> None:
+    """Remove temporary folders whose process has ended without removing them."""
+    for folder in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):
+        with suppress(OSError, Timeout):
+            if (folder / _LOCK).is_file() and not folder.is_symlink():
+                with FileLock(folder / _LOCK, timeout=0):
+                    shutil.rmtree(folder, ignore_errors=True)
+
+
+def file_content(file: Path) -> tuple[int, str]:
+    """Size of `file` [bytes], and the SHA-256 over the CRC-32 of each of its MiB.
+
+    It reads the whole file, 5 to 10 times as fast as a SHA-256 over all of it. An accidental change of a
+    block goes unnoticed with a probability of 2**-32, a short burst of errors never.
+    """
+    size = file.stat().st_size
+    digest, read = hashlib.sha256(), 0
+    with ThreadPoolExecutor(_N_READERS) as readers:
+        for count, checksums in readers.map(lambda start: _checksums(file, start), range(0, size, _SPAN)):
+            digest.update(checksums)
+            read += count
+    return read, digest.hexdigest()
+
+
+def _checksums(file: Path, start: int) -> tuple[int, bytes]:
+    """Number of bytes read from `start` on, at most `_SPAN`, and the CRC-32 of each of their MiB."""
+    found, read, block = [], 0, bytearray(_BLOCK)
+    with file.open("rb", buffering=0) as stream:
+        stream.seek(start)
+        while read < _SPAN and (count := stream.readinto(block)):
+            read += count
+            found.append(zlib.crc32(memoryview(block)[:count]).to_bytes(4, "big"))
+    return read, b"".join(found)
+
+
+def printable(name: object) -> str:
+    """The file name `name` as text for any file and any terminal: bytes that are not UTF-8 are escaped."""
+    text = str(name).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)

@@ -1,7 +1,7 @@
-"""Work in parallel: processes here, or a Dask cluster, whatever joblib is configured for.
+"""Parallel work: processes on this machine, or a Dask cluster, as joblib is configured.
 
-A laptop needs nothing: ``n_jobs=2``.  Inside ``joblib.parallel_config("dask")``, with a
-``distributed.Client`` open, the same calls go to a Dask cluster; `cluster` opens both for an address.
+On one machine pass ``n_jobs=2``. Inside ``joblib.parallel_config("dask")``, with an open
+``distributed.Client``, the same calls run on the Dask cluster; `cluster` opens both for an address.
 """
 
 from __future__ import annotations
@@ -20,28 +20,36 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from . import memory
 from .errors import SzlibError
 
-_PATIENCE = 10
-"""So long a scheduler may take to answer [s]."""
-_PER_CORE = 4
-"""More processes than that for each core only get into each other's way."""
+_CONNECT_TIMEOUT = 10
+"""Longest wait for the answer of a scheduler [s]."""
+_MAX_PER_CORE = 4
+"""More processes than this for each core slow each other down."""
 _HEARTBEAT = 0.5
-"""So often a process looks whether its parent still lives [s]."""
+"""Interval at which a process checks that its parent lives [s]."""
 
 
-def run_tasks(tasks: Sequence[Any], *, n_jobs: int | None = None) -> Iterator[Any]:
-    """Results of ``joblib.delayed`` calls, each as soon as it is there, in any order.
+def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
+    """Yield the results of ``joblib.delayed`` calls, each when it is finished, in any order.
 
-    `n_jobs` is a number of processes, -1 for every core; None takes what ``joblib.parallel_config`` says, or
-    one.  There are never more than tasks, nor, with a RuntimeWarning, than four for each core.  Processes
-    end with this one, however it ends, and share the memory that it may use.
-    Raises SzlibError where a process here is killed; a cluster computes again what a worker took with it.
+    The processes end with this one, even if it is killed, and share its memory limit.
+
+    Parameters
+    ----------
+    tasks : the ``joblib.delayed`` calls.
+    n_jobs : number of processes; -1: one for each core. With 1, the configuration of
+        ``joblib.parallel_config`` applies, if there is one. See `limit_jobs`.
+
+    Raises
+    ------
+    SzlibError : a process on this machine was killed. A cluster repeats the tasks of a lost worker.
     """
-    done, parent, n_jobs = 0, os.getpid(), bounded(n_jobs, len(tasks))
-    share = _share(n_jobs)
-    guarded = [joblib.delayed(_in_share)(parent, share, task) for task in tasks]
+    done, parent, n_jobs = 0, os.getpid(), limit_jobs(n_jobs, len(tasks))
+    jobs = None if n_jobs == 1 else n_jobs
+    share = memory.limit() // max(1, joblib.effective_n_jobs(jobs))
     workers = joblib.Parallel(
-        n_jobs=n_jobs, return_as="generator_unordered", initializer=end_with, initargs=(parent,)
+        n_jobs=jobs, return_as="generator_unordered", initializer=end_with, initargs=(parent,)
     )
+    guarded = [joblib.delayed(_run_in_share)(parent, share, task) for task in tasks]
     try:
         with closing(workers(guarded)) as results:
             for result in results:
@@ -50,62 +58,60 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int | None = None) -> Iterator[An
     except TerminatedWorkerError as error:
         raise SzlibError(
             f"a worker process was killed after {done} of {len(tasks)} tasks, perhaps for lack of memory "
-            f"({' '.join(str(error).split())}); what was finished is kept: run again, with fewer processes"
+            f"({' '.join(str(error).split())}); finished tasks are kept: run again with fewer processes"
         ) from error
 
 
-def bounded(n_jobs: int | None, tasks: int) -> int | None:
-    """A number of processes that makes sense for so many tasks on this machine."""
+def limit_jobs(n_jobs: int, n_tasks: int) -> int:
+    """Reduce `n_jobs` to at most `n_tasks` and, with a RuntimeWarning, to four for each core; -1 is left.
+
+    Raises SzlibError for 0.
+    """
     if n_jobs == 0:
         raise SzlibError("n_jobs must be a number of processes, or -1 for every core; got 0")
-    if n_jobs is None or n_jobs < 0:
+    if n_jobs < 0:
         return n_jobs
-    most = _PER_CORE * (os.cpu_count() or 1)
-    if n_jobs > most:
+    largest = _MAX_PER_CORE * (os.cpu_count() or 1)
+    allowed = min(n_jobs, largest, max(n_tasks, 1))
+    if n_jobs > largest:
         warnings.warn(
-            f"of {n_jobs} processes {min(most, max(tasks, 1))} are used: at most one for each task, and "
-            f"{_PER_CORE} for each core",
+            f"n_jobs={n_jobs} is reduced to {allowed}: at most one process for each task, and "
+            f"{_MAX_PER_CORE} for each core",
             RuntimeWarning,
             stacklevel=3,
         )
-    return min(n_jobs, most, max(tasks, 1))
+    return allowed
 
 
 def end_with(parent: int) -> None:
-    """End this process as soon as `parent`, which started it, has ended, even by SIGKILL.
+    """End this process soon after the process number `parent`, which started it, ends, even by SIGKILL.
 
-    As the initializer of a pool it holds before the first task comes, and where the parent is gone by then.
+    As the initializer of a pool it runs before the first task, also if the parent has ended by then.
     """
 
-    def watch() -> None:
-        """Look after the parent until it is gone."""
+    def watch_parent() -> None:
+        """Poll until the parent has ended."""
         while os.getppid() == parent:
             time.sleep(_HEARTBEAT)
         os._exit(1)
 
     if os.getppid() != parent:
         os._exit(1)
-    threading.Thread(target=watch, name="ends with its parent", daemon=True).start()
+    threading.Thread(target=watch_parent, name="ends with its parent", daemon=True).start()
 
 
-def _in_share(parent: int, share: int | None, task: tuple[Callable[..., Any], Any, Any]) -> Any:
-    """One task, in this process or one that it started, within that process's share of memory."""
+def _run_in_share(parent: int, share: int, task: tuple[Callable[..., Any], Any, Any]) -> Any:
+    """Run one task, within `share` bytes of memory on the machine of `parent`, else within its limit."""
     function, positional, named = task
     with memory.granted(share if parent in (os.getpid(), os.getppid()) else None):
         return function(*positional, **named)
 
 
-def _share(n_jobs: int | None) -> int | None:
-    """The memory of one of these processes: None for workers elsewhere, who have their own."""
-    limit = memory.ceiling()
-    return None if limit is None else limit // max(1, joblib.effective_n_jobs(n_jobs))
-
-
 @contextmanager
 def cluster(address: str | None) -> Iterator[Any]:
-    """Hand out everything inside to the Dask scheduler at `address`; gives the client. None changes nothing.
+    """Run parallel work inside a with block on the Dask scheduler at `address`; yields the client.
 
-    Raises SzlibError where nobody answers there, or the extra `cluster` is not installed.
+    None changes nothing. Raises SzlibError if no scheduler answers, or the extra `cluster` is not installed.
     """
     if address is None:
         yield None
@@ -115,7 +121,7 @@ def cluster(address: str | None) -> Iterator[Any]:
     except ImportError as error:
         raise SzlibError("a scheduler needs Dask; install it with: pip install -e '.[cluster]'") from error
     try:
-        client = Client(address, timeout=_PATIENCE)
+        client = Client(address, timeout=_CONNECT_TIMEOUT)
     except (OSError, ValueError) as error:
         raise SzlibError(
             f"no Dask scheduler answers at {address!r} ({error}); start one with `dask scheduler`, and give "

@@ -24,7 +24,7 @@ import pandas as pd
 from tqdm import tqdm
 
 from ..errors import DataError, DataWarning, SzlibError
-from ..files import own_folder, printable
+from ..files import claim_folder, printable
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.formats.layouts import layout_of, start_of_day
@@ -110,7 +110,7 @@ def extract_days(
     paths: str | Path | Sequence[str | Path],
     *,
     out: str | Path,
-    n_jobs: int | None = None,
+    n_jobs: int = 1,
     exclude: Iterable[str] = (),
     progress: bool = True,
     **parameters: Any,
@@ -123,7 +123,7 @@ def extract_days(
         of the 1 Hz day); a recording that counts frames, has its own days, or whose clock does not count from
         1970, is one by its file's name (and folder's, where two are called the same).
     out : folder of the results, its own; made if it is missing.
-    n_jobs : processes; None takes what ``joblib.parallel_config`` says, such as a Dask cluster, or one.
+    n_jobs : number of processes; -1: one for each core. See `szlib.parallel.run_tasks`.
     exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
     progress : whether to show a bar over the days.
     parameters : of `szlib.read_tracks` and `szlib.find_encounters`: square, space, duration, min_distance,
@@ -150,7 +150,7 @@ def extract_days(
     chain, folder = Chain(**parameters), Path(out)
     excluded = (exclude,) if isinstance(exclude, str) else tuple(sorted(map(str, exclude)))
     files = sorted({file.resolve() for file in datasets.find(paths)})
-    own_folder(folder, PURPOSE, inputs=files)
+    claim_folder(folder, PURPOSE, inputs=files)
     days = _by_day(files, chain)
     chain = _settled(chain, [files for day, files in sorted(days.items()) if day not in excluded])
     rows = [_row(day, files, status="excluded") for day, files in days.items() if day in excluded]

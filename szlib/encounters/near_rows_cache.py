@@ -1,9 +1,8 @@
 """Rows near the square, kept in the user's cache: asked with other conditions, a day is not read again.
 
 An entry is known by the content of its file, by all that says which rows are near, and by this version of
-the step; it is whole, or it is made anew (`szlib.files.kept`).  $SZLIB_CACHE names the folder of the cache,
-or is "off".  Entries take at most `LIMIT`; those that were not used for longest give way.  `clear` removes
-all of them.
+the step; it is whole, or it is made anew (`szlib.files.load_cached`).  $SZLIB_CACHE names the folder of the
+cache, or is "off".  Entries take at most `LIMIT`; the least recently used are removed.  `clear` removes all.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from ..errors import StorageError
-from ..files import CACHE, MARKER, cache_folder, keep, kept, own_folder
+from ..files import CACHE, MARKER, cache_folder, claim_folder, load_cached, store_cached
 from .blocks import Rows, Tally
 
 Content = Callable[[], tuple[int, str]]
@@ -52,7 +51,7 @@ def find(size: int, which: dict[str, Any], content: Content) -> tuple[Rows, Tall
     home = folder()
     for path in home.glob(f"{_name(size, which)}-*.parquet") if home else ():
         kept_of = size, path.stem.rpartition("-")[2]
-        entry = kept(path, _made_of(kept_of, which))
+        entry = load_cached(path, _made_of(kept_of, which))
         found = _read(entry) if entry else None
         if found and kept_of == content():
             with suppress(OSError):  # only the order in which entries give way depends on it
@@ -86,8 +85,8 @@ def remember(content: tuple[int, str], which: dict[str, Any], rows: Rows, seen: 
     file = io.BytesIO()
     pq.write_table(table, file, compression="zstd", use_dictionary=False, column_encoding=encodings)
     try:
-        own_folder(home, PURPOSE)
-        keep(_path(home, content, which), file.getvalue(), _made_of(content, which))
+        claim_folder(home, PURPOSE)
+        store_cached(_path(home, content, which), file.getvalue(), _made_of(content, which))
         _make_room(home, LIMIT)
     except (StorageError, OSError) as error:
         warnings.warn(

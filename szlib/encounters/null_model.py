@@ -71,7 +71,7 @@ def null_encounters(
     r_max: float = CLOSE,
     square: object = ATC_SQUARE,
     duration: float = 3.0,
-    n_jobs: int | None = None,
+    n_jobs: int = 1,
     progress: bool = True,
     **parameters: Any,
 ) -> NullEncounters:
@@ -87,7 +87,7 @@ def null_encounters(
     seed, minutes : as in `time_shifted`.
     r_max : samples farther than that are counted, not kept [m].
     square, duration, parameters : those of `szlib.find_encounters`, and the same as for the data.
-    n_jobs : processes; None takes what ``joblib.parallel_config`` says, or one.
+    n_jobs : number of processes; -1: one for each core. See `szlib.parallel.run_tasks`.
     progress : whether to show a bar over the shifts.
 
     Raises

@@ -29,7 +29,7 @@ from ..control.mpc import MPCCBF
 from ..control.problem import TOLERANCE
 from ..control.settings import MPCSettings
 from ..errors import SolverError, SzlibError
-from ..files import keep, kept, own_folder, write_file
+from ..files import claim_folder, load_cached, store_cached, write_file
 from ..parallel import run_tasks
 from ..zones.ellipses import Ellipse
 from .closed_loop import Zones, drive
@@ -106,8 +106,8 @@ def rollouts(
     )
     folder = None if out is None else Path(out) / setup.key()
     if folder is not None:
-        own_folder(folder.parent, PURPOSE)
-        own_folder(folder, f"{PURPOSE} {setup.key()}")
+        claim_folder(folder.parent, PURPOSE)
+        claim_folder(folder, f"{PURPOSE} {setup.key()}")
         write_file(folder / "parameters.txt", setup.describe() + "\n")
     chunks = [range(first, min(first + CHUNK, seed + n)) for first in range(seed, seed + n, CHUNK)]
     tasks = [delayed(_chunk)(setup, chunk, folder) for chunk in chunks]
@@ -236,7 +236,7 @@ def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
     """The rows of these seeds: read where they are finished, else driven, and kept."""
     file = None if folder is None else folder / f"seeds-{seeds.start:07d}-{seeds.stop - 1:07d}.parquet"
     made = {"rollouts": file and setup.describe(), "seeds": [seeds.start, seeds.stop]}
-    if file is not None and (content := kept(file, made)) is not None:
+    if file is not None and (content := load_cached(file, made)) is not None:
         return pd.read_parquet(io.BytesIO(content))
     if setup.controller is mpc_cbf:
         setup = replace(setup, controller=_in_turn(setup.settings, get_ident()))
@@ -249,5 +249,5 @@ def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
     if file is not None:
         buffer = io.BytesIO()
         table.to_parquet(buffer)
-        keep(file, buffer.getvalue(), made)
+        store_cached(file, buffer.getvalue(), made)
     return table

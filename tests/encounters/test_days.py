@@ -18,7 +18,7 @@ import pytest
 
 import szlib
 from szlib.encounters import days as extraction
-from szlib.files import own_folder
+from szlib.files import claim_folder
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
 from szlib.tracks import funnels
@@ -194,7 +194,7 @@ def test_an_output_that_is_read_only(
     def refuse(*_: object) -> None:
         raise OSError(30, "Read-only file system")
 
-    own_folder(tmp_path / "out", extraction.PURPOSE)
+    claim_folder(tmp_path / "out", extraction.PURPOSE)
     monkeypatch.setattr("szlib.files._fill", refuse)
     refused = extract(days[:1], tmp_path / "out")
     assert "Read-only file system" in refused.failed["why"].iloc[0]

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from szlib.errors import StorageError
-from szlib.files import held
+from szlib.files import folder_lock
 from szlib.workbook.command_line import main
 from szlib.workbook.record import places
 from szlib.workbook.runner import execution
@@ -99,7 +99,7 @@ def test_relative_results_start_at_the_notebooks(workbook, tmp_path, monkeypatch
 
 
 def _hold(folder, held_now, release):
-    with held(folder):
+    with folder_lock(folder):
         held_now.set()
         release.wait(60)
 
@@ -127,8 +127,8 @@ def test_two_runs_of_the_same_do_not_write_into_each_other(workbook, tmp_path, c
 def test_a_folder_is_free_again_when_its_holder_is_killed(tmp_path):
     places.own_folder(tmp_path / "own", "a test")
     program = f"""
-from szlib.files import held
-with held({str(tmp_path / "own")!r}):
+from szlib.files import folder_lock
+with folder_lock({str(tmp_path / "own")!r}):
     print("held", flush=True)
     input()
 """
@@ -136,8 +136,8 @@ with held({str(tmp_path / "own")!r}):
     with holder:
         if holder.stdout is None or holder.stdout.readline() != b"held\n":
             pytest.fail("it is not held")
-        with pytest.raises(StorageError, match="another process"), held(tmp_path / "own"):
+        with pytest.raises(StorageError, match="another process"), folder_lock(tmp_path / "own"):
             pass
         holder.kill()
-    with held(tmp_path / "own"):
+    with folder_lock(tmp_path / "own"):
         pass

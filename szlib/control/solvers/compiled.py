@@ -29,7 +29,7 @@ from typing import Any
 import casadi as ca
 
 from ...errors import SolverError, StorageError
-from ...files import cache_folder, keep, kept, own_folder, temporary_folder
+from ...files import cache_folder, claim_folder, load_cached, store_cached, temporary_folder
 from ..problem import BUILDING, Buffered
 from ..settings import Compile
 
@@ -133,7 +133,7 @@ def compile_library(path: Path, functions: Sequence[str]) -> None:
 
     Raises SolverError where there is no compiler or it fails, StorageError where the file cannot be written.
     """
-    own_folder(path.parent, PURPOSE)
+    claim_folder(path.parent, PURPOSE)
     with temporary_folder() as place:
         with BUILDING:
             code = ca.CodeGenerator("functions.c")
@@ -144,7 +144,7 @@ def compile_library(path: Path, functions: Sequence[str]) -> None:
         done = subprocess.run(command, cwd=place, capture_output=True, text=True)
         if done.returncode:
             raise SolverError(f"{' '.join(command)} failed ({done.returncode}): {done.stderr.strip()[:500]}")
-        keep(path, (place / "functions.so").read_bytes(), path.stem)
+        store_cached(path, (place / "functions.so").read_bytes(), path.stem)
     for old in sorted(path.parent.glob("*.so"), key=lambda file: file.stat().st_mtime)[:-MOST]:
         old.unlink(missing_ok=True)
         old.with_name(f"{old.name}.json").unlink(missing_ok=True)
@@ -152,7 +152,7 @@ def compile_library(path: Path, functions: Sequence[str]) -> None:
 
 def _is_there(path: Path) -> bool:
     """Whether a file of the cache is there, and whole: what is damaged is compiled anew."""
-    return kept(path, path.stem) is not None
+    return load_cached(path, path.stem) is not None
 
 
 def _said(functions: Sequence[Buffered]) -> list[str]:

@@ -84,7 +84,7 @@ NO_START = "cannot start"
 """The outcome of a cell that starts in violation: the place is too narrow for the robot alone."""
 
 
-def chart(cells: Sequence[Cell], zone: Ellipse, *, n_jobs: int | None = None) -> pd.DataFrame:
+def chart(cells: Sequence[Cell], zone: Ellipse, *, n_jobs: int = 1) -> pd.DataFrame:
     """What the robot does in each cell: a row each, in their order.
 
     Columns: those of `Cell`; manner, as in `metrics.manners`, or `NO_START`; time_to_goal, time_yielding [s],

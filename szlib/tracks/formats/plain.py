@@ -73,7 +73,7 @@ def _what_it_is(path: Path) -> str:
 def check_rows(plain: Path, path: Path) -> None:
     """Raise MemoryLimitError where a file has more rows than memory can take."""
     most = plain.stat().st_size / 2  # a row and its end are two bytes or more
-    if (limit := memory.ceiling()) is None or most * ROW <= limit:
+    if most * ROW <= memory.limit():
         return
     with plain.open("rb") as stream:
         if stream.read(4) == b"PAR1":

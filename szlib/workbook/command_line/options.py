@@ -25,7 +25,7 @@ def _count(text: str, least: int = 0) -> int:
 def _memory(text: str) -> int:
     """An amount of memory of a command line."""
     try:
-        return memory.parse(text)
+        return memory.parse_size(text)
     except SzlibError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
 

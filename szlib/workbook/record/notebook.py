@@ -25,7 +25,7 @@ from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
 from ...encounters.one_day import Chain, check_met
 from ...errors import DataError, ZoneError
-from ...files import file_content, keep, kept, own_folder, sign, write_file
+from ...files import claim_folder, file_content, load_cached, store_cached, write_checksum, write_file
 from ...plaza.people import make_plaza
 from ...plaza.truth import PlazaSettings
 from ...tracks import datasets
@@ -90,7 +90,7 @@ class NotebookRecord:
         if run := os.environ.get(places.RUN_VARIABLE):
             return Path(run)
         results = places.root(variables.get("results", places.RESULTS))
-        own_folder(results, places.ROOT)
+        claim_folder(results, places.ROOT)
         return places.home(results / places.LAB, self.data, given)
 
     @property
@@ -112,7 +112,7 @@ class NotebookRecord:
 
     def encounters(self) -> pd.DataFrame:
         """The encounters that notebook 02 left, or found now where there are none of this data and seed."""
-        content = kept(self.out / "encounters.parquet", self._source())
+        content = load_cached(self.out / "encounters.parquet", self._source())
         if content is not None:
             return pd.read_parquet(io.BytesIO(content))
         tracks = self.tracks()
@@ -124,11 +124,11 @@ class NotebookRecord:
 
         `tracks`, those of the data, spare reading them again where people's walks must tell the area.
         """
-        if content := kept(self.out / "area.txt", self._source()):
+        if content := load_cached(self.out / "area.txt", self._source()):
             return as_area(content.decode())
         chain = Chain(square=self.area or None)
         area = chain.settled(self.files(), tracks).square
-        keep(self.out / "area.txt", str(area).encode(), self._source())
+        store_cached(self.out / "area.txt", str(area).encode(), self._source())
         return as_area(area)
 
     def keep_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
@@ -136,7 +136,7 @@ class NotebookRecord:
         check_met(samples)
         content = io.BytesIO()
         samples.to_parquet(content)
-        keep(self.out / "encounters.parquet", content.getvalue(), self._source())
+        store_cached(self.out / "encounters.parquet", content.getvalue(), self._source())
         return samples
 
     def zone(self) -> SocialZone:
@@ -144,7 +144,7 @@ class NotebookRecord:
         file = self.out / "zone.json"
         if file.exists():
             try:
-                if kept(file, self._source(zone=True)) is not None:
+                if load_cached(file, self._source(zone=True)) is not None:
                     return SocialZone.load(file)
                 print("fitting the zone again: that in zone.json is of other data, or damaged")
             except ZoneError as error:
@@ -160,7 +160,7 @@ class NotebookRecord:
         source = self._source(zone=True)
         zone = replace(zone, provenance={**zone.provenance, "source": source})
         zone.save(self.out / "zone.json")
-        sign(self.out / "zone.json", (self.out / "zone.json").read_bytes(), source)
+        write_checksum(self.out / "zone.json", (self.out / "zone.json").read_bytes(), source)
         return zone
 
     def check(self, what: str, passed: object, value: object = None, *, always: bool = False) -> None:
@@ -215,7 +215,7 @@ class NotebookRecord:
         print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({as_text(value)})"))
 
     def _picture(self, content: bytes, name: str) -> None:
-        write_file(self.out / "figures" / name, content, lasting=False)
+        write_file(self.out / "figures" / name, content, durable=False)
         self.figures.append(name)
 
     def _source(self, *, zone: bool = False) -> dict[str, Any]:
@@ -238,11 +238,11 @@ def data_files(data: str | Sequence[str], *, folder: Path, seed: int) -> list[Pa
         return datasets.find(data)
     file = folder / f"plaza-{seed}.csv"
     made = {"plaza": repr(PlazaSettings()), "seed": seed, "szlib": __version__}
-    if kept(file, made) is None:
+    if load_cached(file, made) is None:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             make_plaza(file, seed=seed)
-            sign(file, file.read_bytes(), made)
+            write_checksum(file, file.read_bytes(), made)
         except OSError as error:
             raise DataError(f"{file}: the plaza cannot be made ({error}); choose another folder") from error
     return [file]

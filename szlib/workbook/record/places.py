@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import DataError, StorageError
-from ...files import own_folder, owner_of, printable
+from ...files import claim_folder, folder_purpose, printable
 from ...tracks import datasets
 
 NOTEBOOKS = Path(__file__).resolve().parents[3] / "notebooks"
@@ -81,9 +81,9 @@ def home(
     if parameters:
         purpose += f" with {json.dumps(parameters, sort_keys=True)}"
     digits = hashlib.sha256(purpose.encode()).hexdigest()[:8]
-    own_folder(results, ROOT)
+    claim_folder(results, ROOT)
     folder = Path(results) / name
-    if not parameters and owner_of(folder) in (None, purpose):
+    if not parameters and folder_purpose(folder) in (None, purpose):
         with suppress(_TakenError):
             return _take(folder, purpose, inputs)
     return _take(Path(results) / f"{name}-{digits}", purpose, inputs)
@@ -120,9 +120,9 @@ class _TakenError(StorageError):
 
 def _take(folder: Path, purpose: str, inputs: Iterable[Path]) -> Path:
     try:
-        return own_folder(folder, purpose, inputs=inputs)
+        return claim_folder(folder, purpose, inputs=inputs)
     except StorageError as error:
-        if owner_of(folder) not in (None, purpose):
+        if folder_purpose(folder) not in (None, purpose):
             raise _TakenError(str(error)) from error
         raise
 

@@ -20,8 +20,8 @@ from tqdm import tqdm
 from ... import __version__, memory
 from ...encounters.areas import AUTO, as_area
 from ...errors import DataError, SzlibError
-from ...files import file_content, held, sweep_temporary
-from ...parallel import bounded, cluster
+from ...files import file_content, folder_lock, remove_abandoned_temporary
+from ...parallel import cluster, limit_jobs
 from ...tracks import datasets
 from ..record import places
 from ..record.notebook import data_files
@@ -75,7 +75,7 @@ def run(
     files = [] if asked == datasets.SYNTHETIC else datasets.find(asked)
     results = places.root(out)
     home = places.home(results, asked, given, inputs=files)
-    with held(home):
+    with folder_lock(home):
         seed = given.get("seed", 0)
         files = files or data_files(asked, folder=home, seed=seed)
         names = [source.stem for source in sources]
@@ -94,8 +94,8 @@ def _outcomes(
     sources: Sequence[Path], given: dict[str, Any], home: Path, jobs: int, scheduler: str | None
 ) -> dict[str, dict[str, Any]]:
     """What came of each notebook, by its name."""
-    jobs = bounded(jobs, len(sources)) or 1
-    limit = None if scheduler else memory.ceiling()
+    jobs = limit_jobs(jobs, len(sources))
+    limit = None if scheduler else memory.limit()
     share = None if limit is None else limit // max(jobs, 1)
     outcomes: dict[str, dict[str, Any]] = {}
     bar = tqdm(total=len(sources), unit="notebook", desc=datasets.label(given["data"]))
@@ -145,7 +145,7 @@ def _pool(client: Any, jobs: int) -> Iterator[Executor]:
         for child in set(active_children()) - others:
             child.terminate()  # kernels end with their parents
         pool.shutdown(wait=True, cancel_futures=True)
-        sweep_temporary()
+        remove_abandoned_temporary()
         if isinstance(error, BrokenProcessPool):
             raise SzlibError(
                 "a process that executed notebooks was killed, perhaps for lack of memory; what was finished "
