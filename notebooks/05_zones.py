@@ -34,7 +34,8 @@ import pandas as pd
 
 import szlib
 from szlib.plaza.truth import PlazaSettings
-from szlib.workbook import claims, figures, laboratory
+from szlib.simulation import paper_claims as claims
+from szlib.workbook import figures, laboratory
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]

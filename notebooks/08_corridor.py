@@ -34,8 +34,8 @@ import pandas as pd
 from IPython.display import Markdown
 
 import szlib
-from szlib.simulation.metrics import manner
-from szlib.simulation.scenarios import Cell
+from szlib.simulation.atlas import Cell
+from szlib.simulation.strategies import manner
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 

@@ -36,8 +36,9 @@ from IPython.display import Markdown
 
 import szlib
 from szlib.control.step import admissible
-from szlib.simulation.metrics import manner, yielding
-from szlib.simulation.scenarios import Cell
+from szlib.simulation.atlas import Cell
+from szlib.simulation.metrics import yielding
+from szlib.simulation.strategies import manner
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 

@@ -35,8 +35,8 @@ from IPython.display import Markdown
 
 import szlib
 from szlib.control.step import admissible
-from szlib.simulation.metrics import manner, retreat
-from szlib.simulation.scenarios import Cell
+from szlib.simulation.atlas import Cell
+from szlib.simulation.strategies import manner, retreat
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 

@@ -41,7 +41,7 @@ import pandas as pd
 
 import szlib
 from szlib.simulation.closed_loop import advance, drive
-from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds, world
+from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds, world
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
@@ -265,7 +265,7 @@ record.key |= {"worlds driven": int(thousands["worlds"].sum())}
 thousands.set_index(["set", "formulation"]).T
 
 # %% [markdown]
-# Failures are worlds with a seed: `szlib.simulation.rollouts.replay(seed, settings=..., worlds=...)` shows
+# Failures are worlds with a seed: `szlib.simulation.monte_carlo.replay(seed, settings=..., worlds=...)` shows
 # each again. The first that did not arrive here:
 
 # %%

@@ -35,10 +35,11 @@ from IPython.display import Markdown
 
 import szlib
 from szlib.plaza.scores import true_kinds
-from szlib.workbook import claims, figures
+from szlib.simulation import paper_claims as claims
+from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
-from szlib.workbook.sensitivity import sensitivity
 from szlib.zones.outliers import is_outlier
+from szlib.zones.sensitivity import sensitivity
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks

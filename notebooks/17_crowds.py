@@ -39,15 +39,15 @@ import pandas as pd
 from IPython.display import display
 
 import szlib
+from szlib.simulation import replay
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import summarise
-from szlib.simulation.crowds import replay
-from szlib.simulation.crowds.promises import KINDS, broken_promises
 from szlib.simulation.crowds.reacting import Reacting
-from szlib.simulation.crowds.scores import score
-from szlib.simulation.metrics.motion import avoidance_start
+from szlib.simulation.metrics import avoidance_start
+from szlib.simulation.replay_metrics import score
+from szlib.simulation.safety_claims import KINDS, broken_promises
 from szlib.simulation.scenario import Scenario
-from szlib.simulation.scenarios.worlds import Worlds
+from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 

@@ -36,9 +36,9 @@ import pandas as pd
 import szlib
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS, summarise
-from szlib.simulation.metrics.social import social
-from szlib.simulation.rollouts import rollouts
+from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.scenarios.meetings import InSight, Variations
+from szlib.simulation.social_metrics import social
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 

@@ -34,9 +34,8 @@ import numpy as np
 import pandas as pd
 from IPython.display import Markdown
 
-from szlib.simulation.metrics import MANNERS, manner
-from szlib.simulation.scenarios import Cell, chart
-from szlib.simulation.scenarios.atlas import REFERENCE, SCENES
+from szlib.simulation.atlas import REFERENCE, SCENES, Cell, chart
+from szlib.simulation.strategies import MANNERS, manner
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
@@ -65,7 +64,7 @@ parameters(
 # %% [markdown]
 # ## What a robot can do
 #
-# Each run gets one name, the first of these that holds (`szlib.simulation.metrics.manner`):
+# Each run gets one name, the first of these that holds (`szlib.simulation.strategies.manner`):
 #
 # | | |
 # |---|---|

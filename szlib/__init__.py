@@ -47,7 +47,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "plaza.truth": ["PlazaSettings"],
         "simulation.closed_loop": ["simulate"],
         "simulation.log": ["SimulationLog"],
-        "simulation.rollouts": ["rollouts"],
+        "simulation.monte_carlo": ["rollouts"],
         "simulation.scenario": ["Scenario"],
         "simulation.scenarios.meetings": ["MEETINGS"],
         "simulation.scenarios.paper": ["SCENARIOS"],

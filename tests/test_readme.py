@@ -11,7 +11,7 @@ import pytest
 import szlib
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
-from szlib.simulation.controllers.protocol import advance
+from szlib.simulation.robots import advance
 from szlib.workbook.command_line import main, options
 
 ROOT = Path(__file__).parent.parent

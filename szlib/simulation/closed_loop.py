@@ -22,8 +22,8 @@ from ..control.people.person import BODY_RADIUS, Person, SpeedZone, as_ellipse, 
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .controllers.protocol import Controller, DoubleIntegrator, Robot, StepLike, advance
 from .log import SimulationLog
+from .robots import Controller, DoubleIntegrator, Robot, StepLike, advance
 from .scenario import GOAL_RADIUS, STOPPED, UNAFFECTED, Crowd, CrowdModel, Scenario
 
 __all__ = ["BODY", "Zones", "advance", "drive", "simulate"]
@@ -52,7 +52,7 @@ def simulate(
     Parameters
     ----------
     scenario : the scene.
-    controller : an `MPCCBF`, or anything else with `reset` and `step`: see `controllers.protocol`.
+    controller : an `MPCCBF`, or anything else with `reset` and `step`: see `robots`.
     crowd : everybody's true motion; see `scenario.Crowd`. Default: the scenario's people walk on.
 
     Raises

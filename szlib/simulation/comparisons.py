@@ -28,13 +28,13 @@ from ..control.people import BODY_RADIUS, as_ellipse
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
+from .baseline_controllers import dynamic_window, social_force, straight
 from .closed_loop import Zones
-from .controllers.baselines import dynamic_window, social_force, straight
-from .controllers.protocol import Factory
 from .log import SimulationLog
-from .rollouts import Scenes, mpc_cbf, rollouts
+from .monte_carlo import Scenes, mpc_cbf, rollouts
+from .robots import Factory
 from .scenario import Behaviour, CrowdModel
-from .scenarios.worlds import Worlds
+from .scenarios.random_worlds import Worlds
 
 HALL_PERSONAL = 1.2
 """Far end of the personal distance [m] (Hall 1966)."""

@@ -24,8 +24,8 @@ from ..control.step import status_of
 from ..errors import DataError
 from ..files import write_file
 from ..zones.ellipses import Ellipse
-from .metrics.endings import least
-from .metrics.motion import metrics
+from .metrics import metrics
+from .outcomes import least
 from .scenario import Scenario
 
 if TYPE_CHECKING:

@@ -242,7 +242,7 @@ def ten_worlds(rival: str, first: int) -> tuple[float, list[dict[str, Any]]]:
         else szlib
     )
     given = {} if rival == "before" else {"compile": rival}
-    module = importlib.import_module(f"{of.__name__}.simulation.rollouts")
+    module = importlib.import_module(f"{of.__name__}.simulation.monte_carlo")
     setup = module.setup_of(settings=of.MPCSettings(time_limit=np.inf, **given))
     begun = time.process_time()
     table = module._chunk(setup, range(first, first + 10), None)

@@ -15,7 +15,7 @@ from szlib.control.differential import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
 from szlib.control.people import BODY_RADIUS
 from szlib.control.problem import TOLERANCE
-from szlib.simulation.scenarios.worlds import Worlds, random_zone, world
+from szlib.simulation.scenarios.random_worlds import Worlds, random_zone, world
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 OPEN = (6.0, 1.0)

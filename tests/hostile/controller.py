@@ -15,7 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 import szlib
-from szlib.simulation.rollouts import replay
+from szlib.simulation.monte_carlo import replay
 
 BODY = 0.25
 TOLERANCE = 1e-6

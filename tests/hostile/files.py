@@ -28,8 +28,8 @@ from szlib import files
 from szlib.errors import DataError, StorageError, ZoneError
 from szlib.plaza.people import make_plaza
 from szlib.plaza.truth import PlazaSettings
-from szlib.simulation.rollouts import rollouts
-from szlib.simulation.scenarios.worlds import Worlds
+from szlib.simulation.monte_carlo import rollouts
+from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.workbook.record import NotebookRecord
 from szlib.workbook.record.method import Method
 

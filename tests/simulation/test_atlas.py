@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import szlib
+from szlib.simulation.atlas import NO_START, REFERENCE, SCENES, Cell, chart
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.metrics.manners import BACKWARDS, MANNERS, manner, retreat
-from szlib.simulation.scenarios.atlas import NO_START, REFERENCE, SCENES, Cell, chart
+from szlib.simulation.strategies import BACKWARDS, MANNERS, manner, retreat
 
 
 def made(x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: object) -> SimulationLog:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import szlib
+from szlib.simulation.baseline_controllers import dynamic_window, social_force, straight
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS
-from szlib.simulation.controllers.baselines import dynamic_window, social_force, straight
-from szlib.simulation.rollouts import rollouts
-from szlib.simulation.scenarios.worlds import Worlds
+from szlib.simulation.monte_carlo import rollouts
+from szlib.simulation.scenarios.random_worlds import Worlds
 
 SETTINGS = szlib.MPCSettings()
 BASELINES = [straight, social_force, dynamic_window]

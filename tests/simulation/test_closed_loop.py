@@ -11,9 +11,9 @@ import szlib
 from szlib.control.people.person import circle_around
 from szlib.simulation.closed_loop import BODY, drive
 from szlib.simulation.comparisons import compare, summarise
-from szlib.simulation.rollouts import identity, replay, rollouts, tally
+from szlib.simulation.monte_carlo import identity, replay, rollouts, tally
 from szlib.simulation.scenario import Behaviour
-from szlib.simulation.scenarios.worlds import Worlds
+from szlib.simulation.scenarios.random_worlds import Worlds
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 WALK = szlib.Scenario("walk", (-4.0, 0.0, 0.0, 0.0), (4.0, 0.0), duration=20.0)

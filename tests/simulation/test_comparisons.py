@@ -16,8 +16,8 @@ from szlib.simulation.comparisons import (
     summarise,
     time_inside,
 )
-from szlib.simulation.rollouts import replay
-from szlib.simulation.scenarios.worlds import world
+from szlib.simulation.monte_carlo import replay
+from szlib.simulation.scenarios.random_worlds import world
 
 FITTED = szlib.Ellipse((0.1, -0.02), (1.0, 0.7), 0.3)
 

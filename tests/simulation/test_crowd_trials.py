@@ -15,10 +15,10 @@ from test_crowds import PACKAGES, model, scene
 import szlib
 from szlib.control.people import Person
 from szlib.simulation.closed_loop import drive
-from szlib.simulation.crowds.promises import broken_promises
 from szlib.simulation.crowds.reacting import Reacting
-from szlib.simulation.crowds.replay import AsRecorded, replays
-from szlib.simulation.crowds.scores import score
+from szlib.simulation.replay import AsRecorded, replays
+from szlib.simulation.replay_metrics import score
+from szlib.simulation.safety_claims import broken_promises
 from szlib.simulation.scenario import Scenario
 
 __all__ = ["PACKAGES", "model"]

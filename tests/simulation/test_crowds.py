@@ -17,7 +17,7 @@ from conftest import make_tracks, make_walk
 import szlib
 from szlib.control.people import BODY_RADIUS, Person
 from szlib.simulation.crowds.reacting import MODELS, Reacting
-from szlib.simulation.crowds.replay import APART, SIGHT, AsRecorded, Replay, replays
+from szlib.simulation.replay import APART, SIGHT, AsRecorded, Replay, replays
 from szlib.simulation.scenario import Crowd, Scenario
 
 PACKAGES = {"orca": "pyrvo", "social force": "pysocialforce", "speed model": "jupedsim"}

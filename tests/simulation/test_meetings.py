@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import szlib
+from szlib.simulation.baseline_controllers import straight
 from szlib.simulation.closed_loop import drive
-from szlib.simulation.controllers.baselines import straight
-from szlib.simulation.rollouts import identity, rollouts
+from szlib.simulation.monte_carlo import identity, rollouts
 from szlib.simulation.scenarios.meetings import MEETINGS, InSight, Variations, in_sight
 
 ZONE = szlib.Ellipse((0.05, 0.0), (1.0, 0.7))

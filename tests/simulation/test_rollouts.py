@@ -8,11 +8,11 @@ import pytest
 
 import szlib
 from szlib.simulation.closed_loop import drive
-from szlib.simulation.rollouts import replay, rollouts, tally
-from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds
+from szlib.simulation.monte_carlo import replay, rollouts, tally
+from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
-MODULE = importlib.import_module("szlib.simulation.rollouts")  # the name of its function, too
+MODULE = importlib.import_module("szlib.simulation.monte_carlo")  # the name of its function, too
 SETTINGS = szlib.MPCSettings()
 TIMES = ["solve_time_median", "solve_time_p95", "solve_time_p99", "solve_time_max"]
 SHORT = Worlds(duration=2.0)

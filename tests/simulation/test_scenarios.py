@@ -10,7 +10,7 @@ import shapely
 import szlib
 from szlib.control.people import BODY_RADIUS
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.metrics.motion import avoidance_start, passing_side
+from szlib.simulation.metrics import avoidance_start, passing_side
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 KEYS = {

@@ -5,7 +5,7 @@ import pytest
 
 import szlib
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.metrics.social import heading_changes, social
+from szlib.simulation.social_metrics import heading_changes, social
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 

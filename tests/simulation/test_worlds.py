@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import szlib
 from szlib.control.distances import euclidean_to_segment
 from szlib.simulation.scenario import Behaviour
-from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds, world
+from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds, world
 
 seeds = st.integers(0, 2**32)
 

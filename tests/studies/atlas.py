@@ -2,7 +2,7 @@
 
     python tests/studies/atlas.py > notebooks/tables/19_atlas.csv
 
-A row for each run, as in `szlib.simulation.scenarios.atlas.chart`, with its zone `REFERENCE`; 1,384 runs,
+A row for each run, as in `szlib.simulation.atlas.chart`, with its zone `REFERENCE`; 1,384 runs,
 four minutes on one core.  Notebook 19 drives a part of it anew and holds it against the table.
 """
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from itertools import product
 
-from szlib.simulation.scenarios.atlas import REFERENCE, Cell, chart
+from szlib.simulation.atlas import REFERENCE, Cell, chart
 
 PACES, SIZES = (0.3, 0.5, 0.8), (0.5, 0.75, 1.0, 1.25)
 CELLS = [

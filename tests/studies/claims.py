@@ -22,10 +22,10 @@ import pandas as pd
 
 import szlib
 from szlib.plaza.scores import true_kinds
+from szlib.simulation import paper_claims as claims
 from szlib.tracks import sites
-from szlib.workbook import claims
-from szlib.workbook.sensitivity import FIT, sensitivity
 from szlib.zones.outliers import is_outlier
+from szlib.zones.sensitivity import FIT, sensitivity
 
 TABLES = Path(__file__).parents[2] / "notebooks" / "tables"
 DATA = Path(os.environ.get("SZLIB_DATA_DIR", "."))

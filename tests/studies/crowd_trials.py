@@ -26,14 +26,14 @@ import pandas as pd
 import szlib
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS, summarise
-from szlib.simulation.controllers.protocol import Controller, Factory
-from szlib.simulation.crowds.promises import KINDS, broken_promises
 from szlib.simulation.crowds.reacting import Reacting
-from szlib.simulation.crowds.replay import AsRecorded, Replays, replays
-from szlib.simulation.crowds.scores import score
 from szlib.simulation.log import SimulationLog
+from szlib.simulation.replay import AsRecorded, Replays, replays
+from szlib.simulation.replay_metrics import score
+from szlib.simulation.robots import Controller, Factory
+from szlib.simulation.safety_claims import KINDS, broken_promises
 from szlib.simulation.scenario import Scenario
-from szlib.simulation.scenarios.worlds import Worlds
+from szlib.simulation.scenarios.random_worlds import Worlds
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
 

@@ -24,9 +24,9 @@ from szlib.control.differential import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
 from szlib.control.people import BODY_RADIUS
 from szlib.control.problem import TOLERANCE
-from szlib.simulation.rollouts import CIRCLE, mpc_cbf
+from szlib.simulation.monte_carlo import CIRCLE, mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS
-from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds
+from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
 

@@ -16,8 +16,8 @@ from scipy.stats import beta
 
 import szlib
 from szlib.control.problem import TOLERANCE
-from szlib.simulation.rollouts import rollouts, tally
-from szlib.simulation.scenarios.worlds import ONE_PERSON, Worlds
+from szlib.simulation.monte_carlo import rollouts, tally
+from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
 TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "11_rollouts.csv"
 APART = 1_000_000

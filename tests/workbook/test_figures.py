@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import szlib
-from szlib.simulation.crowds.promises import KINDS
+from szlib.simulation.safety_claims import KINDS
 from szlib.workbook import figures
 
 matplotlib.use("Agg")

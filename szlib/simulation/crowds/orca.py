@@ -13,7 +13,7 @@ import numpy as np
 
 from ...checks import Array
 from ...control.people import BODY_RADIUS
-from .walkers import CROWDS, FASTER, Walkers, package
+from .walking_model import CROWDS, FASTER, Walkers, package
 
 HORIZON, WALL_HORIZON = 3.0, 1.0
 """How far ahead people keep apart from others and from walls [s] (assumed)."""

@@ -18,7 +18,7 @@ from ..scenario import Crowd, Scenario
 from .orca import Orca
 from .social_force import SocialForce
 from .speed_model import SpeedModel
-from .walkers import Build, Model, Walkers
+from .walking_model import Build, Model, Walkers
 
 MODELS: Mapping[str, Build] = MappingProxyType(
     {"orca": Orca, "social force": SocialForce, "speed model": SpeedModel}

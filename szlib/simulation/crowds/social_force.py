@@ -17,7 +17,7 @@ import numpy as np
 
 from ...checks import Array
 from ...errors import SolverError
-from .walkers import CROWDS, Walkers, package
+from .walking_model import CROWDS, Walkers, package
 
 SHORTEST = 0.2
 """A shorter wall counts as one of this length: walls are points, 0.1 m apart [m]."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...checks import Array
 from ...errors import SolverError
-from .walkers import Walkers, package
+from .walking_model import Walkers, package
 
 INSTALL = "pip install --no-deps jupedsim deprecated wrapt shapely"
 TICK = 0.01

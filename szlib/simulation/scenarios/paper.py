@@ -14,9 +14,9 @@ from ...control.mpc import MPCCBF
 from ...control.people import Person
 from ..closed_loop import simulate
 from ..log import SimulationLog
-from ..metrics.manners import BACKWARDS, YIELDED
-from ..metrics.motion import along_course, avoidance_start, passing_side
+from ..metrics import along_course, avoidance_start, passing_side
 from ..scenario import GOAL_RADIUS, Claim, Scenario
+from ..strategies import BACKWARDS, YIELDED
 
 WELL_BEFORE = 0.5
 """Avoidance that starts at this h starts well before the zone [m] (assumed)."""

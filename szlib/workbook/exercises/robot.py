@@ -10,7 +10,7 @@ import numpy as np
 from ...control.mpc import MPCCBF
 from ...control.settings import MPCSettings
 from ...simulation.closed_loop import simulate
-from ...simulation.metrics.motion import avoidance_start
+from ...simulation.metrics import avoidance_start
 from ...simulation.scenarios.paper import SCENARIOS
 from ...zones.ellipses import Ellipse
 from .task import Case, Rng, Task, formula

@@ -7,9 +7,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
-from ...simulation.crowds.promises import KINDS
-from ...simulation.crowds.replay import Replay
 from ...simulation.log import SimulationLog
+from ...simulation.replay import Replay
+from ...simulation.safety_claims import KINDS
 from .style import BLACK, BLUE, GREEN, ORANGE, RED, axes, metres
 
 _AROUND = 3.0

@@ -177,7 +177,7 @@ def plot_by_number(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes 
 
 
 def plot_tornado(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
-    """How far each parameter moves the zone's area; `table` as from `workbook.sensitivity.sensitivity`."""
+    """How far each parameter moves the zone's area; `table` as from `zones.sensitivity.sensitivity`."""
     ax = axes(ax, size=(8, 4.5))
     usual = float(table["area"].iloc[0])
     varied = table.iloc[1:].dropna(subset=["area"])
@@ -202,7 +202,7 @@ def plot_tornado(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_findings(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
-    """Effects with their intervals, one row a finding; `table` as from `workbook.claims.findings_table`.
+    """Effects with their intervals, one row a finding; `table` as from `paper_claims.findings_table`.
 
     Each is shown as a share of its own largest end, so that metres and shares stand side by side.
     """

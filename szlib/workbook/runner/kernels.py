@@ -25,7 +25,7 @@ _LAUNCHER = "ipykernel_launcher"
 _IMPORTED = [
     "ipykernel.kernelapp", "matplotlib.pyplot", "sklearn.neighbors", "pandas.io.formats.style",
     "szlib.workbook.figures.simulation", "szlib.workbook.figures.zones", "szlib.workbook.record.notebook",
-    "szlib.control.mpc", "szlib.control.solvers.sqp", "szlib.simulation.rollouts", __name__,
+    "szlib.control.mpc", "szlib.control.solvers.sqp", "szlib.simulation.monte_carlo", __name__,
 ]  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from ..encounters.finding import find_encounters
 from ..encounters.geometry import Area
 from ..encounters.nearby import near_square
 from ..errors import DataError, DataWarning, ZoneError
-from ..zones.social_zone import SocialZone
+from .social_zone import SocialZone
 
 SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
     {

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ...checks import Array
-from ...control.barriers import barrier, ellipse_distance
-from ...control.problem import TOLERANCE
+from ..checks import Array
+from ..control.barriers import barrier, ellipse_distance
+from ..control.problem import TOLERANCE
 
 if TYPE_CHECKING:
-    from ..log import SimulationLog
+    from .log import SimulationLog
 
 SAME = 1e-6
 """Who is no farther than this from where their velocity leads has kept it [m], and so their heading [rad]."""

@@ -17,16 +17,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...checks import Array
-from ...control.people import Person
-from ...control.settings import MPCSettings
-from ...encounters.areas import area_for
-from ...encounters.geometry import Area
-from ...errors import DataError
-from ...tracks.clock import TICKS_PER_SECOND, clock_index
-from ...zones.ellipses import Ellipse
-from ..scenario import Crowd, Scenario
-from .reacting import FACES
+from ..checks import Array
+from ..control.people import Person
+from ..control.settings import MPCSettings
+from ..encounters.areas import area_for
+from ..encounters.geometry import Area
+from ..errors import DataError
+from ..tracks.clock import TICKS_PER_SECOND, clock_index
+from ..zones.ellipses import Ellipse
+from .crowds.reacting import FACES
+from .scenario import Crowd, Scenario
 
 PATIENCE = 2.0
 """The robot has so many times as long as the walker took, or as it needs itself at full speed (assumed)."""

@@ -13,16 +13,16 @@ import joblib
 import numpy as np
 import pandas as pd
 
-from ...control.mpc import MPCCBF
-from ...control.settings import MPCSettings
-from ...errors import SolverError
-from ...parallel import run_tasks
-from ...zones.ellipses import Ellipse
-from ..closed_loop import simulate
-from ..log import SimulationLog
-from ..metrics.manners import manner
-from ..scenario import Scenario
-from .paper import SCENARIOS
+from ..control.mpc import MPCCBF
+from ..control.settings import MPCSettings
+from ..errors import SolverError
+from ..parallel import run_tasks
+from ..zones.ellipses import Ellipse
+from .closed_loop import simulate
+from .log import SimulationLog
+from .scenario import Scenario
+from .scenarios.paper import SCENARIOS
+from .strategies import manner
 
 SCENES = {"corridor": 4.6, "waiting": 2.0, "making_room": 2.0}
 """Scenarios with walls, by name, and the width that is theirs [m]."""

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from ...control.problem import TOLERANCE
-from .endings import least
-from .motion import metrics, passing_side
+from ..control.problem import TOLERANCE
+from .metrics import metrics, passing_side
+from .outcomes import least
 
 if TYPE_CHECKING:
-    from ..log import SimulationLog
+    from .log import SimulationLog
 
 Manner = Literal[
     "goes ahead", "waits", "backs out", "passes on the other side", "deadlock", "infeasible", "h < 0"

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Array
-from ...control.problem import TOLERANCE
-from ...control.step import RUNGS
-from ..scenario import GOAL_RADIUS, STOPPED
-from .endings import least, outcome
+from ..checks import Array
+from ..control.problem import TOLERANCE
+from ..control.step import RUNGS
+from .outcomes import least, outcome
+from .scenario import GOAL_RADIUS, STOPPED
 
 if TYPE_CHECKING:
-    from ..log import SimulationLog
+    from .log import SimulationLog
 
 START_UP = 1.0
 """Time from the start that does not count as slow or yielding [s]: v_max / a_max."""

@@ -17,10 +17,10 @@ from scipy.stats import binomtest, chi2
 from ..checks import check_columns
 from ..control.mpc import MPCCBF
 from ..errors import DataError, ZoneError
-from ..simulation.closed_loop import simulate
-from ..simulation.scenarios.paper import SCENARIOS
 from ..zones.ellipses import Ellipse
 from ..zones.social_zone import SocialZone
+from .closed_loop import simulate
+from .scenarios.paper import SCENARIOS
 
 PAPERS_RATE = 16_181 / 92
 """Encounters a day in the paper (sec. 2)."""

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from scipy.ndimage import label
 
-from ...checks import Array
-from ...control.barriers import barrier, ellipse_distance, segment_distance
-from ...control.distances import wall_margin
-from ...control.problem import TOLERANCE
-from ..scenario import STOPPED
+from ..checks import Array
+from ..control.barriers import barrier, ellipse_distance, segment_distance
+from ..control.distances import wall_margin
+from ..control.problem import TOLERANCE
+from .scenario import STOPPED
 
 if TYPE_CHECKING:
-    from ..log import SimulationLog
+    from .log import SimulationLog
 
 Outcome = Literal[
     "arrived", "hit wall", "run into", "squeezed", "drove in", "boxed in", "deadlock", "out of time"

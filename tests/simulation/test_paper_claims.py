@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.workbook import claims
-from szlib.workbook.sensitivity import sensitivity
+from szlib.simulation import paper_claims as claims
+from szlib.zones.sensitivity import sensitivity
 
 
 def finding(low: float, high: float) -> claims.Finding:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...control.barriers import ellipse_distance
-from ...zones.ellipses import Ellipse
+from ..control.barriers import ellipse_distance
+from ..zones.ellipses import Ellipse
 
 if TYPE_CHECKING:
-    from ..log import SimulationLog
+    from .log import SimulationLog
 
 REACHED = 0.5
 """Who is within this distance has reached the goal [m] (assumed): people pass there, robots come to rest."""

@@ -33,11 +33,11 @@ from ..files import claim_folder, load_cached, store_cached, write_file
 from ..parallel import run_tasks
 from ..zones.ellipses import Ellipse
 from .closed_loop import Zones, drive
-from .controllers.protocol import Factory
 from .log import SimulationLog
-from .metrics.endings import Outcome
+from .outcomes import Outcome
+from .robots import Factory
 from .scenario import Behaviour, CrowdModel, Scenario
-from .scenarios.worlds import Worlds
+from .scenarios.random_worlds import Worlds
 
 PURPOSE = "rollouts"
 """What the folder of finished chunks is marked as."""

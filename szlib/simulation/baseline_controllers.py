@@ -22,11 +22,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...checks import Array
-from ...control.barriers import euclidean_segment_formula
-from ...control.people import BODY_RADIUS, Person
-from ...control.settings import MPCSettings
-from ..scenario import Scenario
+from ..checks import Array
+from ..control.barriers import euclidean_segment_formula
+from ..control.people import BODY_RADIUS, Person
+from ..control.settings import MPCSettings
+from .scenario import Scenario
 
 
 class Command(NamedTuple):

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checks import Array
-from ...control.distances import euclidean_to_segment
-from ...control.people import BODY_RADIUS
-from ..scenario import STOPPED
-from .endings import least
+from ..checks import Array
+from ..control.distances import euclidean_to_segment
+from ..control.people import BODY_RADIUS
+from .outcomes import least
+from .scenario import STOPPED
 
 if TYPE_CHECKING:
-    from ..log import SimulationLog
+    from .log import SimulationLog
 
 HALL = {"intimate": (0.0, 0.45), "personal": (0.45, 1.2), "social": (1.2, 3.6)}
 """From where to where each of Hall's distances reaches [m]."""

@@ -17,10 +17,10 @@ from typing import Protocol
 
 import numpy as np
 
-from ...checks import Array
-from ...control.people import Person
-from ...control.settings import MPCSettings
-from ..scenario import Scenario
+from ..checks import Array
+from ..control.people import Person
+from ..control.settings import MPCSettings
+from .scenario import Scenario
 
 
 class StepLike(Protocol):
