@@ -19,22 +19,10 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.control.problem import Buffered
-from szlib.control.solvers import compiled
 
 DAY = "2012-10-24"
 
 os.environ["SZLIB_CACHE"] = "off"  # nor do tests leave anything in the user's cache
-if COMPILED := os.environ.get("SZLIB_COMPILED"):  # a folder: every controller of the tests is a compiled one
-
-    def take(self: compiled.Compiled, functions: Sequence[Buffered]) -> None:
-        self._on = True
-        compiled.compile_now(functions)
-        take_what_is_there(self, functions)
-
-    compiled.cache_folder = lambda name: Path(COMPILED) / name
-    compiled.FLAGS = ("-O0", *compiled.FLAGS[1:])
-    take_what_is_there, compiled.Compiled.take = compiled.Compiled.take, take
 hypothesis.settings.register_profile("szlib", deadline=None)  # tests are never timed
 hypothesis.settings.load_profile("szlib")
 

@@ -39,8 +39,8 @@ HARD_SHARE = 0.4
 """Share of a step's time for the hard problem. Its second try begins within half of that, or not at all, so
 that as much again is left for the relaxed problem."""
 BUILDING = RLock()
-"""Held while anything of CasADi is written down, compiled or given away: its symbols count their users, and
-not safely for threads. Compiled functions may run at the same time, each in memory of its own."""
+"""Held while anything of CasADi is written down, built or given away: its symbols count their users, and
+not safely for threads. Functions may run at the same time, each in memory of its own."""
 
 
 @dataclass(frozen=True)
@@ -156,18 +156,14 @@ class Buffered:
     """
 
     def __init__(self, function: Any, *arguments: Array) -> None:
-        self.function, self._arguments = function, arguments
         self.results = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
-        self.become(function)
-
-    def become(self, function: Any) -> None:
-        """From the next call on ask this function, which gives the same."""
         buffer, call = function.buffer()
-        for i, array in enumerate(self._arguments):
+        for i, array in enumerate(arguments):
             buffer.set_arg(i, array.data)
         for i, array in enumerate(self.results):
             buffer.set_res(i, array.data)
-        self._buffer, self.call = buffer, call
+        self.call = call
+        self._memory = buffer, arguments  # must live as long as `call`
 
 
 class Numbers(NamedTuple):
@@ -246,8 +242,6 @@ class ProblemSolver(Protocol):
     budget: Budget
     late: bool
 
-    functions: Sequence[Buffered]
-    """What may be compiled."""
     remembered: Array
     """What goes from call to call: it saves time, and changes the answers by rounding."""
 

@@ -10,7 +10,6 @@ import numpy as np
 from ..checks import check_array
 from ..errors import SolverError
 
-Compile = Literal["auto", "off"]
 Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
 Solver = Literal["sqp", "ipopt"]
@@ -54,8 +53,6 @@ class MPCSettings:
     time_limit : computing time of the step's thread after which the best plan so far, or full braking, is
         taken; see `Step.timed_out` [s]. `inf` for none. What other processes take does not count, so that
         runs stay the same on a busy machine.
-    compile : "auto", let a C compiler make the step faster, where there is one; "off", do not. The controls
-        are the same; see `szlib.control.solvers.compiled`.
 
     Raises
     ------
@@ -82,7 +79,6 @@ class MPCSettings:
     slack_weight: float = _from("measured", 1e5)
     max_iterations: int = _from("assumed", 100)
     time_limit: float = _from("assumed", 0.05)
-    compile: Compile = _from("assumed", "off")  # noqa: RUF009
 
     def __post_init__(self) -> None:
         for name, length in (("Q", 4), ("R", 2), ("P", 4)):
@@ -110,9 +106,7 @@ class MPCSettings:
         _require(0 <= self.tie <= 0.5, "tie", self.tie, "in [0, 0.5]")
 
     def _check_choices(self) -> None:
-        choices = {
-            "margin": Margin, "pass_side": Side, "terminal": Terminal, "solver": Solver, "compile": Compile
-        }  # fmt: skip
+        choices = {"margin": Margin, "pass_side": Side, "terminal": Terminal, "solver": Solver}
         for name, literal in choices.items():
             given, allowed = getattr(self, name), get_args(literal)
             _require(given in allowed, name, given, " or ".join(map(repr, allowed)))

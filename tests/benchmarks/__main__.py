@@ -10,7 +10,6 @@ import importlib.util
 import itertools
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -33,7 +32,6 @@ import szlib
 from szlib.checks import Array
 from szlib.control import problem
 from szlib.control.solvers import ipopt
-from szlib.control.solvers.sizes import compile_ahead
 from szlib.files import CACHE
 from szlib.plaza.people import make_plaza
 from szlib.tracks import datasets
@@ -112,7 +110,7 @@ def ratios(times: dict[str, Array], rival: str) -> dict[str, float]:
 
 
 def bench_solvers(scenario: szlib.Scenario) -> dict[str, float]:
-    """One control step by SQP, and compiled, against IPOPT, warm: as tuned here, and as it comes."""
+    """One control step by SQP against IPOPT, warm: as tuned here, and as it comes."""
     ipopt._idle.clear()  # of an earlier case, with other options
     baselines = {name: controller_of(scenario, solver=name) for name in ("sqp", "ipopt")}
     tuned = dict(ipopt._OPTIONS)
@@ -121,15 +119,8 @@ def bench_solvers(scenario: szlib.Scenario) -> dict[str, float]:
     ipopt._idle.clear()
     baselines["plain ipopt"] = controller_of(scenario, solver="ipopt")
     ipopt._OPTIONS.update(tuned)
-    if shutil.which("cc"):
-        for _ in compile_ahead(szlib.MPCSettings(), len(scenario.people), len(scenario.walls)):
-            continue
-        baselines["compiled"] = controller_of(scenario, compile="auto")
     times = race(scenario, {name: asking(controller, scenario) for name, controller in baselines.items()})
-    found = ratios(times, "ipopt") | ratios(times, "plain ipopt")
-    if "compiled" in times:
-        found["ipopt / compiled median"] = float(np.median(times["ipopt"]) / np.median(times["compiled"]))
-    return found
+    return ratios(times, "ipopt") | ratios(times, "plain ipopt")
 
 
 def asking(controller: szlib.MPCCBF, scenario: szlib.Scenario) -> Callable[..., szlib.Step]:
@@ -243,7 +234,7 @@ def bench_import() -> dict[str, float]:
 
 
 BARS: dict[str, measuring.Bars] = {
-    "one person": {"ipopt / compiled median": (">=", 38), "ipopt / sqp p95": (">=", 20)},
+    "one person": {"ipopt / sqp p95": (">=", 20)},
     "5 people, 4 walls": {"ipopt / sqp median": (">=", 10), "sqp p99 ms": ("<=", 5)},
 }
 """Of a case: what its numbers are held against."""

@@ -8,7 +8,6 @@ import gc
 import importlib
 import importlib.util
 import os
-import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -24,7 +23,6 @@ from helpers.random_states import ZONE
 
 import szlib
 from szlib.checks import Array
-from szlib.control.solvers.sizes import compile_ahead
 from szlib.simulation.closed_loop import advance
 
 BEFORE_VARIABLE = "SZLIB_BEFORE"
@@ -50,16 +48,6 @@ def controller_of(of: ModuleType, people: int, n_walls: int, **settings: Any) ->
     """A controller of this szlib, or of an earlier one."""
     zone = of.Ellipse(ZONE.center, ZONE.semi_axes, ZONE.angle)
     return of.MPCCBF(zone, walls=walls(n_walls), settings=of.MPCSettings(**settings), max_people=people)
-
-
-def compiled_controller(people: int, n_walls: int) -> list[Any]:
-    """The same, with compiled functions: one, or none where there is no C compiler."""
-    if shutil.which("cc") is None:
-        return []
-    settings = szlib.MPCSettings(compile="auto")
-    for _ in compile_ahead(settings, people, n_walls):
-        continue
-    return [controller_of(szlib, people, n_walls, compile="auto")]
 
 
 def way(people: int, n_walls: int, steps: int = 120, **settings: Any) -> list[tuple[Array, Array]]:
@@ -195,32 +183,27 @@ def earlier(clone: str) -> ModuleType:
 
 
 def bench_before(people: int, n_walls: int) -> dict[str, float]:
-    """This step over the earlier commit's, in turn: median, p95 and p99.9; compiled as well; how far they
-    differ."""
+    """This step over the earlier commit's, in turn: median, p95 and p99.9; how far they differ."""
     before = sys.modules.get("szlib_before") or earlier(os.environ[BEFORE_VARIABLE])
     rivals = [(of, controller_of(of, people, n_walls)) for of in (before, szlib)]
-    rivals += [(szlib, controller) for controller in compiled_controller(people, n_walls)]
     gc.collect()
     took, apart = laps(rivals, way(people, n_walls), 15)
-    then, *others = np.median(took, axis=1)
-    found = {"ms": 1e3 * float(np.median(others[0]))}
-    for i, (name, now) in enumerate(zip(("now", "compiled"), others, strict=False), start=1):
-        found[f"{name} / before median"] = float(np.median(now) / np.median(then))
-        found[f"{name} / before p95"] = float(np.quantile(now, 0.95) / np.quantile(then, 0.95))
-        found[f"{name} / before p99.9"] = float(np.quantile(took[i], 0.999) / np.quantile(took[0], 0.999))
-    return found | {"largest |du|": apart}
+    before_each, now_each = np.median(took, axis=1)
+    return {
+        "ms": 1e3 * float(np.median(now_each)),
+        "now / before median": float(np.median(now_each) / np.median(before_each)),
+        "now / before p95": float(np.quantile(now_each, 0.95) / np.quantile(before_each, 0.95)),
+        "now / before p99.9": float(np.quantile(took[1], 0.999) / np.quantile(took[0], 0.999)),
+        "largest |du|": apart,
+    }
 
 
 def bench_worlds(count: int) -> dict[str, float]:
-    """Random worlds, one core: CPU time of the earlier commit over this one's, and over that of compiled
-    controllers; rows that differ by 1e-5.
+    """Random worlds, one core: CPU time of the earlier commit over this one's; rows that differ by 1e-5.
 
     Each has a process of its own, or it would collect the others' garbage.
     """
-    rivals = ["before", "off", *(["auto"] if shutil.which("cc") else [])]
-    for walls in (0, 1, 2, 3, 4) if "auto" in rivals else ():
-        for _ in compile_ahead(szlib.MPCSettings(), 6, walls):
-            continue
+    rivals = ("before", "now")
     took, rows = np.zeros((len(rivals), count // 10)), dict[tuple[int, int], list[dict[str, Any]]]()
     with ExitStack() as open_pools:
         pools = [open_pools.enter_context(get_context("spawn").Pool(1)) for _ in rivals]
@@ -229,21 +212,19 @@ def bench_worlds(count: int) -> dict[str, float]:
                 took[i, first // 10], rows[i, first] = pool.apply(ten_worlds, (rival, first))
     pairs = (zip(rows[0, first], rows[1, first], strict=True) for first in range(0, count, 10))
     differ = sum(not _same(*pair) for ten in pairs for pair in ten)
-    before, now, *compiled = took.sum(axis=1)
-    found = {"before / now": before / now, "rows that differ": differ}
-    return found | ({"before / compiled": before / compiled[0]} if compiled else {})
+    before, now = took.sum(axis=1)
+    return {"before / now": before / now, "rows that differ": differ}
 
 
 def ten_worlds(rival: str, first: int) -> tuple[float, list[dict[str, Any]]]:
-    """CPU time and rows of ten worlds, by the earlier commit ("before") or this one (`compile`)."""
+    """CPU time and rows of ten worlds, by the earlier commit ("before") or this one ("now")."""
     of = (
         sys.modules.get("szlib_before") or earlier(os.environ[BEFORE_VARIABLE])
         if rival == "before"
         else szlib
     )
-    given = {} if rival == "before" else {"compile": rival}
     module = importlib.import_module(f"{of.__name__}.simulation.monte_carlo")
-    setup = module.setup_of(settings=of.MPCSettings(time_limit=np.inf, **given))
+    setup = module.setup_of(settings=of.MPCSettings(time_limit=np.inf))
     begun = time.process_time()
     table = module._chunk(setup, range(first, first + 10), None)
     return time.process_time() - begun, table.to_dict("records")
@@ -277,9 +258,7 @@ BARS: dict[str, measuring.Bars] = {
     f"{size} against before": {
         "now / before median": ("<=", 0.8),
         "now / before p95": ("<=", 0.75),
-        "compiled / before median": ("<=", bar),
-        "compiled / before p99.9": ("<=", 1.0),
     }
-    for size, bar in (("1 + 0", 0.62), ("5 + 4", 0.47), ("10 + 12", 0.42))
+    for size in ("1 + 0", "5 + 4", "10 + 12")
 }
 """Of a case: what its numbers are held against."""

@@ -60,7 +60,7 @@ def test_the_scenarios_of_the_paper_run_the_same_with_both(name):
 
 
 @pytest.mark.parametrize(
-    ("package", "where"), [("casadi", {"problem", "compiled", "ipopt", "program"}), ("daqp", {"sqp"})]
+    ("package", "where"), [("casadi", {"problem", "ipopt", "program"}), ("daqp", {"sqp"})]
 )
 def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
     found = set()

@@ -1,6 +1,5 @@
 """How the problem is solved, and what is done where it is not.
 
-compiled  the functions of a solver as machine code, where that is asked for
 ipopt     by IPOPT, as in the paper
 program   what the SQP works with: derivatives by the structure of the problem
 sqp       by a condensed SQP

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import weakref
 from collections import deque
-from collections.abc import Sequence
 from math import inf
 from typing import Any
 
@@ -20,7 +19,6 @@ from ..problem import (
     BUILDING,
     HARD_SHARE,
     Budget,
-    Buffered,
     Evaluator,
     Numbers,
     build_problem,
@@ -64,7 +62,6 @@ class Ipopt:
         solvers = _borrow(key)
         weakref.finalize(self, _give_back, key, solvers).atexit = False
         self._hard, self._relaxed, self._n_terminal = solvers
-        self.functions: Sequence[Buffered] = [self.evaluate.function]
         self.remembered = np.zeros(0)
 
     def hard(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:

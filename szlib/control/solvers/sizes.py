@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from ..problem import BUILDING, Budget, ProblemSolver
 from ..settings import MPCSettings
-from .compiled import Compiled, compile_now
 from .ipopt import Ipopt
 from .sqp import Sqp
 
@@ -66,7 +65,6 @@ class Sizes:
         self._solvers: dict[tuple[int, int], ProblemSolver] = {}
         self._begun = {(self.ready, rounded(n_walls))}
         self._builder: Thread | None = None
-        self._compiled = Compiled(settings.compile)
         self._build(self.ready, rounded(n_walls))
 
     def of(self, n_people: int, n_walls: int) -> ProblemSolver:
@@ -77,8 +75,6 @@ class Sizes:
             self.ready, self._grows = people, True
         if size not in self._solvers:
             self._add(people, walls)
-            self._compiled.begin()
-        self._compiled.look()
         if self._builder is None or not self._builder.is_alive():
             if self._grows and 2 * n_people >= self.ready:
                 self.ready *= 2
@@ -99,7 +95,6 @@ class Sizes:
         for size, remembered in state["solvers"].items():
             self._add(*size)
             self._solvers[size].remembered = remembered
-        self._compiled.begin()
 
     def reset(self) -> None:
         """Let every solver forget what it remembers from call to call."""
@@ -110,7 +105,6 @@ class Sizes:
         """Every size up to the largest number of people."""
         for people in up_to(largest):
             self._add(people, walls)
-        self._compiled.begin()
 
     def _add(self, people: int, walls: int) -> None:
         """One size, unless it is there already: who comes second waits for who came first."""
@@ -118,29 +112,11 @@ class Sizes:
             if (people, walls) not in self._solvers:
                 solver = _solver(self.settings, people, walls)
                 solver.budget = self.budget
-                self._compiled.take(solver.functions)
                 self._solvers[people, walls] = solver
 
 
 def _solver(settings: MPCSettings, n_people: int, n_walls: int) -> ProblemSolver:
     return (Sqp if settings.solver == "sqp" else Ipopt)(settings, n_people, n_walls)
-
-
-def compile_ahead(
-    settings: MPCSettings, max_people: int = READY, n_walls: int = 0
-) -> Iterator[tuple[int, int, float]]:
-    """Compile now what controllers with `compile = "auto"` would have compiled in the background.
-
-    Yields each size, people and walls, and how long it took [s]: 0 where it was in the cache.
-
-    Raises
-    ------
-    SolverError : there is no C compiler, or it failed.
-    StorageError : the user's cache is off or cannot be written.
-    """
-    walls = rounded(n_walls)
-    for people in up_to(rounded(max_people)):
-        yield people, walls, compile_now(_solver(settings, people, walls).functions)
 
 
 def slots(

@@ -18,7 +18,6 @@ the answer is a linear feedback of the error, K (x - g), without any program.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import isnan
 from typing import Literal
 
@@ -68,8 +67,6 @@ class Sqp:
         self._derive = Buffered(of.derive, *arguments)
         self._measure = Buffered(of.measure, *arguments, self._step, self._share)
         self._free = None if of.free is None else Buffered(of.free, self._parameters)
-        ours = (self.evaluate.function, self._derive, self._measure, self._free)
-        self.functions: Sequence[Buffered] = [function for function in ours if function is not None]
         self._before, self._lower, self._upper, gradient, jacobian, exact, gauss = self._derive.results
         self._after, self._trial, self._values, states, h = self._measure.results
         self._jacobian = jacobian.reshape(m, n)

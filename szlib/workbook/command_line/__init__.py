@@ -1,4 +1,4 @@
-"""The command line: `szlib run` the workbook, `report` on it, `inspect` a file, `extract`, `compile`.
+"""The command line: `szlib run` the workbook, `report` on it, `inspect` a file, `extract`.
 
 endings   how a command ends before its time, and what it says then
 commands  what each command does

@@ -99,21 +99,6 @@ def report_command(options: argparse.Namespace) -> int:
     return 0
 
 
-def compile_command(options: argparse.Namespace) -> int:
-    """Compile the controller of these settings for each number of people, a line for each."""
-    from ...control.settings import MPCSettings
-    from ...control.solvers.sizes import compile_ahead
-
-    given = dict(_assignment(text) for text in options.parameter)
-    if unknown := sorted(given.keys() - MPCSettings.badges().keys()):
-        known = ", ".join(MPCSettings.badges())
-        raise DataError(f"parameter {unknown[0]}: is none of MPCSettings; expected one of {known}")
-    for people, walls, seconds in compile_ahead(MPCSettings(**given), options.people, options.walls):
-        how = f"compiled in {seconds:.1f} s" if seconds else "was there already"
-        print(f"{people} people, {walls} walls: {how}", flush=True)
-    return 0
-
-
 def _area(options: argparse.Namespace) -> str:
     """The area that was asked for, as it is recorded: "" for the data's own, "auto", numbers or a polygon."""
     if options.auto or not (options.square or options.polygon):

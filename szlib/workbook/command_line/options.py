@@ -42,7 +42,6 @@ def parser() -> argparse.ArgumentParser:
         ("report", _add_report, "make the report of a run anew: one HTML file"),
         ("inspect", _add_inspect, "print what becomes of the rows of a file"),
         ("extract", _add_extract, "find the encounters of many days, resumably"),
-        ("compile", _add_compile, "make a controller's step faster, with the C compiler"),
     ):
         add(each.add_parser(name, help=summary))
     return whole
@@ -96,18 +95,6 @@ def _add_extract(extract: argparse.ArgumentParser) -> None:
     _add_scheduler(extract)
     _add_limits(extract)
     extract.set_defaults(command=commands.extract_command)
-
-
-def _add_compile(compile: argparse.ArgumentParser) -> None:
-    compile.add_argument(
-        "--people", type=_count, default=8, metavar="N", help="how many at most (default: 8)"
-    )
-    compile.add_argument("--walls", type=_count, default=0, metavar="N", help="how many (default: none)")
-    compile.add_argument(
-        "-p", "--parameter", action="append", default=[], metavar="NAME=VALUE",
-        help="one of MPCSettings that is not the default, such as gamma=0.2",
-    )  # fmt: skip
-    compile.set_defaults(command=commands.compile_command, memory=None)
 
 
 def _add_scheduler(command: argparse.ArgumentParser) -> None:
