@@ -122,7 +122,7 @@ inside = square.contains(people["x"], people["y"])
 print(f"{inside.mean():.1%} of all person-time is spent in the area of {square.area:.0f} m2")
 record.check("people walk through the area", inside.any(), int(inside.sum()), always=True)
 record.key["area [m2]"] = round(square.area, 1)
-ax = figures.plot_space(szlib.AttentionalSpace(), square)
+ax = figures.plot_attentional_space(szlib.AttentionalSpace(), square)
 record.figure(ax.figure, "space")
 
 # %% [markdown]

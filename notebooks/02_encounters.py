@@ -148,11 +148,11 @@ record.figure(ax.figure, "paths")
 # more samples.
 
 # %%
-ax = figures.plot_los(samples, r_max=record.method.r_max)
+ax = figures.plot_relative_positions(samples, r_max=record.method.r_max)
 record.figure(ax.figure, "los")
 
 # %%
-ax = figures.plot_los_distance(samples, r_max=record.method.r_max)
+ax = figures.plot_distance_by_direction(samples, r_max=record.method.r_max)
 record.figure(ax.figure, "los-distance")
 
 # %% [markdown]

@@ -119,7 +119,7 @@ fig, both = plt.subplots(1, 2, figsize=(10, 4.5), layout="constrained", sharex=T
 for ax, mask, title in zip(both, (outlier, plain_outlier), ("complementary", "plain"), strict=True):
     ax.plot(*plain[~mask].T, ".", color=figures.GREY, markersize=2)
     ax.plot(*plain[mask].T, "x", color=figures.RED, markersize=7, mew=1.8)
-    figures.metres(ax, f"LOF on {title} coordinates", person=True)
+    figures.label_metres(ax, f"LOF on {title} coordinates", person=True)
 record.figure(fig, "plain")
 
 # %%
@@ -201,7 +201,7 @@ for ax, (rule, mask) in zip(both, rules.items(), strict=True):
         size = 2 if marker == "." else 4
         ax.plot(*points[who & (mask == gone)].T, marker, color=colour, ms=size, mew=0.8, label=label)
     precision, recall = scores.precision_and_recall(mask, intruder)
-    figures.metres(ax, f"{rule}: precision {precision:.0%}, recall {recall:.0%}")
+    figures.label_metres(ax, f"{rule}: precision {precision:.0%}, recall {recall:.0%}")
     ax.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
 fig.legend(*both[1].get_legend_handles_labels(), loc="outside lower center", ncols=4, markerscale=2)
 record.figure(fig, "found")

@@ -102,7 +102,7 @@ right.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
 titles = (f"The slice at {zone_speed:g} m/s", "The zone it leaves free")
 for ax, title, circle in zip((left, right), titles, ("contact, r = 0", "r_max"), strict=True):
     ax.plot(r_max * np.cos(theta), r_max * np.sin(theta), ":", color=figures.BLACK, label=circle)
-    figures.metres(ax, title, person=True)
+    figures.label_metres(ax, title, person=True)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, fontsize=8)
 left.set(xlabel="x' [m]", ylabel="y' [m]")
 record.figure(fig, "slice")
@@ -147,7 +147,7 @@ for v in grid:
         )
     except szlib.ZoneError:
         areas.append(np.nan)
-ax = figures.axes(None)
+ax = figures.get_axes(None)
 ax.plot(grid, areas, color=figures.BLUE)
 ax.set(
     xlabel="speed [m/s]",

@@ -191,7 +191,7 @@ record.claim(claim, ahead.verdict == "supported", value)
 # %%
 theta = np.linspace(-np.pi, np.pi, 361)
 fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
-shown = zip((0.7, 1.1, 1.5), figures.colours((0.7, 1.1, 1.5)), ("-", "--", ":"), strict=True)
+shown = zip((0.7, 1.1, 1.5), figures.pick_colours((0.7, 1.1, 1.5)), ("-", "--", ":"), strict=True)
 for v, colour, line in shown:
     if v in zone.ellipses:
         ax.plot(np.degrees(theta), np.hypot(*zone.boundary(v).T), line, color=colour, label=f"{v:g} m/s")
@@ -207,7 +207,9 @@ record.figure(fig, "reach")
 
 # %%
 low, high = (round(v, 2) for v in zone.speed_range)
-laboratory.slide(lambda speed: figures.plot_zone(zone, speed), speed=(1.1, low + 0.1, high - 0.1, 0.05))
+laboratory.show_sliders(
+    lambda speed: figures.plot_zone(zone, speed), speed=(1.1, low + 0.1, high - 0.1, 0.05)
+)
 
 # %% [markdown]
 # **What it means.** One small file, `zone.json`, now holds what people's distance looks like at

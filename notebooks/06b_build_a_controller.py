@@ -355,7 +355,7 @@ for k in (0, 40, 60, 80, 100):
 ax.plot(*path[:, :2].T, color=figures.BLUE)
 for a, b in scene.walls:
     ax.plot(*np.array([a, b]).T, color=figures.BLACK, linewidth=3)
-figures.metres(ax, "Your controller in the corridor; zones of the person in red")
+figures.label_metres(ax, "Your controller in the corridor; zones of the person in red")
 record.figure(fig, "corridor")
 
 # %% [markdown]

@@ -113,7 +113,7 @@ record.figure(fig, "limit")
 # %%
 turns = float(log.time[np.argmax(np.abs(log.controls[:, 1]) > 0.5 * a_max)])
 step = controller.step(*log.at(turns))
-record.figure(figures.step_panels(step), "admissible")
+record.figure(figures.draw_step(step), "admissible")
 
 # %% [markdown]
 # This is the instant at which it begins to turn. On the right are all accelerations that obey every row of
@@ -204,7 +204,7 @@ for ax, what in zip(panels, sweep.columns[2:], strict=True):
     ax.minorticks_off()
 panels[0].set_title("Too small is slow")
 panels[2].set_title("Too large has no way out")
-figures.legend_below(panels)
+figures.add_shared_legend(panels)
 record.figure(fig, "gamma")
 
 # %%
@@ -228,7 +228,7 @@ def run_with(gamma: float) -> None:
     szlib.simulate(scenario, other).plot()
 
 
-laboratory.slide(run_with, gamma=(gamma, 0.01, max(0.2, gamma), 0.01))
+laboratory.show_sliders(run_with, gamma=(gamma, 0.01, max(0.2, gamma), 0.01))
 
 # %% [markdown]
 # **What it means.** The minimum zone is a last boundary. The robot gives way long before it, as the

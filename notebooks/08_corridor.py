@@ -120,7 +120,7 @@ record.figure(fig, "holds")
 # %%
 slow = int(log.speed[10 : np.abs(log.people[:, 0, 0] - log.states[:, 0]).argmin()].argmin()) + 10
 step = controller.step(*log.at(float(log.time[slow])))
-record.figure(figures.step_panels(step), "admissible")
+record.figure(figures.draw_step(step), "admissible")
 
 # %% [markdown]
 # The instant at which it is slowest before they are abeam. With the paper's settings person and wall leave a

@@ -128,7 +128,7 @@ record.figure(fig, "space-time")
 waits = np.flatnonzero(yielding(log))
 middle = float(log.time[waits[len(waits) // 2] if len(waits) else log.speed[10:].argmin() + 10])
 step = controller.step(*log.at(middle))
-record.figure(figures.step_panels(step), "admissible")
+record.figure(figures.draw_step(step), "admissible")
 
 # %%
 ahead = admissible(step).polygon.bounds[2]
@@ -166,7 +166,7 @@ firsts.style.format(precision=2).hide(axis="index")
 # %%
 fig, ax = plt.subplots(figsize=(8, 4), layout="constrained")
 ax.axhspan(0, 3, color=figures.GREY, alpha=0.25, label="inside the passage")
-for (start, run), colour in zip(runs.items(), figures.colours(list(runs)), strict=True):
+for (start, run), colour in zip(runs.items(), figures.pick_colours(list(runs)), strict=True):
     ax.plot(run.time, run.states[:, 0], color=colour, label=f"robot, person from {start:g} m")
     ax.plot(run.time, run.people[:, 0, 0], "--", color=colour, linewidth=0.8)
 ax.set(xlabel="time [s]", ylabel="x [m]", title="The robot whole, the person dashed")

@@ -143,7 +143,7 @@ record.figure(fig, "below-zero")
 # %%
 turns = float(log.time[np.argmax(log.states[:, 2] < -0.02)])
 step = controller.step(*log.at(turns))
-record.figure(figures.step_panels(step), "admissible")
+record.figure(figures.draw_step(step), "admissible")
 
 # %%
 ahead = admissible(step).polygon.bounds[2]

@@ -167,7 +167,9 @@ left.legend(loc="upper center", fontsize=8)
 around = szlib.SCENARIOS["passing"].people[0]
 right.plot(*zone.placed(around.position, around.heading).curve().T, color=figures.RED, label="zone")
 right.plot([], [], "s", color=figures.GREY, label="after 12 s")
-figures.metres(right, "Paths").legend(loc="upper center", bbox_to_anchor=(0.5, -0.3), ncols=5, fontsize=8)
+figures.label_metres(right, "Paths").legend(
+    loc="upper center", bbox_to_anchor=(0.5, -0.3), ncols=5, fontsize=8
+)
 record.figure(fig, "answers")
 
 # %%

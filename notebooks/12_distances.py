@@ -72,9 +72,9 @@ parameters(
 # %%
 zone = record.ellipse()
 fig, sides = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
-figures.plot_overestimate(zone, r_robot=r, eps=eps, ax=sides[0]).set_title("Around the learned zone")
+figures.plot_distance_error(zone, r_robot=r, eps=eps, ax=sides[0]).set_title("Around the learned zone")
 short = np.array([(-0.5, 0.0), (0.5, 0.0)])
-figures.plot_overestimate(short, r_robot=r, eps=eps, extent=1.3, ax=sides[1]).set_title(
+figures.plot_distance_error(short, r_robot=r, eps=eps, extent=1.3, ax=sides[1]).set_title(
     "Around a wall of 1 m"
 )
 record.figure(fig, "maps")

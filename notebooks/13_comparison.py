@@ -78,14 +78,14 @@ parameters(
 # %%
 zone = record.ellipse()
 of_zone = replace(WORLDS, zone=zone)  # worlds in which everybody has this zone
-ax = figures.axes(None, size=(5.5, 5))
+ax = figures.get_axes(None, size=(5.5, 5))
 shades = (figures.GREY, figures.GREEN, figures.ORANGE, figures.RED, figures.BLUE)
 lines = (":", "--", "-.", (0, (5, 1, 1, 1, 1, 1)), "-")
 for (name, make), shade, line in zip(ZONES.items(), shades, lines, strict=True):
     ax.plot(*make(zone).curve().T, color=shade, linestyle=line, linewidth=2, label=name)
 ax.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
 ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=5, fontsize=8)
-figures.metres(ax, "Five zones of one person", person=True)
+figures.label_metres(ax, "Five zones of one person", person=True)
 record.figure(ax.figure, "zones")
 
 # %% [markdown]
@@ -144,7 +144,7 @@ readable(expected, "zone")
 
 # %%
 title = "Identical worlds, people as expected"
-fig = figures.interval_grid(expected, labels, rows="zone", colour="formulation", title=title)
+fig = figures.draw_interval_grid(expected, labels, rows="zone", colour="formulation", title=title)
 record.figure(fig, "zones-and-formulations")
 
 # %% [markdown]
@@ -204,7 +204,7 @@ more_labels = {
     "jerk": "mean squared jerk [m$^2$/s$^6$]",
 }
 title = "The fitted zone, people not as expected"
-fig = figures.interval_grid(surprised, more_labels, rows="behaviour", colour="formulation", title=title)
+fig = figures.draw_interval_grid(surprised, more_labels, rows="behaviour", colour="formulation", title=title)
 record.figure(fig, "surprises")
 
 # %%

@@ -83,7 +83,7 @@ print(f"{len(files)} files, {seconds['rows'].sum():,} rows, {len(seconds):,} per
 # %%
 both = seconds.dropna(subset=["sensor_speed", "moved"])
 if len(both):
-    ax = figures.plot_speeds(both["sensor_speed"].to_numpy(), both["moved"].to_numpy())
+    ax = figures.plot_speed_histogram(both["sensor_speed"].to_numpy(), both["moved"].to_numpy())
     slow = both.loc[both["moved"] < quality.STANDING, "sensor_speed"].median()
     inflated = "inflates" if slow > 0.3 else "does not inflate"
     ax.set_title(f"The velocity column {inflated} the speed of who stands: {slow:.2f} m/s")
@@ -114,7 +114,7 @@ table
 # %%
 usual = float(np.median(intervals[intervals < 5]))
 record.key["median frame interval [s]"] = round(usual, 4)
-ax = figures.axes(None)
+ax = figures.get_axes(None)
 short = 1e3 * intervals[intervals < 3 * usual]
 bins = np.arange(np.floor(short.min()) - 0.5, short.max() + 1.5)  # of 1 ms, as the files tell time
 ax.hist(short, bins=bins if len(bins) < 200 else 60, color=figures.BLUE)
@@ -124,7 +124,7 @@ ax.set_title("Nine frames in ten come after {} to {} ms".format(*spread))
 record.figure(ax.figure, "intervals")
 
 # %%
-ax = figures.axes(None)
+ax = figures.get_axes(None)
 gaps = found["longest_gap"].dropna().to_numpy()
 lengths = (found["last_seen"] - found["first_seen"]).to_numpy()
 bins = np.geomspace(0.02, 2000, 31).tolist()
@@ -172,7 +172,7 @@ days
 # %%
 mall = pd.read_csv("tables/14_hours.csv")
 figure, panels = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
-lines = zip(hours.groupby("day"), figures.colours(days["day"]), cycle("os^Dv"), strict=False)
+lines = zip(hours.groupby("day"), figures.pick_colours(days["day"]), cycle("os^Dv"), strict=False)
 for (day, rows), colour, marker in lines:
     for ax, column in zip(panels, ("visits", "standing"), strict=True):
         ax.plot(rows["hour"], rows[column], f"{marker}-", color=colour, label=day)
@@ -181,7 +181,7 @@ for ax, title in zip(panels, ("visits", "standing"), strict=True):
     ax.set(xlabel="hour of the day", ylabel="people", xticks=range(9, 22), ylim=(0, None))
 panels[0].set_title("Visits in the hour")
 panels[1].set_title("People who stand, mean")
-figures.legend_below(panels)
+figures.add_shared_legend(panels)
 record.figure(figure, "hours")
 
 # %% [markdown]

@@ -243,7 +243,7 @@ shown = {
     "null_respect": "respect, of the null model",
 }
 for ax, (site, part) in zip(panels, curves.groupby("site"), strict=True):
-    figures.plot_by_number(part, shown, ax=ax).set_title(f"{site}, strangers")
+    figures.plot_zone_sizes(part, shown, ax=ax).set_title(f"{site}, strangers")
 record.figure(fig, "n-curve")
 
 # %%

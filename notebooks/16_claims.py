@@ -109,7 +109,7 @@ if record.synthetic:
     record.claim(f"{lof.claim} (20 neighbours, {fraction:.1%})", lof.low > 0, str(lof))
 
 # %%
-ax = figures.plot_findings(table)
+ax = figures.plot_claims(table)
 ax.set_title(f"{(table['verdict'] == 'supported').sum()} of {len(table)} claims are supported here")
 record.figure(ax.figure, "claims")
 
@@ -212,9 +212,9 @@ moved.round(2)
 # %%
 saved = pd.read_csv("tables/16_sensitivity.csv")
 fig, panels = plt.subplots(1, 3, figsize=(15, 4.6), layout="constrained")
-figures.plot_tornado(moved, ax=panels[0]).set_title("This data, hull")
+figures.plot_sensitivity(moved, ax=panels[0]).set_title("This data, hull")
 for ax, (method, part) in zip(panels[1:], saved.groupby("method"), strict=True):
-    figures.plot_tornado(part, ax=ax).set_title(f"ATC day, {method}")
+    figures.plot_sensitivity(part, ax=ax).set_title(f"ATC day, {method}")
 record.figure(fig, "tornado")
 
 # %% [markdown]

@@ -117,7 +117,7 @@ fig, grid = plt.subplots(1, max(1, len(logs)), figsize=(15, 5), layout="constrai
 for ax, (name, log) in zip(grid.flat, logs.items(), strict=False):
     figures.plot_crowd(log, ax=ax).set(xlim=(-7.8, 7.8), ylim=(-6, 6))
     ax.set_title(f"{name}: {log.metrics()['outcome']} after {log.time[-1]:.1f} s")
-figures.legend_below(grid.flat)
+figures.add_shared_legend(grid.flat)
 record.figure(fig, "crossing")
 
 # %% [markdown]
@@ -191,7 +191,7 @@ labels = {
 }
 seen = reacting[(reacting["sees"] == "robot") & reacting["controller"].isin(shown)]
 title = "People who react, and see the robot"
-fig = figures.interval_grid(seen, labels, rows="crowd", colour="controller", title=title)
+fig = figures.draw_interval_grid(seen, labels, rows="crowd", colour="controller", title=title)
 record.figure(fig, "reacting")
 
 # %% [markdown]
@@ -231,7 +231,7 @@ record.figure(ax.figure, "replay")
 sites = saved[~saved["crowd"].isin(packages) & saved["controller"].isin(shown)]
 labels["path_efficiency"] = "straight way over way gone"
 title = "In the place of recorded walkers, among people who do not see it"
-fig = figures.interval_grid(sites, labels, rows="crowd", colour="controller", columns=2, title=title)
+fig = figures.draw_interval_grid(sites, labels, rows="crowd", colour="controller", columns=2, title=title)
 record.figure(fig, "sites")
 
 # %%
@@ -271,7 +271,7 @@ total.astype(int).to_frame("all trials").T
 
 # %%
 by_crowd = promises[promises["controller"] == "MPC-CBF"].groupby("crowd", sort=False).sum(numeric_only=True)
-ax = figures.plot_promises(by_crowd)
+ax = figures.plot_safety_claims(by_crowd)
 ax.set_title("MPC-CBF, settings of the paper")
 record.figure(ax.figure, "promises")
 

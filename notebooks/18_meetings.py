@@ -86,7 +86,7 @@ for ax, (name, log) in zip(grid.flat, logs.items(), strict=False):
     log.plot(ax=ax).set_title(f"{name}: {log.time[-1]:.0f} s", fontsize=11)
     ax.get_legend().remove()
 grid.flat[-1].axis("off")
-figures.legend_below([grid[0, 1]])
+figures.add_shared_legend([grid[0, 1]])
 record.figure(fig, "meetings")
 
 # %% [markdown]
@@ -190,7 +190,7 @@ labels = {
     "robot_on_person": "ran into somebody, times",
 }
 shown = full[full["controller"].isin([*CONTROLLERS, "MPC-CBF, bolder"])]
-fig = figures.interval_grid(shown, labels, rows="meeting", colour="controller")
+fig = figures.draw_interval_grid(shown, labels, rows="meeting", colour="controller")
 record.figure(fig, "controllers")
 
 # %%

@@ -104,7 +104,7 @@ corridor = atlas[atlas["scene"] == "corridor"]
 fig, grid = plt.subplots(4, 4, figsize=(13, 12), layout="constrained", sharex=True, sharey=True)
 for (size, pace), part in corridor.groupby(["size", "pace"]):
     row, column = sorted(corridor["size"].unique()).index(size), sorted(corridor["pace"].unique()).index(pace)
-    ax = figures.plot_manners(part, names=MANNERS, rows="gamma", columns="width", ax=grid[row, column])
+    ax = figures.plot_strategies(part, names=MANNERS, rows="gamma", columns="width", ax=grid[row, column])
     ax.set_title(f"zone x {size:g}, person at {pace:g} m/s", fontsize=10)
     ax.set(xlabel="width [m]" if row == 3 else "", ylabel="gamma" if column == 0 else "")
 key = ",  ".join(f"{chr(ord('A') + i)}: {name}" for i, name in enumerate(MANNERS))
@@ -119,7 +119,9 @@ fig, grid = plt.subplots(2, 4, figsize=(13, 6.5), layout="constrained", sharex=T
 for row, scene in enumerate(("waiting", "making_room")):
     part = atlas[(atlas["scene"] == scene) & (atlas["pace"] == 0.5)]
     for column, (size, cells) in enumerate(part.groupby("size")):
-        ax = figures.plot_manners(cells, names=MANNERS, rows="gamma", columns="width", ax=grid[row, column])
+        ax = figures.plot_strategies(
+            cells, names=MANNERS, rows="gamma", columns="width", ax=grid[row, column]
+        )
         ax.set_title(f"{scene}, zone x {size:g}", fontsize=10)
         ax.set(xlabel="width [m]" if row else "", ylabel="gamma" if column == 0 else "")
 fig.supxlabel(key, fontsize=11)
@@ -160,7 +162,7 @@ for ax, (name, log) in zip(grid.flat, logs.items(), strict=False):
     ax.set_title(f"{name}: {cell.scene}, {told}", fontsize=10)
 for ax in grid.flat[len(logs) :]:
     ax.axis("off")
-figures.legend_below([grid[0, 0]])
+figures.add_shared_legend([grid[0, 0]])
 record.figure(fig, "examples")
 
 # %%

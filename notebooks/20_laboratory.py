@@ -82,11 +82,11 @@ samples = record.encounters()
 pace = record.method.zone_speed
 hull = szlib.SocialZone.fit(samples, method="hull", speeds=(pace,), resamples=0)
 zones = {"quantile": record.ellipse(), "hull": hull.ellipse(pace)}
-first = laboratory.Choice(gamma, N_h, a_max, size, estimator)
-second = laboratory.Choice(gamma_b, N_h_b, a_max_b, size_b, estimator_b)
+first = laboratory.RobotOptions(gamma, N_h, a_max, size, estimator)
+second = laboratory.RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)
 
 # %%
-scene = laboratory.scene(goal, person, speed, walls, start=[-4.0, 0.0])
+scene = laboratory.make_scene(goal, person, speed, walls, start=[-4.0, 0.0])
 logs = {}
 for name, choice in (("A", first), ("B", second)):
     controller = szlib.MPCCBF(choice.zone(zones), walls=scene.walls, settings=choice.settings())
@@ -99,7 +99,7 @@ for name, choice in (("A", first), ("B", second)):
 # robot, the diamond its goal; the triangle is the person, within their zone.
 
 # %%
-fig = figures.run_grid(logs, every=3.0)
+fig = figures.draw_run_grid(logs, every=3.0)
 record.figure(fig, "strip")
 
 # %%
@@ -119,13 +119,15 @@ record.key |= {"A: time_to_goal": a["time_to_goal"], "B: time_to_goal": b["time_
 # chosen. *share* writes a parameter cell: put it below that of this notebook, and it begins with your scene.
 
 # %%
-laboratory.Laboratory(laboratory.Bench(scene, zones, [first, second])) if laboratory.live() else None
+laboratory.LaboratoryWidget(
+    laboratory.Experiment(scene, zones, [first, second])
+) if laboratory.is_interactive() else None
 
 # %% [markdown]
 # What is shown live is what `szlib.simulate` computes, step by step:
 
 # %%
-trial = laboratory.Bench(scene, zones, [first, second])
+trial = laboratory.Experiment(scene, zones, [first, second])
 same = []
 for k in range(min(60, *(len(log.states) for log in logs.values()))):
     same += [np.array_equal(x, log.states[k]) for x, log in zip(trial.states, logs.values(), strict=True)]

@@ -58,14 +58,14 @@ exercises.check("velocity", velocity)
 
 # %%
 ref, heading, other = np.array([1.0, 1.0]), 2.4, np.array([-1.5, 0.6])
-ax = figures.axes(None, size=(5, 3.6))
+ax = figures.get_axes(None, size=(5, 3.6))
 ax.plot(*ref, marker=(3, 0, np.degrees(heading) - 90), color=figures.BLACK, markersize=14)
 ax.arrow(*ref, 1.5 * np.cos(heading), 1.5 * np.sin(heading), head_width=0.1, color=figures.BLACK)
 ax.plot(*other, "o", color=figures.ORANGE, markersize=10)
 ax.plot(*np.transpose([ref, other]), ":", color=figures.ORANGE)
 ax.annotate("other", (-1.5, 0.3), ha="center")
 ax.annotate("ref, with heading", (1.2, 1.1))
-figures.metres(ax, "Which angle is the line of sight?").set(xlim=(-2.5, 3.2), ylim=(0, 2.6))
+figures.label_metres(ax, "Which angle is the line of sight?").set(xlim=(-2.5, 3.2), ylim=(0, 2.6))
 plt.show()
 
 
@@ -87,7 +87,7 @@ exercises.check("line_of_sight", line_of_sight)
 # that space: booleans, shape (n,).
 
 # %%
-ax = figures.plot_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE)
+ax = figures.plot_attentional_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE)
 plt.show()
 
 

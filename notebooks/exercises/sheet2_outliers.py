@@ -105,13 +105,13 @@ exercises.check("blind_spot", blind_spot)
 # %%
 direction, reach = np.random.default_rng(0).uniform([-np.pi, 0], [np.pi, 1], (600, 2)).T
 cloud = np.sqrt(reach)[:, None] * np.column_stack([np.cos(direction), np.sin(direction)])
-ax = figures.axes(None, size=(5, 4.5))
+ax = figures.get_axes(None, size=(5, 4.5))
 ax.plot(*cloud.T, ".", color=figures.GREY, markersize=3, label="everybody else")
 try:
     ax.plot(*blind_spot(cloud).T, "x", color=figures.RED, markersize=4, label="your intruder")
 except NotImplementedError:
     print("your intruder appears here once blind_spot is written")
-figures.metres(ax, "Far from everybody, and in dense company")
-figures.legend_below([ax])
+figures.label_metres(ax, "Far from everybody, and in dense company")
+figures.add_shared_legend([ax])
 ax.set(xlabel="x' [m]", ylabel="y' [m]")
 plt.show()

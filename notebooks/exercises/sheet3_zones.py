@@ -60,12 +60,12 @@ exercises.check("crossing", crossing)
 # %%
 corner = np.radians([20, 75, 140, 200, 265, 320, 380])
 polygon = np.column_stack([1.3 * np.cos(corner), np.sin(corner)])
-ax = figures.axes(None, size=(5, 4.2))
+ax = figures.get_axes(None, size=(5, 4.2))
 ax.fill(*polygon.T, facecolor=figures.BLUE, alpha=0.3)
 ax.plot([0, 1.5 * np.cos(0.9)], [0, 1.5 * np.sin(0.9)], "--", color=figures.BLACK)
 ax.annotate("theta", (0.95, 1.08))
 ax.plot(0, 0, "o", color=figures.BLACK)
-figures.metres(ax, "Where does the ray leave the slice?").set(xlabel="x' [m]", ylabel="y' [m]")
+figures.label_metres(ax, "Where does the ray leave the slice?").set(xlabel="x' [m]", ylabel="y' [m]")
 plt.show()
 
 

@@ -70,7 +70,7 @@ exercises.check("expected_nearest", expected_nearest)
 # %%
 counts = np.geomspace(10, 1000, 20).astype(int)
 drawn = [np.random.default_rng(0).exponential(0.3, (400, n)) for n in counts]
-ax = figures.axes(None, size=(6, 3.6))
+ax = figures.get_axes(None, size=(6, 3.6))
 ax.plot(counts, [each.min(axis=1).mean() for each in drawn], "o", color=figures.BLUE, label="nearest of n")
 ax.plot(
     counts,

@@ -77,9 +77,11 @@ def paths():
 
 MAPS = {
     "map": lambda f: figures.plot_map(f("tracks"), szlib.ATC_SQUARE),
-    "space": lambda f: figures.plot_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE, (-13, 0, 1.0)),
+    "space": lambda f: figures.plot_attentional_space(
+        szlib.AttentionalSpace(), szlib.ATC_SQUARE, (-13, 0, 1.0)
+    ),
     "paths": lambda f: figures.plot_encounter_paths(paths(), count=3),
-    "los": lambda f: figures.plot_los(f("samples")),
+    "los": lambda f: figures.plot_relative_positions(f("samples")),
     "outliers": lambda f: figures.plot_outliers(np.eye(2).repeat(3, axis=0), np.arange(6) < 1),
     "zone": lambda f: figures.plot_zone(f("zone"), 1.1, truth=ZONE),
     "zones": lambda f: figures.plot_zones(f("zone").ellipses),
@@ -90,8 +92,8 @@ MAPS = {
     "robot paths": lambda f: figures.plot_robot_paths({"a": f("log"), "b": f("log")}),
 }
 GRAPHS = {
-    "speeds": lambda f: figures.plot_speeds(np.ones(9), np.zeros(9)),
-    "los-distance": lambda f: figures.plot_los_distance(f("samples")),
+    "speeds": lambda f: figures.plot_speed_histogram(np.ones(9), np.zeros(9)),
+    "los-distance": lambda f: figures.plot_distance_by_direction(f("samples")),
     "hull": lambda f: figures.plot_hull(f("zone"), (0.9, 1.1)),
 }
 
@@ -105,7 +107,7 @@ def test_maps_are_square_and_in_metres(name, request):
 
 
 def test_what_is_counted_in_cells_is_every_sample_near_enough(samples):
-    for plot in (figures.plot_los, figures.plot_los_distance):
+    for plot in (figures.plot_relative_positions, figures.plot_distance_by_direction):
         (cells,) = [c for c in plot(samples).collections if c.get_array() is not None]
         assert cells.get_array().sum() == (samples["distance"] <= 2).sum()
 
@@ -185,7 +187,7 @@ def test_a_run_shows_speed_and_every_h_to_its_greatest(log):
 
 
 def test_the_admissible_polygon_shows_what_is_chosen_and_who_forbids_the_rest(step):
-    ax = figures.plot_admissible(step)
+    ax = figures.plot_admissible_controls(step)
     assert ax.get_xlabel().endswith("[m/s²]") and ax.get_aspect() == 1
     told = [text.get_text() for text in ax.get_legend().get_texts()]
     assert {"allowed", "chosen"} <= set(told)
@@ -240,7 +242,7 @@ def test_a_figure_in_words():
     left.set(title="A run", xlabel="time [s]", ylabel="h [m]")
     left.legend()
     right.set(xlabel="speed\n[m/s]")
-    assert figures.in_words(fig) == "A run: h [m] over time [s], with robot; speed [m/s]"
+    assert figures.alt_text(fig) == "A run: h [m] over time [s], with robot; speed [m/s]"
 
 
 # --- respect, claims, what moves a zone --------------------------------------------------------------
@@ -256,20 +258,20 @@ def test_the_map_of_g_is_in_metres_and_names_its_contour():
 
 def test_sizes_by_number_have_a_band_each():
     sizes = {"a": [1.2, 1.0], "a_low": [1.0, 0.9], "a_high": [1.5, 1.1]}
-    ax = figures.plot_by_number(pd.DataFrame({"encounters": [10, 100], **sizes}), {"a": "hull"})
+    ax = figures.plot_zone_sizes(pd.DataFrame({"encounters": [10, 100], **sizes}), {"a": "hull"})
     assert ax.get_xscale() == "log" and "[m]" in ax.get_ylabel()
     assert len(ax.collections) == len(ax.lines) == 1
 
 
 def test_a_tornado_puts_what_moves_most_on_top():
     rows = [("default", "", 2.0), ("r_max", "1.5", 1.9), ("speed", "0.9", 0.5), ("speed", "1.3", 4.0)]
-    ax = figures.plot_tornado(pd.DataFrame(rows, columns=["parameter", "value", "area"]))
+    ax = figures.plot_sensitivity(pd.DataFrame(rows, columns=["parameter", "value", "area"]))
     assert [label.get_text() for label in ax.get_yticklabels()] == ["r_max\n1.5", "speed\n0.9; 1.3"]
 
 
 def test_a_map_of_manners_has_a_letter_for_each_cell():
     cells = pd.DataFrame({"gamma": [0.1, 0.1, 0.2, 0.2], "width": [1.0, 2.0] * 2, "manner": list("xyyz")})
-    ax = figures.plot_manners(cells, names=["x", "y", "z"], rows="gamma", columns="width")
+    ax = figures.plot_strategies(cells, names=["x", "y", "z"], rows="gamma", columns="width")
     assert [text.get_text() for text in ax.texts] == ["B", "C", "A", "B"]  # the largest gamma on top
     assert ax.get_xlabel() == "width" and [each.get_text() for each in ax.get_yticklabels()] == ["0.2", "0.1"]
 
@@ -279,7 +281,7 @@ def test_findings_are_told_apart_by_more_than_colour():
         {"claim": list("abc"), "effect": [1.0, -1.0, 0.1], "low": [0.5, -2, -1], "high": [2.0, -0.5, 1],
          "verdict": ["supported", "contradicted", "not decidable with n = 3"]}
     )  # fmt: skip
-    ax = figures.plot_findings(table)
+    ax = figures.plot_claims(table)
     assert len({line.get_marker() for line in ax.lines if line.get_marker() != "None"}) == 3
     assert [label.get_text() for label in ax.get_yticklabels()] == list("abc")
 
@@ -288,7 +290,7 @@ def test_a_grid_has_a_panel_for_each_metric_and_one_legend():
     rows = [(w, c, m, 0.5, 0.4, 0.6) for w in ("a", "b") for c in ("x", "y") for m in ("s", "t", "u", "v")]
     table = pd.DataFrame(rows, columns=["crowd", "who", "metric", "mean", "low", "high"])
     labels = {"s": "share", "t": "time [s]", "u": "u", "v": "v"}
-    grid = figures.interval_grid(table, labels, rows="crowd", colour="who", title="A and b")
+    grid = figures.draw_interval_grid(table, labels, rows="crowd", colour="who", title="A and b")
     assert [ax.get_xlabel() for ax in grid.axes if ax.axison] == list(labels.values())
     assert [text.get_text() for text in grid.legends[0].get_texts()] == ["x", "y"]
 
@@ -304,5 +306,5 @@ def test_a_crowd_is_drawn_where_it_is_nearest(log):
 def test_promises_are_shares_of_the_steps_that_promised():
     table = pd.DataFrame(0, index=["orca", "ETH"], columns=[*KINDS, "promised_steps"])
     table["promised_steps"], table["turned"], table["came"] = [1000, 500], [3, 0], [0, 1]
-    widths = [bar.get_width() for bars in figures.plot_promises(table).containers for bar in bars]
+    widths = [bar.get_width() for bars in figures.plot_safety_claims(table).containers for bar in bars]
     assert sorted(widths)[-2:] == [2, 3]

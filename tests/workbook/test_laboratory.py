@@ -15,9 +15,9 @@ WALLS = [-6.0, 2.3, 7.0, 2.3, -6.0, -2.3, 7.0, -2.3]
 
 
 def make_bench(*choices):
-    scene = laboratory.scene([4.0, 0.0], [4.0, 0.0, 180.0], 0.5, WALLS, start=[-4.0, 0.0])
-    return laboratory.Bench(
-        scene, ZONES, choices or (laboratory.Choice(), laboratory.Choice(gamma=0.2, N_h=9))
+    scene = laboratory.make_scene([4.0, 0.0], [4.0, 0.0, 180.0], 0.5, WALLS, start=[-4.0, 0.0])
+    return laboratory.Experiment(
+        scene, ZONES, choices or (laboratory.RobotOptions(), laboratory.RobotOptions(gamma=0.2, N_h=9))
     )
 
 
@@ -51,7 +51,7 @@ def test_what_is_set_reaches_the_robot_it_is_set_for():
         bench.choose(0, estimator="circle")
     with pytest.raises(SolverError, match="gamma"):
         bench.choose(0, gamma=2.0)
-    assert bench.choices[0] == laboratory.Choice()
+    assert bench.choices[0] == laboratory.RobotOptions()
 
 
 def test_what_is_moved_is_where_it_was_put():
@@ -72,7 +72,7 @@ def test_what_is_moved_is_where_it_was_put():
 
 
 def test_a_wall_without_length_is_refused_in_words_and_nothing_moves():
-    widget = laboratory.Laboratory(make_bench())
+    widget = laboratory.LaboratoryWidget(make_bench())
     said = widget.answer({"kind": "step", "changed": {"goal": [1, 1], "walls": [[0, 0, 0, 0]]}})
     assert said["kind"] == "refused"
     assert "two different end points" in said["text"]
@@ -81,7 +81,7 @@ def test_a_wall_without_length_is_refused_in_words_and_nothing_moves():
 
 
 def test_the_page_is_told_every_instant():
-    widget = laboratory.Laboratory(make_bench())
+    widget = laboratory.LaboratoryWidget(make_bench())
     for k in range(3):
         said = widget.answer(
             {"kind": "step", "changed": {"choices": {"0": {"gamma": 0.1}}} if k == 1 else {}}
@@ -96,7 +96,7 @@ def test_the_page_is_told_every_instant():
 
 
 def test_messages_may_come_in_any_thread():
-    widget, said = laboratory.Laboratory(make_bench()), []
+    widget, said = laboratory.LaboratoryWidget(make_bench()), []
     widget.send = said.append
     asked = {"kind": "step", "changed": {}}
     widget._handle_custom_msg(asked, [])
@@ -110,22 +110,24 @@ def test_what_is_shared_begins_with_the_same_scene():
     bench = make_bench()
     bench.move(goal=[3.0, 1.0], people={0: [2.0, 0.5]}, walls=[[-6, 2, 7, 2.5]], speed=0.7)
     bench.choose(1, size=1.5)
-    said = laboratory.Laboratory(bench).answer({"kind": "share", "changed": {}})["text"]
+    said = laboratory.LaboratoryWidget(bench).answer({"kind": "share", "changed": {}})["text"]
     found = {}
     exec(said, found)
-    scene = laboratory.scene(*(found[name] for name in ("goal", "person", "speed", "walls")), start=[-4, 0])
+    scene = laboratory.make_scene(
+        *(found[name] for name in ("goal", "person", "speed", "walls")), start=[-4, 0]
+    )
     assert np.array_equal(scene.walls, bench.scenario.walls) and np.array_equal(scene.goal, [3, 1])
     assert scene.people[0].position == (2.0, 0.5)
     assert scene.people[0].velocity == pytest.approx(bench.people[0].velocity)
     for choice, suffix in zip(bench.choices, ("", "_b"), strict=True):
-        assert laboratory.Choice(**{name: found[name + suffix] for name in asdict(choice)}) == choice
+        assert laboratory.RobotOptions(**{name: found[name + suffix] for name in asdict(choice)}) == choice
 
 
 def test_without_a_page_nothing_is_shown(monkeypatch):
     monkeypatch.delenv("JPY_SESSION_NAME", raising=False)
-    assert not laboratory.live()
-    laboratory.slide(lambda speed: pytest.fail("drawn"), speed=(1.0, 0.5, 1.5, 0.1))
+    assert not laboratory.is_interactive()
+    laboratory.show_sliders(lambda speed: pytest.fail("drawn"), speed=(1.0, 0.5, 1.5, 0.1))
     monkeypatch.setenv("JPY_SESSION_NAME", "20_laboratory.ipynb")
-    assert laboratory.live()
+    assert laboratory.is_interactive()
     monkeypatch.setenv("SZLIB_RUN", "results")
-    assert not laboratory.live()
+    assert not laboratory.is_interactive()

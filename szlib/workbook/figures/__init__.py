@@ -5,28 +5,46 @@ tracks       where people were, how fast, and what became of the rows
 encounters   the attentional space and the other person
 zones        outliers, the hull, zones by speed
 control      distances and barriers, and what they leave to a step
-players      runs with controls, in a browser
+movies       runs with controls, in a browser
 simulation   runs of the robot, and their animations
 comparisons  many runs: sweeps, manners, intervals side by side
 crowds       robots among other people's crowds
 """
 
-from .comparisons import interval_grid, legend_below, plot_intervals, plot_manners, plot_sweep
-from .control import plot_admissible, plot_distance, plot_overestimate, plot_step, step_panels
-from .crowds import plot_crowd, plot_promises
-from .encounters import plot_encounter_paths, plot_los, plot_los_distance, plot_space
-from .players import Movie
-from .simulation import animate, plot_barriers, plot_robot_paths, plot_scenario, plot_speed, run_grid
-from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, SEQUENCE, axes, colours, in_words, metres, outline
-from .tracks import plot_funnel, plot_map, plot_speeds
+from .comparisons import add_shared_legend, draw_interval_grid, plot_intervals, plot_strategies, plot_sweep
+from .control import draw_step, plot_admissible_controls, plot_distance, plot_distance_error, plot_step
+from .crowds import plot_crowd, plot_safety_claims
+from .encounters import (
+    plot_attentional_space,
+    plot_distance_by_direction,
+    plot_encounter_paths,
+    plot_relative_positions,
+)
+from .movies import Movie
+from .simulation import animate, draw_run_grid, plot_barriers, plot_robot_paths, plot_scenario, plot_speed
+from .style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    SEQUENCE,
+    alt_text,
+    area_patch,
+    get_axes,
+    label_metres,
+    pick_colours,
+)
+from .tracks import plot_funnel, plot_map, plot_speed_histogram
 from .zones import (
-    plot_by_number,
-    plot_findings,
+    plot_claims,
     plot_hull,
     plot_outliers,
     plot_pair_correlation,
-    plot_tornado,
+    plot_sensitivity,
     plot_zone,
+    plot_zone_sizes,
     plot_zones,
 )
 
@@ -39,42 +57,42 @@ __all__ = [
     "RED",
     "SEQUENCE",
     "Movie",
+    "add_shared_legend",
+    "alt_text",
     "animate",
-    "axes",
-    "colours",
-    "in_words",
-    "interval_grid",
-    "legend_below",
-    "metres",
-    "outline",
-    "plot_admissible",
+    "area_patch",
+    "draw_interval_grid",
+    "draw_run_grid",
+    "draw_step",
+    "get_axes",
+    "label_metres",
+    "pick_colours",
+    "plot_admissible_controls",
+    "plot_attentional_space",
     "plot_barriers",
-    "plot_by_number",
+    "plot_claims",
     "plot_crowd",
     "plot_distance",
+    "plot_distance_by_direction",
+    "plot_distance_error",
     "plot_encounter_paths",
-    "plot_findings",
     "plot_funnel",
     "plot_hull",
     "plot_intervals",
-    "plot_los",
-    "plot_los_distance",
-    "plot_manners",
     "plot_map",
     "plot_outliers",
-    "plot_overestimate",
     "plot_pair_correlation",
-    "plot_promises",
+    "plot_relative_positions",
     "plot_robot_paths",
+    "plot_safety_claims",
     "plot_scenario",
-    "plot_space",
+    "plot_sensitivity",
     "plot_speed",
-    "plot_speeds",
+    "plot_speed_histogram",
     "plot_step",
+    "plot_strategies",
     "plot_sweep",
-    "plot_tornado",
     "plot_zone",
+    "plot_zone_sizes",
     "plot_zones",
-    "run_grid",
-    "step_panels",
 ]

@@ -10,12 +10,12 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, axes
+from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, get_axes
 
 
 def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> Axes:
     """A table as a heat map with its numbers: index down, columns across, pale at 0 and dark at `worst`."""
-    ax = axes(ax, size=(5, 3.5))
+    ax = get_axes(ax, size=(5, 3.5))
     values = table.to_numpy(float)
     ax.imshow(np.clip(values / worst, 0, 1), cmap="Oranges", vmin=0, vmax=1.3, aspect="auto")
     for (row, column), value in np.ndenumerate(values):
@@ -26,14 +26,14 @@ def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> 
     return ax
 
 
-def plot_manners(
+def plot_strategies(
     table: pd.DataFrame, *, names: Sequence[str], rows: str, columns: str, ax: Axes | None = None
 ) -> Axes:
     """A map of what a robot did, as from `scenarios.atlas.chart`: one value of "manner" a cell, as a letter.
 
     `names` are all that may occur, from pale to dark; the letter is the place in them: A, B, C, ...
     """
-    ax = axes(ax, size=(4, 3.2))
+    ax = get_axes(ax, size=(4, 3.2))
     found = table.pivot(index=rows, columns=columns, values="manner").sort_index(ascending=False)
     places = found.map(list(names).index).to_numpy()
     ax.imshow(places, cmap="YlOrBr", vmin=0, vmax=1.3 * len(names), aspect="auto")
@@ -49,7 +49,7 @@ def plot_intervals(
     table: pd.DataFrame, metric: str, *, rows: str, colour: str, label: str, ax: Axes | None = None
 ) -> Axes:
     """Means with intervals of one metric, as from `comparisons.summarise`: `rows` down, `colour` aside."""
-    ax = axes(ax, size=(5.5, 3.5))
+    ax = get_axes(ax, size=(5.5, 3.5))
     shown = table[table["metric"] == metric]
     names, groups = list(dict.fromkeys(shown[rows])), list(dict.fromkeys(shown[colour]))
     styles = zip(groups, (BLUE, ORANGE, GREEN, RED, BLACK), ("o", "s", "^", "D", "v"), strict=False)
@@ -64,7 +64,7 @@ def plot_intervals(
     return ax
 
 
-def interval_grid(
+def draw_interval_grid(
     table: pd.DataFrame,
     labels: Mapping[str, str],
     *,
@@ -82,12 +82,12 @@ def interval_grid(
         plot_intervals(table, metric, rows=rows, colour=colour, label=label, ax=ax)
     for ax in grid.flat[len(labels) :]:
         ax.axis("off")
-    legend_below(list(grid.flat))
+    add_shared_legend(list(grid.flat))
     figure.suptitle(title)
     return figure
 
 
-def legend_below(panels: Sequence[Axes]) -> None:
+def add_shared_legend(panels: Sequence[Axes]) -> None:
     """One legend below several panels that show the same things: that of the first."""
     handles, names = panels[0].get_legend_handles_labels()
     panels[0].figure.legend(handles, names, loc="outside lower center", ncols=len(names))

@@ -24,7 +24,7 @@ from ...control.distances import (
 )
 from ...control.step import Limit, Step, admissible
 from ...zones.ellipses import Ellipse
-from .style import BLACK, BLUE, GREEN, GREY, RED, axes, metres
+from .style import BLACK, BLUE, GREEN, GREY, RED, get_axes, label_metres
 
 _DASHES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 """Of walls 0, 1, 2, 3, and so on again."""
@@ -39,7 +39,7 @@ def plot_distance(
 
     `margin` [m] draws where h = 0 for a robot of that radius (margin included).
     """
-    ax = axes(ax, size=(5.5, 4.5))
+    ax = get_axes(ax, size=(5.5, 4.5))
     x, y = np.meshgrid(np.linspace(-extent, extent, 241), np.linspace(-extent, extent, 241))
     grid = np.stack([x, y], axis=-1)
     if isinstance(of, Ellipse):
@@ -57,17 +57,17 @@ def plot_distance(
     ax.plot(*outline.T, color=BLACK, linewidth=2, label=f"{name}, d = 0")
     ax.plot([], [], color=RED, linewidth=2, label=f"h = 0, d = {margin:g} m")
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, fontsize=8)
-    return metres(ax, f"Distance to {name} [m], and h = 0")
+    return label_metres(ax, f"Distance to {name} [m], and h = 0")
 
 
-def plot_overestimate(
+def plot_distance_error(
     of: Ellipse | ArrayLike, *, r_robot: float, eps: float, extent: float = 2.0, ax: Axes | None = None
 ) -> Axes:
     """Approximate less Euclidean distance [cm] near a zone or a wall, and h = 0 with two margins.
 
     Dotted: where the robot's disc touches, in Euclidean distance.  An h = 0 inside of it is a collision.
     """
-    ax = axes(ax, size=(5.5, 4.5))
+    ax = get_axes(ax, size=(5.5, 4.5))
     ticks = np.linspace(-extent, extent, 321)
     x, y = np.meshgrid(ticks, ticks)
     grid = np.stack([x, y], axis=-1)
@@ -91,16 +91,16 @@ def plot_overestimate(
     ax.plot([], [], ":", color=BLACK, label="the robot's disc touches")
     ax.set(xlim=(-extent, extent), ylim=(-extent, extent))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), fontsize=8, ncols=2)
-    return metres(ax, "Where the distance is wrong")
+    return label_metres(ax, "Where the distance is wrong")
 
 
-def plot_admissible(step: Step, *, ax: Axes | None = None) -> Axes:
+def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
     """All accelerations that obey every row of a step, the rest of its plan kept, with the one it chose.
 
     What is coloured is allowed; each line is the edge of what one person or wall allows, hatched where it
     forbids: that of the row which takes most.
     """
-    ax, a_max = axes(ax, size=(5, 4.6)), step.scene.settings.a_max
+    ax, a_max = get_axes(ax, size=(5, 4.6)), step.scene.settings.a_max
     found, reach = admissible(step), 1.25 * step.scene.settings.a_max
     if not found.polygon.is_empty:
         ax.add_patch(patch_from_polygon(found.polygon, facecolor=GREEN, alpha=0.45, label="allowed"))
@@ -140,17 +140,17 @@ def _tightest(limits: tuple[Limit, ...], reach: float) -> list[Limit]:
     return [limit for _, limit in tightest.values()]
 
 
-def step_panels(step: Step) -> Figure:
+def draw_step(step: Step) -> Figure:
     """What a step was asked, beside the accelerations among which it could choose."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
     plot_step(step, ax=left)
-    plot_admissible(step, ax=right)
+    plot_admissible_controls(step, ax=right)
     return figure
 
 
 def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
     """What a step was asked, and its plan: the robot, zones, walls near by, velocities."""
-    ax, scene = axes(ax, size=(5, 4.6)), step.scene
+    ax, scene = get_axes(ax, size=(5, 4.6)), step.scene
     x, y, vx, vy = scene.state
     ax.add_patch(Circle((x, y), scene.settings.r_robot, color=BLUE, alpha=0.45, lw=0, label="robot"))
     zones = []
@@ -178,4 +178,4 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
     ax.legend(
         first.values(), first.keys(), loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8
     )
-    return metres(ax, f"least h = {step.h.min(initial=np.inf):.2f} m, speed {np.hypot(vx, vy):.2f} m/s")
+    return label_metres(ax, f"least h = {step.h.min(initial=np.inf):.2f} m, speed {np.hypot(vx, vy):.2f} m/s")

@@ -10,7 +10,7 @@ from matplotlib.patches import Circle
 from ...simulation.log import SimulationLog
 from ...simulation.replay import Replay
 from ...simulation.safety_claims import KINDS
-from .style import BLACK, BLUE, GREEN, ORANGE, RED, axes, metres
+from .style import BLACK, BLUE, GREEN, ORANGE, RED, get_axes, label_metres
 
 _AROUND = 3.0
 """Floor that is shown around the robot's path [m]."""
@@ -28,7 +28,7 @@ def plot_crowd(log: SimulationLog, *, replay: Replay | None = None, ax: Axes | N
 
     With the `replay` that it drove in, the path of the person whom it replaced as well.
     """
-    ax = axes(ax, size=(6, 5))
+    ax = get_axes(ax, size=(6, 5))
     second = max(1, round(1 / log.settings.dt))
     distance = np.hypot(log.relative[..., 0], log.relative[..., 1])
     row = int(np.nanargmin(np.where(log.there, distance, np.inf).min(axis=1, initial=np.inf)))
@@ -51,15 +51,15 @@ def plot_crowd(log: SimulationLog, *, replay: Replay | None = None, ax: Axes | N
     path = np.vstack([log.states[:, :2], log.scenario.goal])
     low, high = path.min(axis=0) - _AROUND, path.max(axis=0) + _AROUND
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    return metres(ax, log.scenario.title)
+    return label_metres(ax, log.scenario.title)
 
 
-def plot_promises(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     """Steps that said they were safe and led to h < 0, of a thousand that said so, by what people did.
 
     `table` has a row for each crowd: its name as the index, promised_steps, and a column for each of `KINDS`.
     """
-    ax = axes(ax, size=(8, 3.5))
+    ax = get_axes(ax, size=(8, 3.5))
     left = np.zeros(len(table))
     for did in KINDS:
         share = 1000 * table[did].to_numpy(float) / table["promised_steps"].to_numpy(float)

@@ -12,22 +12,22 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle, Polygon
 
 from ...encounters.geometry import Area, AttentionalSpace
-from .style import BLACK, BLUE, GREY, ORANGE, RED, SEQUENCE, axes, metres, outline
+from .style import BLACK, BLUE, GREY, ORANGE, RED, SEQUENCE, area_patch, get_axes, label_metres
 
 _BINS = 40
 """Cells across r_max, or twice r_max: 5 or 10 cm in the paper's 2 m."""
 
 
-def plot_space(
+def plot_attentional_space(
     space: AttentionalSpace, area: Area, at: Sequence[float] = (), *, ax: Axes | None = None
 ) -> Axes:
     """The attentional space of a person at (x, y, heading), by default towards the middle of the area."""
-    ax = axes(ax, size=(4.5, 5.5))
+    ax = get_axes(ax, size=(4.5, 5.5))
     (x0, x1), (y0, y1) = area.box.x, area.box.y
     x, y, heading = at or (0.75 * x0 + 0.25 * x1, 0.75 * y0 + 0.25 * y1, np.pi / 4)
     cos, sin = np.cos(heading), np.sin(heading)
     corners = space.corners @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
-    ax.add_patch(outline(area, edgecolor=BLACK, label="the area"))
+    ax.add_patch(area_patch(area, edgecolor=BLACK, label="the area"))
     ax.add_patch(
         Polygon(
             corners,
@@ -40,7 +40,7 @@ def plot_space(
     ax.plot(x, y, "o", color=RED, label="reference pedestrian")
     ax.set(xlim=(x0 - 1, x1 + 1), ylim=(y0 - 1, y1 + 1))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), fontsize=8)
-    return metres(ax, "The space stays inside the area")
+    return label_metres(ax, "The space stays inside the area")
 
 
 def plot_encounter_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | None = None) -> Axes:
@@ -49,7 +49,7 @@ def plot_encounter_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | No
     `paths` as from `szlib.encounters.samples.reference_frame`; `count` encounters, evenly spread, are drawn,
     from a dot at the opening to an arrow's head, in the direction of the last half second, at the end.
     """
-    ax = axes(ax, size=(7, 5.5))
+    ax = get_axes(ax, size=(7, 5.5))
     every = [g for _, g in paths.groupby("encounter", sort=True)]
     shown = [every[i] for i in np.unique(np.linspace(0, len(every) - 1, count).round().astype(int))]
     for who, colour, name in (("other", BLUE, "other person"), ("ref", ORANGE, "reference pedestrian")):
@@ -63,15 +63,15 @@ def plot_encounter_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | No
     ax.autoscale_view()
     ax.plot([], [], marker=(3, 0, -90), color=GREY, linestyle="", label="where they go")
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, fontsize=8)
-    return metres(ax, f"{len(shown)} encounters, in the frame of their opening", person=True)
+    return label_metres(ax, f"{len(shown)} encounters, in the frame of their opening", person=True)
 
 
-def plot_los(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:
+def plot_relative_positions(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:
     """How often the other person was where, around the reference pedestrian (paper, fig. 3a).
 
     The dotted circle: nearer than that came one encounter in twenty.
     """
-    ax = axes(ax, size=(6.2, 4.8))
+    ax = get_axes(ax, size=(6.2, 4.8))
     close = samples[samples["distance"] <= r_max]
     x, y = (close["distance"] * part(close["los_angle"]) for part in (np.cos, np.sin))
     edges = np.linspace(-r_max, r_max, _BINS + 1)
@@ -79,15 +79,15 @@ def plot_los(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = Non
     radius = float(close.groupby("encounter")["distance"].min().quantile(0.05))
     ax.add_patch(Circle((0, 0), radius, fill=False, linestyle=":", linewidth=2, color=RED))
     ax.plot(0, 0, marker=(3, 0, -90), color=RED, markersize=12)
-    return metres(ax, f"One encounter in twenty comes nearer than {radius:.2f} m", person=True)
+    return label_metres(ax, f"One encounter in twenty comes nearer than {radius:.2f} m", person=True)
 
 
-def plot_los_distance(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:
+def plot_distance_by_direction(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:
     """How often the other person was how far away, by line-of-sight angle (paper, fig. 3b).
 
     The line: the nearest in each 15 deg, of at least five encounters, but for one in twenty.
     """
-    ax = axes(ax, size=(7, 4))
+    ax = get_axes(ax, size=(7, 4))
     close = samples[samples["distance"] <= r_max]
     angle = np.degrees(close["los_angle"])
     _density(ax, angle, close["distance"], (np.linspace(-180, 180, 73), np.linspace(0, r_max, _BINS + 1)))

@@ -23,8 +23,8 @@ from ...checks import Array
 from ...simulation.log import SimulationLog
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
-from .players import Movie
-from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, axes, metres
+from .movies import Movie
+from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, get_axes, label_metres
 
 _ROBOT = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
 _PADDING = 0.2
@@ -44,7 +44,7 @@ def plot_scenario(log: SimulationLog, *, every: float = 2.0, ax: Axes | None = N
     The times [s] are written on the robot's path and on everybody's, so that they can be matched; where
     somebody stays within `_STAYS`, from when to when.
     """
-    ax = axes(ax, size=(9, 4.5))
+    ax = get_axes(ax, size=(9, 4.5))
     step = max(1, round(every / log.settings.dt))
     shown = np.arange(0, len(log.states), step)
     _stage(ax, log.scenario)
@@ -60,12 +60,12 @@ def plot_scenario(log: SimulationLog, *, every: float = 2.0, ax: Axes | None = N
     ax.plot([], [], marker=(3, 0, 0), color=RED, linestyle="", label="person")
     _frame(ax, [(log, shown)])
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=6, fontsize=8)
-    return metres(ax, f"{log.scenario.title} (times in s; later is darker)")
+    return label_metres(ax, f"{log.scenario.title} (times in s; later is darker)")
 
 
 def plot_speed(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
     """Speed of the robot over time, and its limit."""
-    ax = axes(ax, size=(8, 2.5))
+    ax = get_axes(ax, size=(8, 2.5))
     ax.plot(log.time, log.speed, color=BLUE, label="robot")
     ax.axhline(log.settings.v_max, color=GREY, linestyle="--", label="limit")
     top = 1.15 * max(log.settings.v_max, float(log.speed.max()))
@@ -76,7 +76,7 @@ def plot_speed(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
 
 def plot_barriers(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
     """h of every person, and of the nearest wall, over time: safe where >= 0; logarithmic above 0.5 m."""
-    ax = axes(ax, size=(8, 2.5))
+    ax = get_axes(ax, size=(8, 2.5))
     n = len(log.scenario.people)
     for i, h in enumerate(log.h[:, :n].T):
         ax.plot(log.time, h, color=RED, label="person" if i == 0 else None)
@@ -94,7 +94,7 @@ def plot_barriers(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
 
 def plot_robot_paths(logs: Mapping[str, SimulationLog], *, ax: Axes | None = None) -> Axes:
     """Paths of several runs of one scene, by name; zones as they were at the start."""
-    ax = axes(ax, size=(9, 4))
+    ax = get_axes(ax, size=(9, 4))
     first = next(iter(logs.values()))
     _stage(ax, first.scenario)
     for zone in _zones(first, 0):
@@ -104,10 +104,10 @@ def plot_robot_paths(logs: Mapping[str, SimulationLog], *, ax: Axes | None = Non
         ax.plot(*log.states[:, :2].T, color=colour, linestyle=line, linewidth=2, label=name)
     _frame(ax, [(log, np.zeros(1, int)) for log in logs.values()])
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=4, fontsize=8)
-    return metres(ax, first.scenario.title)
+    return label_metres(ax, first.scenario.title)
 
 
-def run_grid(logs: Mapping[str, SimulationLog], *, every: float) -> Figure:
+def draw_run_grid(logs: Mapping[str, SimulationLog], *, every: float) -> Figure:
     """Pictures of several runs of one scene every so many seconds: a row for each run, by name."""
     longest = max(float(log.time[-1]) for log in logs.values())
     times = np.arange(0.0, longest + 1e-9, every)
@@ -123,7 +123,7 @@ def run_grid(logs: Mapping[str, SimulationLog], *, every: float) -> Figure:
             ax.set_title(
                 f"{name}, {log.time[row]:g} s, h = {log.h[row].min(initial=np.inf):.2f} m", fontsize=9
             )
-            metres(ax)
+            label_metres(ax)
             ax.label_outer()
     return figure
 
@@ -136,7 +136,7 @@ def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> Mo
     canvas, ax = FigureCanvasAgg(figure), figure.subplots()
     _stage(ax, log.scenario)
     _frame(ax, [(log, rows)])
-    metres(ax, "t")
+    label_metres(ax, "t")
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # settled
     standing: list[Artist] = [*ax.lines, ax.title]

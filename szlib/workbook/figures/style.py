@@ -19,12 +19,12 @@ BLUE, ORANGE, GREEN, RED, GREY, BLACK = "#0072B2", "#E69F00", "#009E73", "#D55E0
 SEQUENCE = "viridis"
 
 
-def axes(ax: Axes | None, *, size: tuple[float, float] = (6.0, 4.5)) -> Axes:
+def get_axes(ax: Axes | None, *, size: tuple[float, float] = (6.0, 4.5)) -> Axes:
     """The axes given, or those of a new figure of that size [inch]."""
     return plt.subplots(figsize=size, layout="constrained")[1] if ax is None else ax
 
 
-def metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
+def label_metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
     """Label both axes in metres with equal aspect; of the world, or of a person who walks to the right."""
     ax.set(xlabel="x, ahead [m]" if person else "x [m]", ylabel="y, to the left [m]" if person else "y [m]")
     if title:
@@ -33,18 +33,18 @@ def metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
     return ax
 
 
-def outline(area: Area, **style: Any) -> PathPatch:
+def area_patch(area: Area, **style: Any) -> PathPatch:
     """The borders of an area, pillars included, as one patch."""
     rings = [Path(ring, closed=True) for ring in area.outlines]
     return PathPatch(Path.make_compound_path(*rings), fill=False, **style)
 
 
-def colours(values: Sequence[Any]) -> list[Any]:
+def pick_colours(values: Sequence[Any]) -> list[Any]:
     """One colour of the sequence for each value, dark to light, leaving out the palest."""
     return list(plt.get_cmap(SEQUENCE)(np.linspace(0, 0.85, len(values))))
 
 
-def in_words(figure: Figure) -> str:
+def alt_text(figure: Figure) -> str:
     """What a figure shows, for who cannot see it: titles, what is over what, and the names in legends."""
     told = []
     for ax in figure.axes:

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from ...encounters.geometry import Area
-from .style import BLUE, GREY, RED, SEQUENCE, axes, metres, outline
+from .style import BLUE, GREY, RED, SEQUENCE, area_patch, get_axes, label_metres
 
 _MOST_CELLS = 2000
 """Of a map, along each axis: cells grow with the site."""
@@ -17,7 +17,7 @@ _MARGIN = 0.02
 
 def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes | None = None) -> Axes:
     """Where people were: person-seconds per square metre on a log scale, and the area (paper, fig. 1)."""
-    ax = axes(ax, size=(9, 5))
+    ax = get_axes(ax, size=(9, 5))
     x, y = tracks["x"].to_numpy(), tracks["y"].to_numpy()
     while max(np.ptp(x), np.ptp(y)) / cell > _MOST_CELLS:
         cell *= 2
@@ -26,17 +26,19 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     shown = np.ma.masked_less_equal(np.log10(np.maximum(seconds, 1e-9)), -0.5)
     image = ax.pcolormesh(edges[0], edges[1], shown.T, cmap=SEQUENCE, rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$")
-    ax.add_patch(outline(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
+    ax.add_patch(area_patch(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12))
     for axis, edge, ends in zip("xy", edges, (area.box.x, area.box.y), strict=True):
         low, high = min(edge[0], ends[0]), max(edge[-1], ends[1])
         ax.set(**{f"{axis}lim": (low - _MARGIN * (high - low), high + _MARGIN * (high - low))})
-    return metres(ax, "Where people were seen, and where they are watched")
+    return label_metres(ax, "Where people were seen, and where they are watched")
 
 
-def plot_speeds(by_column: np.ndarray, by_displacement: np.ndarray, *, ax: Axes | None = None) -> Axes:
+def plot_speed_histogram(
+    by_column: np.ndarray, by_displacement: np.ndarray, *, ax: Axes | None = None
+) -> Axes:
     """Speed as recorded against speed from displacement [m/s], both shape (n,)."""
-    ax = axes(ax)
+    ax = get_axes(ax)
     bins = np.linspace(0, 2.5, 101)
     for values, name, colour, line in (
         (by_displacement, "from displacement", BLUE, "-"),
@@ -62,7 +64,7 @@ def plot_funnel(funnel: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     A bar would have no length there: a log scale has no zero.
     """
     kept = funnel[funnel["what"] == "kept"]
-    ax = axes(ax, size=(8, 0.4 * len(kept) + 1))
+    ax = get_axes(ax, size=(8, 0.4 * len(kept) + 1))
     ax.plot(kept["rows"], kept["stage"], "o-", color=BLUE, markersize=7, linewidth=1)
     for at, rows in enumerate(kept["rows"]):
         ax.annotate(f"{rows:,}", (rows, at), (9, 0), textcoords="offset points", va="center", fontsize=8)

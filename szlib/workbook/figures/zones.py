@@ -21,7 +21,7 @@ from ...errors import DataWarning, ZoneError
 from ...zones.ellipses import Ellipse
 from ...zones.respect.presence import PairCorrelation
 from ...zones.social_zone import SocialZone
-from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, axes, colours, metres
+from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, get_axes, label_metres, pick_colours
 
 _LINES = ("-", "--", ":", "-.")
 _DOTS = 4000
@@ -32,7 +32,7 @@ def plot_outliers(
     points: np.ndarray, outlier: np.ndarray, *, r_max: float = 2.0, ax: Axes | None = None
 ) -> Axes:
     """In- and outliers in the complementary plane; points (n, 2), outlier (n,) (paper, fig. 4a)."""
-    ax = axes(ax, size=(6, 5))
+    ax = get_axes(ax, size=(6, 5))
     ax.plot(
         *points[~outlier].T,
         ".",
@@ -45,7 +45,7 @@ def plot_outliers(
     ax.add_patch(Circle((0, 0), r_max, fill=False, linestyle=":", color=BLACK, label="contact, r = 0"))
     ax.set(xlim=(-1.05 * r_max, 1.05 * r_max), ylim=(-1.05 * r_max, 1.05 * r_max))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=8)
-    metres(ax, "Turned inside out: the nearer, the farther out")
+    label_metres(ax, "Turned inside out: the nearer, the farther out")
     ax.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
     return ax
 
@@ -70,7 +70,7 @@ def plot_hull(
     if points is not None:
         shown = points[:: max(1, len(points) // _DOTS)]
         ax.plot(*shown.T, ".", color=BLUE, markersize=1.5, alpha=0.35, label=f"{len(shown):,} of the samples")
-    for speed, colour, line in zip(speeds, colours(speeds), cycle(_LINES), strict=False):
+    for speed, colour, line in zip(speeds, pick_colours(speeds), cycle(_LINES), strict=False):
         corners = zone.slice(speed).polygon
         closed = np.vstack([corners, corners[:1]])
         level = np.full(len(closed), speed)
@@ -93,7 +93,7 @@ def plot_zone(
     zone: SocialZone, speed: float, *, truth: Ellipse | None = None, ax: Axes | None = None
 ) -> Axes:
     """The zone's boundary at one speed, its ellipse (dashed: not adequate), and the ellipse's interval."""
-    ax = axes(ax, size=(5, 4.5))
+    ax = get_axes(ax, size=(5, 4.5))
     ellipse, hull = _ellipse(zone, speed), zone.method == "hull"
     boundary = zone.boundary(speed)
     if hull:
@@ -110,7 +110,7 @@ def plot_zone(
     ax.plot(0, 0, marker=(3, 0, -90), color=BLACK, markersize=10)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), fontsize=8, ncols=2)
     lacks = "" if zone.adequate(speed) else "\nnot adequate: too few people seen on some side"
-    return metres(ax, f"Minimum social zone at {speed:g} m/s{lacks}", person=True)
+    return label_metres(ax, f"Minimum social zone at {speed:g} m/s{lacks}", person=True)
 
 
 def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None = None) -> Axes:
@@ -118,9 +118,9 @@ def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None =
 
     Of a `SocialZone` also their intervals, and those that are not adequate are dashed.
     """
-    ax = axes(ax, size=(6, 5))
+    ax = get_axes(ax, size=(6, 5))
     shown = sorted((zones.ellipses if isinstance(zones, SocialZone) else zones).items())
-    for (speed, ellipse), colour, line in zip(shown, colours(shown), cycle(_LINES), strict=False):
+    for (speed, ellipse), colour, line in zip(shown, pick_colours(shown), cycle(_LINES), strict=False):
         label = f"{speed:g} m/s"
         if isinstance(zones, SocialZone):
             line = _line(zones, speed)
@@ -128,7 +128,7 @@ def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None =
             _band(zones, speed, ax, color=colour, alpha=0.15)
         ax.plot(*ellipse.curve().T, color=colour, linestyle=line, linewidth=2, label=label)
     angles = np.linspace(np.pi / 6, 11 * np.pi / 6, len(shown))
-    for (speed, ellipse), angle, colour in zip(shown, angles.tolist(), colours(shown), strict=True):
+    for (speed, ellipse), angle, colour in zip(shown, angles.tolist(), pick_colours(shown), strict=True):
         at = ellipse.curve()[round(angle / (2 * np.pi) * (len(ellipse.curve()) - 1))]
         white = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
         name = ax.annotate(f"{speed:g}", at, ha="center", va="center", bbox=white)
@@ -136,14 +136,14 @@ def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None =
     ax.plot(0, 0, marker=(3, 0, -90), color=BLACK, markersize=10)
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
     bands = " and their 95 % intervals" if getattr(zones, "uncertainty", None) else ""
-    return metres(ax, f"Minimum social zones by speed{bands}", person=True)
+    return label_metres(ax, f"Minimum social zones by speed{bands}", person=True)
 
 
 def plot_pair_correlation(
     correlation: PairCorrelation, *, radius: float | None = None, ax: Axes | None = None
 ) -> Axes:
     """How often people were where, over how often the null model was; `radius` [m] of the respect zone."""
-    ax = axes(ax, size=(6, 4.8))
+    ax = get_axes(ax, size=(6, 4.8))
     turn = np.r_[correlation.direction, correlation.direction[0] + 2 * np.pi]
     g = np.vstack([correlation.g, correlation.g[:1]])
     x, y = (correlation.distance * part(turn)[:, None] for part in (np.cos, np.sin))
@@ -157,15 +157,15 @@ def plot_pair_correlation(
         ax.plot([], [], "--", color=BLUE, label=f"all bearings: {radius:.2f} m")
     ax.plot(0, 0, marker=(3, 0, -90), color=RED, markersize=10)
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, fontsize=8)
-    return metres(ax, person=True)
+    return label_metres(ax, person=True)
 
 
-def plot_by_number(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes | None = None) -> Axes:
+def plot_zone_sizes(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes | None = None) -> Axes:
     """Sizes of zones by the number of encounters, with bands; `columns`: name in `table` -> label.
 
     `table` has encounters, and for each name its mean, <name>_low and <name>_high [m].
     """
-    ax = axes(ax, size=(6, 4))
+    ax = get_axes(ax, size=(6, 4))
     styles = zip(("-", "--", ":", "-."), ("o", "s", "^", "D"), (RED, BLUE, GREY, GREEN), strict=True)
     for (name, label), (line, marker, colour) in zip(columns.items(), styles, strict=False):
         n = table["encounters"]
@@ -176,9 +176,9 @@ def plot_by_number(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes 
     return ax
 
 
-def plot_tornado(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+def plot_sensitivity(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     """How far each parameter moves the zone's area; `table` as from `zones.sensitivity.sensitivity`."""
-    ax = axes(ax, size=(8, 4.5))
+    ax = get_axes(ax, size=(8, 4.5))
     usual = float(table["area"].iloc[0])
     varied = table.iloc[1:].dropna(subset=["area"])
     spans = varied.groupby("parameter", sort=False)["area"].agg(
@@ -201,12 +201,12 @@ def plot_tornado(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def plot_findings(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+def plot_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     """Effects with their intervals, one row a finding; `table` as from `paper_claims.findings_table`.
 
     Each is shown as a share of its own largest end, so that metres and shares stand side by side.
     """
-    ax = axes(ax, size=(9, 0.45 * len(table) + 1.2))
+    ax = get_axes(ax, size=(9, 0.45 * len(table) + 1.2))
     styles = {"supported": (GREEN, "o"), "contradicted": (RED, "X"), "not": (GREY, "s")}
     for at, (effect, low, high, verdict) in enumerate(
         table[["effect", "low", "high", "verdict"]].itertuples(index=False)

@@ -82,7 +82,7 @@ def show_drawn(figure: Figure, picture: bytes) -> None:
     from IPython.display import display
     from PIL import Image
 
-    from ..figures.style import in_words
+    from ..figures.style import alt_text
 
     if "inline" not in plt.get_backend():
         return
@@ -91,7 +91,7 @@ def show_drawn(figure: Figure, picture: bytes) -> None:
     shown = io.BytesIO()
     drawn.resize(size, Image.Resampling.LANCZOS).quantize(dither=Image.Dither.NONE).save(shown, "PNG")
     content = {"image/png": shown.getvalue(), "text/plain": repr(figure)}
-    told = {"image/png": {"alt": in_words(figure)}}
+    told = {"image/png": {"alt": alt_text(figure)}}
     display(content, raw=True, metadata=told)  # type: ignore[no-untyped-call]
     plt.close(figure)
 
@@ -106,9 +106,9 @@ def show_with_words() -> None:
 
     def words(figure: Figure, **_: object) -> tuple[dict[str, str], dict[str, Any]]:
         """No other form of the figure, but its words."""
-        from ..figures.style import in_words
+        from ..figures.style import alt_text
 
-        return {}, {"image/png": {"alt": in_words(figure)}}
+        return {}, {"image/png": {"alt": alt_text(figure)}}
 
     shell = get_ipython()
     if shell is not None and shell.display_formatter is not None:

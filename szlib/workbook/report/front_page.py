@@ -113,7 +113,7 @@ def _picture(zone: SocialZone, speed: float, truth: Any) -> Any:
     figures.plot_zone(zone, speed, truth=truth, ax=figure.subplots())
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=100)
-    alt = escape(figures.in_words(figure), quote=True)
+    alt = escape(figures.alt_text(figure), quote=True)
     return _html(f'<img src="data:image/png;base64,{b64encode(content.getvalue()).decode()}" alt="{alt}">')
 
 

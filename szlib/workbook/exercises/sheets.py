@@ -5,16 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import DataError
-from . import barriers, certainty, outliers, robot, tracks, zones
+from . import (
+    sheet1_tracks,
+    sheet2_outliers,
+    sheet3_zones,
+    sheet4_certainty,
+    sheet5_barriers,
+    sheet6_robot,
+)
 from .task import Answer, Task, Verdict
 
 SHEETS: dict[str, tuple[Task, ...]] = {
-    "sheet1_tracks": tracks.TASKS,
-    "sheet2_outliers": outliers.TASKS,
-    "sheet3_zones": zones.TASKS,
-    "sheet4_certainty": certainty.TASKS,
-    "sheet5_barriers": barriers.TASKS,
-    "sheet6_robot": robot.TASKS,
+    "sheet1_tracks": sheet1_tracks.TASKS,
+    "sheet2_outliers": sheet2_outliers.TASKS,
+    "sheet3_zones": sheet3_zones.TASKS,
+    "sheet4_certainty": sheet4_certainty.TASKS,
+    "sheet5_barriers": sheet5_barriers.TASKS,
+    "sheet6_robot": sheet6_robot.TASKS,
 }
 """The tasks of every sheet, in their order."""
 
