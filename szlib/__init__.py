@@ -52,6 +52,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "simulation.scenarios.meetings": ["MEETINGS"],
         "simulation.scenarios.paper": ["SCENARIOS"],
         "tracks.clock": ["read_tracks"],
+        "tracks.options": ["ReadOptions"],
         "zones.costmap": ["Grid"],
         "zones.ellipses": ["Ellipse", "minimum_enclosing_ellipse"],
         "zones.outliers": ["remove_outliers"],

@@ -12,9 +12,10 @@ import polars as pl
 
 from .. import memory
 from ..tracks import funnels
-from ..tracks.formats.layouts import Columns, Format, quick_scan, readable, recognise
+from ..tracks.formats.layouts import Format, quick_scan, readable, recognise
 from ..tracks.formats.plain import plain_file
 from ..tracks.formats.rows import in_metres
+from ..tracks.options import ReadOptions
 from ..tracks.plausible import check_unit
 from ..tracks.readers import merge, person_order, read_raw, read_stage
 from . import near_rows_cache as kept_rows
@@ -32,18 +33,13 @@ def read_near_square(
     *,
     square: Area,
     duration: float,
-    file_format: str | None = None,
-    unit: str | None = None,
-    frame_rate: float | None = None,
-    max_gap: float | None = None,
-    tz: str = "Asia/Tokyo",
-    columns: Columns | None = None,
+    options: ReadOptions | None = None,
     content: kept_rows.Content | None = None,
 ) -> pd.DataFrame:
     """The rows of a file that encounters in the square can depend on, as from `tracks.readers.read_raw`.
 
     Only ATC raw files are streamed; others are small, and are read whole.  `square` and `duration` [s] are
-    those of `szlib.find_encounters`, the others those of `szlib.read_tracks`.  The table is empty where
+    those of `szlib.find_encounters`, `options` those of `szlib.read_tracks`.  The table is empty where
     nobody came near; its funnel counts every row of the file.  With `content`, which gives that of the file
     as `szlib.files.file_content`, the rows are kept in the user's cache (`kept_rows`), and taken from it.
 
@@ -51,18 +47,19 @@ def read_near_square(
     ------
     DataError : as `szlib.read_tracks`.
     """
-    path = Path(path)
+    path, options = Path(path), options or ReadOptions()
     if path.is_file():
         with plain_file(path) as plain:
-            layout, scan = recognise(plain, path, file_format, frame_rate, columns=columns, unit=unit)
+            layout, scan = recognise(plain, path, options)
             if layout.name == "atc-raw":
-                metres = layout.metres_in(unit)
-                cells = Cells(square.grown(REACH).box, duration, max_gap or layout.max_gap or 0.0, metres)
+                metres = layout.metres_in(options.unit)
+                cells = Cells(
+                    square.grown(REACH).box, duration, options.max_gap or layout.max_gap or 0.0, metres
+                )
                 blocks = Blocks(quick_scan(plain, layout), scan, metres, layout.seconds)
                 near, seen = _near(blocks, path, layout, cells, content)
-                return _table(near, seen, path, layout, metres, unit=unit, tz=tz)
-    given = {"file_format": file_format, "unit": unit, "frame_rate": frame_rate, "columns": columns}
-    return read_raw(path, tz=tz, **given)  # type: ignore[arg-type]
+                return _table(near, seen, path, layout, metres, options)
+    return read_raw(path, options=options)
 
 
 def _near(
@@ -85,11 +82,11 @@ def _near(
 
 
 def _table(
-    near: Rows, seen: Tally, path: Path, layout: Format, metres: float, *, unit: str | None, tz: str
+    near: Rows, seen: Tally, path: Path, layout: Format, metres: float, options: ReadOptions
 ) -> pd.DataFrame:
     """The rows, whose memory it takes, as from `read_raw`, with the funnel of the whole file."""
     stage = read_stage(path, layout, seen.good, dict(seen.reasons), seen.first)
-    if unit is None:
+    if options.unit is None:
         check_unit(pl.DataFrame({"x": [seen.reach], "y": [0.0]}), layout, path)
     far = {"never near the square": seen.good - len(near.t)}
     stages = [stage, funnels.stage("near the square", seen.good, len(near.t), far)]
@@ -98,7 +95,7 @@ def _table(
         return funnels.attach(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
     for values in (near.x, near.y):
         values *= metres
-    rows = in_metres(pl.DataFrame(near._asdict()), path, layout, 1.0, tz)
+    rows = in_metres(pl.DataFrame(near._asdict()), path, layout, 1.0, options.tz)
     return merge([rows], stages, [layout], [], copy=False)
 
 

@@ -15,7 +15,6 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
-from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
@@ -25,8 +24,9 @@ from ..errors import DataError, DataWarning
 from ..files import file_content, write_file
 from ..tracks import funnels
 from ..tracks.clock import to_clock
-from ..tracks.formats.layouts import FORMATS, UNITS, Columns, layout_of
+from ..tracks.formats.layouts import layout_of
 from ..tracks.formats.plain import first_line
+from ..tracks.options import Columns, ReadOptions
 from ..tracks.readers import read_raw
 from .areas import AUTO, as_area, walked_area
 from .finding import find_encounters
@@ -75,14 +75,12 @@ class Chain:
     def __post_init__(self) -> None:
         if self.square is not None and self.square != AUTO:
             object.__setattr__(self, "square", as_area(self.square))
-        try:
-            ZoneInfo(self.tz)
-        except (KeyError, ValueError, OSError) as error:
-            raise DataError(f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'") from error
-        if self.file_format is not None and self.file_format not in FORMATS:
-            raise DataError(f"unknown file_format {self.file_format!r}; expected one of {list(FORMATS)}")
-        if self.unit not in (None, *UNITS):
-            raise DataError(f"unit must be one of {list(UNITS)}; got {self.unit!r}")
+        _ = self.read_options
+
+    @property
+    def read_options(self) -> ReadOptions:
+        """How the files are read."""
+        return ReadOptions(**{name: getattr(self, name) for name in ReadOptions.__dataclass_fields__})
 
     def parameters(self) -> dict[str, Any]:
         """Every parameter as JSON values; the area as text that reads back."""
@@ -131,12 +129,12 @@ class Chain:
         self, files: Sequence[Path], near: Area | None = None, content: Sequence[Content] = ()
     ) -> pd.DataFrame:
         """Rows of the files; of a single one, where an area is given, those near it."""
-        given = {name: getattr(self, name) for name in ("file_format", "unit", "frame_rate", "columns")}
         if near is None or len(files) > 1:
-            return read_raw(files, tz=self.tz, **given)
-        of = {"square": near, "duration": self.duration, "max_gap": self.max_gap}
+            return read_raw(files, options=self.read_options)
         known = content[0] if content else None
-        return read_near_square(files[0], tz=self.tz, content=known, **of, **given)  # type: ignore[arg-type]
+        return read_near_square(
+            files[0], square=near, duration=self.duration, options=self.read_options, content=known
+        )
 
 
 def check_met(samples: pd.DataFrame) -> pd.DataFrame:

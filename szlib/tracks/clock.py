@@ -15,6 +15,7 @@ mean that the person was lost in between: nobody is bridged across a gap.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from .. import memory
 from ..checks import check_columns
 from ..errors import DataError
 from . import funnels
-from .formats.layouts import Columns
+from .options import SHORTEST_GAP, Columns, ReadOptions
 from .readers import is_sorted, read_raw
 
 TICKS_PER_SECOND = 10
@@ -54,13 +55,14 @@ COLUMNS = ["day", "id", "t", "x", "y", "vx", "vy"]
 def read_tracks(
     paths: Any,
     *,
+    options: ReadOptions | None = None,
+    exclude: Iterable[str] = (),
     file_format: str | None = None,
     unit: str | None = None,
     frame_rate: float | None = None,
     columns: Columns | None = None,
     max_gap: float | None = None,
-    tz: str = "Asia/Tokyo",
-    exclude: Iterable[str] = (),
+    tz: str | None = None,
 ) -> pd.DataFrame:
     """Read files or tables, one or many, into one track table on the common clock.
 
@@ -69,33 +71,35 @@ def read_tracks(
     paths : a file, or several, plain or .gz: ATC raw, ATC 1 Hz, EWAP obsmat, tidy CSV or Parquet; by PedPy's
         loaders texts and HDF5 of Juelich's archive, Viswalk, Vadere, JuPedSim (extra `pedpy`).  Or tables: a
         pandas DataFrame, PedPy's TrajectoryData.
-    file_format : one of `formats.layouts.FORMATS`; None looks at the content.
-    unit : unit of the positions, "m", "cm" or "mm"; None takes the format's.  What people do (speeds, extent)
-        says whether it can be right; a given unit that cannot is a warning, an assumed one an error.
-    frame_rate : frames a second, where `columns` (or a table without t) name a column frame.  EWAP files:
-        None determines it from their velocities (the ETH sequence has 15, hotel, zara and students 25), says
-        so in the funnel, warns of any other, and refuses where they do not tell.
-    columns : which column of a table, CSV or Parquet file is what, such as {"frame": "Frame", "id": "ped",
-        "x": "X", "y": "Y"}: a name, or the number of the field from 0 where there is no header.  Times are in
-        column t [s] (in a DataFrame datetimes as well), or counted in column frame.
-    max_gap : a longer silence ends a track [s], more than 0.1; None takes the format's (0.5 raw, 1.6 at 1 Hz;
-        EWAP: 2.25 sampling intervals, 0.9 for its 0.4; tidy: 4 of them, at least 0.5 and at most 5).
-    tz : time zone whose calendar says which day a time stamp belongs to (ATC: Japan).
+    options : how files are read; None takes the defaults.
     exclude : days "YYYY-MM-DD" to leave out, as event days were left out in the paper (sec. 2).
+    file_format, unit, frame_rate, columns, max_gap, tz : each as in `szlib.ReadOptions`; a value given here
+        replaces that of `options`.
 
     Returns
     -------
-    The track table; its funnel is in ``.attrs["funnel"]``, and a DataWarning counts what was set aside.
+    The track table; its funnel is in ``.attrs["funnel"]``, and a DataWarning counts the rejected rows.
 
     Raises
     ------
     DataError : names the file and line, what was found, what was expected and what to do.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd, szlib
+    >>> walk = pd.DataFrame({"t": np.arange(5.0), "id": 1, "x": 1.2 * np.arange(5), "y": 0.0})
+    >>> walk.to_csv("walk.csv", index=False)
+    >>> tracks = szlib.read_tracks("walk.csv", max_gap=2.0)
+    >>> list(tracks.columns), len(tracks)
+    (['day', 'id', 't', 'x', 'y', 'vx', 'vy'], 41)
     """
-    raw = read_raw(
-        paths, file_format=file_format, unit=unit, frame_rate=frame_rate, tz=tz, exclude=exclude,
-        columns=columns,
-    )  # fmt: skip
-    return to_clock(raw, max_gap=max_gap)
+    given = {
+        "file_format": file_format, "unit": unit, "frame_rate": frame_rate, "columns": columns,
+        "max_gap": max_gap, "tz": tz,
+    }  # fmt: skip
+    changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    options = replace(options or ReadOptions(), **changes)
+    return to_clock(read_raw(paths, options=options, exclude=exclude), max_gap=options.max_gap)
 
 
 def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame:
@@ -118,8 +122,8 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
         raise DataError(f"person {raw['id'].iloc[at]} has two rows at t = {t[at]} s; keep one of them")
     if max_gap is None:
         max_gap = _usual_gap(step[same], raw.attrs.get("max_gap"))
-    if not max_gap > 1 / TICKS_PER_SECOND:
-        raise DataError(f"max_gap must be a time in seconds, longer than the clock's 0.1 s; got {max_gap}")
+    if not max_gap > SHORTEST_GAP:
+        raise DataError(f"max_gap must be longer than the clock's 0.1 s; got {max_gap}")
     within = np.r_[False, same & (step <= max_gap + _ROUNDING)]
     ticks = float(step.sum(where=within[1:])) * TICKS_PER_SECOND
     memory.require(ticks * _TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows")

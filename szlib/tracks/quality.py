@@ -16,6 +16,7 @@ from .clock import TICKS_PER_SECOND, clock_index, nearest_tick, to_clock
 from .formats.layouts import Format, readable, recognise
 from .formats.plain import plain_file
 from .formats.rows import fault
+from .options import ReadOptions
 
 STANDING = 0.1
 """Who moves less than that within a second is standing [m] (measured: sensor noise stays below it)."""
@@ -33,7 +34,7 @@ def seconds(path: str | Path) -> pd.DataFrame:
     """
     path = Path(path)
     with plain_file(path) as plain:
-        layout, scan = recognise(plain, path, None)
+        layout, scan = recognise(plain, path, ReadOptions())
         recording = _sensor_speed(plain, layout)
         usable = scan.filter(fault(layout.metres, layout.seconds, "day" in scan.collect_schema()).is_null())
         time = pl.col("t") * layout.seconds
@@ -72,7 +73,7 @@ def frame_intervals(path: str | Path) -> np.ndarray:
     """Times from one frame to the next [s]; a frame is a time at which anybody was seen."""
     path = Path(path)
     with plain_file(path) as plain:
-        layout, scan = recognise(plain, path, None)
+        layout, scan = recognise(plain, path, ReadOptions())
         with readable(path, layout):
             frames = scan.select(pl.col("t").drop_nulls().unique()).collect(engine="streaming")["t"]
     return np.asarray(np.diff(np.sort(frames.to_numpy())) * layout.seconds)
@@ -82,7 +83,7 @@ def people(path: str | Path) -> pd.DataFrame:
     """One row a person: id, first_seen, last_seen, longest_gap [s], rows."""
     path = Path(path)
     with plain_file(path) as plain:
-        layout, scan = recognise(plain, path, None)
+        layout, scan = recognise(plain, path, ReadOptions())
         usable = scan.filter(fault(layout.metres, layout.seconds, "day" in scan.collect_schema()).is_null())
         time = pl.col("t") * layout.seconds
         grouped = usable.group_by(pl.col("id").cast(pl.Int64)).agg(

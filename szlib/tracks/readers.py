@@ -18,10 +18,11 @@ import polars as pl
 from ..errors import DataError, DataWarning
 from ..files import printable
 from . import funnels
-from .formats.layouts import EXPECTED, FORMATS, UNITS, Columns, Format, readable, recognise
+from .formats.layouts import EXPECTED, Format, readable, recognise
 from .formats.plain import check_rows, plain_file
 from .formats.rows import fault, in_metres, stem
 from .formats.tables import is_table, recognise_table
+from .options import ReadOptions
 from .plausible import check_people, check_unit, suggestion
 
 _FASTEST, _BLUR, _SOON = 5.0, 0.5, 5.0
@@ -32,12 +33,8 @@ rows farther apart than that [s] tell nothing."""
 def read_raw(
     paths: Any,
     *,
-    file_format: str | None = None,
-    unit: str | None = None,
-    frame_rate: float | None = None,
-    tz: str = "Asia/Tokyo",
+    options: ReadOptions | None = None,
     exclude: Iterable[str] = (),
-    columns: Columns | None = None,
 ) -> pd.DataFrame:
     """Read files as they are: day, id, t [s], x, y [m], sorted, without duplicates.
 
@@ -45,17 +42,13 @@ def read_raw(
     longest gap [s] for `to_clock`, ``.attrs["funnel"]`` counts every row, and says at how many frames a
     second an EWAP file was read.
     """
+    options = options or ReadOptions()
     sources = [paths] if isinstance(paths, str | Path) or is_table(paths) else list(paths)
     files = [Path(f"table-{k}") if is_table(each) else Path(each) for k, each in enumerate(sources, start=1)]
     excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
     if not files:
         raise DataError("no track file was given; pass at least one path")
-    if unit not in (None, *UNITS):
-        raise DataError(f"unit must be one of {list(UNITS)}; got {unit!r}")
-    if file_format is not None and file_format not in FORMATS:
-        raise DataError(f"unknown file_format {file_format!r}; expected one of {list(FORMATS)}")
-    given = {"name": file_format, "unit": unit, "frame_rate": frame_rate, "tz": tz, "columns": columns}
-    read = [_read(source, file, **given) for source, file in zip(sources, files, strict=True)]  # type: ignore[arg-type]
+    read = [_read(source, file, options) for source, file in zip(sources, files, strict=True)]
     parts, stages, layouts = zip(*read, strict=True)
     _check_sequences([stem(f) for f, layout in zip(files, layouts, strict=True) if layout.name == "ewap"])
     return merge(told_apart(files, parts, layouts), stages, layouts, excluded)
@@ -119,27 +112,18 @@ def is_sorted(person: np.ndarray, time: np.ndarray) -> bool:
     return bool(((person[1:] > person[:-1]) | (same & (time[1:] >= time[:-1]))).all())
 
 
-def _read(
-    source: Any,
-    path: Path,
-    *,
-    name: str | None,
-    unit: str | None,
-    frame_rate: float | None,
-    tz: str,
-    columns: Columns | None,
-) -> tuple[pl.DataFrame, dict[str, Any], Format]:
+def _read(source: Any, path: Path, options: ReadOptions) -> tuple[pl.DataFrame, dict[str, Any], Format]:
     """One file or table: its usable rows (day, id, t, x, y), its funnel stage, its layout."""
     if is_table(source):
-        layout, scan = recognise_table(source, path, columns=columns, frame_rate=frame_rate, tz=tz)
+        layout, scan = recognise_table(source, path, options)
         rows = scan.collect()
     else:
         with plain_file(path) as plain:
             check_rows(plain, path)
-            layout, scan = recognise(plain, path, name, frame_rate, columns=columns, unit=unit)
+            layout, scan = recognise(plain, path, options)
             with readable(path, layout):
                 rows = scan.collect()
-    metres = layout.metres_in(unit)
+    metres = layout.metres_in(options.unit)
     rows = rows.with_columns(reason=fault(metres, layout.seconds, "day" in rows.columns))
     bad, good = rows.filter(pl.col("reason").is_not_null()), rows.filter(pl.col("reason").is_null())
     reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
@@ -148,10 +132,10 @@ def _read(
     hint = suggestion(rows, layout, metres=metres) if free and bad.height > good.height else ""
     stage = read_stage(path, layout, good.height, reasons, first, hint)
     if free:
-        check_people(good, layout, path, metres=metres, sure=unit is not None)
-    if unit is None:
+        check_people(good, layout, path, metres=metres, sure=options.unit is not None)
+    if options.unit is None:
         check_unit(good, layout, path)
-    return in_metres(good, path, layout, metres, tz), stage, layout
+    return in_metres(good, path, layout, metres, options.tz), stage, layout
 
 
 def read_stage(

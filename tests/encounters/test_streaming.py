@@ -57,7 +57,9 @@ def encounters(raw: pd.DataFrame, **parameters: object) -> pd.DataFrame:
 
 def same(path: Path, *, square: szlib.Square, duration: float, max_gap: float | None = None) -> int:
     """Check that both ways agree to the last bit; how many samples there are."""
-    near = read_near_square(path, square=square, duration=duration, max_gap=max_gap)
+    near = read_near_square(
+        path, square=square, duration=duration, options=szlib.ReadOptions(max_gap=max_gap)
+    )
     given = {"square": square, "duration": duration, "max_gap": max_gap, "space": SPACE}
     streamed, whole = encounters(near, **given), encounters(read_raw(path), **given)
     pd.testing.assert_frame_equal(streamed, whole, check_exact=True)
@@ -164,7 +166,7 @@ def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.Monk
     path = tmp_path / "day.csv"
     lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
     path.write_bytes("\n".join(lines).encode("latin-1"))
-    layout, scan = recognise(path, path, None)
+    layout, scan = recognise(path, path, szlib.ReadOptions())
     found = blocks.Blocks(quick_scan(path, layout), scan, layout.metres, layout.seconds)
     rows = blocks.Rows(*map(np.concatenate, zip(*found, strict=True)))
     with warnings.catch_warnings():

@@ -248,7 +248,7 @@ def test_a_table_that_cannot_be_used_is_told(raw: pd.DataFrame, told: str) -> No
 
 @pytest.mark.parametrize("max_gap", [0, 0.1, -1, np.nan])
 def test_a_gap_shorter_than_the_clock_has_no_meaning(max_gap: float) -> None:
-    with pytest.raises(szlib.DataError, match=r"max_gap must be .* longer than the clock's 0.1 s"):
+    with pytest.raises(szlib.DataError, match=r"max_gap must be longer than the clock's 0.1 s"):
         to_clock(make_raw([0, 0.1]), max_gap=max_gap)
 
 

@@ -132,7 +132,7 @@ def test_pedpys_own_tables_are_tables() -> None:
 REFUSED = {
     "counts frames; pass frame_rate": ({"columns": {"frame": "frame"}}, people),
     "both t and frame": ({"columns": {"t": "a", "frame": "b"}}, people),
-    "none of szlib's": ({"columns": {"time": "frame"}}, people),
+    "are unknown": ({"columns": {"time": "frame"}}, people),
     "has no column ped": ({"columns": {"id": "ped"}, "frame_rate": 10}, people),
     "no field 9": ({"columns": {"id": 9}, "frame_rate": 10}, people),
     "leave frame_rate out": ({"frame_rate": 25}, lambda: in_seconds(people())),

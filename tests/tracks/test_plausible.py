@@ -57,7 +57,9 @@ def test_the_advice_helps(told: str) -> None:
         read_raw(SPOILED[told]())
     advice = re.search(r"pass (unit|columns)=('\w+'|\{.*?\})", str(error.value))
     options = {advice[1]: eval(advice[2])}
-    pd.testing.assert_frame_equal(read_raw(SPOILED[told](), **options), read_raw(table()))
+    pd.testing.assert_frame_equal(
+        read_raw(SPOILED[told](), options=szlib.ReadOptions(**options)), read_raw(table())
+    )
 
 
 def test_the_advice_for_frames_helps() -> None:
@@ -84,14 +86,14 @@ def test_fields_without_names_are_told_by_number(tmp_path: Path) -> None:
         read_raw(tmp_path / "a.csv")
     columns = eval(re.search(r"columns=(\{.*?\})", str(error.value))[1])
     assert columns == {"t": 1, "id": 0, "x": 2, "y": 3}
-    read = read_raw(tmp_path / "a.csv", columns=columns)
+    read = read_raw(tmp_path / "a.csv", options=szlib.ReadOptions(columns=columns))
     pd.testing.assert_frame_equal(read.drop(columns="day"), read_raw(table()).drop(columns="day"))
 
 
 def test_who_insists_is_warned() -> None:
     spoiled = SPOILED["centimetres: pass unit='cm'"]()
     with pytest.warns(szlib.DataWarning, match="people move at"):
-        assert len(read_raw(spoiled, unit="m")) == len(spoiled)
+        assert len(read_raw(spoiled, options=szlib.ReadOptions(unit="m"))) == len(spoiled)
 
 
 def test_people_who_stand_are_people() -> None:

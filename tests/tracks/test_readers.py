@@ -76,12 +76,12 @@ def write(path: Path, content: str | bytes) -> Path:
     return path
 
 
-def read_quietly(path: Path, **options: object) -> tuple[pd.DataFrame, str]:
+def read_quietly(path: Path) -> tuple[pd.DataFrame, str]:
     """The table, and the warnings about rows set aside; any other warning is an error."""
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("error")
         warnings.simplefilter("always", szlib.DataWarning)
-        frame = read_raw(path, **options)
+        frame = read_raw(path)
     return frame, "\n".join(str(w.message) for w in told)
 
 
@@ -175,9 +175,9 @@ def test_the_day_is_that_of_the_calendar_in_tokyo(tmp_path: Path) -> None:
     path = write(tmp_path / "atc-20200101.csv", as_1hz(samples(people=1, count=4, begin=midnight - 0.8)))
     frame = read_raw(path)
     assert frame["day"].astype(str).tolist() == ["2012-10-24"] * 2 + ["2012-10-25"] * 2
-    assert set(read_raw(path, tz="UTC")["day"]) == {"2012-10-24"}
+    assert set(read_raw(path, options=szlib.ReadOptions(tz="UTC"))["day"]) == {"2012-10-24"}
     with pytest.raises(szlib.DataError, match="unknown time zone 'Mars/Olympus'"):
-        read_raw(path, tz="Mars/Olympus")
+        read_raw(path, options=szlib.ReadOptions(tz="Mars/Olympus"))
 
 
 def test_excluded_days_are_counted(tmp_path: Path) -> None:
@@ -393,19 +393,19 @@ def test_paths_that_are_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_options_without_a_meaning(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", as_raw(samples()))
     with pytest.raises(szlib.DataError, match="unknown file_format 'csv'"):
-        read_raw(path, file_format="csv")
+        read_raw(path, options=szlib.ReadOptions(file_format="csv"))
     with pytest.raises(szlib.DataError, match=r"unit must be one of .*; got 'ft'"):
-        read_raw(path, unit="ft")
+        read_raw(path, options=szlib.ReadOptions(unit="ft"))
     with pytest.raises(szlib.DataError, match=r"a\.csv, line 1: missing or extra fields; 60 of 60 rows"):
-        read_raw(path, file_format="atc-1hz")
+        read_raw(path, options=szlib.ReadOptions(file_format="atc-1hz"))
 
 
 def test_the_unit_can_be_given(tmp_path: Path) -> None:
     rows = samples()
     millimetres = read_raw(write(tmp_path / "a.csv", as_raw(rows)))
-    in_metres = read_raw(write(tmp_path / "a.csv", as_raw(scaled(1e-3))), unit="m")
+    in_metres = read_raw(write(tmp_path / "a.csv", as_raw(scaled(1e-3))), options=szlib.ReadOptions(unit="m"))
     pd.testing.assert_frame_equal(in_metres, millimetres, rtol=0, atol=2e-6)
-    wide = read_raw(write(tmp_path / "a.csv", as_1hz(scaled(1e3))), unit="mm")
+    wide = read_raw(write(tmp_path / "a.csv", as_1hz(scaled(1e3))), options=szlib.ReadOptions(unit="mm"))
     pd.testing.assert_frame_equal(wide, millimetres, rtol=0, atol=2e-6)
 
 

@@ -12,11 +12,12 @@ import numpy as np
 import polars as pl
 
 from ...errors import DataError, DataWarning
+from ..options import FRAME_RATES
 
 _EWAP_GAP = 2.25
 """Intervals between samples after which an EWAP track ends: 0.9 s where they are 0.4 s apart."""
-FRAME_RATES, _USUAL_RATES = (1.0, 240.0), (15.0, 25.0)
-"""Frames a second that a video can have, and those that EWAP's have: ETH 15; hotel, zara and students 25."""
+_USUAL_RATES = (15.0, 25.0)
+"""Frames a second of EWAP files: ETH 15; hotel, zara and students 25."""
 _FEWEST_STEPS, _SPREAD, _WHOLE = 10, 0.1, 0.01
 """A rate is told by so many steps at least, the quartiles of their rates apart by at most this share of the
 median; it is a whole number if it is within 1 % of one."""
@@ -32,10 +33,6 @@ def frame_clock(rows: pl.DataFrame, path: Path, given: float | None) -> tuple[fl
     `rows` has id, t [frames], x, y, and vx, vy in the same unit of length a second; `given` is the frame
     rate, or None to take what the velocities tell.  Raises DataError where they do not, or it has no meaning.
     """
-    if given is not None and not FRAME_RATES[0] <= given <= FRAME_RATES[1]:
-        raise DataError(
-            f"frame_rate must be frames a second from {FRAME_RATES[0]:g} to {FRAME_RATES[1]:g}; got {given}"
-        )
     sane = pl.all_horizontal(pl.col("t", "id", "x", "y", "vx", "vy").abs() < _FARTHEST_NUMBER)
     rows = rows.filter(sane).sort("id", "t")  # what is no number, or NaN, is not sane
     told, why = told_rate(rows)

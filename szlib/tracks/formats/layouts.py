@@ -16,8 +16,9 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from ... import memory
 from ...errors import DataError
+from ..options import UNITS, Columns, ReadOptions
 from .foreign import LOADERS, foreign_format, load
-from .frame_rates import FRAME_RATES, frame_clock
+from .frame_rates import frame_clock
 from .plain import LONGEST_LINE, ROW, first_line
 
 
@@ -46,8 +47,6 @@ class Format:
         return self.metres if unit is None or self.name in LOADERS else UNITS[unit]
 
 
-Columns = Mapping[str, str | int]
-"""Which column holds t [s] or frame, id, x, y and day: its name, or the number of the field from 0."""
 _TIXY = {"t": 0, "id": 1, "x": 2, "y": 3}
 _PEDPY = {"t": "frame", "id": "id", "x": "x", "y": "y"}
 
@@ -59,8 +58,6 @@ FORMATS = {
     "tidy": Format("tidy", header=True),
     **{name: Format(name) for name in LOADERS},
 }
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-"""Metres in a unit of position."""
 
 EXPECTED = (
     "expected one of: atc-raw (8 numbers, commas, no header), atc-1hz (6 numbers, commas, no header), "
@@ -81,21 +78,14 @@ def readable(path: Path, layout: Format) -> Iterator[None]:
         raise DataError(f"{path}: cannot be read as {layout.name} ({error}); {EXPECTED}") from error
 
 
-def recognise(
-    plain: Path,
-    path: Path,
-    name: str | None,
-    frame_rate: float | None = None,
-    *,
-    columns: Columns | None = None,
-    unit: str | None = None,
-) -> tuple[Format, pl.LazyFrame]:
+def recognise(plain: Path, path: Path, options: ReadOptions) -> tuple[Format, pl.LazyFrame]:
     """Recognise the layout by the first line; a scan gives line, t, id, x, y (, day) and `ragged`.
 
     Where frames are counted the layout says how long one is: 1 / `frame_rate`, or (EWAP) as the file's own
-    velocities tell.  `columns` and `unit` as in `szlib.read_tracks`.  Raises DataError where frames have no
-    length, and for a rate where no frames are counted.
+    velocities tell.  Raises DataError where frames have no length, and for a rate
+    where no frames are counted.
     """
+    name, columns, frame_rate = options.file_format, options.columns, options.frame_rate
     with plain.open("rb") as stream:
         head = stream.readline(LONGEST_LINE)
     if head[:4] == b"PAR1":
@@ -103,7 +93,7 @@ def recognise(
     if foreign := name if name in LOADERS else foreign_format(head) if name is None else None:
         if columns:
             raise DataError(f"{path}: is {foreign}, whose columns are known; leave columns out")
-        data, rate = load(foreign, plain, path, frame_rate=frame_rate, unit=unit)
+        data, rate = load(foreign, plain, path, frame_rate=frame_rate, unit=options.unit)
         rows = pl.DataFrame({to: data[name].to_numpy().astype(float) for to, name in _PEDPY.items()})
         return replace(FORMATS[foreign], seconds=1 / rate), scan_of(rows)
     if b"\0" in head:
@@ -112,8 +102,6 @@ def recognise(
     if not first:
         raise DataError(f"{path}, line 1: the file is empty or begins with a blank line; {EXPECTED}")
     layout = FORMATS["tidy"] if columns else layout_of(first, name)
-    if columns and name not in (None, "tidy"):
-        raise DataError(f"{path}: columns are for tidy tables; leave columns out, or file_format={name!r}")
     if layout.name == "tidy":
         layout = _tidy(path, first, columns, frame_rate)
         scan = _scan_lines(plain, layout) if layout.separator == " " else _scan_csv(plain, layout)
@@ -150,10 +138,6 @@ def chosen_columns(
     beginning with `where`, for a column that is missing, doubled or unknown, or frames of no length.
     """
     given = dict(columns or {})
-    if unknown := sorted(set(given) - {*_TIXY, "frame", "day"}):
-        raise DataError(f"columns: {unknown} are none of szlib's; expected some of t or frame, id, x, y, day")
-    if {"t", "frame"} <= set(given):
-        raise DataError("columns: both t and frame are given; expected one of them")
     frames = "frame" in given or ("t" not in given and "t" not in names and "frame" in names)
     wanted = {name: given.get(name, name) for name in ("id", "x", "y")}
     wanted["t"] = given.get("frame", "frame") if frames else given.get("t", "t")
@@ -175,11 +159,8 @@ def chosen_columns(
             f"{where}: is tidy, whose times are in seconds; leave frame_rate out, or say which column counts "
             "frames: columns={'frame': ...}"
         )
-    if frames and (frame_rate is None or not FRAME_RATES[0] <= frame_rate <= FRAME_RATES[1]):
-        raise DataError(
-            f"{where}: {wanted['t']!r} counts frames; pass frame_rate=, frames a second from "
-            f"{FRAME_RATES[0]:g} to {FRAME_RATES[1]:g}; got {frame_rate}"
-        )
+    if frames and frame_rate is None:
+        raise DataError(f"{where}: {wanted['t']!r} counts frames; pass frame_rate=, frames a second")
     found = numbered | {name: list(names).index(text) for name, text in texts.items()}
     return found, 1 / frame_rate if frames and frame_rate else 1.0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,8 @@ import pandas as pd
 import polars as pl
 
 from ...errors import DataError
-from .layouts import Columns, Format, chosen_columns, scan_of
+from ..options import ReadOptions
+from .layouts import Format, chosen_columns, scan_of
 
 
 def is_table(source: object) -> bool:
@@ -17,21 +19,23 @@ def is_table(source: object) -> bool:
     return isinstance(source, pd.DataFrame) or (hasattr(source, "data") and hasattr(source, "frame_rate"))
 
 
-def recognise_table(
-    source: Any, where: Path, *, columns: Columns | None, frame_rate: float | None, tz: str
-) -> tuple[Format, pl.LazyFrame]:
+def recognise_table(source: Any, where: Path, options: ReadOptions) -> tuple[Format, pl.LazyFrame]:
     """Layout and scan of a table, as from `layouts.recognise`; `where` stands for its name in messages.
 
     Times may be datetimes (without a zone: those of `tz`).  Raises DataError for columns as `chosen_columns`.
     """
     if not isinstance(source, pd.DataFrame):  # PedPy's, which counts frames
-        columns = {"frame": "frame"} | dict(columns or {})
-        source, frame_rate = source.data, float(frame_rate or source.frame_rate)
+        options = replace(
+            options,
+            columns={"frame": "frame"} | dict(options.columns or {}),
+            frame_rate=float(options.frame_rate or source.frame_rate),
+        )
+        source = source.data
     names = [str(name) for name in source.columns]
     shown = f"{where}: a table of {', '.join(names[:12])}"
-    found, seconds = chosen_columns(names, columns, frame_rate, shown)
+    found, seconds = chosen_columns(names, options.columns, options.frame_rate, shown)
     rows = {name: source.iloc[:, at] for name, at in found.items()}
-    rows["t"] = _seconds(rows["t"], tz)
+    rows["t"] = _seconds(rows["t"], options.tz)
     rows |= {name: pd.to_numeric(rows[name], errors="coerce") for name in ("t", "id", "x", "y")}
     if "day" in rows:
         rows["day"] = rows["day"].astype("string")
