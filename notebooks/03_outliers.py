@@ -36,7 +36,8 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.plaza import scores, truth
+from szlib.plaza import accuracy
+from szlib.plaza.settings import SLOW_INTRUDERS
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 from szlib.zones import outliers
@@ -143,17 +144,17 @@ record.claim(
 # removed, how many are of intruders? *Recall*: of the intruders' samples, how many are removed?
 
 # %%
-settings = szlib.PlazaSettings(intruders=intruders, pace=truth.SLOW)
+settings = szlib.PlazaSettings(intruders=intruders, pace=SLOW_INTRUDERS)
 file = szlib.make_plaza(record.out / "03_intruders.csv", seed=seed, settings=settings)
 people = szlib.find_encounters(szlib.read_tracks(file), **record.method.search())
 people = people[people["distance"] <= r_max]
-intruder = scores.true_kinds(people, seed=seed, settings=settings) == "intruder"
+intruder = accuracy.true_kinds(people, seed=seed, settings=settings) == "intruder"
 crossed = people.loc[intruder, "encounter"].nunique()
 print(f"{people['encounter'].nunique():,} encounters within {r_max:g} m, {crossed} of them with an intruder")
 
 # %%
 quota = outliers.is_outlier(people, fraction=fraction, r_max=r_max)
-precision, recall = scores.precision_and_recall(quota, intruder)
+precision, recall = accuracy.precision_and_recall(quota, intruder)
 record.key |= {"quota: precision": precision, "quota: recall": recall}
 record.claim(
     "LOF with the paper's quota finds most samples of intruders",
@@ -200,7 +201,7 @@ for ax, (rule, mask) in zip(both, rules.items(), strict=True):
     for who, gone, marker, colour, label in kinds:
         size = 2 if marker == "." else 4
         ax.plot(*points[who & (mask == gone)].T, marker, color=colour, ms=size, mew=0.8, label=label)
-    precision, recall = scores.precision_and_recall(mask, intruder)
+    precision, recall = accuracy.precision_and_recall(mask, intruder)
     figures.label_metres(ax, f"{rule}: precision {precision:.0%}, recall {recall:.0%}")
     ax.set(xlabel="x' = (r_max - r) cos LOS [m]", ylabel="y' = (r_max - r) sin LOS [m]")
 fig.legend(*both[1].get_legend_handles_labels(), loc="outside lower center", ncols=4, markerscale=2)
@@ -209,11 +210,11 @@ record.figure(fig, "found")
 # %%
 errors = {}
 for rule, mask in rules.items():
-    options = {"method": "hull", "outlier_fraction": 0, "speeds": scores.SPEEDS, "resamples": 0}
+    options = {"method": "hull", "outlier_fraction": 0, "speeds": accuracy.SPEEDS, "resamples": 0}
     zone = szlib.SocialZone.fit(people[~mask], r_max=r_max, **options)
-    errors[rule] = scores.largest_error(zone, settings)
+    errors[rule] = accuracy.largest_error(zone, settings)
     print(f"{rule}: centre or axes of the zone off by up to {errors[rule]:.3f} m")
-precision, recall = scores.precision_and_recall(whole, intruder)
+precision, recall = accuracy.precision_and_recall(whole, intruder)
 record.key |= {"encounters: precision": precision, "encounters: recall": recall}
 record.check("whole encounters: intruders found", recall > 0.95, f"recall {recall:.0%}")
 record.check("whole encounters: nobody else", precision > 0.95, f"precision {precision:.0%}")

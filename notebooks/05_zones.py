@@ -33,7 +33,7 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.settings import PlazaSettings
 from szlib.simulation import paper_claims as claims
 from szlib.workbook import figures, laboratory
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters

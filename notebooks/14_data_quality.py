@@ -36,8 +36,8 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels, quality
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters

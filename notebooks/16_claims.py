@@ -34,7 +34,7 @@ import pandas as pd
 from IPython.display import Markdown
 
 import szlib
-from szlib.plaza.scores import true_kinds
+from szlib.plaza.accuracy import true_kinds
 from szlib.simulation import paper_claims as claims
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters

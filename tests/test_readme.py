@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.workbook.command_line import options
 
 ROOT = Path(__file__).parent.parent

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Array
 from ..errors import ZoneError
-from .costmap import Layer
+from .costmaps import Layer
 
 Curve = Callable[[Array], Array]
 

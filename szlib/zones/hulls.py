@@ -24,9 +24,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import ZoneError
 from ..tracks import funnels
-from .by_direction.radii import DIRECTIONS
 from .ellipses import minimum_enclosing_ellipse
 from .outliers import complementary_points, encounter_numbers, remove_outliers
+from .polar import DIRECTIONS
 
 
 def hull_vertices(points: ArrayLike) -> np.ndarray:
@@ -145,7 +145,7 @@ def slice_hull(points: ArrayLike, speed: float, *, r_max: float) -> Slice:
 
 
 @dataclass(frozen=True, eq=False)
-class HullZones:
+class HullEstimator:
     """The paper's way to zones: outliers, hull, slices, smallest ellipses; to go again with other people.
 
     Parameters
@@ -174,7 +174,7 @@ class HullZones:
         outlier_fraction: float | None = None,
         neighbours: int | None = None,
         speed_scale: float | None = None,
-    ) -> HullZones:
+    ) -> HullEstimator:
         """From samples; parameters and errors as in `szlib.remove_outliers`."""
         inliers = remove_outliers(
             samples, outlier_fraction, r_max, neighbours=neighbours, speed_scale=speed_scale
@@ -199,7 +199,7 @@ class HullZones:
     def radii(self, speeds: Sequence[float]) -> None:
         """None: the vertices tell all."""
 
-    def others(
+    def refit(
         self, weights: np.ndarray, speeds: Sequence[float], rng: np.random.Generator | None = None
     ) -> np.ndarray:
         """Ellipses (k, s, 5) of the encounters whose weights (k, n) are above 0; NaN: no zone.
@@ -220,7 +220,7 @@ class HullZones:
                     start[j] = np.flatnonzero(on).tolist()
         return ellipses
 
-    def without_each(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], np.ndarray]:
+    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], np.ndarray]:
         """The encounters that the hull rests on (k,), and the ellipses (k, s, 5) without each of them.
 
         A new vertex is a point of these encounters, or a vertex of the hull of all others.
@@ -234,7 +234,7 @@ class HullZones:
         shell = replace(self, points=self.points[kept], encounter=self.encounter[kept])
         weights = np.ones((len(on), len(self.encounters)))
         weights[np.arange(len(on)), on] = 0
-        return on, shell.others(weights, speeds)
+        return on, shell.refit(weights, speeds)
 
 
 def _reach(hull: ConvexHull, unit: np.ndarray, speeds: Sequence[float]) -> np.ndarray:

@@ -24,14 +24,14 @@ from .. import __version__
 from ..checks import check_columns
 from ..encounters.null_model import NullEncounters
 from ..errors import DataWarning, ZoneError
-from .by_direction.quantile import QuantileZones
-from .by_direction.radii import Radii
-from .costmap import Layer
+from .costmaps import Layer
 from .ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
-from .hulls import HullZones, Slice, hull_vertices, slice_hull
+from .hulls import HullEstimator, Slice, hull_vertices, slice_hull
 from .outliers import R_MAX, encounter_numbers
-from .respect.estimate import RespectZones
-from .respect.significance import NullTest, null_test
+from .polar import PolarZone
+from .quantile import QuantileEstimator
+from .respect_estimator import RespectEstimator
+from .respect_significance import NullTest, null_test
 from .uncertainty import QUANTITIES, RESAMPLES, Estimate, Uncertainty, count_seen, measure, missing_sides
 from .zone_file import check_whole, read_zone, write_zone, zone_fields
 
@@ -39,9 +39,9 @@ SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Speeds of the reference pedestrian whose zones are fitted [m/s] (assumed; the paper shows a range)."""
 
 METHODS: dict[str, tuple[Callable[..., Estimate], tuple[str, ...]]] = {
-    "hull": (HullZones.of, ("outlier_fraction", "neighbours", "speed_scale")),
-    "quantile": (QuantileZones.of, ("q",)),
-    "respect": (RespectZones.of, ("speed_width",)),
+    "hull": (HullEstimator.of, ("outlier_fraction", "neighbours", "speed_scale")),
+    "quantile": (QuantileEstimator.of, ("q",)),
+    "respect": (RespectEstimator.of, ("speed_width",)),
 }
 """Ways to a zone, and the keywords of `SocialZone.fit` that belong to each."""
 
@@ -74,7 +74,7 @@ class SocialZone(Layer):
     undefined: dict[float, str] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
     method: str = "hull"
-    radii: Radii | None = None
+    radii: PolarZone | None = None
     seen: pd.DataFrame | None = None
     uncertainty: Uncertainty | None = None
     null_test: NullTest | None = None

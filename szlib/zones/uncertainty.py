@@ -35,9 +35,9 @@ from scipy.stats import norm
 
 from ..checks import Array
 from ..errors import DataError
-from .by_direction.quantile import BAND
-from .by_direction.radii import DIRECTIONS, Radii, ellipse_reach
 from .outliers import encounter_numbers
+from .polar import DIRECTIONS, PolarZone, ellipse_reach
+from .quantile import BAND
 
 SECTORS = (
     "ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right"
@@ -89,20 +89,18 @@ class Estimate(Protocol):
         """Of the hull, where there is one."""
         ...
 
-    def radii(self, speeds: Sequence[float]) -> Radii | None:
+    def radii(self, speeds: Sequence[float]) -> PolarZone | None:
         """By direction at speeds, ascending [m/s]; None where the vertices tell all."""
         ...
 
-    def others(
-        self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None
-    ) -> Array:
+    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
         """Ellipses (k, s, 5) for weights (k, n) of the encounters: centre, semi-axes, angle; NaN: none.
 
         What else is known from a draw only (a null model's shifts) is drawn anew by rng, if there is one.
         """
         ...
 
-    def without_each(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
+    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
         """The encounters that matter most (k,), and the ellipses (k, s, 5) without each of them."""
         ...
 
@@ -194,8 +192,8 @@ def measure(estimate: Estimate, speeds: Sequence[float], *, resamples: int, seed
     else:
         drawn = rng.multinomial(n, np.full(n, 1 / n), size=resamples)
         back, how = 0.0, f"bootstrap: {n} of {n} {unit}, bias-corrected percentiles"
-    ellipses = estimate.others(np.ones((1, len(member))), speeds)
-    others = estimate.others(drawn[:, member].astype(float), speeds, rng)
+    ellipses = estimate.refit(np.ones((1, len(member))), speeds)
+    others = estimate.refit(drawn[:, member].astype(float), speeds, rng)
     reach = ellipse_reach(ellipses)
     known = _quantities(ellipses)
     away = _quantities(others) - known
@@ -219,7 +217,7 @@ def measure(estimate: Estimate, speeds: Sequence[float], *, resamples: int, seed
 
 def _influence(estimate: Estimate, speeds: Sequence[float], ellipses: Array) -> pd.DataFrame:
     """Whose absence moves centre or semi-axes most, by speed; infinitely far where no zone is left."""
-    tried, without = estimate.without_each(speeds)
+    tried, without = estimate.leave_one_out(speeds)
     moved = np.abs(without - ellipses)[..., :4].max(axis=-1)
     moved[np.isnan(moved)] = np.inf
     who = estimate.encounters["encounter"].to_numpy()[tried[np.argmax(moved, axis=0)]]

@@ -18,9 +18,9 @@ import pandas as pd
 from .. import __version__
 from ..errors import SzlibError, ZoneError
 from ..files import write_file
-from .by_direction.radii import Radii
 from .ellipses import Ellipse
-from .respect.significance import NullTest
+from .polar import PolarZone
+from .respect_significance import NullTest
 from .uncertainty import SECTORS, Uncertainty
 
 FORMAT, VERSION = "szlib.SocialZone", 2
@@ -104,7 +104,7 @@ def zone_fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
         "provenance": dict(content["provenance"]),
         "method": str(content["method"]),
-        "radii": None if radii is None else Radii(**{k: np.array(v, float) for k, v in radii.items()}),
+        "radii": None if radii is None else PolarZone(**{k: np.array(v, float) for k, v in radii.items()}),
         "seen": None if seen is None else _table(seen, _SEEN),
         "uncertainty": None if uncertainty is None else _uncertainty(uncertainty),
         "null_test": None if content["null_test"] is None else NullTest.from_record(content["null_test"]),

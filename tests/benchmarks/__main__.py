@@ -33,7 +33,7 @@ from szlib.checks import Array
 from szlib.control import problem
 from szlib.control.solvers import ipopt
 from szlib.files import CACHE
-from szlib.plaza.people import make_plaza
+from szlib.plaza.generation import make_plaza
 from szlib.tracks import datasets
 
 

@@ -12,8 +12,8 @@ from benchmarks import measuring
 from helpers.paper_samples import PAPER_SAMPLES, paper_samples
 
 import szlib
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.tracks.clock import to_clock
 from szlib.tracks.readers import read_raw
 from szlib.zones import outliers

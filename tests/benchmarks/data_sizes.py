@@ -24,7 +24,7 @@ from sklearn.neighbors import LocalOutlierFactor
 
 import szlib
 from szlib.files import CACHE
-from szlib.plaza.people import make_plaza
+from szlib.plaza.generation import make_plaza
 from szlib.zones import outliers
 
 RAW_DAY_VARIABLE = "SZLIB_RAW_DAY"

@@ -13,7 +13,7 @@ import pytest
 import szlib
 from szlib.control.differential import Unicycle
 from szlib.control.distances import euclidean_to_ellipse
-from szlib.zones.by_direction.radii import DIRECTIONS, Radii
+from szlib.zones.polar import DIRECTIONS, PolarZone
 
 NODE = Path(__file__).parents[2] / "notebooks" / "examples" / "ros2_node.py"
 ZONE = szlib.Ellipse((0.1, 0.0), (0.9, 0.7), 0.0)
@@ -112,7 +112,7 @@ def make(monkeypatch, tmp_path):
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "ros2_node", module)
     spec.loader.exec_module(module)
-    radii = Radii(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
+    radii = PolarZone(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
     szlib.SocialZone(None, 2.0, {1.1: ZONE}, {}, {}, "quantile", radii).save(tmp_path / "zone.json")
 
     def node(**parameters):

@@ -19,8 +19,8 @@ import pytest
 import szlib
 from szlib.encounters import days as extraction
 from szlib.files import claim_folder
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
 
 DATES = ("2012-10-24", "2012-10-28", "2012-10-31", "2012-11-04")

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from conftest import make_tracks, make_walk
+from helpers.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.errors import DataError
@@ -18,7 +19,7 @@ ASKED = {"minutes": (1.0, 5.0), "min_distance": 0.5}
 
 @pytest.fixture(scope="module")
 def tracks() -> pd.DataFrame:
-    return szlib.indifferent_crowd(seed=5, people=500, minutes=15)
+    return noninteracting_crowd(seed=5, people=500, minutes=15)
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from conftest import DAY, make_tracks, make_walk
+from helpers.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.encounters.time_shift import APART, Crowd
@@ -20,7 +21,7 @@ MINUTES = (1.0, 5.0)
 @pytest.fixture(scope="module")
 def tracks() -> pd.DataFrame:
     """300 people in 20 minutes, some of them cut off by the end of the recording."""
-    return szlib.indifferent_crowd(seed=3, people=300, minutes=20)
+    return noninteracting_crowd(seed=3, people=300, minutes=20)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,7 @@ def test_velocities_stay_away_from_the_seam(tracks: pd.DataFrame, shifted: pd.Da
 
 def test_density_stays_even_at_the_ends_of_the_recording() -> None:
     """Reflected shifts would leave the first and the last minutes half empty."""
-    tracks = szlib.indifferent_crowd(seed=0, people=2000, minutes=20)
+    tracks = noninteracting_crowd(seed=0, people=2000, minutes=20)
     minute = ticks(tracks) // 600
     before = np.bincount(minute, minlength=20)[1:20]
     after = sum(

@@ -13,8 +13,8 @@ import pytest
 import szlib
 from szlib.encounters import blocks, cells
 from szlib.encounters.near_rows import read_near_square
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
 from szlib.tracks.formats.layouts import quick_scan, recognise

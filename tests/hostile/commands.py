@@ -26,8 +26,8 @@ import pyarrow.parquet as pq
 
 import szlib.encounters.days
 import szlib.zones.social_zone  # noqa: F401 - before the first fork
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.tracks.clock import read_tracks
 from szlib.workbook.command_line import main
 from szlib.workbook.record import places

@@ -26,8 +26,8 @@ import pandas as pd
 import szlib
 from szlib import files
 from szlib.errors import DataError, StorageError, ZoneError
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.workbook.record import NotebookRecord

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import szlib
 from szlib.files import MARKER
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 
 KILLS = {False: 1, True: 50}
 GRACE = 20.0

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.plaza.scores import true_kinds
+from szlib.plaza.accuracy import true_kinds
 from szlib.simulation import paper_claims as claims
 from szlib.tracks import sites
 from szlib.zones.outliers import is_outlier

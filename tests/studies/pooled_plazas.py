@@ -16,7 +16,8 @@ from tqdm import tqdm
 
 import szlib
 from szlib.errors import ZoneError
-from szlib.plaza import scores, truth
+from szlib.plaza import accuracy
+from szlib.plaza.settings import RUSHING_INTRUDERS, SLOW_INTRUDERS
 
 TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "03_outliers.csv"
 RULES: dict[str, dict[str, float | None]] = {
@@ -33,10 +34,10 @@ INTRUDERS = [
     (0.02, "rushing"),
     (0.02, "slow"),
 ]
-PACES = {"rushing": truth.RUSHING, "slow": truth.SLOW}
+PACES = {"rushing": RUSHING_INTRUDERS, "slow": SLOW_INTRUDERS}
 FAMILIES = (0, 100)
 POOLED = (1, 3, 5, 6, 8)
-HULL = {"method": "hull", "outlier_fraction": 0.0, "speeds": scores.SPEEDS, "resamples": 0}
+HULL = {"method": "hull", "outlier_fraction": 0.0, "speeds": accuracy.SPEEDS, "resamples": 0}
 COSTLY = {
     (share, pace, 0, plazas)
     for share, pace in (INTRUDERS[1], INTRUDERS[3], INTRUDERS[5])
@@ -50,7 +51,7 @@ def plaza_samples(seed: int, settings: szlib.PlazaSettings) -> pd.DataFrame:
     with tempfile.TemporaryDirectory() as folder:
         file = szlib.make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings)
         samples = szlib.find_encounters(szlib.read_tracks(file))
-    return samples.assign(kind=scores.true_kinds(samples, seed=seed, settings=settings))
+    return samples.assign(kind=accuracy.true_kinds(samples, seed=seed, settings=settings))
 
 
 def pooled(tables: list[pd.DataFrame]) -> pd.DataFrame:
@@ -67,9 +68,9 @@ def judged(
     close = samples[samples["distance"] <= 2.0].reset_index(drop=True)
     kept = szlib.remove_outliers(close, **rule)
     removed = ~close.index.isin(kept.index)
-    precision, recall = scores.precision_and_recall(removed, close["kind"] == "intruder")
+    precision, recall = accuracy.precision_and_recall(removed, close["kind"] == "intruder")
     try:
-        error = scores.largest_error(szlib.SocialZone.fit(kept, **HULL), settings)
+        error = accuracy.largest_error(szlib.SocialZone.fit(kept, **HULL), settings)
     except ZoneError:  # nothing is left of the zone
         error = np.nan
     return {"removed": removed.mean(), "precision": precision, "recall": recall, "error": error}

@@ -5,7 +5,8 @@ python tests/studies/respect.py sites       15_sites.csv      radii, intervals a
 python tests/studies/respect.py n-curve     15_n_curve.csv    hull and respect zone by number of encounters
 python tests/studies/respect.py changes     15_changes.csv    the radius at Grand Central, one thing changed
 
-They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/ and gc/).
+Set PYTHONPATH=tests. They go to notebooks/tables.
+The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/ and gc/).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 import joblib
 import numpy as np
 import pandas as pd
+from helpers.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.parallel import run_tasks
@@ -73,7 +75,7 @@ def nobody(asked: argparse.Namespace) -> list[dict[str, object]]:
 
 
 def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
-    tracks = szlib.indifferent_crowd(seed=seed, people=500, minutes=30, bunch=bunch)
+    tracks = noninteracting_crowd(seed=seed, people=500, minutes=30, bunch=bunch)
     samples = szlib.find_encounters(tracks)
     null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
     rows = []
@@ -143,11 +145,11 @@ def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
 def resampled(samples: pd.DataFrame, null: szlib.NullEncounters, theta: np.ndarray) -> Iterator[np.ndarray]:
     """Radius of all bearings, and radii in directions theta, of resampled pairs of people."""
     pair = pairs(samples)
-    against = szlib.Presence.of(null.samples, r_max=null.r_max)
+    against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
     rng = np.random.default_rng(0)
     for _ in range(RESAMPLES):
         drawn = np.bincount(rng.integers(pair.max() + 1, size=pair.max() + 1), minlength=pair.max() + 1)
-        data = szlib.Presence.of(samples, r_max=null.r_max, weights=drawn[pair])
+        data = szlib.OccupancyHistogram.from_samples(samples, r_max=null.r_max, weights=drawn[pair])
         if data.counts.any():
             yield np.r_[szlib.respect_radius(data, against), szlib.respect_boundary(data, against, theta)]
 
@@ -179,7 +181,7 @@ def n_curve(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
         samples, null = data_and_null(site, 1.0, asked)
         for name in ("all", "strangers", "opposite, crossing"):
             data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
-            others = szlib.Presence.of(against.samples, r_max=null.r_max)
+            others = szlib.OccupancyHistogram.from_samples(against.samples, r_max=null.r_max)
             total = data["encounter"].nunique()
             for n in sorted({*(size for size in SIZES if size < total), total}):
                 drawn = pd.DataFrame(draws(data, against, others, n, DRAWS if n < total else 1))
@@ -193,7 +195,7 @@ def n_curve(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
 
 
 def draws(
-    data: pd.DataFrame, null: szlib.NullEncounters, against: szlib.Presence, n: int, times: int
+    data: pd.DataFrame, null: szlib.NullEncounters, against: szlib.OccupancyHistogram, n: int, times: int
 ) -> Iterator[dict[str, float]]:
     """Hull and respect radius of n encounters of the data, and of n of one shift of the null model."""
     rng = np.random.default_rng(n)
@@ -204,8 +206,8 @@ def draws(
         own = null.encounters.loc[null.encounters["shift"] == shift, "encounter"].to_numpy()
         model = null.one(shift)
         chosen = model[model["encounter"].isin(rng.choice(own, min(n, len(own)), replace=False))]
-        whole = szlib.Presence.of(model, r_max=null.r_max)
-        rest = szlib.Presence(against.counts - whole.counts, null.r_max)
+        whole = szlib.OccupancyHistogram.from_samples(model, r_max=null.r_max)
+        rest = szlib.OccupancyHistogram(against.counts - whole.counts, null.r_max)
         yield {
             "hull_a": hull_a(part),
             "respect": szlib.respect_radius(part, against),
@@ -240,14 +242,17 @@ def changes(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
         for name, kinds in WHO.items():
             data, null = szlib.of_kind(found[0], kinds), found[1].of_kind(kinds)
             data = data[data["distance"] < null.r_max]
-            against = szlib.Presence.of(null.samples, r_max=null.r_max)
+            against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
             pair = pairs(data)
             rng, drawn = np.random.default_rng(0), [np.ones(len(data))]
             drawn += [
                 rng.multinomial(pair.max() + 1, np.full(pair.max() + 1, 1 / (pair.max() + 1)))[pair]
                 for _ in range(RESAMPLES)
             ]
-            weighted = [szlib.Presence.of(data, r_max=null.r_max, weights=weights) for weights in drawn]
+            weighted = [
+                szlib.OccupancyHistogram.from_samples(data, r_max=null.r_max, weights=weights)
+                for weights in drawn
+            ]
             row = {
                 "change": change,
                 "kinds": name,
@@ -282,7 +287,7 @@ def changed(
     )
 
 
-def half_in_bins(data: szlib.Presence, null: szlib.Presence) -> float:
+def half_in_bins(data: szlib.OccupancyHistogram, null: szlib.OccupancyHistogram) -> float:
     """Where g in bins of 0.1 m, all bearings, is 1/2 of that beyond 1.2 m, seen from there [m]; plain."""
     real, model = (each.counts.sum(axis=(0, 1)).reshape(20, -1).sum(axis=1) for each in (data, null))
     middle = (np.arange(20) + 0.5) * data.r_max / 20

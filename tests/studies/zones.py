@@ -29,9 +29,9 @@ import pandas as pd
 from scipy.optimize import least_squares
 
 import szlib
-from szlib.plaza.truth import PlazaSettings
-from szlib.zones.by_direction.quantile import smoothed
+from szlib.plaza.settings import PlazaSettings
 from szlib.zones.ellipses import Ellipse
+from szlib.zones.quantile import smoothed
 from szlib.zones.uncertainty import QUANTITIES
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)

@@ -12,8 +12,8 @@ from conftest import make_tracks, make_walk, real_data
 from test_formats import RATE, in_seconds, people
 
 import szlib
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.tracks.readers import read_raw
 
 

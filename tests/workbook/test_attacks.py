@@ -17,8 +17,8 @@ import pytest
 import szlib
 from szlib import files
 from szlib.errors import DataError, StorageError
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import datasets
 from szlib.workbook.command_line import main
 from szlib.workbook.record import NotebookRecord, notebook, places

@@ -8,8 +8,8 @@ import pytest
 
 import szlib
 from szlib import ATC_SQUARE, parallel
-from szlib.plaza.people import make_plaza
-from szlib.plaza.truth import PlazaSettings
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.workbook.command_line import main
 
 

@@ -8,8 +8,8 @@ import pytest
 from helpers.passers import TRUTH, passers
 
 import szlib
-from szlib.zones.by_direction.quantile import BAND, approaches, encounter_numbers, quantile_radii, smoothed
-from szlib.zones.by_direction.radii import DIRECTIONS, ellipse_reach
+from szlib.zones.polar import DIRECTIONS, ellipse_reach
+from szlib.zones.quantile import BAND, approaches, encounter_numbers, quantile_radii, smoothed
 
 
 def ellipse(samples: pd.DataFrame, **options: object) -> np.ndarray:

@@ -10,9 +10,9 @@ import pytest
 
 import szlib
 from szlib.errors import ZoneError
-from szlib.zones.respect.boundary import fit_respect, respect_boundary, respect_radius
-from szlib.zones.respect.estimate import RespectZones
-from szlib.zones.respect.presence import Presence, pair_correlation
+from szlib.zones.occupancy import OccupancyHistogram, pair_correlation
+from szlib.zones.respect import fit_respect, respect_boundary, respect_radius
+from szlib.zones.respect_estimator import RespectEstimator
 
 R_MAX = 2.0
 THETA = np.linspace(-np.pi, np.pi, 24, endpoint=False)
@@ -155,10 +155,10 @@ def test_a_mirrored_world_has_a_mirrored_zone(null: szlib.NullEncounters) -> Non
 def test_weights_are_copies(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(10, 2_000), ZONE)
     weights = np.random.default_rng(0).integers(0, 4, len(data))
-    weighed = Presence.of(data, r_max=R_MAX, weights=weights)
-    copies = Presence.of(data.loc[data.index.repeat(weights)], r_max=R_MAX)
+    weighed = OccupancyHistogram.from_samples(data, r_max=R_MAX, weights=weights)
+    copies = OccupancyHistogram.from_samples(data.loc[data.index.repeat(weights)], r_max=R_MAX)
     np.testing.assert_array_equal(weighed.counts, copies.counts)
-    against = Presence.of(null.samples, r_max=R_MAX)
+    against = OccupancyHistogram.from_samples(null.samples, r_max=R_MAX)
     assert respect_radius(weighed, against) == respect_radius(data.loc[data.index.repeat(weights)], null)
 
 
@@ -172,11 +172,11 @@ def test_what_is_far_does_not_matter(null: szlib.NullEncounters) -> None:
 def test_a_null_of_few_shifts_is_drawn_anew_as_well(null: szlib.NullEncounters) -> None:
     few = szlib.NullEncounters(null.samples[:2000], null.encounters[:2000], 11, R_MAX)  # nobody in the last
     data = kept_out(scattered(1, 2000), szlib.Ellipse((0, 0), (0.9, 0.7)))
-    zones = RespectZones.of(data, r_max=R_MAX, null=few)
+    zones = RespectEstimator.of(data, r_max=R_MAX, null=few)
     alike = np.ones((5, len(zones.encounters)))
-    same = zones.others(alike, [1.0])
+    same = zones.refit(alike, [1.0])
     assert np.ptp(same, axis=0).max() == 0
-    drawn = zones.others(alike, [1.0], np.random.default_rng(0))
+    drawn = zones.refit(alike, [1.0], np.random.default_rng(0))
     assert np.ptp(drawn[:, 0, 2]) > 0.005
     np.testing.assert_allclose(zones.shifts.sum(axis=0), zones.null.counts)
 
@@ -195,7 +195,7 @@ def test_nothing_to_compare(null: szlib.NullEncounters) -> None:
     with pytest.raises(ZoneError, match="at about 50 m/s"):
         fit_respect(data, null, speed=50.0)
     with pytest.raises(ZoneError, match="same r_max"):
-        respect_radius(Presence.of(data, r_max=1.5), null)
+        respect_radius(OccupancyHistogram.from_samples(data, r_max=1.5), null)
 
 
 # --- the map -----------------------------------------------------------------------------------------

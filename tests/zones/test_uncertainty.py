@@ -8,7 +8,7 @@ import pytest
 from helpers.passers import passers
 
 import szlib
-from szlib.zones.by_direction.quantile import QuantileZones
+from szlib.zones.quantile import QuantileEstimator
 from szlib.zones.uncertainty import (
     DAYS_NEEDED,
     NEEDED,
@@ -149,4 +149,4 @@ def test_resamples_without_a_zone_leave_no_interval() -> None:
 @pytest.mark.parametrize("resamples", [1, -3, 2.5])
 def test_resamples_without_meaning(samples: pd.DataFrame, resamples: float) -> None:
     with pytest.raises(szlib.DataError, match="resamples must be a whole number"):
-        measure(QuantileZones.of(samples, r_max=2.0), SPEEDS, resamples=resamples, seed=0)
+        measure(QuantileEstimator.of(samples, r_max=2.0), SPEEDS, resamples=resamples, seed=0)

@@ -9,8 +9,8 @@ from typing import NamedTuple, Protocol
 
 from ...checks import LARGEST, check_number, check_point
 from ...errors import SolverError, ZoneError
-from ...zones.costmap import BODY_RADIUS as BODY_RADIUS
-from ...zones.costmap import circle_around as circle_around
+from ...zones.costmaps import BODY_RADIUS as BODY_RADIUS
+from ...zones.costmaps import circle_around as circle_around
 from ...zones.ellipses import Ellipse
 from ..barriers import barrier, ellipse_formula
 from ..settings import MPCSettings

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...plaza.scores import precision_and_recall
+from ...plaza.accuracy import precision_and_recall
 from ...zones.outliers import NEIGHBOURS, complementary_points, local_outlier_factors, nearest_approaches
 from .task import Case, Rng, Task, formula
 

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from ...encounters.finding import find_encounters
-from ...plaza.people import make_plaza
-from ...plaza.truth import SLOW, PlazaSettings
+from ...plaza.generation import make_plaza
+from ...plaza.settings import SLOW_INTRUDERS, PlazaSettings
 from ...tracks.clock import read_tracks
 from ...zones.ellipses import Ellipse, minimum_enclosing_ellipse
 from ...zones.hulls import Slice
@@ -83,7 +83,7 @@ def _circumscribed(triangle: Any) -> float:
 def _plaza(seed: int, a: float, b: float) -> tuple[pd.DataFrame, Ellipse]:
     """What people did on a plaza whose zone nobody knows, and that zone."""
     slow, fast = (Ellipse((0.05, 0.0), (a + grow, b + grow)) for grow in (-0.04, 0.04))
-    settings = PlazaSettings(encounters=_PAIRS, slow=slow, fast=fast, intruders=0.01, pace=SLOW)
+    settings = PlazaSettings(encounters=_PAIRS, slow=slow, fast=fast, intruders=0.01, pace=SLOW_INTRUDERS)
     with tempfile.TemporaryDirectory() as folder:
         file = make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings)
         return find_encounters(read_tracks(file)), settings.true_zone(SPEED)

@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull
 
 from ...errors import DataWarning, ZoneError
 from ...zones.ellipses import Ellipse
-from ...zones.respect.presence import PairCorrelation
+from ...zones.occupancy import PairCorrelation
 from ...zones.social_zone import SocialZone
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, get_axes, label_metres, pick_colours
 

@@ -12,8 +12,8 @@ from typing import Any
 from ...control.settings import MPCSettings
 from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
 from ...encounters.one_day import Chain
-from ...zones.by_direction.quantile import SHARE
 from ...zones.outliers import R_MAX
+from ...zones.quantile import SHARE
 from ...zones.social_zone import SPEEDS
 
 

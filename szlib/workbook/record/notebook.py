@@ -26,8 +26,8 @@ from ...encounters.geometry import Area
 from ...encounters.one_day import Chain, check_met
 from ...errors import DataError, ZoneError
 from ...files import claim_folder, file_content, load_cached, store_cached, write_checksum, write_file
-from ...plaza.people import make_plaza
-from ...plaza.truth import PlazaSettings
+from ...plaza.generation import make_plaza
+from ...plaza.settings import PlazaSettings
 from ...tracks import datasets
 from ...tracks.clock import read_tracks
 from ...zones.ellipses import Ellipse

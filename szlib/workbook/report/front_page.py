@@ -17,7 +17,7 @@ from bs4 import BeautifulSoup
 
 from ...control.settings import MPCSettings
 from ...errors import ZoneError
-from ...plaza.truth import PlazaSettings
+from ...plaza.settings import PlazaSettings
 from ...simulation.scenarios.paper import SCENARIOS
 from ...tracks import datasets, funnels
 from ...zones.social_zone import SocialZone

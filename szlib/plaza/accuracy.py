@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..checks import check_columns
 from ..errors import DataError
 from ..zones.social_zone import SocialZone
-from .people import FIRST_ID, ID_STEP, stage_encounters
-from .truth import PlazaSettings
+from .generation import FIRST_ID, ID_STEP, stage_encounters
+from .settings import PlazaSettings
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
 """Speeds at which a zone is compared with the truth [m/s]: well inside the plaza's range."""
@@ -21,7 +21,7 @@ SPEEDS = (0.7, 0.9, 1.1, 1.3)
 def true_kinds(
     samples: pd.DataFrame, *, seed: int = 0, settings: PlazaSettings | None = None
 ) -> NDArray[np.str_]:
-    """What kind of encounter (one of `szlib.plaza.people.KINDS`) each sample of a plaza comes from, (n,).
+    """What kind of encounter (one of `szlib.plaza.generation.KINDS`) each sample of a plaza comes from, (n,).
 
     `samples` are those of `szlib.find_encounters` on the plaza of this seed and these settings.
     Raises DataError where two people are no pair of that plaza.

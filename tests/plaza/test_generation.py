@@ -10,8 +10,8 @@ import polars as pl
 import pytest
 
 import szlib
-from szlib.plaza.people import KINDS, make_plaza, positions, stage_encounters
-from szlib.plaza.truth import RUSHING, SLOW, PlazaSettings
+from szlib.plaza.generation import KINDS, make_plaza, positions, stage_encounters
+from szlib.plaza.settings import RUSHING_INTRUDERS, SLOW_INTRUDERS, PlazaSettings
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
 DEFAULT = PlazaSettings()
@@ -167,7 +167,7 @@ def test_shares_are_as_set() -> None:
 def test_intruders_have_a_pace(tmp_path: Path) -> None:
     """Slow ones leave many samples deep within the zone, rushing ones a few; both pass as near."""
     inside, nearest = {}, {}
-    for pace in (RUSHING, SLOW):
+    for pace in (RUSHING_INTRUDERS, SLOW_INTRUDERS):
         settings = PlazaSettings(encounters=300, intruders=0.3, pace=pace)
         staged = stage_encounters(settings=settings).query("kind == 'intruder'")
         relative = np.hypot(
@@ -176,8 +176,8 @@ def test_intruders_have_a_pace(tmp_path: Path) -> None:
         assert relative.between(*pace).all()
         distance = in_frame(staged)[2][..., 0]
         inside[pace], nearest[pace] = (distance < 0.6).mean(), distance.min(axis=1).mean()
-    assert inside[SLOW] > 2 * inside[RUSHING]
-    assert nearest[SLOW] == pytest.approx(nearest[RUSHING], abs=0.05)
+    assert inside[SLOW_INTRUDERS] > 2 * inside[RUSHING_INTRUDERS]
+    assert nearest[SLOW_INTRUDERS] == pytest.approx(nearest[RUSHING_INTRUDERS], abs=0.05)
 
 
 def test_most_pairs_are_seen_as_the_encounter_they_are(tmp_path: Path, staged: pd.DataFrame) -> None:

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from helpers.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.errors import DataError, DataWarning, ZoneError
-from szlib.zones.respect.significance import NullTest, null_test
+from szlib.zones.respect_significance import NullTest, null_test
 
 KINDS = ("opposite", "crossing")
 SHIFTS = 39
@@ -46,7 +47,7 @@ def test_a_crowd_that_minds_nobody_is_found_out() -> None:
     """100 seeds stand in notebooks/tables/15_nobody.csv."""
     p = []
     for seed in range(12):
-        tracks = szlib.indifferent_crowd(seed=seed, people=600, minutes=40)
+        tracks = noninteracting_crowd(seed=seed, people=600, minutes=40)
         null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
         p.append(null_test(szlib.find_encounters(tracks), null, radii=False).p_value)
     assert np.sum(np.array(p) <= 0.05) <= 3  # 3 and more of 12: 2 %

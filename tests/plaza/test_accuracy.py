@@ -8,7 +8,7 @@ import pytest
 from studies.pooled_plazas import PACES, TABLE, judged, plaza_samples, pooled
 
 import szlib
-from szlib.plaza import scores
+from szlib.plaza import accuracy
 
 TOO_FAR, TOO_FAR_WITH_MANY = 0.035, 0.05
 """Error of the zone without many intruders, and with 1 % or 2 % of them [m]."""
@@ -32,42 +32,42 @@ def test_every_sample_knows_its_kind(plazas: list[pd.DataFrame]) -> None:
 
 def test_people_of_another_plaza_have_no_kind(plazas: list[pd.DataFrame]) -> None:
     with pytest.raises(szlib.DataError, match=r"row \d+: .* no pair of a plaza of 40 encounters"):
-        scores.true_kinds(plazas[0], settings=szlib.PlazaSettings(encounters=40))
+        accuracy.true_kinds(plazas[0], settings=szlib.PlazaSettings(encounters=40))
     strangers = plazas[0].assign(other_id=plazas[0]["other_id"] + 400)
     with pytest.raises(szlib.DataError, match=r"row 0: .* no pair"):
-        scores.true_kinds(strangers)
+        accuracy.true_kinds(strangers)
 
 
 def test_precision_and_recall() -> None:
     removed, intruders = np.array([1, 1, 1, 0, 0], bool), np.array([1, 0, 0, 1, 0], bool)
-    assert scores.precision_and_recall(removed, intruders) == pytest.approx((1 / 3, 1 / 2))
-    assert scores.precision_and_recall(intruders, removed) == pytest.approx((1 / 2, 1 / 3))
-    assert scores.precision_and_recall(removed, removed) == (1, 1)
-    precision, recall = scores.precision_and_recall(np.zeros(5, bool), intruders)
+    assert accuracy.precision_and_recall(removed, intruders) == pytest.approx((1 / 3, 1 / 2))
+    assert accuracy.precision_and_recall(intruders, removed) == pytest.approx((1 / 2, 1 / 3))
+    assert accuracy.precision_and_recall(removed, removed) == (1, 1)
+    precision, recall = accuracy.precision_and_recall(np.zeros(5, bool), intruders)
     assert np.isnan(precision)
     assert recall == 0
-    assert np.isnan(scores.precision_and_recall(removed, np.zeros(5, bool))[1])
+    assert np.isnan(accuracy.precision_and_recall(removed, np.zeros(5, bool))[1])
     with pytest.raises(szlib.DataError, match=r"got \(5,\) and \(4,\)"):
-        scores.precision_and_recall(removed, intruders[1:])
+        accuracy.precision_and_recall(removed, intruders[1:])
 
 
 def test_the_error_is_the_largest_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:
     zone, truth = (
-        szlib.SocialZone.fit(plazas[0], method="hull", speeds=scores.SPEEDS, resamples=0),
+        szlib.SocialZone.fit(plazas[0], method="hull", speeds=accuracy.SPEEDS, resamples=0),
         szlib.PlazaSettings(),
     )
     off = [
         np.abs(np.subtract([*zone.ellipse(v).center, *zone.ellipse(v).semi_axes], [*t.center, *t.semi_axes]))
-        for v, t in ((v, truth.true_zone(v)) for v in scores.SPEEDS)
+        for v, t in ((v, truth.true_zone(v)) for v in accuracy.SPEEDS)
     ]
-    assert scores.largest_error(zone) == np.max(off)
-    assert scores.largest_error(zone, speeds=(1.1,)) == np.max(off[2])
+    assert accuracy.largest_error(zone) == np.max(off)
+    assert accuracy.largest_error(zone, speeds=(1.1,)) == np.max(off[2])
     larger = szlib.PlazaSettings(
         slow=szlib.Ellipse((0.04, 0.0), (0.98, 0.78)), fast=szlib.Ellipse((0.06, 0.0), (1.1, 0.88))
     )
-    assert scores.largest_error(zone, larger) == pytest.approx(0.1, abs=scores.largest_error(zone))
+    assert accuracy.largest_error(zone, larger) == pytest.approx(0.1, abs=accuracy.largest_error(zone))
     with pytest.raises(szlib.ZoneError, match="at 5 m/s is undefined"):
-        scores.largest_error(zone, speeds=(5.0,))
+        accuracy.largest_error(zone, speeds=(5.0,))
 
 
 # --- what they say -----------------------------------------------------------------------------------
@@ -75,9 +75,9 @@ def test_the_error_is_the_largest_of_centre_and_axes(plazas: list[pd.DataFrame])
 
 @pytest.mark.parametrize("seed", range(6))
 def test_the_pipeline_finds_the_true_zone(plazas: list[pd.DataFrame], seed: int) -> None:
-    zone = szlib.SocialZone.fit(plazas[seed], method="hull", speeds=scores.SPEEDS, resamples=0)
-    assert scores.largest_error(zone) < 0.05
-    turned = [zone.ellipse(v).angle - szlib.PlazaSettings().true_zone(v).angle for v in scores.SPEEDS]
+    zone = szlib.SocialZone.fit(plazas[seed], method="hull", speeds=accuracy.SPEEDS, resamples=0)
+    assert accuracy.largest_error(zone) < 0.05
+    turned = [zone.ellipse(v).angle - szlib.PlazaSettings().true_zone(v).angle for v in accuracy.SPEEDS]
     assert np.abs((np.degrees(turned) + 90) % 180 - 90).max() < 10
 
 

@@ -16,11 +16,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...checks import Array, check_columns
-from ...errors import DataError, ZoneError
-from ...tracks import funnels
-from ..outliers import encounter_numbers
-from .radii import DIRECTIONS, Radii, closed, fit_ellipses
+from ..checks import Array, check_columns
+from ..errors import DataError, ZoneError
+from ..tracks import funnels
+from .outliers import encounter_numbers
+from .polar import DIRECTIONS, PolarZone, closed, fit_ellipses
 
 SHARE = 0.05
 """Share q of encounters that may enter the zone (assumed)."""
@@ -139,7 +139,7 @@ def quantile_radii(known: Approaches, speed: float, q: float, weights: Array | N
 
 
 @dataclass(frozen=True, eq=False)
-class QuantileZones:
+class QuantileEstimator:
     """The quantile's way to zones, to go again with other people.
 
     Parameters
@@ -163,7 +163,7 @@ class QuantileZones:
             raise ZoneError(f"q must be a share of encounters, 0 < q < 1; got {self.q}")
 
     @classmethod
-    def of(cls, samples: pd.DataFrame, *, r_max: float, q: float = SHARE) -> QuantileZones:
+    def of(cls, samples: pd.DataFrame, *, r_max: float, q: float = SHARE) -> QuantileEstimator:
         """From samples; errors as in `approaches`."""
         known = approaches(samples, r_max=r_max)
         entered, kept = len(encounter_numbers(samples)[1]), len(known.encounters)
@@ -177,19 +177,17 @@ class QuantileZones:
         """The first of each encounter's samples within r_max."""
         return self.known.encounters
 
-    def radii(self, speeds: Sequence[float]) -> Radii:
+    def radii(self, speeds: Sequence[float]) -> PolarZone:
         """Radii at speeds, ascending [m/s]."""
         lines = [quantile_radii(self.known, speed, self.q)[0] for speed in speeds]
-        return Radii(np.array(speeds), DIRECTIONS, np.array(lines))
+        return PolarZone(np.array(speeds), DIRECTIONS, np.array(lines))
 
-    def others(
-        self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None
-    ) -> Array:
+    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
         """Ellipses (k, s, 5) for weights (k, n) of the encounters; NaN: no zone.  Nothing else is drawn."""
         radii = np.stack([quantile_radii(self.known, v, self.q, weights) for v in speeds], axis=1)
         return fit_ellipses(closed(radii.reshape(-1, radii.shape[-1]))).reshape(*radii.shape[:2], 5)
 
-    def without_each(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
+    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
         """The encounters that enter the zones most (k,), and the ellipses (k, s, 5) without each of them."""
         depth = np.zeros(len(self.encounters))
         for speed in speeds:
@@ -198,7 +196,7 @@ class QuantileZones:
         deepest = np.argsort(-depth, kind="stable")[:_DEEPEST]
         weights = np.ones((len(deepest), len(depth)))
         weights[np.arange(len(deepest)), deepest] = 0
-        return deepest, self.others(weights, speeds)
+        return deepest, self.refit(weights, speeds)
 
 
 def _smoother(length: int) -> Array:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Array
-from ...errors import ZoneError
-from ..ellipses import Ellipse
+from ..checks import Array
+from ..errors import ZoneError
+from .ellipses import Ellipse
 
 DIRECTIONS: Array = np.radians(np.arange(-180.0, 180.0, 5.0))
 """Directions in which a radius is told, counter-clockwise from ahead [rad]."""
@@ -25,7 +25,7 @@ _ROUNDS, _SETTLED = 100, 1e-12  # of Gauss, Newton, Levenberg and Marquardt; ste
 
 
 @dataclass(frozen=True, eq=False)
-class Radii:
+class PolarZone:
     """Radii of the zone by speed and direction, in the reference pedestrian's frame.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Radii by direction: the ellipse they are of is found, gaps are told, nonsense is refused."""
+"""PolarZone by direction: the ellipse they are of is found, gaps are told, nonsense is refused."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.zones.by_direction.radii import DIRECTIONS, Radii, closed, ellipse_reach, fit_ellipses
+from szlib.zones.polar import DIRECTIONS, PolarZone, closed, ellipse_reach, fit_ellipses
 
 KNOWN = np.array(
     [
@@ -77,20 +77,20 @@ def test_gaps_are_closed_up_to_half_of_all_directions() -> None:
 def test_a_half_circle_is_no_zone_and_the_error_names_it() -> None:
     radii = ellipse_reach(KNOWN[:1])
     radii[0, 10:50] = np.nan
-    zone = Radii(np.array([1.1]), DIRECTIONS, radii)
+    zone = PolarZone(np.array([1.1]), DIRECTIONS, radii)
     with pytest.raises(szlib.ZoneError, match=r"at 1\.1 m/s .* from -135 counter-clockwise to 70 deg"):
         zone.ellipse(1.1)
     assert np.isnan(zone.boundary(1.1, np.radians([0.0]))).all()
     assert np.isfinite(zone.boundary(1.1, np.radians([100.0]))).all()
-    nobody = Radii(np.array([1.1]), DIRECTIONS, np.full((1, 72), np.nan))
+    nobody = PolarZone(np.array([1.1]), DIRECTIONS, np.full((1, 72), np.nan))
     with pytest.raises(szlib.ZoneError, match="nobody was seen"):
         nobody.ellipse(1.1)
     with pytest.raises(szlib.ZoneError, match="of no ellipse around the person"):
-        Radii(np.array([1.1]), DIRECTIONS, np.zeros((1, 72))).ellipse(1.1)
+        PolarZone(np.array([1.1]), DIRECTIONS, np.zeros((1, 72))).ellipse(1.1)
 
 
 def test_between_speeds_radii_are_linear() -> None:
-    zone = Radii(np.array([0.5, 1.5]), DIRECTIONS, np.array([np.full(72, 0.8), np.full(72, 1.0)]))
+    zone = PolarZone(np.array([0.5, 1.5]), DIRECTIONS, np.array([np.full(72, 0.8), np.full(72, 1.0)]))
     np.testing.assert_allclose(zone.at(1.0), 0.9)
     np.testing.assert_array_equal(zone.at(1.5), 1.0)
     np.testing.assert_allclose(np.hypot(*zone.boundary(0.75, DIRECTIONS).T), 0.85)
@@ -112,4 +112,4 @@ def test_between_speeds_radii_are_linear() -> None:
 )
 def test_radii_without_meaning(speeds: list, directions: list, radii: list, told: str) -> None:
     with pytest.raises(szlib.ZoneError, match=told):
-        Radii(np.array(speeds), np.array(directions), np.array(radii))
+        PolarZone(np.array(speeds), np.array(directions), np.array(radii))

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from ..encounters.geometry import ATC_SQUARE, Square
-from ..errors import DataError
-from ..tracks import funnels
-from ..tracks.clock import TICKS_PER_SECOND, to_clock
+from szlib.encounters.geometry import ATC_SQUARE, Square
+from szlib.errors import DataError
+from szlib.tracks import funnels
+from szlib.tracks.clock import TICKS_PER_SECOND, to_clock
 
 _DAY = "indifferent"
 _AROUND = 6.0  # people come into view so far outside the square [m]
@@ -19,7 +19,7 @@ _SPEEDS = (0.6, 1.6)  # slowest and fastest [m/s]
 _BUNCH = 20.0  # a bunch comes within so many seconds
 
 
-def indifferent_crowd(
+def noninteracting_crowd(
     *,
     seed: int = 0,
     people: int = 1000,

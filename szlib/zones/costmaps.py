@@ -122,7 +122,7 @@ class Layer:
         fade: float = FADE,
         body: float = BODY_RADIUS,
     ) -> NDArray[np.int8]:
-        """Costs 0 to 100 of this zone around people; see the top of `szlib.zones.costmap`.
+        """Costs 0 to 100 of this zone around people; see the top of `szlib.zones.costmaps`.
 
         Parameters
         ----------

@@ -5,8 +5,8 @@ import pytest
 import shapely
 
 import szlib
-from szlib.zones.by_direction.radii import DIRECTIONS, Radii
-from szlib.zones.costmap import BODY_RADIUS, FADE, circle_around
+from szlib.zones.costmaps import BODY_RADIUS, FADE, circle_around
+from szlib.zones.polar import DIRECTIONS, PolarZone
 
 ZONE = szlib.Ellipse((0.2, -0.1), (1.0, 0.6), 0.4)
 GRID = szlib.Grid((-4.0, -3.0), 0.1, (60, 80))
@@ -100,7 +100,7 @@ def test_people_may_have_zones_of_their_own_and_a_social_zone_is_asked_for_its_s
     own = szlib.Ellipse((0.0, 0.0), (0.5, 0.5))
     drawn = ZONE.costmap([szlib.Person((0.0, 0.0), (1.0, 0.0), zone=own)], GRID)
     assert np.array_equal(drawn, own.costmap([[0.0, 0.0, 1.0, 0.0]], GRID))
-    radii = Radii(np.array([0.5, 1.1]), DIRECTIONS, np.ones((2, len(DIRECTIONS))))
+    radii = PolarZone(np.array([0.5, 1.1]), DIRECTIONS, np.ones((2, len(DIRECTIONS))))
     zone = szlib.SocialZone(None, 2.0, {0.5: own, 1.1: ZONE}, {}, {}, "quantile", radii)
     people = [[0.0, 0.0, 1.0, 0.0], [1.0, 1.0, 1.0, 0.0]]
     with pytest.warns(szlib.DataWarning, match="of unknown worth") as told:

@@ -28,12 +28,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...checks import check_columns
-from ...encounters.kinds import COMPANIONS
-from ...encounters.null_model import NullEncounters
-from ...errors import DataWarning, ZoneError
-from .boundary import respect_radius
-from .presence import Presence
+from ..checks import check_columns
+from ..encounters.kinds import COMPANIONS
+from ..encounters.null_model import NullEncounters
+from ..errors import DataWarning, ZoneError
+from .occupancy import OccupancyHistogram
+from .respect import respect_radius
 
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
 """Within which too few may come [m]; none of them needs to be the zone's."""
@@ -174,12 +174,12 @@ def _too_few(
 
 def _null_radii(null: NullEncounters) -> tuple[float, ...]:
     """Respect zone of each shift against all others [m]; NaN where nothing of it can be compared."""
-    everybody = Presence.of(null.samples, r_max=null.r_max)
+    everybody = OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
     radii = []
     for shift in range(null.shifts):
         samples = null.one(shift)
-        own = Presence.of(samples, r_max=null.r_max) if len(samples) else None
-        others = None if own is None else Presence(everybody.counts - own.counts, null.r_max)
+        own = OccupancyHistogram.from_samples(samples, r_max=null.r_max) if len(samples) else None
+        others = None if own is None else OccupancyHistogram(everybody.counts - own.counts, null.r_max)
         if own is None or others is None or not others.counts.any():
             radii.append(float("nan"))
         else:

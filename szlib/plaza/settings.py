@@ -18,7 +18,7 @@ SLOWEST = 0.45
 SPACE = AttentionalSpace()
 MARGIN = 0.15
 """What must be inside stays so in spite of the noise [m]."""
-RUSHING, SLOW = (1.5, np.inf), (0.25, 1.0)
+RUSHING_INTRUDERS, SLOW_INTRUDERS = (1.5, np.inf), (0.25, 1.0)
 """Paces of intruders, relative to the walker, (slowest, fastest) [m/s]."""
 
 _SLOW, _FAST = 0.5, 1.5  # speeds at which the settings give the zone [m/s]
@@ -45,8 +45,8 @@ class PlazaSettings:
     standing, together, intruders : shares of encounters with a person who stands, of two who walk
         together, and with one who walks right through the walker's zone.
     intrusion : how close intruders come, (nearest, farthest) [m].
-    pace : of intruders, relative to the walker, (slowest, fastest) [m/s].  `RUSHING` ones, the default,
-        leave a few samples within the zone; `SLOW` ones leave many, which look like a habit.
+    pace : of intruders, relative to the walker, (slowest, fastest) [m/s].  `RUSHING_INTRUDERS`, the
+        default, leave a few samples within the zone; `SLOW_INTRUDERS` leave many.
     noise : standard deviation of each coordinate measured [m].
     gaps, losses : shares of tracks interrupted for 0.1-0.4 s, and for 0.6-1 s, which ends a track.
     square : where people meet [m].
@@ -74,7 +74,7 @@ class PlazaSettings:
     together: float = 0.12
     intruders: float = 0.0025
     intrusion: tuple[float, float] = (0.2, 0.4)
-    pace: tuple[float, float] = RUSHING
+    pace: tuple[float, float] = RUSHING_INTRUDERS
     noise: float = 0.01
     gaps: float = 0.05
     losses: float = 0.01

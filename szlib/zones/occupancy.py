@@ -9,9 +9,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter
 
-from ...checks import Array, check_columns
-from ...encounters.null_model import NullEncounters
-from ...errors import ZoneError
+from ..checks import Array, check_columns
+from ..encounters.null_model import NullEncounters
+from ..errors import ZoneError
 
 _DISTANCES, _DIRECTIONS = 80, 36
 _SPEED_STEP, _SPEEDS = 0.1, 40  # [m/s]; faster samples count as of the last bin
@@ -20,7 +20,7 @@ _BLUR = (15.0, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
-class Presence:
+class OccupancyHistogram:
     """How often people were where: weights of samples by speed, direction and distance.
 
     Parameters
@@ -33,7 +33,9 @@ class Presence:
     r_max: float
 
     @classmethod
-    def of(cls, samples: pd.DataFrame, *, r_max: float, weights: ArrayLike | None = None) -> Presence:
+    def from_samples(
+        cls, samples: pd.DataFrame, *, r_max: float, weights: ArrayLike | None = None
+    ) -> OccupancyHistogram:
         """Count samples within r_max, each once or with its weight (n,), as resampling gives them."""
         check_columns(samples, ["los_angle", "distance", "speed"])
         distance = samples["distance"].to_numpy(float)
@@ -78,7 +80,7 @@ def pair_correlation(samples: pd.DataFrame, null: NullEncounters) -> PairCorrela
     if len(null.encounters) == 0:
         raise ZoneError("the null model has no encounter: nothing to compare; more shifts are needed")
     real, model = (
-        Presence.of(each, r_max=null.r_max).at(None, 1.0) / encounters
+        OccupancyHistogram.from_samples(each, r_max=null.r_max).at(None, 1.0) / encounters
         for each, encounters in (
             (samples, samples["encounter"].nunique()),
             (null.samples, len(null.encounters)),

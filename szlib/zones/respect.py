@@ -38,10 +38,10 @@ from scipy.optimize import minimize
 from scipy.special import expit, logit
 from threadpoolctl import ThreadpoolController
 
-from ...checks import Array
-from ...encounters.null_model import NullEncounters
-from ...errors import ZoneError
-from .presence import Presence
+from ..checks import Array
+from ..encounters.null_model import NullEncounters
+from ..errors import ZoneError
+from .occupancy import OccupancyHistogram
 
 SPEED_WIDTH = 0.2
 """Standard deviation of the Gaussian that weighs samples of other speeds than the one asked for [m/s]."""
@@ -85,8 +85,8 @@ class Respect:
 
 
 def fit_respect(
-    samples: pd.DataFrame | Presence,
-    null: NullEncounters | Presence,
+    samples: pd.DataFrame | OccupancyHistogram,
+    null: NullEncounters | OccupancyHistogram,
     *,
     speed: float | None = None,
     speed_width: float = SPEED_WIDTH,
@@ -96,7 +96,7 @@ def fit_respect(
 
     Parameters
     ----------
-    samples : as from `szlib.find_encounters`, or a `Presence` (of weighted samples).
+    samples : as from `szlib.find_encounters`, or a `OccupancyHistogram` (of weighted samples).
     null : of the same tracks, found with the same parameters, of the same kinds; its r_max counts.
     speed : weigh samples by nearness to this speed of the reference pedestrian [m/s]; None takes all alike.
     speed_width : standard deviation of that weight [m/s].
@@ -106,8 +106,11 @@ def fit_respect(
     ------
     ZoneError : there is no sample, or no null, within r_max (at about that speed).
     """
-    against = null if isinstance(null, Presence) else Presence.of(null.samples, r_max=null.r_max)
-    data = samples if isinstance(samples, Presence) else Presence.of(samples, r_max=against.r_max)
+    against, data = null, samples
+    if isinstance(against, NullEncounters):
+        against = OccupancyHistogram.from_samples(against.samples, r_max=against.r_max)
+    if isinstance(data, pd.DataFrame):
+        data = OccupancyHistogram.from_samples(data, r_max=against.r_max)
     if data.r_max != against.r_max:
         raise ZoneError(f"data within {data.r_max} m, null within {against.r_max} m; expected the same r_max")
     real, model = (each.at(speed, speed_width) for each in (data, against))
@@ -123,8 +126,8 @@ def fit_respect(
 
 
 def respect_boundary(
-    samples: pd.DataFrame | Presence,
-    null: NullEncounters | Presence,
+    samples: pd.DataFrame | OccupancyHistogram,
+    null: NullEncounters | OccupancyHistogram,
     theta: ArrayLike,
     *,
     speed: float | None = None,
@@ -134,7 +137,9 @@ def respect_boundary(
     return fit_respect(samples, null, speed=speed, speed_width=speed_width).radii(theta)
 
 
-def respect_radius(samples: pd.DataFrame | Presence, null: NullEncounters | Presence) -> float:
+def respect_radius(
+    samples: pd.DataFrame | OccupancyHistogram, null: NullEncounters | OccupancyHistogram
+) -> float:
     """Radius of the respect zone, all bearings and speeds together [m]; errors as in `fit_respect`."""
     return float(fit_respect(samples, null, by_direction=False).radii(0.0))
 

@@ -24,7 +24,7 @@ from ..checks import Array
 from ..encounters.geometry import wrap_angle
 from ..errors import ZoneError
 from ..files import write_file
-from .truth import (
+from .settings import (
     MARGIN,
     SLOWEST,
     SPACE,
