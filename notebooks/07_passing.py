@@ -36,7 +36,7 @@ import pandas as pd
 from IPython.display import Markdown
 
 import szlib
-from szlib.simulation.metrics import avoidance_start
+from szlib.simulation.metrics import find_avoidance_start
 from szlib.workbook import figures, laboratory
 from szlib.workbook.record import NotebookRecord, settings_table
 
@@ -98,7 +98,7 @@ for claim in scenario.claims:
 # turn, and from there on it goes down along it.
 
 # %%
-behind = szlib.simulate(scenario.turned(), controller)
+behind = szlib.simulate(scenario.turn_people(), controller)
 fig, ax = plt.subplots(figsize=(8.5, 4), layout="constrained")
 for (name, run), line in zip({"head-on": log, "from behind": behind}.items(), ("-", "--"), strict=True):
     h = run.h[:, 0]
@@ -134,7 +134,7 @@ Markdown(
 # the straight line.
 
 # %%
-starts = {name: avoidance_start(run) for name, run in (("head-on", log), ("from behind", behind))}
+starts = {name: find_avoidance_start(run) for name, run in (("head-on", log), ("from behind", behind))}
 pd.DataFrame(starts, index=["distance to the person [m]", "h [m]"]).round(3)
 
 # %%

@@ -34,8 +34,8 @@ import pandas as pd
 from IPython.display import Markdown
 
 import szlib
-from szlib.simulation.atlas import Cell
-from szlib.simulation.strategies import manner
+from szlib.simulation.atlas import AtlasCell
+from szlib.simulation.strategies import classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
@@ -54,7 +54,7 @@ pace = 0.5  # of the person, m/s
 # %%
 record = NotebookRecord("08_corridor", globals())
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
-scenario = Cell("corridor", width=width, pace=pace).scenario()
+scenario = AtlasCell("corridor", width=width, pace=pace).scenario()
 parameters(
     [
         ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
@@ -145,9 +145,12 @@ Markdown(
 WIDTHS = (3.4, 3.8, 4.2, 4.6, 5.0, 5.6, 6.4, 8.0)
 runs = {}
 for each in WIDTHS:
-    scene = Cell("corridor", width=each, pace=pace).scenario()
+    scene = AtlasCell("corridor", width=each, pace=pace).scenario()
     runs[each] = szlib.simulate(scene, szlib.MPCCBF(zone, walls=scene.walls, settings=settings))
-rows = [(manner(run), run.metrics()["min_speed"], run.metrics()["time_to_goal"]) for run in runs.values()]
+rows = [
+    (classify_strategy(run), run.metrics()["min_speed"], run.metrics()["time_to_goal"])
+    for run in runs.values()
+]
 table = pd.DataFrame(rows, index=list(runs), columns=["robot", "slowest [m/s]", "to goal [s]"])
 table.rename_axis("width [m]").style.format(precision=2).format_index("{:.1f}")
 

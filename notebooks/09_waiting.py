@@ -36,9 +36,9 @@ from IPython.display import Markdown
 
 import szlib
 from szlib.control.step import admissible
-from szlib.simulation.atlas import Cell
-from szlib.simulation.metrics import yielding
-from szlib.simulation.strategies import manner
+from szlib.simulation.atlas import AtlasCell
+from szlib.simulation.metrics import find_yielding_steps
+from szlib.simulation.strategies import classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
@@ -57,7 +57,7 @@ pace = 0.5  # of the person, m/s
 # %%
 record = NotebookRecord("09_waiting", globals())
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
-scenario = Cell("waiting", width=width, pace=pace).scenario()
+scenario = AtlasCell("waiting", width=width, pace=pace).scenario()
 parameters(
     [
         ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
@@ -125,7 +125,7 @@ record.figure(fig, "space-time")
 # of it, one step:
 
 # %%
-waits = np.flatnonzero(yielding(log))
+waits = np.flatnonzero(find_yielding_steps(log))
 middle = float(log.time[waits[len(waits) // 2] if len(waits) else log.speed[10:].argmin() + 10])
 step = controller.step(*log.at(middle))
 record.figure(figures.draw_step(step), "admissible")
@@ -158,7 +158,7 @@ for start in (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0):
     both = (run.states[:, 0] > 0) & (run.people[:, 0, 0] > 0)
     found = run.metrics()
     numbers = (found[name] for name in ("time_yielding", "time_to_goal", "min_h"))
-    rows.append((start, manner(run), bool(both.any()), *numbers))
+    rows.append((start, classify_strategy(run), bool(both.any()), *numbers))
 columns = ["person from x [m]", "robot", "in before they are out", "yields [s]", "to goal [s]", "least h [m]"]
 firsts = pd.DataFrame(rows, columns=columns)
 firsts.style.format(precision=2).hide(axis="index")

@@ -35,8 +35,8 @@ from IPython.display import Markdown
 
 import szlib
 from szlib.control.step import admissible
-from szlib.simulation.atlas import Cell
-from szlib.simulation.strategies import manner, retreat
+from szlib.simulation.atlas import AtlasCell
+from szlib.simulation.strategies import classify_strategy, compute_retreat
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
@@ -55,7 +55,7 @@ pace = 0.5  # of the person, m/s
 # %%
 record = NotebookRecord("10_making_room", globals())
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
-scenario = Cell("making_room", width=width, pace=pace).scenario()
+scenario = AtlasCell("making_room", width=width, pace=pace).scenario()
 parameters(
     [
         ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
@@ -109,7 +109,7 @@ ax.fill_between(log.time, x - reach, x + reach, color=figures.RED, alpha=0.15, l
 ax.set(
     xlabel="time [s]",
     ylabel="x [m]",
-    title=f"It goes back by {retreat(log):.1f} m, stands aside, and goes on",
+    title=f"It goes back by {compute_retreat(log):.1f} m, stands aside, and goes on",
 )
 ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1))
 record.figure(fig, "space-time")
@@ -161,11 +161,11 @@ Markdown(
 # %%
 rows = []
 for each in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2):
-    scene = Cell("making_room", width=width, pace=each).scenario()
+    scene = AtlasCell("making_room", width=width, pace=each).scenario()
     run = szlib.simulate(scene, szlib.MPCCBF(zone, walls=scene.walls, settings=settings))
     found = run.metrics()
     numbers = (found[name] for name in ("min_h", "infeasible_steps", "time_to_goal"))
-    rows.append((each, manner(run), retreat(run), *numbers))
+    rows.append((each, classify_strategy(run), compute_retreat(run), *numbers))
 columns = ["pace [m/s]", "robot", "goes back [m]", "least h [m]", "infeasible steps", "to goal [s]"]
 paces = pd.DataFrame(rows, columns=columns)
 paces.style.format(precision=2).hide(axis="index")

@@ -42,10 +42,10 @@ import szlib
 from szlib.simulation import replay
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import summarise
-from szlib.simulation.crowds.reacting import Reacting
-from szlib.simulation.metrics import avoidance_start
-from szlib.simulation.replay_metrics import score
-from szlib.simulation.safety_claims import KINDS, broken_promises
+from szlib.simulation.crowds.reacting import ReactingPeople
+from szlib.simulation.metrics import find_avoidance_start
+from szlib.simulation.replay_metrics import compute_replay_metrics
+from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
 from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.workbook import figures
@@ -77,9 +77,14 @@ parameters(
         ("gamma", paper.gamma, MEASURED, "notebook 11, with people at 0.5 m/s or less"),
         ("people in a world", crowded.people, ASSUMED, f"in {crowded.size:g} m x {crowded.size:g} m"),
         ("their pace", crowded.pace, ASSUMED, "m/s; a fifth of them stand; the paper has 0.5"),
-        ("sight", f"{replay.SIGHT:g} m", ASSUMED, "recorded people farther away are not given"),
-        ("time for a recorded way", replay.PATIENCE, ASSUMED, full_speed),
-        ("nobody at the start within", f"{replay.APART:g} m", ASSUMED, "the robot has no companions"),
+        ("sight", f"{replay.SENSING_RANGE:g} m", ASSUMED, "recorded people farther away are not given"),
+        ("time for a recorded way", replay.TIME_FACTOR, ASSUMED, full_speed),
+        (
+            "nobody at the start within",
+            f"{replay.MIN_START_DISTANCE:g} m",
+            ASSUMED,
+            "the robot has no companions",
+        ),
     ]
 )
 
@@ -87,7 +92,7 @@ parameters(
 # ## People who react
 #
 # Three models of walking, each by its authors' or somebody else's package, behind one behaviour:
-# `Reacting`. Everybody has somewhere to go; walls are obstacles; the robot is seen as a disc of its
+# `ReactingPeople`. Everybody has somewhere to go; walls are obstacles; the robot is seen as a disc of its
 # size, as a person, or not at all ("nothing").
 #
 # - **orca** (pyrvo): everybody takes half of what keeps two apart for 3 s and expects the other half;
@@ -109,7 +114,7 @@ start, goal = np.array([-7.0, 0, 0, 0]), np.array([7.0, 0])
 crossing = Scenario("crossing", start, goal, people, title="Six change places", duration=30.0)
 logs = {}
 for name in models:
-    behaviour = Reacting(name, goals=tuple(map(tuple, (-starts).tolist())))
+    behaviour = ReactingPeople(name, goals=tuple(map(tuple, (-starts).tolist())))
     logs[name] = drive(crossing, szlib.MPCCBF(zone), behaviour=behaviour, seed=seed)
 
 # %%
@@ -139,7 +144,9 @@ if logs:
 # %%
 def measure(log: szlib.SimulationLog) -> dict[str, float]:
     """Scores, and promises that were broken without a reason."""
-    return score(log) | {"unexplained": float((~broken_promises(log)["explained"].astype(bool)).sum())}
+    return compute_replay_metrics(log) | {
+        "unexplained": float((~safety_violations(log)["explained"].astype(bool)).sum())
+    }
 
 
 def formatted(table: pd.DataFrame, rows: list[str]) -> pd.DataFrame:
@@ -159,7 +166,7 @@ for name in models:
             worlds,
             seed=seed,
             worlds=crowded,
-            behaviour=Reacting(name, sees=sees),
+            behaviour=ReactingPeople(name, sees=sees),
             measure=measure,
             n_jobs=1,
             progress=worlds > 2,
@@ -203,13 +210,13 @@ record.figure(fig, "reacting")
 
 # %%
 floor = record.encounters().attrs.get("area", szlib.ATC_SQUARE)
-made = replay.replays(record.tracks(), walkers, seed=seed, area=floor, zone=zone)
+made = replay.find_replays(record.tracks(), walkers, seed=seed, area=floor, zone=zone)
 runs = [drive(each.scenario, szlib.MPCCBF(zone), behaviour=each) for each in made]
-own = [drive(each.scenario, replay.AsRecorded(each), behaviour=each) for each in made]
+own = [drive(each.scenario, replay.ReplacedWalker(each), behaviour=each) for each in made]
 table = pd.DataFrame(
     {
         "robot": pd.DataFrame(map(measure, runs)).mean(),
-        "person replaced": pd.DataFrame(map(score, own)).mean(),
+        "person replaced": pd.DataFrame(map(compute_replay_metrics, own)).mean(),
     }
 )
 explained = table.loc["unexplained", "robot"] == 0
@@ -218,7 +225,7 @@ record.table(table.round(4).reset_index(names="metric"), "17_replay")
 table.round(2)
 
 # %%
-busiest = int(np.argmin([score(log)["nearest"] for log in runs]))
+busiest = int(np.argmin([compute_replay_metrics(log)["nearest"] for log in runs]))
 ax = figures.plot_crowd(runs[busiest], replay=made[busiest])
 ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
 record.figure(ax.figure, "replay")
@@ -245,9 +252,9 @@ formatted(saved[~saved["crowd"].isin(packages)], ["crowd", "controller"])
 # *to_who_kept* counts those who had kept theirs, from positions alone and by another formula.
 
 # %%
-promises = pd.read_csv("tables/17_promises.csv")
+promises = pd.read_csv("tables/17_safety_claims.csv")
 total = promises[
-    ["trials", "steps", "promised_steps", "broken_steps", *KINDS, "unexplained", "to_who_kept"]
+    ["trials", "steps", "claimed_safe_steps", "broken_steps", *MOTION_CHANGES, "unexplained", "to_who_kept"]
 ].sum()
 record.check(
     "2,000 trials and more went through without an exception",
@@ -258,7 +265,7 @@ record.check(
 record.check(
     "no promise was broken to anybody who kept their velocity",
     total["to_who_kept"] == 0,
-    int(total["promised_steps"]),
+    int(total["claimed_safe_steps"]),
     always=True,
 )
 record.check(
@@ -292,7 +299,7 @@ for pace in (0.5, 1.0, 1.5):
     scene = Scenario("head-on", np.array([0.0, 0, 1, 0]), np.array([12.0, 0]), (person,), duration=40.0)
     for settings in (paper, bold):
         log = drive(scene, szlib.MPCCBF(zone, settings=settings))
-        limit, turns = pace * settings.dt / settings.gamma, avoidance_start(log)[1]
+        limit, turns = pace * settings.dt / settings.gamma, find_avoidance_start(log)[1]
         aside, least = np.abs(log.states[:, 1]).max(), log.h.min()
         rows.append((pace, settings.gamma, limit, turns, aside, least))
 columns = ["pace [m/s]", "gamma", "w dt / gamma [m]", "h where it turns [m]", "aside [m]", "least h [m]"]

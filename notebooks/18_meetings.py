@@ -37,8 +37,8 @@ import szlib
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS, summarise
 from szlib.simulation.monte_carlo import rollouts
-from szlib.simulation.scenarios.meetings import InSight, Variations
-from szlib.simulation.social_metrics import social
+from szlib.simulation.scenarios.meetings import Variations, VisiblePeople
+from szlib.simulation.social_metrics import compute_social_metrics
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
@@ -75,7 +75,7 @@ logs = {}
 for name, meeting in szlib.MEETINGS.items():
     scenario = Variations(meeting, zone, shift=0.0, pace=(1.0, 1.0))(seed)
     controller = CONTROLLERS["MPC-CBF"](scenario, szlib.MPCSettings())
-    logs[name] = drive(scenario, controller, behaviour=InSight())
+    logs[name] = drive(scenario, controller, behaviour=VisiblePeople())
 pd.DataFrame({name: log.metrics() for name, log in logs.items()}).T[
     ["outcome", "time_to_goal", "path_length", "min_h", "min_clearance", "flagged_steps"]
 ]
@@ -116,9 +116,9 @@ def meet(controller: str, settings: szlib.MPCSettings) -> pd.DataFrame:
             seed=seed,
             settings=settings,
             worlds=worlds,
-            behaviour=InSight(),
+            behaviour=VisiblePeople(),
             controller=CONTROLLERS[controller],
-            measure=social,
+            measure=compute_social_metrics,
             n_jobs=n_jobs,
             progress=variations > 2,
         )
@@ -215,7 +215,7 @@ record.claim(
 scenario = logs["intersection"].scenario
 way = {"gamma = 0.05, N_h = 2": logs["intersection"]}
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=bolder)
-way["gamma = 0.2, N = N_h = 24"] = drive(scenario, controller, behaviour=InSight())
+way["gamma = 0.2, N = N_h = 24"] = drive(scenario, controller, behaviour=VisiblePeople())
 ax = figures.plot_robot_paths(way)
 ax.set(title="intersection: the person walks up, from below")
 record.figure(ax.figure, "carried-along")

@@ -34,8 +34,8 @@ import numpy as np
 import pandas as pd
 from IPython.display import Markdown
 
-from szlib.simulation.atlas import REFERENCE, SCENES, Cell, chart
-from szlib.simulation.strategies import MANNERS, manner
+from szlib.simulation.atlas import REFERENCE, SCENES, AtlasCell, run_atlas
+from szlib.simulation.strategies import STRATEGIES, classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
@@ -83,15 +83,15 @@ parameters(
 atlas = pd.read_csv("tables/19_atlas.csv")
 some = atlas.sample(again, random_state=seed)
 named = ["scene", "gamma", "width", "pace", "size"]
-anew = chart([Cell(**cell) for cell in some[named].to_dict("records")], REFERENCE, n_jobs=n_jobs)
-same = (anew["manner"].to_numpy() == some["manner"].to_numpy()).mean()
+anew = run_atlas([AtlasCell(**cell) for cell in some[named].to_dict("records")], REFERENCE, n_jobs=n_jobs)
+same = (anew["strategy"].to_numpy() == some["strategy"].to_numpy()).mean()
 record.check("runs driven anew end as in the table", same == 1, float(same))
 
 # %%
 off = np.abs(anew["min_h"].to_numpy() - some["min_h"].to_numpy()).max()
 record.check("with the same least h, to a millimetre", off < 1e-3, float(off))
-counts = atlas.groupby(["scene", "manner"]).size().unstack(0, fill_value=0)
-counts.reindex(MANNERS, fill_value=0)
+counts = atlas.groupby(["scene", "strategy"]).size().unstack(0, fill_value=0)
+counts.reindex(STRATEGIES, fill_value=0)
 
 # %% [markdown]
 # ## The corridor
@@ -104,10 +104,10 @@ corridor = atlas[atlas["scene"] == "corridor"]
 fig, grid = plt.subplots(4, 4, figsize=(13, 12), layout="constrained", sharex=True, sharey=True)
 for (size, pace), part in corridor.groupby(["size", "pace"]):
     row, column = sorted(corridor["size"].unique()).index(size), sorted(corridor["pace"].unique()).index(pace)
-    ax = figures.plot_strategies(part, names=MANNERS, rows="gamma", columns="width", ax=grid[row, column])
+    ax = figures.plot_strategies(part, names=STRATEGIES, rows="gamma", columns="width", ax=grid[row, column])
     ax.set_title(f"zone x {size:g}, person at {pace:g} m/s", fontsize=10)
     ax.set(xlabel="width [m]" if row == 3 else "", ylabel="gamma" if column == 0 else "")
-key = ",  ".join(f"{chr(ord('A') + i)}: {name}" for i, name in enumerate(MANNERS))
+key = ",  ".join(f"{chr(ord('A') + i)}: {name}" for i, name in enumerate(STRATEGIES))
 fig.supxlabel(key, fontsize=11)
 record.figure(fig, "corridor")
 
@@ -120,7 +120,7 @@ for row, scene in enumerate(("waiting", "making_room")):
     part = atlas[(atlas["scene"] == scene) & (atlas["pace"] == 0.5)]
     for column, (size, cells) in enumerate(part.groupby("size")):
         ax = figures.plot_strategies(
-            cells, names=MANNERS, rows="gamma", columns="width", ax=grid[row, column]
+            cells, names=STRATEGIES, rows="gamma", columns="width", ax=grid[row, column]
         )
         ax.set_title(f"{scene}, zone x {size:g}", fontsize=10)
         ax.set(xlabel="width [m]" if row else "", ylabel="gamma" if column == 0 else "")
@@ -128,7 +128,7 @@ fig.supxlabel(key, fontsize=11)
 record.figure(fig, "passage")
 
 # %%
-share = atlas.assign(good=~atlas["manner"].isin(["h < 0", "infeasible", "deadlock"]))
+share = atlas.assign(good=~atlas["strategy"].isin(["h < 0", "infeasible", "deadlock"]))
 by_gamma = share.groupby(["gamma", "scene"])["good"].mean().unstack()
 record.key["share of good endings at gamma = 0.05"] = float(share[share["gamma"] == 0.05]["good"].mean())
 by_gamma.style.format("{:.0%}", na_rep="").format_index("{:g}")
@@ -148,10 +148,12 @@ distance = (
     + np.abs(np.log(atlas["pace"] / 0.5))
     + np.abs(np.log(atlas["size"]))
 )
-nearest = atlas.assign(distance=distance).sort_values("distance").groupby("manner").head(1)
-examples = {cell["manner"]: Cell(**{k: cell[k] for k in named}) for cell in nearest.to_dict("records")}
-logs = {name: examples[name].run(REFERENCE) for name in MANNERS if name in examples}
-record.check("each example is what it stands for", all(manner(log) == name for name, log in logs.items()))
+nearest = atlas.assign(distance=distance).sort_values("distance").groupby("strategy").head(1)
+examples = {cell["strategy"]: AtlasCell(**{k: cell[k] for k in named}) for cell in nearest.to_dict("records")}
+logs = {name: examples[name].run(REFERENCE) for name in STRATEGIES if name in examples}
+record.check(
+    "each example is what it stands for", all(classify_strategy(log) == name for name, log in logs.items())
+)
 
 # %%
 fig, grid = plt.subplots(3, 2, figsize=(13, 13), layout="constrained")
@@ -166,7 +168,7 @@ figures.add_shared_legend([grid[0, 0]])
 record.figure(fig, "examples")
 
 # %%
-missing = [name for name in MANNERS if name not in examples]
+missing = [name for name in STRATEGIES if name not in examples]
 Markdown(f"In the whole atlas it never *{'*, never *'.join(missing)}*." if missing else "Each name occurs.")
 
 # %% [markdown]
@@ -178,8 +180,8 @@ Markdown(f"In the whole atlas it never *{'*, never *'.join(missing)}*." if missi
 # %%
 SIZES = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)
 zone = record.ellipse()
-cells = [Cell(scene, gamma, width, size=size) for scene, width in SCENES.items() for size in SIZES]
-curve = chart(cells, zone, n_jobs=n_jobs)
+cells = [AtlasCell(scene, gamma, width, size=size) for scene, width in SCENES.items() for size in SIZES]
+curve = run_atlas(cells, zone, n_jobs=n_jobs)
 curve.pivot(index="size", columns="scene", values=["time_yielding", "time_to_goal"]).round(1)
 
 # %%

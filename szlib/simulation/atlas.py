@@ -1,6 +1,6 @@
 """A sensitivity atlas: the paper's scenarios with other widths, paces, zones and gamma, and what comes of it.
 
-One cell of the atlas is one run.  All that is changed stands in `Cell`; the rest is as in `paper`.
+One cell of the atlas is one run.  All that is changed stands in `AtlasCell`; the rest is as in `paper`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .closed_loop import simulate
 from .log import SimulationLog
 from .scenario import Scenario
 from .scenarios.paper import SCENARIOS
-from .strategies import manner
+from .strategies import classify_strategy
 
 SCENES = {"corridor": 4.6, "waiting": 2.0, "making_room": 2.0}
 """Scenarios with walls, by name, and the width that is theirs [m]."""
@@ -31,7 +31,7 @@ REFERENCE = Ellipse((0.03, 0.0), (0.97, 0.75))
 
 
 @dataclass(frozen=True)
-class Cell:
+class AtlasCell:
     """One cell: a scene of `SCENES`, with what is changed in it.
 
     Parameters
@@ -84,22 +84,22 @@ NO_START = "cannot start"
 """The outcome of a cell that starts in violation: the place is too narrow for the robot alone."""
 
 
-def chart(cells: Sequence[Cell], zone: Ellipse, *, n_jobs: int = 1) -> pd.DataFrame:
+def run_atlas(cells: Sequence[AtlasCell], zone: Ellipse, *, n_jobs: int = 1) -> pd.DataFrame:
     """What the robot does in each cell: a row each, in their order.
 
-    Columns: those of `Cell`; manner, as in `metrics.manners`, or `NO_START`; time_to_goal, time_yielding [s],
-    min_h [m], min_speed [m/s], infeasible_steps.
+    Columns: those of `AtlasCell`; strategy, as of `classify_strategy`, or `NO_START`; time_to_goal,
+    time_yielding [s], min_h [m], min_speed [m/s], infeasible_steps.
     """
     tasks = [joblib.delayed(_row)(i, cell, zone) for i, cell in enumerate(cells)]
     rows = sorted(run_tasks(tasks, n_jobs=n_jobs), key=lambda row: row[0])
     return pd.DataFrame([row for _, row in rows])
 
 
-def _row(i: int, cell: Cell, zone: Ellipse) -> tuple[int, dict[str, Any]]:
+def _row(i: int, cell: AtlasCell, zone: Ellipse) -> tuple[int, dict[str, Any]]:
     shown = ("time_to_goal", "time_yielding", "min_h", "min_speed", "infeasible_steps")
     scenario = cell.scenario()
     if cell.controller(zone).barriers(scenario.start[:2], scenario.people).min() < 0:
-        return i, asdict(cell) | {"manner": NO_START} | dict.fromkeys(shown, np.nan)
+        return i, asdict(cell) | {"strategy": NO_START} | dict.fromkeys(shown, np.nan)
     log = cell.run(zone)
     found = log.metrics()
-    return i, asdict(cell) | {"manner": manner(log)} | {name: found[name] for name in shown}
+    return i, asdict(cell) | {"strategy": classify_strategy(log)} | {name: found[name] for name in shown}

@@ -163,15 +163,15 @@ class DynamicWindow(Baseline):
 
 
 def straight(scenario: Scenario, settings: MPCSettings) -> Straight:
-    """Straight ahead, with stop; a `Factory`."""
+    """Straight ahead, with stop; a `ControllerFactory`."""
     return Straight(settings, scenario.walls)
 
 
 def social_force(scenario: Scenario, settings: MPCSettings) -> SocialForce:
-    """Social forces; a `Factory`."""
+    """Social forces; a `ControllerFactory`."""
     return SocialForce(settings, scenario.walls)
 
 
 def dynamic_window(scenario: Scenario, settings: MPCSettings) -> DynamicWindow:
-    """The dynamic window; a `Factory`."""
+    """The dynamic window; a `ControllerFactory`."""
     return DynamicWindow(settings, scenario.walls)

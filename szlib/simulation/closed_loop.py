@@ -24,7 +24,7 @@ from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from .log import SimulationLog
 from .robots import Controller, DoubleIntegrator, Robot, StepLike, advance
-from .scenario import GOAL_RADIUS, STOPPED, UNAFFECTED, Crowd, CrowdModel, Scenario
+from .scenario import GOAL_RADIUS, STOPPED_SPEED, UNAFFECTED, Crowd, CrowdModel, Scenario
 
 __all__ = ["BODY", "Zones", "advance", "drive", "simulate"]
 
@@ -129,7 +129,7 @@ def drive(
         told = _told(step, perf_counter() - began)
         rows.append((state, given, *told))
         x, y, vx, vy = state.tolist()
-        if until_arrival and hypot(vx, vy) <= STOPPED and hypot(x - gx, y - gy) <= GOAL_RADIUS:
+        if until_arrival and hypot(vx, vy) <= STOPPED_SPEED and hypot(x - gx, y - gy) <= GOAL_RADIUS:
             break
         control = told[0]
         if not all(map(isfinite, control.tolist())):
@@ -222,7 +222,7 @@ def _log(
     controls, plans, residual, rung, safe, slack, solve_time = told
     states = np.array(way)
     away = states - np.r_[scenario.goal, 0.0, 0.0]
-    there = (np.hypot(*away[:, :2].T) <= GOAL_RADIUS) & (np.hypot(*away[:, 2:].T) <= STOPPED)
+    there = (np.hypot(*away[:, :2].T) <= GOAL_RADIUS) & (np.hypot(*away[:, 2:].T) <= STOPPED_SPEED)
     inputs = getattr(robot, "inputs", None) or [f"control_{i}" for i in range(len(controls[0]))]
     return SimulationLog(
         scenario=scenario,

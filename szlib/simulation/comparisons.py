@@ -32,7 +32,7 @@ from .baseline_controllers import dynamic_window, social_force, straight
 from .closed_loop import Zones
 from .log import SimulationLog
 from .monte_carlo import Scenes, mpc_cbf, rollouts
-from .robots import Factory
+from .robots import ControllerFactory
 from .scenario import Behaviour, CrowdModel
 from .scenarios.random_worlds import Worlds
 
@@ -112,7 +112,7 @@ BEHAVIOURS: Mapping[str, Behaviour] = MappingProxyType(
 )
 """What people do, or how they are seen, by name."""
 
-CONTROLLERS: Mapping[str, Factory] = MappingProxyType(
+CONTROLLERS: Mapping[str, ControllerFactory] = MappingProxyType(
     {
         "MPC-CBF": mpc_cbf,
         "straight": straight,
@@ -142,7 +142,7 @@ METRICS = (
 """Columns that are compared; seconds, metres, m2/s6, steps."""
 
 
-def time_inside(log: SimulationLog) -> dict[str, float]:
+def measure_time_inside(log: SimulationLog) -> dict[str, float]:
     """Seconds for which the robot's disc overlapped anybody's zone of each kind, Euclidean.
 
     The fitted zones are those of the world, whatever the controller kept; those that were kept for people
@@ -167,7 +167,7 @@ def compare(
     n: int,
     *,
     seed: int = 0,
-    controllers: Sequence[str] | Mapping[str, Factory] = ("MPC-CBF",),
+    controllers: Sequence[str] | Mapping[str, ControllerFactory] = ("MPC-CBF",),
     zones: Sequence[str] | Mapping[str, Zones] = tuple(ZONES),
     formulations: Sequence[str] | Mapping[str, MPCSettings] = tuple(FORMULATIONS),
     behaviours: Sequence[str] | Mapping[str, CrowdModel] = ("as expected",),
@@ -200,7 +200,7 @@ def compare(
             behaviour=behaviour,
             controller=controller,
             zones=zone,
-            measure=time_inside,
+            measure=measure_time_inside,
             out=out,
             n_jobs=n_jobs,
             progress=progress,

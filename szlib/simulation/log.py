@@ -24,8 +24,8 @@ from ..control.step import status_of
 from ..errors import DataError
 from ..files import write_file
 from ..zones.ellipses import Ellipse
-from .metrics import metrics
-from .outcomes import least
+from .metrics import compute_metrics
+from .outcomes import nanmin
 from .scenario import Scenario
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ class SimulationLog:
     @cached_property
     def cbf_people(self) -> Array:
         """Smallest residual of a person's barrier condition, shape (n,) [m]; inf where there is none."""
-        return least(self.residual[:, : len(self.zones)], axis=(1, 2))
+        return nanmin(self.residual[:, : len(self.zones)], axis=(1, 2))
 
     @cached_property
     def table(self) -> pd.DataFrame:
@@ -158,7 +158,7 @@ class SimulationLog:
         columns |= dict(zip(self.inputs, self.controls.T, strict=True))
         words = {"status": [status_of(rung) for rung in self.rung.tolist()], "rung": self.rung}
         numbers = {"slack": self.slack, "solve_time": self.solve_time, "cbf_people": self.cbf_people}
-        numbers["clearance"] = least(self.clearance, axis=1)
+        numbers["clearance"] = nanmin(self.clearance, axis=1)
         for i in range(n):
             x, y, heading = self.people[:, i, :3].T
             numbers |= {f"person_{i}_x": x, f"person_{i}_y": y, f"person_{i}_heading": heading}
@@ -187,8 +187,8 @@ class SimulationLog:
         return self.table.filter(regex="^h_").min()
 
     def metrics(self) -> dict[str, Any]:
-        """The run in numbers; `szlib.simulation.metrics.metrics` says what each is."""
-        return metrics(self)
+        """The run in numbers; `szlib.simulation.metrics.compute_metrics` says what each is."""
+        return compute_metrics(self)
 
     def plot(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Draw the run (paper, fig. 6); `options` of `workbook.figures.simulation.plot_scenario`."""

@@ -1,7 +1,7 @@
 """Monte Carlo: thousands of random worlds, each driven through, measured, and classified if it failed.
 
     table = szlib.rollouts(10_000, settings=szlib.MPCSettings(), out="results/rollouts")
-    log = replay(4711)                     # the world of a row, once more, with every state
+    log = rerun_world(4711)                     # the world of a row, once more, with every state
 
 Worlds run in parallel; each chunk of them is a Parquet file, written as a whole or not at all, in a
 folder named after the parameters: an interrupted call goes on where it stopped, a larger `n` adds.
@@ -35,7 +35,7 @@ from ..zones.ellipses import Ellipse
 from .closed_loop import Zones, drive
 from .log import SimulationLog
 from .outcomes import Outcome
-from .robots import Factory
+from .robots import ControllerFactory
 from .scenario import Behaviour, CrowdModel, Scenario
 from .scenarios.random_worlds import Worlds
 
@@ -45,7 +45,7 @@ PURPOSE = "rollouts"
 CHUNK = 50
 """Worlds in one file and in one task: half a second of work."""
 
-CIRCLE = Ellipse((0.0, 0.0), (1.0, 1.0))
+DEFAULT_ZONE = Ellipse((0.0, 0.0), (1.0, 1.0))
 """The zone of people without one [m] (assumed); in random worlds everybody has one of their own."""
 
 Scenes = Callable[[int], Scenario]
@@ -62,7 +62,7 @@ def rollouts(
     settings: MPCSettings | None = None,
     worlds: Scenes | None = None,
     behaviour: CrowdModel | None = None,
-    controller: Factory | None = None,
+    controller: ControllerFactory | None = None,
     zones: Zones | None = None,
     measure: Measure | None = None,
     out: str | Path | None = None,
@@ -96,7 +96,7 @@ def rollouts(
     """
     if n < 1:
         raise SolverError(f"n must be at least 1; got {n}")
-    setup = setup_of(
+    setup = make_setup(
         settings=settings,
         worlds=worlds,
         behaviour=behaviour,
@@ -119,7 +119,7 @@ def rollouts(
     return pd.concat(tables).sort_values("seed", ignore_index=True)
 
 
-def mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = CIRCLE) -> MPCCBF:
+def mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = DEFAULT_ZONE) -> MPCCBF:
     """The controller of the paper; `zone` is that of people without one of their own."""
     return MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
 
@@ -153,13 +153,13 @@ class Setup:
     settings: MPCSettings
     worlds: Scenes
     behaviour: CrowdModel
-    controller: Factory
+    controller: ControllerFactory
     zones: Zones | None
     measure: Measure | None
 
     def describe(self) -> str:
         """Every parameter, as text."""
-        named = {field.name: identity(getattr(self, field.name)) for field in fields(self)}
+        named = {field.name: identify(getattr(self, field.name)) for field in fields(self)}
         return repr((__version__, named))
 
     def key(self) -> str:
@@ -186,14 +186,14 @@ class Setup:
             raise
 
 
-def setup_of(**given: Any) -> Setup:
+def make_setup(**given: Any) -> Setup:
     """A `Setup` of what is given, and of the defaults where that is None or missing."""
     setup: dict[str, Any] = {"settings": MPCSettings(), "worlds": Worlds(), "behaviour": Behaviour()}
     setup |= {"controller": mpc_cbf, "zones": None, "measure": None}
     return Setup(**(setup | {name: value for name, value in given.items() if value is not None}))
 
 
-def identity(part: Any) -> str:
+def identify(part: Any) -> str:
     """What tells a part of a `Setup` from any other, in every process: its name if it is a function of a
     module, its text if it is one of szlib's own settings, and else its type with a hash of what it holds.
 
@@ -208,7 +208,7 @@ def identity(part: Any) -> str:
     return name if kind is part else f"{name} {joblib.hash(part)}"
 
 
-def tally(rows: pd.DataFrame) -> pd.Series[Any]:
+def summarise_rollouts(rows: pd.DataFrame) -> pd.Series[Any]:
     """Rows of `rollouts` in one: worlds, steps by what they say, shares of worlds with h < 0, with Euclidean
     overlaps, and of each outcome, least h and clearance [m]."""
     numbers: dict[str, Any] = {"worlds": len(rows)}
@@ -227,9 +227,9 @@ def tally(rows: pd.DataFrame) -> pd.Series[Any]:
     return pd.Series(numbers)
 
 
-def replay(seed: int, **parameters: Any) -> SimulationLog:
+def rerun_world(seed: int, **parameters: Any) -> SimulationLog:
     """One world again, with every state; parameters as of `rollouts` (settings, worlds, ...)."""
-    return setup_of(**parameters).run(seed)
+    return make_setup(**parameters).run(seed)
 
 
 def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:

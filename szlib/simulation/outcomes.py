@@ -11,7 +11,7 @@ from ..checks import Array
 from ..control.barriers import barrier, ellipse_distance, segment_distance
 from ..control.distances import wall_margin
 from ..control.problem import TOLERANCE
-from .scenario import STOPPED
+from .scenario import STOPPED_SPEED
 
 if TYPE_CHECKING:
     from .log import SimulationLog
@@ -22,7 +22,7 @@ Outcome = Literal[
 """How a run ended; see `outcome`."""
 CROWDED = 0.2
 """Two barriers below this h at once leave a robot no way out [m] (assumed)."""
-AT_LAST = 3.0
+STOP_WINDOW = 3.0
 """A robot that stood for so long at the end has stopped for good [s] (assumed)."""
 _CELL = 0.1
 """Grid on which a way to the goal is looked for [m]."""
@@ -30,12 +30,12 @@ _AROUND = 2.5
 """How far around everything it reaches: enough for a zone and the robot beside it [m]."""
 
 
-def least(values: Array, axis: int | tuple[int, ...] | None = None) -> Array:
+def nanmin(values: Array, axis: int | tuple[int, ...] | None = None) -> Array:
     """The smallest value along an axis, NaN left out; inf where there is none."""
     return np.asarray(np.fmin.reduce(values, axis=axis, initial=np.inf))
 
 
-def outcome(log: SimulationLog) -> Outcome:
+def classify_outcome(log: SimulationLog) -> Outcome:
     """How a run ended; where a barrier was broken, how that began.
 
     "arrived", or where h fell below 0 first: "hit wall"; "run into", by a person who came nearer while
@@ -43,13 +43,13 @@ def outcome(log: SimulationLog) -> Outcome:
     the robot did it. Where it never did: "boxed in", stopped where no way leads to the goal;
     "deadlock", stopped where one does; "out of time", still on its way.
     """
-    broken = np.flatnonzero(least(log.h, axis=1) < -TOLERANCE)
+    broken = np.flatnonzero(nanmin(log.h, axis=1) < -TOLERANCE)
     if len(broken):
         return _breach(log, int(broken[0]))
     if log.success:
         return "arrived"
-    last = round(AT_LAST / log.settings.dt)
-    if log.speed[-last:].max() > STOPPED:
+    last = round(STOP_WINDOW / log.settings.dt)
+    if log.speed[-last:].max() > STOPPED_SPEED:
         return "out of time"
     return "deadlock" if path_exists(log) else "boxed in"
 

@@ -25,22 +25,22 @@ from ..encounters.geometry import Area
 from ..errors import DataError
 from ..tracks.clock import TICKS_PER_SECOND, clock_index
 from ..zones.ellipses import Ellipse
-from .crowds.reacting import FACES
+from .crowds.reacting import MIN_HEADING_SPEED
 from .scenario import Crowd, Scenario
 
-PATIENCE = 2.0
+TIME_FACTOR = 2.0
 """The robot has so many times as long as the walker took, or as it needs itself at full speed (assumed)."""
-SIGHT = 6.0
+SENSING_RANGE = 6.0
 """The controller is given who is within this distance of the robot [m] (assumed)."""
-APART = 2.0
+MIN_START_DISTANCE = 2.0
 """Nobody is within this distance when the robot is put in [m] (assumed): it has no companions."""
-TRAVEL = 5.0
+MIN_TRAVEL = 5.0
 """Walkers who came no farther than this are not replaced [m] (assumed)."""
 _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedPerson:
     """A person from one tick to another without a gap.
 
     Attributes
@@ -80,10 +80,10 @@ class Replay:
     """
 
     scenario: Scenario
-    walker: Recorded
-    others: tuple[Recorded, ...] = field(repr=False)
+    walker: RecordedPerson
+    others: tuple[RecordedPerson, ...] = field(repr=False)
     zone: Ellipse | None = None
-    sight: float = SIGHT
+    sight: float = SENSING_RANGE
 
     def crowd(self, scenario: Scenario, seed: int) -> Crowd:
         """Everybody within sight of the robot as they were; the same whatever the seed."""
@@ -123,7 +123,7 @@ class Replays(tuple[Replay, ...]):
         return people
 
 
-class AsRecorded:
+class ReplacedWalker:
     """The walker who was replaced, as a controller and its robot: drives their own path, whatever is ahead.
 
     With it the person replaced is measured like any controller.
@@ -135,14 +135,14 @@ class AsRecorded:
         self.settings, self._path = settings or MPCSettings(), replay.walker.states[:, :4]
 
     @property
-    def robot(self) -> AsRecorded:
+    def robot(self) -> ReplacedWalker:
         """Itself; its own state is the time since the start, shape (1,) [s]."""
         return self
 
     def reset(self) -> None:
         """Nothing to forget."""
 
-    def step(self, state: Array, goal: Array, people: Sequence[Person]) -> AsRecorded:
+    def step(self, state: Array, goal: Array, people: Sequence[Person]) -> ReplacedWalker:
         """On along the path."""
         return self
 
@@ -165,7 +165,7 @@ class AsRecorded:
         return own + dt
 
 
-def replays(
+def find_replays(
     tracks: pd.DataFrame,
     n: int,
     *,
@@ -176,8 +176,8 @@ def replays(
 ) -> Replays:
     """At most n recorded walkers, drawn by the seed, each to be replaced by the robot.
 
-    A walker's way is a gap-free piece of their track within the area, at least `TRAVEL` from its first to its
-    last point, with nobody within `APART` at the first.
+    A walker's way is a gap-free piece of their track within the area, at least `MIN_TRAVEL` from its first
+    to its last point, with nobody within `MIN_START_DISTANCE` at the first.
 
     Parameters
     ----------
@@ -208,29 +208,29 @@ def replays(
     for i in np.random.default_rng(seed).permutation(len(ways)):
         number, begin, end = ways[i]
         t0, straight = int(tick[begin]), hypot(*(states[end - 1, :2] - states[begin, :2]))
-        time = round(PATIENCE * max((end - 1 - begin) / TICKS_PER_SECOND, straight / s.v_max), 1)
+        time = round(TIME_FACTOR * max((end - 1 - begin) / TICKS_PER_SECOND, straight / s.v_max), 1)
         until = t0 + round(time * TICKS_PER_SECOND)
         there = (pieces["day"] == pieces["day"].iloc[number]) & (pieces["id"] != ids[begin])
         there &= (pieces["last"] >= t0) & (pieces["first"] <= until)
         others = [_cut(states, each, t0, until) for each in pieces[there].itertuples()]
-        walker = Recorded(int(ids[begin]), 0, _with_heading(states[begin:end]))
+        walker = RecordedPerson(int(ids[begin]), 0, _with_heading(states[begin:end]))
         if _has_room(walker, others):
             made.append(Replay(_scenario(walker, time, s), walker, tuple(others), zone))
         if len(made) == n:
             break
     if not made:
         raise DataError(
-            f"no walker came {TRAVEL} m far within {floor or 'the tracks'} from a point with nobody within "
-            f"{APART} m ({len(ways)} came so far); give a larger area or other tracks"
+            f"no walker came {MIN_TRAVEL} m far within {floor or 'the tracks'} from a point with nobody "
+            f"within {MIN_START_DISTANCE} m ({len(ways)} came so far); give a larger area or other tracks"
         )
     return Replays(made)
 
 
-def _cut(states: Array, piece: Any, t0: int, until: int) -> Recorded:
+def _cut(states: Array, piece: Any, t0: int, until: int) -> RecordedPerson:
     """What a piece has of the ticks from `t0` to `until`, from when they first came."""
     rows = slice(max(t0 - piece.first, 0), until + 1 - piece.first)
     whole_way = _with_heading(states[piece.begin : piece.end])
-    return Recorded(int(piece.id), int(max(piece.first - t0, 0)), whole_way[rows])
+    return RecordedPerson(int(piece.id), int(max(piece.first - t0, 0)), whole_way[rows])
 
 
 def _ways(states: Array, pieces: pd.DataFrame, area: Area | None) -> list[tuple[int, int, int]]:
@@ -242,18 +242,18 @@ def _ways(states: Array, pieces: pd.DataFrame, area: Area | None) -> list[tuple[
     for number, (a, b) in enumerate(pieces[["begin", "end"]].itertuples(index=False)):
         edges = np.flatnonzero(np.diff(np.r_[False, inside[a:b], False])).reshape(-1, 2) + a
         for begin, end in edges.tolist():
-            if hypot(*(states[end - 1, :2] - states[begin, :2])) >= TRAVEL:
+            if hypot(*(states[end - 1, :2] - states[begin, :2])) >= MIN_TRAVEL:
                 ways.append((number, begin, end))
     return ways
 
 
-def _has_room(walker: Recorded, others: list[Recorded]) -> bool:
-    """True if nobody is within `APART` where the walker began."""
+def _has_room(walker: RecordedPerson, others: list[RecordedPerson]) -> bool:
+    """True if nobody is within `MIN_START_DISTANCE` where the walker began."""
     near = [person for other in others if (person := other.at(0.0)) is not None]
-    return all(np.hypot(*(walker.states[0, :2] - person.position)) > APART for person in near)
+    return all(np.hypot(*(walker.states[0, :2] - person.position)) > MIN_START_DISTANCE for person in near)
 
 
-def _scenario(walker: Recorded, time: float, s: MPCSettings) -> Scenario:
+def _scenario(walker: RecordedPerson, time: float, s: MPCSettings) -> Scenario:
     """The robot from the walker's first to their last point, as fast as they were or as it may be."""
     x, y, vx, vy, _ = walker.states[0].tolist()
     share = min(1.0, 0.99 * s.v_max / max(hypot(vx, vy), _ROUNDING))
@@ -267,9 +267,9 @@ def _scenario(walker: Recorded, time: float, s: MPCSettings) -> Scenario:
 
 
 def _with_heading(states: Array) -> Array:
-    """x, y, vx, vy and where they face: where they walk, or last walked at `FACES`; at first, will walk."""
+    """x, y, vx, vy and heading: where they walk, or last walked at `MIN_HEADING_SPEED`, or first walk."""
     vx, vy = states[:, 2:].T
-    walking = np.hypot(vx, vy) >= FACES
+    walking = np.hypot(vx, vy) >= MIN_HEADING_SPEED
     if walking.any():
         row = np.maximum.accumulate(np.where(walking, np.arange(len(states)), -1))
         heading = np.arctan2(vy, vx)[np.where(row >= 0, row, walking.argmax())]

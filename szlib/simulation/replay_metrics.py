@@ -17,7 +17,7 @@ REACHED = 0.5
 """Who is within this distance has reached the goal [m] (assumed): people pass there, robots come to rest."""
 
 
-def score(log: SimulationLog, zone: Ellipse | None = None) -> dict[str, float]:
+def compute_replay_metrics(log: SimulationLog, zone: Ellipse | None = None) -> dict[str, float]:
     """How the robot came to its goal, and how often it was where people keep others out.
 
     reached : 1 if it came within `REACHED` of the goal, else 0.

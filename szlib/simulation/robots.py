@@ -70,7 +70,7 @@ class Robot(Protocol):
         """Its own state dt later [s]."""
 
 
-Factory = Callable[[Scenario, MPCSettings], Controller]
+ControllerFactory = Callable[[Scenario, MPCSettings], Controller]
 """Makes a controller for a scenario; a function of a module, so that other processes find it."""
 
 

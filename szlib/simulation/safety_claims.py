@@ -21,11 +21,19 @@ if TYPE_CHECKING:
 
 SAME = 1e-6
 """Who is no farther than this from where their velocity leads has kept it [m], and so their heading [rad]."""
-KINDS = ("came", "turned", "slowed down", "sped up", "faced elsewhere", "kept their velocity", "wall")
-"""What people did: `broken_promises` says what each is."""
+MOTION_CHANGES = (
+    "came",
+    "turned",
+    "slowed down",
+    "sped up",
+    "faced elsewhere",
+    "kept their velocity",
+    "wall",
+)
+"""What people did: `safety_violations` says what each is."""
 
 
-def broken_promises(log: SimulationLog) -> pd.DataFrame:
+def safety_violations(log: SimulationLog) -> pd.DataFrame:
     """A row for each step that said it was safe, and each person or wall with h < 0 one step later.
 
     Returns

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 GOAL_RADIUS = 0.1
 """The robot has arrived within this distance of the goal [m], when it has stopped (assumed)."""
-STOPPED = 0.05
+STOPPED_SPEED = 0.05
 """Below this speed the robot stands, and below this progress to the goal it yields [m/s] (assumed)."""
 
 Crowd = Callable[[float, Array], Sequence[Person | None]]
@@ -87,7 +87,7 @@ class Scenario:
         if not 0 < self.duration < np.inf:
             raise SolverError(f"duration must be a positive number of seconds; got {self.duration}")
 
-    def turned(self) -> Scenario:
+    def turn_people(self) -> Scenario:
         """The same place with everybody facing the other way; who walks, walks on backwards."""
         people = tuple(p if p.heading is None else replace(p, heading=p.heading + pi) for p in self.people)
         return replace(self, people=people)

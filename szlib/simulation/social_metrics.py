@@ -14,8 +14,8 @@ import numpy as np
 from ..checks import Array
 from ..control.distances import euclidean_to_segment
 from ..control.people import BODY_RADIUS
-from .outcomes import least
-from .scenario import STOPPED
+from .outcomes import nanmin
+from .scenario import STOPPED_SPEED
 
 if TYPE_CHECKING:
     from .log import SimulationLog
@@ -28,11 +28,11 @@ _ON_THE_WAY = 21
 """Points of the straight way to the goal at which it is held against walls."""
 
 
-def social(log: SimulationLog) -> dict[str, float]:
+def compute_social_metrics(log: SimulationLog) -> dict[str, float]:
     """What people would notice, until the arrival; time to the goal and path length are in `metrics`.
 
     heading_changes : sum of the angles between successive directions of motion [rad], while the robot is
-        faster than `STOPPED`: one that drives in any direction has no heading of its own.
+        faster than `STOPPED_SPEED`: one that drives in any direction has no heading of its own.
     closest_person : mean over time of the gap from the robot's disc to the nearest body [m].
     intimate, personal, social : share of the time in which the nearest person, their centre, is that far
         from the robot's disc (`HALL`).
@@ -46,7 +46,7 @@ def social(log: SimulationLog) -> dict[str, float]:
     """
     way = slice(None if log.arrived is None else log.arrived + 1)
     states, gap = log.states[way], log.clearance[way, : len(log.zones)]
-    nearest = least(gap, axis=1)
+    nearest = nanmin(gap, axis=1)
     to_person = np.maximum(nearest + BODY_RADIUS, 0.0)
     met = np.isfinite(nearest)
     robot, person = _contacts(log, way, gap)
@@ -66,7 +66,7 @@ def social(log: SimulationLog) -> dict[str, float]:
 
 def heading_changes(states: Array) -> float:
     """Sum of the angles between successive directions of motion [rad], of states (n, 4)."""
-    moving = states[np.hypot(states[:, 2], states[:, 3]) > STOPPED]
+    moving = states[np.hypot(states[:, 2], states[:, 3]) > STOPPED_SPEED]
     turns = np.diff(np.arctan2(moving[:, 3], moving[:, 2]))
     return float(np.abs((turns + np.pi) % (2 * np.pi) - np.pi).sum())
 

@@ -224,7 +224,7 @@ def ten_worlds(rival: str, first: int) -> tuple[float, list[dict[str, Any]]]:
         else szlib
     )
     module = importlib.import_module(f"{of.__name__}.simulation.monte_carlo")
-    setup = module.setup_of(settings=of.MPCSettings(time_limit=np.inf))
+    setup = module.make_setup(settings=of.MPCSettings(time_limit=np.inf))
     begun = time.process_time()
     table = module._chunk(setup, range(first, first + 10), None)
     return time.process_time() - begun, table.to_dict("records")

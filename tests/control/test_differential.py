@@ -15,7 +15,7 @@ from szlib.control.differential import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
 from szlib.control.people import BODY_RADIUS
 from szlib.control.problem import TOLERANCE
-from szlib.simulation.scenarios.random_worlds import Worlds, random_zone, world
+from szlib.simulation.scenarios.random_worlds import Worlds, draw_zone, make_world
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 OPEN = (6.0, 1.0)
@@ -107,7 +107,7 @@ def test_where_the_point_is_safe_the_disc_is_whatever_its_heading():
         drive = szlib.DifferentialDrive(
             ZONE, walls=[wall], settings=s, ahead=rng.uniform(0.1, 0.6), max_people=0
         )
-        zone = random_zone(rng).placed(rng.uniform(-2, 2, 2), rng.uniform(-np.pi, np.pi))
+        zone = draw_zone(rng).placed(rng.uniform(-2, 2, 2), rng.uniform(-np.pi, np.pi))
         person = szlib.Person((0.0, 0.0), heading=0.0, zone=zone)
         for point in rng.uniform(-5, 5, (60, 2)):
             h = drive._point.barriers(point, [person])
@@ -169,7 +169,7 @@ def test_the_disc_keeps_out_on_a_fine_grid_after_every_step_that_said_it_was_saf
     checked = 0
     for seed in range(8):
         rng = np.random.default_rng(seed)
-        zone, wall = random_zone(rng), np.array([[1.0, -4.0], [1.0 + rng.uniform(-1, 1), -1.2]])
+        zone, wall = draw_zone(rng), np.array([[1.0, -4.0], [1.0 + rng.uniform(-1, 1), -1.2]])
         people = [
             szlib.Person(tuple(rng.uniform((2, -2), (5, 2))), tuple(rng.uniform(-0.5, 0.5, 2)), zone=zone)
             for _ in range(3)
@@ -197,7 +197,7 @@ def test_among_people_who_stand_a_plan_that_ends_at_rest_is_never_without_a_next
     """Recursive feasibility, proved of the double integrator in `szlib.control.mpc`, holds of the wheels."""
     settings, quiet = szlib.MPCSettings(terminal="rest"), Worlds(standing=1.0, start_speed=0.0, min_h=0.6)
     for seed in range(10):
-        scene = world(seed, quiet)
+        scene = make_world(seed, quiet)
         drive = szlib.DifferentialDrive(
             ZONE, walls=scene.walls, settings=settings, max_people=len(scene.people)
         )

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.simulation.atlas import NO_START, REFERENCE, SCENES, Cell, chart
+from szlib.simulation.atlas import NO_START, REFERENCE, SCENES, AtlasCell, run_atlas
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.strategies import BACKWARDS, MANNERS, manner, retreat
+from szlib.simulation.strategies import MIN_RETREAT, STRATEGIES, classify_strategy, compute_retreat
 
 
 def made(x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: object) -> SimulationLog:
@@ -52,26 +52,26 @@ RUNS = {
 
 @pytest.mark.parametrize("name", RUNS)
 def test_a_manner_is_what_was_done(name: str) -> None:
-    assert manner(RUNS[name]) == name
+    assert classify_strategy(RUNS[name]) == name
 
 
 def test_there_is_a_run_for_every_manner() -> None:
-    assert set(RUNS) == set(MANNERS)
+    assert set(RUNS) == set(STRATEGIES)
 
 
 def test_what_is_worse_comes_first() -> None:
     both = replace(RUNS["infeasible"], arrived=None)
-    assert manner(both) == "infeasible"
-    assert manner(replace(RUNS["backs out"], arrived=None)) == "deadlock"
+    assert classify_strategy(both) == "infeasible"
+    assert classify_strategy(replace(RUNS["backs out"], arrived=None)) == "deadlock"
 
 
 def test_standing_while_nobody_holds_the_robot_back_is_not_waiting() -> None:
-    assert manner(made(STANDS, held=False)) == "goes ahead"
+    assert classify_strategy(made(STANDS, held=False)) == "goes ahead"
 
 
 def test_retreat_is_measured_from_the_farthest_point_by_then() -> None:
-    assert retreat(RUNS["backs out"]) == pytest.approx(0.9)
-    assert retreat(RUNS["goes ahead"]) == 0.0 < BACKWARDS
+    assert compute_retreat(RUNS["backs out"]) == pytest.approx(0.9)
+    assert compute_retreat(RUNS["goes ahead"]) == 0.0 < MIN_RETREAT
 
 
 # --- cells -------------------------------------------------------------------------------------------
@@ -79,34 +79,38 @@ def test_retreat_is_measured_from_the_farthest_point_by_then() -> None:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_cell_of_the_paper_is_the_scenario_of_the_paper(scene: str) -> None:
-    same, own = Cell(scene, width=SCENES[scene]).scenario(), szlib.SCENARIOS[scene]
+    same, own = AtlasCell(scene, width=SCENES[scene]).scenario(), szlib.SCENARIOS[scene]
     assert np.array_equal(same.walls, own.walls)
     assert same.people == own.people
 
 
 def test_a_width_moves_the_walls_of_a_pathway_and_keeps_its_mouth_closed() -> None:
-    walls = Cell("waiting", width=3.0).scenario().walls
+    walls = AtlasCell("waiting", width=3.0).scenario().walls
     assert np.array_equal(np.unique(np.abs(walls[:2, :, 1])), [1.5])
     assert np.array_equal(np.sort(np.abs(walls[2:, :, 1]), axis=1), [[1.5, 4.0]] * 2)
 
 
 def test_the_chart_has_a_row_for_each_cell_in_their_order() -> None:
-    cells = [Cell("corridor", width=6.4, size=0.5), Cell("corridor", width=1.0), Cell("corridor", size=1.25)]
-    table = chart(cells, REFERENCE)
+    cells = [
+        AtlasCell("corridor", width=6.4, size=0.5),
+        AtlasCell("corridor", width=1.0),
+        AtlasCell("corridor", size=1.25),
+    ]
+    table = run_atlas(cells, REFERENCE)
     assert table["width"].tolist() == [6.4, 1.0, 4.6]
-    assert table["manner"].iloc[:2].tolist() == ["goes ahead", NO_START]
-    assert table["manner"].iloc[2] != "goes ahead"  # the corridor of the paper with a larger zone
+    assert table["strategy"].iloc[:2].tolist() == ["goes ahead", NO_START]
+    assert table["strategy"].iloc[2] != "goes ahead"  # the corridor of the paper with a larger zone
     assert table["min_h"].iloc[[0, 2]].min() >= 0
 
 
 @pytest.mark.parametrize("wrong", [{"scene": "hall"}, {"scene": "corridor", "width": 0}])
 def test_a_cell_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(szlib.SolverError, match="must be"):
-        Cell(**wrong)  # type: ignore[arg-type]
+        AtlasCell(**wrong)  # type: ignore[arg-type]
 
 
 def test_a_run_can_be_asked_again_at_any_of_its_times() -> None:
-    log = Cell("corridor", size=0.5).run(REFERENCE)
+    log = AtlasCell("corridor", size=0.5).run(REFERENCE)
     controller = szlib.MPCCBF(log.zones[0], walls=log.scenario.walls)
     for time in (0.0, 3.0):
         controller.reset()

@@ -11,7 +11,7 @@ import szlib
 from szlib.control.people.person import circle_around
 from szlib.simulation.closed_loop import BODY, drive
 from szlib.simulation.comparisons import compare, summarise
-from szlib.simulation.monte_carlo import identity, replay, rollouts, tally
+from szlib.simulation.monte_carlo import identify, rerun_world, rollouts, summarise_rollouts
 from szlib.simulation.scenario import Behaviour
 from szlib.simulation.scenarios.random_worlds import Worlds
 
@@ -74,7 +74,7 @@ def test_a_controller_that_promises_nothing_breaks_no_promise_and_its_violations
     inside = int((log.h[1:].min(axis=1) < -1e-6).sum())
     assert metrics["violations"] == inside > 0
     assert metrics["overlaps"] == int((log.clearance[1:].min(axis=1) < -1e-6).sum()) > 0
-    assert metrics["promised_steps"] == metrics["flagged_steps"] == metrics["unflagged_violations"] == 0
+    assert metrics["claimed_safe_steps"] == metrics["flagged_steps"] == metrics["unflagged_violations"] == 0
     assert metrics["outcome"] == "drove in"
     assert np.isnan(metrics["time_yielding"])
 
@@ -84,7 +84,7 @@ def test_a_controller_that_promises_is_held_to_it():
         szlib.SCENARIOS["corridor"], szlib.MPCCBF(ZONE, walls=szlib.SCENARIOS["corridor"].walls)
     )
     metrics = log.metrics()
-    assert metrics["promised_steps"] + metrics["flagged_steps"] == len(log.states) - 1
+    assert metrics["claimed_safe_steps"] + metrics["flagged_steps"] == len(log.states) - 1
     assert metrics["violations"] == metrics["overlaps"] == 0
 
 
@@ -302,12 +302,12 @@ def test_a_loop_has_one_dt():
 
 def test_rollouts_with_a_controller_of_ones_own():
     rows = rollouts(3, worlds=ALONE, controller=straight, n_jobs=1, progress=False)
-    assert rows["success"].all() and (rows["promised_steps"] == 0).all()
+    assert rows["success"].all() and (rows["claimed_safe_steps"] == 0).all()
     slow = rollouts(3, worlds=ALONE, controller=partial(straight, pace=0.5), n_jobs=1, progress=False)
     assert (slow["max_speed"] <= 0.5 + 1e-9).all()
-    again = replay(1, worlds=ALONE, controller=straight).metrics()
+    again = rerun_world(1, worlds=ALONE, controller=straight).metrics()
     assert again["path_length"] == rows["path_length"][1]
-    assert tally(rows)["unflagged_violations"] == 0
+    assert summarise_rollouts(rows)["unflagged_violations"] == 0
 
 
 def scene(seed):
@@ -335,8 +335,8 @@ def test_the_controller_is_part_of_what_chunks_are_of(tmp_path):
 def test_parts_are_told_apart_by_what_they_hold():
     parts = [None, straight, Straight, szlib.MPCSettings(), szlib.MPCSettings(gamma=0.1), Behaviour(), ALONE]
     parts += [partial(straight, pace=0.5), partial(straight, pace=0.4), Worlds().__call__, ALONE.__call__]
-    assert len({identity(part) for part in parts}) == len(parts)
-    assert identity(partial(straight, pace=0.5)) == identity(partial(straight, pace=0.5))
+    assert len({identify(part) for part in parts}) == len(parts)
+    assert identify(partial(straight, pace=0.5)) == identify(partial(straight, pace=0.5))
 
 
 class Failing(Straight):

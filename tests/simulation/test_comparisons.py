@@ -13,11 +13,11 @@ from szlib.simulation.comparisons import (
     ZONES,
     compare,
     kirby_curve,
+    measure_time_inside,
     summarise,
-    time_inside,
 )
-from szlib.simulation.monte_carlo import replay
-from szlib.simulation.scenarios.random_worlds import world
+from szlib.simulation.monte_carlo import rerun_world
+from szlib.simulation.scenarios.random_worlds import make_world
 
 FITTED = szlib.Ellipse((0.1, -0.02), (1.0, 0.7), 0.3)
 
@@ -43,7 +43,7 @@ def test_kirbys_zone_is_enclosed_by_its_ellipse_and_not_by_a_smaller_one():
 
 @pytest.mark.parametrize("seed", range(20))
 def test_nobody_begins_inside_any_zone(seed):
-    scenario = world(seed, WORLDS)
+    scenario = make_world(seed, WORLDS)
     for zone in ZONES.values():
         controller = szlib.MPCCBF(zone(scenario.people[0].zone), walls=scenario.walls)
         people = [szlib.Person(p.position, p.velocity, p.heading) for p in scenario.people]
@@ -51,8 +51,8 @@ def test_nobody_begins_inside_any_zone(seed):
 
 
 def test_time_inside_counts_the_worlds_own_zone_whatever_is_kept():
-    log = replay(0, worlds=WORLDS, zones=ZONES["none"])
-    inside = time_inside(log)
+    log = rerun_world(0, worlds=WORLDS, zones=ZONES["none"])
+    inside = measure_time_inside(log)
     bodies = log.clearance[:, : len(log.scenario.people)]
     assert inside["inside none"] == pytest.approx(0.1 * (bodies.min(axis=1) < 0).sum())
     assert inside["inside none"] <= inside["inside equal circle"] <= inside["inside Hall"]

@@ -15,10 +15,10 @@ from test_crowds import PACKAGES, model, scene
 import szlib
 from szlib.control.people import Person
 from szlib.simulation.closed_loop import drive
-from szlib.simulation.crowds.reacting import Reacting
-from szlib.simulation.replay import AsRecorded, replays
-from szlib.simulation.replay_metrics import score
-from szlib.simulation.safety_claims import broken_promises
+from szlib.simulation.crowds.reacting import ReactingPeople
+from szlib.simulation.replay import ReplacedWalker, find_replays
+from szlib.simulation.replay_metrics import compute_replay_metrics
+from szlib.simulation.safety_claims import safety_violations
 from szlib.simulation.scenario import Scenario
 
 __all__ = ["PACKAGES", "model"]
@@ -45,7 +45,12 @@ def straight(*people: Person, y: float = 0.0) -> Scenario:
 @pytest.mark.parametrize("sees", ["robot", "nothing"])
 def test_who_keeps_their_velocity_is_promised_nothing_that_is_not_kept(model: str, sees: str) -> None:
     rows = szlib.rollouts(
-        6, worlds=CROWDED, behaviour=Reacting(model, sees=sees), measure=measure, n_jobs=1, progress=False
+        6,
+        worlds=CROWDED,
+        behaviour=ReactingPeople(model, sees=sees),
+        measure=measure,
+        n_jobs=1,
+        progress=False,
     )
     assert len(rows) == 6
     assert (rows["to_who_kept"] == 0).all(), "from positions alone"
@@ -82,7 +87,7 @@ def h_if_they_had_kept_on(log: szlib.SimulationLog) -> np.ndarray:
 def test_recorded_people_who_do_not_see_the_robot_are_no_exception_either() -> None:
     rows = []
     for seed in range(12):
-        for made in replays(crossing(seed), 3, zone=ZONE):
+        for made in find_replays(crossing(seed), 3, zone=ZONE):
             log = drive(made.scenario, szlib.MPCCBF(ZONE), behaviour=made, until_arrival=False)
             rows.append(measure(log))
             promised = h_if_they_had_kept_on(log)[log.safe[:-1]]
@@ -94,13 +99,13 @@ def test_recorded_people_who_do_not_see_the_robot_are_no_exception_either() -> N
 
 def test_a_controller_that_lies_is_found_out() -> None:
     log = drive(straight(Person((0.0, 0.2), (-0.3, 0.0))), Careless())
-    broken = broken_promises(log)
+    broken = safety_violations(log)
     assert set(broken["did"]) == {"kept their velocity"}
     assert not broken["explained"].any()
     assert broken["h"].to_numpy() == pytest.approx(broken["h_promised"].to_numpy(), abs=1e-9)
     assert len(broken) == violated_by_who_kept(log) > 5
     wall = Scenario("wall", np.array([-4.0, 0, 1, 0]), np.zeros(2), walls=[[(0, -1), (0, 1)]], duration=4.0)
-    assert set(broken_promises(drive(wall, Careless()))["did"]) == {"wall"}
+    assert set(safety_violations(drive(wall, Careless()))["did"]) == {"wall"}
 
 
 @pytest.mark.parametrize(
@@ -122,7 +127,7 @@ def test_what_people_did_is_told(given: tuple, walked: tuple, turned: float, did
     at = log.states[1, :2] + (0.5, 0.0)
     before = np.array([*(at - 0.1 * np.array(walked)), 0.0, *given])
     people = np.array([before * (np.nan if did == "came" else 1.0), [*at, turned, *walked]])
-    (row,) = broken_promises(replace(log, people=people[:, None])).to_dict("records")
+    (row,) = safety_violations(replace(log, people=people[:, None])).to_dict("records")
     assert (row["did"], row["t"], row["person"]) == (did, 0.1, 0)
     if did != "came":
         assert row["off"] == pytest.approx(0.1 * np.hypot(*np.subtract(walked, given)))
@@ -132,33 +137,39 @@ def test_what_people_did_is_told(given: tuple, walked: tuple, turned: float, did
 def test_intrusions_are_counted_as_geometry_says() -> None:
     circle = szlib.Ellipse((0.0, 0.0), (1.0, 1.0))
     through = drive(straight(Person((0.0, 0.6), heading=0.0)), Careless(), until_arrival=False)
-    seen = score(through, circle)
+    seen = compute_replay_metrics(through, circle)
     assert seen["time_intruding"] == pytest.approx(2 * 0.8, abs=0.11), "a chord of 2 sqrt(1 - 0.36) at 1 m/s"
     assert (seen["intrusions"], seen["nearest"]) == (1, pytest.approx(0.6))
     assert (seen["reached"], seen["time_to_goal"]) == (1, pytest.approx(7.5))
     assert seen["path_efficiency"] == pytest.approx(1.0)
     two = drive(straight(Person((0.0, 0.6), heading=0.0), Person((0.5, -0.6), heading=0.0)), Careless())
-    assert score(two, circle)["intrusions"] == 2
-    assert score(two, circle)["time_intruding"] == pytest.approx(1.6 + 0.5, abs=0.11), "not twice at once"
-    nobody = score(drive(straight(), Careless()), circle)
+    assert compute_replay_metrics(two, circle)["intrusions"] == 2
+    assert compute_replay_metrics(two, circle)["time_intruding"] == pytest.approx(1.6 + 0.5, abs=0.11), (
+        "not twice at once"
+    )
+    nobody = compute_replay_metrics(drive(straight(), Careless()), circle)
     assert (nobody["intrusions"], nobody["time_intruding"]) == (0, 0)
     assert np.isnan(nobody["nearest"])
 
 
 def test_the_person_replaced_has_their_own_time_and_path() -> None:
-    for made in replays(crossing(0), 9, zone=ZONE):
-        log = drive(made.scenario, AsRecorded(made), behaviour=made, until_arrival=False)
+    for made in find_replays(crossing(0), 9, zone=ZONE):
+        log = drive(made.scenario, ReplacedWalker(made), behaviour=made, until_arrival=False)
         path = made.walker.states[:, :2]
         away = np.hypot(*(path - path[-1]).T)
-        assert score(log)["time_to_goal"] == pytest.approx(0.1 * (away <= 0.5).argmax(), abs=0.101), (
-            "0.5 m may lie on a tick"
-        )
+        assert compute_replay_metrics(log)["time_to_goal"] == pytest.approx(
+            0.1 * (away <= 0.5).argmax(), abs=0.101
+        ), "0.5 m may lie on a tick"
         assert log.states[: len(path), :2] == pytest.approx(path)
 
 
 def test_replays_are_worlds_and_behaviour_of_rollouts() -> None:
-    made = replays(crossing(3), 2, zone=ZONE)
-    rows = szlib.rollouts(len(made), worlds=made, behaviour=made, measure=score, n_jobs=1, progress=False)
+    made = find_replays(crossing(3), 2, zone=ZONE)
+    rows = szlib.rollouts(
+        len(made), worlds=made, behaviour=made, measure=compute_replay_metrics, n_jobs=1, progress=False
+    )
     alone = drive(made[0].scenario, szlib.MPCCBF(ZONE), behaviour=made[0], until_arrival=False)
-    assert rows.loc[0, list(score(alone))].astype(float).to_dict() == pytest.approx(score(alone), nan_ok=True)
+    assert rows.loc[0, list(compute_replay_metrics(alone))].astype(float).to_dict() == pytest.approx(
+        compute_replay_metrics(alone), nan_ok=True
+    )
     assert scene().people == ()

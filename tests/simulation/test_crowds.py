@@ -16,8 +16,8 @@ from conftest import make_tracks, make_walk
 
 import szlib
 from szlib.control.people import BODY_RADIUS, Person
-from szlib.simulation.crowds.reacting import MODELS, Reacting
-from szlib.simulation.replay import APART, SIGHT, AsRecorded, Replay, replays
+from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
+from szlib.simulation.replay import MIN_START_DISTANCE, SENSING_RANGE, ReplacedWalker, Replay, find_replays
 from szlib.simulation.scenario import Crowd, Scenario
 
 PACKAGES = {"orca": "pyrvo", "social force": "pysocialforce", "speed model": "jupedsim"}
@@ -56,7 +56,7 @@ def gaps(paths: np.ndarray) -> np.ndarray:
 
 
 def test_who_is_alone_walks_straight_to_their_goal_at_their_pace(model: str) -> None:
-    path = walk(Reacting(model, jitter=0).crowd(scene(TWO[0], duration=10.0), 0), seconds=10.0)[:, 0]
+    path = walk(ReactingPeople(model, jitter=0).crowd(scene(TWO[0], duration=10.0), 0), seconds=10.0)[:, 0]
     assert path[0, :2] == pytest.approx((-4, 0))
     assert np.abs(path[:, 1]).max() < 1e-6
     assert np.hypot(*path[20:60, 2:4].T) == pytest.approx(0.5, abs=1e-3)
@@ -64,13 +64,13 @@ def test_who_is_alone_walks_straight_to_their_goal_at_their_pace(model: str) -> 
 
 
 def test_velocity_is_what_brought_people_here(model: str) -> None:
-    paths = walk(Reacting(model).crowd(scene(*TWO), 3))
+    paths = walk(ReactingPeople(model).crowd(scene(*TWO), 3))
     assert np.diff(paths[:, :, :2], axis=0) == pytest.approx(0.1 * paths[1:, :, 2:4], abs=1e-6)
 
 
 def test_two_who_meet_head_on_pass_each_other(model: str) -> None:
     head_on = (TWO[0], Person((4.0, 0.0), (-0.5, 0.0)))
-    paths = walk(Reacting(model).crowd(scene(*head_on), 1))
+    paths = walk(ReactingPeople(model).crowd(scene(*head_on), 1))
     assert paths[-1, 0, 0] > 3 and paths[-1, 1, 0] < -3
     assert gaps(paths).min() > 0.35
 
@@ -79,7 +79,7 @@ def test_they_avoid_the_robot_that_they_see_and_not_the_one_that_they_do_not(mod
     alone = scene(Person((-4.0, 0.1), (0.5, 0.0)))
     robot = np.array([0.0, 0.0, 0.0, 0.0])
     nearest = {
-        sees: np.hypot(*walk(Reacting(model, sees=sees).crowd(alone, 0), robot)[:, 0, :2].T).min()
+        sees: np.hypot(*walk(ReactingPeople(model, sees=sees).crowd(alone, 0), robot)[:, 0, :2].T).min()
         for sees in ("robot", "person", "nothing")
     }
     assert nearest["nothing"] < 0.25
@@ -91,40 +91,42 @@ def test_they_avoid_the_robot_that_they_see_and_not_the_one_that_they_do_not(mod
 
 def test_nobody_walks_through_a_wall(model: str) -> None:
     wall = [[(0.0, -1.0), (0.0, 1.5)]]
-    paths = walk(Reacting(model).crowd(scene(TWO[0], walls=wall), 2), seconds=40.0)[:, 0, :2]
+    paths = walk(ReactingPeople(model).crowd(scene(TWO[0], walls=wall), 2), seconds=40.0)[:, 0, :2]
     crossing = np.flatnonzero(np.diff(np.sign(paths[:, 0])) != 0)
     assert all(not -1.0 <= paths[k, 1] <= 1.5 for k in crossing)
 
 
 def test_who_stands_stays_and_keeps_their_heading(model: str) -> None:
     standing = Person((0.0, 3.0), heading=1.0)
-    path = walk(Reacting(model).crowd(scene(standing), 0))[:, 0]
+    path = walk(ReactingPeople(model).crowd(scene(standing), 0))[:, 0]
     assert path[:, :2] == pytest.approx(np.tile((0.0, 3.0), (201, 1)), abs=1e-3)
     assert (path[:, 4] == 1.0).all()
 
 
 def test_goals_can_be_given(model: str) -> None:
-    crowd = Reacting(model, goals=((3.0, 4.0),), jitter=0).crowd(scene(Person((0.0, 0.0), heading=0.0)), 0)
+    crowd = ReactingPeople(model, goals=((3.0, 4.0),), jitter=0).crowd(
+        scene(Person((0.0, 0.0), heading=0.0)), 0
+    )
     path = walk(crowd, seconds=25.0)[:, 0]
     assert np.hypot(*(path[-1, :2] - (3.0, 4.0))) < 0.6
 
 
 def test_the_same_seed_gives_the_same_people_and_another_seed_others(model: str) -> None:
-    first, again, other = (walk(Reacting(model).crowd(scene(*TWO), seed)) for seed in (1, 1, 2))
+    first, again, other = (walk(ReactingPeople(model).crowd(scene(*TWO), seed)) for seed in (1, 1, 2))
     assert (first == again).all()
     assert not np.allclose(first, other, atol=1e-4)
 
 
 def test_people_keep_their_zones_and_an_empty_place_stays_empty(model: str) -> None:
     zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
-    crowd = Reacting(model).crowd(scene(Person((0.0, 0.0), (0.5, 0.0), zone=zone)), 0)
+    crowd = ReactingPeople(model).crowd(scene(Person((0.0, 0.0), (0.5, 0.0), zone=zone)), 0)
     assert [crowd(t, FAR)[0].zone for t in (0.0, 0.1, 0.2)] == [zone] * 3
-    nobody = Reacting(model).crowd(scene(), 0)
+    nobody = ReactingPeople(model).crowd(scene(), 0)
     assert [len(nobody(t, FAR)) for t in (0.0, 0.1)] == [0, 0]
 
 
 def test_time_does_not_go_back(model: str) -> None:
-    crowd = Reacting(model).crowd(scene(*TWO), 0)
+    crowd = ReactingPeople(model).crowd(scene(*TWO), 0)
     crowd(0.5, FAR)
     assert crowd(0.5, FAR)[0] == crowd(0.5, FAR)[0]
     with pytest.raises(szlib.SolverError, match=r"it is at 0.5 s, and got 0.4 s"):
@@ -137,18 +139,18 @@ def test_a_missing_package_is_named_with_what_installs_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, PACKAGES[model], None)
     with pytest.raises(szlib.SolverError, match=r"pip install .*(crowds|jupedsim)"):
-        Reacting(model).crowd(scene(*TWO), 0)
+        ReactingPeople(model).crowd(scene(*TWO), 0)
 
 
 def test_what_makes_no_sense_is_refused() -> None:
     with pytest.raises(szlib.SolverError, match="orca, social force, speed model; got 'boids'"):
-        Reacting("boids")
+        ReactingPeople("boids")
     with pytest.raises(szlib.SolverError, match="robot, person, nothing"):
-        Reacting("orca", sees="everything")  # type: ignore[arg-type]
+        ReactingPeople("orca", sees="everything")  # type: ignore[arg-type]
     with pytest.raises(szlib.SolverError, match="jitter must be finite"):
-        Reacting("orca", jitter=np.nan)
+        ReactingPeople("orca", jitter=np.nan)
     with pytest.raises(szlib.SolverError, match="2 people need a goal each; got 1"):
-        Reacting("orca", goals=((0.0, 0.0),)).crowd(scene(*TWO), 0)
+        ReactingPeople("orca", goals=((0.0, 0.0),)).crowd(scene(*TWO), 0)
 
 
 def test_importing_the_social_force_leaves_no_file_and_no_logging_behind(tmp_path: Path) -> None:
@@ -192,7 +194,7 @@ def recording() -> pd.DataFrame:
 
 
 def replay_of(tracks: pd.DataFrame, person: int) -> Replay:
-    return next(each for each in replays(tracks, 99) if each.walker.id == person)
+    return next(each for each in find_replays(tracks, 99) if each.walker.id == person)
 
 
 def test_the_robot_goes_where_the_walker_went_among_all_the_others() -> None:
@@ -209,7 +211,7 @@ def test_people_come_go_and_are_where_they_were() -> None:
     for t in np.arange(0.0, 16.0, 0.1):
         seen = [p for p in crowd(t, robot) if p is not None]
         now = tracks[np.isclose(tracks["t"], 10.0 + t) & (tracks["id"] != 1)]
-        near = now[np.hypot(now["x"] - 4.0, now["y"]) <= SIGHT]
+        near = now[np.hypot(now["x"] - 4.0, now["y"]) <= SENSING_RANGE]
         was, true = sorted(p.position for p in seen), sorted(zip(near["x"], near["y"], strict=True))
         assert np.reshape(was, (-1, 2)) == pytest.approx(np.reshape(true, (-1, 2)))
         assert {p.velocity for p in seen if p.heading} <= {(0.0, 1.0), (-1.0, 0.0)}
@@ -235,7 +237,7 @@ def test_a_person_who_stops_keeps_facing_where_they_walked() -> None:
 
 def test_the_walker_replaced_can_be_driven_like_a_controller() -> None:
     replay = replay_of(recording(), 1)
-    walker = AsRecorded(replay)
+    walker = ReplacedWalker(replay)
     own = walker.robot.start(replay.scenario.start)
     bodies = []
     for _ in range(101):
@@ -247,22 +249,22 @@ def test_the_walker_replaced_can_be_driven_like_a_controller() -> None:
 
 def test_ways_begin_and_end_in_the_area_and_in_open_space() -> None:
     area = szlib.Square(x=(1.0, 7.0), y=(-5.0, 5.0))
-    (replay,) = (each for each in replays(recording(), 99, area=area) if each.walker.id == 1)
+    (replay,) = (each for each in find_replays(recording(), 99, area=area) if each.walker.id == 1)
     assert (replay.scenario.start[0], replay.scenario.goal[0]) == pytest.approx((1.0, 7.0))
-    beside = make_walk((0, APART - 0.1), (1.0, 0.0), person=9, begin=10.0, duration=8.0)
-    ids = {each.walker.id for each in replays(make_tracks(recording(), beside), 99)}
+    beside = make_walk((0, MIN_START_DISTANCE - 0.1), (1.0, 0.0), person=9, begin=10.0, duration=8.0)
+    ids = {each.walker.id for each in find_replays(make_tracks(recording(), beside), 99)}
     assert ids.isdisjoint({1, 9}), "the robot has no companions"
     with pytest.raises(szlib.DataError, match=r"no walker came 5.0 m far"):
-        replays(recording(), 5, area=szlib.Square(x=(0.0, 1.0), y=(0.0, 1.0)))
+        find_replays(recording(), 5, area=szlib.Square(x=(0.0, 1.0), y=(0.0, 1.0)))
 
 
 def test_the_seed_draws_the_walkers() -> None:
-    ids = [[each.walker.id for each in replays(recording(), 2, seed=seed)] for seed in (0, 0, 1, 2, 3)]
+    ids = [[each.walker.id for each in find_replays(recording(), 2, seed=seed)] for seed in (0, 0, 1, 2, 3)]
     assert ids[0] == ids[1]
     assert len({tuple(each) for each in ids}) > 1
 
 
 def test_days_are_scenes_of_their_own() -> None:
     other_day = make_walk((4, 1), (0.0, 1.0), person=2, begin=10.0, duration=9.0, day="2012-10-28")
-    first = next(r for r in replays(make_tracks(recording(), other_day), 99) if r.walker.id == 1)
+    first = next(r for r in find_replays(make_tracks(recording(), other_day), 99) if r.walker.id == 1)
     assert [other.id for other in first.others].count(2) == 1

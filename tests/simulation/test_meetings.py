@@ -9,8 +9,8 @@ import pytest
 import szlib
 from szlib.simulation.baseline_controllers import straight
 from szlib.simulation.closed_loop import drive
-from szlib.simulation.monte_carlo import identity, rollouts
-from szlib.simulation.scenarios.meetings import MEETINGS, InSight, Variations, in_sight
+from szlib.simulation.monte_carlo import identify, rollouts
+from szlib.simulation.scenarios.meetings import MEETINGS, Variations, VisiblePeople, is_visible
 
 ZONE = szlib.Ellipse((0.05, 0.0), (1.0, 0.7))
 SETTINGS = szlib.MPCSettings()
@@ -52,7 +52,7 @@ def test_nobody_starts_or_walks_where_they_cannot_be(name):
 def test_the_controller_arrives_and_keeps_its_promise(name):
     scenario = Variations(MEETINGS[name], ZONE, shift=0.0, pace=(1.0, 1.0))(0)
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
-    metrics = drive(scenario, controller, behaviour=InSight()).metrics()
+    metrics = drive(scenario, controller, behaviour=VisiblePeople()).metrics()
     assert metrics["success"] and metrics["overlaps"] == 0
     assert metrics["unflagged_violations"] == 0
 
@@ -85,7 +85,13 @@ def test_variations_are_worlds_for_rollouts(tmp_path):
     def run(scene, **options):
         worlds = Variations(MEETINGS[scene], ZONE, **options)
         return rollouts(
-            2, worlds=worlds, behaviour=InSight(), controller=straight, out=tmp_path, n_jobs=1, progress=False
+            2,
+            worlds=worlds,
+            behaviour=VisiblePeople(),
+            controller=straight,
+            out=tmp_path,
+            n_jobs=1,
+            progress=False,
         )
 
     first = run("overtaking")
@@ -102,19 +108,19 @@ def test_variations_are_worlds_for_rollouts(tmp_path):
 def test_walls_hide_who_is_behind_them():
     wall = np.array([[(0.0, -1.0), (0.0, 1.0)]])
     here = np.array([-1.0, 0.0])
-    assert not in_sight(here, (1.0, 0.5), wall)
-    assert in_sight(here, (-0.5, 0.5), wall)  # before it
-    assert in_sight(here, (1.0, 2.5), wall)  # beside it
-    assert in_sight(here, (1.0, 0.5), np.zeros((0, 2, 2)))
+    assert not is_visible(here, (1.0, 0.5), wall)
+    assert is_visible(here, (-0.5, 0.5), wall)  # before it
+    assert is_visible(here, (1.0, 2.5), wall)  # beside it
+    assert is_visible(here, (1.0, 0.5), np.zeros((0, 2, 2)))
 
 
 def test_who_is_hidden_is_there_but_not_given_to_the_controller():
     scenario = Variations(MEETINGS["blind corner"], ZONE, shift=0.0, pace=(1.0, 1.0))(0)
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
-    log = drive(scenario, controller, behaviour=InSight())
+    log = drive(scenario, controller, behaviour=VisiblePeople())
     given = ~np.isnan(log.residual[:, 0, 0])
     sight = [
-        in_sight(x[:2], p[:2], scenario.walls) for x, p in zip(log.states, log.people[:, 0], strict=True)
+        is_visible(x[:2], p[:2], scenario.walls) for x, p in zip(log.states, log.people[:, 0], strict=True)
     ]
     assert given.tolist() == sight
     assert 0 < given.sum() < len(given)
@@ -123,7 +129,7 @@ def test_who_is_hidden_is_there_but_not_given_to_the_controller():
 
 
 def test_what_was_seen_is_no_part_of_what_a_model_is():
-    model, used = InSight(), InSight()
+    model, used = VisiblePeople(), VisiblePeople()
     used.crowd(MEETINGS["blind corner"], 0)(0.0, np.zeros(4))
-    assert identity(model) == identity(used)
+    assert identify(model) == identify(used)
     assert vars(pickle.loads(pickle.dumps(used))) == {}

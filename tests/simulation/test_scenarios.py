@@ -10,7 +10,7 @@ import shapely
 import szlib
 from szlib.control.people import BODY_RADIUS
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.metrics import avoidance_start, passing_side
+from szlib.simulation.metrics import find_avoidance_start, find_passing_side
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 KEYS = {
@@ -20,7 +20,7 @@ KEYS = {
     "steps_relaxed", "steps_braking", "outcome",
     "min_h_people", "min_h_walls", "jerk", "people", "walls", "flagged_steps", "unflagged_violations",
     "unflagged_overlaps", "min_clearance_people", "min_clearance_walls",
-    "max_slack", "solve_time_p99", "violations", "overlaps", "promised_steps",
+    "max_slack", "solve_time_p99", "violations", "overlaps", "claimed_safe_steps",
 }  # fmt: skip
 
 
@@ -80,7 +80,7 @@ def test_the_claims_do_not_hang_on_one_zone(name, zone):
 def test_a_zone_without_a_front_starts_avoidance_at_the_same_distance_from_either_side():
     symmetric = szlib.Ellipse((0.0, 0.0), (1.0, 0.7))
     scenario = szlib.SCENARIOS["passing"]
-    front, back = (avoidance_start(run(s, symmetric))[0] for s in (scenario, scenario.turned()))
+    front, back = (find_avoidance_start(run(s, symmetric))[0] for s in (scenario, scenario.turn_people()))
     assert front == pytest.approx(back, abs=1e-3)
     assert not scenario.claims[0].check(run(scenario, szlib.Ellipse((-0.2, 0.0), (1.0, 0.7))))[0]
 
@@ -187,23 +187,25 @@ def passing_log(y, x=(-2.0, -1.0, 0.5, 2.0)):
 
 
 def test_the_passing_side_is_where_the_person_is_not():
-    assert passing_side(passing_log(y=-1.0)) == "right"
-    assert passing_side(passing_log(y=1.0)) == "left"
-    assert passing_side(passing_log(y=1.0, x=(-2, -1.5, -1, -1))) == "none"
+    assert find_passing_side(passing_log(y=-1.0)) == "right"
+    assert find_passing_side(passing_log(y=1.0)) == "left"
+    assert find_passing_side(passing_log(y=1.0, x=(-2, -1.5, -1, -1))) == "none"
 
 
 def test_avoidance_starts_where_the_line_is_left():
-    distance, h = avoidance_start(passing_log(y=[0.0, -0.05, -0.2, 0.0]))  # 0.1 m beside it at x = -0.5 m
+    distance, h = find_avoidance_start(
+        passing_log(y=[0.0, -0.05, -0.2, 0.0])
+    )  # 0.1 m beside it at x = -0.5 m
     assert distance == pytest.approx(np.hypot(0.5, 0.1))
     person = szlib.Person((0, 0), heading=0.0)
     before, after = (szlib.MPCCBF(ZONE).barriers(at, [person])[0] for at in ((-1.0, -0.05), (0.5, -0.2)))
     assert h == pytest.approx(before + (after - before) / 3)
-    assert np.isnan(avoidance_start(passing_log(y=0.0))).all()
+    assert np.isnan(find_avoidance_start(passing_log(y=0.0))).all()
 
 
 def test_turning_everybody_around_turns_only_the_headings():
     scenario = szlib.SCENARIOS["corridor"]
-    turned = scenario.turned().people[0]
+    turned = scenario.turn_people().people[0]
     assert np.cos(turned.heading) == pytest.approx(1)
     assert (turned.position, turned.velocity) == (scenario.people[0].position, scenario.people[0].velocity)
 

@@ -5,7 +5,7 @@ import pytest
 
 import szlib
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.social_metrics import heading_changes, social
+from szlib.simulation.social_metrics import compute_social_metrics, heading_changes
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 
@@ -45,7 +45,7 @@ def still(n, x, y, velocity=(0.0, 0.0)):
 def test_spaces_are_the_share_of_time_at_halls_distances():
     # distances of the disc (0.5 m) to a person at the origin: 0.2, 0.44, 0.45, 1.1, 1.2, 3.5, 3.6, 9
     gaps = np.array([0.2, 0.44, 0.451, 1.1, 1.201, 3.5, 3.601, 9.0])
-    found = social(made(line(0.5 + gaps), [still(8, 0.0, 0.0)]))
+    found = compute_social_metrics(made(line(0.5 + gaps), [still(8, 0.0, 0.0)]))
     assert (found["intimate"], found["personal"], found["social"]) == (2 / 8, 2 / 8, 2 / 8)
     assert found["closest_person"] == pytest.approx((gaps - 0.25).mean())
 
@@ -53,13 +53,13 @@ def test_spaces_are_the_share_of_time_at_halls_distances():
 def test_the_nearest_of_several_counts_and_who_is_away_does_not():
     far, near = still(4, 0.0, 4.0), still(4, 0.0, 1.5)
     near[2:] = np.nan
-    found = social(made(line([0.0] * 4, 0.0), [far, near]))
+    found = compute_social_metrics(made(line([0.0] * 4, 0.0), [far, near]))
     assert found["closest_person"] == pytest.approx((0.75 + 0.75 + 3.25 + 3.25) / 4)
     assert (found["personal"], found["social"]) == (0.5, 0.5)
 
 
 def test_where_nobody_is_there_is_nothing_to_intrude_upon():
-    found = social(made(line([0.0, 0.1])))
+    found = compute_social_metrics(made(line([0.0, 0.1])))
     assert np.isnan(found["closest_person"])
     assert found["intimate"] == found["personal"] == found["social"] == 0
     assert found["robot_on_person"] == found["person_on_robot"] == 0
@@ -80,20 +80,20 @@ def test_who_ran_into_whom(robot, person, expected):
     t = 0.1 * np.arange(60)
     xs, at = robot * t, 2.0 + person * t
     people = np.column_stack([at, 0 * t, 0 * t, 0 * t + person, 0 * t])
-    found = social(made(line(xs, robot), [people]))
+    found = compute_social_metrics(made(line(xs, robot), [people]))
     assert (found["robot_on_person"], found["person_on_robot"]) == expected
 
 
 def test_a_collision_counts_once_and_again_after_a_gap():
     xs = np.array([0.0, 1.4, 1.5, 1.4, 0.0, 1.4, 1.4])
-    found = social(made(line(xs), [still(7, 2.0, 0.0)]))
+    found = compute_social_metrics(made(line(xs), [still(7, 2.0, 0.0)]))
     assert (found["robot_on_person"], found["person_on_robot"]) == (2, 0)
 
 
 def test_one_who_appears_in_the_robot_is_a_collision():
     ghost = still(4, 0.2, 0.0, (-1.0, 0.0))
     ghost[:2] = np.nan
-    found = social(made(line([0.0] * 4, 0.0), [ghost]))
+    found = compute_social_metrics(made(line([0.0] * 4, 0.0), [ghost]))
     assert (found["robot_on_person"], found["person_on_robot"]) == (0, 1)
 
 
@@ -113,20 +113,22 @@ def test_heading_changes_of_a_square_a_turn_back_and_a_circle():
 def test_time_not_moving_is_until_the_arrival():
     states = line([0.0, 0.0, 1.0, 2.0, 10.0, 10.0, 10.0])
     states[[0, 1, 4, 5, 6], 2] = 0.0
-    assert social(made(states, arrived=4))["time_not_moving"] == pytest.approx(0.3)
-    assert social(made(states))["time_not_moving"] == pytest.approx(0.5)
+    assert compute_social_metrics(made(states, arrived=4))["time_not_moving"] == pytest.approx(0.3)
+    assert compute_social_metrics(made(states))["time_not_moving"] == pytest.approx(0.5)
 
 
 def test_path_efficiency():
     straight = line([0.0, 5.0, 10.0])
-    assert social(made(straight, arrived=2))["path_efficiency"] == 1
+    assert compute_social_metrics(made(straight, arrived=2))["path_efficiency"] == 1
     corner = np.array([[0, 0, 0, 0], [0, 10, 0, 0], [10, 10, 0, 0], [10, 0, 0, 0]], float)
-    assert social(made(corner, arrived=3))["path_efficiency"] == pytest.approx(1 / 3)
-    assert np.isnan(social(made(straight))["path_efficiency"])
+    assert compute_social_metrics(made(corner, arrived=3))["path_efficiency"] == pytest.approx(1 / 3)
+    assert np.isnan(compute_social_metrics(made(straight))["path_efficiency"])
     across = [[(5.0, -3.0), (5.0, 3.0)]]
-    assert np.isnan(social(made(corner, walls=across, arrived=3))["path_efficiency"])
+    assert np.isnan(compute_social_metrics(made(corner, walls=across, arrived=3))["path_efficiency"])
     beside = [[(0.0, 3.0), (9.0, 3.0)]]
-    assert social(made(corner, walls=beside, arrived=3))["path_efficiency"] == pytest.approx(1 / 3)
+    assert compute_social_metrics(made(corner, walls=beside, arrived=3))["path_efficiency"] == pytest.approx(
+        1 / 3
+    )
 
 
 def test_moving_the_world_changes_nothing():
@@ -134,7 +136,9 @@ def test_moving_the_world_changes_nothing():
     states = np.column_stack([t, 0.3 * np.sin(t), np.ones_like(t), 0.3 * np.cos(t)])
     people = np.column_stack([3 - 0.5 * t, 0.5 + 0 * t, np.pi + 0 * t, -0.5 + 0 * t, 0 * t])
     moved = np.add(people, [7.0, -3.0, 0, 0, 0])
-    one = social(made(states, [people], arrived=60, goal=(6.0, 0.0)))
-    other = social(made(np.add(states, [7.0, -3.0, 0, 0]), [moved], arrived=60, goal=(13.0, -3.0)))
+    one = compute_social_metrics(made(states, [people], arrived=60, goal=(6.0, 0.0)))
+    other = compute_social_metrics(
+        made(np.add(states, [7.0, -3.0, 0, 0]), [moved], arrived=60, goal=(13.0, -3.0))
+    )
     assert one == pytest.approx(other)
     assert one["robot_on_person"] == 1

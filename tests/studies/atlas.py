@@ -11,16 +11,16 @@ from __future__ import annotations
 import sys
 from itertools import product
 
-from szlib.simulation.atlas import REFERENCE, Cell, chart
+from szlib.simulation.atlas import REFERENCE, AtlasCell, run_atlas
 
 PACES, SIZES = (0.3, 0.5, 0.8), (0.5, 0.75, 1.0, 1.25)
 CELLS = [
-    Cell("corridor", *rest)
+    AtlasCell("corridor", *rest)
     for rest in product(
         (0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2), (3.0, 3.4, 3.8, 4.2, 4.6, 5.4, 6.4), (*PACES, 1.1), SIZES
     )
 ] + [
-    Cell(*rest)
+    AtlasCell(*rest)
     for rest in product(
         ("waiting", "making_room"),
         (0.03, 0.05, 0.07, 0.1, 0.2),
@@ -31,4 +31,4 @@ CELLS = [
 ]
 
 if __name__ == "__main__":
-    chart(CELLS, REFERENCE, n_jobs=1).round(4).to_csv(sys.stdout, index=False)
+    run_atlas(CELLS, REFERENCE, n_jobs=1).round(4).to_csv(sys.stdout, index=False)

@@ -4,7 +4,7 @@ python tests/studies/crowd_trials.py           both tables, as they are saved: s
 python tests/studies/crowd_trials.py --n 10    at most 10 trials of each kind
 
 17_crowds.csv     means with 95 % intervals: crowd by what people see by controller
-17_promises.csv   steps that said they were safe, how many led to h < 0, and what people did meanwhile
+17_safety_claims.csv   steps that said they were safe, how many led to h < 0, and what people did meanwhile
 
 They go to notebooks/tables, or to --out.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/,
 eth/); JuPedSim is left out where it is not installed.  An exception in any trial ends the run.
@@ -26,12 +26,12 @@ import pandas as pd
 import szlib
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS, summarise
-from szlib.simulation.crowds.reacting import Reacting
+from szlib.simulation.crowds.reacting import ReactingPeople
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.replay import AsRecorded, Replays, replays
-from szlib.simulation.replay_metrics import score
-from szlib.simulation.robots import Controller, Factory
-from szlib.simulation.safety_claims import KINDS, broken_promises
+from szlib.simulation.replay import ReplacedWalker, Replays, find_replays
+from szlib.simulation.replay_metrics import compute_replay_metrics
+from szlib.simulation.robots import Controller, ControllerFactory
+from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
 from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds
 
@@ -77,8 +77,8 @@ def reused(scenario: Scenario, settings: szlib.MPCSettings) -> Controller:
 
 def measure(log: SimulationLog) -> dict[str, float]:
     """Scores, and broken promises by what people did."""
-    broken = broken_promises(log)
-    counts = {did: float((broken["did"] == did).sum()) for did in KINDS}
+    broken = safety_violations(log)
+    counts = {did: float((broken["did"] == did).sum()) for did in MOTION_CHANGES}
     rest = {
         "unexplained": float((~broken["explained"].astype(bool)).sum()),
         "broken_steps": float(broken["t"].nunique()),
@@ -86,7 +86,7 @@ def measure(log: SimulationLog) -> dict[str, float]:
         "steps": float(len(log.states) - 1),
         "worst": float(broken["h"].min()) if len(broken) else np.nan,
     }
-    return score(log) | counts | rest
+    return compute_replay_metrics(log) | counts | rest
 
 
 def violated_by_who_kept(log: SimulationLog) -> int:
@@ -110,7 +110,7 @@ def violated_by_who_kept(log: SimulationLog) -> int:
 
 def controllers(
     n: int, most: int, others: int, baselines: int
-) -> Iterator[tuple[str, Factory, szlib.MPCSettings, int]]:
+) -> Iterator[tuple[str, ControllerFactory, szlib.MPCSettings, int]]:
     """Name, factory, settings and trials of each."""
     for name, settings in SETTINGS.items():
         trials = min(n, most) if name == "MPC-CBF" else min(n, most, others)
@@ -128,7 +128,7 @@ def reacting(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
                 trials,
                 settings=settings,
                 worlds=CROWDED,
-                behaviour=Reacting(model, sees=sees),
+                behaviour=ReactingPeople(model, sees=sees),
                 controller=factory,
                 measure=measure,
                 out=work,
@@ -143,7 +143,7 @@ def recorded(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
     for site, most in WALKERS.items():
         load, square = SITES[site]
         zone = zone_of("plaza" if site == "plaza" else "ATC day")
-        made = replays(load(), min(n, most), seed=0, area=square, zone=zone)
+        made = find_replays(load(), min(n, most), seed=0, area=square, zone=zone)
         for name, factory, settings, trials in controllers(n, len(made), IN_PLACE, IN_PLACE):
             rows = szlib.rollouts(
                 trials,
@@ -162,8 +162,8 @@ def recorded(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
 
 def walkers(made: Replays) -> pd.DataFrame:
     """Scores of the people who are replaced."""
-    logs = (drive(each.scenario, AsRecorded(each), behaviour=each, until_arrival=False) for each in made)
-    return pd.DataFrame([{"seed": i} | score(log) for i, log in enumerate(logs)])
+    logs = (drive(each.scenario, ReplacedWalker(each), behaviour=each, until_arrival=False) for each in made)
+    return pd.DataFrame([{"seed": i} | compute_replay_metrics(log) for i, log in enumerate(logs)])
 
 
 @lru_cache
@@ -176,7 +176,15 @@ def zone_of(site: str) -> szlib.Ellipse:
 def promises(rows: pd.DataFrame) -> pd.DataFrame:
     """One row each crowd and controller: trials, steps, and what became of the promises."""
     told = rows[rows["controller"].str.startswith("MPC")]
-    sums = ["steps", "promised_steps", "broken_steps", *KINDS, "unexplained", "to_who_kept", "flagged_steps"]
+    sums = [
+        "steps",
+        "claimed_safe_steps",
+        "broken_steps",
+        *MOTION_CHANGES,
+        "unexplained",
+        "to_who_kept",
+        "flagged_steps",
+    ]
     table = told.groupby(list(BY), sort=False).agg(
         trials=("seed", "size"), **{name: (name, "sum") for name in sums}, worst=("worst", "min")
     )
@@ -191,7 +199,7 @@ def main(n: int, out: Path, work: Path | None) -> None:
     means = pd.concat([summarise(rows, by=BY, metrics=SCORES) for rows in parts], ignore_index=True)
     table = promises(pd.concat(parts, ignore_index=True))
     means.round(4).to_csv(out / "17_crowds.csv", index=False)
-    table.round(4).to_csv(out / "17_promises.csv", index=False)
+    table.round(4).to_csv(out / "17_safety_claims.csv", index=False)
     print(table.to_string())
 
 

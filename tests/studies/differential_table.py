@@ -24,7 +24,7 @@ from szlib.control.differential import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
 from szlib.control.people import BODY_RADIUS
 from szlib.control.problem import TOLERANCE
-from szlib.simulation.monte_carlo import CIRCLE, mpc_cbf
+from szlib.simulation.monte_carlo import DEFAULT_ZONE, mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
@@ -43,7 +43,7 @@ NEAR = 0.6
 def two_wheels(scenario: szlib.Scenario, settings: szlib.MPCSettings, omega_max: float) -> Any:
     """A differential drive that heads anywhere where it starts at rest."""
     drive = szlib.DifferentialDrive(
-        CIRCLE,
+        DEFAULT_ZONE,
         walls=scenario.walls,
         settings=settings,
         omega_max=omega_max,

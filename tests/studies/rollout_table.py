@@ -16,7 +16,7 @@ from scipy.stats import beta
 
 import szlib
 from szlib.control.problem import TOLERANCE
-from szlib.simulation.monte_carlo import rollouts, tally
+from szlib.simulation.monte_carlo import rollouts, summarise_rollouts
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
 TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "11_rollouts.csv"
@@ -52,7 +52,7 @@ def interval(count: int, n: int, level: float = 0.95) -> tuple[float, float]:
 def row(blocks: list[pd.DataFrame]) -> dict[str, Any]:
     """All blocks in one line."""
     rows = pd.concat(blocks, ignore_index=True)
-    line = tally(rows).to_dict()
+    line = summarise_rollouts(rows).to_dict()
     line["worlds of blocks"] = " ".join(str(len(block)) for block in blocks)
     for event, column in EVENTS.items():
         happened = [int((block[column] < -TOLERANCE).sum()) for block in blocks]

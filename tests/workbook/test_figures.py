@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import szlib
-from szlib.simulation.safety_claims import KINDS
+from szlib.simulation.safety_claims import MOTION_CHANGES
 from szlib.workbook import figures
 
 matplotlib.use("Agg")
@@ -270,7 +270,7 @@ def test_a_tornado_puts_what_moves_most_on_top():
 
 
 def test_a_map_of_manners_has_a_letter_for_each_cell():
-    cells = pd.DataFrame({"gamma": [0.1, 0.1, 0.2, 0.2], "width": [1.0, 2.0] * 2, "manner": list("xyyz")})
+    cells = pd.DataFrame({"gamma": [0.1, 0.1, 0.2, 0.2], "width": [1.0, 2.0] * 2, "strategy": list("xyyz")})
     ax = figures.plot_strategies(cells, names=["x", "y", "z"], rows="gamma", columns="width")
     assert [text.get_text() for text in ax.texts] == ["B", "C", "A", "B"]  # the largest gamma on top
     assert ax.get_xlabel() == "width" and [each.get_text() for each in ax.get_yticklabels()] == ["0.2", "0.1"]
@@ -304,7 +304,7 @@ def test_a_crowd_is_drawn_where_it_is_nearest(log):
 
 
 def test_promises_are_shares_of_the_steps_that_promised():
-    table = pd.DataFrame(0, index=["orca", "ETH"], columns=[*KINDS, "promised_steps"])
-    table["promised_steps"], table["turned"], table["came"] = [1000, 500], [3, 0], [0, 1]
+    table = pd.DataFrame(0, index=["orca", "ETH"], columns=[*MOTION_CHANGES, "claimed_safe_steps"])
+    table["claimed_safe_steps"], table["turned"], table["came"] = [1000, 500], [3, 0], [0, 1]
     widths = [bar.get_width() for bars in figures.plot_safety_claims(table).containers for bar in bars]
     assert sorted(widths)[-2:] == [2, 3]

@@ -1,5 +1,5 @@
 """People who react to the robot and to each other, by three interchangeable models of walking."""
 
-from .reacting import MODELS, Reacting
+from .reacting import MODELS, ReactingPeople
 
-__all__ = ["MODELS", "Reacting"]
+__all__ = ["MODELS", "ReactingPeople"]

@@ -17,7 +17,7 @@ from .walking_model import CROWDS, FASTER, Walkers, package
 
 HORIZON, WALL_HORIZON = 3.0, 1.0
 """How far ahead people keep apart from others and from walls [s] (assumed)."""
-SIGHT, NEIGHBOURS = 10.0, 10
+SENSING_RANGE, NEIGHBOURS = 10.0, 10
 """How far they see [m], and to how many at once they react (as in RVO2's examples)."""
 STEP_ASIDE = 0.5
 """Greatest speed of who stands [m/s] (assumed)."""
@@ -32,7 +32,7 @@ class Orca:
     @staticmethod
     def _simulator(walkers: Walkers) -> Any:
         rvo = package("pyrvo", CROWDS)
-        near = (SIGHT, NEIGHBOURS, HORIZON, WALL_HORIZON)
+        near = (SENSING_RANGE, NEIGHBOURS, HORIZON, WALL_HORIZON)
         sim = rvo.RVOSimulator(0.1, *near, BODY_RADIUS, 1.0)
         fastest = np.where(walkers.paces > 0, FASTER * walkers.paces, STEP_ASIDE).tolist()
         for position, velocity, speed in zip(walkers.positions, walkers.velocities, fastest, strict=True):

@@ -25,12 +25,12 @@ MODELS: Mapping[str, Build] = MappingProxyType(
 )
 """Models of walking, by name; the first two need the extra `crowds`, the third JuPedSim."""
 Sees = Literal["robot", "person", "nothing"]
-FACES = 0.2
+MIN_HEADING_SPEED = 0.2
 """Slower people keep the heading that they had [m/s] (assumed)."""
 
 
 @dataclass(frozen=True)
-class Reacting:
+class ReactingPeople:
     """People who walk by a model, each to their own goal: a behaviour for `simulate` and `rollouts`.
 
     Parameters
@@ -121,9 +121,9 @@ class _Walking:
 
 
 def _moved(person: Person, at: list[float], velocity: list[float]) -> Person:
-    """The same person elsewhere, who faces where they walk, or, below `FACES`, where they faced."""
+    """The person elsewhere, facing where they walk, or below `MIN_HEADING_SPEED` where they faced."""
     (x, y), (vx, vy) = at, velocity
-    heading = atan2(vy, vx) if hypot(vx, vy) >= FACES else person.heading
+    heading = atan2(vy, vx) if hypot(vx, vy) >= MIN_HEADING_SPEED else person.heading
     return replace(
         person, position=(x, y), velocity=(vx, vy), heading=heading, heading_unknown=heading is None
     )

@@ -1,16 +1,16 @@
 """Scenes to drive through: the paper's four scenarios, eleven meetings, random worlds."""
 
-from .meetings import MEETINGS, InSight, Variations
+from .meetings import MEETINGS, Variations, VisiblePeople
 from .paper import SCENARIOS
-from .random_worlds import ONE_PERSON, Worlds, random_zone, world
+from .random_worlds import ONE_PERSON, Worlds, draw_zone, make_world
 
 __all__ = [
     "MEETINGS",
     "ONE_PERSON",
     "SCENARIOS",
-    "InSight",
     "Variations",
+    "VisiblePeople",
     "Worlds",
-    "random_zone",
-    "world",
+    "draw_zone",
+    "make_world",
 ]

@@ -166,7 +166,7 @@ class Variations:
         return replace(person, position=(x + dx, y + dy), velocity=velocity, zone=zone)
 
 
-class InSight:
+class VisiblePeople:
     """People who walk on, unaffected; the controller gets those whom no wall hides. A `CrowdModel`."""
 
     def crowd(self, scenario: Scenario, seed: int) -> Crowd:
@@ -183,14 +183,14 @@ class InSight:
 
     def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person | None, ...]:
         """Everybody, but None for whom a wall hides."""
-        return tuple(p if in_sight(self._robot, p.position, self._walls) else None for p in people)
+        return tuple(p if is_visible(self._robot, p.position, self._walls) else None for p in people)
 
-    def __reduce__(self) -> tuple[type[InSight], tuple[()]]:
+    def __reduce__(self) -> tuple[type[VisiblePeople], tuple[()]]:
         """A copy begins anew: what is remembered is of one run."""
-        return InSight, ()
+        return VisiblePeople, ()
 
 
-def in_sight(a: Array, b: Place, walls: Array) -> bool:
+def is_visible(a: Array, b: Place, walls: Array) -> bool:
     """True if the line between two places crosses no wall (n, 2, 2)."""
     if not len(walls):
         return True

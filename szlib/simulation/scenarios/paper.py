@@ -14,9 +14,9 @@ from ...control.mpc import MPCCBF
 from ...control.people import Person
 from ..closed_loop import simulate
 from ..log import SimulationLog
-from ..metrics import along_course, avoidance_start, passing_side
+from ..metrics import find_avoidance_start, find_passing_side, locate_along_course
 from ..scenario import GOAL_RADIUS, Claim, Scenario
-from ..strategies import BACKWARDS, YIELDED
+from ..strategies import MIN_RETREAT, MIN_WAIT
 
 WELL_BEFORE = 0.5
 """Avoidance that starts at this h starts well before the zone [m] (assumed)."""
@@ -36,28 +36,28 @@ _PATHWAY = np.array(
 
 def _avoids_earlier_head_on(log: SimulationLog) -> tuple[bool, float]:
     """How much farther away [m]."""
-    head_on = avoidance_start(log)[0]
+    head_on = find_avoidance_start(log)[0]
     controller = MPCCBF(log.zones[0], walls=log.scenario.walls, settings=log.settings)
-    from_behind = avoidance_start(simulate(log.scenario.turned(), controller))[0]
+    from_behind = find_avoidance_start(simulate(log.scenario.turn_people(), controller))[0]
     return head_on > from_behind, head_on - from_behind
 
 
 def _avoids_well_before(log: SimulationLog) -> tuple[bool, float]:
     """h where avoidance starts [m]."""
-    h = avoidance_start(log)[1]
+    h = find_avoidance_start(log)[1]
     return h > WELL_BEFORE, h
 
 
 def _passes_on_chosen_side(log: SimulationLog) -> tuple[bool, float]:
     """How far to the robot's left the person is when abeam [m]."""
-    ahead, left = along_course(log, 0)
-    return passing_side(log) == log.settings.pass_side, float(left[np.abs(ahead).argmin()])
+    ahead, left = locate_along_course(log, 0)
+    return find_passing_side(log) == log.settings.pass_side, float(left[np.abs(ahead).argmin()])
 
 
 def _slows_while_passing(log: SimulationLog) -> tuple[bool, float]:
     """Least speed beside the person, as a share of the greatest speed."""
     speed = log.table["speed"].to_numpy()
-    beside = np.abs(along_course(log, 0)[0]) <= BESIDE
+    beside = np.abs(locate_along_course(log, 0)[0]) <= BESIDE
     share = float(speed[beside].min() / speed.max()) if beside.any() else np.nan
     return share < SLOWED, share
 
@@ -65,12 +65,12 @@ def _slows_while_passing(log: SimulationLog) -> tuple[bool, float]:
 def _waits(log: SimulationLog) -> tuple[bool, float]:
     """How long the robot yields [s], without having to go back."""
     waited = float(log.metrics()["time_yielding"])
-    return waited >= YIELDED and _retreat(log) < GOAL_RADIUS, waited
+    return waited >= MIN_WAIT and _retreat(log) < GOAL_RADIUS, waited
 
 
 def _makes_room(log: SimulationLog) -> tuple[bool, float]:
     """How far the robot goes back behind its start [m]."""
-    return _retreat(log) >= BACKWARDS, _retreat(log)
+    return _retreat(log) >= MIN_RETREAT, _retreat(log)
 
 
 def _retreat(log: SimulationLog) -> float:

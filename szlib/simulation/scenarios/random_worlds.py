@@ -45,7 +45,7 @@ class Worlds:
     start_speed : fastest start, in any direction [m/s].
     min_h : least h of every person and wall at the start, and where full braking would end [m].
     duration : time that the robot has [s].
-    zone : everybody's, such as one that was learned; None draws one for each world (`random_zone`).
+    zone : everybody's, such as one that was learned; None draws one for each world (`draw_zone`).
 
     Raises
     ------
@@ -79,19 +79,19 @@ class Worlds:
 
     def __call__(self, seed: int) -> Scenario:
         """The world of this seed; see `world`."""
-        return world(seed, self)
+        return make_world(seed, self)
 
 
 ONE_PERSON = Worlds(people=(1, 1), walls=0.0, start_speed=0.0, min_h=0.3)
 """One person in open space, a robot that starts at rest: here a controller has no excuse."""
 
 
-def world(seed: int, worlds: Worlds | None = None) -> Scenario:
+def make_world(seed: int, worlds: Worlds | None = None) -> Scenario:
     """The world of this seed: the same one every time, whatever controller is to drive in it.
 
     Start and goal are clear of walls by what a robot of the default radius requires, the goal also
     of people who stand. People keep off walls and off each other's bodies at the start, and walkers
-    never cross a wall. Each person has the zone of the world: `worlds.zone`, or one by `random_zone`.
+    never cross a wall. Each person has the zone of the world: `worlds.zone`, or one by `draw_zone`.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def world(seed: int, worlds: Worlds | None = None) -> Scenario:
     """
     w, rng = worlds or Worlds(), np.random.default_rng(seed)
     for _ in range(_TRIES):
-        drawn = random_zone(rng)  # drawn in any case: the rest of the world does not depend on it
+        drawn = draw_zone(rng)  # drawn in any case: the rest of the world does not depend on it
         zone, walls = w.zone or drawn, _walls(rng, w)
         people = _people(rng, w, walls, zone)
         x, goal = rng.uniform(-w.size / 2, w.size / 2, (2, 2))
@@ -127,7 +127,7 @@ def world(seed: int, worlds: Worlds | None = None) -> Scenario:
     )
 
 
-def random_zone(rng: np.random.Generator) -> Ellipse:
+def draw_zone(rng: np.random.Generator) -> Ellipse:
     """A zone of the fitted family: like those learned (1.0 m x 0.75 m), of any tilt, off centre."""
     a = rng.uniform(0.7, 1.2)
     center = (rng.uniform(-0.1, 0.2), rng.uniform(-0.1, 0.1))

@@ -10,7 +10,7 @@ import numpy as np
 from ...control.mpc import MPCCBF
 from ...control.settings import MPCSettings
 from ...simulation.closed_loop import simulate
-from ...simulation.metrics import avoidance_start
+from ...simulation.metrics import find_avoidance_start
 from ...simulation.scenarios.paper import SCENARIOS
 from ...zones.ellipses import Ellipse
 from .task import Case, Rng, Task, formula
@@ -35,10 +35,12 @@ def _some_zone(rng: Rng) -> Ellipse:
 @lru_cache(maxsize=64)
 def _run(name: str, zone: Ellipse, settings: MPCSettings, turned: bool = False) -> dict[str, float]:
     """A scenario of the paper in numbers: infeasible steps, least h [m], where avoidance starts [m]."""
-    scenario = SCENARIOS[name].turned() if turned else SCENARIOS[name]
+    scenario = SCENARIOS[name].turn_people() if turned else SCENARIOS[name]
     log = simulate(scenario, MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=1))
     found = log.metrics()
-    return {name: found[name] for name in ("infeasible_steps", "min_h")} | {"start": avoidance_start(log)[0]}
+    return {name: found[name] for name in ("infeasible_steps", "min_h")} | {
+        "start": find_avoidance_start(log)[0]
+    }
 
 
 def _weak_brake(rng: Rng) -> tuple[Any, ...]:
@@ -175,7 +177,7 @@ TASKS = (
             "What does gamma allow, what does a longer horizon see, on which side is a zone longer?",
             "A larger gamma lets h fall faster; more barrier steps tell the robot earlier; the zone reaches "
             "farther ahead of a person than behind.",
-            "Now run: szlib.simulate(scenario, controller).metrics(), and scenario.turned() for from behind.",
+            "Now run: szlib.simulate(scenario, controller).metrics(), and scenario.turn_people() too.",
         ),
         _runs,
         {

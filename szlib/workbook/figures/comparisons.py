@@ -29,12 +29,12 @@ def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> 
 def plot_strategies(
     table: pd.DataFrame, *, names: Sequence[str], rows: str, columns: str, ax: Axes | None = None
 ) -> Axes:
-    """A map of what a robot did, as from `scenarios.atlas.chart`: one value of "manner" a cell, as a letter.
+    """A map of what a robot did, as from `simulation.atlas`: one value of "strategy" a cell, as a letter.
 
     `names` are all that may occur, from pale to dark; the letter is the place in them: A, B, C, ...
     """
     ax = get_axes(ax, size=(4, 3.2))
-    found = table.pivot(index=rows, columns=columns, values="manner").sort_index(ascending=False)
+    found = table.pivot(index=rows, columns=columns, values="strategy").sort_index(ascending=False)
     places = found.map(list(names).index).to_numpy()
     ax.imshow(places, cmap="YlOrBr", vmin=0, vmax=1.3 * len(names), aspect="auto")
     for (row, column), place in np.ndenumerate(places):

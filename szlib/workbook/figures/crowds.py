@@ -9,7 +9,7 @@ from matplotlib.patches import Circle
 
 from ...simulation.log import SimulationLog
 from ...simulation.replay import Replay
-from ...simulation.safety_claims import KINDS
+from ...simulation.safety_claims import MOTION_CHANGES
 from .style import BLACK, BLUE, GREEN, ORANGE, RED, get_axes, label_metres
 
 _AROUND = 3.0
@@ -57,12 +57,13 @@ def plot_crowd(log: SimulationLog, *, replay: Replay | None = None, ax: Axes | N
 def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     """Steps that said they were safe and led to h < 0, of a thousand that said so, by what people did.
 
-    `table` has a row for each crowd: its name as the index, promised_steps, and a column for each of `KINDS`.
+    `table` has a row for each crowd: its name as the index, claimed_safe_steps, and a column for each
+    of `MOTION_CHANGES`.
     """
     ax = get_axes(ax, size=(8, 3.5))
     left = np.zeros(len(table))
-    for did in KINDS:
-        share = 1000 * table[did].to_numpy(float) / table["promised_steps"].to_numpy(float)
+    for did in MOTION_CHANGES:
+        share = 1000 * table[did].to_numpy(float) / table["claimed_safe_steps"].to_numpy(float)
         if did in _SHADES or share.any():
             colour, hatch = _SHADES.get(did, ("magenta", "ooo"))
             ax.barh(table.index, share, left=left, color=colour, hatch=hatch, edgecolor="white", label=did)
