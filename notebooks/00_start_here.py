@@ -173,6 +173,31 @@ for sheet in SHEETS:
 # | $\mathbf{u} = (f_x, f_y)$ | control, an acceleration | `szlib.Step` |
 
 # %% [markdown]
+# ## Parameters
+#
+# | parameter | value | badge |
+# |---|---|---|
+# | attentional space; window; smallest distance at the opening; smallest speed | 4 m x 5 m ahead; 3 s; 1 m; 0.4 m/s | paper ("ahead": assumed) |
+# | the other person | inside the space at the opening | assumed |
+# | area of the ATC mall | x -18.5 to -7.5 m, y -10 to 8 m | assumed |
+# | clock; velocity from the displacement over | 0.1 s; +-0.5 s | assumed |
+# | gap that ends a track | 0.5 s in raw files, 1.6 s at 1 Hz | measured |
+# | $r_{max}$ | 2 m | paper |
+# | outliers: encounters nearer than half of all, with a local outlier factor above | 2, among 2 % of all (at least 20) | measured |
+# | outliers by samples (`fraction=0.002, neighbours=20`): share; neighbours | 0.2 %; 20 | paper; assumed |
+# | zone that the robot keeps | the one at 1.1 m/s | paper |
+# | time step; N; $N_h$; speed limit (Euclidean) | 0.1 s; 8; 2; 1 m/s | paper |
+# | robot radius; margin $\epsilon$ | 0.5 m; 0.05 m, more at the ends of short walls ($r^2 / L$) | paper; measured |
+# | quantile q; encounters needed on each side | 5 %; 20 | assumed |
+# | companions; shifts of the null model | see notebook 15; 1 to 10 min | measured; assumed |
+# | gamma | 0.05 | measured |
+# | Q; R; P | diag(10, 10, 1, 1); I; 10 Q | assumed |
+# | acceleration limit per axis | 1 m/s2 | assumed |
+# | side on which a head-on person is passed | right | assumed |
+# | solver | SQP (IPOPT is the paper's) | measured |
+# | places in the four scenarios | as in `szlib.SCENARIOS` | assumed |
+
+# %% [markdown]
 # ## References
 #
 # - J. Jang, M. Ghaffari: Social zone as a barrier function for socially-compliant robot navigation, 2024.

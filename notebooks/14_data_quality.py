@@ -211,6 +211,27 @@ record.check("each row is used or counted", counted, unusable, always=True)
 record.check("frames are at most 1 s apart (median)", usual <= 1.0, f"{usual:.3f} s")
 
 # %% [markdown]
+# ## Ninety-two days
+#
+# `szlib extract atc/*.csv --out days --jobs 4 --exclude 2012-11-11` writes a Parquet file and a funnel for each day. In Python:
+#
+# ```
+# days = szlib.extract_days("atc/", out="days", n_jobs=4)  # print(days): the table
+# zone = szlib.SocialZone.fit(days.samples())
+# ```
+#
+# A raw day of 1 GB is streamed: only rows near the area are kept in memory, and the encounters are bit for bit those of the
+# whole day. A day is identified by the content of its files and every parameter. A run that was stopped or killed resumes, and
+# a day that fails does not stop the others. Rows near the area are cached (9 MB a day, at most 2 GB; `SZLIB_CACHE` names
+# another folder, or is "off").
+#
+# | where | how |
+# |---|---|
+# | laptop | `--jobs 2`; each process needs up to 1 GB, or 180 bytes for each row near the area where that is more |
+# | workstation | `--jobs 16`; set `POLARS_MAX_THREADS=2`, so that processes do not compete for cores |
+# | SLURM, or any Dask cluster | start `dask scheduler --scheduler-file s.json` and, by `srun`, `dask worker --scheduler-file s.json --nthreads 1` on nodes that share the data; then `szlib extract atc/ --out days --scheduler tcp://HOST:8786`. In a program: `with joblib.parallel_config("dask"):`. The extra `cluster` is needed. |
+
+# %% [markdown]
 # **What it means.** Speed must come from positions. Gaps and irregular frames are ordinary: everything
 # is brought to one clock, within pieces without a gap. Which days to leave out remains a choice by hand,
 # made with the figure of visits and standing people, and handed on as `exclude`; the funnel says what it

@@ -300,6 +300,20 @@ Markdown(f"""Strangers keep {fitted["strangers"]}. Without those who walk in the
 {fitted[fewer]}, in bins {binned[fewer]}: people of one stream are kept apart by condition 3 as well. Of
 the other changes "{moved.idxmax()}" moves the radius most, by {100 * moved.max():.0f} %.""")
 
+# %% [markdown]
+# ## Results on real data
+#
+# | | ATC day, strangers | Grand Central, strangers |
+# |---|---|---|
+# | radius of the respect zone [m] | 1.11 (0.97 to 1.65) | 0.74 (0.70 to 0.78); not in the same direction: 0.69 (0.66 to 0.73) |
+# | p-value | 0.01, the least of 100 null models | 1/21, the least of 20 |
+#
+# The null model's own radius is at most 0.1 m, but its *hull* reaches 0.32 m. In crowds that ignore each other, 4 of 100 gave
+# a false alarm, and 1 of 100 that come in bunches: each kind of encounter is compared with its own kind.
+#
+# Companions are found with precision 23/23 and recall 23/24 on THOR-MAGNI, 121/154 and 121/177 on the ETH sequence, whose list
+# of groups is incomplete.
+
 # %%
 kept = f"a distance of {radius:.2f} m remains that strangers keep" if found else "no distance is shown here"
 Markdown(f"""**What it means.** Emptiness alone makes a zone, and a method that looks for the nearest person

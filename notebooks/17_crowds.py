@@ -317,6 +317,27 @@ record.claim("and is not longer in anybody's zone", max(less.values()) <= 0, les
 means.loc[["reached", "path_efficiency", "time_intruding"]].round(2)
 
 # %% [markdown]
+# ## Two wheels, and numbers to compare with
+#
+# **Differential drive** (`python tests/studies/differential_table.py`): in 2,000 random worlds no step that claimed to be safe led to
+# h < 0, nor to an overlap on ten points between samples. 80 % arrive (90.9 % of the double integrator), 0.86 s (0.80 to 0.92)
+# later. The disc grows by the distance ahead of the axle, 25 cm at 4 rad/s. That is too much for the passages of notebooks 09
+# and 10, which need 8 rad/s.
+#
+# **All crowds** (`python tests/studies/crowd_trials.py`): 2,341 trials among ORCA, social forces, JuPedSim's speed model and recorded
+# people, without an exception. Of 467,672 steps that claimed to be safe 265 led to h < 0. In each of them a person had appeared
+# (157), turned (71), sped up (40) or slowed down (11).
+#
+# | in the place of recorded walkers, who do not see the robot | reached the goal | time: robot, person | seconds in zones: robot, person |
+# |---|---|---|---|
+# | ATC day, 200 | 99.5 % | 11.0 s, 10.1 s | 0.01, 0.29 |
+# | ETH, 127 | 87 % (81 to 93) | 17.8 s, 8.4 s | 0.23, 0.19 |
+# | Grand Central, 12 | 42 % (17 to 67) | 46 s, 21 s | 0.61, 0.92 |
+#
+# The robot performs poorly around people who walk faster than it: gamma = 0.05 makes it yield from afar. gamma = 0.2 over the whole
+# horizon reaches the goal in 92 % (75 to 100) at Grand Central, measured before the side of passing was chosen within the horizon.
+
+# %% [markdown]
 # **What it means.** Promises hold: in all trials no step that said it was safe led to $h < 0$ for
 # somebody who went on as they were seen. What was void was made so by people who appeared, turned or
 # changed their pace. Among people who react, the robot hardly ever comes into a zone, where straight
