@@ -182,7 +182,7 @@ def test_the_way_to_a_robot_loads_no_figures() -> None:
 
 
 def test_the_command_line_loads_neither_numbers_nor_notebooks() -> None:
-    loaded = loaded_after("from szlib.workbook.command_line.options import parser; parser()")
+    loaded = loaded_after("from szlib.workbook.cli import build_parser; build_parser()")
     assert {"numpy", "pandas", "matplotlib", "papermill", "jupytext", "casadi"}.isdisjoint(loaded)
 
 

@@ -10,7 +10,7 @@ import pytest
 import szlib
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
-from szlib.workbook.command_line import options
+from szlib.workbook.cli import build_parser
 
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -82,4 +82,4 @@ def test_make_verbs_exist():
 
 def test_commands_parse():
     for line in re.findall(r"`szlib ((?:run|inspect|extract)[^`]*)`", TEXT):
-        options.parser().parse_args(line.split())
+        build_parser().parse_args(line.split())

@@ -8,5 +8,5 @@ record        what a notebook writes down, and where it goes
 laboratory    a scene that can be dragged and set while it runs
 report        a run to read without running anything
 runner        the whole workbook, headless, and what came of it
-command_line  `szlib run | report | inspect | extract`
+cli           `szlib run | report | inspect | extract`
 """

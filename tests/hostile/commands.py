@@ -29,7 +29,7 @@ import szlib.zones.social_zone  # noqa: F401 - before the first fork
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks.clock import read_tracks
-from szlib.workbook.command_line import main
+from szlib.workbook.cli import main
 from szlib.workbook.record import places
 
 COUNT = {False: 40, True: 1000}

@@ -27,7 +27,7 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from szlib.workbook.record import places
-from szlib.workbook.command_line import main
+from szlib.workbook.cli import main
 if __name__ == "__main__":
     places.NOTEBOOKS = Path({notebooks!r})
     sys.exit(main())

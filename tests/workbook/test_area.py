@@ -11,7 +11,7 @@ from conftest import make_crowd, make_hall, make_tracks, make_walk
 
 import szlib
 from szlib.encounters.one_day import check_met
-from szlib.workbook.command_line import main
+from szlib.workbook.cli import main
 from szlib.workbook.record import NotebookRecord
 
 HALL = shapely.box(0, 0, 12, 8)

@@ -20,7 +20,7 @@ from szlib.errors import DataError, StorageError
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import datasets
-from szlib.workbook.command_line import main
+from szlib.workbook.cli import main
 from szlib.workbook.record import NotebookRecord, notebook, places
 from szlib.workbook.record.validation import check_parameters
 from szlib.workbook.runner import execution
@@ -159,7 +159,7 @@ def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks
     notebooks(_00_fine='record.check("ok", True)', _01_full=full, _06_later="")
     assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
     printed = capsys.readouterr()
-    assert "01_full: could not be run: StorageError: no room; what was finished stays" in printed.err
+    assert "01_full: could not be run: StorageError: no room; finished results stay" in printed.err
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
     assert {n: r["status"] for n, r in left["notebooks"].items()} == {
         "00_fine": "done", "01_full": "refused", "06_later": "not started",
@@ -216,7 +216,7 @@ def test_values_that_cannot_even_be_read(value, capsys):
 
 
 def command(*arguments, **options):
-    code = "import sys; from szlib.workbook.command_line import main; sys.exit(main())"
+    code = "import sys; from szlib.workbook.cli import main; sys.exit(main())"
     return subprocess.Popen(
         [sys.executable, "-c", code, *arguments], env=HERE | options.pop("env", {}), text=True,
         stderr=subprocess.PIPE, **options,
@@ -245,7 +245,7 @@ def test_sigterm_ends_a_command_as_ctrl_c_does(tmp_path):
     done.send_signal(signal.SIGTERM)
     _, printed = done.communicate()
     assert done.returncode == 143
-    assert "szlib: stopped; what was finished stays in the results" in printed
+    assert "szlib: stopped; finished results stay" in printed
     assert not list(tmp_path.rglob(".szlib-*"))
 
 
@@ -258,7 +258,7 @@ time.sleep(120)"""
     program = tmp_path / "program.py"
     program.write_text(
         "import sys\nfrom pathlib import Path\nfrom szlib.workbook.record import places\n"
-        "from szlib.workbook.command_line import main\nif __name__ == '__main__':\n"
+        "from szlib.workbook.cli import main\nif __name__ == '__main__':\n"
         f"    places.NOTEBOOKS = Path({str(folder)!r})\n    sys.exit(main())\n"
     )
     run = subprocess.Popen(
@@ -272,7 +272,7 @@ time.sleep(120)"""
     run.send_signal(signal.SIGTERM)
     _, printed = run.communicate()
     assert run.returncode == 143
-    assert "szlib: stopped; what was finished stays in the results" in printed
+    assert "szlib: stopped; finished results stay" in printed
     end = time.monotonic() + 30
     while Path(f"/proc/{kernel}").exists() and time.monotonic() < end:
         time.sleep(0.1)

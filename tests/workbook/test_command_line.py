@@ -10,7 +10,7 @@ import szlib
 from szlib import ATC_SQUARE, parallel
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
-from szlib.workbook.command_line import main
+from szlib.workbook.cli import main
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from bs4 import BeautifulSoup
 
 import szlib
 from szlib.errors import DataError
-from szlib.workbook.command_line import main
+from szlib.workbook.cli import main
 from szlib.workbook.record import PAPER, parameters
 from szlib.workbook.report import document
 

@@ -10,7 +10,7 @@ import pytest
 
 from szlib.errors import StorageError
 from szlib.files import folder_lock
-from szlib.workbook.command_line import main
+from szlib.workbook.cli import main
 from szlib.workbook.record import places
 from szlib.workbook.runner import execution
 

@@ -6,7 +6,8 @@ import os
 import pytest
 
 from szlib.errors import DataError
-from szlib.workbook.command_line import commands, main
+from szlib.workbook import cli
+from szlib.workbook.cli import main
 from szlib.workbook.record.validation import check_parameters
 from szlib.workbook.runner import execution, worker
 
@@ -147,9 +148,9 @@ def test_a_number_of_jobs_that_is_none_is_refused_at_once(jobs, capsys):
 
 
 def test_without_the_workbooks_packages_it_says_what_to_install(monkeypatch, capsys):
-    monkeypatch.setattr(commands, "WORKBOOK_PACKAGES", ("papermill", "no_such_package"))
+    monkeypatch.setattr(cli, "_WORKBOOK_PACKAGES", ("papermill", "no_such_package"))
     assert main(["run"]) == 2
-    assert "needs no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
+    assert "need no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
 
 
 def test_without_notebooks_it_says_where_to_find_them(notebooks):

@@ -1,0 +1,320 @@
+"""Learn social zones from pedestrian tracks, and keep a robot out of them.
+
+exit codes:
+  0    success
+  1    a check failed, or a day could not be extracted
+  2    the command cannot be carried out; one line says why (set SZLIB_TRACEBACK=1 for the traceback)
+  129, 130, 143   stopped by a closed terminal, by Ctrl-C or by SIGTERM; finished results stay
+"""
+
+from __future__ import annotations
+
+# A command imports what it needs when it starts, so that --version, --help and a typing error answer at once.
+import argparse
+import inspect
+import json
+import os
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from .. import __version__, memory
+from ..errors import DataError, DataWarning, SzlibError
+from ..files import printable
+
+_WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbconvert", "papermill")
+"""Packages of the extra `workbook`, which the commands `run` and `report` need."""
+_BROKEN_STREAM = (OSError, ValueError, AttributeError)
+"""Errors of standard output or standard error that is full, closed or missing."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command that `arguments` name (default: those of the process) and return its exit code."""
+    for stream in (sys.stdout, sys.stderr):  # print escapes where the terminal's encoding lacks a letter
+        with suppress(*_BROKEN_STREAM):
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+    options = build_parser().parse_args(arguments)
+    try:
+        with _stop_on_signals(), memory.granted(options.memory), warnings.catch_warnings():
+            warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
+            code = int(options.command(options))
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        return code
+    except KeyboardInterrupt as stop:
+        _print_error("stopped; finished results stay in their folder")
+        return int(stop.args[0]) if stop.args else 130
+    except Exception as error:
+        if os.environ.get("SZLIB_TRACEBACK"):
+            raise
+        is_expected = isinstance(error, SzlibError | OSError) and str(error)
+        _print_error(str(error) if is_expected else f"{type(error).__name__}: {error}")
+        return 2
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Build the parser of the command line."""
+    parser = argparse.ArgumentParser(
+        prog="szlib", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )  # fmt: skip
+    parser.add_argument("--version", action="version", version=f"szlib {__version__}")
+    parser.set_defaults(memory=None)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    data = argparse.ArgumentParser(add_help=False)
+    area = data.add_mutually_exclusive_group()
+    area.add_argument(
+        "--area", "--square", nargs=4, type=float, metavar=("X0", "X1", "Y0", "Y1"),
+        help="the rectangle in which encounters are found [m] (default: the open square for ATC files, "
+        "else as with --auto)",
+    )  # fmt: skip
+    area.add_argument("--polygon", metavar="FILE", help="the area as a polygon in a WKT or GeoJSON file [m]")
+    area.add_argument(
+        "--auto", action="store_true", help="use the largest rectangle in which people walked everywhere"
+    )
+    data.add_argument(
+        "--memory", type=_memory, metavar="SIZE",
+        help="refuse data that needs more memory, such as 4GB (default: 80 %% of the free memory)",
+    )  # fmt: skip
+    cluster = argparse.ArgumentParser(add_help=False)
+    cluster.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster at this address")
+
+    summary, _, rules = str(inspect.getdoc(_run)).partition("\n\n")
+    run = commands.add_parser(
+        "run", help="execute the notebooks and check their results", parents=[data, cluster],
+        description=summary, epilog=rules, formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    run.add_argument(
+        "--data", nargs="+", default=["synthetic"], metavar="DATA",
+        help="synthetic (default), atc-1hz, atc-10-days, or files, folders or globs of tracks",
+    )  # fmt: skip
+    run.add_argument(
+        "--out", type=os.path.abspath, metavar="FOLDER",
+        help="the folder of all results (default: results, beside the notebooks)",
+    )  # fmt: skip
+    run.add_argument(
+        "-j", "--jobs", type=_job_count, default=min(os.cpu_count() or 1, 4), metavar="N",
+        help="notebooks that run at the same time (default: one for each core, at most 4)",
+    )  # fmt: skip
+    run.add_argument(
+        "--only", nargs="+", default=[], metavar="NN", help="run only these notebooks, such as 07"
+    )
+    run.add_argument(
+        "-p", "--parameter", action="append", default=[], metavar="NAME=VALUE",
+        help="set a parameter of the notebooks, such as seed=1",
+    )  # fmt: skip
+    run.set_defaults(command=_run)
+
+    report = commands.add_parser("report", help="write the report of a run again, as one HTML file")
+    report.add_argument(
+        "folder", nargs="?", metavar="FOLDER",
+        help="the folder of the run (default: results/synthetic, beside the notebooks)",
+    )  # fmt: skip
+    report.add_argument("--open", action="store_true", help="open the report in a browser")
+    report.set_defaults(command=_report)
+
+    look = commands.add_parser(
+        "inspect", help="print how many rows of a file are used, and why others are rejected", parents=[data]
+    )
+    look.add_argument("file", help="a file of tracks: ATC, EWAP or a table; plain or .gz")
+    look.set_defaults(command=_inspect)
+
+    extract = commands.add_parser(
+        "extract", help="find the encounters of many days; a stopped extraction continues where it was",
+        parents=[data, cluster],
+    )  # fmt: skip
+    extract.add_argument("data", nargs="+", metavar="PATH", help="files, folders or globs of tracks")
+    extract.add_argument(
+        "--out", default="results/days", metavar="FOLDER",
+        help="the folder for one Parquet file a day (default: %(default)s)",
+    )  # fmt: skip
+    extract.add_argument(
+        "-j", "--jobs", type=_job_count, metavar="N", help="days that run at the same time (default: 1)"
+    )
+    extract.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help="days to leave out")
+    extract.set_defaults(command=_extract)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Execute the notebooks without a browser, and check their results.
+
+    results:
+      The results go to results/DATA/: the executed notebooks, records/, figures/, encounters.parquet,
+      zone.json, parameters.json, summary.json (time, checks and key figures of each notebook), report.html.
+      A run with other parameters than the defaults has a folder of its own, results/DATA-HASH/.
+      Notebooks that you execute by hand write to results/lab/ and never change the results of a run.
+      szlib writes only to folders that are new, empty or marked by a file `.szlib`, and never to a folder
+      that holds the input data. Files are written atomically and cached by data and parameters.
+
+    checks:
+      A failed check fails the run. With other parameters, checks that assume the defaults are reported as
+      observations but cannot fail the run. Checks that hold for all parameters can still fail it.
+
+    data:
+      The data set atc-1hz is one real day of the ATC mall (31 MB). It is downloaded once and verified. If
+      $SZLIB_DATA_DIR names a folder that holds atc-1hz/, no network is used.
+      A run stops if no encounters are left. The message names the condition that rejected the last rows.
+
+    examples:
+      szlib run --data atc-1hz
+      szlib run --data my/tracks/*.csv --area 0 12 0 8
+      szlib run --only 07 -p gamma=0.1
+    """
+    parameters = dict(_parse_parameter(text) for text in options.parameter)
+    if area := _area_text(options):
+        parameters["area"] = area
+    _require_workbook_packages()
+    from .record import places
+    from .runner.execution import run
+    from .runner.summary import render
+
+    summary = run(
+        options.data[0] if len(options.data) == 1 else options.data,
+        out=options.out or places.RESULTS,
+        jobs=options.jobs,
+        only=options.only,
+        parameters=parameters,
+        scheduler=options.scheduler,
+    )
+    print(render(summary))
+    if "report" in summary:
+        print(f"report: {printable(os.path.relpath(summary['report']))}")
+    refused = {name: n["error"] for name, n in summary["notebooks"].items() if n["status"] == "refused"}
+    if refused:
+        error = next(iter(refused.values()))
+        raise SzlibError(f"{', '.join(refused)}: could not be run: {error}; finished results stay")
+    return 0 if summary["passed"] else 1
+
+
+def _report(options: argparse.Namespace) -> int:
+    """Write the report of a run again."""
+    _require_workbook_packages()
+    from .record import places
+    from .report import document
+
+    home = Path(options.folder) if options.folder else places.root(places.RESULTS) / "synthetic"
+    print(printable(os.path.relpath(file := document.write(home))))
+    if options.open:
+        import webbrowser
+
+        if not webbrowser.open(file.resolve().as_uri()):
+            raise SzlibError("no browser can be opened on this machine; open the file in a browser yourself")
+    return 0
+
+
+def _inspect(options: argparse.Namespace) -> int:
+    """Print the funnel of a file, from its rows to its encounters."""
+    from ..encounters.one_day import Chain
+    from ..tracks import datasets, funnels
+
+    files = datasets.find([options.file])
+    if len(files) != 1:
+        raise DataError(
+            f"{options.file}: stands for {len(files)} files; expected one file; inspect each by itself"
+        )
+    with warnings.catch_warnings():  # the table shows the same counts
+        warnings.simplefilter("ignore", DataWarning)
+        samples = Chain(square=_area_text(options) or None).encounters(files)
+    if "area" in samples.attrs:
+        print(f"area {samples.attrs['area']}")
+    print(funnels.text(funnels.get(samples)))
+    return 0
+
+
+def _extract(options: argparse.Namespace) -> int:
+    """Extract the encounters of many days, and print the table of days."""
+    from ..encounters.days import extract_days
+    from ..parallel import cluster
+
+    with cluster(options.scheduler):
+        extraction = extract_days(
+            options.data,
+            out=options.out,
+            n_jobs=options.jobs,
+            exclude=options.exclude,
+            square=_area_text(options) or None,
+        )
+    print(extraction)
+    return 1 if len(extraction.failed) else 0
+
+
+def _area_text(options: argparse.Namespace) -> str:
+    """The area of the options as text: "" for the area of the data, "auto", numbers or a polygon."""
+    if options.auto or not (options.area or options.polygon):
+        return "auto" if options.auto else ""
+    from ..encounters.areas import as_area
+
+    return str(as_area(options.area or Path(options.polygon)))
+
+
+def _require_workbook_packages() -> None:
+    """Raise SzlibError if a package is missing that executes the notebooks."""
+    if missing := [name for name in _WORKBOOK_PACKAGES if find_spec(name) is None]:
+        raise SzlibError(
+            f"the notebooks need {', '.join(missing)}: pip install 'szlib[workbook]'; the notebooks "
+            "themselves come with the repository: clone it, and call `make run` there"
+        )
+
+
+def _parse_parameter(text: str) -> tuple[str, Any]:
+    """Name and value of NAME=VALUE."""
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise DataError(f"parameter {text!r} must be NAME=VALUE, such as seed=1")
+    try:
+        return name, json.loads(value)
+    except json.JSONDecodeError:
+        return name, value
+    except (ValueError, RecursionError) as error:  # an integer with too many digits, or too many brackets
+        raise DataError(f"parameter {name}: cannot be read ({error}); give a shorter value") from error
+
+
+def _job_count(text: str) -> int:
+    """A number of processes."""
+    if not text.isascii() or not text.isdigit() or len(text) > 9 or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number >= 1; got {text[:40]!a}")
+    return int(text)
+
+
+def _memory(text: str) -> int:
+    """An amount of memory in bytes."""
+    try:
+        return memory.parse(text)
+    except SzlibError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+@contextmanager
+def _stop_on_signals() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP stop the command as Ctrl-C does; a SIGHUP that is ignored stays ignored."""
+
+    def stop(number: int, _frame: object) -> None:
+        """Stop with the exit code of the signal."""
+        raise KeyboardInterrupt(128 + number)
+
+    is_main = threading.current_thread() is threading.main_thread()
+    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if is_main and hasattr(signal, name)]
+    before = {n: signal.signal(n, stop) for n in numbers if signal.getsignal(n) is not signal.SIG_IGN}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _print_error(text: str) -> None:
+    """Print one line on standard error, and drop the rest of a standard output that cannot be written."""
+    with suppress(*_BROKEN_STREAM):
+        print(f"szlib: {printable(' '.join(text.split()))}", file=sys.stderr, flush=True)
+    try:
+        sys.stdout.flush()
+    except _BROKEN_STREAM:
+        with suppress(*_BROKEN_STREAM):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
