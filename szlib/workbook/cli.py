@@ -135,7 +135,12 @@ def build_parser() -> argparse.ArgumentParser:
         help="the folder for one Parquet file a day (default: %(default)s)",
     )  # fmt: skip
     extract.add_argument(
-        "-j", "--jobs", type=_job_count, metavar="N", help="days that run at the same time (default: 1)"
+        "-j",
+        "--jobs",
+        type=_job_count,
+        default=1,
+        metavar="N",
+        help="days that run at the same time (default: %(default)s)",
     )
     extract.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help="days to leave out")
     extract.set_defaults(command=_extract)
@@ -286,7 +291,7 @@ def _job_count(text: str) -> int:
 def _memory(text: str) -> int:
     """An amount of memory in bytes."""
     try:
-        return memory.parse(text)
+        return memory.parse_size(text)
     except SzlibError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
 
