@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -14,6 +15,7 @@ import pytest
 import szlib
 
 PACKAGE = Path(szlib.__file__).parent
+TESTS = Path(__file__).parent
 ROOMS = [
     "errors", "checks", "files", "memory", "parallel", "tracks", "encounters", "zones", "plaza", "control",
     "simulation", "workbook",
@@ -98,10 +100,17 @@ def test_the_top_level_is_fixed() -> None:
     }  # fmt: skip
 
 
-def test_no_two_test_files_have_one_name() -> None:
-    """They are imported by it, and so is conftest, from any folder."""
-    names = Counter(path.name for path in (PACKAGE.parent / "tests").rglob("*.py"))
-    assert [name for name, count in names.items() if count > 1 and name != "__main__.py"] == []
+def test_names_of_test_modules_are_unique() -> None:
+    """pytest imports test modules by their file name alone."""
+    names = Counter(path.name for path in TESTS.rglob("test_*.py"))
+    assert [name for name, count in names.items() if count > 1] == []
+
+
+def test_no_test_module_imports_another() -> None:
+    names = "|".join(["conftest", *(path.stem for path in TESTS.rglob("test_*.py"))])
+    imported = re.compile(rf"^\s*(?:from|import) (?:[\w.]+\.)?(?:{names})\b", re.MULTILINE)
+    wrong = [path.name for path in TESTS.rglob("*.py") if imported.search(path.read_text(encoding="utf-8"))]
+    assert wrong == [], "code that several test modules use belongs to tests/helpers"
 
 
 # --- rooms -------------------------------------------------------------------------------------------

@@ -5,7 +5,6 @@ import subprocess
 import jupytext
 import nbformat
 import pytest
-from jupyter_lab import browser, copy, lab
 
 from szlib.workbook.report import document
 

@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import shapely
-from conftest import make_crowd, make_hall, make_tracks, make_walk
+from helpers.encounter_tables import ROOM, assert_same_samples
+from helpers.raw_days import assert_streamed_as_whole, make_raw_day, write_raw_day
+from helpers.track_tables import make_crowd, make_hall, make_tracks, make_walk
 from hypothesis import given, strategies
 from matplotlib.path import Path as Outline
-from test_search import ROOM, assert_same_samples
-from test_streaming import make_raw, same, write
 
 import szlib
 from szlib.encounters.areas import _largest, area_for
@@ -235,8 +235,8 @@ def test_nobody_is_watched_across_a_pillar() -> None:
 def test_streaming_keeps_what_a_polygon_needs(tmp_path: Path, shape: object) -> None:
     found = 0
     for seed in range(3):
-        path = write(tmp_path / "day.csv", make_raw(seed, wild=seed % 2 == 0))
-        found += same(path, square=szlib.as_area(shape), duration=1.0)
+        path = write_raw_day(tmp_path / "day.csv", make_raw_day(seed, wild=seed % 2 == 0))
+        found += assert_streamed_as_whole(path, square=szlib.as_area(shape), duration=1.0)
     assert found > 0
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from test_streaming import make_raw, write
+from helpers.raw_days import make_raw_day, write_raw_day
 
 import szlib
 from szlib.encounters import blocks
@@ -29,7 +29,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def day(tmp_path: Path) -> Path:
-    lines = write(tmp_path / "day.csv", make_raw(1, wild=False)).read_text().splitlines()
+    lines = write_raw_day(tmp_path / "day.csv", make_raw_day(1, wild=False)).read_text().splitlines()
     lines.insert(500, "1,2")  # a row that is set aside
     (tmp_path / "day.csv").write_text("\n".join(lines))
     return tmp_path / "day.csv"

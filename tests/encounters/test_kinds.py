@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import DAY, make_crowd, make_tracks, make_walk, real_data
+from helpers.track_tables import DAY, make_crowd, make_tracks, make_walk, real_data
 
 import szlib
 from szlib.encounters.finding import find_encounters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 import pytest
-from conftest import make_crowd, make_tracks, make_walk
+from helpers.track_tables import make_crowd, make_tracks, make_walk
 
 import szlib
 from szlib.encounters.nearby import near_square

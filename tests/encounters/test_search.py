@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import DAY, make_crowd, make_tracks, make_walk
+from helpers.encounter_tables import ROOM, assert_same_samples
+from helpers.track_tables import DAY, make_crowd, make_tracks, make_walk
 
 import szlib
 from szlib.encounters import occupants
@@ -17,7 +18,6 @@ from szlib.encounters.geometry import AttentionalSpace, Square, wrap_angle
 from szlib.encounters.samples import SAMPLE_COLUMNS, reference_frame
 from szlib.tracks import funnels
 
-ROOM = Square(x=(-20, 20), y=(-20, 20))
 AHEAD, AROUND = AttentionalSpace(), AttentionalSpace(centred=True)
 VARIANTS = {
     "ahead": {},
@@ -121,17 +121,6 @@ def search(
                 found.append((number, day, ref, other, tick / 10, math.atan2(left, ahead), distance, speed))
             free, number = window[-1] + 1, number + 1
     return pd.DataFrame(found, columns=SAMPLE_COLUMNS).astype(dict.fromkeys(SAMPLE_COLUMNS[4:], float))
-
-
-def assert_same_samples(samples: pd.DataFrame, expected: pd.DataFrame) -> None:
-    assert list(samples.columns) == [*SAMPLE_COLUMNS, "kind"]
-    assert list(expected.columns[: len(SAMPLE_COLUMNS)]) == SAMPLE_COLUMNS
-    labels = SAMPLE_COLUMNS[:4]
-    assert samples[labels].astype(str).to_numpy().tolist() == expected[labels].astype(str).to_numpy().tolist()
-    for name in ("t", "distance", "speed"):
-        np.testing.assert_allclose(samples[name], expected[name], rtol=0, atol=1e-9)
-    turn = wrap_angle(samples["los_angle"].to_numpy() - expected["los_angle"].to_numpy())
-    np.testing.assert_allclose(turn, 0, atol=1e-9)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)

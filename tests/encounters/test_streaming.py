@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from helpers.raw_days import SPACE, assert_streamed_as_whole, encounters, make_raw_day, write_raw_day
 
 import szlib
 from szlib.encounters import blocks, cells
@@ -16,63 +17,8 @@ from szlib.encounters.near_rows import read_near_square
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
-from szlib.tracks.clock import to_clock
 from szlib.tracks.formats.layouts import quick_scan, recognise
 from szlib.tracks.readers import read_raw
-
-SPACE = szlib.AttentionalSpace(length=2.5, width=2.0)
-
-
-def make_raw(seed: int, *, people: int = 60, wild: bool = True) -> pd.DataFrame:
-    """Rows of a raw file: people cross the square, some get lost, some jump across it in one frame."""
-    rng = np.random.default_rng(seed)
-    walks = []
-    for person in range(people):
-        n = int(rng.integers(2, 500))
-        heading = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.02, n))
-        pace = rng.uniform(0.3, 1.8)
-        step = 0.04 * pace * np.column_stack([np.cos(heading), np.sin(heading)])
-        middle = [rng.uniform(-25, -1), rng.uniform(-16, 14)]
-        where = middle + np.cumsum(step, axis=0) - step[: n // 2].sum(axis=0)
-        if wild and rng.random() < 0.5:  # the sensor takes somebody else for them, for a moment
-            at = int(rng.integers(n))
-            where[at : at + int(rng.integers(1, 30))] += rng.uniform(-60, 60, 2)
-        walk = pd.DataFrame(
-            {"t": 1351038629 + 0.04 * (rng.integers(1500) + np.arange(n)), "id": 100 * person}
-        )
-        walk[["x", "y"]] = where * 1000
-        walks.append(walk[rng.random(n) > (0.15 if wild else 0)])
-    rows = pd.concat(walks).sort_values(["t", "id"], kind="stable")
-    return rows.assign(z=1500.0, v=1000.0, motion=0.1, facing=0.1)
-
-
-def write(path: Path, rows: pd.DataFrame) -> Path:
-    rows.to_csv(path, header=False, index=False, float_format="%.3f")
-    return path
-
-
-def encounters(raw: pd.DataFrame, **parameters: object) -> pd.DataFrame:
-    return szlib.find_encounters(to_clock(raw, max_gap=parameters.pop("max_gap", None)), **parameters)
-
-
-def same(path: Path, *, square: szlib.Square, duration: float, max_gap: float | None = None) -> int:
-    """Check that both ways agree to the last bit; how many samples there are."""
-    near = read_near_square(
-        path, square=square, duration=duration, options=szlib.ReadOptions(max_gap=max_gap)
-    )
-    given = {"square": square, "duration": duration, "max_gap": max_gap, "space": SPACE}
-    streamed, whole = encounters(near, **given), encounters(read_raw(path), **given)
-    pd.testing.assert_frame_equal(streamed, whole, check_exact=True)
-    ours, theirs = funnels.get(streamed), funnels.get(whole)
-    assert ours[-1] == theirs[-1], "windows are turned away for the same reasons"
-    assert {k: v for k, v in ours[-2]["rejected"].items() if k != "not in the square"} == {
-        k: v for k, v in theirs[-2]["rejected"].items() if k != "not in the square"
-    }
-    assert ours[0] == theirs[0], "every row of the file is counted"
-    for before, after in zip(ours[:3], ours[1:4], strict=True):
-        assert before["kept"] == after["entered"]
-    return len(streamed)
-
 
 SETTINGS = [
     (szlib.ATC_SQUARE, 3.0, None),
@@ -95,32 +41,34 @@ def test_the_encounters_are_those_of_the_whole_day(
     monkeypatch.setattr(blocks, "_ROWS_AT_ONCE", rows_at_once)
     found = 0
     for seed in range(4):
-        path = write(tmp_path / "day.csv", make_raw(seed, wild=seed % 2 == 0))
-        found += same(path, square=square, duration=duration, max_gap=max_gap)
+        path = write_raw_day(tmp_path / "day.csv", make_raw_day(seed, wild=seed % 2 == 0))
+        found += assert_streamed_as_whole(path, square=square, duration=duration, max_gap=max_gap)
     assert found > 0
 
 
 def test_rows_in_any_order_give_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(blocks, "_ROWS_AT_ONCE", 1000)
-    rows = make_raw(1, wild=False)
-    shuffled = write(tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0))
-    assert same(shuffled, square=szlib.ATC_SQUARE, duration=1.0) > 0
-    in_order = read_near_square(write(tmp_path / "a.csv", rows), square=szlib.ATC_SQUARE, duration=1.0)
+    rows = make_raw_day(1, wild=False)
+    shuffled = write_raw_day(tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0))
+    assert assert_streamed_as_whole(shuffled, square=szlib.ATC_SQUARE, duration=1.0) > 0
+    in_order = read_near_square(
+        write_raw_day(tmp_path / "a.csv", rows), square=szlib.ATC_SQUARE, duration=1.0
+    )
     given = {"duration": 1.0, "space": SPACE}
     any_order = read_near_square(shuffled, square=szlib.ATC_SQUARE, duration=1.0)
     pd.testing.assert_frame_equal(encounters(in_order, **given), encounters(any_order, **given))
 
 
 def test_slots_that_are_shared_only_keep_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = write(tmp_path / "day.csv", make_raw(3))
+    path = write_raw_day(tmp_path / "day.csv", make_raw_day(3))
     apart = len(read_near_square(path, square=szlib.ATC_SQUARE, duration=1.0))
     monkeypatch.setattr(cells, "_CELLS", 64)
     assert len(read_near_square(path, square=szlib.ATC_SQUARE, duration=1.0)) > apart
-    assert same(path, square=szlib.ATC_SQUARE, duration=1.0) > 0
+    assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=1.0) > 0
 
 
 def test_packed_files_and_bad_rows(tmp_path: Path) -> None:
-    lines = write(tmp_path / "day.csv", make_raw(2)).read_text().splitlines()
+    lines = write_raw_day(tmp_path / "day.csv", make_raw_day(2)).read_text().splitlines()
     for at, bad in ((5, "1,2"), (900, "no row at all"), (901, lines[900] + ",9"), (3000, lines[0])):
         lines.insert(at, bad)
     path = tmp_path / "day.csv.gz"
@@ -181,7 +129,7 @@ def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_the_plaza_and_a_place_where_nobody_is(tmp_path: Path) -> None:
     path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(encounters=100))
-    assert same(path, square=szlib.ATC_SQUARE, duration=3.0) > 0
+    assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=3.0) > 0
     elsewhere = read_near_square(path, square=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0)
     assert len(elsewhere) == 0
     assert list(elsewhere.columns) == ["day", "id", "t", "x", "y"]
@@ -190,12 +138,12 @@ def test_the_plaza_and_a_place_where_nobody_is(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_read_is_told_as_by_read_tracks(tmp_path: Path) -> None:
-    rows = make_raw(0)
+    rows = make_raw_day(0)
     mostly_bad = tmp_path / "bad.csv"
     mostly_bad.write_text(
-        write(tmp_path / "a.csv", rows.head(3)).read_text() + "1,2,3,4,5,6,7\n" * 9, encoding="utf-8"
+        write_raw_day(tmp_path / "a.csv", rows.head(3)).read_text() + "1,2,3,4,5,6,7\n" * 9, encoding="utf-8"
     )
-    in_metres = write(tmp_path / "metres.csv", rows.assign(x=rows["x"] / 1000, y=rows["y"] / 1000))
+    in_metres = write_raw_day(tmp_path / "metres.csv", rows.assign(x=rows["x"] / 1000, y=rows["y"] / 1000))
     for path in (mostly_bad, in_metres, tmp_path / "missing.csv", tmp_path):
         with pytest.raises(szlib.DataError) as ours:
             read_near_square(path, square=szlib.ATC_SQUARE, duration=3.0)

@@ -10,7 +10,7 @@ import pytest
 import szlib
 
 
-@pytest.mark.parametrize("attack", ["commands", "files", "processes"])
+@pytest.mark.parametrize("attack", ["commands", "damaged_tracks", "files", "processes"])
 def test_nothing_breaks(attack, tmp_path):
     done = subprocess.run(
         [sys.executable, str(Path(__file__).parent), attack],

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import make_tracks, make_walk
+from helpers.crowd_models import scene
+from helpers.track_tables import make_tracks, make_walk
 from studies.crowd_trials import CROWDED, measure, violated_by_who_kept
-from test_crowds import PACKAGES, model, scene
 
 import szlib
 from szlib.control.people import Person
@@ -21,7 +21,6 @@ from szlib.simulation.replay_metrics import compute_replay_metrics
 from szlib.simulation.safety_claims import safety_violations
 from szlib.simulation.scenario import Scenario
 
-__all__ = ["PACKAGES", "model"]
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 
 

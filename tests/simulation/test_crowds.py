@@ -12,33 +12,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import make_tracks, make_walk
+from helpers.crowd_models import PACKAGES, scene
+from helpers.track_tables import make_tracks, make_walk
 
 import szlib
 from szlib.control.people import BODY_RADIUS, Person
 from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
 from szlib.simulation.replay import MIN_START_DISTANCE, SENSING_RANGE, ReplacedWalker, Replay, find_replays
-from szlib.simulation.scenario import Crowd, Scenario
+from szlib.simulation.scenario import Crowd
 
-PACKAGES = {"orca": "pyrvo", "social force": "pysocialforce", "speed model": "jupedsim"}
 FAR = np.array([50.0, 50.0, 0.0, 0.0])
 TWO = (Person((-4.0, 0.0), (0.5, 0.0)), Person((4.0, 0.1), (-0.5, 0.0)))
-
-
-@pytest.fixture(params=MODELS)
-def model(request: pytest.FixtureRequest) -> str:
-    """Every model of walking whose package is installed."""
-    if request.param == "social force":
-        pytest.importorskip("numba")  # the package itself is imported quietly, by szlib
-    else:
-        pytest.importorskip(PACKAGES[request.param])
-    return str(request.param)
-
-
-def scene(*people: Person, walls: object = (), duration: float = 20.0) -> Scenario:
-    return Scenario(
-        "scene", np.zeros(4), np.ones(2), people, np.reshape(walls, (-1, 2, 2)), duration=duration
-    )
 
 
 def walk(crowd: Crowd, robot: np.ndarray = FAR, seconds: float = 20.0) -> np.ndarray:

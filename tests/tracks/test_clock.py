@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import DAY, make_crowd, make_tracks, make_walk
+from helpers.track_tables import DAY, make_crowd, make_tracks, make_walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

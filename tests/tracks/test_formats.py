@@ -10,32 +10,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import make_crowd
-from test_readers import samples, write
+from helpers.track_files import RATE, in_seconds, people, samples, write
+from helpers.track_tables import make_crowd
 
 import szlib
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
 from szlib.tracks.interop import check_tracks
-
-RATE = 12.5
-"""Frames a second; a frame is 0.08 s."""
-
-
-def people(seed: int = 0, *, count: int = 12, begin: int = 0) -> pd.DataFrame:
-    """Who walk straight through a hall of 12 m by 8 m: id, frame, x, y [m]."""
-    rng = np.random.default_rng(seed)
-    rows = []
-    for person in range(count):
-        frame = begin + rng.integers(0, 100) + np.arange(100)
-        a, b = rng.uniform((0, 0), (12, 8), (2, 2))
-        where = a + np.linspace(0, 1, 100)[:, None] * (b - a)
-        rows.append(pd.DataFrame({"id": person + 1, "frame": frame, "x": where[:, 0], "y": where[:, 1]}))
-    return pd.concat(rows, ignore_index=True).round(4)
-
-
-def in_seconds(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.assign(t=rows["frame"] / RATE)[["t", "id", "x", "y"]]
 
 
 def expected(rows: pd.DataFrame) -> pd.DataFrame:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import make_tracks, make_walk, real_data
-from test_formats import RATE, in_seconds, people
+from helpers.track_files import RATE, in_seconds, people
+from helpers.track_tables import make_tracks, make_walk, real_data
 
 import szlib
 from szlib.plaza.generation import make_plaza

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import make_tracks, make_walk, real_data
-from test_readers import as_1hz, as_tidy
+from helpers.track_files import as_1hz, as_tidy
+from helpers.track_tables import make_tracks, make_walk, real_data
 
 import szlib
 from szlib.tracks import quality

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import real_data
+from helpers.track_tables import real_data
 
 import szlib
 from szlib.tracks import funnels, sites

@@ -7,7 +7,7 @@ import json
 import pandas as pd
 import pytest
 import shapely
-from conftest import make_crowd, make_hall, make_tracks, make_walk
+from helpers.track_tables import make_crowd, make_hall, make_tracks, make_walk
 
 import szlib
 from szlib.encounters.one_day import check_met

@@ -1,0 +1,69 @@
+"""Make raw days, and check that a streamed day has the encounters of the whole day."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import szlib
+from szlib.encounters.near_rows import read_near_square
+from szlib.tracks import funnels
+from szlib.tracks.clock import to_clock
+from szlib.tracks.readers import read_raw
+
+SPACE = szlib.AttentionalSpace(length=2.5, width=2.0)
+
+
+def make_raw_day(seed: int, *, people: int = 60, wild: bool = True) -> pd.DataFrame:
+    """Rows of a raw file: people cross the square, some get lost, some jump across it in one frame."""
+    rng = np.random.default_rng(seed)
+    walks = []
+    for person in range(people):
+        n = int(rng.integers(2, 500))
+        heading = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.02, n))
+        pace = rng.uniform(0.3, 1.8)
+        step = 0.04 * pace * np.column_stack([np.cos(heading), np.sin(heading)])
+        middle = [rng.uniform(-25, -1), rng.uniform(-16, 14)]
+        where = middle + np.cumsum(step, axis=0) - step[: n // 2].sum(axis=0)
+        if wild and rng.random() < 0.5:  # the sensor takes somebody else for them, for a moment
+            at = int(rng.integers(n))
+            where[at : at + int(rng.integers(1, 30))] += rng.uniform(-60, 60, 2)
+        walk = pd.DataFrame(
+            {"t": 1351038629 + 0.04 * (rng.integers(1500) + np.arange(n)), "id": 100 * person}
+        )
+        walk[["x", "y"]] = where * 1000
+        walks.append(walk[rng.random(n) > (0.15 if wild else 0)])
+    rows = pd.concat(walks).sort_values(["t", "id"], kind="stable")
+    return rows.assign(z=1500.0, v=1000.0, motion=0.1, facing=0.1)
+
+
+def write_raw_day(path: Path, rows: pd.DataFrame) -> Path:
+    rows.to_csv(path, header=False, index=False, float_format="%.3f")
+    return path
+
+
+def encounters(raw: pd.DataFrame, **parameters: object) -> pd.DataFrame:
+    return szlib.find_encounters(to_clock(raw, max_gap=parameters.pop("max_gap", None)), **parameters)
+
+
+def assert_streamed_as_whole(
+    path: Path, *, square: szlib.Square, duration: float, max_gap: float | None = None
+) -> int:
+    """Check that both ways agree to the last bit, and return the number of samples."""
+    near = read_near_square(
+        path, square=square, duration=duration, options=szlib.ReadOptions(max_gap=max_gap)
+    )
+    given = {"square": square, "duration": duration, "max_gap": max_gap, "space": SPACE}
+    streamed, whole = encounters(near, **given), encounters(read_raw(path), **given)
+    pd.testing.assert_frame_equal(streamed, whole, check_exact=True)
+    ours, theirs = funnels.get(streamed), funnels.get(whole)
+    assert ours[-1] == theirs[-1], "windows are turned away for the same reasons"
+    assert {k: v for k, v in ours[-2]["rejected"].items() if k != "not in the square"} == {
+        k: v for k, v in theirs[-2]["rejected"].items() if k != "not in the square"
+    }
+    assert ours[0] == theirs[0], "every row of the file is counted"
+    for before, after in zip(ours[:3], ours[1:4], strict=True):
+        assert before["kept"] == after["entered"]
+    return len(streamed)
