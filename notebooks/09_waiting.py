@@ -35,7 +35,7 @@ import pandas as pd
 from IPython.display import Markdown
 
 import szlib
-from szlib.control.step import admissible
+from szlib.control.acceleration_polygon import admissible
 from szlib.simulation.atlas import AtlasCell
 from szlib.simulation.metrics import find_yielding_steps
 from szlib.simulation.strategies import classify_strategy

@@ -21,10 +21,10 @@ __getattr__, __dir__, __all__ = lazy.attach(
     ],
     submod_attrs={
         "control.barriers": ["ellipse_distance", "segment_distance"],
-        "control.differential": ["DifferentialDrive"],
+        "control.differential_drive": ["DifferentialDrive"],
         "control.mpc": ["MPCCBF", "Step"],
-        "control.people.person": ["Person"],
-        "control.people.tracker": ["Tracker"],
+        "control.person": ["Person"],
+        "control.tracker": ["Tracker"],
         "control.settings": ["MPCSettings"],
         "encounters.days": ["Extraction", "extract_days"],
         "encounters.areas": ["as_area", "walked_area"],

@@ -1,6 +1,6 @@
 """The controller: model predictive control with barriers around people and walls (MPC-CBF).
 
-The problem stands in `problem`; `solvers` solve it, and `solvers.ladder` says what is done where they cannot.
+`problem` states the problem, `solvers` solve it, and `solvers.fallbacks` says what follows where they cannot.
 
 The terminal condition and what it is good for
 ----------------------------------------------
@@ -39,14 +39,14 @@ from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from .barriers import barrier, segment_formula, walls_of
 from .distances import wall_margin
-from .people.meetings import subgoal
-from .people.person import Person, SpeedZone, as_ellipse, circle_around, place
-from .people.tracker import People, Seen, Tracker
+from .head_on import subgoal
+from .person import Person, SpeedZone, as_ellipse, circle_around, place
+from .scene import Scene
 from .settings import MPCSettings
-from .solvers.ladder import solve_with_fallbacks
-from .solvers.sizes import Sizes, slots, taken
-from .step.decision import Step, terminal_of
-from .step.scene import Scene
+from .solvers.fallbacks import solve_with_fallbacks
+from .solvers.solver_pool import Sizes, slots, taken
+from .step import Step, terminal_of
+from .tracker import People, Seen, Tracker
 
 
 class MPCCBF:
@@ -104,7 +104,7 @@ class MPCCBF:
     def set_walls(self, walls: Any) -> None:
         """Know these walls from the next step on, in place of those before; given as to the controller.
 
-        Where their number takes another size (1, 2, 3, 4, 6, ...), that is built here: see `solvers.sizes`.
+        A number of walls that needs another size (1, 2, 3, 4, 6, ...) is built now: see `SolverPool`.
 
         Raises
         ------

@@ -10,7 +10,7 @@
         (vx, vy)_N = w                                                if there is a terminal condition
 
 (paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., k) takes person i at constant
-velocity, k steps ahead. `g` is the goal at rest, but for people met head-on (`people.subgoal`); w is 0
+velocity, k steps ahead. `g` is the goal at rest, but for people met head-on (`head_on.subgoal`); w is 0
 or the velocity of a person. The states are eliminated: 2 N unknowns remain. The *relaxed* problem
 adds a slack s >= 0 to each barrier row, and to the speed rows if the robot is already too fast, and
 penalises their sum: exactly, so wherever the hard problem has a solution near by, both have the

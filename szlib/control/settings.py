@@ -42,7 +42,7 @@ class MPCSettings:
     zone_speed : walking speed whose social zone is kept, where a zone depends on speed [m/s].
     pass_side : the robot's own hand on which it passes a person whom it meets head-on.
     tie : a meeting is head-on while the goal lies within this share of the half-angle under which the
-        robot sees the person's zone; see `people.subgoal`. At most 0.5.
+        robot sees the person's zone; see `head_on.subgoal`. At most 0.5.
     terminal : what the plan ends in: "none", as in the paper; "rest", zero velocity; "person", the
         velocity of the one person there is, in open space ("rest" while there is not exactly one; see
         `Step.terminal`). See the proof in `szlib.control.mpc`.

@@ -24,7 +24,7 @@ import numpy as np
 
 from ..checks import Array
 from ..control.barriers import euclidean_segment_formula
-from ..control.people import BODY_RADIUS, Person
+from ..control.person import BODY_RADIUS, Person
 from ..control.settings import MPCSettings
 from .scenario import Scenario
 

@@ -18,7 +18,7 @@ import pandas as pd
 
 from ..checks import Array
 from ..control.mpc import MPCCBF
-from ..control.people.person import BODY_RADIUS, Person, SpeedZone, as_ellipse, circle_around
+from ..control.person import BODY_RADIUS, Person, SpeedZone, as_ellipse, circle_around
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse

@@ -24,7 +24,7 @@ import pandas as pd
 
 from ..checks import Array
 from ..control.distances import euclidean_to_ellipse
-from ..control.people import BODY_RADIUS, as_ellipse
+from ..control.person import BODY_RADIUS, as_ellipse
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse, minimum_enclosing_ellipse_of_curve

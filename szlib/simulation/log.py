@@ -18,7 +18,7 @@ from .. import __version__
 from ..checks import Array
 from ..control.barriers import barrier, ellipse_formula, euclidean_segment_formula, segment_formula
 from ..control.distances import wall_margin
-from ..control.people import BODY_RADIUS, Person
+from ..control.person import BODY_RADIUS, Person
 from ..control.settings import MPCSettings
 from ..control.step import status_of
 from ..errors import DataError

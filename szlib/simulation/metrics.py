@@ -63,7 +63,7 @@ def compute_metrics(log: SimulationLog) -> dict[str, Any]:
     unflagged_violations : steps that said they were safe and led to h < 0.
     unflagged_overlaps : steps that said they were safe and led to a Euclidean overlap.
     steps_warm, steps_cold, steps_kept, steps_relaxed, steps_braking : steps of each rung of the
-        ladder in `szlib.control.solvers.ladder`.
+        ladder in `szlib.control.solvers.fallbacks`.
     max_slack : largest violation of a hard row by any plan; NaN where the controller does not tell it.
     solve_time_median, solve_time_p95, solve_time_p99, solve_time_max : of `Step.solve_time`, or of the call.
 

@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from ..checks import Array
-from ..control.people import Person
+from ..control.person import Person
 from ..control.settings import MPCSettings
 from .scenario import Scenario
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..checks import Array, check_array
 from ..control.barriers import check_wall
-from ..control.people import Person
+from ..control.person import Person
 from ..errors import SolverError
 
 if TYPE_CHECKING:

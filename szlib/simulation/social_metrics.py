@@ -13,7 +13,7 @@ import numpy as np
 
 from ..checks import Array
 from ..control.distances import euclidean_to_segment
-from ..control.people import BODY_RADIUS
+from ..control.person import BODY_RADIUS
 from .outcomes import nanmin
 from .scenario import STOPPED_SPEED
 

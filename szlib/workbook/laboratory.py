@@ -19,11 +19,12 @@ import numpy as np
 import traitlets
 
 from ..checks import Array, check_array
+from ..control.acceleration_polygon import admissible
 from ..control.barriers import check_wall
 from ..control.mpc import MPCCBF
-from ..control.people import Person
+from ..control.person import Person
 from ..control.settings import MPCSettings
-from ..control.step import Step, admissible
+from ..control.step import Step
 from ..errors import SolverError, SzlibError
 from ..simulation.closed_loop import advance
 from ..simulation.scenario import Scenario

@@ -9,7 +9,7 @@ import numpy as np
 import szlib
 from szlib.checks import Array
 from szlib.control.barriers import barrier, cbf_residual, ellipse_formula
-from szlib.control.people import place
+from szlib.control.person import place
 
 
 def do_mpc_step(settings: szlib.MPCSettings, zone: szlib.Ellipse) -> Callable[..., Array]:

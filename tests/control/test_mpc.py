@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import minimize
 
 import szlib
-from szlib.control.people import place
+from szlib.control.person import place
 from szlib.control.problem import TOLERANCE, build_problem
 from szlib.control.solvers.ipopt import Ipopt
 from szlib.control.solvers.sqp import Sqp

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.control.differential import Unicycle
+from szlib.control.differential_drive import Unicycle
 from szlib.control.distances import euclidean_to_ellipse
 from szlib.zones.polar import DIRECTIONS, PolarZone
 

@@ -13,7 +13,7 @@ from helpers.random_states import ZONE, meetings, questions
 import szlib
 from szlib.control.problem import TOLERANCE, build_problem, remaining_distance
 from szlib.control.solvers import sqp
-from szlib.control.solvers.program import build_program
+from szlib.control.solvers.sqp_functions import build_program
 from szlib.simulation.closed_loop import advance
 
 SOLVERS = ("sqp", "ipopt")
@@ -60,7 +60,7 @@ def test_the_scenarios_of_the_paper_run_the_same_with_both(name):
 
 
 @pytest.mark.parametrize(
-    ("package", "where"), [("casadi", {"problem", "ipopt", "program"}), ("daqp", {"sqp"})]
+    ("package", "where"), [("casadi", {"problem", "ipopt", "sqp_functions"}), ("daqp", {"sqp"})]
 )
 def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
     found = set()

@@ -14,7 +14,7 @@ from helpers.random_states import ZONE, questions
 import szlib
 from szlib.control import problem
 from szlib.control.distances import required_margin, wall_margin
-from szlib.control.people import BODY_RADIUS
+from szlib.control.person import BODY_RADIUS
 from szlib.simulation.closed_loop import advance, drive
 
 SOLVERS = ("sqp", "ipopt")

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.control.people.person import circle_around
+from szlib.control.person import circle_around
 from szlib.simulation.closed_loop import BODY, drive
 from szlib.simulation.comparisons import compare, summarise
 from szlib.simulation.monte_carlo import identify, rerun_world, rollouts, summarise_rollouts

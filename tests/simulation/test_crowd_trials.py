@@ -13,7 +13,7 @@ from helpers.track_tables import make_tracks, make_walk
 from studies.crowd_trials import CROWDED, measure, violated_by_who_kept
 
 import szlib
-from szlib.control.people import Person
+from szlib.control.person import Person
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.crowds.reacting import ReactingPeople
 from szlib.simulation.replay import ReplacedWalker, find_replays

@@ -16,7 +16,7 @@ from helpers.crowd_models import PACKAGES, scene
 from helpers.track_tables import make_tracks, make_walk
 
 import szlib
-from szlib.control.people import BODY_RADIUS, Person
+from szlib.control.person import BODY_RADIUS, Person
 from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
 from szlib.simulation.replay import MIN_START_DISTANCE, SENSING_RANGE, ReplacedWalker, Replay, find_replays
 from szlib.simulation.scenario import Crowd

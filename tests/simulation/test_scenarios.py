@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 import szlib
-from szlib.control.people import BODY_RADIUS
+from szlib.control.person import BODY_RADIUS
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.metrics import find_avoidance_start, find_passing_side
 

@@ -20,9 +20,9 @@ import pandas as pd
 import szlib
 from szlib.checks import Array
 from szlib.control.barriers import ellipse_distance
-from szlib.control.differential import Unicycle
+from szlib.control.differential_drive import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
-from szlib.control.people import BODY_RADIUS
+from szlib.control.person import BODY_RADIUS
 from szlib.control.problem import TOLERANCE
 from szlib.simulation.monte_carlo import DEFAULT_ZONE, mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS

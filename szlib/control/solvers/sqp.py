@@ -27,7 +27,7 @@ import numpy as np
 from ...checks import Array
 from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, Numbers
 from ..settings import MPCSettings
-from .program import Program, build_program
+from .sqp_functions import Program, build_program
 
 Outcome = Literal["converged", "stalled", "late", "failed"]
 CONVERGED = {True: 1e-2, False: 1e-5}

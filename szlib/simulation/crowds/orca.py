@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...checks import Array
-from ...control.people import BODY_RADIUS
+from ...control.person import BODY_RADIUS
 from .walking_model import CROWDS, FASTER, Walkers, package
 
 HORIZON, WALL_HORIZON = 3.0, 1.0

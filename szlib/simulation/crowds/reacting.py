@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from ...checks import Array, check_array
-from ...control.people import BODY_RADIUS, Person
+from ...control.person import BODY_RADIUS, Person
 from ...control.settings import MPCSettings
 from ...errors import SolverError
 from ..scenario import Crowd, Scenario

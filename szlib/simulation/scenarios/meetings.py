@@ -17,7 +17,7 @@ from math import cos, pi, sin
 import numpy as np
 
 from ...checks import Array
-from ...control.people import Person
+from ...control.person import Person
 from ...zones.ellipses import Ellipse
 from ..scenario import UNAFFECTED, Crowd, Scenario
 

@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 
 from ...control.mpc import MPCCBF
-from ...control.people import Person
+from ...control.person import Person
 from ..closed_loop import simulate
 from ..log import SimulationLog
 from ..metrics import find_avoidance_start, find_passing_side, locate_along_course

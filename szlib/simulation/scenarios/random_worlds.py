@@ -13,8 +13,7 @@ import numpy as np
 from ...checks import Array
 from ...control.barriers import barrier, euclidean_segment_formula, segment_formula
 from ...control.distances import required_margin
-from ...control.people import BODY_RADIUS, Person
-from ...control.people.person import PlacedZone, place
+from ...control.person import BODY_RADIUS, Person, PlacedZone, place
 from ...control.settings import MPCSettings
 from ...errors import SolverError
 from ...zones.ellipses import Ellipse

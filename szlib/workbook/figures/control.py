@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from shapely.plotting import patch_from_polygon
 
 from ...checks import Array
+from ...control.acceleration_polygon import Limit, admissible
 from ...control.barriers import barrier, check_wall, ellipse_distance, segment_distance
 from ...control.distances import (
     euclidean_to_ellipse,
@@ -22,7 +23,7 @@ from ...control.distances import (
     required_margin,
     safe_edge,
 )
-from ...control.step import Limit, Step, admissible
+from ...control.step import Step
 from ...zones.ellipses import Ellipse
 from .style import BLACK, BLUE, GREEN, GREY, RED, get_axes, label_metres
 

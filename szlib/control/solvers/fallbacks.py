@@ -18,7 +18,7 @@ import numpy as np
 from ...checks import Array
 from ..problem import HARD_SHARE, TOLERANCE, Numbers, ProblemSolver
 from ..settings import MPCSettings
-from ..step.decision import Rung
+from ..step import Rung
 
 
 def solve_with_fallbacks(

@@ -12,7 +12,7 @@ from helpers.random_states import ZONE, questions
 from hostile.controller import cruel_states
 
 import szlib
-from szlib.control.step import report
+from szlib.control import step_report as report
 
 GOAL = (4.0, 0.0)
 FACING = szlib.Person((0.0, 0.0), heading=np.pi)

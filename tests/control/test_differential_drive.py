@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 
 import szlib
 from szlib.control.barriers import ellipse_distance, segment_distance
-from szlib.control.differential import Unicycle
+from szlib.control.differential_drive import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
-from szlib.control.people import BODY_RADIUS
+from szlib.control.person import BODY_RADIUS
 from szlib.control.problem import TOLERANCE
 from szlib.simulation.scenarios.random_worlds import Worlds, draw_zone, make_world
 

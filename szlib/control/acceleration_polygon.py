@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 import shapely
 
-from ...checks import Array
-from ..barriers import barrier, cbf_residual, ellipse_formula, segment_formula
+from ..checks import Array
+from .barriers import barrier, cbf_residual, ellipse_formula, segment_formula
 
 if TYPE_CHECKING:
-    from .decision import Step
+    from .step import Step
 
 _REACH = 3
 """The box of accelerations ends within so many times its half-width of any point in it."""

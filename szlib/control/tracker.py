@@ -19,8 +19,8 @@ from typing import NamedTuple, TypeGuard, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import LARGEST
-from ...errors import SolverError
+from ..checks import LARGEST
+from ..errors import SolverError
 from .person import Person
 
 _Known = tuple[Person, float]

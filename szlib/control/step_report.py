@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from ...checks import Array
-from ..people.person import BODY_RADIUS
-from ..problem import TOLERANCE
+from ..checks import Array
+from .person import BODY_RADIUS
+from .problem import TOLERANCE
 from .scene import Scene
 
 if TYPE_CHECKING:
-    from .decision import Step
+    from .step import Step
 
 NEAR = 1e-7
 """Two computations of one number may differ by so much, relative to the largest (at least 1)."""

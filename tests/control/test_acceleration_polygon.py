@@ -9,7 +9,8 @@ import pytest
 import shapely
 
 import szlib
-from szlib.control.step import Step, admissible
+from szlib.control.acceleration_polygon import admissible
+from szlib.control.step import Step
 
 ZONE = szlib.Ellipse((0.05, 0.0), (0.97, 0.75))
 PASSAGE = szlib.SCENARIOS["making_room"].walls

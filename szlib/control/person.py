@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
 from typing import NamedTuple, Protocol
 
-from ...checks import LARGEST, check_number, check_point
-from ...errors import SolverError, ZoneError
-from ...zones.costmaps import BODY_RADIUS as BODY_RADIUS
-from ...zones.costmaps import circle_around as circle_around
-from ...zones.ellipses import Ellipse
-from ..barriers import barrier, ellipse_formula
-from ..settings import MPCSettings
+from ..checks import LARGEST, check_number, check_point
+from ..errors import SolverError, ZoneError
+from ..zones.costmaps import BODY_RADIUS as BODY_RADIUS
+from ..zones.costmaps import circle_around as circle_around
+from ..zones.ellipses import Ellipse
+from .barriers import barrier, ellipse_formula
+from .settings import MPCSettings
 
 STANDS = 0.1
 """Who is slower does not leave the goal free by going on, whatever a tracker's noise says [m/s] (assumed)."""

@@ -7,11 +7,11 @@ from typing import Literal, cast, get_args
 
 import numpy as np
 
-from ...checks import Array
-from ..problem import TOLERANCE
-from ..settings import MPCSettings, Terminal
-from .report import Report, described, verified
+from ..checks import Array
+from .problem import TOLERANCE
 from .scene import Scene
+from .settings import MPCSettings, Terminal
+from .step_report import Report, described, verified
 
 Rung = Literal["warm", "cold", "kept", "relaxed", "braking"]
 RUNGS: tuple[Rung, ...] = get_args(Rung)
@@ -26,7 +26,7 @@ class Step:
     ----------
     control : acceleration (ax, ay) to apply now, within its bounds, shape (2,) [m/s2].
     predicted : states x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s].
-    rung : the rung of the ladder that gave the plan; see `szlib.control.solvers.ladder`.
+    rung : the rung of the ladder that gave the plan; see `szlib.control.solvers.fallbacks`.
     slack : largest violation of a hard row by the plan, 0 if none [m for barriers, m2/s2 for speed,
         m/s for the terminal velocity].
     residual : h_{k+1} - (1-gamma) h_k, people before walls, shape (people + walls, N_h) [m].
@@ -65,7 +65,7 @@ class Step:
     def goal_blocked(self) -> bool:
         """True if the goal cannot be reached, h < 0 there: for a wall, or for somebody who stands.
 
-        Who is slower than `people.person.STANDS` counts as standing. The robot waits beside them.
+        Who is slower than `person.STANDS` counts as standing. The robot waits beside them.
         """
         return self.scene.goal_blocked
 

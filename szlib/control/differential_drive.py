@@ -57,11 +57,11 @@ from ..zones.ellipses import Ellipse
 from .barriers import barrier, segment_formula
 from .distances import wall_margin
 from .mpc import MPCCBF
-from .people.person import Person, PlacedZone, SpeedZone, place
-from .people.tracker import People, Tracker
+from .person import Person, PlacedZone, SpeedZone, place
 from .problem import TOLERANCE
 from .settings import MPCSettings
-from .step.decision import Rung, Step
+from .step import Rung, Step
+from .tracker import People, Tracker
 
 OMEGA_MAX = 4.0
 """Turning rate of a common indoor robot whose wheels reach 1 m/s [rad/s] (assumed)."""

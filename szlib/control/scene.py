@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from math import hypot
 from typing import NamedTuple
 
-from ...zones.ellipses import Ellipse
-from ..barriers import barrier, euclidean_segment_formula, segment_formula
-from ..people.person import BODY_RADIUS, Person, PlacedZone
-from ..people.tracker import Seen
-from ..settings import MPCSettings
+from ..zones.ellipses import Ellipse
+from .barriers import barrier, euclidean_segment_formula, segment_formula
+from .person import BODY_RADIUS, Person, PlacedZone
+from .settings import MPCSettings
+from .tracker import Seen
 
 
 class Scene(NamedTuple):

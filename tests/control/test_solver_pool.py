@@ -14,7 +14,7 @@ from helpers.random_states import ZONE, questions
 import szlib
 from szlib.control.barriers import walls_of
 from szlib.control.solvers import sizes
-from szlib.control.solvers.sizes import UNFELT, rounded
+from szlib.control.solvers.solver_pool import UNFELT, rounded
 from szlib.simulation.closed_loop import advance
 
 GOAL = (4.0, 0.0)

@@ -7,9 +7,9 @@ from math import acos, atan2, cos, hypot, inf, sin, sqrt
 
 import numpy as np
 
-from ..barriers import barrier, segment_formula
-from ..settings import MPCSettings
+from .barriers import barrier, segment_formula
 from .person import PlacedZone
+from .settings import MPCSettings
 
 _ALONG = np.linspace(0, 1, 20)
 """Where room is looked for, from the zone's centre to where the robot passes."""
