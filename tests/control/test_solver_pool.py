@@ -13,7 +13,7 @@ from helpers.random_states import ZONE, questions
 
 import szlib
 from szlib.control.barriers import walls_of
-from szlib.control.solvers import sizes
+from szlib.control.solvers import solver_pool
 from szlib.control.solvers.solver_pool import UNFELT, rounded
 from szlib.simulation.closed_loop import advance
 
@@ -68,7 +68,7 @@ def test_empty_slots_do_not_change_the_control(monkeypatch, solver, count, formu
     for question in islice(questions(seed=31), count):
         answers = []
         for size in (lambda n: n, lambda n: 4 if n <= 4 else 8):
-            monkeypatch.setattr(sizes, "rounded", size)
+            monkeypatch.setattr(solver_pool, "rounded", size)
             controller = controller_of(solver, question.walls, max_people=0, **formulation)
             steps = [controller.step(question.state, question.goal, question.people) for _ in range(2)]
             answers.append(steps)
@@ -90,7 +90,7 @@ def test_a_run_is_the_same_whether_or_not_a_size_was_built_ahead(monkeypatch, so
     numbers = [3] * 3 + [4] * 3 + [9] * 3 + [3] * 2 + [20] * 3 + [0] * 2
     ahead = drive(controller_of(solver), numbers, wait_for_the_builder)
     racing = drive(controller_of(solver), numbers)
-    monkeypatch.setattr(sizes.Thread, "start", lambda _: None)
+    monkeypatch.setattr(solver_pool.Thread, "start", lambda _: None)
     in_place = drive(controller_of(solver), numbers)
     assert np.array_equal(ahead, racing) and np.array_equal(ahead, in_place)
 
