@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from szlib.control.people import Person
+from szlib.control.person import Person
 from szlib.simulation.scenario import Scenario
 
 PACKAGES = {"orca": "pyrvo", "social force": "pysocialforce", "speed model": "jupedsim"}
