@@ -149,7 +149,7 @@ class SocialDrive(Node):
         """The zones around people, in a square around the robot."""
         side, cells = self.costmap_resolution, round(self.costmap_size / self.costmap_resolution)
         corner = [side * round(c / side) - side * (cells // 2) for c in self.own[:2].tolist()]
-        costs = self.zone_around.costmap(people, szlib.Grid(corner, side, (cells, cells)))
+        costs = szlib.draw_costmap(self.zone_around, people, szlib.Grid(corner, side, (cells, cells)))
         message = OccupancyGrid()
         message.header.frame_id, message.header.stamp = self.frame, self.people.header.stamp
         message.info.resolution, message.info.width, message.info.height = side, cells, cells

@@ -98,7 +98,7 @@ def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
     Distances, shape (...) [m].
     """
     xy = check_array("points", points, (..., 2))
-    return np.asarray(ellipse_formula(xy[..., 0], xy[..., 1], *ellipse.numbers))
+    return np.asarray(ellipse_formula(xy[..., 0], xy[..., 1], *ellipse.foci_and_axis))
 
 
 def check_wall(wall: ArrayLike) -> Array:

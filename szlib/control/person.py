@@ -126,7 +126,7 @@ def place(person: Person, zone: Ellipse) -> PlacedZone:
     (x, y), (vx, vy), heading = person.position, person.velocity, person.heading
     if heading is None:
         zone, heading = circle_around(zone), 0.0
-    c, s, (ma, na, mb, nb, a) = cos(heading), sin(heading), zone.numbers
+    c, s, (ma, na, mb, nb, a) = cos(heading), sin(heading), zone.foci_and_axis
     xa, ya, xb, yb = x + ma * c - na * s, y + ma * s + na * c, x + mb * c - nb * s, y + mb * s + nb * c
     # The constructor of a named tuple would take as long as all of this.
     return tuple.__new__(PlacedZone, (xa, ya, xb, yb, a, vx, vy))

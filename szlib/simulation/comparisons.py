@@ -27,7 +27,8 @@ from ..control.distances import euclidean_to_ellipse
 from ..control.person import BODY_RADIUS, as_ellipse
 from ..control.settings import MPCSettings
 from ..errors import SolverError
-from ..zones.ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
+from ..zones.ellipses import Ellipse
+from ..zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
 from .baseline_controllers import dynamic_window, social_force, straight
 from .closed_loop import Zones
 from .log import SimulationLog

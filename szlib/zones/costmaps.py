@@ -1,62 +1,36 @@
-"""Zones around people as a layer of a costmap, as navigation stacks read it (nav_msgs/OccupancyGrid).
+"""Zones around people as a costmap, in the convention of navigation stacks (nav_msgs/OccupancyGrid).
 
     100         in a person's body
-    99 ... 50   in their zone, falling linearly from its centre to its boundary
-    49 ... 0    beyond, falling linearly over `fade`, along the line from the zone's centre
+    99 ... 50   in a person's zone, falling linearly from its centre to its boundary
+    49 ... 0    outside, falling linearly over the distance `fade`, along the line from the zone's centre
 
-so a cell costs 50 or more exactly if its centre lies in somebody's zone or body. Where zones overlap, the
-greatest cost counts. Of somebody too slow to say which way they face, the zone is `circle_around` it. To
-inflate costs by the robot's radius is left to the stack.
+A cell costs 50 or more exactly if its centre lies in a zone or a body. Where zones overlap, the greatest cost
+counts. A person whose heading is unknown gets the circle `circle_around` the zone. The costmap does not
+inflate costs by the robot's radius: navigation stacks do this themselves.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from math import atan2, cos, hypot, pi, sin
-from typing import Any, Protocol, TypeVar, cast
+from dataclasses import dataclass
+from math import atan2, hypot
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Array
 from ..errors import ZoneError
+from .ellipses import BODY_RADIUS, Ellipse, circle_around
 
-BODY_RADIUS = 0.25
-"""Radius of a person's body: half the breadth of shoulders [m] (assumed)."""
 FADE = 0.5
-"""How far from a zone its cost has faded to 0 [m] (assumed)."""
-WALKING = 0.2
-"""Speed from which on a velocity says which way somebody faces [m/s] (assumed)."""
+"""Distance from a zone at which its cost reaches 0 [m] (assumed)."""
+MIN_HEADING_SPEED = 0.2
+"""Speed above which the velocity gives the heading of a person [m/s] (assumed)."""
 ZONE_SPEED = 1.1
-"""Walking speed whose zone is meant, where a zone depends on speed [m/s] (paper, sec. 4)."""
-BODY, CENTRE, BOUNDARY = 100, 99, 50
+"""Walking speed of the zone that is drawn, if a zone depends on speed [m/s] (paper, sec. 4)."""
+BODY_COST, CENTER_COST, BOUNDARY_COST = 100, 99, 50
 """Costs of a body, at the centre of a zone, and at its boundary."""
-_BISECTIONS = 60
-"""Halvings of a quarter turn until nothing is left of it in double precision."""
-
-
-class Oval(Protocol):
-    """What is asked of an `Ellipse` here."""
-
-    @property
-    def center(self) -> tuple[float, float]:
-        """(x, y) [m]."""
-
-    @property
-    def semi_axes(self) -> tuple[float, float]:
-        """The larger, the smaller [m]."""
-
-    @property
-    def angle(self) -> float:
-        """From x to the larger axis [rad]."""
-
-    def level(self, points: Array) -> Array:
-        """Of points (n, 2): 1 on the ellipse, less inside, more outside."""
-
-    def placed(self, position: tuple[float, float], heading: float) -> Oval:
-        """The same in the world frame, of a person there with this heading [m, rad]."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +39,20 @@ class Grid:
 
     Parameters
     ----------
-    origin : (x, y) of the corner of cell (0, 0) where x and y are least [m].
+    origin : (x, y) of the corner of cell (0, 0) with the smallest x and y [m].
     resolution : side of a cell [m].
-    shape : (rows, columns): cells along y, and along x.
+    shape : (rows, columns): number of cells along y and along x.
 
     Raises
     ------
-    ZoneError : a number is not finite, or resolution or shape not positive.
+    ZoneError : a number is not finite, or `resolution` or `shape` is not positive.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> grid = szlib.Grid(origin=(-2.0, -2.0), resolution=0.1, shape=(40, 40))
+    >>> grid.centers()[0, 0].round(2).tolist()
+    [-1.95, -1.95]
     """
 
     origin: tuple[float, float]
@@ -92,125 +73,105 @@ class Grid:
         object.__setattr__(self, "shape", (int(shape[0]), int(shape[1])))
 
     def centers(self, rows: slice = slice(None), columns: slice = slice(None)) -> Array:
-        """(x, y) of the centre of each cell in these rows and columns, shape (rows, columns, 2) [m]."""
+        """(x, y) of the cell centres in these `rows` and `columns`, shape (rows, columns, 2) [m]."""
         (x, y), side = self.origin, self.resolution
         xs = x + side * (np.arange(self.shape[1])[columns] + 0.5)
         ys = y + side * (np.arange(self.shape[0])[rows] + 0.5)
         return np.stack(np.broadcast_arrays(xs, ys[:, None]), axis=-1)
 
-    def window(self, around: tuple[float, float], reach: float) -> tuple[slice, slice]:
-        """Rows and columns of all the cells that may lie within reach of a place [m]."""
+    def window(self, center: tuple[float, float], radius: float) -> tuple[slice, slice]:
+        """Rows and columns of all cells that may lie within `radius` of the point `center` [m]."""
         ends = []
-        for middle, corner, cells in zip(around[::-1], self.origin[::-1], self.shape, strict=True):
-            first, last = ((middle + side - corner) / self.resolution for side in (-reach, reach))
+        for middle, corner, cells in zip(center[::-1], self.origin[::-1], self.shape, strict=True):
+            first, last = ((middle + side - corner) / self.resolution for side in (-radius, radius))
             ends.append(slice(int(np.clip(first - 1, 0, cells)), int(np.clip(last + 1, 0, cells))))
         return ends[0], ends[1]
 
 
-Z = TypeVar("Z", bound=Oval)
+def draw_costmap(
+    zone: Any,
+    people: Sequence[Any] | ArrayLike,
+    grid: Grid,
+    *,
+    speed: float = ZONE_SPEED,
+    fade: float = FADE,
+    body_radius: float = BODY_RADIUS,
+) -> NDArray[np.int8]:
+    """Draw a zone around people into a costmap (see the top of this module for the costs).
 
+    Parameters
+    ----------
+    zone : an `Ellipse` in the person's frame, or an object with a method `.ellipse(speed)`, such as
+        `SocialZone`.
+    people : array (n, 4) of x, y [m], vx, vy [m/s] in the world frame, or a sequence of `Person`. The `zone`
+        of a `Person` replaces the argument `zone`. A person slower than 0.2 m/s has no known heading.
+    grid : the cells.
+    speed : walking speed of the zone, if it depends on speed [m/s].
+    fade : distance from a zone at which its cost reaches 0 [m].
+    body_radius : radius of a person's body [m].
 
-class Layer:
-    """A zone that can be drawn into a costmap: an `Ellipse`, or anything with `.ellipse(speed)`."""
+    Returns
+    -------
+    Costs 0 to 100, int8, of shape `grid.shape`: [row, column] is the cell at y, x. Its `.ravel()` is
+    `OccupancyGrid.data`.
 
-    def costmap(
-        self,
-        people: Sequence[Any] | ArrayLike,
-        grid: Grid,
-        *,
-        speed: float = ZONE_SPEED,
-        fade: float = FADE,
-        body: float = BODY_RADIUS,
-    ) -> NDArray[np.int8]:
-        """Costs 0 to 100 of this zone around people; see the top of `szlib.zones.costmaps`.
+    Raises
+    ------
+    ZoneError : a number is not finite or negative, a shape is wrong, or the zone is undefined at `speed`.
 
-        Parameters
-        ----------
-        people : an array, shape (n, 4): x, y [m], vx, vy [m/s], world frame; or `Person`s: a `zone` of their
-            own is drawn in place of this one. Who is slower than 0.2 m/s, without a heading, gets the circle.
-        grid : the cells.
-        speed : walking speed whose zone is meant, where it depends on speed [m/s].
-        fade : how far beyond a zone its cost ends [m]; 0: at its boundary.
-        body : radius of a person's body [m].
-
-        Returns
-        -------
-        int8, shape `grid.shape`: [row, column] is the cell at y, x. `.ravel()` is `OccupancyGrid.data`.
-
-        Raises
-        ------
-        ZoneError : a number is not finite or negative, a shape is wrong, or the zone is undefined at `speed`.
-        """
-        if not (np.isfinite([fade, body]).all() and min(fade, body) >= 0):
-            raise ZoneError(f"fade and body must be finite and >= 0, in metres; got {fade}, {body}")
-        costs = np.zeros(grid.shape, np.int8)
-        mine: Oval | None = None
-        for (x, y), heading, own in _each(people):
-            zone = _oval(own, speed) if own is not None else (mine := mine or _oval(self, speed))
-            placed = (circle_around(zone) if heading is None else zone).placed((x, y), heading or 0.0)
-            offset = hypot(placed.center[0] - x, placed.center[1] - y)
-            window = grid.window(placed.center, max(offset + body, placed.semi_axes[0] + fade))
-            points = grid.centers(*window)
-            cost = _zone_cost(points, placed, fade)
-            cost[np.hypot(*np.moveaxis(points - (x, y), -1, 0)) <= body] = BODY
-            costs[window] = np.maximum(costs[window], cost)
-        return costs
-
-
-def circle_around(zone: Z) -> Z:
-    """The smallest circle around a person that contains their zone whichever way they face.
-
-    Its radius is the greatest distance from the person to the ellipse. With the person's offset from the
-    centre (-p, -q), p, q >= 0, in the ellipse's frame, the farthest point (a cos t, b sin t) lies in the
-    first quadrant, and half the derivative of the squared distance by t,
-
-        b q cos t - a p sin t - (a^2 - b^2) sin t cos t,
-
-    changes its sign once there: divided by sin t cos t it falls.
+    Examples
+    --------
+    >>> import szlib
+    >>> zone = szlib.Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))
+    >>> grid = szlib.Grid(origin=(-2.0, -2.0), resolution=0.5, shape=(8, 8))
+    >>> costs = szlib.draw_costmap(zone, [[0.25, 0.25, 1.0, 0.0]], grid)
+    >>> int(costs[4, 4]), int(costs[4, 5]), int(costs[0, 0])  # the body, the zone, far away
+    (100, 79, 0)
     """
-    radius = _farthest(zone.center, zone.semi_axes, zone.angle)
-    circle = {"center": (0.0, 0.0), "semi_axes": (radius, radius), "angle": 0.0, "support": None}
-    return cast(Z, replace(cast(Any, zone), **circle))
+    if not (np.isfinite([fade, body_radius]).all() and min(fade, body_radius) >= 0):
+        raise ZoneError(f"fade and body_radius must be finite and >= 0 [m]; got {fade}, {body_radius}")
+    costs = np.zeros(grid.shape, np.int8)
+    common: Ellipse | None = None
+    for (x, y), heading, own_zone in _read_people(people):
+        if own_zone is not None:
+            ellipse = _as_ellipse(own_zone, speed)
+        else:
+            ellipse = common = common or _as_ellipse(zone, speed)
+        placed = (circle_around(ellipse) if heading is None else ellipse).placed((x, y), heading or 0.0)
+        offset = hypot(placed.center[0] - x, placed.center[1] - y)
+        window = grid.window(placed.center, max(offset + body_radius, placed.semi_axes[0] + fade))
+        points = grid.centers(*window)
+        cost = _zone_cost(points, placed, fade)
+        cost[np.hypot(*np.moveaxis(points - (x, y), -1, 0)) <= body_radius] = BODY_COST
+        costs[window] = np.maximum(costs[window], cost)
+    return costs
 
 
-@lru_cache(maxsize=256)
-def _farthest(center: tuple[float, float], semi_axes: tuple[float, float], angle: float) -> float:
-    (m, n), (a, b) = center, semi_axes
-    c, s = cos(angle), sin(angle)
-    p, q = abs(m * c + n * s), abs(n * c - m * s)
-    low, high = 0.0, pi / 2
-    for _ in range(_BISECTIONS):
-        t = (low + high) / 2
-        rises = b * q * cos(t) - a * p * sin(t) - (a**2 - b**2) * sin(t) * cos(t) > 0
-        low, high = (t, high) if rises else (low, t)
-    return hypot(p + a * cos(low), q + b * sin(low))
-
-
-def _zone_cost(points: Array, zone: Oval, fade: float) -> NDArray[np.int8]:
+def _zone_cost(points: Array, zone: Ellipse, fade: float) -> NDArray[np.int8]:
     """Cost of a zone at points (..., 2), 0 to 99."""
     share = np.sqrt(zone.level(points))  # of the way from the centre to the boundary
-    inside = np.rint(CENTRE - (CENTRE - BOUNDARY) * share)
-    beyond = np.hypot(*np.moveaxis(points - zone.center, -1, 0)) * (1 - 1 / np.maximum(share, 1))
-    outside = np.floor(BOUNDARY * (1 - beyond / fade)) if fade else np.zeros_like(share)
-    return np.asarray(np.where(share <= 1, inside, np.clip(outside, 0, BOUNDARY - 1)), np.int8)
+    inside = np.rint(CENTER_COST - (CENTER_COST - BOUNDARY_COST) * share)
+    distance = np.hypot(*np.moveaxis(points - zone.center, -1, 0)) * (1 - 1 / np.maximum(share, 1))
+    outside = np.floor(BOUNDARY_COST * (1 - distance / fade)) if fade else np.zeros_like(share)
+    return np.asarray(np.where(share <= 1, inside, np.clip(outside, 0, BOUNDARY_COST - 1)), np.int8)
 
 
-def _each(people: Sequence[Any] | ArrayLike) -> Iterator[tuple[tuple[float, float], float | None, Any]]:
-    """Position, heading (None: unknown) and own zone of everybody."""
+def _read_people(
+    people: Sequence[Any] | ArrayLike,
+) -> Iterator[tuple[tuple[float, float], float | None, Any]]:
+    """Position, heading (None: unknown) and own zone (None: none) of each person."""
     rows = people if isinstance(people, np.ndarray) else list(cast(Sequence[Any], people))
     if len(rows) and all(hasattr(row, "position") for row in rows):
         yield from ((row.position, row.heading, row.zone) for row in rows)
         return
-    numbers = np.asarray(rows, float)
-    if numbers.size and (numbers.ndim != 2 or numbers.shape[1] != 4):
-        raise ZoneError(f"people must be Persons, or an array (n, 4): x, y, vx, vy; got {numbers.shape}")
-    for i, (x, y, vx, vy) in enumerate(numbers.reshape(-1, 4).tolist()):
+    table = np.asarray(rows, float)
+    if table.size and (table.ndim != 2 or table.shape[1] != 4):
+        raise ZoneError(f"people must be Persons, or an array (n, 4): x, y, vx, vy; got {table.shape}")
+    for i, (x, y, vx, vy) in enumerate(table.reshape(-1, 4).tolist()):
         if not np.isfinite([x, y, vx, vy]).all():
-            raise ZoneError(
-                f"people must be finite; number {i} is {[x, y, vx, vy]}: leave it out, or repair it"
-            )
-        yield (x, y), atan2(vy, vx) if hypot(vx, vy) >= WALKING else None, None
+            raise ZoneError(f"people must be finite; person {i} is {[x, y, vx, vy]}: drop or repair it")
+        yield (x, y), atan2(vy, vx) if hypot(vx, vy) >= MIN_HEADING_SPEED else None, None
 
 
-def _oval(zone: Any, speed: float) -> Oval:
-    return cast(Oval, zone.ellipse(speed) if hasattr(zone, "ellipse") else zone)
+def _as_ellipse(zone: Any, speed: float) -> Ellipse:
+    return cast(Ellipse, zone.ellipse(speed) if hasattr(zone, "ellipse") else zone)

@@ -24,7 +24,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..errors import ZoneError
 from ..tracks import funnels
-from .ellipses import minimum_enclosing_ellipse
+from .enclosing_ellipse import minimum_enclosing_ellipse
 from .outliers import complementary_points, encounter_numbers, remove_outliers
 from .polar import DIRECTIONS
 

@@ -24,8 +24,8 @@ from .. import __version__
 from ..checks import check_columns
 from ..encounters.null_model import NullEncounters
 from ..errors import DataWarning, ZoneError
-from .costmaps import Layer
-from .ellipses import Ellipse, minimum_enclosing_ellipse_of_curve
+from .ellipses import Ellipse
+from .enclosing_ellipse import minimum_enclosing_ellipse_of_curve
 from .hulls import HullEstimator, Slice, hull_vertices, slice_hull
 from .outliers import R_MAX, encounter_numbers
 from .polar import PolarZone
@@ -47,7 +47,7 @@ METHODS: dict[str, tuple[Callable[..., Estimate], tuple[str, ...]]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class SocialZone(Layer):
+class SocialZone:
     """Minimum social zones by speed, in the reference pedestrian's frame (paper, fig. 5).
 
     Parameters

@@ -26,7 +26,7 @@ import szlib
 from szlib.parallel import run_tasks
 from szlib.tracks.clock import to_clock
 from szlib.tracks.sites import GRAND_CENTRAL_RATE, read_grand_central
-from szlib.zones.ellipses import minimum_enclosing_ellipse_of_curve
+from szlib.zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
 from szlib.zones.hulls import hull_vertices, slice_hull
 from szlib.zones.outliers import complementary_points
 

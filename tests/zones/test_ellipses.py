@@ -10,7 +10,8 @@ from mpmath import MPContext
 from scipy.optimize import minimize, nnls
 
 from szlib.errors import SzlibError, ZoneError
-from szlib.zones.ellipses import Ellipse, minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
+from szlib.zones.ellipses import Ellipse, circle_around
+from szlib.zones.enclosing_ellipse import minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
 
 mp = MPContext()
 mp.dps = 50
@@ -200,6 +201,16 @@ def test_angle_is_kept_in_the_half_turn_that_tells_axes_apart(angle):
 def test_impossible_ellipse_is_refused(arguments, words):
     with pytest.raises(ZoneError, match=words):
         Ellipse(*arguments)
+
+
+def test_circle_around_a_zone_is_the_smallest():
+    rng = np.random.default_rng(2)
+    for _ in range(100):
+        axes = np.sort(rng.uniform(0.2, 2.0, 2))[::-1]
+        zone = Ellipse(tuple(rng.uniform(-1, 1, 2)), tuple(axes), rng.uniform(-2, 2))
+        circle = circle_around(zone)
+        assert circle.center == (0.0, 0.0)
+        assert circle.semi_axes[0] == pytest.approx(np.hypot(*zone.curve(20_001).T).max(), rel=1e-7)
 
 
 # --- the smallest one around points ------------------------------------------------------------------

@@ -14,7 +14,8 @@ from ...encounters.finding import find_encounters
 from ...plaza.generation import make_plaza
 from ...plaza.settings import SLOW_INTRUDERS, PlazaSettings
 from ...tracks.clock import read_tracks
-from ...zones.ellipses import Ellipse, minimum_enclosing_ellipse
+from ...zones.ellipses import Ellipse
+from ...zones.enclosing_ellipse import minimum_enclosing_ellipse
 from ...zones.hulls import Slice
 from .task import Case, Rng, Task, formula
 
