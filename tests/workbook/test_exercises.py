@@ -1,4 +1,4 @@
-"""The exercises: solutions pass, stubs fail, and typical wrong answers are told what is wrong."""
+"""The exercises: solutions pass, stubs fail, and each typical mistake gets its own message."""
 
 import importlib.util
 import re
@@ -14,6 +14,7 @@ import pytest
 
 import szlib
 from szlib.workbook.exercises import SHEETS, Task, check, hint
+from szlib.workbook.exercises.task import load_texts
 from szlib.workbook.record import places
 
 TASKS = {
@@ -38,7 +39,7 @@ def cells(file: Path) -> list[nbformat.NotebookNode]:
 
 
 def defined(sheet: str, folder: Path) -> dict[str, object]:
-    """What the cells of a sheet define: those that import something or define a function."""
+    """The names that the cells of a sheet define; only cells that import or define functions are run."""
     found: dict[str, object] = {}
     for cell in cells(folder / f"{sheet}.py"):
         if cell.cell_type == "code" and re.search(r"^(import|from|def) ", cell.source, re.MULTILINE):
@@ -64,22 +65,22 @@ class TestEach:
         assert verdict.passed, verdict
         verdict.require()
 
-    def test_the_stub_fails_and_is_told_that_there_is_no_answer(self, name):
+    def test_the_stub_fails_with_no_answer_yet(self, name):
         verdict = check(name, defined(TASKS[name][0], sheets.EXERCISES)[name], seed=SEED)
         assert not verdict.passed
         assert "no answer yet" in verdict.message
         with pytest.raises(szlib.SzlibError, match="no answer yet"):
             verdict.require()
 
-    def test_typical_wrong_answers_are_told_what_is_wrong(self, name):
+    def test_each_typical_mistake_gets_its_message(self, name):
         mistakes = TASKS[name][2].mistakes
         assert len(mistakes) >= 3
-        for told, wrong in mistakes.items():
+        for message, wrong in mistakes.items():
             verdict = check(name, wrong, seed=SEED)
             assert not verdict.passed
-            assert told in verdict.message
+            assert message in verdict.message
 
-    def test_hints_go_on_to_the_last(self, name, capsys):
+    def test_every_hint_up_to_the_last_can_be_read(self, name, capsys):
         hints = TASKS[name][2].hints
         assert len(hints) >= 3
         hint(name, len(hints))
@@ -87,7 +88,7 @@ class TestEach:
         with pytest.raises(szlib.DataError, match=f"hints 1 to {len(hints)}"):
             hint(name, len(hints) + 1)
 
-    def test_the_sheet_asks_for_it_where_and_as_long_as_declared(self, name):
+    def test_the_sheet_states_the_declared_order_and_time(self, name):
         sheet, number, task = TASKS[name]
         (place,) = [
             i for i, c in enumerate(cells(sheets.SOLUTIONS / f"{sheet}.py")) if f'check("{name}"' in c.source
@@ -100,7 +101,7 @@ class TestEach:
         assert title.endswith(f"{task.minutes} min)")
 
 
-def test_there_are_enough_for_a_course():
+def test_there_are_enough_tasks_for_a_course():
     assert len(TASKS) >= 24
     assert all(2 <= len(tasks) <= 4 for tasks in SHEETS.values())
     minutes = [task.minutes for _, _, task in TASKS.values()]
@@ -108,23 +109,30 @@ def test_there_are_enough_for_a_course():
     assert max(minutes) >= 120
 
 
-def test_cases_are_fresh():
+def test_every_text_belongs_to_a_task_and_a_mistake():
+    texts = load_texts()
+    assert set(texts) == set(TASKS)
+    for name, (_, _, task) in TASKS.items():
+        assert task.judge or set(task.mistakes) == set(texts[name]["mistakes"].values())
+
+
+def test_each_check_draws_new_cases():
     first, second = [], []
     for seen in (first, second):
         check("velocity", lambda path, k, half, seen=seen: seen.append(path) or path[k])
     assert not np.array_equal(first[0], second[0])
 
 
-# --- what else a learner may hand in -------------------------------------------------------------------
+# --- invalid answers ---------------------------------------------------------------------------------
 
 
-def one(judge=None):
-    """A task whose truth is twice a number."""
-    return Task("double", 1, (), lambda rng: ((3.0,), 6.0), {"add": lambda x: x + x + 1}, judge, unit="m")
+def make_task():
+    """A task whose correct answer is twice a number."""
+    return Task("double", 1, (), lambda rng: ((3.0,), 6.0), {"add": lambda x: x + x + 1}, unit="m")
 
 
 @pytest.mark.parametrize(
-    ("answer", "told"),
+    ("answer", "message"),
     [
         (lambda x: None, "does it end with `return`"),
         (lambda x: x[0], r"stopped with TypeError .* for \(3.0\)"),
@@ -135,33 +143,33 @@ def one(judge=None):
         (lambda x: 6.0 + 1e-5, "expected 6.0 m; got 6.0"),
     ],
 )
-def test_an_answer_that_is_none(answer, told):
-    verdict = one().check(answer, np.random.default_rng(0))
+def test_a_wrong_answer_is_described(answer, message):
+    verdict = make_task().check(answer, np.random.default_rng(0))
     assert not verdict.passed
-    assert re.search(told, verdict.message), verdict.message
+    assert re.search(message, verdict.message), verdict.message
 
 
-def test_what_the_answer_raised_is_kept():
-    verdict = one().check(lambda x: 1 / 0, np.random.default_rng(0))
+def test_the_verdict_holds_the_error_of_the_answer():
+    verdict = make_task().check(lambda x: 1 / 0, np.random.default_rng(0))
     assert isinstance(verdict.error, ZeroDivisionError)
 
 
-def test_an_answer_cannot_spoil_the_case():
-    def spoils(path, k, half):
+def test_an_answer_cannot_change_the_case():
+    def overwrites(path, k, half):
         right = (path[k + half] - path[k - half]) / (2 * half * 0.1)
         path[:] = 0
         return right
 
-    assert check("velocity", spoils, seed=SEED).passed
+    assert check("velocity", overwrites, seed=SEED).passed
 
 
-def test_a_value_in_place_of_a_function_and_an_unknown_task():
+def test_a_value_instead_of_a_function_and_an_unknown_task_are_refused():
     assert "the function itself" in check("velocity", 1.0).message
-    with pytest.raises(szlib.DataError, match="no task 'speed'; there are velocity"):
+    with pytest.raises(szlib.DataError, match="no task 'speed'; the tasks are velocity"):
         check("speed", lambda: 0)
 
 
-def test_of_a_large_array_the_first_wrong_number_is_shown():
+def test_the_first_wrong_number_of_a_large_array_is_shown():
     verdict = check("in_space", lambda ref, heading, others: np.zeros(len(others)), seed=SEED)
     assert re.search(r"\d+ of 60 numbers are wrong; at \[\d+\] expected", verdict.message)
 
@@ -171,7 +179,7 @@ def test_of_a_large_array_the_first_wrong_number_is_shown():
 
 @pytest.mark.parametrize("sheet", SHEETS)
 class TestSheet:
-    def test_the_exercise_is_made_of_the_solutions(self, sheet):
+    def test_the_exercise_is_generated_from_the_solutions(self, sheet):
         solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
         exercise = (sheets.EXERCISES / f"{sheet}.py").read_text(encoding="utf-8")
         assert exercise == sheets.exercise_of(solutions)
@@ -179,7 +187,7 @@ class TestSheet:
         assert exercise.count("raise NotImplementedError()") == len(SHEETS[sheet])
 
     @pytest.mark.parametrize("folder", [sheets.SOLUTIONS, sheets.EXERCISES], ids=lambda f: f.name)
-    def test_the_pairs_hold_together(self, sheet, folder):
+    def test_script_and_notebook_are_equal(self, sheet, folder):
         copy = nbformat.read(folder / f"{sheet}.ipynb", as_version=4).cells
         assert [(c.cell_type, c.source) for c in copy] == [
             (c.cell_type, c.source) for c in cells(folder / f"{sheet}.py")
@@ -187,22 +195,22 @@ class TestSheet:
 
     def test_the_executed_copy_of_the_solutions_passes(self, sheet):
         copy = nbformat.read(sheets.SOLUTIONS / f"{sheet}.ipynb", as_version=4).cells
-        said = [
+        outputs = [
             out["data"]["text/plain"]
             for c in copy
             if c.source.startswith("exercises.check")
             for out in c.outputs
         ]
-        assert [line.split(" - ")[0] for line in said] == ["passed"] * len(SHEETS[sheet])
+        assert [line.split(" - ")[0] for line in outputs] == ["passed"] * len(SHEETS[sheet])
 
-    def test_run_all_goes_through_before_anything_is_answered(self, sheet, monkeypatch):
+    def test_the_sheet_runs_before_it_is_answered(self, sheet, monkeypatch):
         monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
         found: dict[str, object] = {}
         for cell in cells(sheets.EXERCISES / f"{sheet}.py"):
             if cell.cell_type == "code" and not cell.source.startswith("exercises.check"):
                 exec(cell.source, found)
 
-    def test_for_a_class_each_check_is_graded_and_locked(self, sheet):
+    def test_each_check_of_a_class_is_graded_and_locked(self, sheet):
         solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
         points = {task.name: task.minutes for task in SHEETS[sheet]}
         marked = [c for c in sheets.graded(solutions, points).cells if "nbgrader" in c.metadata]

@@ -1,6 +1,7 @@
-"""Can you do it yourself? The tasks of the exercise sheets: `check` an answer, ask for a `hint`.
+"""Tasks of the exercise sheets: `check` an answer, or read a `hint`.
 
-task              one task: cases, the correct answer, messages for typical mistakes
+task              one task: it draws cases and compares the answers
+texts.toml        minutes, hints and messages of all tasks
 sheet1_tracks     velocity, line of sight, attentional space, sampling at 1 Hz
 sheet2_outliers   complementary coordinates, nearest approaches, LOF's blind spot
 sheet3_zones      a slice, its zone, the smallest ellipse, a zone of your own

@@ -1,4 +1,4 @@
-"""Check an answer, or ask for a hint: `check("barrier_row", barrier_row)`, `hint("barrier_row", 2)`."""
+"""Check an answer, or read a hint: `check("barrier_row", barrier_row)`, `hint("barrier_row", 2)`."""
 
 from __future__ import annotations
 
@@ -15,48 +15,70 @@ from . import (
 )
 from .task import Answer, Task, Verdict
 
+_MODULES = (sheet1_tracks, sheet2_outliers, sheet3_zones, sheet4_certainty, sheet5_barriers, sheet6_robot)
 SHEETS: dict[str, tuple[Task, ...]] = {
-    "sheet1_tracks": sheet1_tracks.TASKS,
-    "sheet2_outliers": sheet2_outliers.TASKS,
-    "sheet3_zones": sheet3_zones.TASKS,
-    "sheet4_certainty": sheet4_certainty.TASKS,
-    "sheet5_barriers": sheet5_barriers.TASKS,
-    "sheet6_robot": sheet6_robot.TASKS,
+    module.__name__.rpartition(".")[2]: module.TASKS for module in _MODULES
 }
-"""The tasks of every sheet, in their order."""
+"""The tasks of each sheet, in order."""
 
 
 def check(name: str, answer: Answer, *, seed: int | None = None) -> Verdict:
-    """What is right or wrong with an answer, in words.
+    """Check an answer, and say what is correct or wrong.
 
     Parameters
     ----------
-    name : of the task.
-    answer : the function itself, not what it gives.
-    seed : of the cases; None draws fresh ones every time.
+    name : name of the task.
+    answer : the function itself, not its result.
+    seed : seed of the cases; None draws fresh cases each time.
 
-    Raises DataError where there is no such task.
+    Returns
+    -------
+    The verdict. Its text stands below the cell.
+
+    Raises
+    ------
+    DataError : there is no such task.
+
+    Examples
+    --------
+    >>> from szlib.workbook import exercises
+    >>> def speed_limit(h, gamma, dt, person_speed):
+    ...     return gamma * h / dt - person_speed
+    >>> exercises.check("speed_limit", speed_limit)
+    passed - speed_limit: correct in 5 fresh cases
     """
-    task = _task(name)
+    task = _find_task(name)
     if not callable(answer):
-        told = f"hand over the function itself, check({name!r}, {name}), not what it gives"
-        return Verdict(name, False, told)
+        return Verdict(name, False, f"give the function itself, check({name!r}, {name}), not its result")
     return task.check(answer, np.random.default_rng(seed))
 
 
 def hint(name: str, number: int = 1) -> None:
-    """Print one hint for a task, 1 for the first; the last one is nearly the solution.
+    """Print a hint for a task.
 
-    Raises DataError where there is no such task or hint.
+    Parameters
+    ----------
+    name : name of the task.
+    number : number of the hint, from 1; the last one is nearly the solution.
+
+    Raises
+    ------
+    DataError : there is no such task or hint.
+
+    Examples
+    --------
+    >>> from szlib.workbook import exercises
+    >>> exercises.hint("velocity", 1)
+    hint 1 of 3: Velocity is displacement divided by time.
     """
-    hints = _task(name).hints
+    hints = _find_task(name).hints
     if not 1 <= number <= len(hints):
         raise DataError(f"{name} has hints 1 to {len(hints)}; got {number}")
     print(f"hint {number} of {len(hints)}: {hints[number - 1]}")
 
 
-def _task(name: str) -> Task:
+def _find_task(name: str) -> Task:
     tasks = {task.name: task for sheet in SHEETS.values() for task in sheet}
     if name not in tasks:
-        raise DataError(f"there is no task {name!r}; there are {', '.join(tasks)}")
+        raise DataError(f"there is no task {name!r}; the tasks are {', '.join(tasks)}")
     return tasks[name]

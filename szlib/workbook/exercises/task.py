@@ -1,14 +1,17 @@
-"""One task: the learner's answer is a function, asked for cases that nobody has seen before.
+"""A task of an exercise sheet: it asks the learner's function for fresh cases and compares the answers.
 
-Each case is drawn from fresh random numbers, so its truth cannot be looked up. A wrong answer is compared
-with typical mistakes, functions as well: if one gives the same in every case, the learner is told which.
+Each case is drawn from fresh random numbers, so nobody can look up the correct answer.  Typical mistakes are
+functions as well: if one of them gives the learner's answer in every case, the learner reads its message.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,17 +21,29 @@ from ...errors import SzlibError
 
 Answer = Callable[..., Any]
 Case = tuple[tuple[Any, ...], Any]
-"""The arguments of the answer, and the truth."""
+"""The arguments for the learner's function, and the correct answer."""
 Rng = np.random.Generator
 
-_LONGEST, _DIGITS = 6, 4  # of an array that is shown
+_TEXTS = Path(__file__).with_name("texts.toml")
+_MAX_SHOWN, _DIGITS = 6, 4  # of an array in a message
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is said of an answer: whether it passed, and what is right or wrong with it, in words.
+    """The result of a check.
 
-    `error` is what the answer's function raised, None if it did not.
+    Attributes
+    ----------
+    task : name of the task.
+    passed : True if the answer is correct in every case.
+    message : what is correct or wrong.
+    error : the exception that the learner's function raised; None if it raised none.
+
+    Examples
+    --------
+    >>> from szlib.workbook.exercises import Verdict
+    >>> Verdict("velocity", True, "correct in 5 fresh cases")
+    passed - velocity: correct in 5 fresh cases
     """
 
     task: str
@@ -40,7 +55,7 @@ class Verdict:
         return f"{'passed' if self.passed else 'not yet'} - {self.task}: {self.message}"
 
     def require(self) -> None:
-        """Raise SzlibError with the message unless it passed: for graders, which count errors."""
+        """Raise SzlibError with the message if the answer did not pass; graders count errors."""
         if not self.passed:
             raise SzlibError(repr(self)) from self.error
 
@@ -51,16 +66,24 @@ class Task:
 
     Parameters
     ----------
-    name : of the task, and of the function that the learner writes.
-    minutes : that it takes [min].
-    hints : from a nudge to nearly the solution.
-    case : draws one case from a generator.
-    mistakes : typical wrong answers, by what is said of them.
-    judge : (arguments, truth, what the answer gave) -> what is wrong in words, "" for nothing; by default
-        the answer must be the truth up to `tolerance`.  A judge finds the mistakes by itself.
-    tolerance : greatest difference of any number from the truth [unit].
-    unit : of the answer, "" where it has none.
-    cases : how many are drawn for a check.
+    name : name of the task and of the function that the learner writes.
+    minutes : time that the task takes [min].
+    hints : hints in order; the last one is nearly the solution.
+    case : function that draws one case from a random generator.
+    mistakes : message -> function that makes this typical mistake.
+    judge : function of (arguments, correct answer, learner's answer) that returns a message, "" for a correct
+        answer. Without it, the answer must equal the correct answer up to `tolerance`.
+    tolerance : largest allowed difference of any number [unit].
+    unit : unit of the answer; "" if it has none.
+    n_cases : number of cases in a check.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from szlib.workbook.exercises import Task
+    >>> double = Task("double", 1, (), lambda rng: ((3.0,), 6.0), {"you add 2": lambda x: x + 2}, unit="m")
+    >>> double.check(lambda x: x + 2, np.random.default_rng(0))
+    not yet - double: you add 2: expected 6.0 m; got 5.0 for (3.0)
     """
 
     name: str
@@ -71,40 +94,38 @@ class Task:
     judge: Callable[[tuple[Any, ...], Any, Any], str] | None = None
     tolerance: float = 1e-6
     unit: str = ""
-    cases: int = 5
+    n_cases: int = 5
 
     def check(self, answer: Answer, rng: Rng) -> Verdict:
-        """Ask the answer for fresh cases, and say what came of it."""
+        """Check the function `answer` in fresh cases drawn from `rng`."""
         tried = []
-        for _ in range(self.cases):
-            args, truth = self.case(rng)
+        for _ in range(self.n_cases):
+            args, expected = self.case(rng)
             try:
                 got = answer(*deepcopy(args))
             except NotImplementedError as error:
                 return Verdict(self.name, False, "no answer yet: write it, then run this cell", error)
             except Exception as error:
-                told = f"your function stopped with {type(error).__name__} ({error}) {_asked(args)}"
-                return Verdict(self.name, False, told, error)
+                stopped = f"your function stopped with {type(error).__name__} ({error}) {_arguments(args)}"
+                return Verdict(self.name, False, stopped, error)
             if got is None:
-                told = "your function gives None: does it end with `return`?"
-                return Verdict(self.name, False, told)
-            tried.append((args, truth, got, self._fault(args, truth, got)))
-        faults = [(args, fault) for args, _, _, fault in tried if fault]
-        if not faults:
-            return Verdict(self.name, True, f"right in {self.cases} fresh case{'s' * (self.cases > 1)}")
-        args, fault = faults[0]
-        named = "" if self.judge else self._mistake([(args, got) for args, _, got, _ in tried])
-        return Verdict(self.name, False, f"{named}: {fault}" if named else fault)
+                return Verdict(self.name, False, "your function returns None: does it end with `return`?")
+            tried.append((args, expected, got))
+        for args, expected, got in tried:
+            if fault := self._fault(args, expected, got):
+                mistake = "" if self.judge else self._mistake([(args, got) for args, _, got in tried])
+                return Verdict(self.name, False, f"{mistake}: {fault}" if mistake else fault)
+        return Verdict(self.name, True, f"correct in {self.n_cases} fresh case{'s' * (self.n_cases > 1)}")
 
-    def _fault(self, args: tuple[Any, ...], truth: Any, got: Any) -> str:
+    def _fault(self, args: tuple[Any, ...], expected: Any, got: Any) -> str:
         if self.judge:
-            return self.judge(args, truth, got)
-        fault = self._difference(truth, got)
-        return f"{fault} {_asked(args)}" if fault else ""
+            return self.judge(args, expected, got)
+        fault = self._difference(expected, got)
+        return f"{fault} {_arguments(args)}" if fault else ""
 
-    def _difference(self, truth: Any, got: Any) -> str:
-        """How the numbers differ, "" if they do not."""
-        want = np.asarray(truth, float)
+    def _difference(self, expected: Any, got: Any) -> str:
+        """Describe how the numbers differ; "" if they agree."""
+        want = np.asarray(expected, float)
         try:
             have = np.asarray(got, float)
         except (TypeError, ValueError):
@@ -115,8 +136,8 @@ class Task:
         if not len(wrong):
             return ""
         unit = f" {self.unit}" if self.unit else ""
-        if want.size <= _LONGEST:
-            return f"expected {_shown(truth)}{unit}; got {_shown(got)}"
+        if want.size <= _MAX_SHOWN:
+            return f"expected {_shown(expected)}{unit}; got {_shown(got)}"
         first = np.unravel_index(wrong[0], want.shape)
         return (
             f"{len(wrong)} of {want.size} numbers are wrong; at [{', '.join(map(str, first))}] expected "
@@ -124,25 +145,53 @@ class Task:
         )
 
     def _mistake(self, tried: list[tuple[tuple[Any, ...], Any]]) -> str:
-        """What is said of the mistake that gives the same in every case, "" where none does."""
-        for told, mistake in self.mistakes.items():
+        """Message of the typical mistake that gives the same answers in every case; "" if there is none."""
+        for message, mistake in self.mistakes.items():
             if not any(self._difference(mistake(*deepcopy(args)), got) for args, got in tried):
-                return told
+                return message
         return ""
 
 
-def formula(draw: Callable[[Rng], tuple[Any, ...]], truth: Answer) -> Callable[[Rng], Case]:
-    """Cases whose truth is a function of the arguments."""
+def make_task(name: str, case: Callable[[Rng], Case], mistakes: Mapping[str, Answer], **options: Any) -> Task:
+    """Build a task with the texts of `texts.toml`.
+
+    Parameters
+    ----------
+    name : name of the task, and of its section in `texts.toml`.
+    case : as for `Task`.
+    mistakes : key -> function that makes the mistake. `texts.toml` holds the message of each key; with a
+        `judge` the keys are the messages.
+    options : other fields of `Task`: `judge`, `tolerance`, `n_cases`.
+
+    Raises
+    ------
+    KeyError : a task or a mistake has no text.
+    """
+    texts = load_texts()[name]
+    if "judge" not in options:
+        mistakes = {texts["mistakes"][key]: answer for key, answer in mistakes.items()}
+    unit = texts.get("unit", "")
+    return Task(name, texts["minutes"], tuple(texts["hints"]), case, mistakes, unit=unit, **options)
+
+
+@cache
+def load_texts() -> dict[str, Any]:
+    """Texts of all tasks, by the name of the task."""
+    return tomllib.loads(_TEXTS.read_text(encoding="utf-8"))
+
+
+def formula(draw: Callable[[Rng], tuple[Any, ...]], solution: Answer) -> Callable[[Rng], Case]:
+    """Cases with arguments from `draw` and the correct answer from the function `solution`."""
 
     def case(rng: Rng) -> Case:
-        """Arguments, and what the formula gives for them."""
+        """Draw arguments and compute the correct answer."""
         args = draw(rng)
-        return args, truth(*args)
+        return args, solution(*args)
 
     return case
 
 
-def _asked(args: tuple[Any, ...]) -> str:
+def _arguments(args: tuple[Any, ...]) -> str:
     return f"for ({', '.join(map(_shown, args))})" if args else ""
 
 
@@ -151,10 +200,10 @@ def _kind(array: Any) -> str:
 
 
 def _shown(value: Any) -> str:
-    """A value in a few digits; of long ones only the size."""
+    """A value in a few digits; only the size of a long one."""
     if isinstance(value, pd.DataFrame):
         return f"a table of {len(value)} rows"
-    if isinstance(value, np.ndarray | list | tuple) and np.size(value) > _LONGEST:
+    if isinstance(value, np.ndarray | list | tuple) and np.size(value) > _MAX_SHOWN:
         return _kind(np.asarray(value))
     if isinstance(value, np.ndarray | list | tuple | float | int | np.number):
         return str(np.round(np.asarray(value), _DIGITS).tolist())
