@@ -1,0 +1,174 @@
+"""Documentation: every parameter is described, every example runs, every exported name has an example.
+
+pytest tests/test_documentation.py -k zones.ellipses --runxfail     one module, unfinished or not
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import doctest
+import importlib
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+
+import szlib
+
+PACKAGE = Path(szlib.__file__).parent
+UNFINISHED = {"control", "encounters", "errors", "files", "parallel", "plaza", "simulation", "tracks"} | {
+    "checks", "memory", "workbook", "zones",
+}  # fmt: skip
+"""Rooms whose documentation is not complete yet: their failures are expected. The aim is none."""
+SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
+ENTRY = re.compile(r"^(\*{0,2}\w+(?:, \*{0,2}\w+)*) ?:(?: |$)", re.MULTILINE)
+QUOTED = re.compile(r"(`+)(.+?)\1", re.DOTALL)
+
+
+def module_names() -> Iterator[str]:
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if path.name != "__main__.py":
+            parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+            yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = list(module_names())
+
+
+def room(module: str) -> str:
+    return module.split(".")[1] if "." in module else "szlib"
+
+
+def check_finished(module: str, problems: list[str]) -> None:
+    """Fail with a list of problems, as expected where the room is not finished."""
+    if problems and room(module) in UNFINISHED:
+        pytest.xfail("\n".join(problems))
+    if problems:
+        pytest.fail("\n".join([f"{module}:", *problems]), pytrace=False)
+
+
+# --- parameters --------------------------------------------------------------------------------------
+
+
+def sections(docstring: str) -> dict[str, str]:
+    """The text of each underlined section."""
+    parts = SECTION.split(docstring)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def entries(docstring: str, *names: str) -> set[str]:
+    """The names that have an entry in one of these sections."""
+    text = "\n".join(sections(docstring).get(name, "") for name in names)
+    return {name.strip(" *") for match in ENTRY.finditer(text) for name in match[1].split(",")}
+
+
+def quoted(docstring: str) -> set[str]:
+    """Every word in backticks."""
+    return {word for match in QUOTED.finditer(docstring) for word in re.findall(r"\w+", match[2])}
+
+
+def parameters(function: Callable[..., object]) -> set[str]:
+    names = inspect.signature(function).parameters
+    return {name for name in names if name not in ("self", "cls") and not name.startswith("_")}
+
+
+def constructor_parameters(kind: type) -> set[str]:
+    """Parameters of a class; none where the constructor is not written in szlib."""
+    if dataclasses.is_dataclass(kind) or hasattr(kind, "_fields"):
+        return parameters(kind)
+    written = next((base for base in kind.__mro__ if "__init__" in vars(base)), object)
+    is_ours = written.__module__.startswith("szlib") and not getattr(kind, "_is_protocol", False)
+    return parameters(kind) if is_ours else set()
+
+
+def attributes(kind: type) -> set[str]:
+    """Names of a class's attributes, also of those that its methods set."""
+    names = set(dir(kind))
+    for base in kind.__mro__:
+        names |= set(getattr(base, "__annotations__", ()))
+        if base.__module__.startswith("szlib"):
+            names |= set(re.findall(r"self\.(\w+)", inspect.getsource(base)))
+    return names
+
+
+def described(module: str) -> Iterator[tuple[str, str, set[str], set[str]]]:
+    """Name, docstring, parameters and attributes of each public function, class and method of a module."""
+    members = vars(importlib.import_module(module))
+    for name, found in members.items():
+        if name.startswith("_") or getattr(found, "__module__", None) != module:
+            continue
+        if inspect.isclass(found):
+            text = f"{inspect.getdoc(found) or ''}\n{vars(found).get('__init__', object).__doc__ or ''}"
+            yield name, text, constructor_parameters(found), attributes(found)
+            for method, value in vars(found).items():
+                called = value.__func__ if isinstance(value, classmethod | staticmethod) else value
+                if not method.startswith("_") and inspect.isfunction(called):
+                    text = inspect.getdoc(getattr(found, method)) or ""
+                    yield f"{name}.{method}", text, parameters(called), set()
+        elif inspect.isfunction(inspect.unwrap(found) if callable(found) else found):
+            yield name, inspect.getdoc(found) or "", parameters(found), set()
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_every_parameter_is_described(module: str) -> None:
+    """An entry under Parameters (or Attributes), or its name in backticks; no entry for what is not there."""
+    problems = []
+    for name, docstring, given, fields in described(module):
+        known = entries(docstring, "Parameters", "Attributes", "Other Parameters")
+        problems += [f"{name}: {each} is not described" for each in sorted(given - known - quoted(docstring))]
+        stray = entries(docstring, "Parameters", "Other Parameters") - given - fields
+        stray |= entries(docstring, "Attributes") - given - fields
+        problems += [f"{name}: {each} is described, but there is no such parameter" for each in sorted(stray)]
+    check_finished(module, problems)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_everything_public_has_a_docstring(module: str) -> None:
+    """Functions within functions as well."""
+    tree = ast.parse(Path(importlib.import_module(module).__file__ or "").read_text(encoding="utf-8"))
+    silent = [] if ast.get_docstring(tree) else ["the module"]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            silent += [] if ast.get_docstring(node) else [f"{node.name}, line {node.lineno}"]
+    assert silent == []
+
+
+# --- examples ----------------------------------------------------------------------------------------
+
+
+def examples(module: str) -> list[doctest.DocTest]:
+    """The examples of a module's docstrings; `szlib` and `np` are there without an import."""
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    names = {"szlib": szlib, "np": np}
+    return [each for each in finder.find(importlib.import_module(module), extraglobs=names) if each.examples]
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_every_example_runs(module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    matplotlib.use("Agg")
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS, verbose=False)
+    report: list[str] = []
+    for example in examples(module):
+        runner.run(example, out=report.append)
+    assert not report, "".join(report)
+
+
+@pytest.mark.parametrize("name", sorted(szlib.__all__))
+def test_every_exported_name_has_an_example(name: str) -> None:
+    """A section in its docstring; a constant is used in an example of its module or another one."""
+    found = getattr(szlib, name)
+    if inspect.ismodule(found):
+        return
+    if inspect.isclass(found) or inspect.isfunction(found):
+        missing = ">>>" not in sections(inspect.getdoc(found) or "").get("Examples", "")
+        check_finished(found.__module__, [f"{name} has no Examples"] if missing else [])
+    else:
+        used = re.compile(rf"^\s*(?:>>>|\.\.\.) .*\bszlib\.{name}\b", re.MULTILINE)
+        shown = any(used.search(path.read_text(encoding="utf-8")) for path in PACKAGE.rglob("*.py"))
+        check_finished("szlib.errors", [] if shown else [f"szlib.{name} is used in no example"])
