@@ -26,7 +26,7 @@ UNFINISHED = {"control", "encounters", "errors", "files", "parallel", "plaza", "
 }  # fmt: skip
 """Rooms whose documentation is not complete yet: their failures are expected. The aim is none."""
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
-ENTRY = re.compile(r"^(\*{0,2}\w+(?:, \*{0,2}\w+)*) ?:(?: |$)", re.MULTILINE)
+ENTRY = re.compile(r"^(\*{0,2}\w+(?:, \*{0,2}\w+)*) :(?: |$)", re.MULTILINE)
 QUOTED = re.compile(r"(`+)(.+?)\1", re.DOTALL)
 
 
