@@ -112,7 +112,7 @@ record.figure(fig, "limit")
 
 # %%
 turns = float(log.time[np.argmax(np.abs(log.controls[:, 1]) > 0.5 * a_max)])
-step = controller.step(*log.at(turns))
+step = controller.step(*log.controller_inputs(turns))
 record.figure(figures.draw_step(step), "admissible")
 
 # %% [markdown]

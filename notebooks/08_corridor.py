@@ -119,7 +119,7 @@ record.figure(fig, "holds")
 
 # %%
 slow = int(log.speed[10 : np.abs(log.people[:, 0, 0] - log.states[:, 0]).argmin()].argmin()) + 10
-step = controller.step(*log.at(float(log.time[slow])))
+step = controller.step(*log.controller_inputs(float(log.time[slow])))
 record.figure(figures.draw_step(step), "admissible")
 
 # %% [markdown]

@@ -127,7 +127,7 @@ record.figure(fig, "space-time")
 # %%
 waits = np.flatnonzero(find_yielding_steps(log))
 middle = float(log.time[waits[len(waits) // 2] if len(waits) else log.speed[10:].argmin() + 10])
-step = controller.step(*log.at(middle))
+step = controller.step(*log.controller_inputs(middle))
 record.figure(figures.draw_step(step), "admissible")
 
 # %%

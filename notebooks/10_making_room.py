@@ -142,7 +142,7 @@ record.figure(fig, "below-zero")
 
 # %%
 turns = float(log.time[np.argmax(log.states[:, 2] < -0.02)])
-step = controller.step(*log.at(turns))
+step = controller.step(*log.controller_inputs(turns))
 record.figure(figures.draw_step(step), "admissible")
 
 # %%

@@ -44,10 +44,10 @@ from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import summarise
 from szlib.simulation.crowds.reacting import ReactingPeople
 from szlib.simulation.metrics import find_avoidance_start
-from szlib.simulation.replay_metrics import compute_replay_metrics
 from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
 from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds
+from szlib.simulation.social_metrics import compute_replay_metrics
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 

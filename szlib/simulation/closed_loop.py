@@ -219,7 +219,7 @@ def _log(
 ) -> SimulationLog:
     """What the run was: a row is a state, who was given to the controller, and what the step told."""
     way, given, *told = zip(*rows, strict=True)
-    controls, plans, residual, rung, safe, slack, solve_time = told
+    controls, plans, residual, fallback, safe, slack, solve_time = told
     states = np.array(way)
     away = states - np.r_[scenario.goal, 0.0, 0.0]
     there = (np.hypot(*away[:, :2].T) <= GOAL_RADIUS) & (np.hypot(*away[:, 2:].T) <= STOPPED_SPEED)
@@ -233,12 +233,12 @@ def _log(
         people=people,
         predicted=_plans(plans),
         residual=_residuals(residual, given, people.shape[1], len(scenario.walls)),
-        rung=np.array(rung),
+        fallback=np.array(fallback),
         safe=np.array(safe, bool),
         slack=np.array(slack),
         solve_time=np.array(solve_time),
-        arrived=int(there.argmax()) if there.any() else None,
-        promises=safe[0] is not None,
+        arrival=int(there.argmax()) if there.any() else None,
+        has_safety_claims=safe[0] is not None,
         inputs=tuple(inputs),
     )
 

@@ -156,7 +156,8 @@ def measure_time_inside(log: SimulationLog) -> dict[str, float]:
     inside = {}
     for name, zone in ZONES.items():
         gaps = [
-            log.to_person(i, partial(euclidean_to_ellipse, ellipse=zone(each))) - log.settings.r_robot
+            log.distance_to_person(i, partial(euclidean_to_ellipse, ellipse=zone(each)))
+            - log.settings.r_robot
             for i, each in enumerate(fitted)
         ]
         overlaps = np.fmin.reduce(np.reshape(gaps, (-1, len(log.states))), initial=np.inf) < 0

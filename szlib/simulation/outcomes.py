@@ -1,89 +1,87 @@
-"""How a run ended; where a barrier was broken, by whom."""
+"""The outcome of a run: how it ends, and who causes the first violation of a barrier."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from scipy.ndimage import label
 
-from ..checks import Array
 from ..control.barriers import barrier, ellipse_distance, segment_distance
 from ..control.distances import wall_margin
 from ..control.problem import TOLERANCE
+from .run import Run, nanmin
 from .scenario import STOPPED_SPEED
-
-if TYPE_CHECKING:
-    from .log import SimulationLog
 
 Outcome = Literal[
     "arrived", "hit wall", "run into", "squeezed", "drove in", "boxed in", "deadlock", "out of time"
 ]
-"""How a run ended; see `outcome`."""
-CROWDED = 0.2
-"""Two barriers below this h at once leave a robot no way out [m] (assumed)."""
+"""How a run ends; see `classify_outcome`."""
+CROWDED_H = 0.2
+"""If two barriers are below this h, the robot has no way out [m] (assumed)."""
 STOP_WINDOW = 3.0
-"""A robot that stood for so long at the end has stopped for good [s] (assumed)."""
+"""A robot that stands for this time at the end of a run has stopped for good [s] (assumed)."""
 _CELL = 0.1
-"""Grid on which a way to the goal is looked for [m]."""
-_AROUND = 2.5
-"""How far around everything it reaches: enough for a zone and the robot beside it [m]."""
+"""Cell size of the grid for the search of a free path to the goal [m]."""
+_MARGIN = 2.5
+"""Margin of the grid around everything: enough for a zone and the robot beside it [m]."""
 
 
-def nanmin(values: Array, axis: int | tuple[int, ...] | None = None) -> Array:
-    """The smallest value along an axis, NaN left out; inf where there is none."""
-    return np.asarray(np.fmin.reduce(values, axis=axis, initial=np.inf))
+def classify_outcome(run: Run) -> Outcome:
+    """How a `run` ends.  Where a barrier is violated, how the first violation begins.
 
-
-def classify_outcome(log: SimulationLog) -> Outcome:
-    """How a run ended; where a barrier was broken, how that began.
-
-    "arrived", or where h fell below 0 first: "hit wall"; "run into", by a person who came nearer while
-    the robot did so less; "squeezed", the same with another barrier close by (`CROWDED`); "drove in",
-    the robot did it. Where it never did: "boxed in", stopped where no way leads to the goal;
-    "deadlock", stopped where one does; "out of time", still on its way.
+    Returns
+    -------
+    "arrived" : the robot is at rest at the goal, and h >= 0 at all states.
+    "hit wall" : h of a wall is the first below 0.
+    "run into" : h of a person is the first below 0, and the person approached faster than the robot.
+    "squeezed" : the same, and another barrier is below `CROWDED_H`.
+    "drove in" : h of a person is the first below 0, and the robot approached faster than the person.
+    "boxed in" : the robot has stopped, and no free path leads to the goal.
+    "deadlock" : the robot has stopped although a free path leads to the goal.
+    "out of time" : the robot is still moving at the end.
     """
-    broken = np.flatnonzero(nanmin(log.h, axis=1) < -TOLERANCE)
-    if len(broken):
-        return _breach(log, int(broken[0]))
-    if log.success:
+    violated = np.flatnonzero(nanmin(run.h, axis=1) < -TOLERANCE)
+    if len(violated):
+        return _classify_violation(run, int(violated[0]))
+    if run.success:
         return "arrived"
-    last = round(STOP_WINDOW / log.settings.dt)
-    if log.speed[-last:].max() > STOPPED_SPEED:
+    window = round(STOP_WINDOW / run.settings.dt)
+    if run.speed[-window:].max() > STOPPED_SPEED:
         return "out of time"
-    return "deadlock" if path_exists(log) else "boxed in"
+    return "deadlock" if _has_free_path(run) else "boxed in"
 
 
-def _breach(log: SimulationLog, k: int) -> Outcome:
-    """Who broke the barrier at state k; who was not there before it came to the robot."""
-    i = int(np.nanargmin(log.h[k]))
-    if i >= len(log.zones):
+def _classify_violation(run: Run, k: int) -> Outcome:
+    """Who violates the barrier at state k; a person who was absent before came to the robot."""
+    i = int(np.nanargmin(run.h[k]))
+    if i >= len(run.zones):
         return "hit wall"
     before = max(k - 1, 0)
-    away = log.states[before, :2] - log.people[before, i, :2]
-    away = away / np.hypot(*away)
-    walked = (log.people[k, i, :2] - log.people[before, i, :2]) @ away
-    drove = -(log.states[k, :2] - log.states[before, :2]) @ away
-    if drove > walked:
+    direction = run.states[before, :2] - run.people[before, i, :2]
+    direction = direction / np.hypot(*direction)
+    approach_of_person = (run.people[k, i, :2] - run.people[before, i, :2]) @ direction
+    approach_of_robot = -(run.states[k, :2] - run.states[before, :2]) @ direction
+    if approach_of_robot > approach_of_person:
         return "drove in"
-    return "squeezed" if (log.h[k] < CROWDED).sum() > 1 else "run into"
+    return "squeezed" if (run.h[k] < CROWDED_H).sum() > 1 else "run into"
 
 
-def path_exists(log: SimulationLog) -> bool:
-    """True if h >= 0 all along some way from the robot to the goal, with everybody where they are at last."""
-    ends = np.array([log.states[-1, :2], log.scenario.goal])
-    people = [(zone, who) for zone, who in zip(log.zones, log.people[-1], strict=True) if who[0] == who[0]]
-    bodies = np.reshape([who[:2] for _, who in people], (-1, 2))
-    everything = np.vstack([ends, bodies, log.scenario.walls.reshape(-1, 2)])
-    low, high = everything.min(axis=0) - _AROUND, everything.max(axis=0) + _AROUND
+def _has_free_path(run: Run) -> bool:
+    """True if a path with h >= 0 leads from the robot to the goal, with people at their last positions."""
+    ends = np.array([run.states[-1, :2], run.scenario.goal])
+    people = [(zone, p) for zone, p in zip(run.zones, run.people[-1], strict=True) if p[0] == p[0]]
+    bodies = np.reshape([p[:2] for _, p in people], (-1, 2))
+    everything = np.vstack([ends, bodies, run.scenario.walls.reshape(-1, 2)])
+    low, high = everything.min(axis=0) - _MARGIN, everything.max(axis=0) + _MARGIN
     axes = [np.arange(low[i], high[i], _CELL) for i in range(2)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    s, free = log.settings, np.ones(grid.shape[:2], bool)
+    s, free = run.settings, np.ones(grid.shape[:2], bool)
     for zone, (x, y, heading, *_) in people:
         free &= barrier(ellipse_distance(grid, zone.placed((x, y), heading)), s.r_robot, s.eps) >= 0
-    for wall in log.scenario.walls:
+    for wall in run.scenario.walls:
         free &= barrier(segment_distance(grid, *wall), s.r_robot, wall_margin(wall, s)) >= 0
-    here, there = np.round((ends - low) / _CELL).astype(int)
     regions = label(free, structure=np.ones((3, 3)))[0]
-    around = [regions[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] for i, j in (here, there)]
-    return bool(set(np.unique(around[0])) & set(np.unique(around[1])) - {0})
+    cells = np.round((ends - low) / _CELL).astype(int)
+    robot, goal = (regions[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] for i, j in cells)
+    return bool(set(np.unique(robot)) & set(np.unique(goal)) - {0})

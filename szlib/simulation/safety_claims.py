@@ -1,13 +1,13 @@
-"""Steps that said they were safe and led to h < 0: which they were, and what people did meanwhile.
+"""Safety claims that fail: steps that are reported as safe and lead to h < 0, and what people do meanwhile.
 
-A step promises h >= 0 at the next state to people who keep the velocity and the heading with which they were
-given (`szlib.control.step.Step.safe`).  Nobody can promise more of people who decide for themselves.
+A safe step claims h >= 0 at the next state, for people who keep the velocity and the heading that the
+controller is given (`szlib.Step.safe`).  It claims nothing for people who change them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,70 +15,63 @@ import pandas as pd
 from ..checks import Array
 from ..control.barriers import barrier, ellipse_distance
 from ..control.problem import TOLERANCE
+from .run import Run
 
-if TYPE_CHECKING:
-    from .log import SimulationLog
-
-SAME = 1e-6
-"""Who is no farther than this from where their velocity leads has kept it [m], and so their heading [rad]."""
+SAME_MOTION = 1e-6
+"""A person within this distance of the expected position keeps their velocity [m]; the same for the heading
+[rad]."""
 MOTION_CHANGES = (
-    "came",
-    "turned",
-    "slowed down",
-    "sped up",
-    "faced elsewhere",
-    "kept their velocity",
-    "wall",
-)
-"""What people did: `safety_violations` says what each is."""
+    "came", "turned", "slowed down", "sped up", "faced elsewhere", "kept their velocity", "wall",
+)  # fmt: skip
+"""What people do during a step; see `safety_violations`."""
 
 
-def safety_violations(log: SimulationLog) -> pd.DataFrame:
-    """A row for each step that said it was safe, and each person or wall with h < 0 one step later.
+def safety_violations(run: Run) -> pd.DataFrame:
+    """Violations after safe steps of a `run`: one row for each such step and each person or wall with h < 0.
 
     Returns
     -------
-    Columns:
-
     t : time of the state with h < 0 [s].
-    person : index; people before walls.
-    h : then [m].
-    h_promised : if the person had kept their velocity and heading [m]; NaN for who was not there before.
-    off : how far they are from where they would be then [m].
-    did : "came", they were not there before; "turned", "slowed down", "sped up", whichever changed their
-        velocity most; "faced elsewhere", their zone turned and they did not; "kept their velocity"; "wall".
-    explained : the promise was kept to them as they were given, h_promised >= 0, or there was none.
+    person : index of the person or wall; people before walls.
+    h : h at that state [m].
+    h_claimed : h if the person keeps their velocity and heading [m]; NaN for a person who was absent.
+    deviation : distance of the person from the position at constant velocity [m].
+    change : "came": the person was absent before. "turned", "slowed down", "sped up": the greatest change of
+        their velocity. "faced elsewhere": only the zone turned. "kept their velocity"; "wall".
+    explained : True if the claim holds for the person as the controller was given them (h_claimed >= 0), or
+        if there was no claim.
     """
-    columns = ["t", "person", "h", "h_promised", "off", "did", "explained"]
-    return pd.DataFrame(_rows(log), columns=columns)
+    columns = ["t", "person", "h", "h_claimed", "deviation", "change", "explained"]
+    return pd.DataFrame(_find_violations(run), columns=columns)
 
 
-def _rows(log: SimulationLog) -> Iterator[tuple[Any, ...]]:
-    worst, n = log.h[1:], len(log.zones)
-    for k, i in np.argwhere(log.safe[:-1, None] & (worst < -TOLERANCE)).tolist():
-        t, h = float(log.time[k + 1]), float(worst[k, i])
+def _find_violations(run: Run) -> Iterator[tuple[Any, ...]]:
+    h_next, n, dt = run.h[1:], len(run.zones), run.settings.dt
+    for k, i in np.argwhere(run.safe[:-1, None] & (h_next < -TOLERANCE)).tolist():
+        t, h = float(run.time[k + 1]), float(h_next[k, i])
         if i >= n:
             yield t, i, h, h, 0.0, "wall", False
             continue
-        before, after = log.people[k, i], log.people[k + 1, i]
+        before, after = run.people[k, i], run.people[k + 1, i]
         if np.isnan(before).any():
             yield t, i, h, np.nan, np.nan, "came", True
             continue
-        there = before[:2] + log.settings.dt * before[3:]
-        zone = log.zones[i].placed((float(there[0]), float(there[1])), float(before[2]))
-        distance = ellipse_distance(log.states[k + 1, :2], zone)
-        promised = float(barrier(distance, log.settings.r_robot, log.settings.eps))
-        off = float(np.hypot(*(after[:2] - there)))
-        yield t, i, h, promised, off, _did(before, after, off, log.settings.dt), promised >= -TOLERANCE
+        expected = before[:2] + dt * before[3:]
+        zone = run.zones[i].placed((float(expected[0]), float(expected[1])), float(before[2]))
+        distance = ellipse_distance(run.states[k + 1, :2], zone)
+        h_claimed = float(barrier(distance, run.settings.r_robot, run.settings.eps))
+        deviation = float(np.hypot(*(after[:2] - expected)))
+        change = _classify_change(before, after, deviation, dt)
+        yield t, i, h, h_claimed, deviation, change, h_claimed >= -TOLERANCE
 
 
-def _did(before: Array, after: Array, off: float, dt: float) -> str:
-    """What a person did between two states (x, y, heading, vx, vy), off by so much [m]."""
-    if off <= SAME:
-        turned = abs((after[2] - before[2] + np.pi) % (2 * np.pi) - np.pi)
-        return "kept their velocity" if turned <= SAME else "faced elsewhere"
-    given, walked = before[3:], (after[:2] - before[:2]) / dt
-    pace, faster = np.hypot(*given), np.hypot(*walked) - np.hypot(*given)
-    if np.hypot(*(walked - given)) > np.sqrt(2) * abs(faster) and pace > 0:
+def _classify_change(before: Array, after: Array, deviation: float, dt: float) -> str:
+    """What a person does between two states (x, y, heading, vx, vy), `deviation` [m] from the expected."""
+    if deviation <= SAME_MOTION:
+        angle = abs((after[2] - before[2] + np.pi) % (2 * np.pi) - np.pi)
+        return "kept their velocity" if angle <= SAME_MOTION else "faced elsewhere"
+    velocity, new_velocity = before[3:], (after[:2] - before[:2]) / dt
+    speed, increase = np.hypot(*velocity), np.hypot(*new_velocity) - np.hypot(*velocity)
+    if np.hypot(*(new_velocity - velocity)) > np.sqrt(2) * abs(increase) and speed > 0:
         return "turned"
-    return "sped up" if faster > 0 else "slowed down"
+    return "sped up" if increase > 0 else "slowed down"

@@ -1,93 +1,139 @@
-"""How social a run was: metrics after HuNavSim, from the log of any controller.
+"""Social metrics of a run: what people notice of a robot, and a robot compared with a person.
 
-Source: N. Perez-Higueras et al., "HuNavSim: a ROS 2 human navigation simulator for benchmarking human-aware
+Sources: N. Perez-Higueras et al., "HuNavSim: a ROS 2 human navigation simulator for benchmarking human-aware
 robot navigation", IEEE Robotics and Automation Letters 8(11), 2023, and its `hunav_evaluator`; distances of
 E. T. Hall, "The Hidden Dimension", 1966; path efficiency as in N. Tsoi et al., "SEAN 2.0", RA-L 7(4), 2022.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
 
 import numpy as np
 
 from ..checks import Array
+from ..control.barriers import ellipse_distance
 from ..control.distances import euclidean_to_segment
 from ..control.person import BODY_RADIUS
-from .outcomes import nanmin
+from ..zones.ellipses import Ellipse
+from .run import Run, nanmin
 from .scenario import STOPPED_SPEED
 
-if TYPE_CHECKING:
-    from .log import SimulationLog
-
-HALL = {"intimate": (0.0, 0.45), "personal": (0.45, 1.2), "social": (1.2, 3.6)}
-"""From where to where each of Hall's distances reaches [m]."""
+HALL_DISTANCES = {"intimate": (0.0, 0.45), "personal": (0.45, 1.2), "social": (1.2, 3.6)}
+"""Range of each of Hall's distances [m]."""
 NOT_MOVING = 0.001
 """Below this speed HuNavSim's robot does not move [m/s]."""
-_ON_THE_WAY = 21
-"""Points of the straight way to the goal at which it is held against walls."""
+REACHED = 0.5
+"""Within this distance a person or a robot has reached the goal [m] (assumed): people walk on there."""
+_N_POINTS = 21
+"""Points of the straight path to the goal that are checked against walls."""
 
 
-def compute_social_metrics(log: SimulationLog) -> dict[str, float]:
-    """What people would notice, until the arrival; time to the goal and path length are in `metrics`.
+def compute_social_metrics(run: Run) -> dict[str, float]:
+    """What people notice of the robot in a `run`, until the arrival.
 
+    Returns
+    -------
     heading_changes : sum of the angles between successive directions of motion [rad], while the robot is
-        faster than `STOPPED_SPEED`: one that drives in any direction has no heading of its own.
+        faster than `STOPPED_SPEED`. (A robot that drives in any direction has no heading of its own.)
     closest_person : mean over time of the gap from the robot's disc to the nearest body [m].
-    intimate, personal, social : share of the time in which the nearest person, their centre, is that far
-        from the robot's disc (`HALL`).
-    robot_on_person, person_on_robot : how often the disc and a body came to overlap, by who closed in faster
-        then. (HuNavSim counts the steps of an overlap, and asks who faces whom more.)
-    time_not_moving : slower than `NOT_MOVING` [s].
-    path_efficiency : the straight way from start to goal over the way driven; NaN without success, or where a
-        wall leaves no straight way.
+    intimate, personal, social : fraction of the time in which the centre of the nearest person is at that
+        distance from the robot's disc (`HALL_DISTANCES`).
+    robot_on_person, person_on_robot : number of overlaps of the disc and a body, by who approaches faster
+        when the overlap begins. (HuNavSim counts the steps of an overlap and compares headings.)
+    time_not_moving : time below `NOT_MOVING` [s].
+    path_efficiency : length of the straight path from start to goal over the length of the path driven; NaN
+        without success, or where a wall crosses the straight path.
 
-    Where nobody ever is, distances are NaN, and shares and numbers are 0.
+    Without people, distances are NaN, and fractions and numbers are 0.
     """
-    way = slice(None if log.arrived is None else log.arrived + 1)
-    states, gap = log.states[way], log.clearance[way, : len(log.zones)]
+    way = run.until_arrival
+    states, gap = run.states[way], run.clearance[way, : len(run.zones)]
     nearest = nanmin(gap, axis=1)
     to_person = np.maximum(nearest + BODY_RADIUS, 0.0)
-    met = np.isfinite(nearest)
-    robot, person = _contacts(log, way, gap)
-    shares = {
-        name: float(((to_person >= low) & (to_person < high)).mean()) for name, (low, high) in HALL.items()
+    is_near_person = np.isfinite(nearest)
+    robot_on_person, person_on_robot = _count_collisions(run, way, gap)
+    fractions = {
+        name: float(((to_person >= low) & (to_person < high)).mean())
+        for name, (low, high) in HALL_DISTANCES.items()
     }
     return {
-        "heading_changes": heading_changes(states),
-        "closest_person": float(nearest[met].mean()) if met.any() else np.nan,
-        **shares,
-        "robot_on_person": robot,
-        "person_on_robot": person,
-        "time_not_moving": log.settings.dt * int((log.speed[way] < NOT_MOVING).sum()),
-        "path_efficiency": path_efficiency(log, states),
+        "heading_changes": _sum_heading_changes(states),
+        "closest_person": float(nearest[is_near_person].mean()) if is_near_person.any() else np.nan,
+        **fractions,
+        "robot_on_person": robot_on_person,
+        "person_on_robot": person_on_robot,
+        "time_not_moving": run.settings.dt * int((run.speed[way] < NOT_MOVING).sum()),
+        "path_efficiency": _compute_path_efficiency(run, states),
     }
 
 
-def heading_changes(states: Array) -> float:
-    """Sum of the angles between successive directions of motion [rad], of states (n, 4)."""
+def _sum_heading_changes(states: Array) -> float:
     moving = states[np.hypot(states[:, 2], states[:, 3]) > STOPPED_SPEED]
     turns = np.diff(np.arctan2(moving[:, 3], moving[:, 2]))
     return float(np.abs((turns + np.pi) % (2 * np.pi) - np.pi).sum())
 
 
-def path_efficiency(log: SimulationLog, states: Array) -> float:
-    """The straight way over the way driven; see `social`."""
-    start, goal = log.scenario.start[:2], log.scenario.goal
-    straight = start + np.linspace(0, 1, _ON_THE_WAY)[:, None] * (goal - start)
-    radius = log.settings.r_robot
-    if not log.success or any(euclidean_to_segment(straight, *w).min() < radius for w in log.scenario.walls):
+def _compute_path_efficiency(run: Run, states: Array) -> float:
+    start, goal = run.scenario.start[:2], run.scenario.goal
+    straight = start + np.linspace(0, 1, _N_POINTS)[:, None] * (goal - start)
+    radius = run.settings.r_robot
+    if not run.success or any(euclidean_to_segment(straight, *w).min() < radius for w in run.scenario.walls):
         return np.nan
-    driven = float(np.hypot(*np.diff(states[:, :2], axis=0).T).sum())
-    left = float(np.hypot(*(goal - states[-1, :2])))
-    return float(np.hypot(*(goal - start))) / (driven + left) if driven else np.nan
+    driven, rest = _path_length(states[:, :2]), float(np.hypot(*(goal - states[-1, :2])))
+    return float(np.hypot(*(goal - start))) / (driven + rest) if driven else np.nan
 
 
-def _contacts(log: SimulationLog, way: slice, gap: Array) -> tuple[int, int]:
-    """How often the robot ran into somebody, and somebody into the robot."""
+def _path_length(path: Array) -> float:
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def _count_collisions(run: Run, way: slice, gap: Array) -> tuple[int, int]:
+    """Number of times the robot runs into a person, and a person into the robot."""
     touching = gap < 0
     begins = touching & ~np.vstack([np.zeros((1, gap.shape[1]), bool), touching[:-1]])
-    apart = log.states[way, None, :2] - log.people[way, :, :2]
-    robot = -(log.states[way, None, 2:] * apart).sum(axis=2)
-    person = (log.people[way, :, 3:] * apart).sum(axis=2)
+    offset = run.states[way, None, :2] - run.people[way, :, :2]
+    robot = -(run.states[way, None, 2:] * offset).sum(axis=2)
+    person = (run.people[way, :, 3:] * offset).sum(axis=2)
     return int((begins & (robot >= person)).sum()), int((begins & (robot < person)).sum())
+
+
+def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, float]:
+    """Compare a robot with the person whom it replaces: the same numbers for the runs of both.
+
+    Parameters
+    ----------
+    run : the run of the robot, or of the person (`szlib.simulation.ReplacedWalker`).
+    zone : the fitted zone, in each person's own frame; None: the zones of the run. It is learned from
+        distances between centres, so that a robot and a person are measured alike.
+
+    Returns
+    -------
+    reached : 1 if the robot comes within `REACHED` of the goal, else 0.
+    time_to_goal : time until then [s]; NaN if it does not.
+    path_efficiency : length of the straight path there over that of the path driven; NaN if it does not.
+    intrusions : number of times until then that the robot's centre enters a zone, over all people.
+    time_intruding : time in any zone [s].
+    nearest : smallest distance from the robot's centre to a person's [m]; NaN without people.
+    """
+    rows = np.flatnonzero(np.hypot(*(run.states[:, :2] - run.scenario.goal).T) <= REACHED)
+    way = slice(None, int(rows[0]) + 1 if len(rows) else None)
+    path, n_people = run.states[way, :2], len(run.zones)
+    length, straight = _path_length(path), float(np.hypot(*(path[-1] - path[0])))
+    zones = run.zones if zone is None else (zone,) * n_people
+    gaps = [
+        run.distance_to_person(i, partial(ellipse_distance, ellipse=each))[way]
+        for i, each in enumerate(zones)
+    ]
+    inside = np.reshape(gaps, (n_people, len(path))).T < 0  # NaN, of absent people, is not inside
+    entered = inside & ~np.vstack([np.zeros((1, n_people), bool), inside[:-1]])
+    distance = np.hypot(run.relative[way, :, 0], run.relative[way, :, 1])
+    reached = len(rows) > 0
+    return {
+        "reached": float(reached),
+        "time_to_goal": float(run.time[rows[0]]) if reached else np.nan,
+        "path_efficiency": straight / length if reached and length > 0 else np.nan,
+        "intrusions": float(entered.sum()),
+        "time_intruding": run.settings.dt * float(inside.any(axis=1).sum()),
+        "nearest": float(np.nanmin(distance)) if np.isfinite(distance).any() else np.nan,
+    }

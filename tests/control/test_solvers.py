@@ -183,7 +183,7 @@ def test_the_rungs_are_counted():
     log = szlib.simulate(scenario, controller_of("sqp"))
     counts = {k: v for k, v in log.metrics().items() if k.startswith("steps_")}
     assert sum(counts.values()) == len(log.table) - 1, "the control of the last state is not applied"
-    assert counts["steps_relaxed"] == (log.table["rung"][:-1] == "relaxed").sum() > 0
+    assert counts["steps_relaxed"] == (log.table["fallback"][:-1] == "relaxed").sum() > 0
     assert log.metrics()["infeasible_steps"] == (log.table["slack"][:-1] > TOLERANCE).sum() > 0
 
 

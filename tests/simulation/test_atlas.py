@@ -27,11 +27,11 @@ def made(x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: objec
         people=np.tile([0.0, 0.0, np.pi, 0.0, 0.0], (n, 1, 1)),
         predicted=np.zeros((n, 0, 4)),
         residual=np.full((n, 1, 2), 0.0 if held else 1.0),
-        rung=np.full(n, "warm"),
+        fallback=np.full(n, "warm"),
         safe=np.ones(n, bool),
         slack=np.zeros(n),
         solve_time=np.zeros(n),
-        arrived=n - 1,
+        arrival=n - 1,
     )
     return replace(log, **changes)
 
@@ -44,9 +44,9 @@ RUNS = {
     "waits": made(STANDS, held=True),
     "backs out": made(BACK, held=True),
     "passes on the other side": made(AHEAD, y=1.6),
-    "deadlock": made(STANDS, arrived=None),
+    "deadlock": made(STANDS, arrival=None),
     "infeasible": made(AHEAD, slack=np.where(np.arange(81) == 5, 0.1, 0.0)),
-    "h < 0": made(AHEAD, y=-0.5, arrived=None),
+    "h < 0": made(AHEAD, y=-0.5, arrival=None),
 }
 
 
@@ -60,9 +60,9 @@ def test_there_is_a_run_for_every_manner() -> None:
 
 
 def test_what_is_worse_comes_first() -> None:
-    both = replace(RUNS["infeasible"], arrived=None)
+    both = replace(RUNS["infeasible"], arrival=None)
     assert classify_strategy(both) == "infeasible"
-    assert classify_strategy(replace(RUNS["backs out"], arrived=None)) == "deadlock"
+    assert classify_strategy(replace(RUNS["backs out"], arrival=None)) == "deadlock"
 
 
 def test_standing_while_nobody_holds_the_robot_back_is_not_waiting() -> None:
@@ -114,7 +114,7 @@ def test_a_run_can_be_asked_again_at_any_of_its_times() -> None:
     controller = szlib.MPCCBF(log.zones[0], walls=log.scenario.walls)
     for time in (0.0, 3.0):
         controller.reset()
-        control = controller.step(*log.at(time)).control
+        control = controller.step(*log.controller_inputs(time)).control
         assert control == pytest.approx(log.controls[round(10 * time)], abs=1e-3)
     with pytest.raises(szlib.DataError, match="times from 0 to"):
-        log.at(1e3)
+        log.controller_inputs(1e3)

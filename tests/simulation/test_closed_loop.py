@@ -58,7 +58,7 @@ def test_a_strangers_controller_drives_and_what_it_does_not_tell_is_empty(tmp_pa
     metrics = log.metrics()
     assert log.success and metrics["outcome"] == "arrived"
     assert log.predicted.shape[1] == log.residual.shape[2] == 0
-    assert set(log.rung) == {""} and np.isnan(log.slack).all()
+    assert set(log.fallback) == {""} and np.isnan(log.slack).all()
     assert (log.solve_time > 0).all()
     log.save(tmp_path / "run")
     back = szlib.SimulationLog.load(tmp_path / "run")

@@ -17,9 +17,9 @@ from szlib.control.person import Person
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.crowds.reacting import ReactingPeople
 from szlib.simulation.replay import ReplacedWalker, find_replays
-from szlib.simulation.replay_metrics import compute_replay_metrics
 from szlib.simulation.safety_claims import safety_violations
 from szlib.simulation.scenario import Scenario
+from szlib.simulation.social_metrics import compute_replay_metrics
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 
@@ -99,12 +99,12 @@ def test_recorded_people_who_do_not_see_the_robot_are_no_exception_either() -> N
 def test_a_controller_that_lies_is_found_out() -> None:
     log = drive(straight(Person((0.0, 0.2), (-0.3, 0.0))), Careless())
     broken = safety_violations(log)
-    assert set(broken["did"]) == {"kept their velocity"}
+    assert set(broken["change"]) == {"kept their velocity"}
     assert not broken["explained"].any()
-    assert broken["h"].to_numpy() == pytest.approx(broken["h_promised"].to_numpy(), abs=1e-9)
+    assert broken["h"].to_numpy() == pytest.approx(broken["h_claimed"].to_numpy(), abs=1e-9)
     assert len(broken) == violated_by_who_kept(log) > 5
     wall = Scenario("wall", np.array([-4.0, 0, 1, 0]), np.zeros(2), walls=[[(0, -1), (0, 1)]], duration=4.0)
-    assert set(safety_violations(drive(wall, Careless()))["did"]) == {"wall"}
+    assert set(safety_violations(drive(wall, Careless()))["change"]) == {"wall"}
 
 
 @pytest.mark.parametrize(
@@ -127,9 +127,9 @@ def test_what_people_did_is_told(given: tuple, walked: tuple, turned: float, did
     before = np.array([*(at - 0.1 * np.array(walked)), 0.0, *given])
     people = np.array([before * (np.nan if did == "came" else 1.0), [*at, turned, *walked]])
     (row,) = safety_violations(replace(log, people=people[:, None])).to_dict("records")
-    assert (row["did"], row["t"], row["person"]) == (did, 0.1, 0)
+    assert (row["change"], row["t"], row["person"]) == (did, 0.1, 0)
     if did != "came":
-        assert row["off"] == pytest.approx(0.1 * np.hypot(*np.subtract(walked, given)))
+        assert row["deviation"] == pytest.approx(0.1 * np.hypot(*np.subtract(walked, given)))
     assert row["h"] < 0
 
 

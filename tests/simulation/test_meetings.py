@@ -124,7 +124,7 @@ def test_who_is_hidden_is_there_but_not_given_to_the_controller():
     ]
     assert given.tolist() == sight
     assert 0 < given.sum() < len(given)
-    assert log.there.all() and np.isfinite(log.h).all()
+    assert log.is_present.all() and np.isfinite(log.h).all()
     assert np.isfinite(log.residual[:, 1:]).all()  # of the walls
 
 

@@ -5,19 +5,19 @@ import pytest
 
 import szlib
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.social_metrics import compute_social_metrics, heading_changes
+from szlib.simulation.social_metrics import compute_social_metrics
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 
 
-def made(states, people=(), walls=(), arrived=None, goal=(10.0, 0.0)):
+def made(states, people=(), walls=(), arrival=None, goal=(10.0, 0.0)):
     """A log of these states (n, 4), and of each person their (x, y, heading, vx, vy), (n, 5); dt is 0.1 s."""
     states = np.asarray(states, float)
     n, known = len(states), [np.asarray(p, float) for p in people]
     scenario = szlib.Scenario("made", states[0], goal, walls=walls)
     at = np.stack(known, axis=1) if known else np.zeros((n, 0, 5))
     empty = {"predicted": np.zeros((n, 0, 4)), "residual": np.zeros((n, len(known) + len(walls), 0))}
-    steps = {"rung": np.full(n, ""), "safe": np.zeros(n, bool), "slack": np.full(n, np.nan)}
+    steps = {"fallback": np.full(n, ""), "safe": np.zeros(n, bool), "slack": np.full(n, np.nan)}
     return SimulationLog(
         scenario,
         szlib.MPCSettings(),
@@ -26,8 +26,8 @@ def made(states, people=(), walls=(), arrived=None, goal=(10.0, 0.0)):
         controls=np.zeros((n, 2)),
         people=at,
         solve_time=np.zeros(n),
-        arrived=arrived,
-        promises=False,
+        arrival=arrival,
+        has_safety_claims=False,
         **empty,
         **steps,
     )
@@ -98,35 +98,34 @@ def test_one_who_appears_in_the_robot_is_a_collision():
 
 
 def test_heading_changes_of_a_square_a_turn_back_and_a_circle():
-    square = [[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, -1, 0], [0, 0, 0, -1], [0, 0, 1, 0]]
-    assert heading_changes(np.array(square, float)) == pytest.approx(2 * np.pi)
+    def changes(velocities):
+        return compute_social_metrics(made(np.pad(velocities, ((0, 0), (2, 0)))))["heading_changes"]
+
+    assert changes([[1.0, 0], [0, 1], [-1, 0], [0, -1], [1, 0]]) == pytest.approx(2 * np.pi)
     angle = np.linspace(0, -2 * np.pi, 500)
-    circle = np.column_stack([0 * angle, 0 * angle, np.cos(angle), np.sin(angle)])
-    assert heading_changes(circle) == pytest.approx(2 * np.pi)
-    back = np.array(
-        [[0, 0, 1, 0], [0, 0, 0.01, 0.01], [0, 0, -1, 0]], float
-    )  # what is nearly at rest has none
-    assert heading_changes(back) == pytest.approx(np.pi)
-    assert heading_changes(np.zeros((3, 4))) == 0
+    assert changes(np.column_stack([np.cos(angle), np.sin(angle)])) == pytest.approx(2 * np.pi)
+    nearly_at_rest = [0.01, 0.01]  # has no direction
+    assert changes([[1.0, 0], nearly_at_rest, [-1, 0]]) == pytest.approx(np.pi)
+    assert changes(np.zeros((3, 2))) == 0
 
 
 def test_time_not_moving_is_until_the_arrival():
     states = line([0.0, 0.0, 1.0, 2.0, 10.0, 10.0, 10.0])
     states[[0, 1, 4, 5, 6], 2] = 0.0
-    assert compute_social_metrics(made(states, arrived=4))["time_not_moving"] == pytest.approx(0.3)
+    assert compute_social_metrics(made(states, arrival=4))["time_not_moving"] == pytest.approx(0.3)
     assert compute_social_metrics(made(states))["time_not_moving"] == pytest.approx(0.5)
 
 
 def test_path_efficiency():
     straight = line([0.0, 5.0, 10.0])
-    assert compute_social_metrics(made(straight, arrived=2))["path_efficiency"] == 1
+    assert compute_social_metrics(made(straight, arrival=2))["path_efficiency"] == 1
     corner = np.array([[0, 0, 0, 0], [0, 10, 0, 0], [10, 10, 0, 0], [10, 0, 0, 0]], float)
-    assert compute_social_metrics(made(corner, arrived=3))["path_efficiency"] == pytest.approx(1 / 3)
+    assert compute_social_metrics(made(corner, arrival=3))["path_efficiency"] == pytest.approx(1 / 3)
     assert np.isnan(compute_social_metrics(made(straight))["path_efficiency"])
     across = [[(5.0, -3.0), (5.0, 3.0)]]
-    assert np.isnan(compute_social_metrics(made(corner, walls=across, arrived=3))["path_efficiency"])
+    assert np.isnan(compute_social_metrics(made(corner, walls=across, arrival=3))["path_efficiency"])
     beside = [[(0.0, 3.0), (9.0, 3.0)]]
-    assert compute_social_metrics(made(corner, walls=beside, arrived=3))["path_efficiency"] == pytest.approx(
+    assert compute_social_metrics(made(corner, walls=beside, arrival=3))["path_efficiency"] == pytest.approx(
         1 / 3
     )
 
@@ -136,9 +135,9 @@ def test_moving_the_world_changes_nothing():
     states = np.column_stack([t, 0.3 * np.sin(t), np.ones_like(t), 0.3 * np.cos(t)])
     people = np.column_stack([3 - 0.5 * t, 0.5 + 0 * t, np.pi + 0 * t, -0.5 + 0 * t, 0 * t])
     moved = np.add(people, [7.0, -3.0, 0, 0, 0])
-    one = compute_social_metrics(made(states, [people], arrived=60, goal=(6.0, 0.0)))
+    one = compute_social_metrics(made(states, [people], arrival=60, goal=(6.0, 0.0)))
     other = compute_social_metrics(
-        made(np.add(states, [7.0, -3.0, 0, 0]), [moved], arrived=60, goal=(13.0, -3.0))
+        made(np.add(states, [7.0, -3.0, 0, 0]), [moved], arrival=60, goal=(13.0, -3.0))
     )
     assert one == pytest.approx(other)
     assert one["robot_on_person"] == 1

@@ -29,11 +29,11 @@ from szlib.simulation.comparisons import CONTROLLERS, summarise
 from szlib.simulation.crowds.reacting import ReactingPeople
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.replay import ReplacedWalker, Replays, find_replays
-from szlib.simulation.replay_metrics import compute_replay_metrics
 from szlib.simulation.robots import Controller, ControllerFactory
 from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
 from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds
+from szlib.simulation.social_metrics import compute_replay_metrics
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
 
@@ -78,7 +78,7 @@ def reused(scenario: Scenario, settings: szlib.MPCSettings) -> Controller:
 def measure(log: SimulationLog) -> dict[str, float]:
     """Scores, and broken promises by what people did."""
     broken = safety_violations(log)
-    counts = {did: float((broken["did"] == did).sum()) for did in MOTION_CHANGES}
+    counts = {did: float((broken["change"] == did).sum()) for did in MOTION_CHANGES}
     rest = {
         "unexplained": float((~broken["explained"].astype(bool)).sum()),
         "broken_steps": float(broken["t"].nunique()),

@@ -31,12 +31,12 @@ def plot_crowd(log: SimulationLog, *, replay: Replay | None = None, ax: Axes | N
     ax = get_axes(ax, size=(6, 5))
     second = max(1, round(1 / log.settings.dt))
     distance = np.hypot(log.relative[..., 0], log.relative[..., 1])
-    row = int(np.nanargmin(np.where(log.there, distance, np.inf).min(axis=1, initial=np.inf)))
+    row = int(np.nanargmin(np.where(log.is_present, distance, np.inf).min(axis=1, initial=np.inf)))
     for i in range(log.people.shape[1]):
         x, y = log.people[:, i, 0], log.people[:, i, 1]
         ax.plot(x, y, color=RED, linewidth=1, alpha=0.5, label="people" if i == 0 else None)
         ax.plot(x[::second], y[::second], ".", color=RED, markersize=3, alpha=0.5)
-        if log.there[row, i]:
+        if log.is_present[row, i]:
             px, py, heading = log.people[row, i, :3].tolist()
             ax.plot(*log.zones[i].placed((px, py), heading).curve().T, color=RED, linewidth=1.2)
             ax.plot(px, py, marker=(3, 0, np.degrees(heading) - 90), color=RED, markersize=6)

@@ -95,7 +95,13 @@ class Movie(bytes):
             log.settings.dt,
         )
         rows = zip(
-            log.time.tolist(), log.states, log.people, log.predicted, log.h, log.rung.tolist(), strict=True
+            log.time.tolist(),
+            log.states,
+            log.people,
+            log.predicted,
+            log.h,
+            log.fallback.tolist(),
+            strict=True,
         )
         moments = [moment(t, x, people, log.zones, plan, h, rung) for t, x, people, plan, h, rung in rows]
         people = len(log.zones)

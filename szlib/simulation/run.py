@@ -1,0 +1,162 @@
+"""A run of the closed loop: the arrays that it leaves, and the quantities that follow from them.
+
+Metrics, claims and figures are written against `Run`.  The log of the user, `szlib.SimulationLog`, is a run
+with a table, pictures and files.  World frame, metres and seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import Array
+from ..control.barriers import barrier, ellipse_formula, euclidean_segment_formula, segment_formula
+from ..control.distances import wall_margin
+from ..control.person import BODY_RADIUS, Person
+from ..control.settings import MPCSettings
+from ..errors import DataError
+from ..zones.ellipses import Ellipse
+from .scenario import Scenario
+
+
+def nanmin(values: Array, axis: int | tuple[int, ...] | None = None) -> Array:
+    """Smallest of `values` along `axis` without NaN; inf where there is none."""
+    return np.asarray(np.fmin.reduce(values, axis=axis, initial=np.inf))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run:
+    """One run in n states, dt apart, each with the step that the controller decided there.
+
+    P is the number of people, W the number of walls.  Arrays that belong to people and walls have the people
+    first.  A value of a person who is absent is NaN.
+
+    Attributes
+    ----------
+    scenario : the scene; its people have their own zones.
+    settings : settings of the loop and of the measurements: dt, r_robot, eps.
+    zones : zone that the robot keeps out of, for each person, in the person's frame; h is about these.
+    states : (x, y, vx, vy) of the robot's disc, shape (n, 4) [m, m/s].
+    controls : control of each step, shape (n, 2): (ax, ay) [m/s2] for the paper's robot. The control of the
+        last state is not applied.
+    people : true (x, y, heading, vx, vy) of each person, shape (n, P, 5) [m, rad, m/s].
+    predicted : plan of each step, shape (n, N+1, 4); (n, 0, 4) if the controller reports none.
+    residual : `Step.residual`, shape (n, P+W, N_h) [m]; NaN for people whom the controller did not see;
+        (n, P+W, 0) if the controller reports none.
+    fallback : `Step.fallback`, shape (n,); "" if the controller reports none.
+    safe : `Step.safe`, shape (n,): True is a safety claim.
+    slack : largest violation of a hard constraint by each plan, shape (n,); NaN if not reported.
+    solve_time : time of each step, shape (n,) [s]: as reported, else the duration of the call.
+    arrival : index of the first state at rest at the goal; None if there is none.
+    has_safety_claims : True if the controller reports whether its steps are safe.
+    inputs : names of the controls.
+    """
+
+    scenario: Scenario
+    settings: MPCSettings
+    zones: tuple[Ellipse, ...]
+    states: Array
+    controls: Array
+    people: Array
+    predicted: Array
+    residual: Array
+    fallback: NDArray[np.str_]
+    safe: NDArray[np.bool_]
+    slack: Array
+    solve_time: Array
+    arrival: int | None
+    has_safety_claims: bool = True
+    inputs: tuple[str, ...] = ("ax", "ay")
+
+    @property
+    def flagged(self) -> NDArray[np.bool_]:
+        """Steps that are reported as not safe, shape (n,); none for a controller without safety claims."""
+        return ~self.safe & self.has_safety_claims
+
+    @property
+    def success(self) -> bool:
+        """True if the robot comes to rest at the goal."""
+        return self.arrival is not None
+
+    @property
+    def until_arrival(self) -> slice:
+        """The rows up to the arrival; all rows if the robot does not arrive."""
+        return slice(None if self.arrival is None else self.arrival + 1)
+
+    @cached_property
+    def time(self) -> Array:
+        """Time of each state, shape (n,) [s]."""
+        return np.round(np.arange(len(self.states)) * self.settings.dt, 9)
+
+    @cached_property
+    def speed(self) -> Array:
+        """Speed of the robot, shape (n,) [m/s]."""
+        return np.asarray(np.hypot(self.states[:, 2], self.states[:, 3]))
+
+    @cached_property
+    def relative(self) -> Array:
+        """Position of the robot in each person's frame, shape (n, P, 2) [m]."""
+        offset = self.states[:, None, :2] - self.people[:, :, :2]
+        cos, sin = np.cos(self.people[:, :, 2]), np.sin(self.people[:, :, 2])
+        ahead = offset[..., 0] * cos + offset[..., 1] * sin
+        return np.stack([ahead, offset[..., 1] * cos - offset[..., 0] * sin], axis=-1)
+
+    @cached_property
+    def is_present(self) -> NDArray[np.bool_]:
+        """True where a person is present, shape (n, P)."""
+        return ~np.isnan(self.people[:, :, 0])
+
+    def distance_to_person(self, i: int, distance: Callable[[Array], Array]) -> Array:
+        """Apply a `distance` of points to the robot in the frame of person `i`, shape (n,) [m]."""
+        values = np.full(len(self.states), np.nan)
+        values[self.is_present[:, i]] = distance(self.relative[self.is_present[:, i], i])
+        return values
+
+    @cached_property
+    def h(self) -> Array:
+        """Barriers with the true positions of people, shape (n, P+W) [m]."""
+        s, walls = self.settings, self.scenario.walls
+        zones = np.reshape([(*zone.foci.flat, zone.semi_axes[0]) for zone in self.zones], (-1, 5))
+        to_people = ellipse_formula(self.relative[..., 0], self.relative[..., 1], *zones.T)
+        margins = [s.eps] * len(zones) + [wall_margin(wall, s) for wall in walls]
+        distances = np.hstack([to_people, self._distance_to_walls(segment_formula)])
+        return np.asarray(barrier(distances, s.r_robot, np.array(margins)))
+
+    @cached_property
+    def clearance(self) -> Array:
+        """Euclidean gaps from the robot's disc to bodies (of `BODY_RADIUS`) and walls, shape (n, P+W) [m]."""
+        to_people = np.hypot(self.relative[..., 0], self.relative[..., 1]) - BODY_RADIUS
+        to_walls = self._distance_to_walls(euclidean_segment_formula)
+        return np.hstack([to_people, to_walls]) - self.settings.r_robot
+
+    def _distance_to_walls(self, distance: Callable[..., Array]) -> Array:
+        x, y = self.states[:, :1], self.states[:, 1:2]
+        return distance(x, y, *self.scenario.walls.reshape(-1, 4).T)
+
+    @cached_property
+    def cbf_people(self) -> Array:
+        """Smallest residual of a person's barrier condition, shape (n,) [m]; inf where there is none."""
+        return nanmin(self.residual[:, : len(self.zones)], axis=(1, 2))
+
+    def controller_inputs(self, time: float) -> tuple[Array, Array, list[Person]]:
+        """State, goal and people, with their zones, as the controller was given them at a `time` [s].
+
+        `controller.step(*run.controller_inputs(5.0))` decides there again.
+
+        Raises
+        ------
+        DataError : the run has no such time.
+        """
+        row = round(time / self.settings.dt)
+        if not 0 <= row < len(self.states):
+            raise DataError(f"the run has times from 0 to {self.time[-1]:g} s; got {time:g}")
+        present = [
+            Person((x, y), (vx, vy), heading, zone)
+            for zone, (x, y, heading, vx, vy) in zip(self.zones, self.people[row].tolist(), strict=True)
+            if x == x
+        ]
+        return self.states[row], self.scenario.goal, present
