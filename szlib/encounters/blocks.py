@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from ..tracks.formats.rows import fault, limits
+from ..tracks.formats.rows import rejection_reason, value_limits
 
 _ROWS_AT_ONCE = 1 << 17
 """Rows of one block [about 5 minutes of a raw day]."""
@@ -75,7 +75,7 @@ class Blocks:
 
     def _spotless(self, block: pl.DataFrame, rows: Rows) -> bool:
         """Whether every row is usable: limits are kept by all values that lie between two that keep them."""
-        limit = limits(self.metres, self.seconds)
+        limit = value_limits(self.metres, self.seconds)
         within = (_farthest(v) * limit[name][0] <= limit[name][1] for name, v in rows._asdict().items())
         return all(within) and not block["ragged"].any() and np.array_equal(rows.id, np.floor(rows.id))
 
@@ -85,7 +85,7 @@ class Blocks:
         if self._spotless(block, rows):
             return rows
         lines = block.with_row_index("line", offset=seen + 1)
-        lines = lines.with_columns(reason=fault(self.metres, self.seconds, False))
+        lines = lines.with_columns(reason=rejection_reason(self.metres, self.seconds, False))
         bad = lines.filter(pl.col("reason").is_not_null())
         if bad.height:
             self.tally.first = self.tally.first or bad.select("line", "reason").row(0)

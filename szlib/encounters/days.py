@@ -14,10 +14,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from datetime import datetime
 from pathlib import Path
 from typing import Any
-from zoneinfo import ZoneInfo
 
 import joblib
 import pandas as pd
@@ -27,10 +25,7 @@ from ..errors import DataError, DataWarning, SzlibError
 from ..files import claim_folder, printable
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.formats.layouts import layout_of, start_of_day
-from ..tracks.formats.plain import first_line
-from ..tracks.formats.rows import CALENDAR_BEGINS
-from ..tracks.readers import recording_names
+from ..tracks.recordings import find_day, name_recordings
 from .geometry import Area
 from .one_day import Chain, contents, day_key, finished_record, write_record
 
@@ -172,8 +167,8 @@ def extract_days(
 def _by_day(files: Sequence[Path], chain: Chain) -> dict[str, list[str]]:
     """The files of each day, or of each recording that has no calendar day."""
     days: dict[str, list[str]] = {}
-    for file, name in zip(files, recording_names(files), strict=True):
-        days.setdefault(_day_of(file, chain) or printable(name), []).append(str(file))
+    for file, name in zip(files, name_recordings(files), strict=True):
+        days.setdefault(find_day(file, chain.read_options) or printable(name), []).append(str(file))
     return days
 
 
@@ -212,18 +207,3 @@ def extract_day(day: str, files: Sequence[str], out: str, chain: Chain) -> dict[
 def _row(day: str, files: Sequence[str], status: str) -> dict[str, Any]:
     counts = dict.fromkeys(("rows", "unusable", "encounters", "samples"), 0)
     return {"day": day, "status": status, "files": len(files), **counts, "seconds": 0.0, "why": "", "key": ""}
-
-
-def _day_of(file: Path, chain: Chain) -> str | None:
-    """The calendar day on which a file begins; None where it tells none."""
-    try:
-        first = first_line(file)
-        layout = layout_of(first, "tidy" if chain.columns else chain.file_format)
-        if layout.name not in ("atc-raw", "atc-1hz"):
-            return None
-        begun = float(first.split(layout.separator)[layout.columns["t"]]) + start_of_day(file, layout, first)
-        if not begun >= CALENDAR_BEGINS:
-            return None
-        return datetime.fromtimestamp(begun, ZoneInfo(chain.tz)).strftime("%Y-%m-%d")
-    except (OSError, ValueError, OverflowError):  # reading the day will tell why
-        return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +12,14 @@ import polars as pl
 
 from .. import memory
 from ..tracks import funnels
-from ..tracks.formats.layouts import Format, quick_scan, readable, recognise
-from ..tracks.formats.plain import plain_file
-from ..tracks.formats.rows import in_metres
+from ..tracks.formats import TrackFormat, open_file
+from ..tracks.formats.base import readable
+from ..tracks.formats.rows import to_metres
+from ..tracks.formats.unpack import unpacked
 from ..tracks.options import ReadOptions
-from ..tracks.plausible import check_unit
-from ..tracks.readers import merge, person_order, read_raw, read_stage
+from ..tracks.plausibility import check_unit
+from ..tracks.readers import merge, order_by_person, read_raw, read_stage
+from ..tracks.recordings import FileRows
 from . import near_rows_cache as kept_rows
 from .blocks import Blocks, Rows, Tally
 from .cells import Cells, Unsorted, one_pass, two_passes
@@ -49,21 +51,20 @@ def read_near_square(
     """
     path, options = Path(path), options or ReadOptions()
     if path.is_file():
-        with plain_file(path) as plain:
-            layout, scan = recognise(plain, path, options)
-            if layout.name == "atc-raw":
-                metres = layout.metres_in(options.unit)
+        with unpacked(path) as plain:
+            layout, scan = open_file(plain, path, options)
+            if layout.is_streamed:
                 cells = Cells(
-                    square.grown(REACH).box, duration, options.max_gap or layout.max_gap or 0.0, metres
+                    square.grown(REACH).box, duration, options.max_gap or layout.max_gap or 0.0, layout.metres
                 )
-                blocks = Blocks(quick_scan(plain, layout), scan, metres, layout.seconds)
+                blocks = Blocks(layout.quick_scan(plain), scan, layout.metres, layout.seconds)
                 near, seen = _near(blocks, path, layout, cells, content)
-                return _table(near, seen, path, layout, metres, options)
+                return _table(near, seen, path, layout, options)
     return read_raw(path, options=options)
 
 
 def _near(
-    blocks: Blocks, path: Path, layout: Format, cells: Cells, content: kept_rows.Content | None
+    blocks: Blocks, path: Path, layout: TrackFormat, cells: Cells, content: kept_rows.Content | None
 ) -> tuple[Rows, Tally]:
     """The rows near the square, from the cache where they are kept, and what was seen of the file."""
     which = {"format": asdict(layout), "cells": asdict(cells)}
@@ -74,16 +75,14 @@ def _near(
             parts = _gather(one_pass(cells, blocks), path)
         except Unsorted:
             parts = _gather(two_passes(cells, blocks), path)
-    order = person_order(np.concatenate([rows.id for rows in parts]))
+    order = order_by_person(np.concatenate([rows.id for rows in parts]))
     near = Rows(*(np.concatenate(values)[order] for values in zip(*parts, strict=True)))
     if content:
         kept_rows.remember(content(), which, near, blocks.tally)
     return near, blocks.tally
 
 
-def _table(
-    near: Rows, seen: Tally, path: Path, layout: Format, metres: float, options: ReadOptions
-) -> pd.DataFrame:
+def _table(near: Rows, seen: Tally, path: Path, layout: TrackFormat, options: ReadOptions) -> pd.DataFrame:
     """The rows, whose memory it takes, as from `read_raw`, with the funnel of the whole file."""
     stage = read_stage(path, layout, seen.good, dict(seen.reasons), seen.first)
     if options.unit is None:
@@ -94,9 +93,10 @@ def _table(
         empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
         return funnels.attach(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
     for values in (near.x, near.y):
-        values *= metres
-    rows = in_metres(pl.DataFrame(near._asdict()), path, layout, 1.0, options.tz)
-    return merge([rows], stages, [layout], [], copy=False)
+        values *= layout.metres
+    layout = replace(layout, metres=1.0)
+    rows = to_metres(pl.DataFrame(near._asdict()), path, layout, options.tz)
+    return merge([FileRows(path, rows, stages, layout)], copy=False)
 
 
 def _gather(blocks: Iterator[Rows], path: Path) -> list[Rows]:

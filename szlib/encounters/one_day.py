@@ -24,13 +24,12 @@ from ..errors import DataError, DataWarning
 from ..files import file_content, write_file
 from ..tracks import funnels
 from ..tracks.clock import to_clock
-from ..tracks.formats.layouts import layout_of
-from ..tracks.formats.plain import first_line
+from ..tracks.formats import find_format
 from ..tracks.options import Columns, ReadOptions
 from ..tracks.readers import read_raw
 from .areas import AUTO, as_area, walked_area
 from .finding import find_encounters
-from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, Square
+from .geometry import PAPER_SPACE, Area, AttentionalSpace, Region, Square
 from .kinds import KINDS
 from .near_rows import read_near_square
 from .near_rows_cache import Content
@@ -121,9 +120,9 @@ class Chain:
         """The area given, or the mall's; None where it must be found."""
         if isinstance(self.square, Square | Region):
             return self.square
-        name = "tidy" if self.columns else self.file_format
-        layouts = {layout_of(first_line(file), name).name for file in files}
-        return ATC_SQUARE if self.square is None and layouts <= {"atc-raw", "atc-1hz"} else None
+        areas = {find_format(file, self.read_options).area for file in files}
+        known = areas.pop() if self.square is None and len(areas) == 1 else None
+        return Square(*known) if known else None
 
     def _read(
         self, files: Sequence[Path], near: Area | None = None, content: Sequence[Content] = ()
