@@ -29,6 +29,7 @@ __getattr__, __dir__, __all__ = lazy.attach(
         "encounters.days": ["Extraction", "extract_days"],
         "encounters.areas": ["as_area", "walked_area"],
         "encounters.geometry": ["ATC_SQUARE", "AttentionalSpace", "Region", "Square"],
+        "encounters.settings": ["EncounterSettings"],
         "encounters.kinds": ["encounter_kinds", "of_kind"],
         "encounters.null_model": ["NullEncounters", "null_encounters"],
         "encounters.finding": ["find_encounters"],

@@ -27,6 +27,7 @@ DRAWN = {("simulation.log", "workbook.figures.simulation"), ("zones.social_zone"
 
 PUBLIC = [
     "ATC_SQUARE", "AttentionalSpace", "DataError", "DataWarning", "DifferentialDrive", "Ellipse",
+    "EncounterSettings",
     "Extraction", "Grid", "MEETINGS", "MPCCBF", "MPCSettings", "NullEncounters", "NullTest",
     "PairCorrelation", "Person", "PlazaSettings", "OccupancyHistogram", "Region", "Respect", "SCENARIOS",
     "Scenario", "SimulationLog", "SocialZone", "SolverError", "Square", "Step", "SzlibError", "Tracker",
@@ -225,7 +226,7 @@ def test_the_keywords_of_the_paper_are_there() -> None:
     def parameters(function: object) -> set[str]:
         return set(inspect.signature(function).parameters)
 
-    assert {"square", "space"} <= parameters(szlib.find_encounters)
+    assert {"area", "space", "min_speed"} <= parameters(szlib.EncounterSettings)
     assert {"fraction", "r_max"} <= parameters(szlib.remove_outliers)
     assert {"r_max", "outlier_fraction", "speeds"} <= parameters(szlib.SocialZone.fit)
     assert {"gamma", "N", "N_h", "dt", "pass_side"} <= parameters(szlib.MPCSettings)

@@ -3,12 +3,12 @@
 geometry         the area and the attentional space
 areas            an area in any form, or found from walking people: `as_area`, `walked_area`
 kinds            companions, same direction, opposite, crossing, standing, decided on the common track
+settings         what counts as an encounter: `EncounterSettings`
 occupants        the people inside the attentional space of each row of a track table
-windows          windows of ticks that meet a condition throughout
 finding          the four conditions of the paper: `find_encounters`
 samples          what is measured in a window: `reference_frame`
-nearby           the rows of a track table that encounters in an area can depend on
-near_rows        the rows of a file that encounters in an area can depend on
+near_rows        the rows of a track table or file that encounters in an area can depend on
+blocks, cells    how they are read from a raw file, and how they are selected
 near_rows_cache  the user's cache of these rows
 one_day          from the files of a day to its encounters
 days             many days, resumable, on one machine or many: `extract_days`
@@ -23,6 +23,7 @@ from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace, Region, S
 from .kinds import KINDS, encounter_kinds, of_kind
 from .null_model import NullEncounters, null_encounters
 from .samples import SAMPLE_COLUMNS, reference_frame
+from .settings import EncounterSettings
 from .time_shift import time_shifted
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "SAMPLE_COLUMNS",
     "Area",
     "AttentionalSpace",
+    "EncounterSettings",
     "Extraction",
     "NullEncounters",
     "Region",

@@ -1,4 +1,4 @@
-"""The usable rows of a raw file, block by block; those that are set aside are counted."""
+"""The usable rows of a raw file, block by block, and a summary of the file."""
 
 from __future__ import annotations
 
@@ -10,100 +10,118 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from ..tracks.formats.rows import rejection_reason, value_limits
+from ..tracks.formats.rows import fault, limits
 
-_ROWS_AT_ONCE = 1 << 17
+_BLOCK_ROWS = 1 << 17
 """Rows of one block [about 5 minutes of a raw day]."""
 
 
-class Rows(NamedTuple):
-    """Usable rows as they stand in the file, each array of shape (n,)."""
+class FileRows(NamedTuple):
+    """Usable rows as they stand in the file; each array has shape (n,).
+
+    Attributes
+    ----------
+    t, id, x, y : time, person and position, in the units of the file.
+    """
 
     t: np.ndarray
     id: np.ndarray
     x: np.ndarray
     y: np.ndarray
 
-    def at(self, rows: np.ndarray) -> Rows:
-        """Some of the rows, by their indices."""
-        return Rows(*(values[rows] for values in self))
+    def take(self, rows: np.ndarray) -> FileRows:
+        """The rows at the indices `rows`."""
+        return FileRows(*(values[rows] for values in self))
 
 
 @dataclass
-class Tally:
-    """What has been seen of a file: usable rows, their greatest coordinate, rows set aside by reason, and the
-    line and reason of the first of these."""
+class FileSummary:
+    """Counts of the rows of a file.
 
-    good: int = 0
-    reach: float = 0.0
-    reasons: Counter[str] = field(default_factory=Counter)
-    first: tuple[int, str] | None = None
-
-
-@dataclass
-class Blocks:
-    """A scan's usable rows, block by block in the order of the file; `tally` counts what was seen.
-
-    `quick` is a faster scan of the same file, which is read as far as every row of it is usable.
+    Attributes
+    ----------
+    usable : number of usable rows.
+    farthest : their greatest coordinate, in the unit of the file.
+    reasons : number of rejected rows, by reason.
+    first_fault : line and reason of the first rejected row.
     """
 
-    quick: pl.LazyFrame
+    usable: int = 0
+    farthest: float = 0.0
+    reasons: Counter[str] = field(default_factory=Counter)
+    first_fault: tuple[int, str] | None = None
+
+
+@dataclass
+class UsableBlocks:
+    """The usable rows of a scan, block by block, in the order of the file.
+
+    Attributes
+    ----------
+    quick_scan : a faster scan of the same file; it is read up to the first row that is not usable.
+    scan : a scan of the file, as from `recognise`.
+    metres, seconds : length of the units of position and time.
+    summary : of the rows read so far.
+    """
+
+    quick_scan: pl.LazyFrame
     scan: pl.LazyFrame
     metres: float
     seconds: float
-    tally: Tally = field(default_factory=Tally)
+    summary: FileSummary = field(default_factory=FileSummary)
 
-    def __iter__(self) -> Iterator[Rows]:
-        self.tally, seen = Tally(), 0
-        for block in _batches(self.quick):
-            rows = _numbers(block)
-            if not self._spotless(block, rows):
+    def __iter__(self) -> Iterator[FileRows]:
+        self.summary, read = FileSummary(), 0
+        for block in _batches(self.quick_scan):
+            rows = _as_numbers(block)
+            if not self._all_usable(block, rows):
                 break
-            seen += block.height
+            read += block.height
             yield self._counted(rows)
         else:
             return
-        for block in _batches(self.scan.slice(seen)):
-            if len((rows := self._usable(block, seen)).t):
+        for block in _batches(self.scan.slice(read)):
+            if len((rows := self._usable(block, read)).t):
                 yield self._counted(rows)
-            seen += block.height
+            read += block.height
 
-    def _counted(self, rows: Rows) -> Rows:
-        self.tally.good += len(rows.t)
-        self.tally.reach = max(self.tally.reach, _farthest(rows.x), _farthest(rows.y))
+    def _counted(self, rows: FileRows) -> FileRows:
+        self.summary.usable += len(rows.t)
+        self.summary.farthest = max(self.summary.farthest, _largest(rows.x), _largest(rows.y))
         return rows
 
-    def _spotless(self, block: pl.DataFrame, rows: Rows) -> bool:
-        """Whether every row is usable: limits are kept by all values that lie between two that keep them."""
-        limit = value_limits(self.metres, self.seconds)
-        within = (_farthest(v) * limit[name][0] <= limit[name][1] for name, v in rows._asdict().items())
+    def _all_usable(self, block: pl.DataFrame, rows: FileRows) -> bool:
+        """Whether every row is usable; where the extreme values are within the limits, all values are."""
+        limit = limits(self.metres, self.seconds)
+        within = (_largest(v) * limit[name][0] <= limit[name][1] for name, v in rows._asdict().items())
         return all(within) and not block["ragged"].any() and np.array_equal(rows.id, np.floor(rows.id))
 
-    def _usable(self, block: pl.DataFrame, seen: int) -> Rows:
+    def _usable(self, block: pl.DataFrame, read: int) -> FileRows:
         """The usable rows of a block; counts the others."""
-        rows = _numbers(block)
-        if self._spotless(block, rows):
+        rows = _as_numbers(block)
+        if self._all_usable(block, rows):
             return rows
-        lines = block.with_row_index("line", offset=seen + 1)
-        lines = lines.with_columns(reason=rejection_reason(self.metres, self.seconds, False))
+        lines = block.with_row_index("line", offset=read + 1)
+        lines = lines.with_columns(reason=fault(self.metres, self.seconds, False))
         bad = lines.filter(pl.col("reason").is_not_null())
         if bad.height:
-            self.tally.first = self.tally.first or bad.select("line", "reason").row(0)
-            self.tally.reasons.update(dict(bad.group_by("reason", maintain_order=True).len().iter_rows()))
-        return rows.at(np.flatnonzero(lines["reason"].is_null().to_numpy()))
+            first = self.summary.first_fault
+            self.summary.first_fault = first or bad.select("line", "reason").row(0)
+            self.summary.reasons.update(dict(bad.group_by("reason", maintain_order=True).len().iter_rows()))
+        return rows.take(np.flatnonzero(lines["reason"].is_null().to_numpy()))
 
 
 def _batches(scan: pl.LazyFrame) -> Iterator[pl.DataFrame]:
-    wanted = scan.select("ragged", *Rows._fields)  # not the lines: to number them takes long
-    batches = wanted.collect_batches(chunk_size=_ROWS_AT_ONCE, maintain_order=True, engine="streaming")
+    columns = scan.select("ragged", *FileRows._fields)  # without the line numbers, which take long
+    batches = columns.collect_batches(chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming")
     return (block for block in batches if block.height)
 
 
-def _numbers(block: pl.DataFrame) -> Rows:
-    """Its numbers; NaN where there is none."""
-    return Rows(*(block[name].to_numpy().astype(float, copy=False) for name in Rows._fields))
+def _as_numbers(block: pl.DataFrame) -> FileRows:
+    """The columns of a block as floats; NaN where a value is missing."""
+    return FileRows(*(block[name].to_numpy().astype(float, copy=False) for name in FileRows._fields))
 
 
-def _farthest(values: np.ndarray) -> float:
-    """The greatest distance from 0; NaN where a value is."""
+def _largest(values: np.ndarray) -> float:
+    """The largest absolute value; NaN if any value is NaN."""
     return float(np.abs([values.min(), values.max()]).max())

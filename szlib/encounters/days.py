@@ -1,9 +1,9 @@
-"""Many days to encounters: a Parquet file and a funnel for each, resumable, on one machine or many.
+"""Many days to encounters: a cached Parquet file for each, resumable, on one machine or many.
 
-In the folder `out` each day leaves ``<day>.parquet``, its samples, and then ``<day>.json``, its record: the
-funnel, every parameter, and a key made of these and of the content of the day's files.  Both are written
-as a whole or not at all, the record last.  A day whose record has the right key, and whose samples have
-the right SHA-256, is not computed again; so a run that was stopped or killed goes on where it was.
+In the folder `out` each day has two files: ``<day>.parquet``, its samples and their funnel, and then
+``<day>.parquet.json``, their checksum and what they are made of: the content of the day's files, every
+parameter, and the version of szlib.  Each file is written atomically.  A day whose two files match is not
+computed again, so a run that was stopped or killed continues where it ended.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
+from zoneinfo import ZoneInfo
 
 import joblib
 import pandas as pd
@@ -25,34 +27,55 @@ from ..errors import DataError, DataWarning, SzlibError
 from ..files import claim_folder, printable
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.recordings import find_day, name_recordings
+from ..tracks.formats.layouts import layout_of, start_of_day
+from ..tracks.formats.plain import first_line
+from ..tracks.formats.rows import CALENDAR_BEGINS
+from ..tracks.options import ReadOptions
+from ..tracks.readers import recording_names
 from .geometry import Area
-from .one_day import Chain, contents, day_key, finished_record, write_record
+from .one_day import (
+    describe_source,
+    file_contents,
+    find_encounters_in_files,
+    load_day,
+    store_day,
+    with_area,
+)
+from .settings import EncounterSettings
 
 PURPOSE = "encounters by day"
-"""What the folder of an extraction is marked as."""
+"""Purpose of an extraction's folder, as its marker states it."""
 _READ = "read all files"
 """The first stage of the funnel of many days."""
 
 
 @dataclass(frozen=True, eq=False)
 class Extraction:
-    """What `extract_days` has done.
+    """Result of `extract_days`.
 
-    Parameters
+    Attributes
     ----------
     out : folder of the results.
     table : one row a day: day, status ("done" now, "kept" from before, "excluded", "failed"), files, rows
         read, unusable rows among them, encounters, samples, seconds, and why a day failed.
     exclude : days that were left out.
-    keys : of each finished day, the name of its result: content, parameters and version.
-    area : where encounters were looked for, in every day; None where the files of no day have one.
+    sources : what the result of each finished day is made of: content, parameters and version.
+    area : where encounters were searched, the same in every day; None where no day has an area.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=20))
+    >>> days = szlib.extract_days(plaza, out="days", progress=False)
+    >>> days.table["status"].tolist(), len(days.failed)
+    (['done'], 0)
+    >>> samples = days.samples()
     """
 
     out: Path
     table: pd.DataFrame
     exclude: tuple[str, ...] = ()
-    keys: Mapping[str, str] = field(default_factory=dict)
+    sources: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     area: Area | None = None
 
     @property
@@ -63,22 +86,25 @@ class Extraction:
     def samples(self) -> pd.DataFrame:
         """Samples of all finished days, as from `szlib.find_encounters`, by day, encounters numbered anew.
 
-        The funnels of all days are added up, stage by stage.
-        Independent of the order of the files, of what was kept, and of who computed it.  Where recordings
-        of several files have one day in common, their names tell them apart.  Raises DataError where no day
-        was finished, or another run has since left something else in the folder.
+        The funnels of all days are added up, stage by stage.  The result depends neither on the order of the
+        files nor on the number of processes.  Recordings of several files that share a day are distinguished
+        by their names.
+
+        Raises
+        ------
+        DataError : no day is finished, or another run has since replaced a result in the folder.
         """
         days = self.table.loc[self.table["status"].isin(["done", "kept"]), "day"]
         if len(days) == 0:
             raise DataError(f"no day was finished in {self.out}; see the table: {self}")
         parts, stages, count = [], [], 0
         for day in sorted(days):
-            if finished_record(self.out, day, self.keys.get(day, "")) is None:
+            part = load_day(self.out, day, self.sources.get(day))
+            if part is None:
                 raise DataError(
-                    f"{self.out / day}.parquet: is no longer what this extraction has left there (another "
-                    "run, other data or parameters, or damage); extract again, into a folder of its own"
+                    f"{self.out / day}.parquet: is not the result of this extraction (another run, other "
+                    "data or parameters, or damage); extract again, into another folder"
                 )
-            part = pd.read_parquet(self.out / f"{day}.parquet")
             stages.append(
                 [s | {"stage": _READ} if s["stage"].startswith("read ") else s for s in funnels.get(part)]
             )
@@ -88,122 +114,159 @@ class Extraction:
             count += len(found)
         shared = Counter(name for part in parts for name in part["day"].unique())
         for k, part in enumerate(parts):
-            twice = part["day"].map(shared) > 1
-            parts[k] = part.assign(day=part["day"].where(~twice, part["day"] + " (" + part["file"] + ")"))
-        parts = [part.drop(columns="file") for part in parts]
+            ambiguous = part["day"].map(shared) > 1
+            day = part["day"].where(~ambiguous, part["day"] + " (" + part["file"] + ")")
+            parts[k] = part.assign(day=day).drop(columns="file")
         samples = pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
         return funnels.attach(samples.astype({"day": "category"}), funnels.add(stages))
 
     def __str__(self) -> str:
         shown = self.table.to_string(index=False, float_format="{:.1f}".format)
-        counts = self.table["status"].value_counts().sort_index()
-        told = ", ".join(f"{n} {status}" for status, n in counts.items())
-        return f"{shown}\n{told}" + (f"; area: {self.area}" if self.area else "")
+        statuses = self.table["status"].value_counts().sort_index()
+        counts = ", ".join(f"{n} {status}" for status, n in statuses.items())
+        return f"{shown}\n{counts}" + (f"; area: {self.area}" if self.area else "")
 
 
 def extract_days(
     paths: str | Path | Sequence[str | Path],
     *,
     out: str | Path,
+    settings: EncounterSettings | None = None,
+    options: ReadOptions | None = None,
     n_jobs: int = 1,
     exclude: Iterable[str] = (),
     progress: bool = True,
     **parameters: Any,
 ) -> Extraction:
-    """Find the encounters of many days, each on its own, and keep them in a folder.
+    """Find the encounters of many days, each separately, and store them in a folder.
 
     Parameters
     ----------
     paths : files, folders or globs.  Files that begin on the same calendar day make one day (the pieces
-        of the 1 Hz day); a recording that counts frames, has its own days, or whose clock does not count from
-        1970, is one by its file's name (and folder's, where two are called the same).
-    out : folder of the results, its own; made if it is missing.
-    n_jobs : number of processes; -1: one for each core. See `szlib.parallel.run_tasks`.
+        of the 1 Hz day).  A recording without a calendar day is a day of its own, named after its file (and
+        its folder, where two files have the same name).
+    out : folder for the results only; made if it is missing.
+    settings : what counts as an encounter; None takes the paper's.  With area None the files of the ATC mall
+        have `ATC_SQUARE`; others have "auto": the `szlib.walked_area` of the first day, the same for all.
+    options : how files are read.
+    n_jobs : number of processes; -1 takes all cores, or all workers of ``joblib.parallel_config("dask")``.
     exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
     progress : whether to show a bar over the days.
-    parameters : of `szlib.read_tracks` and `szlib.find_encounters`: square, space, duration, min_distance,
-        min_speed, throughout, file_format, unit, frame_rate, columns, max_gap, tz.  Without
-        a square the ATC mall's files have `ATC_SQUARE`, others "auto": the `szlib.walked_area` of the first
-        day, the same for all.
-
-    Of a raw day the rows near the square, some 2 % of the file, are kept in the user's cache, so that other
-    conditions are asked of them without reading it again (`szlib.encounters.near_rows_cache`):
-    $SZLIB_CACHE names the folder, or is "off".
+    parameters : single values in place of those of `settings` and `options`, such as area or unit.
 
     Returns
     -------
-    An `Extraction`: its table says what became of each day; a day that fails does not stop the others.
+    An `Extraction`.  Its table gives the status of each day; a day that fails does not stop the others.
 
     Raises
     ------
     DataError : there is no such file or parameter.
-    StorageError : the folder cannot be made, holds what szlib did not write, or data that is to be read.
+    StorageError : the folder cannot be made, holds files that szlib did not write, or holds the input.
+
+    Notes
+    -----
+    The rows of a raw day near the area are cached, so that a search with other conditions does not read the
+    file again (`szlib.encounters.near_rows_cache`).  $SZLIB_CACHE names the folder of the cache, or is "off".
+
+    Examples
+    --------
+    >>> import szlib
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=20))
+    >>> days = szlib.extract_days(plaza, out="days", min_speed=0.5, progress=False)
+    >>> days.samples()["encounter"].nunique() > 0
+    True
     """
-    unknown = sorted(set(parameters) - set(Chain.__dataclass_fields__))
-    if unknown:
-        raise DataError(f"unknown parameter {unknown}; expected some of {list(Chain.__dataclass_fields__)}")
-    chain, folder = Chain(**parameters), Path(out)
+    read_names = {each.name for each in fields(ReadOptions)}
+    options = replace(options or ReadOptions(), **{k: v for k, v in parameters.items() if k in read_names})
+    others = {name: value for name, value in parameters.items() if name not in read_names}
+    settings = (settings or EncounterSettings()).with_parameters(others)
+    folder = Path(out)
     excluded = (exclude,) if isinstance(exclude, str) else tuple(sorted(map(str, exclude)))
     files = sorted({file.resolve() for file in datasets.find(paths)})
     claim_folder(folder, PURPOSE, inputs=files)
-    days = _by_day(files, chain)
-    chain = _settled(chain, [files for day, files in sorted(days.items()) if day not in excluded])
-    rows = [_row(day, files, status="excluded") for day, files in days.items() if day in excluded]
+    days = _group_by_day(files, options)
+    included = [(day, of_day) for day, of_day in sorted(days.items()) if day not in excluded]
+    for _, of_day in included:
+        with suppress(SzlibError):  # the first day with an area; computing a day that fails says why
+            settings = with_area(settings, [Path(file) for file in of_day], options)
+            break
+    rows = [_row(day, of_day, status="excluded") for day, of_day in days.items() if day in excluded]
     tasks = [
-        joblib.delayed(extract_day)(day, files, str(folder.resolve()), chain)
-        for day, files in sorted(days.items())
-        if day not in excluded
+        joblib.delayed(extract_day)(day, of_day, str(folder.resolve()), settings, options)
+        for day, of_day in included
     ]
     with tqdm(total=len(tasks), unit="day", disable=not progress) as bar:
         for row in run_tasks(tasks, n_jobs=n_jobs):
             rows.append(row)
             bar.update()
             bar.set_postfix_str(f"{row['day']} {row['status']}")
-    keys = {row["day"]: row.pop("key") for row in rows}
+    sources = {row["day"]: row.pop("source") for row in rows}
     table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
-    return Extraction(folder, table, excluded, keys, chain.square if isinstance(chain.square, Area) else None)
+    area = settings.area if isinstance(settings.area, Area) else None
+    return Extraction(folder, table, excluded, sources, area)
 
 
-def _by_day(files: Sequence[Path], chain: Chain) -> dict[str, list[str]]:
+def _group_by_day(files: Sequence[Path], options: ReadOptions) -> dict[str, list[str]]:
     """The files of each day, or of each recording that has no calendar day."""
     days: dict[str, list[str]] = {}
-    for file, name in zip(files, name_recordings(files), strict=True):
-        days.setdefault(find_day(file, chain.read_options) or printable(name), []).append(str(file))
+    for file, name in zip(files, recording_names(files), strict=True):
+        days.setdefault(_calendar_day(file, options) or printable(name), []).append(str(file))
     return days
 
 
-def _settled(chain: Chain, days: Iterable[Sequence[str]]) -> Chain:
-    """The parameters with the area of the first day that has one."""
-    for files in days:
-        with suppress(SzlibError):  # computing that day will tell why
-            return chain.settled([Path(file) for file in files])
-    return chain
+def extract_day(
+    day: str, files: Sequence[str], out: str, settings: EncounterSettings, options: ReadOptions
+) -> dict[str, Any]:
+    """Compute one `day` from its `files`, or load it from the folder `out`; return its row of the table.
 
-
-def extract_day(day: str, files: Sequence[str], out: str, chain: Chain) -> dict[str, Any]:
-    """Compute one day, or keep it if it is there; its row of the table.  Nothing but `out` is shared."""
-    begun = time.perf_counter()
+    `settings` and `options` as in `extract_days`.  Days share nothing but `out`.
+    """
+    start = time.perf_counter()
     row, folder = _row(day, files, status="failed"), Path(out)
     try:
-        with contents(files) as content:
-            record, status = None, "done"
-            if (folder / f"{day}.json").is_file():
-                record = finished_record(folder, day, day_key(files, content, chain))
-                status = "kept" if record else "done"
-            if record is None:
-                with warnings.catch_warnings():  # the table and the funnel tell of rows set aside
+        with file_contents(files) as contents:
+            samples, status = None, "kept"
+            if (folder / f"{day}.parquet").is_file():
+                samples = load_day(folder, day, describe_source(files, contents, settings, options))
+            if samples is None:
+                status = "done"
+                with warnings.catch_warnings():  # the table and the funnel count the rejected rows
                     warnings.simplefilter("ignore", DataWarning)
-                    samples = chain.encounters([Path(file) for file in files], content)
-                record = write_record(folder, day, day_key(files, content, chain), samples, files, chain)
-        row |= {name: record[name] for name in ("key", "rows", "unusable", "encounters", "samples")}
-        row["status"] = status
+                    paths = [Path(file) for file in files]
+                    samples = find_encounters_in_files(paths, settings, options, contents)
+                store_day(folder, day, samples, describe_source(files, contents, settings, options))
+            row["source"] = describe_source(files, contents, settings, options)
+        read = [stage for stage in funnels.get(samples) if stage["stage"].startswith("read ")]
+        row |= {
+            "status": status,
+            "rows": sum(stage["entered"] for stage in read),
+            "unusable": sum(stage["entered"] - stage["kept"] for stage in read),
+            "encounters": int(samples["encounter"].nunique()),
+            "samples": len(samples),
+        }
     except SzlibError as error:
         row["why"] = printable(error)
-    except Exception as error:  # whatever is wrong with one day, the others go on
+    except Exception as error:  # whatever fails in one day, the others go on
         row["why"] = printable(f"{type(error).__name__}: {error}")
-    return row | {"seconds": time.perf_counter() - begun}
+    return row | {"seconds": time.perf_counter() - start}
 
 
 def _row(day: str, files: Sequence[str], status: str) -> dict[str, Any]:
     counts = dict.fromkeys(("rows", "unusable", "encounters", "samples"), 0)
-    return {"day": day, "status": status, "files": len(files), **counts, "seconds": 0.0, "why": "", "key": ""}
+    row = {"day": day, "status": status, "files": len(files), **counts}
+    return row | {"seconds": 0.0, "why": "", "source": {}}
+
+
+def _calendar_day(file: Path, options: ReadOptions) -> str | None:
+    """The calendar day on which a file begins; None where the file has none."""
+    try:
+        first = first_line(file)
+        layout = layout_of(first, "tidy" if options.columns else options.file_format)
+        if layout.name not in ("atc-raw", "atc-1hz"):
+            return None
+        start = float(first.split(layout.separator)[layout.columns["t"]]) + start_of_day(file, layout, first)
+        if not start >= CALENDAR_BEGINS:
+            return None
+        return datetime.fromtimestamp(start, ZoneInfo(options.tz)).strftime("%Y-%m-%d")
+    except (OSError, ValueError, OverflowError):  # reading the day says what is wrong
+        return None

@@ -1,16 +1,15 @@
-"""Encounters of two people in an open square (paper, sec. 2; the four conditions).
+"""Encounters of two people in an open area (paper, sec. 2; the four conditions).
 
 The *attentional space* is a rectangle ahead of the reference pedestrian that turns with them.  Over
 a window of 3 s (31 ticks of 0.1 s):
 
-1. the space stays inside the square (in any convex area: its four corners do);
-2. nobody but one and the same other person is ever inside the space, and that person is inside it
-   when the window opens;
+1. the space stays inside the area (in any convex area: its four corners do);
+2. one other person is inside the space when the window opens, and no third person enters it;
 3. at the opening that person is at least 1 m away;
 4. the reference pedestrian walks at 0.4 m/s or more throughout.
 
-Both are tracked for the whole window.  Windows of one reference pedestrian do not overlap.  Every
-window is one encounter of 31 samples.  Everything is vectorised over rows.
+Both people are tracked for the whole window.  Windows of one reference pedestrian do not overlap.
+Every window is one encounter of 31 samples.  All rows are computed at once, in arrays.
 """
 
 from __future__ import annotations
@@ -22,156 +21,177 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..checks import check_columns
-from ..errors import DataError
 from ..tracks import funnels
-from ..tracks.clock import COLUMNS, TICKS_PER_SECOND
 from .areas import area_for
-from .geometry import ATC_SQUARE, PAPER_SPACE, Area, AttentionalSpace
+from .geometry import ATC_SQUARE, Area
 from .kinds import REACH, kinds_of_pairs, number_people, of_kind
-from .occupants import Rows, changes_of_occupant, occupants
-from .samples import sampled
-from .windows import always, sift, without_overlap
-
-_LONGEST_WINDOW = 3600.0
-"""No two people are watched for an hour [s]."""
+from .occupants import TrackRows, find_occupants, occupant_changes
+from .samples import sample_windows
+from .settings import EncounterSettings
 
 
 def find_encounters(
     tracks: pd.DataFrame,
     *,
-    square: object = ATC_SQUARE,
-    space: AttentionalSpace = PAPER_SPACE,
-    duration: float = 3.0,
-    min_distance: float = 1.0,
-    min_speed: float = 0.4,
-    throughout: bool = False,
+    settings: EncounterSettings | None = None,
     kinds: str | Iterable[str] | None = None,
+    **parameters: Any,
 ) -> pd.DataFrame:
     """Find the encounters of two people, and sample each at 10 Hz.
 
     Parameters
     ----------
     tracks : a track table as from `szlib.read_tracks` (any row order, left untouched).
-    square : where the attentional space must stay: a `Square`, a Shapely polygon, PedPy's ``WalkableArea``,
-        text or a file, as for `szlib.as_area`; or "auto", the `szlib.walked_area` of these tracks.
-    space : the attentional space.
-    duration : of a window [s], a multiple of 0.1 (paper: 3).
-    min_distance : of the other person when the window opens [m] (paper: 1).
-    min_speed : of the reference pedestrian, throughout [m/s] (paper: 0.4).
-    throughout : also require that the other person stays inside the space for the whole window.
-        That reading of the paper never sees two people pass each other (assumed: False).
+    settings : what counts as an encounter; None takes the paper's.
     kinds : None keeps all (paper); "strangers" all but companions; else one or several of
-        `szlib.encounters.kinds.KINDS`.  Encounters keep the numbers that they have among all.
+        `szlib.encounters.KINDS`.  Encounters keep the numbers that they have among all.
+    parameters : single values in place of those of `settings`: area (or square, its older name), space,
+        duration [s], min_distance [m], min_speed [m/s], throughout.  See `szlib.EncounterSettings`.
 
     Returns
     -------
     One row a sample: encounter (number), day, ref_id, other_id, t [s], los_angle [rad] (bearing of
     the other person in the reference pedestrian's frame, in (-pi, pi]), distance [m], speed of the
-    reference pedestrian [m/s], kind (category, see `szlib.encounters.kinds`).  Empty where nobody met.
-    ``.attrs["funnel"]`` says why every other tick opened no encounter.
+    reference pedestrian [m/s], kind (category, see `szlib.encounters.kinds`).  Empty if there is no
+    encounter.  ``.attrs["funnel"]`` counts, by reason, the ticks that open no encounter.
 
     Raises
     ------
     DataError : a column is missing, a time is off the clock, a row is doubled, a parameter has no meaning.
+
+    Examples
+    --------
+    Two people walk towards each other.  Each of them sees the other:
+
+    >>> import numpy as np, pandas as pd, szlib
+    >>> t = np.arange(0, 4, 0.1).round(1)
+    >>> left = pd.DataFrame({"day": "a", "id": 1, "t": t, "x": t, "y": 0.0, "vx": 1.0, "vy": 0.0})
+    >>> right = left.assign(id=2, x=5 - t, y=1.0, vx=-1.0)
+    >>> samples = szlib.find_encounters(pd.concat([left, right]), area="-5 15 -5 5")
+    >>> samples["encounter"].nunique(), len(samples), samples["kind"].iloc[0]
+    (2, 62, 'opposite')
     """
-    steps = _steps(duration, min_distance, min_speed)
-    check_columns(tracks, COLUMNS)
-    rows, area = Rows.of(tracks), area_for(tracks, square)
-    opening = _openings(rows, area, space, min_distance, min_speed)
-    kept, windows = _windows(rows, opening, steps, throughout)
-    ref, other = opening.rows[kept], opening.other[opening.rows[kept]]
+    settings = (settings or EncounterSettings()).with_parameters(parameters)
+    rows = TrackRows.from_tracks(tracks)
+    area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area)
+    openings = _find_openings(rows, area, settings)
+    chosen, stage = _find_windows(rows, openings, settings)
+    ref, other = openings.rows[chosen], openings.other[openings.rows[chosen]]
 
-    samples = sampled(tracks, rows.order, ref, other, steps)
+    samples = sample_windows(tracks, rows.order, ref, other, settings.steps)
     number, _ = number_people(rows.day, rows.person)
-    near = area.grown(REACH).contains(rows.x, rows.y)
+    counts = area.grown(REACH).contains(rows.x, rows.y)
     position, velocity = (rows.x, rows.y), (rows.vx, rows.vy)
-    kind = kinds_of_pairs(number[ref], number[other], number, rows.tick, position, velocity, near)
-    samples["kind"] = kind.repeat(steps + 1)
+    kind = kinds_of_pairs(number[ref], number[other], number, rows.tick, position, velocity, counts)
+    samples["kind"] = kind.repeat(settings.steps + 1)
     samples.attrs["area"] = str(area)
-    return of_kind(funnels.attach(samples, [*funnels.get(tracks), opening.stage, windows]), kinds)
-
-
-def _steps(duration: float, min_distance: float, min_speed: float) -> int:
-    """The steps of the clock in a window; DataError where a parameter has no meaning."""
-    if not (0 < duration < _LONGEST_WINDOW and 0 <= min_distance < np.inf and 0 < min_speed < np.inf):
-        raise DataError(
-            f"expected 0 < duration < {_LONGEST_WINDOW:g} s, min_distance >= 0 m and min_speed > 0 m/s; "
-            f"got {duration} s, {min_distance} m, {min_speed} m/s"
-        )
-    steps = round(duration * TICKS_PER_SECOND)
-    if abs(duration * TICKS_PER_SECOND - steps) > 1e-6:
-        raise DataError(f"duration must be a multiple of 0.1 s, the step of the clock; got {duration} s")
-    return steps
+    return of_kind(funnels.attach(samples, [*funnels.get(tracks), openings.stage, stage]), kinds)
 
 
 @dataclass(frozen=True, eq=False)
 class _Openings:
-    """Ticks at which an encounter may open, and what holds at every row.
+    """Ticks at which an encounter may open, and conditions at every row.
 
-    rows : those ticks; other : the row of somebody in the space of each row (-1: nobody); alone, several :
-    of exactly one, of more; cornered : its corners are in the square; ready : so, and fast enough.
+    Attributes
+    ----------
+    rows : the ticks at which an encounter may open.
+    other : row of one person in the space of each row; -1 if the space is empty.
+    one, several : whether one person, or more, are in the space.
+    space_inside : whether the corners of the space are inside the area.
+    ready : whether they are, and the reference pedestrian is fast enough.
+    stage : the funnel's stage.
     """
 
     rows: np.ndarray
     other: np.ndarray
-    alone: np.ndarray
+    one: np.ndarray
     several: np.ndarray
-    cornered: np.ndarray
+    space_inside: np.ndarray
     ready: np.ndarray
     stage: dict[str, Any]
 
 
-def _openings(
-    rows: Rows, area: Area, space: AttentionalSpace, min_distance: float, min_speed: float
-) -> _Openings:
-    """Ticks that meet the four conditions by themselves."""
+def _find_openings(rows: TrackRows, area: Area, settings: EncounterSettings) -> _Openings:
+    """Find the ticks that meet the four conditions by themselves."""
     inside = area.contains(rows.x, rows.y)
     at = np.flatnonzero(inside)
     cos, sin = np.cos(rows.heading[at]), np.sin(rows.heading[at])
-    ahead, side = space.corners.T[..., None]
-    cornered = inside.copy()
-    cornered[at] = area.covers(rows.x[at] + ahead * cos - side * sin, rows.y[at] + ahead * sin + side * cos)
-    ready = cornered & (rows.speed >= min_speed)
-    people, other = occupants(rows, at, ready, space)
-    alone, who = people == 1, other[people == 1]
+    ahead, side = settings.space.corners.T[..., None]
+    corners = rows.x[at] + ahead * cos - side * sin, rows.y[at] + ahead * sin + side * cos
+    space_inside = inside.copy()
+    space_inside[at] = area.covers(*corners)
+    ready = space_inside & (rows.speed >= settings.min_speed)
+    people, other = find_occupants(rows, at, ready, settings.space)
+    one, partner = people == 1, other[people == 1]
     far = np.zeros(len(rows), bool)
-    far[alone] = np.hypot(rows.x[who] - rows.x[alone], rows.y[who] - rows.y[alone]) >= min_distance
-    found, reasons = sift(
+    distance = np.hypot(rows.x[partner] - rows.x[one], rows.y[partner] - rows.y[one])
+    far[one] = distance >= settings.min_distance
+    found, reasons = _apply_conditions(
         np.arange(len(rows)),
         [
-            ("not in the square", inside),
+            ("not in the area", inside),
             ("velocity unknown", np.isfinite(rows.speed)),
-            ("a corner of the space outside the square", cornered),
-            (f"slower than {min_speed} m/s", ready),
+            ("a corner of the space outside the area", space_inside),
+            (f"slower than {settings.min_speed} m/s", ready),
             ("nobody in the space", people >= 1),
-            ("several people in the space", alone),
-            (f"other person nearer than {min_distance} m", far),
+            ("several people in the space", one),
+            (f"other person nearer than {settings.min_distance} m", far),
         ],
     )
     stage = funnels.stage("encounters: ticks that open a window", len(rows), len(found), reasons)
-    return _Openings(found, other, alone, people > 1, cornered, ready, stage)
+    return _Openings(found, other, one, people > 1, space_inside, ready, stage)
 
 
-def _windows(
-    rows: Rows, opening: _Openings, steps: int, throughout: bool
+def _find_windows(
+    rows: TrackRows, openings: _Openings, settings: EncounterSettings
 ) -> tuple[np.ndarray, dict[str, Any]]:
-    """Which of the openings begin a window that meets the conditions throughout, and the funnel's stage."""
-    first, partner = opening.rows, opening.other[opening.rows]
+    """Find the openings whose window meets the conditions throughout, and count the others in a stage."""
+    steps, first, partner = settings.steps, openings.rows, openings.other[openings.rows]
     last, partner_last = (np.minimum(row + steps, len(rows) - 1) for row in (first, partner))
     tracked = np.ones(len(first), bool)
-    for begin, end in ((first, last), (partner, partner_last)):
-        tracked &= (rows.piece[end] == rows.piece[begin]) & (rows.tick[end] - rows.tick[begin] == steps)
-    intrusion = changes_of_occupant(rows, opening.other, opening.alone) | opening.several
+    for start, end in ((first, last), (partner, partner_last)):
+        tracked &= (rows.piece[end] == rows.piece[start]) & (rows.tick[end] - rows.tick[start] == steps)
+    third_person = occupant_changes(rows, openings.other, openings.one) | openings.several
     conditions = [
         ("a track ends within the window", tracked),
-        ("a corner leaves the square within the window", always(opening.cornered, first, last)),
-        ("too slow within the window", always(opening.ready, first, last)),
-        ("somebody else enters the space", always(~intrusion, first + 1, last)),
+        ("a corner leaves the area within the window", _holds_throughout(openings.space_inside, first, last)),
+        ("too slow within the window", _holds_throughout(openings.ready, first, last)),
+        ("somebody else enters the space", _holds_throughout(~third_person, first + 1, last)),
     ]
-    if throughout:
-        conditions.append(("the other person leaves the space", always(opening.alone, first, last)))
-    whole = np.logical_and.reduce([condition for _, condition in conditions])
-    conditions.append(("overlaps an earlier window", without_overlap(first, whole, steps)))
-    kept, reasons = sift(np.arange(len(first)), conditions)
-    return kept, funnels.stage("encounters: windows", len(first), len(kept), reasons)
+    if settings.throughout:
+        stays = _holds_throughout(openings.one, first, last)
+        conditions.append(("the other person leaves the space", stays))
+    valid = np.logical_and.reduce([condition for _, condition in conditions])
+    conditions.append(("overlaps an earlier window", _drop_overlaps(first, valid, steps)))
+    chosen, reasons = _apply_conditions(np.arange(len(first)), conditions)
+    return chosen, funnels.stage("encounters: windows", len(first), len(chosen), reasons)
+
+
+def _holds_throughout(condition: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Whether the condition holds at every row from `first` to `last` (inclusive)."""
+    failures = np.r_[0, np.cumsum(~condition)]
+    return np.asarray(failures[last + 1] == failures[np.minimum(first, last + 1)])
+
+
+def _drop_overlaps(first: np.ndarray, valid: np.ndarray, steps: int) -> np.ndarray:
+    """Which valid windows are taken: the earliest one, then the next that begins after its end, and so on."""
+    taken = np.zeros(len(first), bool)
+    candidates = np.flatnonzero(valid)
+    following = np.searchsorted(first[candidates], first[candidates] + steps, side="right")
+    at = 0
+    while at < len(candidates):
+        taken[candidates[at]] = True
+        at = int(following[at])
+    return taken
+
+
+def _apply_conditions(
+    rows: np.ndarray, conditions: list[tuple[str, np.ndarray]]
+) -> tuple[np.ndarray, dict[str, int]]:
+    """The rows that meet all conditions, and how many rows each condition was the first to reject."""
+    reasons: dict[str, int] = {}
+    for reason, condition in conditions:
+        passing = rows[condition[rows]]
+        reasons[reason] = len(rows) - len(passing)
+        rows = passing
+    return rows, reasons

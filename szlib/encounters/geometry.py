@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import DataError
-from ..tracks.formats.atc import ATC_AREA
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -155,7 +154,7 @@ class Region:
 Area = Square | Region
 """Where encounters are looked for."""
 
-ATC_SQUARE = Square(*ATC_AREA)
+ATC_SQUARE = Square(x=(-18.5, -7.5), y=(-10.0, 8.0))
 """The central square of the ATC mall (assumed; free of pillars, walls and queues on the real day)."""
 
 

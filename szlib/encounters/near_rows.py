@@ -1,9 +1,13 @@
-"""The rows of a file near the square, as a table: `read_near_square`."""
+"""The rows of a track table, or of a file, that encounters in an area can depend on.
+
+`select_near_rows` takes them from a track table (one row in six of a mall's day), `read_near_area` from a
+file.  `szlib.find_encounters` finds the same encounters in them as in all rows.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -12,38 +16,77 @@ import polars as pl
 
 from .. import memory
 from ..tracks import funnels
-from ..tracks.formats import TrackFormat, open_file
-from ..tracks.formats.base import readable
-from ..tracks.formats.rows import to_metres
-from ..tracks.formats.unpack import unpacked
+from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
+from ..tracks.formats.layouts import Format, quick_scan, readable, recognise
+from ..tracks.formats.plain import plain_file
+from ..tracks.formats.rows import in_metres
 from ..tracks.options import ReadOptions
-from ..tracks.plausibility import check_unit
-from ..tracks.readers import merge, order_by_person, read_raw, read_stage
-from ..tracks.recordings import FileRows
-from . import near_rows_cache as kept_rows
-from .blocks import Blocks, Rows, Tally
-from .cells import Cells, Unsorted, one_pass, two_passes
+from ..tracks.plausible import check_unit
+from ..tracks.readers import merge, person_order, read_raw, read_stage
+from . import near_rows_cache
+from .blocks import FileRows, FileSummary, UsableBlocks
+from .cells import Cells, UnsortedError, select_in_one_pass, select_in_two_passes
 from .geometry import Area
-from .kinds import REACH
+from .kinds import REACH, number_people
+from .near_rows_cache import Content
+from .occupants import TrackRows
 
-_NEAR_ROW = 180
-"""Bytes that a row near the square takes until its day is done (15.6 million of them: 2.7 GB)."""
+_ROW_BYTES = 180
+"""Memory that a row near the area takes until its day is done (15.6 million of them: 2.7 GB)."""
 
 
-def read_near_square(
+def select_near_rows(tracks: pd.DataFrame, area: Area, duration: float) -> pd.DataFrame:
+    """Select the rows of `tracks`, by person and time, that encounters in the `area` can depend on.
+
+    `szlib.find_encounters` finds the same encounters in them, in this area or in one inside it, with windows
+    of `duration` [s] or less.  The funnel counts the other rows.  Raises DataError as `find_encounters`.
+    """
+    rows = TrackRows.from_tracks(tracks)
+    near = is_near(rows.x, rows.y, number_people(rows.day, rows.person)[0], area, duration)
+    stage = funnels.stage("near the area", len(near), near.sum(), {"elsewhere": (~near).sum()})
+    table = tracks.iloc[rows.order[near]].reset_index(drop=True)
+    return funnels.attach(table, [*funnels.get(tracks), stage])
+
+
+def is_near(x: np.ndarray, y: np.ndarray, person: np.ndarray, area: Area, duration: float) -> np.ndarray:
+    """Whether encounters in the `area` can depend on each row at `x`, `y` [m]; shape (n,).
+
+    Rows are sorted by `person` (numbered from 0) and time.  Of each person who is in the area at all, these
+    are the rows in the area grown by `REACH` (for kinds of encounter), half a second around them (for
+    velocities), and the `duration` [s] after them (both people must be tracked).
+    """
+    visits = np.zeros(person[-1] + 1 if len(person) else 0, bool)
+    visits[person[area.contains(x, y)]] = True
+    inside = area.grown(REACH).contains(x, y) & visits[person]
+    count, row = np.r_[0, np.cumsum(inside)], np.arange(len(inside))
+    after = row + round(VELOCITY_SPAN * TICKS_PER_SECOND)
+    before = row - round(max(duration, VELOCITY_SPAN) * TICKS_PER_SECOND)
+    return np.asarray(count[np.minimum(after + 1, len(row))] > count[np.maximum(before, 0)])
+
+
+def read_near_area(
     path: str | Path,
     *,
-    square: Area,
+    area: Area,
     duration: float,
     options: ReadOptions | None = None,
-    content: kept_rows.Content | None = None,
+    content: Content | None = None,
 ) -> pd.DataFrame:
-    """The rows of a file that encounters in the square can depend on, as from `tracks.readers.read_raw`.
+    """Read the rows of a file that encounters in an area can depend on, as `tracks.readers.read_raw` does.
 
-    Only ATC raw files are streamed; others are small, and are read whole.  `square` and `duration` [s] are
-    those of `szlib.find_encounters`, `options` those of `szlib.read_tracks`.  The table is empty where
-    nobody came near; its funnel counts every row of the file.  With `content`, which gives that of the file
-    as `szlib.files.file_content`, the rows are kept in the user's cache (`kept_rows`), and taken from it.
+    Only ATC raw files are streamed; others are small, and are read whole.
+
+    Parameters
+    ----------
+    path : of the file.
+    area, duration : as in `szlib.EncounterSettings`.
+    options : how the file is read.
+    content : gives size and checksum of the file, as `szlib.files.file_content`; with it the rows are stored
+        in the user's cache, and loaded from there (`near_rows_cache`).
+
+    Returns
+    -------
+    The rows; empty where nobody came near.  The funnel counts every row of the file.
 
     Raises
     ------
@@ -51,59 +94,60 @@ def read_near_square(
     """
     path, options = Path(path), options or ReadOptions()
     if path.is_file():
-        with unpacked(path) as plain:
-            layout, scan = open_file(plain, path, options)
-            if layout.is_streamed:
-                cells = Cells(
-                    square.grown(REACH).box, duration, options.max_gap or layout.max_gap or 0.0, layout.metres
-                )
-                blocks = Blocks(layout.quick_scan(plain), scan, layout.metres, layout.seconds)
-                near, seen = _near(blocks, path, layout, cells, content)
-                return _table(near, seen, path, layout, options)
+        with plain_file(path) as plain:
+            layout, scan = recognise(plain, path, options)
+            if layout.name == "atc-raw":
+                metres = layout.metres_in(options.unit)
+                max_gap = options.max_gap or layout.max_gap or 0.0
+                cells = Cells(area.grown(REACH).box, duration, max_gap, metres)
+                blocks = UsableBlocks(quick_scan(plain, layout), scan, metres, layout.seconds)
+                near, summary = _load_or_select(blocks, path, layout, cells, content)
+                return _as_table(near, summary, path, layout, metres, options)
     return read_raw(path, options=options)
 
 
-def _near(
-    blocks: Blocks, path: Path, layout: TrackFormat, cells: Cells, content: kept_rows.Content | None
-) -> tuple[Rows, Tally]:
-    """The rows near the square, from the cache where they are kept, and what was seen of the file."""
-    which = {"format": asdict(layout), "cells": asdict(cells)}
-    if content and (known := kept_rows.find(path.stat().st_size, which, content)):
-        return known
+def _load_or_select(
+    blocks: UsableBlocks, path: Path, layout: Format, cells: Cells, content: Content | None
+) -> tuple[FileRows, FileSummary]:
+    """The rows near the area, loaded from the cache or selected from the file, and a summary of the file."""
+    selection = {"format": asdict(layout), "cells": asdict(cells)}
+    if content and (found := near_rows_cache.load(path.stat().st_size, selection, content)):
+        return found
     with readable(path, layout):
         try:
-            parts = _gather(one_pass(cells, blocks), path)
-        except Unsorted:
-            parts = _gather(two_passes(cells, blocks), path)
-    order = order_by_person(np.concatenate([rows.id for rows in parts]))
-    near = Rows(*(np.concatenate(values)[order] for values in zip(*parts, strict=True)))
+            parts = _collect(select_in_one_pass(cells, blocks), path)
+        except UnsortedError:
+            parts = _collect(select_in_two_passes(cells, blocks), path)
+    order = person_order(np.concatenate([rows.id for rows in parts]))
+    near = FileRows(*(np.concatenate(values)[order] for values in zip(*parts, strict=True)))
     if content:
-        kept_rows.remember(content(), which, near, blocks.tally)
-    return near, blocks.tally
+        near_rows_cache.store(content(), selection, near, blocks.summary)
+    return near, blocks.summary
 
 
-def _table(near: Rows, seen: Tally, path: Path, layout: TrackFormat, options: ReadOptions) -> pd.DataFrame:
-    """The rows, whose memory it takes, as from `read_raw`, with the funnel of the whole file."""
-    stage = read_stage(path, layout, seen.good, dict(seen.reasons), seen.first)
-    if options.unit is None:
-        check_unit(pl.DataFrame({"x": [seen.reach], "y": [0.0]}), layout, path)
-    far = {"never near the square": seen.good - len(near.t)}
-    stages = [stage, funnels.stage("near the square", seen.good, len(near.t), far)]
-    if len(near.t) == 0:
-        empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
-        return funnels.attach(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
-    for values in (near.x, near.y):
-        values *= layout.metres
-    layout = replace(layout, metres=1.0)
-    rows = to_metres(pl.DataFrame(near._asdict()), path, layout, options.tz)
-    return merge([FileRows(path, rows, stages, layout)], copy=False)
-
-
-def _gather(blocks: Iterator[Rows], path: Path) -> list[Rows]:
+def _collect(blocks: Iterator[FileRows], path: Path) -> list[FileRows]:
     """The rows of all blocks; raises MemoryLimitError as soon as they are too many."""
     parts, count = [], 0
     for rows in blocks:
         parts.append(rows)
         count += len(rows.t)
-        memory.require(count * _NEAR_ROW, f"{path}: to keep {count:,} rows near the square, or more,")
+        memory.require(count * _ROW_BYTES, f"{path}: to hold {count:,} rows near the area, or more,")
     return parts
+
+
+def _as_table(
+    near: FileRows, summary: FileSummary, path: Path, layout: Format, metres: float, options: ReadOptions
+) -> pd.DataFrame:
+    """The rows as a table as from `read_raw`, with the funnel of the whole file; it overwrites `near`."""
+    stage = read_stage(path, layout, summary.usable, dict(summary.reasons), summary.first_fault)
+    if options.unit is None:
+        check_unit(pl.DataFrame({"x": [summary.farthest], "y": [0.0]}), layout, path)
+    far = {"never near the area": summary.usable - len(near.t)}
+    stages = [stage, funnels.stage("near the area", summary.usable, len(near.t), far)]
+    if len(near.t) == 0:
+        empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
+        return funnels.attach(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
+    for values in (near.x, near.y):
+        values *= metres
+    rows = in_metres(pl.DataFrame(near._asdict()), path, layout, 1.0, options.tz)
+    return merge([rows], stages, [layout], [], copy=False)

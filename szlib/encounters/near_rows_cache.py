@@ -1,8 +1,9 @@
-"""Rows near the square, kept in the user's cache: asked with other conditions, a day is not read again.
+"""The user's cache of the rows near an area: a search with other conditions does not read the day again.
 
-An entry is known by the content of its file, by all that says which rows are near, and by this version of
-the step; it is whole, or it is made anew (`szlib.files.load_cached`).  $SZLIB_CACHE names the folder of the
-cache, or is "off".  Entries take at most `LIMIT`; the least recently used are removed.  `clear` removes all.
+An entry belongs to the content of its file, to all that decides which rows are near, and to the version of
+that selection.  A damaged entry is made anew (`szlib.files.load_cached`).  $SZLIB_CACHE names the folder of
+the cache, or is "off".  All entries together take at most `LIMIT` bytes; those that were not used for
+longest are removed.  `clear` removes all.
 """
 
 from __future__ import annotations
@@ -24,73 +25,79 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from ..errors import StorageError
 from ..files import CACHE, MARKER, cache_folder, claim_folder, load_cached, store_cached
-from .blocks import Rows, Tally
+from .blocks import FileRows, FileSummary
 
 Content = Callable[[], tuple[int, str]]
-"""Gives size and checksum of a file, once they are known."""
-PURPOSE = "rows near a square"
-"""What the folder of the entries is marked as."""
+"""Returns size and checksum of a file; waits until they are known."""
+PURPOSE = "rows near an area"
+"""Purpose of the folder of the entries, as its marker states it."""
 LIMIT = 2_000_000_000
 """Bytes of all entries; the 92 days of the paper take 1.6e9."""
-_STEP = 1
-"""Version of what is kept, and of how rows near the square are found: another one reads no older entry."""
+_VERSION = 2
+"""Version of the entries and of the selection of rows; entries of another version are not read."""
 _SCALES = (1, 1000)
-"""Numbers that are whole in such parts of a unit are kept as whole numbers."""
+"""Numbers that are whole multiples of 1 / scale are stored as whole numbers."""
 
 
 def folder() -> Path | None:
-    """Where entries are; None where they are off."""
+    """The folder of the entries; None where the cache is off."""
     return cache_folder("near-rows")
 
 
-def find(size: int, which: dict[str, Any], content: Content) -> tuple[Rows, Tally] | None:
-    """The rows of a file of this size [bytes] and content, and what was seen of it; None if not kept whole.
+def load(size: int, selection: dict[str, Any], content: Content) -> tuple[FileRows, FileSummary] | None:
+    """The rows of a file and its summary; None if there is no whole entry.
 
-    An entry that may be the file's is read before its content is asked for, which takes a while to be known.
+    `size` is that of the file [bytes], `selection` decides which rows are near.  The entry is read before
+    `content` of the file is known, which takes a while.
     """
     home = folder()
-    for path in home.glob(f"{_name(size, which)}-*.parquet") if home else ():
-        kept_of = size, path.stem.rpartition("-")[2]
-        entry = load_cached(path, _made_of(kept_of, which))
-        found = _read(entry) if entry else None
-        if found and kept_of == content():
-            with suppress(OSError):  # only the order in which entries give way depends on it
+    for path in home.glob(f"{_name(size, selection)}-*.parquet") if home else ():
+        stored = size, path.stem.rpartition("-")[2]
+        entry = load_cached(path, _made_of(stored, selection))
+        found = _unpack(entry) if entry else None
+        if found and stored == content():
+            with suppress(OSError):  # the time only decides which entries are removed first
                 os.utime(path)
             return found
     return None
 
 
-def _read(entry: bytes) -> tuple[Rows, Tally]:
-    with pq.ParquetFile(io.BytesIO(entry)) as file:  # column by column, as memory is short
-        told = json.loads(file.schema_arrow.metadata[b"szlib"])
-        rows = [file.read([name])[name].to_numpy() / told["scales"][name] for name in Rows._fields]
-    seen = told["tally"]
-    first = tuple(seen["first"]) if seen["first"] else None
-    return Rows(*rows), Tally(seen["good"], seen["reach"], Counter(seen["reasons"]), first)
+def _unpack(entry: bytes) -> tuple[FileRows, FileSummary]:
+    with pq.ParquetFile(io.BytesIO(entry)) as file:  # column by column, to save memory
+        header = json.loads(file.schema_arrow.metadata[b"szlib"])
+        columns = [file.read([name])[name].to_numpy() / header["scales"][name] for name in FileRows._fields]
+    summary = header["summary"]
+    first = tuple(summary["first_fault"]) if summary["first_fault"] else None
+    reasons = Counter(summary["reasons"])
+    return FileRows(*columns), FileSummary(**summary | {"reasons": reasons, "first_fault": first})
 
 
-def remember(content: tuple[int, str], which: dict[str, Any], rows: Rows, seen: Tally) -> None:
-    """Keep the rows of a file; where that cannot be done, a RuntimeWarning says why, and the day goes on."""
+def store(content: tuple[int, str], selection: dict[str, Any], rows: FileRows, summary: FileSummary) -> None:
+    """Store the `rows` of a file of this `content`, and its `summary`, for `load` with this `selection`.
+
+    Where that fails a RuntimeWarning says why, and the day goes on.
+    """
     home = folder()
     if home is None:
         return
     packed = {name: _packed(values) for name, values in rows._asdict().items()}
     table = pa.table({name: values for name, (values, _) in packed.items()})
-    told = {"scales": {name: scale for name, (_, scale) in packed.items()}, "tally": vars(seen)}
-    table = table.replace_schema_metadata({"szlib": json.dumps(told)})
+    header = {"scales": {name: scale for name, (_, scale) in packed.items()}, "summary": vars(summary)}
+    table = table.replace_schema_metadata({"szlib": json.dumps(header)})
     encodings = {
         field.name: "DELTA_BINARY_PACKED" if pa.types.is_integer(field.type) else "BYTE_STREAM_SPLIT"
         for field in table.schema
     }
     file = io.BytesIO()
     pq.write_table(table, file, compression="zstd", use_dictionary=False, column_encoding=encodings)
+    path = home / f"{_name(content[0], selection)}-{content[1]}.parquet"
     try:
         claim_folder(home, PURPOSE)
-        store_cached(_path(home, content, which), file.getvalue(), _made_of(content, which))
-        _make_room(home, LIMIT)
+        store_cached(path, file.getvalue(), _made_of(content, selection))
+        _remove_oldest(home, LIMIT)
     except (StorageError, OSError) as error:
         warnings.warn(
-            f"rows near the square are not kept ({error}); name another folder in ${CACHE}, or set it to off",
+            f"rows near the area are not cached ({error}); name another folder in ${CACHE}, or set it to off",
             RuntimeWarning,
             stacklevel=2,
         )
@@ -100,7 +107,7 @@ def clear() -> None:
     """Remove every entry."""
     home = folder()
     if home is not None and home.is_dir():
-        _make_room(home, 0)
+        _remove_oldest(home, 0)
 
 
 def _packed(values: np.ndarray) -> tuple[np.ndarray, int]:
@@ -114,27 +121,24 @@ def _packed(values: np.ndarray) -> tuple[np.ndarray, int]:
     return values, 1
 
 
-def _made_of(content: tuple[int, str], which: dict[str, Any]) -> dict[str, Any]:
-    return {"step": _STEP, "content": list(content), "which": which}
+def _made_of(content: tuple[int, str], selection: dict[str, Any]) -> dict[str, Any]:
+    return {"version": _VERSION, "content": list(content), "selection": selection}
 
 
-def _name(size: int, which: dict[str, Any]) -> str:
-    return f"{size}-{hashlib.sha256(json.dumps([_STEP, which], sort_keys=True).encode()).hexdigest()[:16]}"
+def _name(size: int, selection: dict[str, Any]) -> str:
+    key = json.dumps([_VERSION, selection], sort_keys=True)
+    return f"{size}-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
 
 
-def _path(home: Path, content: tuple[int, str], which: dict[str, Any]) -> Path:
-    return home / f"{_name(content[0], which)}-{content[1]}.parquet"
-
-
-def _make_room(home: Path, limit: int) -> None:
-    """Remove the entries not used for longest, until the others take no more than `limit` bytes."""
+def _remove_oldest(home: Path, limit: int) -> None:
+    """Remove the entries that were not used for longest, until the others take at most `limit` bytes."""
     entries = []
     for path in home.iterdir():
         if not path.name.startswith(MARKER):
-            with suppress(FileNotFoundError):  # another process makes room as well
+            with suppress(FileNotFoundError):  # another process may remove entries too
                 entries.append((path.stat().st_mtime, path.stat().st_size, path))
-    taken = 0
+    total = 0
     for _, size, path in sorted(entries, reverse=True):
-        taken += size
-        if taken > limit:
+        total += size
+        if total > limit:
             path.unlink(missing_ok=True)

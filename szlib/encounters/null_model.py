@@ -1,13 +1,14 @@
-"""The null model: who meets whom where nobody minds anybody.
+"""The null model: encounters of people who do not interact.
 
 Where people are rarely near each other, is that respect, or is the place merely empty?  `null_encounters`
-finds the encounters of many `time_shifted` days, to hold those of the data against.
+finds the encounters of many `time_shifted` days, to compare with those of the data.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field, is_dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import joblib
@@ -22,26 +23,37 @@ from .areas import area_for
 from .finding import find_encounters
 from .geometry import ATC_SQUARE
 from .kinds import of_kind
-from .time_shift import MINUTES, Crowd
+from .settings import EncounterSettings
+from .time_shift import MINUTES, ShiftableTracks
 
 CLOSE = 2.0
-"""Samples farther than that [m] bear on no zone (paper: r_max)."""
+"""Samples farther away [m] do not belong to a zone (paper: r_max)."""
 
-_AT_ONCE = 5  # shifts of one task
+_TASK_SHIFTS = 5
+"""Shifts of one task."""
 
 
 @dataclass(frozen=True, eq=False)
 class NullEncounters:
-    """Encounters of the null model, over many shifts.
+    """Encounters of the null model, over many shifts; see `null_encounters` for an example.
 
-    Parameters
+    Attributes
     ----------
     samples : as from `szlib.find_encounters`, with a column shift (from 0); only those within `r_max`.  No
         two encounters of any two shifts share a number.  The funnel counts all shifts together.
     encounters : every encounter, one row each: shift, encounter, kind, nearest approach [m].
     shifts : number of null models.
-    r_max : distance up to which samples were kept [m].
-    parameters : that made it (JSON values).
+    r_max : distance up to which samples are stored [m].
+    parameters : parameters of `null_encounters` that made it (JSON values).
+
+    Examples
+    --------
+    >>> import szlib
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=100))
+    >>> tracks = szlib.read_tracks(plaza)
+    >>> null = szlib.null_encounters(tracks, shifts=2, minutes=(0.2, 1), progress=False)
+    >>> len(null.one(0)) + len(null.one(1)) == len(null.samples)
+    True
     """
 
     samples: pd.DataFrame
@@ -51,13 +63,13 @@ class NullEncounters:
     parameters: dict[str, Any] = field(default_factory=dict)
 
     def one(self, shift: int) -> pd.DataFrame:
-        """The samples of one shift, to be treated like those of the data."""
+        """The samples of one `shift` (its number), to be treated like those of the data."""
         if not 0 <= shift < self.shifts:
             raise DataError(f"expected a shift from 0 to {self.shifts - 1}; got {shift}")
         return self.samples[self.samples["shift"] == shift]
 
     def of_kind(self, kinds: str | Iterable[str] | None) -> NullEncounters:
-        """The encounters of some kinds, as `szlib.of_kind`: treat data and null alike."""
+        """The encounters of some `kinds`, as `szlib.of_kind`: treat data and null model alike."""
         kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
         return replace(self, samples=of_kind(self.samples, kinds), encounters=of_kind(self.encounters, kinds))
 
@@ -69,65 +81,87 @@ def null_encounters(
     seed: int = 0,
     minutes: tuple[float, float] = MINUTES,
     r_max: float = CLOSE,
-    square: object = ATC_SQUARE,
-    duration: float = 3.0,
+    settings: EncounterSettings | None = None,
+    kinds: str | Iterable[str] | None = None,
     n_jobs: int = 1,
     progress: bool = True,
     **parameters: Any,
 ) -> NullEncounters:
-    """Who meets whom where nobody minds anybody: encounters of many `time_shifted` days.
+    """Find the encounters of people who do not interact: those of many `time_shifted` days.
 
-    Shift k has the encounters of ``find_encounters(time_shifted(tracks, seed=(seed, k)))``, and far sooner:
-    only what is near the square is moved.
+    Shift k has the encounters of ``find_encounters(time_shifted(tracks, seed=(seed, k)))``.  It is computed
+    much faster, because only the rows near the area are moved.
 
     Parameters
     ----------
     tracks : a track table as from `szlib.read_tracks`.
-    shifts : how many null models, each of its own seed.
+    shifts : number of null models, each with a seed of its own.
     seed, minutes : as in `time_shifted`.
-    r_max : samples farther than that are counted, not kept [m].
-    square, duration, parameters : those of `szlib.find_encounters`, and the same as for the data.
-    n_jobs : number of processes; -1: one for each core. See `szlib.parallel.run_tasks`.
+    r_max : samples farther away are counted, not stored [m].
+    settings, kinds, parameters : as in `szlib.find_encounters`, and the same as for the data.
+    n_jobs : number of processes; -1 takes all cores, or all workers of ``joblib.parallel_config("dask")``.
     progress : whether to show a bar over the shifts.
+
+    Returns
+    -------
+    `NullEncounters`.
 
     Raises
     ------
     DataError : as `time_shifted` and `szlib.find_encounters`; or there is no shift, or no r_max.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=100))
+    >>> tracks = szlib.read_tracks(plaza)
+    >>> null = szlib.null_encounters(tracks, shifts=2, minutes=(0.2, 1), progress=False)
+    >>> list(null.encounters.columns)
+    ['encounter', 'shift', 'kind', 'nearest']
     """
     if not (shifts >= 1 and 0 < r_max < np.inf):
         raise DataError(f"expected shifts >= 1 and r_max > 0 m; got {shifts} shifts, {r_max} m")
-    crowd = Crowd.of(tracks)
-    crowd.shifts(seed, minutes)  # what cannot be shifted is told here, not by a worker
-    area = area_for(tracks, square)
-    near, companions = crowd.near(area, duration), len(crowd.companions)
-    del crowd  # of a whole day only what is near the square is needed from here on
-    asked = {"square": area, "duration": duration, **parameters}
-    batches = [range(k, min(k + _AT_ONCE, shifts)) for k in range(0, shifts, _AT_ONCE)]
-    tasks = [joblib.delayed(_shift_and_find)(near, seed, batch, minutes, r_max, asked) for batch in batches]
+    settings = (settings or EncounterSettings()).with_parameters(parameters)
+    area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area)
+    settings = replace(settings, area=area)
+    kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
+    everyone = ShiftableTracks.from_tracks(tracks)
+    everyone.draw_shifts(seed, minutes)  # an impossible shift raises its error here, not in a worker
+    people, companions = everyone.near(area, settings.duration), len(everyone.companions)
+    del everyone  # from here on only the rows near the area are needed
+    find = partial(_find_shifted, people, seed, minutes, r_max, settings, kinds)
+    batches = [range(k, min(k + _TASK_SHIFTS, shifts)) for k in range(0, shifts, _TASK_SHIFTS)]
     found: dict[int, tuple[pd.DataFrame, pd.DataFrame]] = {}
     with tqdm(total=shifts, unit="shift", disable=not progress) as bar:
-        for part in run_tasks(tasks, n_jobs=n_jobs):
+        for part in run_tasks([joblib.delayed(find)(batch) for batch in batches], n_jobs=n_jobs):
             found |= part
             bar.update(len(part))
-    made = {"shifts": shifts, "seed": seed, "minutes": list(minutes), "companions": companions}
-    made |= {name: asdict(v) if is_dataclass(v) else v for name, v in asked.items()}  # type: ignore[arg-type]
-    return NullEncounters(*_in_one(found), shifts, float(r_max), made)
+    made_by: dict[str, Any] = {
+        "shifts": shifts,
+        "seed": seed,
+        "minutes": list(minutes),
+        "companions": companions,
+    }
+    made_by |= {"kinds": kinds, **settings.as_json()}
+    return NullEncounters(*_concatenate(found), shifts, float(r_max), made_by)
 
 
-def _shift_and_find(
-    crowd: Crowd,
+def _find_shifted(
+    people: ShiftableTracks,
     seed: int,
-    batch: Iterable[int],
     minutes: tuple[float, float],
     r_max: float,
-    asked: dict[str, Any],
+    settings: EncounterSettings,
+    kinds: str | Iterable[str] | None,
+    batch: Iterable[int],
 ) -> dict[int, tuple[pd.DataFrame, pd.DataFrame]]:
-    """By shift: samples within r_max, and one row for each encounter."""
+    """For each shift of the batch: the samples within `r_max`, and one row for each encounter."""
     found = {}
     for k in batch:
-        samples = find_encounters(crowd.moved(crowd.shifts((seed, k), minutes)), **asked).assign(shift=k)
-        by = samples.groupby("encounter", sort=False)
-        encounters = by.agg(shift=("shift", "first"), kind=("kind", "first"), nearest=("distance", "min"))
+        shifted = people.shift(people.draw_shifts((seed, k), minutes))
+        samples = find_encounters(shifted, settings=settings, kinds=kinds).assign(shift=k)
+        groups = samples.groupby("encounter", sort=False)
+        encounters = groups.agg(shift=("shift", "first"), kind=("kind", "first"), nearest=("distance", "min"))
         close = samples[samples["distance"] <= r_max].copy()
         far = {f"farther than {r_max} m": len(samples) - len(close)}
         stage = funnels.stage("samples: close", len(samples), len(close), far)
@@ -135,14 +169,16 @@ def _shift_and_find(
     return found
 
 
-def _in_one(found: dict[int, tuple[pd.DataFrame, pd.DataFrame]]) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Samples and encounters of all shifts, numbered one after the other; their funnels are added up."""
+def _concatenate(found: dict[int, tuple[pd.DataFrame, pd.DataFrame]]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Samples and encounters of all shifts, numbered consecutively; their funnels are added up."""
     parts = [found[k] for k in sorted(found)]
     first = np.cumsum(
         [0, *(1 + encounters["encounter"].to_numpy().max(initial=-1) for _, encounters in parts)]
     )
     tables = [
-        pd.concat([t.assign(encounter=t["encounter"] + n) for t, n in zip(side, first, strict=False)])
+        pd.concat(
+            [part.assign(encounter=part["encounter"] + n) for part, n in zip(side, first, strict=False)]
+        )
         for side in zip(*parts, strict=True)
     ]
     samples, encounters = (table.reset_index(drop=True) for table in tables)

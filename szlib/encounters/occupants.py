@@ -1,4 +1,4 @@
-"""Who is in whose attentional space, at every tick of a day at once."""
+"""The people inside the attentional space of each reference pedestrian, at every tick of a day at once."""
 
 from __future__ import annotations
 
@@ -13,16 +13,22 @@ from .geometry import AttentionalSpace
 
 _PAIRS_AT_ONCE = 4_000_000
 """Pairs of people held in memory at a time."""
-_TOUCH = 1e-3
-"""Covers every rounding of a position, however many ticks there are [m]."""
+_ROUNDING = 1e-3
+"""Larger than every rounding error of a position, for any number of ticks [m]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """The rows of a track table by person and time, as arrays.
+class TrackRows:
+    """The rows of a track table by person and time, as arrays of one length.
 
-    order : where each row stands in the table; tick, piece : as from `clock_index`; day : its number;
-    person : id; x, y [m]; vx, vy [m/s], NaN where unknown; speed [m/s] and heading [rad], of these.
+    Attributes
+    ----------
+    order : position of each row in the table.
+    tick, piece : number of the tick and of the gap-free piece, as from `clock_index`.
+    day, person : number of the day, and id of the person.
+    x, y : position [m].
+    vx, vy : velocity [m/s], NaN where unknown.
+    speed, heading : magnitude [m/s] and direction [rad] of the velocity.
     """
 
     order: np.ndarray
@@ -38,8 +44,8 @@ class Rows:
     heading: np.ndarray
 
     @classmethod
-    def of(cls, tracks: pd.DataFrame) -> Rows:
-        """Those of a track table; DataError as `clock_index`."""
+    def from_tracks(cls, tracks: pd.DataFrame) -> TrackRows:
+        """The rows of the table `tracks`.  Raises DataError as `clock_index`."""
         order, tick, piece = clock_index(tracks)
         x, y, vx, vy = (tracks[name].to_numpy(float)[order] for name in ("x", "y", "vx", "vy"))
         day, person = pd.factorize(tracks["day"])[0][order], tracks["id"].to_numpy()[order]
@@ -49,53 +55,58 @@ class Rows:
         return len(self.x)
 
 
-def occupants(
-    rows: Rows, inside: np.ndarray, ready: np.ndarray, space: AttentionalSpace
+def find_occupants(
+    rows: TrackRows, inside: np.ndarray, ready: np.ndarray, space: AttentionalSpace
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How many people are in the space of each ready row, and the row of one of them (-1: nobody).
+    """Count the people in the `space` of each row, and give the row of one of them (-1 if it is empty).
 
-    The space lies inside the square, so only the rows `inside` the square (their indices) can be in it.
+    Only rows that are `ready` (booleans) have a space.  The space lies inside the area, so only the rows
+    `inside` the area (their indices) can be in it.
     """
     people, other = np.zeros(len(rows), np.int64), np.full(len(rows), -1)
     reach = float(np.hypot(*space.corners.T).max())
     for ref, oth in _simultaneous(rows, inside, ready, reach):
         dx, dy = rows.x[oth] - rows.x[ref], rows.y[oth] - rows.y[ref]
         cos, sin = np.cos(rows.heading[ref]), np.sin(rows.heading[ref])
-        seen = space.contains(cos * dx + sin * dy, cos * dy - sin * dx) & (ref != oth)
-        people += np.bincount(ref[seen], minlength=len(rows))
-        other[ref[seen]] = oth[seen]
+        within = space.contains(cos * dx + sin * dy, cos * dy - sin * dx) & (ref != oth)
+        people += np.bincount(ref[within], minlength=len(rows))
+        other[ref[within]] = oth[within]
     return people, other
 
 
-def changes_of_occupant(rows: Rows, other: np.ndarray, alone: np.ndarray) -> np.ndarray:
-    """Rows whose only occupant is not the last one seen in the same gap-free piece of the reference."""
-    row = np.flatnonzero(alone)
-    who = rows.person[other[row]]
+def occupant_changes(rows: TrackRows, other: np.ndarray, one: np.ndarray) -> np.ndarray:
+    """Whether the only occupant of a row differs from the last one in the same gap-free piece.
+
+    `other` is as from `find_occupants`; `one` says which rows have exactly one occupant.
+    """
+    row = np.flatnonzero(one)
+    person = rows.person[other[row]]
     changed = np.zeros(len(other), bool)
-    changed[row[1:]] = (rows.piece[row[1:]] == rows.piece[row[:-1]]) & (who[1:] != who[:-1])
+    changed[row[1:]] = (rows.piece[row[1:]] == rows.piece[row[:-1]]) & (person[1:] != person[:-1])
     return changed
 
 
 def _simultaneous(
-    rows: Rows, inside: np.ndarray, ready: np.ndarray, reach: float
+    rows: TrackRows, inside: np.ndarray, ready: np.ndarray, reach: float
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Blocks of pairs (ready row, row inside the square) that share a tick, itself included.
+    """Yield blocks of pairs (ready row, row inside the area) that share a tick.
 
-    Pairs farther apart than `reach` along y [m] are left out; in a hall that saves most of them.
+    A ready row is also paired with itself.  Pairs farther apart than `reach` along y [m] are left out; in a
+    hall these are most pairs.
     """
     if len(inside) == 0:
         return
     at = inside[np.lexsort((rows.y[inside], rows.tick[inside], rows.day[inside]))]
-    fresh = np.r_[True, (np.diff(rows.tick[at]) != 0) | (np.diff(rows.day[at]) != 0)]
-    beyond = reach + _TOUCH
+    new_tick = np.r_[True, (np.diff(rows.tick[at]) != 0) | (np.diff(rows.day[at]) != 0)]
+    beyond = reach + _ROUNDING
     place = rows.y[at] - rows.y[at].min()
-    place += (np.cumsum(fresh) - 1) * (place.max() + 2 * beyond)  # nobody is within reach of another tick
-    of_ready = np.flatnonzero(ready[at])
-    first = np.searchsorted(place, place[of_ready] - beyond)
-    count = np.searchsorted(place, place[of_ready] + beyond, side="right") - first
+    place += (np.cumsum(new_tick) - 1) * (place.max() + 2 * beyond)  # ticks lie out of reach of each other
+    ready_rows = np.flatnonzero(ready[at])
+    first = np.searchsorted(place, place[ready_rows] - beyond)
+    count = np.searchsorted(place, place[ready_rows] + beyond, side="right") - first
     block = np.cumsum(count) // _PAIRS_AT_ONCE
     for b in range(int(block[-1]) + 1 if len(block) else 0):
-        mine = block == b
-        size = count[mine]
+        chosen = block == b
+        size = count[chosen]
         offset = np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
-        yield np.repeat(at[of_ready[mine]], size), at[np.repeat(first[mine], size) + offset]
+        yield np.repeat(at[ready_rows[chosen]], size), at[np.repeat(first[chosen], size) + offset]

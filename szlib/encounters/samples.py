@@ -1,4 +1,4 @@
-"""What is measured in the window of an encounter, in the reference pedestrian's frame."""
+"""Samples of encounters: measurements in each window, in the reference pedestrian's frame."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, nearest_tick
 from .geometry import wrap_angle
 
 SAMPLE_COLUMNS = ["encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed"]
-"""What is measured; the column kind follows them."""
+"""Columns of a table of samples; the column kind follows them."""
 
 
-def sampled(
+def sample_windows(
     tracks: pd.DataFrame, order: np.ndarray, ref: np.ndarray, other: np.ndarray, steps: int
 ) -> pd.DataFrame:
-    """The samples of windows that open at rows `ref` and `other` of the tracks in `order`."""
+    """The samples of windows of `steps` that open at rows `ref` and `other` of `tracks` in `order`."""
     window = np.arange(steps + 1)
     of_ref = tracks.iloc[order[(ref[:, None] + window).ravel()]].reset_index(drop=True)
     of_other = tracks.iloc[order[(other[:, None] + window).ravel()]].reset_index(drop=True)
@@ -38,15 +38,31 @@ def sampled(
 
 
 def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame:
-    """Both people's paths of each encounter in the reference pedestrian's frame *at the opening*.
+    """Transform both people's paths of each encounter to the reference pedestrian's frame *at the opening*.
 
-    Columns: encounter, t, ref_x, ref_y, other_x, other_y [m]: x along the motion at the opening, y
-    to the left (paper, fig. 2); a row for each of `samples`, in their order.  The opening is the first
-    sample of an encounter, so outliers must not have been removed.
+    Parameters
+    ----------
+    tracks : the track table in which the encounters were found.
+    samples : samples as from `szlib.find_encounters`, before outliers are removed: the first sample of an
+        encounter is its opening.
+
+    Returns
+    -------
+    One row for each row of `samples`, in their order: encounter, t [s], ref_x, ref_y, other_x, other_y [m].
+    x points along the motion at the opening, y to the left (paper, fig. 2).
 
     Raises
     ------
     DataError : a table lacks a column or is empty, or a sample is not in `tracks`.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.encounters import reference_frame
+    >>> tracks = szlib.read_tracks(szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=20)))
+    >>> paths = reference_frame(tracks, szlib.find_encounters(tracks))
+    >>> list(paths.columns)
+    ['encounter', 't', 'ref_x', 'ref_y', 'other_x', 'other_y']
     """
     check_columns(tracks, COLUMNS)
     check_columns(samples, SAMPLE_COLUMNS[:5])
@@ -58,18 +74,18 @@ def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame
         tick=nearest_tick(samples["t"].to_numpy(float))
     )
     ref, oth = (
-        keys.merge(people, how="left", left_on=["day", who, "tick"], right_on=["day", "id", "tick"])
-        for who in ("ref_id", "other_id")
+        keys.merge(people, how="left", left_on=["day", column, "tick"], right_on=["day", "id", "tick"])
+        for column in ("ref_id", "other_id")
     )
-    lost = ref["x"].isna() | oth["x"].isna()
-    if lost.any():
-        found = samples[SAMPLE_COLUMNS[:5]].iloc[int(np.flatnonzero(lost)[0])].to_dict()
+    missing = ref["x"].isna() | oth["x"].isna()
+    if missing.any():
+        found = samples[SAMPLE_COLUMNS[:5]].iloc[int(np.flatnonzero(missing)[0])].to_dict()
         raise DataError(f"sample {found} is not in these tracks; pass the tracks it was found in")
     opening = ref.groupby("encounter")["tick"].transform("idxmin").to_numpy()
     x, y, vx, vy = (ref[name].to_numpy()[opening] for name in ("x", "y", "vx", "vy"))
     cos, sin = np.cos(np.arctan2(vy, vx)), np.sin(np.arctan2(vy, vx))
     out = {"encounter": samples["encounter"].to_numpy(), "t": samples["t"].to_numpy()}
-    for who, rows in (("ref", ref), ("other", oth)):
+    for person, rows in (("ref", ref), ("other", oth)):
         dx, dy = rows["x"].to_numpy() - x, rows["y"].to_numpy() - y
-        out |= {f"{who}_x": cos * dx + sin * dy, f"{who}_y": cos * dy - sin * dx}
+        out |= {f"{person}_x": cos * dx + sin * dy, f"{person}_y": cos * dy - sin * dx}
     return pd.DataFrame(out)

@@ -216,8 +216,10 @@ def _report(options: argparse.Namespace) -> int:
 
 def _inspect(options: argparse.Namespace) -> int:
     """Print the funnel of a file, from its rows to its encounters."""
-    from ..encounters.one_day import Chain
+    from ..encounters.one_day import find_encounters_in_files
+    from ..encounters.settings import EncounterSettings
     from ..tracks import datasets, funnels
+    from ..tracks.options import ReadOptions
 
     files = datasets.find([options.file])
     if len(files) != 1:
@@ -226,7 +228,8 @@ def _inspect(options: argparse.Namespace) -> int:
         )
     with warnings.catch_warnings():  # the table shows the same counts
         warnings.simplefilter("ignore", DataWarning)
-        samples = Chain(square=_area_text(options) or None).encounters(files)
+        settings = EncounterSettings(area=_area_text(options) or None)
+        samples = find_encounters_in_files(files, settings, ReadOptions())
     if "area" in samples.attrs:
         print(f"area {samples.attrs['area']}")
     print(funnels.text(funnels.get(samples)))
@@ -244,7 +247,7 @@ def _extract(options: argparse.Namespace) -> int:
             out=options.out,
             n_jobs=options.jobs,
             exclude=options.exclude,
-            square=_area_text(options) or None,
+            area=_area_text(options) or None,
         )
     print(extraction)
     return 1 if len(extraction.failed) else 0

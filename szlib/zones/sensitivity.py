@@ -12,7 +12,7 @@ import pandas as pd
 
 from ..encounters.finding import find_encounters
 from ..encounters.geometry import Area
-from ..encounters.nearby import near_square
+from ..encounters.near_rows import select_near_rows
 from ..errors import DataError, DataWarning, ZoneError
 from .social_zone import SocialZone
 
@@ -77,7 +77,7 @@ def sensitivity(
         text = ", ".join(value) if isinstance(value, tuple) else str(value)
         rows.append((parameter, text, count, *sizes))
 
-    tracks = near_square(tracks, square, max(SEARCH["duration"]))  # searched many times
+    tracks = select_near_rows(tracks, square, max(SEARCH["duration"]))  # searched many times
     usual = find_encounters(tracks, square=square)
     add("default", "", usual)
     for name, values in SEARCH.items():

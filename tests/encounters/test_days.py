@@ -66,7 +66,7 @@ def test_days_are_those_of_the_whole_table(days: list[Path], tmp_path: Path) -> 
     read = [stage for stage in funnels.get(ours) if stage["stage"].startswith("read ")]
     entered, kept = sum(s["entered"] for s in read), sum(s["kept"] for s in read)
     assert entered == sum(len(day.read_text().splitlines()) for day in days)
-    assert kept == next(s["entered"] for s in funnels.get(ours) if s["stage"] == "near the square")
+    assert kept == next(s["entered"] for s in funnels.get(ours) if s["stage"] == "near the area")
 
 
 def test_the_result_depends_neither_on_order_nor_on_processes_nor_on_blocks(
@@ -74,7 +74,7 @@ def test_the_result_depends_neither_on_order_nor_on_processes_nor_on_blocks(
 ) -> None:
     extract(days[::-1], tmp_path / "reversed")
     extract(str(days[0].parent / "*.csv"), tmp_path / "two", n_jobs=2)
-    monkeypatch.setattr("szlib.encounters.blocks._ROWS_AT_ONCE", 700)
+    monkeypatch.setattr("szlib.encounters.blocks._BLOCK_ROWS", 700)
     extract([days[0].parent], tmp_path / "blocks")
     for name in ("reversed", "two", "blocks"):
         assert contents(tmp_path / name) == reference
@@ -104,13 +104,12 @@ def test_what_is_there_is_kept_and_what_changed_is_done_again(days: list[Path], 
     copies[2].write_bytes(content)
     assert statuses() == ["kept", "kept", "done", "kept"]
     (out / f"{DATES[3]}.parquet").write_bytes((out / f"{DATES[3]}.parquet").read_bytes()[:-1])
-    (out / f"{DATES[0]}.json").write_text("{")
+    (out / f"{DATES[0]}.parquet.json").write_text("{")
     assert statuses() == ["done", "kept", "kept", "done"], "what is damaged is done again"
     assert statuses(min_speed=0.5) == ["done"] * 4
     assert statuses() == ["done"] * 4
-    record = json.loads((out / f"{DATES[0]}.json").read_text())
-    assert record["parameters"]["min_speed"] == 0.4
-    assert record["rows"] == sum(s["entered"] for s in record["funnel"] if s["stage"].startswith("read"))
+    record = json.loads((out / f"{DATES[0]}.parquet.json").read_text())
+    assert record["made_of"]["parameters"]["min_speed"] == 0.4
 
 
 def test_days_that_fail_do_not_stop_the_others(days: list[Path], tmp_path: Path) -> None:
@@ -269,7 +268,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same(
         "            os.kill(victim, signal.SIGKILL)\n"
         "        threading.Thread(target=strike, daemon=True).start()\n"
         "        with joblib.parallel_config('dask'):\n"
-        "            done = szlib.extract_days(sys.argv[2:], out=out, progress=False)\n"
+        "            done = szlib.extract_days(sys.argv[2:], out=out, n_jobs=-1, progress=False)\n"
         "        print(victim in client.run(os.getpid).values(), *done.table['status'])\n"
     )
     out = tmp_path / "out"

@@ -1,4 +1,4 @@
-"""Rows near the square are kept: the same encounters without reading the day, never from a damaged entry."""
+"""Rows near the area are kept: the same encounters without reading the day, never from a damaged entry."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import pytest
 from helpers.raw_days import make_raw_day, write_raw_day
 
 import szlib
-from szlib.encounters import blocks
-from szlib.encounters import near_rows_cache as kept_rows
-from szlib.encounters.one_day import Chain
+from szlib.encounters import blocks, near_rows_cache
+from szlib.encounters.one_day import find_encounters_in_files
 from szlib.files import CACHE, file_content
 from szlib.tracks import funnels
 
@@ -37,8 +36,9 @@ def day(tmp_path: Path) -> Path:
 
 def found(day: Path, **parameters: object) -> pd.DataFrame:
     """Encounters as `extract_days` finds them."""
-    chain = Chain(**{"duration": 1.0, "space": SPACE, **parameters})
-    return chain.encounters([day], [lambda: file_content(day)])
+    options = szlib.ReadOptions(max_gap=parameters.pop("max_gap", None))
+    settings = szlib.EncounterSettings(**{"duration": 1.0, "space": SPACE, **parameters})
+    return find_encounters_in_files([day], settings, options, [lambda: file_content(day)])
 
 
 def same(ours: pd.DataFrame, theirs: pd.DataFrame) -> bool:
@@ -59,7 +59,7 @@ def test_other_conditions_are_asked_of_what_is_kept(
     assert not cache.exists(), "off is off"
     monkeypatch.setenv(CACHE, str(cache.parent))
     found(day)
-    monkeypatch.setattr(blocks.Blocks, "__iter__", None)  # the file is not read again
+    monkeypatch.setattr(blocks.UsableBlocks, "__iter__", None)  # the file is not read again
     again = [found(day, **conditions) for conditions in asked]
     for ours, theirs in zip(again[:3], fresh[:3], strict=True):
         assert same(ours, theirs)
@@ -70,7 +70,7 @@ def test_other_conditions_are_asked_of_what_is_kept(
 def test_whatever_makes_other_rows_near_is_another_entry(cache: Path, day: Path) -> None:
     found(day)
     other_square = szlib.Square(x=(-17, -8), y=(-9, 8))
-    for number, parameters in enumerate(({"square": other_square}, {"duration": 2.0}, {"max_gap": 0.3}), 2):
+    for number, parameters in enumerate(({"area": other_square}, {"duration": 2.0}, {"max_gap": 0.3}), 2):
         found(day, **parameters)
         assert len(entries(cache)) == number
     changed = day.read_text().replace("1500.0", "1400.0", 1)
@@ -88,7 +88,7 @@ def test_a_damaged_entry_is_made_anew(cache: Path, day: Path, damage: str) -> No
     if damage == "no record":
         record.unlink()
     elif damage == "the record of another":
-        record.write_bytes(told.replace(b'"step": 1', b'"step": 0'))
+        record.write_bytes(told.replace(b'"version": 2', b'"version": 0'))
     else:
         middle = len(content) // 2
         flipped = content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
@@ -105,19 +105,19 @@ def test_entries_not_used_for_longest_give_way(
     found(day, duration=2.0)
     (second,) = set(entries(cache)) - {first}
     for path, age in ((first, 2), (second, 1)):
-        kept_rows.os.utime(path, (1e9 - age, 1e9 - age))
+        near_rows_cache.os.utime(path, (1e9 - age, 1e9 - age))
     found(day, duration=1.0)  # now the second one is older
-    monkeypatch.setattr(kept_rows, "LIMIT", 2 * first.stat().st_size + 5000)
+    monkeypatch.setattr(near_rows_cache, "LIMIT", 2 * first.stat().st_size + 5000)
     found(day, duration=0.5)
     assert first in entries(cache)
     assert second not in entries(cache)
-    kept_rows.clear()
+    near_rows_cache.clear()
     assert entries(cache) == []
 
 
 def test_a_cache_that_cannot_be_written_is_told_and_stops_nobody(cache: Path, day: Path) -> None:
     cache.parent.write_text("a file where the folder should be")
-    with pytest.warns(RuntimeWarning, match="rows near the square are not kept"):
+    with pytest.warns(RuntimeWarning, match="rows near the area are not cached"):
         assert len(found(day)) > 0
 
 
@@ -125,17 +125,18 @@ def test_numbers_come_back_to_the_last_bit(cache: Path) -> None:
     rng = np.random.default_rng(0)
     odd = np.array([-0.0, 0.1 + 0.2, 1e-300, -2.5e15, 7.0])
     for t, x in ((1351038629 + rng.integers(0, 10**7, 5) / 1000, odd), (odd, np.arange(5.0))):
-        rows = blocks.Rows(t, np.array([1.0, 1, 2, 3, 5e9]), x, rng.normal(size=5))
-        kept_rows.remember((5, "ab"), {"which": str(t)}, rows, blocks.Tally(9, 2.5, first=(3, "ragged")))
-        back, seen = kept_rows.find(5, {"which": str(t)}, lambda: (5, "ab")) or (None, None)
-        assert seen == blocks.Tally(9, 2.5, first=(3, "ragged"))
+        rows = blocks.FileRows(t, np.array([1.0, 1, 2, 3, 5e9]), x, rng.normal(size=5))
+        summary = blocks.FileSummary(9, 2.5, first_fault=(3, "ragged"))
+        near_rows_cache.store((5, "ab"), {"which": str(t)}, rows, summary)
+        back, seen = near_rows_cache.load(5, {"which": str(t)}, lambda: (5, "ab")) or (None, None)
+        assert seen == summary
         for ours, theirs in zip(rows, back, strict=True):
             assert ours.tobytes() == theirs.tobytes()
 
 
 def test_two_may_keep_the_same_at_once(cache: Path, day: Path) -> None:
     fresh = found(day)
-    kept_rows.clear()
+    near_rows_cache.clear()
     with ThreadPoolExecutor(2) as two:  # each entry is written whole: tests/test_files.py has processes
         for ours in two.map(found, [day] * 4):
             assert same(ours, fresh)

@@ -7,7 +7,7 @@ import pytest
 from helpers.track_tables import make_crowd, make_tracks, make_walk
 
 import szlib
-from szlib.encounters.nearby import near_square
+from szlib.encounters.near_rows import select_near_rows
 from szlib.tracks import funnels
 
 SQUARE = szlib.Square(x=(0, 14), y=(0, 14))
@@ -25,7 +25,7 @@ def crowd() -> pd.DataFrame:
 @pytest.mark.parametrize("asked", [{}, {"duration": 1.0}, {"kinds": "strangers"}, {"throughout": True}])
 @pytest.mark.parametrize("narrower", [0.0, 1.0])
 def test_they_are_those_of_all_rows(crowd: pd.DataFrame, asked: dict[str, object], narrower: float) -> None:
-    near = near_square(crowd, SQUARE, 3.0)
+    near = select_near_rows(crowd, SQUARE, 3.0)
     square = SQUARE.grown(-narrower)
     found, whole = (szlib.find_encounters(rows, square=square, **asked) for rows in (near, crowd))
     assert len(whole) > 100
@@ -35,12 +35,12 @@ def test_they_are_those_of_all_rows(crowd: pd.DataFrame, asked: dict[str, object
 
 def test_those_who_never_come_and_what_is_long_after_are_elsewhere(crowd: pd.DataFrame) -> None:
     through = make_walk((-20, 4), (1, 0), duration=60)  # inside from 20 to 34 s, within 5 m from 15 to 39 s
-    near = near_square(make_tracks(through, make_walk((-3, 26), (1, 0), person=2)), SQUARE, 3.0)
+    near = select_near_rows(make_tracks(through, make_walk((-3, 26), (1, 0), person=2)), SQUARE, 3.0)
     assert near["id"].unique().tolist() == [1]
     assert near["t"].min() == pytest.approx(15 - 0.5)
     assert near["t"].max() == pytest.approx(39 + 3)
     (stage,) = funnels.get(near)
     assert (stage["entered"], stage["kept"]) == (601 + 41, len(near))
-    assert len(near_square(crowd, SQUARE.grown(-6), 3.0)) < len(near_square(crowd, SQUARE, 3.0)) / 2
+    assert len(select_near_rows(crowd, SQUARE.grown(-6), 3.0)) < len(select_near_rows(crowd, SQUARE, 3.0)) / 2
     with pytest.raises(szlib.DataError, match="the table is empty"):
-        near_square(crowd.iloc[:0], SQUARE, 3.0)
+        select_near_rows(crowd.iloc[:0], SQUARE, 3.0)

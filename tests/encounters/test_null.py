@@ -89,7 +89,7 @@ def test_errors(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
         szlib.null_encounters(tracks, progress=False, minutes=(1, 30))
     with pytest.raises(DataError, match="from 0 to 6; got 7"):
         null.one(7)
-    with pytest.raises(TypeError, match="min_distanse"):
+    with pytest.raises(DataError, match=r"unknown parameter \['min_distanse'"):
         szlib.null_encounters(tracks, shifts=1, progress=False, min_distanse=1.0)
 
 

@@ -310,9 +310,9 @@ def test_what_spoils_an_encounter_is_named(scene: str) -> None:
 @pytest.mark.parametrize(
     ("low", "high", "reason"),
     [
-        (-1.0, 7.9, "a corner leaves the square within the window"),
-        (-1.0, 4.9, "a corner of the space outside the square"),
-        (3.05, 20.0, "not in the square"),
+        (-1.0, 7.9, "a corner leaves the area within the window"),
+        (-1.0, 4.9, "a corner of the space outside the area"),
+        (3.05, 20.0, "not in the area"),
     ],
 )
 def test_a_corner_that_leaves_the_square(low: float, high: float, reason: str) -> None:

@@ -9,7 +9,7 @@ from helpers.noninteracting_crowd import noninteracting_crowd
 from helpers.track_tables import DAY, make_tracks, make_walk
 
 import szlib
-from szlib.encounters.time_shift import APART, Crowd
+from szlib.encounters.time_shift import COMPANION_SEPARATION, ShiftableTracks
 from szlib.errors import DataError
 from szlib.tracks import funnels
 from szlib.tracks.clock import nearest_tick
@@ -148,21 +148,23 @@ def test_companions_are_taken_apart() -> None:
         for g in range(29)
         for k in range(3)
     ]
-    crowd = Crowd.of(make_tracks(*walks))
+    crowd = ShiftableTracks.from_tracks(make_tracks(*walks))
     assert len(crowd.companions) == 29 * 3
     one, other = crowd.companions.T
     period = int(crowd.period[0])
     for seed in range(20):
-        apart = np.diff(crowd.shifts(seed, MINUTES)[crowd.companions], axis=1).ravel() % period
-        assert np.minimum(apart, period - apart).min() >= 10 * APART
-    alone = Crowd(**{**crowd.__dict__, "companions": crowd.companions[:0]})
-    gaps = np.abs(np.concatenate([np.subtract(*alone.shifts(s, MINUTES)[[one, other]]) for s in range(20)]))
-    assert (gaps < 10 * APART).sum() > 10
+        apart = np.diff(crowd.draw_shifts(seed, MINUTES)[crowd.companions], axis=1).ravel() % period
+        assert np.minimum(apart, period - apart).min() >= 10 * COMPANION_SEPARATION
+    alone = ShiftableTracks(**{**crowd.__dict__, "companions": crowd.companions[:0]})
+    gaps = np.abs(
+        np.concatenate([np.subtract(*alone.draw_shifts(s, MINUTES)[[one, other]]) for s in range(20)])
+    )
+    assert (gaps < 10 * COMPANION_SEPARATION).sum() > 10
 
 
 def test_who_only_passes_is_no_companion() -> None:
     walks = [make_walk((-18, 0), (1, 0), person=1), make_walk((-14, 0.5), (-1, 0), person=2)]
-    assert len(Crowd.of(make_tracks(*walks)).companions) == 0
+    assert len(ShiftableTracks.from_tracks(make_tracks(*walks)).companions) == 0
 
 
 # --- errors ------------------------------------------------------------------------------------------

@@ -13,11 +13,11 @@ from helpers.raw_days import SPACE, assert_streamed_as_whole, encounters, make_r
 
 import szlib
 from szlib.encounters import blocks, cells
-from szlib.encounters.near_rows import read_near_square
+from szlib.encounters.near_rows import read_near_area
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
-from szlib.tracks.formats import open_file
+from szlib.tracks.formats.layouts import quick_scan, recognise
 from szlib.tracks.readers import read_raw
 
 SETTINGS = [
@@ -38,7 +38,7 @@ def test_the_encounters_are_those_of_the_whole_day(
     max_gap: float | None,
     rows_at_once: int,
 ) -> None:
-    monkeypatch.setattr(blocks, "_ROWS_AT_ONCE", rows_at_once)
+    monkeypatch.setattr(blocks, "_BLOCK_ROWS", rows_at_once)
     found = 0
     for seed in range(4):
         path = write_raw_day(tmp_path / "day.csv", make_raw_day(seed, wild=seed % 2 == 0))
@@ -47,23 +47,21 @@ def test_the_encounters_are_those_of_the_whole_day(
 
 
 def test_rows_in_any_order_give_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(blocks, "_ROWS_AT_ONCE", 1000)
+    monkeypatch.setattr(blocks, "_BLOCK_ROWS", 1000)
     rows = make_raw_day(1, wild=False)
     shuffled = write_raw_day(tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0))
     assert assert_streamed_as_whole(shuffled, square=szlib.ATC_SQUARE, duration=1.0) > 0
-    in_order = read_near_square(
-        write_raw_day(tmp_path / "a.csv", rows), square=szlib.ATC_SQUARE, duration=1.0
-    )
+    in_order = read_near_area(write_raw_day(tmp_path / "a.csv", rows), area=szlib.ATC_SQUARE, duration=1.0)
     given = {"duration": 1.0, "space": SPACE}
-    any_order = read_near_square(shuffled, square=szlib.ATC_SQUARE, duration=1.0)
+    any_order = read_near_area(shuffled, area=szlib.ATC_SQUARE, duration=1.0)
     pd.testing.assert_frame_equal(encounters(in_order, **given), encounters(any_order, **given))
 
 
 def test_slots_that_are_shared_only_keep_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_raw_day(tmp_path / "day.csv", make_raw_day(3))
-    apart = len(read_near_square(path, square=szlib.ATC_SQUARE, duration=1.0))
+    apart = len(read_near_area(path, area=szlib.ATC_SQUARE, duration=1.0))
     monkeypatch.setattr(cells, "_CELLS", 64)
-    assert len(read_near_square(path, square=szlib.ATC_SQUARE, duration=1.0)) > apart
+    assert len(read_near_area(path, area=szlib.ATC_SQUARE, duration=1.0)) > apart
     assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=1.0) > 0
 
 
@@ -75,11 +73,11 @@ def test_packed_files_and_bad_rows(tmp_path: Path) -> None:
     path.write_bytes(gzip.compress("\n".join(lines).encode()))
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        raw = read_near_square(path, square=szlib.ATC_SQUARE, duration=3.0)
+        raw = read_near_area(path, area=szlib.ATC_SQUARE, duration=3.0)
     with warnings.catch_warnings(record=True) as expected:
         warnings.simplefilter("always")
         whole = read_raw(path)
-    assert "first at line 6: rejected rows" in str(told[0].message)
+    assert "first at line 6: rows set aside" in str(told[0].message)
     assert [str(each.message) for each in told] == [str(each.message) for each in expected]
     assert funnels.get(raw)[0] == funnels.get(whole)[0]
     assert sum(funnels.get(raw)[0]["rejected"].values()) == 3
@@ -110,19 +108,19 @@ DAMAGED = {
 
 @pytest.mark.parametrize("bad", DAMAGED.values(), ids=DAMAGED.keys())
 def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bad: str) -> None:
-    monkeypatch.setattr(blocks, "_ROWS_AT_ONCE", 7)
+    monkeypatch.setattr(blocks, "_BLOCK_ROWS", 7)
     path = tmp_path / "day.csv"
     lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
     path.write_bytes("\n".join(lines).encode("latin-1"))
-    layout, scan = open_file(path, path, szlib.ReadOptions())
-    found = blocks.Blocks(layout.quick_scan(path), scan, layout.metres, layout.seconds)
-    rows = blocks.Rows(*map(np.concatenate, zip(*found, strict=True)))
+    layout, scan = recognise(path, path, szlib.ReadOptions())
+    found = blocks.UsableBlocks(quick_scan(path, layout), scan, layout.metres, layout.seconds)
+    rows = blocks.FileRows(*map(np.concatenate, zip(*found, strict=True)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)
         whole = read_raw(path)
     read = funnels.get(whole)[0]
-    assert (found.tally.good, dict(found.tally.reasons)) == (read["kept"], read["rejected"])
-    assert found.tally.first is None or found.tally.first[0] == 31
+    assert (found.summary.usable, dict(found.summary.reasons)) == (read["kept"], read["rejected"])
+    assert found.summary.first_fault is None or found.summary.first_fault[0] == 31
     np.testing.assert_array_equal(rows.id, whole["id"])
     np.testing.assert_array_equal(rows.y * layout.metres, whole["y"])
 
@@ -130,11 +128,11 @@ def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.Monk
 def test_the_plaza_and_a_place_where_nobody_is(tmp_path: Path) -> None:
     path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(encounters=100))
     assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=3.0) > 0
-    elsewhere = read_near_square(path, square=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0)
+    elsewhere = read_near_area(path, area=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0)
     assert len(elsewhere) == 0
     assert list(elsewhere.columns) == ["day", "id", "t", "x", "y"]
     read, near = funnels.get(elsewhere)
-    assert near["rejected"] == {"never near the square": read["kept"]}
+    assert near["rejected"] == {"never near the area": read["kept"]}
 
 
 def test_what_cannot_be_read_is_told_as_by_read_tracks(tmp_path: Path) -> None:
@@ -146,7 +144,7 @@ def test_what_cannot_be_read_is_told_as_by_read_tracks(tmp_path: Path) -> None:
     in_metres = write_raw_day(tmp_path / "metres.csv", rows.assign(x=rows["x"] / 1000, y=rows["y"] / 1000))
     for path in (mostly_bad, in_metres, tmp_path / "missing.csv", tmp_path):
         with pytest.raises(szlib.DataError) as ours:
-            read_near_square(path, square=szlib.ATC_SQUARE, duration=3.0)
+            read_near_area(path, area=szlib.ATC_SQUARE, duration=3.0)
         with pytest.raises(szlib.DataError) as theirs:
             read_raw(path)
         assert str(ours.value) == str(theirs.value)

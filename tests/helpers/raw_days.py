@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.encounters.near_rows import read_near_square
+from szlib.encounters.near_rows import read_near_area
 from szlib.tracks import funnels
 from szlib.tracks.clock import to_clock
 from szlib.tracks.readers import read_raw
@@ -52,16 +52,14 @@ def assert_streamed_as_whole(
     path: Path, *, square: szlib.Square, duration: float, max_gap: float | None = None
 ) -> int:
     """Check that both ways agree to the last bit, and return the number of samples."""
-    near = read_near_square(
-        path, square=square, duration=duration, options=szlib.ReadOptions(max_gap=max_gap)
-    )
+    near = read_near_area(path, area=square, duration=duration, options=szlib.ReadOptions(max_gap=max_gap))
     given = {"square": square, "duration": duration, "max_gap": max_gap, "space": SPACE}
     streamed, whole = encounters(near, **given), encounters(read_raw(path), **given)
     pd.testing.assert_frame_equal(streamed, whole, check_exact=True)
     ours, theirs = funnels.get(streamed), funnels.get(whole)
     assert ours[-1] == theirs[-1], "windows are turned away for the same reasons"
-    assert {k: v for k, v in ours[-2]["rejected"].items() if k != "not in the square"} == {
-        k: v for k, v in theirs[-2]["rejected"].items() if k != "not in the square"
+    assert {k: v for k, v in ours[-2]["rejected"].items() if k != "not in the area"} == {
+        k: v for k, v in theirs[-2]["rejected"].items() if k != "not in the area"
     }
     assert ours[0] == theirs[0], "every row of the file is counted"
     for before, after in zip(ours[:3], ours[1:4], strict=True):

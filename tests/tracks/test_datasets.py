@@ -106,7 +106,7 @@ def test_days_are_those_of_the_files_names_in_japan(served_days, tmp_path):
     assert begin.tolist() == [1351040400.0, 1351386000.0], "10 o'clock of either day"
     here = szlib.read_tracks(datasets.find("atc-10-days"), tz="UTC")
     assert here["t"].tolist() == tracks["t"].tolist(), "the mall is in Japan, wherever we are"
-    assert quality.summarise_seconds(served_days / "1024.csv")["sensor_speed"].tolist() == [1.0] * 9
+    assert quality.seconds(served_days / "1024.csv")["sensor_speed"].tolist() == [1.0] * 9
     extracted = szlib.extract_days("atc-10-days", out=tmp_path / "days", progress=False)
     assert extracted.table["day"].tolist() == ["2012-10-24", "2012-10-28"]
     assert (extracted.table["status"] == "done").all()

@@ -29,7 +29,7 @@ def day(tmp_path: Path) -> Path:
 
 
 def test_speed_by_the_sensor_and_by_displacement(day: Path) -> None:
-    rows = quality.summarise_seconds(day)
+    rows = quality.seconds(day)
     walker, stander = rows[rows["id"] == 1], rows[rows["id"] == 2]
     np.testing.assert_allclose(walker["moved"].dropna(), 1.0)
     np.testing.assert_allclose(walker["sensor_speed"], 1.0)
@@ -41,7 +41,7 @@ def test_speed_by_the_sensor_and_by_displacement(day: Path) -> None:
 
 
 def test_visits_and_standing_people_by_hour(day: Path) -> None:
-    table = quality.count_visits_by_hour(quality.summarise_seconds(day))
+    table = quality.by_hour(quality.seconds(day))
     assert table[["day", "hour", "visits"]].to_numpy().tolist() == [
         ["2012-10-24", 10, 1],
         ["2012-10-24", 11, 1],
@@ -50,10 +50,10 @@ def test_visits_and_standing_people_by_hour(day: Path) -> None:
 
 
 def test_frames_gaps_and_lengths(day: Path) -> None:
-    intervals = quality.measure_frame_intervals(day)
+    intervals = quality.frame_intervals(day)
     assert np.isclose(np.median(intervals), 0.04, atol=1e-6)
     assert len(intervals) == 524
-    found = quality.summarise_people(day)
+    found = quality.people(day)
     assert found["id"].tolist() == [1, 2]
     np.testing.assert_allclose(found["longest_gap"], [0.04, 3.04], atol=1e-5)
     np.testing.assert_allclose(found["last_seen"] - found["first_seen"], [9.96, 13.96], atol=1e-5)
@@ -64,10 +64,7 @@ def test_files_without_a_speed_have_none(tmp_path: Path) -> None:
     rows = pd.DataFrame({"t": BEGIN + np.arange(5.0), "id": 1, "x": np.arange(5.0), "y": 0.0})
     (tmp_path / "a.csv").write_text(as_tidy(rows))
     (tmp_path / "b.csv").write_text(as_1hz(rows))
-    tidy, hourly = (
-        quality.summarise_seconds(tmp_path / "a.csv"),
-        quality.summarise_seconds(tmp_path / "b.csv"),
-    )
+    tidy, hourly = quality.seconds(tmp_path / "a.csv"), quality.seconds(tmp_path / "b.csv")
     assert tidy["sensor_speed"].isna().all()
     np.testing.assert_allclose(hourly["sensor_speed"], 1.2)
     np.testing.assert_allclose(tidy["moved"], hourly["moved"])
@@ -78,25 +75,25 @@ def test_what_thinning_costs_is_known_for_a_bend() -> None:
     walk = make_walk((0, 0), (1, 0), duration=12.0)
     walk[["x", "y"]] = 5 * np.column_stack([np.cos(turn), np.sin(turn)])
     sagitta = 5 * (1 - np.cos(0.2))  # between samples 1 s apart the chord is so far from the bend
-    rms, high = quality.measure_thinning_error(make_tracks(walk))
+    rms, high = quality.thinning_error(make_tracks(walk))
     assert rms == pytest.approx(sagitta * np.sqrt(8 / 15), rel=0.05), "the RMS of a parabola over its chord"
     assert sagitta * 0.9 < high < sagitta * 1.01
     straight = make_tracks(make_walk((0, 0), (1, 0.5), duration=12.0))
-    assert quality.measure_thinning_error(straight)[0] < 1e-9
-    rough = quality.measure_thinning_error(make_tracks(walk), every=2.0)[0]
+    assert quality.thinning_error(straight)[0] < 1e-9
+    rough = quality.thinning_error(make_tracks(walk), every=2.0)[0]
     assert rough == pytest.approx(4 * rms, rel=0.05), "an error of second order"
 
 
 def test_what_cannot_be_thinned_is_refused() -> None:
     tracks = make_tracks(make_walk((0, 0), (1, 0), duration=0.5))
     with pytest.raises(szlib.DataError, match=r"no piece of these tracks is longer than 1\.0 s"):
-        quality.measure_thinning_error(tracks)
+        quality.thinning_error(tracks)
     for every in (0.1, 0.25, -1.0):
         with pytest.raises(szlib.DataError, match="every must be a multiple"):
-            quality.measure_thinning_error(tracks, every=every)
+            quality.thinning_error(tracks, every=every)
 
 
 def test_what_thinning_costs_people() -> None:
-    rms, high = quality.measure_thinning_error(szlib.read_tracks(real_data("eth") / "seq_eth_obsmat.txt"))
+    rms, high = quality.thinning_error(szlib.read_tracks(real_data("eth") / "seq_eth_obsmat.txt"))
     assert 0.04 < rms < 0.06
     assert high < 0.13

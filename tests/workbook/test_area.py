@@ -10,7 +10,7 @@ import shapely
 from helpers.track_tables import make_crowd, make_hall, make_tracks, make_walk
 
 import szlib
-from szlib.encounters.one_day import check_met
+from szlib.encounters.one_day import require_encounters
 from szlib.workbook.cli import main
 from szlib.workbook.record import NotebookRecord
 
@@ -54,8 +54,8 @@ def test_what_is_nobodys_is_found(hall, capsys):
 def test_extract_takes_an_area_and_tells_it(hall, tmp_path, capsys):
     assert main(["extract", str(hall), "--out", str(tmp_path / "days"), "--square", "0", "12", "0", "8"]) == 0
     assert "area: 0.0 12.0 0.0 8.0" in capsys.readouterr().out
-    record = json.loads((tmp_path / "days" / "hall.json").read_text())
-    assert record["parameters"]["square"] == "0.0 12.0 0.0 8.0"
+    record = json.loads((tmp_path / "days" / "hall.parquet.json").read_text())
+    assert record["made_of"]["parameters"]["area"] == "0.0 12.0 0.0 8.0"
 
 
 def test_one_area_only(hall, capsys):
@@ -110,8 +110,8 @@ ROOM = szlib.Square(x=(-20, 20), y=(-20, 20))
 APART = make_tracks(make_walk((0, 0), (1, 0)), make_walk((0, 15), (1, 0), person=2))
 CROWDED = make_tracks(*(make_walk((0.3 * k, 0.2 * k), (1, 0), person=k) for k in range(8)))
 EMPTIED = {
-    "not in the square; give an area in which people walked": (APART, szlib.Square(x=(50, 60), y=(0, 9))),
-    "corner of the space outside the square; the space ahead": (APART, szlib.Square(x=(-1, 20), y=(-1, 1))),
+    "not in the area; give an area in which people walked": (APART, szlib.Square(x=(50, 60), y=(0, 9))),
+    "corner of the space outside the area; the space ahead": (APART, szlib.Square(x=(-1, 20), y=(-1, 1))),
     "slower than 0.4 m/s; are unit": (APART.assign(vx=APART["vx"] / 10), ROOM),
     "nobody in the space; people were never": (APART, ROOM),
     "other person nearer than 1.0 m; people came": (
@@ -130,14 +130,14 @@ def test_the_condition_that_emptied_it_is_told_with_its_funnel(told):
     tracks, square = EMPTIED[told]
     samples = szlib.find_encounters(tracks, square=square)
     with pytest.raises(szlib.DataError) as error:
-        check_met(samples)
-    assert f"What emptied it: {told}" in str(error.value).replace("a corner", "corner")
+        require_encounters(samples)
+    assert f"The last condition: {told}" in str(error.value).replace("a corner", "corner")
     assert str(square) in str(error.value)
 
 
 def test_where_people_met_nothing_is_said():
     samples = szlib.find_encounters(make_crowd(77, people=160, seconds=200, square=ROOM), square=ROOM)
-    assert check_met(samples) is samples
+    assert require_encounters(samples) is samples
 
 
 @pytest.mark.usefixtures("at_once")
@@ -157,4 +157,4 @@ def test_a_run_stops_at_the_first_empty_stage(notebooks, tmp_path, capsys):
     }
     assert not found["passed"]
     printed = capsys.readouterr()
-    assert "What emptied it: not in the square" in printed.err
+    assert "The last condition: not in the area" in printed.err

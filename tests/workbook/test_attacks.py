@@ -109,7 +109,7 @@ def test_an_extraction_gives_its_own_samples_or_none(tmp_path):
     first = szlib.extract_days(day, out=tmp_path / "out", progress=False)
     assert len(first.samples()) > 0
     szlib.extract_days(day, out=tmp_path / "out", progress=False, min_speed=1.2)
-    with pytest.raises(DataError, match="no longer what this extraction has left there"):
+    with pytest.raises(DataError, match="is not the result of this extraction"):
         first.samples()
 
 
@@ -119,15 +119,15 @@ def test_a_poisoned_day_is_a_line_and_the_others_are_done(tmp_path, monkeypatch)
     (tmp_path / "other.csv").write_bytes(day.read_bytes())
     import szlib.encounters.days as days
 
-    real = days.day_key
+    real = days.describe_source
 
-    def poisoned(files, content, chain):
+    def poisoned(files, *arguments):
         if files[0].endswith("other.csv"):
             raise KeyError("foreign")
-        return real(files, content, chain)
+        return real(files, *arguments)
 
-    monkeypatch.setattr(days, "day_key", poisoned)
-    monkeypatch.setattr(days, "_day_of", lambda file, chain: None)
+    monkeypatch.setattr(days, "describe_source", poisoned)
+    monkeypatch.setattr(days, "_calendar_day", lambda file, options: None)
     done = szlib.extract_days(tmp_path, out=tmp_path / "out", progress=False).table.set_index("day")
     assert done["status"].to_dict() == {"day": "done", r"latin\xe4": "failed", "other": "failed"}
     assert done["why"]["other"] == "KeyError: 'foreign'"

@@ -74,8 +74,8 @@ def test_knobs_of_the_method_reach_encounters_and_zone_and_their_names(record, m
 def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monkeypatch):
     made = []
 
-    def fake(tracks, square, **_):
-        assert square == szlib.Square(x=(0, 12), y=(0, 8))
+    def fake(tracks, area, **_):
+        assert area == szlib.Square(x=(0, 12), y=(0, 8))
         made.append(len(tracks))
         return pd.DataFrame({"encounter": [0], "distance": [1.0]})
 

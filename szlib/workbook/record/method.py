@@ -11,7 +11,7 @@ from typing import Any
 
 from ...control.settings import MPCSettings
 from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
-from ...encounters.one_day import Chain
+from ...encounters.settings import EncounterSettings
 from ...zones.outliers import R_MAX
 from ...zones.quantile import SHARE
 from ...zones.social_zone import SPEEDS
@@ -32,9 +32,9 @@ class Method:
 
     space_width: float = PAPER_SPACE.width
     space_length: float = PAPER_SPACE.length
-    duration: float = Chain.duration
-    min_distance: float = Chain.min_distance
-    min_speed: float = Chain.min_speed
+    duration: float = EncounterSettings.duration
+    min_distance: float = EncounterSettings.min_distance
+    min_speed: float = EncounterSettings.min_speed
     r_max: float = R_MAX
     q: float = SHARE
     zone_speed: float = MPCSettings.zone_speed

@@ -23,13 +23,15 @@ from ... import __version__
 from ...encounters.areas import as_area
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
-from ...encounters.one_day import Chain, check_met
+from ...encounters.one_day import require_encounters, with_area
+from ...encounters.settings import EncounterSettings
 from ...errors import DataError, ZoneError
 from ...files import claim_folder, file_content, load_cached, store_cached, write_checksum, write_file
 from ...plaza.generation import make_plaza
 from ...plaza.settings import PlazaSettings
 from ...tracks import datasets
 from ...tracks.clock import read_tracks
+from ...tracks.options import ReadOptions
 from ...zones.ellipses import Ellipse
 from ...zones.social_zone import SocialZone
 from . import places
@@ -116,7 +118,7 @@ class NotebookRecord:
         if content is not None:
             return pd.read_parquet(io.BytesIO(content))
         tracks = self.tracks()
-        found = find_encounters(tracks, square=self.square(tracks), **self.method.search())
+        found = find_encounters(tracks, area=self.square(tracks), **self.method.search())
         return self.keep_encounters(found)
 
     def square(self, tracks: pd.DataFrame | None = None) -> Area:
@@ -126,14 +128,14 @@ class NotebookRecord:
         """
         if content := load_cached(self.out / "area.txt", self._source()):
             return as_area(content.decode())
-        chain = Chain(square=self.area or None)
-        area = chain.settled(self.files(), tracks).square
+        settings = EncounterSettings(area=self.area or None)
+        area = with_area(settings, self.files(), ReadOptions(), tracks).area
         store_cached(self.out / "area.txt", str(area).encode(), self._source())
         return as_area(area)
 
     def keep_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
         """Leave the encounters for the notebooks to come; DataError, saying why, where there are none."""
-        check_met(samples)
+        require_encounters(samples)
         content = io.BytesIO()
         samples.to_parquet(content)
         store_cached(self.out / "encounters.parquet", content.getvalue(), self._source())
@@ -223,7 +225,7 @@ class NotebookRecord:
         files = [[file.name, *file_content(file)] for file in self.files()]
         made = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "area": self.area}
         made["szlib"] = __version__
-        made["parameters"] = Chain(**self.method.search()).parameters()
+        made["parameters"] = EncounterSettings(**self.method.search()).as_json()
         if zone:
             made["fit"] = self.method.fit()
         return json.loads(json.dumps(made))  # type: ignore[no-any-return]

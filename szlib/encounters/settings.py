@@ -1,0 +1,96 @@
+"""What counts as an encounter: `EncounterSettings`, carried through every search."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import DataError
+from ..tracks.clock import TICKS_PER_SECOND
+from .areas import AUTO, as_area
+from .geometry import PAPER_SPACE, AttentionalSpace
+
+_LONGEST_WINDOW = 3600.0
+"""Upper limit of the duration of a window [s]."""
+
+
+@dataclass(frozen=True)
+class EncounterSettings:
+    """Settings of `szlib.find_encounters` and of every function that calls it, validated when built.
+
+    Parameters
+    ----------
+    area : where the attentional space must stay: a `Square`, a Shapely polygon, PedPy's ``WalkableArea``,
+        text or a file, as for `szlib.as_area`; or "auto", the `szlib.walked_area` of the tracks.  None
+        stands for `ATC_SQUARE`; for files in another format than the ATC mall's it stands for "auto".
+    space : the attentional space of the reference pedestrian.
+    duration : of a window [s], a multiple of 0.1 (paper: 3).
+    min_distance : of the other person when the window opens [m] (paper: 1).
+    min_speed : of the reference pedestrian, throughout the window [m/s] (paper: 0.4).
+    throughout : also require that the other person stays inside the space for the whole window.
+        That reading of the paper never sees two people pass each other (assumed: False).
+
+    Raises
+    ------
+    DataError : a value has no meaning.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> settings = szlib.EncounterSettings(area="0 12 0 8", min_speed=0.6)
+    >>> settings.area
+    Square(x=(0.0, 12.0), y=(0.0, 8.0))
+    >>> szlib.EncounterSettings(duration=0.25)
+    Traceback (most recent call last):
+    ...
+    szlib.errors.DataError: duration must be a multiple of 0.1 s, the step of the clock; got 0.25 s
+    """
+
+    area: object = None
+    space: AttentionalSpace = PAPER_SPACE
+    duration: float = 3.0
+    min_distance: float = 1.0
+    min_speed: float = 0.4
+    throughout: bool = False
+
+    def __post_init__(self) -> None:
+        automatic = isinstance(self.area, str) and self.area.strip() == AUTO
+        if self.area is not None:
+            object.__setattr__(self, "area", AUTO if automatic else as_area(self.area))
+        if not (
+            0 < self.duration < _LONGEST_WINDOW
+            and 0 <= self.min_distance < np.inf
+            and 0 < self.min_speed < np.inf
+        ):
+            raise DataError(
+                f"expected 0 < duration < {_LONGEST_WINDOW:g} s, min_distance >= 0 m and min_speed > 0 m/s; "
+                f"got {self.duration} s, {self.min_distance} m, {self.min_speed} m/s"
+            )
+        if abs(self.duration * TICKS_PER_SECOND - self.steps) > 1e-6:
+            raise DataError(
+                f"duration must be a multiple of 0.1 s, the step of the clock; got {self.duration} s"
+            )
+
+    @property
+    def steps(self) -> int:
+        """Steps of the clock in a window."""
+        return round(self.duration * TICKS_PER_SECOND)
+
+    def with_parameters(self, parameters: Mapping[str, Any]) -> EncounterSettings:
+        """These settings with `parameters` (names and values) in place of their own.
+
+        `square` is accepted for `area`.  Raises DataError for an unknown name, or if both are given.
+        """
+        known = [each.name for each in fields(self)]
+        if unknown := sorted(set(parameters) - {*known, "square"}):
+            raise DataError(f"unknown parameter {unknown}; expected some of {known}")
+        if {"area", "square"} <= set(parameters):
+            raise DataError("both area and square are given; they mean the same: give area alone")
+        return replace(self, **{"area" if name == "square" else name: v for name, v in parameters.items()})
+
+    def as_json(self) -> dict[str, Any]:
+        """Every setting as a JSON value; the area as text from which `szlib.as_area` gives it again."""
+        return asdict(self) | {"area": None if self.area is None else str(self.area)}
