@@ -1,4 +1,4 @@
-"""JupyterLab on the loopback, on a copy of the repository, and a Chromium of this machine to open it in."""
+"""JupyterLab on a copy of the repository, and a Chromium of this machine to open it in."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ import pytest
 ROOT = Path(__file__).parents[2]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "microsoft-edge")
 REQUIRED = "SZLIB_BROWSER"
-"""Set where there must be a browser, as in CI: then the tests fail without one."""
+"""Set where a browser is required, as in CI: the tests fail without one."""
 SETTINGS = {
     "notebook-extension/tracker": {"windowingMode": "none"},
     "apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
 }
-"""Every cell is on the page, and nothing is asked of other servers."""
+"""Show every cell on the page, and ask nothing of other servers."""
 
 
 def chromium() -> str:
@@ -56,8 +56,8 @@ def copy(browser: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(ROOT / "pyproject.toml", folder)
     for arguments in (["init", "-q"], ["add", "-A"]):
         subprocess.run(["git", *arguments], cwd=folder, check=True)
-    who = ["-c", "user.name=szlib", "-c", "user.email=szlib@localhost"]
-    subprocess.run(["git", *who, "commit", "-q", "-m", "copy"], cwd=folder, check=True)
+    author = ["-c", "user.name=szlib", "-c", "user.email=szlib@localhost"]
+    subprocess.run(["git", *author, "commit", "-q", "-m", "copy"], cwd=folder, check=True)
     return folder
 
 

@@ -1,4 +1,4 @@
-"""The notebooks in a real browser: run, moved by hand, saved; and the report made of them."""
+"""The notebooks in a real browser: executed, operated by hand and saved; and their report."""
 
 import subprocess
 
@@ -34,7 +34,7 @@ class Notebook:
         self.page.wait_for_function("window.done", timeout=4 * MINUTES)
 
     def save(self):
-        """Save, and what is in the file then."""
+        """Save, and return the content of the file."""
         self.command("docmanager:save")
         self.page.wait_for_function("!window.jupyterapp.shell.currentWidget.context.model.dirty")
         return nbformat.read(self.file, as_version=4)
@@ -42,7 +42,7 @@ class Notebook:
 
 @pytest.fixture
 def notebook(browser, lab, copy):
-    """Opens a notebook by its name."""
+    """Open a notebook by its name."""
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
     page.set_default_timeout(MINUTES)
     yield lambda name: Notebook(page, lab, copy, name)
@@ -56,8 +56,8 @@ def errors(saved):
     ]
 
 
-def in_step(file, saved):
-    """The pair says the same, and nothing but outputs has changed since the commit."""
+def check_pair(file, saved):
+    """Check that the pair agrees, and that only outputs have changed since the commit."""
     script = jupytext.read(file.with_suffix(".py"))
     for a, b in zip(saved.cells, script.cells, strict=True):
         assert (a.cell_type, a.source, a.metadata.get("tags")) == (
@@ -75,20 +75,12 @@ def in_step(file, saved):
 
 
 def picture(locator):
-    """What a canvas shows."""
+    """The picture on a canvas."""
     return locator.evaluate("canvas => canvas.toDataURL()")
 
 
-def test_the_start_is_where_it_begins(notebook):
-    opened = notebook("00_start_here")
-    opened.run()
-    saved = opened.save()
-    assert errors(saved) == []
-    in_step(opened.file, saved)
-
-
 def test_an_exercise_is_solved(notebook, copy):
-    """What is typed in place of the stub is checked, and saved into both files of the pair."""
+    """An answer is checked, and saved into both files of the pair."""
     solved = jupytext.read(copy / "notebooks" / "solutions" / "sheet5_barriers.py")
     (answer,) = (c.source for c in solved.cells if c.source.startswith("def focal_distance"))
     opened = notebook("exercises/sheet5_barriers")
@@ -119,32 +111,32 @@ def test_a_slider_of_the_zones_draws_another_speed(notebook):
     )
     saved = opened.save()
     assert errors(saved) == []
-    in_step(opened.file, saved)
+    check_pair(opened.file, saved)
 
 
 def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
     opened = notebook("08_corridor")
     opened.run()
-    plays(opened.page)
+    check_player(opened.page)
     saved = opened.save()
     assert errors(saved) == []
-    in_step(opened.file, saved)
+    check_pair(opened.file, saved)
     home = copy.parent / "run"
     home.mkdir()
     nbformat.write(saved, home / "08_corridor.ipynb")
-    page, said = browser.new_page(), []
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda r: said.append(r.url) if r.url.startswith("http") else None)
+    page, messages = browser.new_page(), []
+    page.on("console", lambda message: messages.append(message.text))
+    page.on("pageerror", lambda error: messages.append(str(error)))
+    page.on("request", lambda r: messages.append(r.url) if r.url.startswith("http") else None)
     page.goto(document.write(home).as_uri())
-    plays(page)
+    check_player(page)
     broken = page.evaluate("[...document.images].filter((i) => !i.complete || !i.naturalWidth).length")
-    assert (said, broken) == ([], 0)
+    assert (messages, broken) == ([], 0)
     page.close()
 
 
-def plays(page):
-    """The first player goes on when it is asked to, stops, and shows the time it is set to."""
+def check_player(page):
+    """Check that the first player starts, stops, and shows the time it is set to."""
     player = page.locator("figure.szlib-player").first
     player.scroll_into_view_if_needed()
     slider, canvas = player.locator("input[type=range]"), player.locator("canvas").first
@@ -203,4 +195,4 @@ def test_the_laboratory_is_dragged_set_run_and_shared(notebook):
     assert page.locator(".szlib-refused").text_content() == "" and told.count() == 2
     saved = opened.save()
     assert errors(saved) == []
-    in_step(opened.file, saved)
+    check_pair(opened.file, saved)

@@ -1,13 +1,14 @@
-"""The hostile suite: `python tests/hostile [--long] [NAME ...]`; its short form is part of `make test`.
+"""The attacks: `python tests/hostile [--long] [NAME ...]`; their short form is part of `make test`.
 
-Every module here that is no test has `attack(long) -> {what: how many}`: what was tried and what came of it.
-Each of several runs in an interpreter of its own, for some fork, which nobody may who has threads.  Whatever
-is counted under a name that begins with "broken" must be 0: else the exit code is 1.  The tally is printed
-and written to results/hostile.json.
+Every module here that is not a test has a function `attack(long)`, which returns counts of what it tried
+and found.  Counts whose name begins with "broken" must be 0; otherwise the exit code is 1.  Several attacks
+run in one interpreter each, because some fork, which is not safe with threads.  The counts are printed and
+written to results/hostile.json.  The user's cache is not used.
 """
 
 import importlib
 import json
+import os
 import subprocess
 import sys
 import time
@@ -20,6 +21,7 @@ TALLY = Path("results/hostile.json")
 
 def main() -> int:
     sys.path.insert(0, str(HERE.parent))
+    os.environ["SZLIB_CACHE"] = "off"
     long = ["--long"] if "--long" in sys.argv else []
     names = [name for name in sys.argv[1:] if name != "--long"] or ATTACKS
     if unknown := sorted(set(names) - set(ATTACKS)):

@@ -1,7 +1,7 @@
-"""Command lines drawn from a grammar: each ends in time with 0, 1 or 2, says why, and harms nothing.
+"""Random command lines: each ends in time with exit code 0, 1 or 2, gives a reason, and harms no file.
 
-Each runs in a fork of a process that has imported everything (and used none of it: threads do not survive
-a fork), so that a thousand take minutes.
+Each runs in a fork of a process that has imported everything, so that a thousand take minutes.  This
+process uses none of its imports: threads do not survive a fork.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from szlib.workbook.record import places
 
 COUNT = {False: 40, True: 1000}
 LONGEST = 60
-"""No command takes longer than that [s]."""
+"""Time limit of a command [s]."""
 NOTEBOOK = """# %% tags=["parameters"]
 data = "synthetic"
 seed = 0
@@ -62,7 +62,7 @@ SIZES = ["4GB", "300MB", "1", "0", "-1", "much", "1e9", "9" * 40, "1 KB", ""]
 
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
-    """How many command lines there were, how they ended, and how many broke something."""
+    """Run random command lines, and count how they end and how many are broken."""
     tally = Counter({"broken command lines": 0})
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -74,7 +74,7 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
             code, printed = execute(line, place)
             wrong = judge(code, printed)
             if fingerprint(place) != before:
-                wrong = "it changed what is not its own"
+                wrong = "it changed files that are not its own"
                 before = fingerprint(place)
             if wrong:
                 print(f"{seed}-{number}: szlib {line}: {code}: {wrong}: {printed[-1500:]}", file=sys.stderr)
@@ -85,13 +85,13 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
 
 
 def judge(code: int, printed: str) -> str:
-    """What is wrong with the way in which a command ended."""
+    """What is wrong with the end of a command; empty if nothing is."""
     if code not in (0, 1, 2):
         return "an exit code of its own" if code >= 0 else "it hangs, or a signal ended it"
     if "Traceback" in printed or "Exception ignored" in printed:
         return "a foreign traceback"
     complaints = [text for text in printed.splitlines() if text.startswith(("szlib: ", "szlib "))]
-    return "" if code != 2 or complaints else "it does not say why"
+    return "" if code != 2 or complaints else "it gives no reason"
 
 
 def draw(rng: random.Random) -> list[str]:
@@ -127,7 +127,7 @@ def draw(rng: random.Random) -> list[str]:
 
 
 def furnish(place: Path) -> None:
-    """A folder with everything that the grammar names."""
+    """Make a folder with every file that the command lines name."""
     day = make_plaza(place / "day.csv", settings=PlazaSettings(encounters=20))
     (place / "two.csv").write_bytes(day.read_bytes()[:100_000].rsplit(b"\n", 1)[0] + b"\n")
     (place / "packed.csv.gz").write_bytes(gzip.compress(day.read_bytes()))
@@ -152,12 +152,12 @@ def furnish(place: Path) -> None:
 
 
 def fingerprint(place: Path) -> dict[str, str]:
-    """Everything that a command must leave as it is: all but its own results, and nothing unfinished."""
+    """Everything that a command must leave as it is, and unfinished files, which it must not leave."""
     ours = {"out", "days", "latin\udce4", "out\nline"}
     found = {}
     for path in sorted(place.rglob("*")):
         top = path.relative_to(place).parts[0]
-        if not path.name.startswith(".szlib-") and top in ours:
+        if top in ours and not path.name.startswith(".szlib-part-"):
             continue
         content = path.read_bytes() if path.is_file() else b""
         found[str(path.relative_to(place))] = hashlib.sha256(content).hexdigest()
@@ -165,7 +165,7 @@ def fingerprint(place: Path) -> dict[str, str]:
 
 
 def execute(line: list[str], place: Path) -> tuple[int, str]:
-    """Exit code (or minus the signal), and all that it printed."""
+    """Exit code (or minus the signal), and the printed text."""
 
     def command() -> None:
         os.setpgid(0, 0)

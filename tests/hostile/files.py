@@ -1,8 +1,8 @@
-"""A disk that is full at each write in turn, damage, clocks that jump: only what is whole is ever taken.
+"""A disk that is full at each write in turn, damaged files, and clocks that jump: no result is wrong.
 
-The fault is put in at the one door through which every file goes, `szlib.files`: half of the bytes are
-written, then there is no room.  Afterwards what was finished is intact, and the same call makes the same
-bytes (but for the times that steps took).
+Every file is written by `szlib.files`, where the fault is put in: half of the bytes are written, then there
+is no room.  Afterwards finished files are intact, and the same call makes the same bytes (except for the
+times of steps).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.workbook.record import NotebookRecord
 from szlib.workbook.record.method import Method
 
-DAMAGES = {False: 6, True: 300}
+DAMAGES = {False: 4, True: 300}
 JUMPS = {False: 2, True: 40}
 
 
@@ -59,7 +59,7 @@ class Disk:
 
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
-    """What was tried, and how often a result was lost, half-written, or another one."""
+    """Count the attacks, and the results that were missing, half-written or different."""
     tally = Counter({"broken after a full disk": 0, "broken after damage": 0, "broken by a clock": 0})
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), redirect_stdout(io.StringIO()):
         warnings.simplefilter("ignore", szlib.DataWarning)  # so few encounters make no good zone
@@ -109,11 +109,11 @@ def damage(
     name: str, work: Callable[[Path, Path], None], place: Path, reference: dict[str, bytes],
     rng: random.Random, count: int, tally: Counter[str],
 ) -> None:  # fmt: skip
-    """Damage a file of the results: the next call heals it."""
+    """Damage a file of the results: the next call repairs it."""
     out = place / f"{name}-damaged"
     work(place / "data", out)
     for _ in range(count):
-        file = out / rng.choice(sorted(file for file in reference if not file.endswith(files.MARKER)))
+        file = out / rng.choice(sorted(file for file in reference if files.MARKER not in file))
         content = bytearray(file.read_bytes())
         kind = rng.choice(["cut", "flip", "gone", "garbage"])
         if kind == "cut":
@@ -127,7 +127,7 @@ def damage(
             file.write_bytes(rng.randbytes(50))
         work(place / "data", out)
         if _contents(out) != reference:
-            print(f"{name}: {file.name}: {kind} is not healed", file=sys.stderr)
+            print(f"{name}: {file.name}: {kind} is not repaired", file=sys.stderr)
             tally["broken after damage"] += 1
         tally["results damaged"] += 1
 
@@ -135,7 +135,7 @@ def damage(
 def jump(
     place: Path, reference: dict[str, bytes], rng: random.Random, count: int, tally: Counter[str]
 ) -> None:
-    """Clocks that jump, backwards too, and files from the future: time stamps decide nothing."""
+    """Clocks that jump forwards and backwards, files from the future: times change no result."""
     real = time.time
     for number in range(count):
         time.time = lambda: real() + rng.uniform(-1e9, 1e9)
@@ -163,7 +163,7 @@ def _rollouts(_: Path, out: Path) -> None:
 
 
 class _Quick(Method):
-    """One speed, few intervals: it is files that are attacked."""
+    """One speed and few resamples: the attack is on files."""
 
     def fit(self) -> dict[str, Any]:
         return super().fit() | {"speeds": [self.zone_speed], "resamples": 10}
@@ -194,8 +194,12 @@ def _reference(work: Callable[[Path, Path], None], place: Path, name: str) -> di
 
 
 def _contents(out: Path) -> dict[str, bytes]:
-    """Every file of the results; of worlds, without the times that steps took and what depends on them."""
-    found = {str(file.relative_to(out)): file.read_bytes() for file in out.rglob("*") if file.is_file()}
+    """Every file of the results but locks; for worlds, without the times of steps."""
+    found = {
+        str(file.relative_to(out)): file.read_bytes()
+        for file in out.rglob("*")
+        if file.is_file() and not file.name.startswith(".szlib-lock")
+    }
     for name, content in list(found.items()):
         if not Path(name).name.startswith("seeds-"):
             continue

@@ -1,6 +1,6 @@
-"""Processes killed at random moments, and two at once in one folder: the same bytes, and nobody left behind.
+"""Commands killed at random moments, and two commands in one folder: the same files, and no process left.
 
-Every descendant carries a word in its environment, by which it is found (Linux).
+Every process of a command has a word in its environment, by which it is found (Linux).
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from collections import Counter
 from pathlib import Path
 
 import szlib
-from szlib.files import MARKER
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 
 KILLS = {False: 1, True: 50}
 GRACE = 20.0
-"""So long after the end of a command its processes may take to end [s]."""
+"""Time within which the processes of a killed command must end [s]."""
+LOCK, UNFINISHED = ".szlib-lock", ".szlib-part-"
+"""Beginnings of names in a folder of results: locks stay there, unfinished files must not."""
 PROGRAM = """
 import sys
 from pathlib import Path
@@ -49,24 +50,25 @@ record.close()
 
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
-    """What was killed and what came of it."""
+    """Kill commands, and count what is wrong afterwards; the short form kills one run of notebooks."""
     tally = Counter({"broken: other bytes": 0, "broken: processes left": 0, "broken: files left": 0})
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         commands = furnish(place)
-        for name, command in commands.items():
+        for name, command in commands.items() if long else [("run", commands["run"])]:
             reference_folder = place / f"{name}-reference"
             _run([*command, "--out", str(reference_folder)], place).wait()
             reference = _contents(reference_folder)
             if not reference:
                 raise RuntimeError(f"{name}: the reference could not be made")
             kill(name, command, place, reference, random.Random(seed), KILLS[long], tally)
-        both(commands["extract"], place, _contents(place / "extract-reference"), tally)
+        if long:
+            both(commands["extract"], place, _contents(place / "extract-reference"), tally)
     return dict(tally)
 
 
 def furnish(place: Path) -> dict[str, list[str]]:
-    """Four days, one of them packed, two notebooks; the two commands without their `--out`."""
+    """Make four days, one of them packed, and two notebooks; return two commands without their `--out`."""
     (place / "data").mkdir()
     (place / "tmp").mkdir()
     for day in range(4):
@@ -88,7 +90,7 @@ def kill(
     name: str, command: list[str], place: Path, reference: dict[str, bytes], rng: random.Random, kills: int,
     tally: Counter[str],
 ) -> None:  # fmt: skip
-    """Kill a command, most times by SIGKILL and alone, and let it finish at last."""
+    """Kill the first process of a command, mostly by SIGKILL, and at last let the command finish."""
     out, longest, struck = place / f"{name}-killed", 6.0, 0
     while struck < kills:
         begun = time.monotonic()
@@ -106,19 +108,19 @@ def kill(
         tally[f"{name}: {signal.Signals(number).name}"] += 1
         if number == signal.SIGTERM and code not in (143, -15):
             tally[f"broken: SIGTERM ends {name} with {code}"] += 1
-        left = _wait_for_nobody(word)
+        left = _wait_for_end(word)
         if left:
             print(f"{name}, kill {struck}: left {left}", file=sys.stderr)
             tally["broken: processes left"] += 1
         for file, content in _contents(out).items():
             if reference.get(file) != content:
-                print(f"{name}, kill {struck}: {file} is another one", file=sys.stderr)
+                print(f"{name}, kill {struck}: {file} has other bytes", file=sys.stderr)
                 tally["broken: other bytes"] += 1
         if struck == kills or rng.random() < 0.2:
             _run([*command, "--out", str(out)], place).wait()
             if _contents(out) != reference:
                 tally["broken: other bytes"] += 1
-            if rubbish := [*(place / "tmp").glob("szlib-*"), *out.rglob(f"{MARKER}-*")]:
+            if rubbish := [*(place / "tmp").glob("szlib-*"), *out.rglob(f"{UNFINISHED}*")]:
                 print(f"{name}, kill {struck}: left {rubbish}", file=sys.stderr)
                 tally["broken: files left"] += 1
             tally[f"{name}: resumed to identical bytes"] += _contents(out) == reference
@@ -126,7 +128,7 @@ def kill(
 
 
 def both(command: list[str], place: Path, reference: dict[str, bytes], tally: Counter[str]) -> None:
-    """Two processes in one folder, begun at once."""
+    """Start two processes at once in one folder."""
     out = place / "both"
     pair = [_run([*command, "--out", str(out)], place) for _ in range(2)]
     codes = [process.wait() for process in pair]
@@ -143,24 +145,24 @@ def _run(command: list[str], place: Path, word: str = "") -> subprocess.Popen[by
 
 
 def _contents(out: Path) -> dict[str, bytes]:
-    """Finished files, but those that tell of times."""
+    """Finished files, without those that contain times."""
     return {
         str(file.relative_to(out)): file.read_bytes()
         for file in sorted(out.rglob("*"))
-        if file.is_file() and f"{MARKER}-" not in file.name and file.suffix != ".ipynb"
+        if file.is_file() and not file.name.startswith((LOCK, UNFINISHED)) and file.suffix != ".ipynb"
         and file.name not in ("summary.json", "report.html")
     }  # fmt: skip
 
 
-def _wait_for_nobody(word: str) -> list[str]:
-    """Who still carries this word when the grace is over."""
+def _wait_for_end(word: str) -> list[str]:
+    """The processes that still have this word after the time of grace."""
     end = time.monotonic() + GRACE
-    while (left := _carriers(word)) and time.monotonic() < end:
+    while (left := _processes_with(word)) and time.monotonic() < end:
         time.sleep(0.2)
     return left
 
 
-def _carriers(word: str) -> list[str]:
+def _processes_with(word: str) -> list[str]:
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         try:

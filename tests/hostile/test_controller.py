@@ -1,4 +1,4 @@
-"""The attacks on the controller in short form, and that the judge would notice."""
+"""The attacks on the controller in short form, and tests of their judge."""
 
 from collections import Counter
 from dataclasses import replace
@@ -11,7 +11,7 @@ import szlib
 
 
 @pytest.mark.parametrize(("solver", "steps"), [("sqp", 600), ("ipopt", 100)])
-def test_no_step_is_other_than_it_says(solver, steps):
+def test_every_step_is_as_reported(solver, steps):
     tally = Counter()
     hostile.attack_steps(steps, tally, seed=2, solver=solver)
     assert {what: n for what, n in tally.items() if what.startswith("broken") and n} == {}
@@ -19,7 +19,7 @@ def test_no_step_is_other_than_it_says(solver, steps):
 
 
 @pytest.mark.parametrize("terminal", ["none", "rest"])
-def test_no_world_is_other_than_it_says_and_no_wall_is_touched(terminal):
+def test_every_world_is_as_reported_and_no_wall_is_touched(terminal):
     tally = Counter()
     hostile.attack_worlds(range(8), tally, settings=szlib.MPCSettings(terminal=terminal))
     assert {what: n for what, n in tally.items() if what.startswith("broken") and n} == {}
@@ -27,7 +27,7 @@ def test_no_world_is_other_than_it_says_and_no_wall_is_touched(terminal):
 
 
 @pytest.mark.parametrize("solver", ["sqp", "ipopt"])
-def test_cruel_states_get_an_honest_step(solver):
+def test_steps_from_cruel_states_are_as_reported(solver):
     tally = Counter()
     hostile.attack_time(15, tally, solver)
     broken = {what: n for what, n in tally.items() if what.startswith("broken") and n}
@@ -47,7 +47,7 @@ STATE, GOAL = np.array([-3.0, 0.4, 0.5, 0.0]), (4.0, 0.0)
         ({"predicted": np.zeros((9, 4))}, "plan is no motion"),
     ],
 )
-def test_the_judge_notices_a_step_that_was_tampered_with(change, fault):
+def test_judge_finds_a_changed_step(change, fault):
     zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
     people = [szlib.Person((4.0, 0.0), heading=np.pi, zone=zone)]
     settings = szlib.MPCSettings()
@@ -57,14 +57,14 @@ def test_the_judge_notices_a_step_that_was_tampered_with(change, fault):
     assert fault in list(judge.faults(STATE, GOAL, replace(step, **change)))
 
 
-def test_the_judge_notices_a_margin_that_is_too_small():
+def test_judge_finds_a_margin_that_is_too_small():
     paper, zone = szlib.MPCSettings(margin="paper"), szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
     step = szlib.MPCCBF(zone, walls=[WALL], settings=paper).step(STATE, GOAL)
     assert "h or residual" in list(hostile.Judge(szlib.MPCSettings(), [WALL], []).faults(STATE, GOAL, step))
 
 
 @pytest.mark.parametrize("value", [1e155, -1e300, np.inf, np.nan, 1e-200, "x", None, [], [1], {}])
-def test_nonsense_is_refused_with_our_own_error_or_answered(value):
+def test_invalid_numbers_raise_an_error_of_szlib_or_give_a_step(value):
     zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
     controller, person = szlib.MPCCBF(zone), szlib.Person((0.0, 0.0), heading=0.0)
     for ask in (

@@ -1,4 +1,4 @@
-"""The short forms of the attacks on files, commands and processes, each in an interpreter of its own."""
+"""The short forms of the attacks, each in an interpreter of its own."""
 
 import os
 import subprocess
@@ -11,7 +11,7 @@ import szlib
 
 
 @pytest.mark.parametrize("attack", ["commands", "damaged_tracks", "files", "processes"])
-def test_nothing_breaks(attack, tmp_path):
+def test_attack_breaks_nothing(attack, tmp_path):
     done = subprocess.run(
         [sys.executable, str(Path(__file__).parent), attack],
         cwd=tmp_path, capture_output=True, text=True,

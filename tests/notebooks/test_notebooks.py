@@ -94,8 +94,8 @@ def test_a_parameter_has_one_type_wherever_it_stands():
     assert all(len(found) == 1 for found in types.values()), types
 
 
-OF_DATA = ("01", "02", "03", "04", "05", "08", "14", "15", "16")
-"""Notebooks that look at the data, and one scenario; of the data only the zone reaches the others."""
+OF_DATA = ("01", "02", "03", "04", "05", "14")
+"""Notebooks that read the data; the others only use the encounters and the zone."""
 
 
 def proven(summary: dict, home: Path, only: tuple[str, ...] = ("",)) -> None:
