@@ -16,24 +16,35 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 """An array of floats."""
 LARGEST = 1e8
-"""Greatest coordinate, speed or parameter that can be used [m, m/s, ...]: the double next to it is 1.5e-8
-away, well below the tolerance of the controller. Any map projection on Earth stays below it."""
+"""Largest coordinate, speed or parameter that is accepted [m, m/s, ...]. Floats are spaced 1.5e-8 there,
+well below the tolerance of the controller. Every map projection of the Earth stays below it."""
 _DOUBLE = np.dtype(float)
 
 
-def check_columns(frame: pd.DataFrame, needed: Sequence[str]) -> None:
-    """Raise DataError where a table lacks a column, or has no row."""
-    missing = [name for name in needed if name not in frame.columns]
+def check_columns(table: pd.DataFrame, needed: Sequence[str]) -> None:
+    """Raise DataError if `table` has no row, or lacks one of the columns `needed`."""
+    missing = [name for name in needed if name not in table.columns]
     if missing:
         raise DataError(
-            f"columns {missing} are missing; found {list(map(str, frame.columns))}, expected {list(needed)}"
+            f"columns {missing} are missing; found {list(map(str, table.columns))}, expected {list(needed)}"
         )
-    if len(frame) == 0:
+    if len(table) == 0:
         raise DataError(f"the table is empty; expected rows of {list(needed)}")
 
 
 def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
-    """A copy of `value` as floats of this shape (a leading ... for any) in +-`LARGEST`; else SolverError."""
+    """A copy of `value` as an array of floats.
+
+    Parameters
+    ----------
+    name : of the argument, for the message.
+    value : numbers.
+    shape : the shape expected; a leading ... stands for any number of axes.
+
+    Raises
+    ------
+    SolverError : another shape, not numbers, not finite, or beyond +-`LARGEST`.
+    """
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -52,7 +63,7 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
 
 
 def check_vector(name: str, value: ArrayLike, n: int) -> list[float]:
-    """As `check_array` of shape (n,), in a list: several times as fast for an array of floats."""
+    """The `n` numbers of `value` as Python floats; checks and `name` as in `check_array`, but faster."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE and value.shape == (n,):
         numbers: list[float] = value.tolist()
         for each in numbers:  # all() takes three times as long
@@ -64,7 +75,7 @@ def check_vector(name: str, value: ArrayLike, n: int) -> list[float]:
 
 
 def check_point(name: str, value: ArrayLike) -> tuple[float, float]:
-    """As `check_array` of shape (2,), as Python floats."""
+    """The two numbers of `value` as Python floats; checks and `name` as in `check_array`, but faster."""
     if isinstance(value, tuple) and len(value) == 2:
         x, y = value
         if type(x) is float and type(y) is float and abs(x) <= LARGEST and abs(y) <= LARGEST:
@@ -74,7 +85,7 @@ def check_point(name: str, value: ArrayLike) -> tuple[float, float]:
 
 
 def check_number(name: str, value: ArrayLike) -> float:
-    """As `check_array` of shape (), as Python's own float."""
+    """The number `value` as a Python float; checks and `name` as in `check_array`, but faster."""
     if type(value) is float and abs(value) <= LARGEST:
         return value
     return float(check_array(name, value, ()))
