@@ -72,7 +72,7 @@ if record.synthetic:
         date = f"2000-01-{3 + day:02}"
         settings = PlazaSettings(encounters=encounters, standing=standing, date=date)
         files.append(make_plaza(file, seed=seed + day + 1, settings=settings))
-seconds = pd.concat([quality.seconds(file).assign(file=file.name) for file in files])
+seconds = pd.concat([quality.summarise_seconds(file).assign(file=file.name) for file in files])
 print(f"{len(files)} files, {seconds['rows'].sum():,} rows, {len(seconds):,} person-seconds")
 
 # %% [markdown]
@@ -95,8 +95,8 @@ if len(both):
 # ## Frames, gaps, lengths of tracks, ids
 
 # %%
-intervals = np.concatenate([quality.frame_intervals(file) for file in files])
-found = pd.concat([quality.people(file).assign(file=file.name) for file in files])
+intervals = np.concatenate([quality.measure_frame_intervals(file) for file in files])
+found = pd.concat([quality.summarise_people(file).assign(file=file.name) for file in files])
 table = found.assign(length=found["last_seen"] - found["first_seen"]).groupby("file", as_index=False)
 table = table.agg(
     people=("id", "nunique"),
@@ -144,7 +144,7 @@ record.figure(ax.figure, "tracks")
 # stand beside the dates: a Sunday is no event.
 
 # %%
-hours = quality.by_hour(seconds)
+hours = quality.count_visits_by_hour(seconds)
 days = hours.groupby("day", as_index=False).agg(visits=("visits", "sum"), standing=("standing", "mean"))
 names = pd.to_datetime(days["day"]).dt.strftime("%a %Y-%m-%d")
 event = days["standing"] > 2 * days["standing"].median()

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from ..tracks.formats.rows import fault, limits
+from ..tracks.formats import TrackFormat
 
 _BLOCK_ROWS = 1 << 17
 """Rows of one block [about 5 minutes of a raw day]."""
@@ -60,14 +60,13 @@ class UsableBlocks:
     ----------
     quick_scan : a faster scan of the same file; it is read up to the first row that is not usable.
     scan : a scan of the file, as from `recognise`.
-    metres, seconds : length of the units of position and time.
+    layout : the format of the file.
     summary : of the rows read so far.
     """
 
     quick_scan: pl.LazyFrame
     scan: pl.LazyFrame
-    metres: float
-    seconds: float
+    layout: TrackFormat
     summary: FileSummary = field(default_factory=FileSummary)
 
     def __iter__(self) -> Iterator[FileRows]:
@@ -92,7 +91,7 @@ class UsableBlocks:
 
     def _all_usable(self, block: pl.DataFrame, rows: FileRows) -> bool:
         """Whether every row is usable; where the extreme values are within the limits, all values are."""
-        limit = limits(self.metres, self.seconds)
+        limit = self.layout.value_limits()
         within = (_largest(v) * limit[name][0] <= limit[name][1] for name, v in rows._asdict().items())
         return all(within) and not block["ragged"].any() and np.array_equal(rows.id, np.floor(rows.id))
 
@@ -102,7 +101,7 @@ class UsableBlocks:
         if self._all_usable(block, rows):
             return rows
         lines = block.with_row_index("line", offset=read + 1)
-        lines = lines.with_columns(reason=fault(self.metres, self.seconds, False))
+        lines = lines.with_columns(reason=self.layout.rejection_reason())
         bad = lines.filter(pl.col("reason").is_not_null())
         if bad.height:
             first = self.summary.first_fault

@@ -14,10 +14,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
-from datetime import datetime
 from pathlib import Path
 from typing import Any
-from zoneinfo import ZoneInfo
 
 import joblib
 import pandas as pd
@@ -27,11 +25,8 @@ from ..errors import DataError, DataWarning, SzlibError
 from ..files import claim_folder, printable
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
-from ..tracks.formats.layouts import layout_of, start_of_day
-from ..tracks.formats.plain import first_line
-from ..tracks.formats.rows import CALENDAR_BEGINS
 from ..tracks.options import ReadOptions
-from ..tracks.readers import recording_names
+from ..tracks.recordings import find_day, name_recordings
 from .geometry import Area
 from .one_day import (
     describe_source,
@@ -209,8 +204,8 @@ def extract_days(
 def _group_by_day(files: Sequence[Path], options: ReadOptions) -> dict[str, list[str]]:
     """The files of each day, or of each recording that has no calendar day."""
     days: dict[str, list[str]] = {}
-    for file, name in zip(files, recording_names(files), strict=True):
-        days.setdefault(_calendar_day(file, options) or printable(name), []).append(str(file))
+    for file, name in zip(files, name_recordings(files), strict=True):
+        days.setdefault(find_day(file, options) or printable(name), []).append(str(file))
     return days
 
 
@@ -255,18 +250,3 @@ def _row(day: str, files: Sequence[str], status: str) -> dict[str, Any]:
     counts = dict.fromkeys(("rows", "unusable", "encounters", "samples"), 0)
     row = {"day": day, "status": status, "files": len(files), **counts}
     return row | {"seconds": 0.0, "why": "", "source": {}}
-
-
-def _calendar_day(file: Path, options: ReadOptions) -> str | None:
-    """The calendar day on which a file begins; None where the file has none."""
-    try:
-        first = first_line(file)
-        layout = layout_of(first, "tidy" if options.columns else options.file_format)
-        if layout.name not in ("atc-raw", "atc-1hz"):
-            return None
-        start = float(first.split(layout.separator)[layout.columns["t"]]) + start_of_day(file, layout, first)
-        if not start >= CALENDAR_BEGINS:
-            return None
-        return datetime.fromtimestamp(start, ZoneInfo(options.tz)).strftime("%Y-%m-%d")
-    except (OSError, ValueError, OverflowError):  # reading the day says what is wrong
-        return None

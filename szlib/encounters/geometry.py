@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import DataError
+from ..tracks.formats.atc import ATC_AREA
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -154,7 +155,7 @@ class Region:
 Area = Square | Region
 """Where encounters are looked for."""
 
-ATC_SQUARE = Square(x=(-18.5, -7.5), y=(-10.0, 8.0))
+ATC_SQUARE = Square(*ATC_AREA)
 """The central square of the ATC mall (assumed; free of pillars, walls and queues on the real day)."""
 
 

@@ -7,7 +7,7 @@ file.  `szlib.find_encounters` finds the same encounters in them as in all rows.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +17,11 @@ import polars as pl
 from .. import memory
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
-from ..tracks.formats.layouts import Format, quick_scan, readable, recognise
-from ..tracks.formats.plain import plain_file
-from ..tracks.formats.rows import in_metres
+from ..tracks.formats import TrackFormat, open_file
 from ..tracks.options import ReadOptions
-from ..tracks.plausible import check_unit
-from ..tracks.readers import merge, person_order, read_raw, read_stage
+from ..tracks.plausibility import check_unit
+from ..tracks.readers import merge, order_by_person, read_raw, read_stage
+from ..tracks.recordings import LoadedFile
 from . import near_rows_cache
 from .blocks import FileRows, FileSummary, UsableBlocks
 from .cells import Cells, UnsortedError, select_in_one_pass, select_in_two_passes
@@ -94,31 +93,28 @@ def read_near_area(
     """
     path, options = Path(path), options or ReadOptions()
     if path.is_file():
-        with plain_file(path) as plain:
-            layout, scan = recognise(plain, path, options)
-            if layout.name == "atc-raw":
-                metres = layout.metres_in(options.unit)
+        with open_file(path, options) as (layout, scan, plain):
+            if layout.is_streamed:
                 max_gap = options.max_gap or layout.max_gap or 0.0
-                cells = Cells(area.grown(REACH).box, duration, max_gap, metres)
-                blocks = UsableBlocks(quick_scan(plain, layout), scan, metres, layout.seconds)
+                cells = Cells(area.grown(REACH).box, duration, max_gap, layout.metres)
+                blocks = UsableBlocks(layout.quick_scan(plain), scan, layout)
                 near, summary = _load_or_select(blocks, path, layout, cells, content)
-                return _as_table(near, summary, path, layout, metres, options)
+                return _as_table(near, summary, path, layout, options)
     return read_raw(path, options=options)
 
 
 def _load_or_select(
-    blocks: UsableBlocks, path: Path, layout: Format, cells: Cells, content: Content | None
+    blocks: UsableBlocks, path: Path, layout: TrackFormat, cells: Cells, content: Content | None
 ) -> tuple[FileRows, FileSummary]:
     """The rows near the area, loaded from the cache or selected from the file, and a summary of the file."""
     selection = {"format": asdict(layout), "cells": asdict(cells)}
     if content and (found := near_rows_cache.load(path.stat().st_size, selection, content)):
         return found
-    with readable(path, layout):
-        try:
-            parts = _collect(select_in_one_pass(cells, blocks), path)
-        except UnsortedError:
-            parts = _collect(select_in_two_passes(cells, blocks), path)
-    order = person_order(np.concatenate([rows.id for rows in parts]))
+    try:
+        parts = _collect(select_in_one_pass(cells, blocks), path)
+    except UnsortedError:
+        parts = _collect(select_in_two_passes(cells, blocks), path)
+    order = order_by_person(np.concatenate([rows.id for rows in parts]))
     near = FileRows(*(np.concatenate(values)[order] for values in zip(*parts, strict=True)))
     if content:
         near_rows_cache.store(content(), selection, near, blocks.summary)
@@ -136,7 +132,7 @@ def _collect(blocks: Iterator[FileRows], path: Path) -> list[FileRows]:
 
 
 def _as_table(
-    near: FileRows, summary: FileSummary, path: Path, layout: Format, metres: float, options: ReadOptions
+    near: FileRows, summary: FileSummary, path: Path, layout: TrackFormat, options: ReadOptions
 ) -> pd.DataFrame:
     """The rows as a table as from `read_raw`, with the funnel of the whole file; it overwrites `near`."""
     stage = read_stage(path, layout, summary.usable, dict(summary.reasons), summary.first_fault)
@@ -148,6 +144,7 @@ def _as_table(
         empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
         return funnels.attach(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
     for values in (near.x, near.y):
-        values *= metres
-    rows = in_metres(pl.DataFrame(near._asdict()), path, layout, 1.0, options.tz)
-    return merge([rows], stages, [layout], [], copy=False)
+        values *= layout.metres
+    layout = replace(layout, metres=1.0)
+    rows = layout.to_metres(pl.DataFrame(near._asdict()), path, options.tz)
+    return merge([LoadedFile(path, rows, stages, layout)], copy=False)

@@ -19,13 +19,12 @@ from ..errors import DataError, DataWarning
 from ..files import file_content, load_cached, store_cached
 from ..tracks import funnels
 from ..tracks.clock import to_clock
-from ..tracks.formats.layouts import layout_of
-from ..tracks.formats.plain import first_line
+from ..tracks.formats import find_format
 from ..tracks.options import ReadOptions
 from ..tracks.readers import read_raw
 from .areas import walked_area
 from .finding import find_encounters
-from .geometry import ATC_SQUARE, Area, Region, Square
+from .geometry import Area, Region, Square
 from .kinds import KINDS
 from .near_rows import read_near_area
 from .near_rows_cache import Content
@@ -97,9 +96,9 @@ def _known_area(settings: EncounterSettings, files: Sequence[Path], options: Rea
     """The area of the settings, or that of the ATC mall; None where it must be found."""
     if isinstance(settings.area, Square | Region):
         return settings.area
-    name = "tidy" if options.columns else options.file_format
-    layouts = {layout_of(first_line(file), name).name for file in files}
-    return ATC_SQUARE if settings.area is None and layouts <= {"atc-raw", "atc-1hz"} else None
+    areas = {find_format(file, options).area for file in files}
+    known = areas.pop() if settings.area is None and len(areas) == 1 else None
+    return Square(*known) if known else None
 
 
 def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:

@@ -114,18 +114,6 @@ def read_groups(path: str | Path) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["group", "id"]).astype("int64")
 
 
-def without_companions(samples: pd.DataFrame, groups: pd.DataFrame) -> pd.DataFrame:
-    """Samples of encounters between people who do not walk together; `groups` as from `read_groups`."""
-    of = groups.set_index("id")["group"]
-    ref, other = samples["ref_id"].map(of), samples["other_id"].map(of)
-    together = (ref == other).to_numpy()
-    kept = samples[~together].copy()
-    reasons = {"walk together": int(together.sum())}
-    return funnels.attach(
-        kept, [*funnels.get(samples), funnels.stage("samples: strangers", len(samples), len(kept), reasons)]
-    )
-
-
 def to_pedpy(tracks: pd.DataFrame) -> TrajectoryData:
     """A track table of one day as PedPy's TrajectoryData, at 10 frames/s; frame is t in ticks of 0.1 s.
 
@@ -137,23 +125,9 @@ def to_pedpy(tracks: pd.DataFrame) -> TrajectoryData:
     days = tracks["day"].unique()
     if len(days) > 1:
         raise DataError(
-            f"PedPy knows no days, and the table has {len(days)}: {list(days)[:5]}; pass one of them"
+            f"PedPy has no days, and the table has {len(days)}: {list(days)[:5]}; pass one of them"
         )
     frame = nearest_tick(tracks["t"].to_numpy(float))
     data = pd.DataFrame({"id": tracks["id"].to_numpy(), "frame": frame})
     data[["x", "y"]] = tracks[["x", "y"]].to_numpy()
     return TrajectoryData(data=data, frame_rate=float(TICKS_PER_SECOND))
-
-
-def from_pedpy(
-    trajectory: TrajectoryData, *, day: str = "pedpy", max_gap: float | None = None
-) -> pd.DataFrame:
-    """PedPy's TrajectoryData as a track table; t is frame / frame_rate, `max_gap` [s] as in `read_tracks`.
-
-    Raises DataError where it is empty, or a value is not finite.
-    """
-    data = trajectory.data
-    raw = pd.DataFrame({"day": day, "id": data["id"].to_numpy(), "t": data["frame"] / trajectory.frame_rate})
-    raw[["x", "y"]] = data[["x", "y"]].to_numpy(float)
-    funnels.attach(raw, [funnels.stage("read from PedPy", len(raw), len(raw), {})])
-    return to_clock(raw, max_gap=max_gap)

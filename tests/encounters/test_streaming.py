@@ -17,7 +17,7 @@ from szlib.encounters.near_rows import read_near_area
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels
-from szlib.tracks.formats.layouts import quick_scan, recognise
+from szlib.tracks.formats import open_file
 from szlib.tracks.readers import read_raw
 
 SETTINGS = [
@@ -77,7 +77,7 @@ def test_packed_files_and_bad_rows(tmp_path: Path) -> None:
     with warnings.catch_warnings(record=True) as expected:
         warnings.simplefilter("always")
         whole = read_raw(path)
-    assert "first at line 6: rows set aside" in str(told[0].message)
+    assert "first at line 6: rejected rows" in str(told[0].message)
     assert [str(each.message) for each in told] == [str(each.message) for each in expected]
     assert funnels.get(raw)[0] == funnels.get(whole)[0]
     assert sum(funnels.get(raw)[0]["rejected"].values()) == 3
@@ -112,8 +112,8 @@ def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.Monk
     path = tmp_path / "day.csv"
     lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
     path.write_bytes("\n".join(lines).encode("latin-1"))
-    layout, scan = recognise(path, path, szlib.ReadOptions())
-    found = blocks.UsableBlocks(quick_scan(path, layout), scan, layout.metres, layout.seconds)
+    with open_file(path, szlib.ReadOptions()) as (layout, scan, plain):
+        found = blocks.UsableBlocks(layout.quick_scan(plain), scan, layout)
     rows = blocks.FileRows(*map(np.concatenate, zip(*found, strict=True)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)

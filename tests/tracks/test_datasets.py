@@ -2,6 +2,7 @@
 
 import hashlib
 import threading
+from dataclasses import replace
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -14,7 +15,7 @@ from szlib.errors import DataError
 from szlib.tracks import datasets, quality
 
 
-class Quiet(SimpleHTTPRequestHandler):
+class QuietHandler(SimpleHTTPRequestHandler):
     def log_message(self, *args):
         """Say nothing."""
 
@@ -25,29 +26,34 @@ def served(tmp_path, monkeypatch):
     home = tmp_path / "server"
     home.mkdir()
     (home / "a.csv").write_text("1351051200.0,1,0.0,0.0,0.0,0.0\n")
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(home)))
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(QuietHandler, directory=str(home)))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     monkeypatch.delenv(datasets.DATA_DIR_VARIABLE, raising=False)
     monkeypatch.setattr(datasets.pooch, "os_cache", lambda name: tmp_path / "cache" / name)
-    monkeypatch.setattr(datasets, "ATC_1HZ_URL", f"http://127.0.0.1:{server.server_port}/")
-    monkeypatch.setattr(datasets, "ATC_1HZ_FILES", {"a.csv": sha256(home / "a.csv")})
+    url = f"http://127.0.0.1:{server.server_port}/"
+    change(monkeypatch, "atc-1hz", url=url, hashes={"a.csv": sha256(home / "a.csv")})
     yield home
     server.shutdown()
     server.server_close()
+
+
+def change(monkeypatch, name, **changes):
+    """Change the URL or the hashes of a data set."""
+    monkeypatch.setitem(datasets.DATA_SETS, name, replace(datasets.DATA_SETS[name], **changes))
 
 
 def sha256(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
-def test_downloads_once_and_then_needs_no_server(served, tmp_path):
+def test_a_data_set_is_downloaded_once(served, tmp_path):
     (file,) = datasets.find("atc-1hz")
     assert file.read_text().startswith("1351051200.0")
     (served / "a.csv").unlink()
     assert datasets.find("atc-1hz") == [file]
 
 
-def test_a_wrong_hash_is_refused_and_nothing_stays(served, tmp_path):
+def test_a_file_with_a_wrong_hash_is_refused_and_removed(served, tmp_path):
     (served / "a.csv").write_text("tampered")
     with pytest.raises(DataError, match="hash"):
         datasets.find("atc-1hz")
@@ -61,33 +67,32 @@ def served_days(served, monkeypatch):
         "".join(f"{36000 + t},7,{t - 20.0},{0.1 * t},1.0,0.0\n" for t in range(9))
     )
     (served / "1028.csv").write_text("".join(f"{1351386000 + t},7,{-t},0.0,1.0,3.1\n" for t in range(9)))
-    monkeypatch.setattr(datasets, "ATC_10_DAYS_URL", datasets.ATC_1HZ_URL)
     days = {name: datasets.git_blob_id(served / name) for name in ("1024.csv", "1028.csv")}
-    monkeypatch.setattr(datasets, "ATC_10_DAYS_FILES", days)
+    change(monkeypatch, "atc-10-days", url=datasets.DATA_SETS["atc-1hz"].url, hashes=days)
     return served
 
 
-def test_a_blob_is_called_as_by_git(tmp_path):
+def test_git_blob_ids_are_those_of_git(tmp_path):
     (tmp_path / "a").write_bytes(b"hello world\n")
     assert datasets.git_blob_id(tmp_path / "a") == "3b18e512dba79e4c8300dd08aeb37f8e728b8dad"
     (tmp_path / "a").write_bytes(b"")
     assert datasets.git_blob_id(tmp_path / "a") == "e69de29bb2d1d6434b8b29ae775ad8c2e48c5391"
 
 
-def test_ten_days_are_downloaded_once_and_verified_by_their_blobs(served_days, tmp_path):
+def test_ten_days_are_downloaded_once_and_verified_by_blob_id(served_days, tmp_path):
     files = datasets.find("atc-10-days")
     assert [file.name for file in files] == ["1024.csv", "1028.csv"]
     assert files[0].parent == tmp_path / "cache" / "szlib" / "atc-10-days"
     for name in ("1024.csv", "1028.csv"):
         (served_days / name).write_text("tampered")
-    assert datasets.find("atc-10-days") == files, "what is right in the cache needs no server"
+    assert datasets.find("atc-10-days") == files, "a cached file with the right hash needs no server"
     files[1].write_text("damaged")
     with pytest.raises(DataError, match=r"atc-10-days could not be downloaded.*1028\.csv: its hash is"):
         datasets.find("atc-10-days")
-    assert files[0].exists() and not files[1].exists(), "nothing wrong stays"
+    assert files[0].exists() and not files[1].exists(), "a file with a wrong hash is removed"
 
 
-def test_ten_days_from_a_folder(served_days, tmp_path, monkeypatch):
+def test_ten_days_are_read_from_a_data_folder(served_days, tmp_path, monkeypatch):
     folder = tmp_path / "data" / "atc-10-days"
     folder.mkdir(parents=True)
     for name in ("1024.csv", "1028.csv"):
@@ -99,27 +104,29 @@ def test_ten_days_from_a_folder(served_days, tmp_path, monkeypatch):
         datasets.find("atc-10-days")
 
 
-def test_days_are_those_of_the_files_names_in_japan(served_days, tmp_path):
+def test_ten_days_are_dated_by_file_name_in_japan(served_days, tmp_path):
     tracks = szlib.read_tracks(datasets.find("atc-10-days"))
     assert tracks["day"].unique().tolist() == ["2012-10-24", "2012-10-28"]
     begin = tracks.groupby("day", observed=True)["t"].min()
     assert begin.tolist() == [1351040400.0, 1351386000.0], "10 o'clock of either day"
     here = szlib.read_tracks(datasets.find("atc-10-days"), tz="UTC")
-    assert here["t"].tolist() == tracks["t"].tolist(), "the mall is in Japan, wherever we are"
-    assert quality.seconds(served_days / "1024.csv")["sensor_speed"].tolist() == [1.0] * 9
+    assert here["t"].tolist() == tracks["t"].tolist(), "the start of a day in Japan does not depend on tz"
+    assert quality.summarise_seconds(served_days / "1024.csv")["sensor_speed"].tolist() == [1.0] * 9
     extracted = szlib.extract_days("atc-10-days", out=tmp_path / "days", progress=False)
     assert extracted.table["day"].tolist() == ["2012-10-24", "2012-10-28"]
     assert (extracted.table["status"] == "done").all()
 
 
-def test_the_ten_days_are_those_of_the_readme():
-    assert len(datasets.ATC_10_DAYS_FILES) == 10
-    assert datasets.ATC_10_DAYS_FILES["1024.csv"] == "0c7f0c52acc32fc37123141de8ce0b0bbb38100d"
-    assert all(len(blob) == 40 for blob in datasets.ATC_10_DAYS_FILES.values())
+def test_every_file_of_a_named_data_set_has_a_hash():
+    for name, n_files, n_digits in (("atc-1hz", 23, 64), ("atc-10-days", 10, 40)):
+        hashes = datasets.DATA_SETS[name].hashes
+        assert len(hashes) == n_files
+        assert all(len(digits) == n_digits and int(digits, 16) for digits in hashes.values())
+    assert hashes["1024.csv"] == "0c7f0c52acc32fc37123141de8ce0b0bbb38100d"
 
 
-def test_offline_says_what_to_do(served, tmp_path, monkeypatch):
-    monkeypatch.setattr(datasets, "ATC_1HZ_URL", "http://127.0.0.1:9/")
+def test_without_network_the_error_names_the_data_folder(served, tmp_path, monkeypatch):
+    change(monkeypatch, "atc-1hz", url="http://127.0.0.1:9/")
     with pytest.raises(DataError, match=r"could not be downloaded.*SZLIB_DATA_DIR"):
         datasets.find("atc-1hz")
 
@@ -129,7 +136,7 @@ def test_a_data_folder_is_used_and_verified(tmp_path, monkeypatch):
     folder.mkdir()
     (folder / "a.csv").write_text("day")
     monkeypatch.setenv(datasets.DATA_DIR_VARIABLE, str(tmp_path))
-    monkeypatch.setattr(datasets, "ATC_1HZ_FILES", {"a.csv": sha256(folder / "a.csv")})
+    change(monkeypatch, "atc-1hz", hashes={"a.csv": sha256(folder / "a.csv")})
     assert datasets.find("atc-1hz") == [folder / "a.csv"]
     (folder / "a.csv").write_text("other")
     with pytest.raises(DataError, match=r"a\.csv: SHA-256 is .* expected"):
@@ -139,7 +146,7 @@ def test_a_data_folder_is_used_and_verified(tmp_path, monkeypatch):
         datasets.find("atc-1hz")
 
 
-def test_paths_folders_and_globs(tmp_path):
+def test_paths_folders_and_globs_are_found_in_order(tmp_path):
     for name in ("b.csv", "a.csv", ".hidden"):
         (tmp_path / name).write_text("x")
     both = [tmp_path / "a.csv", tmp_path / "b.csv"]
@@ -152,7 +159,7 @@ def test_paths_folders_and_globs(tmp_path):
         datasets.find([])
 
 
-def test_labels_are_fit_for_folders():
+def test_labels_are_valid_folder_names():
     assert datasets.label("synthetic") == "synthetic"
     assert datasets.label("atc-10-days") == "atc-10-days"
     assert datasets.label("/data/atc-20121024.csv.gz") == "atc-20121024"
@@ -160,67 +167,67 @@ def test_labels_are_fit_for_folders():
     assert datasets.label("/data/*.csv") == "files"
 
 
-class Moody(Quiet):
-    """Goes through `moods`, one a request, then serves."""
+class UnreliableHandler(QuietHandler):
+    """Shows one of `faults` for each request, then serves."""
 
-    moods: ClassVar[list[str]] = []
+    faults: ClassVar[list[str]] = []
 
     def do_GET(self) -> None:
-        mood = self.moods.pop(0) if self.moods else "well"
+        fault = self.faults.pop(0) if self.faults else ""
         content = (Path(self.directory) / "a.csv").read_bytes()
-        if mood == "broken":
+        if fault == "error 500":
             self.send_error(500)
             return
         self.send_response(200)
         self.send_header("Content-Length", str(len(content)))
         self.end_headers()
-        if mood == "truncating":
+        if fault == "truncated":
             self.wfile.write(content[: len(content) // 2])
             self.close_connection = True
-        elif mood == "slow":
+        elif fault == "slow":
             for byte in content:
                 self.wfile.write(bytes([byte]))
-                threading.Event().wait(0.01)  # retries do not sleep here, this does
+                threading.Event().wait(0.01)  # pooch's sleep is replaced, this is not
         else:
-            self.wfile.write(b"x" * len(content) if mood == "lying" else content)
+            self.wfile.write(b"x" * len(content) if fault == "wrong content" else content)
 
 
 @pytest.fixture
-def moody(served, monkeypatch):
-    """The same server, in moods; retries do not wait."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Moody, directory=str(served)))
+def server_faults(served, monkeypatch):
+    """The faults that the same server shows; retries do not wait."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(UnreliableHandler, directory=str(served)))
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    monkeypatch.setattr(datasets, "ATC_1HZ_URL", f"http://127.0.0.1:{server.server_port}/")
+    change(monkeypatch, "atc-1hz", url=f"http://127.0.0.1:{server.server_port}/")
     monkeypatch.setattr("pooch.core.time.sleep", lambda seconds: None)
-    yield Moody.moods
-    Moody.moods.clear()
+    yield UnreliableHandler.faults
+    UnreliableHandler.faults.clear()
     server.shutdown()
     server.server_close()
 
 
-@pytest.mark.parametrize("mood", ["broken", "truncating", "slow", "lying"])
-def test_a_server_that_recovers_is_asked_again(moody, served, tmp_path, mood):
-    moody += [mood] * 2
+@pytest.mark.parametrize("fault", ["error 500", "truncated", "slow", "wrong content"])
+def test_a_download_is_repeated_until_the_server_recovers(server_faults, served, tmp_path, fault):
+    server_faults += [fault] * 2
     (file,) = datasets.find("atc-1hz")
     assert file.read_bytes() == (served / "a.csv").read_bytes()
     assert [path.name for path in file.parent.iterdir()] == ["a.csv"]
 
 
-@pytest.mark.parametrize("mood", ["broken", "truncating", "lying"])
-def test_a_server_that_never_recovers_leaves_nothing_half_written(moody, tmp_path, mood):
-    moody += [mood] * 99
+@pytest.mark.parametrize("fault", ["error 500", "truncated", "wrong content"])
+def test_a_failed_download_leaves_no_partial_file(server_faults, tmp_path, fault):
+    server_faults += [fault] * 99
     with pytest.raises(DataError, match=r"could not be downloaded.*SZLIB_DATA_DIR"):
         datasets.find("atc-1hz")
     assert not [path for path in (tmp_path / "cache").rglob("*") if path.is_file()]
-    moody.clear()
-    assert datasets.find("atc-1hz"), "and the next attempt begins anew"
+    server_faults.clear()
+    assert datasets.find("atc-1hz"), "the next attempt downloads again"
 
 
-def test_a_download_that_is_interrupted_leaves_nothing_half_written(moody, tmp_path, monkeypatch):
+def test_an_interrupted_download_leaves_no_partial_file(server_faults, tmp_path, monkeypatch):
     def interrupt(*args, **kwargs):
         raise KeyboardInterrupt
 
-    moody += ["slow"]
+    server_faults += ["slow"]
     with monkeypatch.context() as context:
         context.setattr("pooch.core.hash_matches", interrupt)
         with pytest.raises(KeyboardInterrupt):

@@ -81,7 +81,7 @@ def test_what_a_table_lacks_is_set_aside_and_counted() -> None:
     table = in_seconds(people()).astype({"x": object})
     table.loc[[3, 40], "x"] = [None, "far"]
     table.loc[7, "t"] = np.inf
-    with pytest.warns(szlib.DataWarning, match=r"table-1, first at line 4: rows set aside: 2 x missing"):
+    with pytest.warns(szlib.DataWarning, match=r"table-1, first at line 4: rejected rows: 2 x missing"):
         tracks = szlib.read_tracks(table)
     assert sum(funnels.get(tracks)[0]["rejected"].values()) == 3
 

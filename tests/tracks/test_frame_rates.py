@@ -63,7 +63,9 @@ def test_velocities_tell_the_frame_rate(tmp_path: Path, rate: int, habit: str) -
 
 
 def test_a_rate_that_ewap_files_do_not_have_is_told(tmp_path: Path) -> None:
-    with pytest.warns(szlib.DataWarning, match="30 frames/s by its velocities, EWAP files have 15 or 25"):
+    with pytest.warns(
+        szlib.DataWarning, match="its velocities suggest 30 frames/s, EWAP files have 15 or 25"
+    ):
         tracks = szlib.read_tracks(ewap(tmp_path, rate=30))
     assert pace(tracks) == pytest.approx(1.2, rel=0.05)
     with pytest.warns(szlib.DataWarning, match=r"12\.5 frames/s"):
@@ -75,7 +77,7 @@ def test_a_rate_that_is_asked_for_is_taken_and_contradicted(tmp_path: Path) -> N
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         pd.testing.assert_frame_equal(szlib.read_tracks(file, frame_rate=25), szlib.read_tracks(file))
-    with pytest.warns(szlib.DataWarning, match="read at 15 frames/s as asked; its velocities tell 25"):
+    with pytest.warns(szlib.DataWarning, match="read at 15 frames/s as given; its velocities suggest 25"):
         assert pace(szlib.read_tracks(file, frame_rate=15)) == pytest.approx(1.2 * 15 / 25, rel=0.05)
 
 
@@ -92,7 +94,7 @@ def spoiled(file: Path, velocity: float | None) -> Path:
 @pytest.mark.parametrize("velocity", [0.0, 1.0, None], ids=["none", "all the same", "noise"])
 def test_where_velocities_do_not_tell_the_rate_must_be_said(tmp_path: Path, velocity: float | None) -> None:
     file = spoiled(ewap(tmp_path, rate=25), velocity)
-    with pytest.raises(szlib.DataError, match=r"cannot be told from the file's.*; pass frame_rate=15"):
+    with pytest.raises(szlib.DataError, match=r"cannot be estimated from the file's.*; pass frame_rate=15"):
         szlib.read_tracks(file)
     assert pace(szlib.read_tracks(file, frame_rate=25)) == pytest.approx(1.2, rel=0.05)
 
@@ -121,8 +123,8 @@ def test_no_rate_where_no_frames_are_counted(tmp_path: Path) -> None:
 
 def test_every_way_to_a_file_knows_its_clock(tmp_path: Path) -> None:
     file = ewap(tmp_path, rate=25)
-    assert np.median(quality.frame_intervals(file)) == pytest.approx(0.4)
-    assert quality.people(file).eval("last_seen - first_seen").to_numpy() == pytest.approx(29 * 0.4)
+    assert np.median(quality.measure_frame_intervals(file)) == pytest.approx(0.4)
+    assert quality.summarise_people(file).eval("last_seen - first_seen").to_numpy() == pytest.approx(29 * 0.4)
     square = szlib.Square(x=(-50, 50), y=(-50, 50))
     settings = szlib.EncounterSettings(area=square, min_distance=0.0)
     whole = szlib.find_encounters(szlib.read_tracks(file), settings=settings)

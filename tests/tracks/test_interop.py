@@ -1,4 +1,4 @@
-"""The loader contract, held by every reader here; groups; PedPy, there and back."""
+"""What a track table must be, for every format; groups; conversion to PedPy."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from helpers.track_tables import make_crowd, make_tracks, make_walk, real_data
 import szlib
 from szlib.tracks import funnels
 from szlib.tracks.clock import COLUMNS, to_clock
-from szlib.tracks.interop import check_tracks, from_pedpy, read_groups, to_pedpy, without_companions
+from szlib.tracks.interop import check_tracks, read_groups, to_pedpy
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_every_reader_keeps_the_contract(tmp_path: Path, name: str) -> None:
+def test_every_format_gives_valid_tracks(tmp_path: Path, name: str) -> None:
     (tmp_path / "recording.csv").write_text(WRITERS[name](samples()))
     check_tracks(szlib.read_tracks(tmp_path / "recording.csv"))
 
@@ -28,7 +28,7 @@ def good_tracks() -> pd.DataFrame:
     return to_clock(raw)
 
 
-def test_a_table_that_keeps_the_contract_is_left_alone() -> None:
+def test_check_tracks_does_not_change_a_valid_table() -> None:
     tracks = good_tracks()
     before = tracks.copy(deep=True)
     check_tracks(tracks)
@@ -48,14 +48,14 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize(("told", "spoil"), BROKEN.items(), ids=BROKEN)
-def test_a_loader_that_breaks_the_contract_is_told_how(told: str, spoil: object) -> None:
+@pytest.mark.parametrize(("message", "spoil"), BROKEN.items(), ids=BROKEN)
+def test_check_tracks_names_what_is_wrong(message: str, spoil: object) -> None:
     tracks = good_tracks()
-    with pytest.raises(szlib.DataError, match=told):
+    with pytest.raises(szlib.DataError, match=message):
         check_tracks(spoil(tracks))  # type: ignore[operator]
 
 
-def test_a_loader_must_count() -> None:
+def test_check_tracks_requires_a_funnel_that_adds_up() -> None:
     tracks = good_tracks()
     tracks.attrs.clear()
     with pytest.raises(szlib.DataError, match="no funnel"):
@@ -65,7 +65,7 @@ def test_a_loader_must_count() -> None:
         check_tracks(tracks)
 
 
-def test_groups_of_the_eth_sequence() -> None:
+def test_groups_of_the_eth_sequence_are_read() -> None:
     folder = real_data("eth")
     with pytest.warns(szlib.DataWarning, match="line 37, 38"):  # 238 is in lines 36 and 37, 241 in 37 and 38
         groups = read_groups(folder / "seq_eth_groups.txt")
@@ -77,7 +77,7 @@ def test_groups_of_the_eth_sequence() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("1 2\n3 x\n", "line 2: '3 x' is no group"),
         ("1 2\n\n3\n", "line 3: '3' is no group"),
@@ -85,59 +85,50 @@ def test_groups_of_the_eth_sequence() -> None:
         ("1 2\n3 4.5\n", "line 2"),
     ],
 )
-def test_groups_that_are_none(tmp_path: Path, text: str, told: str) -> None:
+def test_invalid_groups_are_refused_with_their_line(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "groups.txt").write_text(text)
-    with pytest.raises(szlib.DataError, match=told):
+    with pytest.raises(szlib.DataError, match=message):
         read_groups(tmp_path / "groups.txt")
     with pytest.raises(szlib.DataError, match="cannot be read as groups"):
         read_groups(tmp_path)
 
 
-def test_blank_lines_part_no_groups(tmp_path: Path) -> None:
+def test_blank_lines_in_a_group_file_are_ignored(tmp_path: Path) -> None:
     (tmp_path / "groups.txt").write_text(" 5 4\n\n 6 3 2 \n")
     groups = read_groups(tmp_path / "groups.txt")
     assert groups.to_numpy().tolist() == [[0, 5], [0, 4], [1, 6], [1, 3], [1, 2]]
 
 
-def test_lines_that_share_people_make_one_group(tmp_path: Path) -> None:
+def test_group_lines_that_share_people_are_joined(tmp_path: Path) -> None:
     (tmp_path / "groups.txt").write_text("1 2\n3 4\n5 6\n4 2 7\n")
     with pytest.warns(szlib.DataWarning, match="line 4"):
         groups = read_groups(tmp_path / "groups.txt")
     assert groups.groupby("group")["id"].apply(set).tolist() == [{1, 2, 3, 4, 7}, {5, 6}]
 
 
-def test_companions_are_set_aside_and_counted() -> None:
-    together, strangers = [(1, 2), (2, 1), (3, 4)], [(1, 3), (9, 8), (8, 1), (4, 2)]
-    samples = pd.DataFrame([*together, *strangers], columns=["ref_id", "other_id"])
-    groups = pd.DataFrame({"group": [0, 0, 1, 1], "id": [1, 2, 3, 4]})
-    kept = without_companions(samples, groups)
-    assert kept[["ref_id", "other_id"]].to_numpy().tolist() == [list(pair) for pair in strangers]
-    assert funnels.get(kept)[-1]["rejected"] == {"walk together": 3}
-
-
-def test_to_pedpy_and_back() -> None:
+def test_tracks_are_the_same_after_conversion_to_pedpy_and_back() -> None:
     pytest.importorskip("pedpy")
     tracks = good_tracks()
     trajectory = to_pedpy(tracks)
     assert trajectory.frame_rate == 10
     assert trajectory.number_pedestrians == tracks["id"].nunique()
-    back = from_pedpy(trajectory, day=tracks["day"].iloc[0])
+    back = szlib.read_tracks(trajectory)
     check_tracks(back)
-    pd.testing.assert_frame_equal(back, tracks, check_categorical=False, rtol=0, atol=1e-9)
+    pd.testing.assert_frame_equal(back[COLUMNS[1:]], tracks[COLUMNS[1:]], rtol=0, atol=1e-9)
 
 
-def test_pedpy_at_another_rate_comes_to_the_clock() -> None:
+def test_pedpy_tracks_at_25_hz_are_brought_to_the_clock() -> None:
     pedpy = pytest.importorskip("pedpy")
     frames = np.arange(50)
     data = pd.DataFrame({"id": 3, "frame": frames, "x": 1.2 * frames / 25, "y": 0.5})
-    tracks = from_pedpy(pedpy.TrajectoryData(data=data, frame_rate=25.0))
+    tracks = szlib.read_tracks(pedpy.TrajectoryData(data=data, frame_rate=25.0))
     check_tracks(tracks)
     np.testing.assert_allclose(tracks["x"], 1.2 * tracks["t"])
     np.testing.assert_allclose(tracks["vx"], 1.2)
 
 
-def test_pedpy_knows_no_days() -> None:
+def test_tracks_of_several_days_cannot_be_converted_to_pedpy() -> None:
     pytest.importorskip("pedpy")
     both = make_tracks(make_walk((0, 0), (1, 0)), make_walk((0, 0), (1, 0), day="2012-10-28"))
-    with pytest.raises(szlib.DataError, match="PedPy knows no days, and the table has 2"):
+    with pytest.raises(szlib.DataError, match="PedPy has no days, and the table has 2"):
         to_pedpy(both)

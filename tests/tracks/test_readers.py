@@ -28,7 +28,7 @@ from helpers.track_tables import real_data
 
 import szlib
 from szlib.tracks import funnels
-from szlib.tracks.formats.layouts import FORMATS
+from szlib.tracks.formats import FORMATS
 from szlib.tracks.readers import read_raw
 
 
@@ -193,7 +193,7 @@ BAD_ROWS = {
 def test_a_bad_row_is_set_aside_and_told_with_its_line(tmp_path: Path, bad: str, reason: str) -> None:
     content = "\n".join([*GOOD[:3], bad, *GOOD[3:], bad])
     frame, told = read_quietly(write(tmp_path / "a.csv", content + "\n"))
-    assert told == f"a.csv, first at line 4: rows set aside: 2 x {reason}"
+    assert told == f"a.csv, first at line 4: rejected rows: 2 x {reason}"
     assert stage_of(frame, "read") == {
         "stage": "read a.csv",
         "entered": len(GOOD) + 2,
@@ -207,12 +207,12 @@ def test_a_bad_row_is_set_aside_and_told_with_its_line(tmp_path: Path, bad: str,
 def test_every_format_counts_its_lines(tmp_path: Path, name: str, line: int) -> None:
     rows = WRITERS[name](samples(count=9)).splitlines()
     _, told = read_quietly(write(tmp_path / "a.csv", "\n".join([*rows[: line - 1], "x", *rows[line - 1 :]])))
-    assert told.startswith(f"a.csv, first at line {line}: rows set aside: 1 x missing or")
+    assert told.startswith(f"a.csv, first at line {line}: rejected rows: 1 x missing or")
 
 
 def test_a_file_of_mostly_bad_rows_is_refused(tmp_path: Path) -> None:
     frame, told = read_quietly(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z"])))
-    assert (len(frame), told) == (3, "a.csv, first at line 4: rows set aside: 3 x missing or extra fields")
+    assert (len(frame), told) == (3, "a.csv, first at line 4: rejected rows: 3 x missing or extra fields")
     with pytest.raises(
         szlib.DataError, match=r"a\.csv, line 4: missing or extra fields; 4 of 7 rows cannot be"
     ):
@@ -223,14 +223,14 @@ def test_rows_without_a_day_are_set_aside(tmp_path: Path) -> None:
     rows = samples().assign(day="2013-01-06")
     rows.loc[[3, 4], "day"] = None
     _, told = read_quietly(write(tmp_path / "a.csv", as_tidy(rows)))
-    assert told == "a.csv, first at line 5: rows set aside: 2 x no day"
+    assert told == "a.csv, first at line 5: rejected rows: 2 x no day"
 
 
 def test_duplicate_rows_are_counted_and_the_first_one_stays(tmp_path: Path) -> None:
     rows = samples()
     again = rows.assign(x=rows["x"] + 1).iloc[:4]
     frame, told = read_quietly(write(tmp_path / "a.csv", as_1hz(pd.concat([rows, again]))))
-    assert told == "all files: rows set aside: 4 x duplicate (day, id, t)"
+    assert told == "all files: rejected rows: 4 x duplicate (day, id, t)"
     assert stage_of(frame, "merge")["rejected"] == {"duplicate (day, id, t)": 4}
     alone = read_raw(write(tmp_path / "a.csv", as_1hz(rows)))
     pd.testing.assert_frame_equal(frame, alone)
@@ -285,7 +285,7 @@ UNUSABLE: dict[str, tuple[str | bytes, str]] = {
     "random bytes": (random.Random(1).randbytes(5000), "line 1"),
     "UTF-16": (as_tidy(samples()).encode("utf-16"), "line 1"),
     "one endless line": (b"1," * 300_000, "line 1"),
-    "a truncated .gz": (gzip.compress(as_raw(samples()).encode())[:-30], "could be unpacked up to byte"),
+    "a truncated .gz": (gzip.compress(as_raw(samples()).encode())[:-30], "damaged .gz"),
     "a corrupt .gz": (gzip.compress(b"1,2\n" * 99)[:-8] + b"\x00" * 8, "damaged .gz"),
     "rubbish behind a .gz": (gzip.compress(as_raw(samples()).encode()) + b"rubbish", "damaged .gz"),
     "a .gz of nothing": (gzip.compress(b""), "line 1: the file is empty"),

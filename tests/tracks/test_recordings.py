@@ -17,7 +17,7 @@ import szlib
 from szlib import memory
 from szlib.errors import MemoryLimitError, StorageError
 from szlib.tracks import datasets
-from szlib.tracks.formats import plain as formats
+from szlib.tracks.formats import unpack
 from szlib.tracks.readers import read_raw
 
 BEGIN = 1_351_040_400.0
@@ -115,10 +115,10 @@ def test_a_full_temporary_folder_is_no_damaged_file(tmp_path: Path, monkeypatch:
     full.mkdir()
     (full / "unpacked").symlink_to("/dev/full")
     with pytest.raises(StorageError, match=r"no room to unpack it .*No space left"):
-        formats._unpack(packed, full / "unpacked")
+        unpack._unpack(packed, full / "unpacked")
     with pytest.raises(szlib.DataError, match=r"damaged \.gz"):
         (tmp_path / "cut.gz").write_bytes(packed.read_bytes()[:-30])
-        formats._unpack(tmp_path / "cut.gz", tmp_path / "unpacked")
+        unpack._unpack(tmp_path / "cut.gz", tmp_path / "unpacked")
 
 
 def test_what_memory_cannot_take_is_refused_before_it_is_read(tmp_path: Path) -> None:

@@ -1,9 +1,68 @@
-"""Formats of track files: plain or packed, recognised, laid out, or read by PedPy.
+"""Formats of track files: a class each, which recognises a file by its first line and scans it.
 
-frame_rates  how long a frame is, where EWAP files count frames
-plain        files as they are on disk, plain or .gz
-foreign      formats of other programs, by PedPy's own loaders
-layouts      which column is what, and how a file is recognised by its first line
-tables       tables in memory: DataFrames, and PedPy's TrajectoryData
-rows         why some rows cannot be used, and the others in seconds and metres
+base    what all formats share: `TrackFormat`
+atc     the ATC mall's files, raw and 1 Hz
+ewap    EWAP files, whose frame rate is estimated
+tidy    tables: CSV, Parquet, DataFrames, PedPy's TrajectoryData
+pedpy   formats of other programs, read by PedPy's loaders
+unpack  files on disk, plain or .gz
 """
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import polars as pl
+
+from ...errors import DataError
+from ..options import ReadOptions
+from .atc import ATC_1HZ, ATC_RAW
+from .base import EXPECTED, TrackFormat
+from .ewap import EWAP
+from .pedpy import PEDPY_FORMATS, PedPyFormat
+from .tidy import PARQUET, TIDY
+from .unpack import LONGEST_LINE, read_first_line, require_memory, unpacked
+
+__all__ = ["FORMATS", "TrackFormat", "find_format", "open_file"]
+
+FORMATS: dict[str, TrackFormat] = {each.name: each for each in (*PEDPY_FORMATS, ATC_RAW, ATC_1HZ, EWAP, TIDY)}
+"""Formats by name, in the order of recognition."""
+
+
+@contextmanager
+def open_file(
+    path: Path, options: ReadOptions, *, is_whole: bool = False
+) -> Iterator[tuple[TrackFormat, pl.LazyFrame, Path]]:
+    """Open file `path`, plain or .gz, read with `options`: its format, a scan of its rows, the unpacked file.
+
+    The scan has columns line, t, id, x, y (, day) and ragged, which marks lines with missing or extra fields.
+    Raises DataError where the file has no format that szlib knows, cannot be read, or an option does not fit,
+    and, if it `is_whole` in memory, MemoryLimitError where it has more rows than memory can take.
+    """
+    with unpacked(path) as plain:
+        if is_whole:
+            require_memory(plain, path)
+        with plain.open("rb") as stream:
+            head = stream.readline(LONGEST_LINE)
+        found, scan = recognise(head, options).open(plain, path, head, options)
+        try:
+            yield found.in_unit(options.unit), scan, plain
+        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+            raise DataError(f"{path}: cannot be read as {found.name} ({error}); {EXPECTED}") from error
+
+
+def find_format(path: Path, options: ReadOptions) -> TrackFormat:
+    """The format of file `path`, plain or .gz, read with `options`; tidy where the file cannot be read."""
+    return recognise(read_first_line(path), options)
+
+
+def recognise(head: bytes, options: ReadOptions) -> TrackFormat:
+    """The format in `options`, or else the one of a file whose first line is `head`."""
+    if PARQUET.recognises(head):
+        return PARQUET
+    if options.file_format:
+        return FORMATS[options.file_format]
+    found = next(each for each in FORMATS.values() if each.recognises(head))
+    return TIDY if options.columns and not isinstance(found, PedPyFormat) else found

@@ -1,0 +1,256 @@
+"""What all formats of track files share: recognition by the first line, and scans of text and of tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import ClassVar, Self
+
+import polars as pl
+
+from ...errors import DataError
+from ..options import UNITS, ReadOptions
+from .unpack import read_first_line
+
+EXPECTED = (
+    "expected one of: atc-raw (8 numbers, commas, no header), atc-1hz (6 numbers, commas, no header), "
+    "ewap (8 numbers, blanks), or tidy CSV with a header or Parquet with columns t, id, x, y; or, by "
+    "PedPy, texts or HDF5 of Juelich's archive, Viswalk, Vadere, JuPedSim; plain or .gz; "
+    "Grand Central, Edinburgh and THOR-MAGNI are read by szlib.tracks.sites"
+)
+"""The formats, for error messages."""
+CALENDAR_BEGINS = 1e8
+"""A clock that stays below this (1973) does not count from 1970, and gives no calendar day."""
+_LAST_SECOND = 4_102_444_800.0
+"""2100-01-01; later time stamps are not seconds since 1970."""
+_FARTHEST = 2e7
+"""Farther [m] from the origin of any grid is no place on Earth."""
+_MINUTES_PER_DAY = 24 * 60
+
+
+@dataclass(frozen=True)
+class TrackFormat:
+    """A format of track files; `open_file` returns it completed with what one file says.
+
+    Attributes
+    ----------
+    name : one of `szlib.tracks.options.FORMAT_NAMES`.
+    n_fields : number of fields of a row.
+    columns : the number of the field that holds t, id, x, y (and day).
+    metres, seconds : one unit of position [m] and of time [s].
+    max_gap : a longer gap between samples ends a track [s]; None takes a multiple of the sampling interval.
+    separator : character between two fields; a blank stands for any run of blanks.
+    has_header : whether the first line names the columns.
+    start : time at which the clock of the file begins [s since 1970]; not 0 where it counts from midnight.
+
+    Each class sets, for all its files:
+
+    area : area in which encounters are looked for unless another is given: (lowest, highest) x and y [m].
+    is_ambiguous : whether a file in other units or with other columns can look the same; speeds are checked.
+    is_streamed : whether files are too large to be read as a whole.
+    is_sequence : whether each file is a recording of its own, without a calendar.
+    has_optional_end : whether the last field of a row may be missing.
+    speed_field : number of the field that holds the sensor's speed, and its unit [m/s].
+    """
+
+    name: str
+    n_fields: int = 0
+    columns: Mapping[str, int] = field(default_factory=dict)
+    metres: float = 1.0
+    seconds: float = 1.0
+    max_gap: float | None = None
+    separator: str = ","
+    has_header: bool = False
+    start: float = 0.0
+
+    area: ClassVar[tuple[tuple[float, float], tuple[float, float]] | None] = None
+    is_ambiguous: ClassVar[bool] = False
+    is_streamed: ClassVar[bool] = False
+    is_sequence: ClassVar[bool] = False
+    has_optional_end: ClassVar[bool] = False
+    speed_field: ClassVar[tuple[int, float] | None] = None
+
+    def recognises(self, head: bytes) -> bool:
+        """Whether `head`, the first line of a file, looks like this format: numbers, as many as fields."""
+        parts = decode_line(head).split(None if self.separator == " " else self.separator)
+        return len(parts) == self.n_fields and sum(map(is_number, parts)) * 2 > len(parts)
+
+    def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
+        """Complete the format with what a file says, and scan the file.
+
+        Parameters
+        ----------
+        plain : the unpacked file.
+        path : the file as it was given, for messages.
+        head : its first line.
+        options : how it is read.
+
+        Returns
+        -------
+        The format of this file, and a scan with columns line, t, id, x, y (, day) and ragged.
+
+        Raises
+        ------
+        DataError : the file does not have this format, or an option does not fit it.
+        """
+        first = decode_first_line(head, path)
+        if options.frame_rate is not None:
+            raise DataError(f"{path}: is {self.name}, whose times are in seconds; leave frame_rate out")
+        found = replace(self, start=self.clock_start(path, first))
+        return found, found.scan(plain)
+
+    def in_unit(self, unit: str | None) -> Self:
+        """The format with positions in `unit`, if one is given."""
+        return self if unit is None else replace(self, metres=UNITS[unit])
+
+    def clock_start(self, path: Path, first: str) -> float:
+        """Time at which the clock of file `path` with first line `first` begins [s since 1970]."""
+        return 0.0
+
+    def first_time(self, path: Path, first: str) -> float | None:
+        """Time of the `first` line of file `path` [s since 1970]; None where the line does not give it.
+
+        Raises ValueError where the line holds no number.
+        """
+        return None
+
+    def value_limits(self) -> dict[str, tuple[float, float]]:
+        """Of t, id, x and y: one unit of the file, and the greatest usable magnitude, both in s, 1 and m."""
+        place = (self.metres, _FARTHEST)
+        return {"t": (self.seconds, _LAST_SECOND), "id": (1.0, 2.0**53), "x": place, "y": place}
+
+    def rejection_reason(self) -> pl.Expr:
+        """Why a row is rejected; null where it is usable."""
+        limit, person = self.value_limits(), pl.col("id")
+        numbers = list(limit)
+        beyond = {name: pl.col(name).abs() * unit > most for name, (unit, most) in limit.items()}
+        reasons = {
+            "missing or extra fields": pl.col("ragged"),
+            "missing or not a number": pl.any_horizontal(pl.col(numbers).is_null()),
+            "not finite": ~pl.all_horizontal(pl.col(numbers).is_finite()),
+            "id not a whole number": (person != person.floor()) | beyond["id"],
+            "time not in seconds since 1970": beyond["t"],
+            "position not on Earth": beyond["x"] | beyond["y"],
+        }
+        if "day" in self.columns:
+            reasons["no day"] = pl.col("day").is_null()
+        return pl.coalesce(pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons.items())
+
+    def to_metres(self, good: pl.DataFrame, path: Path, tz: str) -> pl.DataFrame:
+        """Convert the `good` rows of file `path` to day, id, t [s], x, y [m].
+
+        The day is the date in time zone `tz`, or the file's name where its clock does not count from 1970.
+        """
+        if "day" not in good.columns:
+            last = good["t"].max()
+            is_named = self.is_sequence or (isinstance(last, float) and last * self.seconds < CALENDAR_BEGINS)
+            try:
+                day = pl.lit(file_stem(path)) if is_named else _find_days(good["t"], tz)
+                good = good.with_columns(day=day)
+            except pl.exceptions.PolarsError as error:
+                raise DataError(
+                    f"unknown time zone {tz!r} ({error}); expected one like 'Asia/Tokyo'"
+                ) from error
+        units = {"t": self.seconds, "x": self.metres, "y": self.metres}
+        numbers = (pl.col(name) if unit == 1 else pl.col(name) * unit for name, unit in units.items())
+        return good.select("day", pl.col("id").cast(pl.Int64), *numbers)
+
+    def scan(
+        self, plain: Path, types: Mapping[str, pl.datatypes.DataTypeClass] = MappingProxyType({})
+    ) -> pl.LazyFrame:
+        """Scan the lines of file `plain`; `types` of some fields f0, f1, ..., if not the usual ones."""
+        return self._scan_blanks(plain) if self.separator == " " else self._scan_separated(plain, types)
+
+    def quick_scan(self, plain: Path) -> pl.LazyFrame:
+        """Scan file `plain` in two thirds of the time, if all its rows are like the first one.
+
+        Numbers are read as integers where they are whole in the first row, and the last field as a number.  A
+        row has null where it is no such number, and is `ragged` where its last field is none.
+        """
+        first = decode_line(read_first_line(plain)).split(self.separator) + [""] * self.n_fields
+        numbers = {*self.columns.values(), self.n_fields - 1}
+        types = {f"f{k}": pl.Int64 if first[k].lstrip("-").isdecimal() else pl.Float64 for k in numbers}
+        return self.scan(plain, types)
+
+    def _scan_separated(self, plain: Path, types: Mapping[str, pl.datatypes.DataTypeClass]) -> pl.LazyFrame:
+        numbers = {index for name, index in self.columns.items() if name != "day"}
+        fields = {f"f{i}": pl.Float64 if i in numbers else pl.String for i in range(self.n_fields)}
+        schema: dict[str, pl.datatypes.DataTypeClass] = {**fields, **types, "extra": pl.String}
+        scan = pl.scan_csv(
+            plain, schema=schema, has_header=False, skip_lines=int(self.has_header),
+            separator=self.separator, quote_char=None, encoding="utf8-lossy", ignore_errors=True,
+            truncate_ragged_lines=True,
+            missing_columns="insert", extra_columns="ignore", raise_if_empty=False, glob=False,
+            row_index_name="line", row_index_offset=1 + self.has_header,
+        )  # fmt: skip
+        ragged = pl.col("extra").is_not_null()
+        if not self.has_optional_end:
+            ragged |= pl.col(f"f{self.n_fields - 1}").is_null()
+        named = {name: pl.col(f"f{index}") for name, index in self.columns.items()}
+        if "day" in named:
+            named["day"] = named["day"].str.strip_chars(' "')
+        if self.start:
+            named["t"] = named["t"] + self.start
+        return scan.select("line", ragged=ragged, **named)
+
+    def _scan_blanks(self, plain: Path) -> pl.LazyFrame:
+        text = plain.read_bytes().decode("utf-8", errors="replace").removeprefix("\ufeff").removesuffix("\n")
+        lines = pl.LazyFrame({"text": text.split("\n")[int(self.has_header) :]})
+        parts = pl.col("text").str.extract_all(r"\S+")
+        fields = {name: parts.list.get(i, null_on_oob=True) for name, i in self.columns.items()}
+        numbers = {n: f if n == "day" else f.cast(pl.Float64, strict=False) for n, f in fields.items()}
+        return lines.with_row_index("line", offset=1 + self.has_header).select(
+            "line", ragged=parts.list.len() != self.n_fields, **numbers
+        )
+
+
+def decode_line(line: bytes) -> str:
+    """The text of `line`, without a byte order mark and blanks around it."""
+    return line.decode("utf-8", errors="replace").lstrip("\ufeff").strip()
+
+
+def decode_first_line(head: bytes, path: Path) -> str:
+    """The first line `head` of file `path` as text; raises DataError where it is binary or blank."""
+    if b"\0" in head:
+        raise DataError(f"{path}, line 1: is binary, not text; {EXPECTED}")
+    first = decode_line(head)
+    if not first:
+        raise DataError(f"{path}, line 1: the file is empty or begins with a blank line; {EXPECTED}")
+    return first
+
+
+def is_number(text: str) -> bool:
+    """Whether `text` is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def scan_table(rows: pl.DataFrame) -> pl.LazyFrame:
+    """Scan table `rows` with columns t, id, x, y (, day) like a file; lines are counted from 1."""
+    day = [pl.col("day").cast(pl.String)] if "day" in rows.columns else []
+    numbers = [pl.col(name).cast(pl.Float64, strict=False) for name in ("t", "id", "x", "y")]
+    return rows.lazy().select(*numbers, *day, ragged=pl.lit(False)).with_row_index("line", offset=1)
+
+
+def file_stem(path: Path) -> str:
+    """The name of file `path` without its endings."""
+    return path.name.split(".")[0]
+
+
+def _find_days(t: pl.Series, tz: str) -> pl.Series | pl.Expr:
+    """The local date of each time [s since 1970]; a single one where all minutes have the same date."""
+    first, last = (int(moment) // 60 for moment in (t.min(), t.max()))  # type: ignore[arg-type]
+    if last - first < _MINUTES_PER_DAY:
+        days = _local_date(pl.Series(range(60 * first, 60 * last + 1, 60)), tz).unique()
+        if len(days) == 1:
+            return pl.lit(days[0])
+    return _local_date(t.floor().cast(pl.Int64), tz)
+
+
+def _local_date(t: pl.Series, tz: str) -> pl.Series:
+    return pl.from_epoch(t, time_unit="s").dt.convert_time_zone(tz).dt.date()
