@@ -137,7 +137,7 @@ kinds.to_frame("encounters")
 
 # %%
 paths = reference_frame(tracks, samples)
-ax = figures.plot_encounter_paths(paths, count=examples)
+ax = figures.plot_encounter_paths(paths, n_shown=examples)
 record.figure(ax.figure, "paths")
 
 # %% [markdown]

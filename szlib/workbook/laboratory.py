@@ -1,6 +1,6 @@
-"""The laboratory: a scene that is dragged and set while it runs, with one robot for each set of options.
+"""The laboratory: one scene with several robots, which a user drags and sets while it runs.
 
-`Experiment` holds the scene and its robots; `LaboratoryWidget` shows it in JupyterLab or in the classic
+`Experiment` holds the scene and its robots.  `LaboratoryWidget` shows it in JupyterLab or in the classic
 notebook, on a canvas that `static/laboratory.js` draws.  The page asks for each step, and the kernel computes
 it.  The widget uses anywidget, which needs no build step and no extension of JupyterLab.
 """
@@ -29,21 +29,42 @@ from ..errors import SolverError, SzlibError
 from ..simulation.closed_loop import advance
 from ..simulation.scenario import Scenario
 from ..zones.ellipses import Ellipse
-from .figures.movies import Stage, moment, script
+from .figures.movies import read_scripts, scene_layout, snapshot
 from .record import places
 
 __all__ = ["Experiment", "LaboratoryWidget", "RobotOptions", "is_interactive", "make_scene", "show_sliders"]
 
+_SLIDERS = [
+    {"name": "gamma", "label": "gamma", "low": 0.01, "high": 1.0, "step": 0.01},
+    {"name": "N_h", "label": "N_h [steps]", "low": 1, "high": 24, "step": 1},
+    {"name": "a_max", "label": "a_max [m/s\u00b2]", "low": 0.2, "high": 3.0, "step": 0.1},
+    {"name": "size", "label": "size of the zone [times]", "low": 0.3, "high": 2.0, "step": 0.05},
+]
+"""Sliders of each robot, one for each field of `RobotOptions` that is a number."""
+_SPEED_SLIDER = {"label": "speed of the person [m/s]", "low": 0.0, "high": 2.0, "step": 0.05}
+_MARGIN = 0.7
+"""Margin around everything that can be dragged [m]."""
+_POLYGON_TOLERANCE = 0.01
+"""Tolerance of the polygon of accelerations on the page [m/s2]."""
+
 
 @dataclass(frozen=True)
 class RobotOptions:
-    """What is set for one robot.
+    """Options of one robot.
 
     Parameters
     ----------
-    gamma, N_h, a_max : as of `MPCSettings`; a plan is as long as N_h where that is longer than its default.
-    size : the zone is so many times as large.
-    estimator : by which the zone was found: a name among those of the bench.
+    gamma : as in `MPCSettings`.
+    N_h : as in `MPCSettings` [steps]. A plan is as long as N_h if that is longer than the default plan.
+    a_max : as in `MPCSettings` [m/s2].
+    size : factor by which the zone is scaled.
+    estimator : name of the estimator whose zone the robot keeps.
+
+    Examples
+    --------
+    >>> from szlib.workbook import laboratory
+    >>> laboratory.RobotOptions(gamma=0.2).settings().gamma
+    0.2
     """
 
     gamma: float = 0.05
@@ -53,65 +74,94 @@ class RobotOptions:
     estimator: str = "quantile"
 
     def settings(self) -> MPCSettings:
-        """The controller's; SolverError for a value out of its range."""
+        """Settings of the controller.
+
+        Raises
+        ------
+        SolverError : an option is out of range.
+        """
         N = max(self.N_h, MPCSettings().N)
         return MPCSettings(gamma=self.gamma, N=N, N_h=self.N_h, a_max=self.a_max)
 
     def zone(self, zones: Mapping[str, Ellipse]) -> Ellipse:
-        """The zone that is kept, in the person's frame; SolverError for an estimator that is not there."""
+        """The zone that the robot keeps, in the person's frame.
+
+        Parameters
+        ----------
+        zones : estimator -> zone in the person's frame.
+
+        Raises
+        ------
+        SolverError : there is no zone of this estimator.
+        """
         if self.estimator not in zones:
             raise SolverError(f"estimator must be one of {', '.join(zones)}; got {self.estimator!r}")
         return zones[self.estimator].scaled(self.size)
 
 
 class Experiment:
-    """One scene, and in it a robot for each choice, which do not see each other.
+    """One scene with several robots that do not see each other.
 
     Parameters
     ----------
-    scenario : where everything begins.
-    zones : a zone for each estimator, in the person's frame.
-    choices : of each robot.
+    scenario : the scene at the start.
+    zones : estimator -> zone in the person's frame.
+    robots : options of each robot.
 
     Raises
     ------
-    SolverError : a choice is out of its range.
+    SolverError : an option is out of range.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import laboratory
+    >>> zones = {"quantile": szlib.Ellipse((0.05, 0.0), (0.95, 0.75))}
+    >>> scene = laboratory.make_scene((4, 0), (2, 0, 180), 0.5, [], start=(-4, 0))
+    >>> experiment = laboratory.Experiment(scene, zones, [laboratory.RobotOptions()])
+    >>> [step.safe for step in experiment.step()]
+    [True]
     """
 
     def __init__(
-        self, scenario: Scenario, zones: Mapping[str, Ellipse], choices: Sequence[RobotOptions]
+        self, scenario: Scenario, zones: Mapping[str, Ellipse], robots: Sequence[RobotOptions]
     ) -> None:
         self.scenario, self.zones = scenario, dict(zones)
-        self.choices = list(choices)
-        self._controllers = [self._controller(choice) for choice in choices]
+        self.robots = list(robots)
+        self._controllers = [self._make_controller(options) for options in robots]
         self.restart()
 
-    def _controller(self, choice: RobotOptions) -> MPCCBF:
-        zone = choice.zone(self.zones)
-        return MPCCBF(zone, walls=self.scenario.walls, settings=choice.settings())
+    def _make_controller(self, options: RobotOptions) -> MPCCBF:
+        zone = options.zone(self.zones)
+        return MPCCBF(zone, walls=self.scenario.walls, settings=options.settings())
 
     def restart(self) -> None:
-        """Robots and people are where they began."""
-        self._step, self._put = 0, (0, list(self.scenario.people))
-        self.states: list[Array] = [self.scenario.start.copy() for _ in self.choices]
+        """Put the robots and the people back to the start."""
+        self._n_steps, self._placed = 0, (0, list(self.scenario.people))
+        self.states: list[Array] = [self.scenario.start.copy() for _ in self.robots]
         for controller in self._controllers:
             controller.reset()
 
     @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return self._controllers[0].settings.dt
+
+    @property
     def t(self) -> float:
-        """Time since everything began [s]."""
-        return self._step * self._controllers[0].settings.dt
+        """Time since the start [s]."""
+        return self._n_steps * self.dt
 
     @property
     def people(self) -> list[Person]:
-        """Everybody as they are now."""
-        when, people = self._put
-        return [p.after((self._step - when) * self._controllers[0].settings.dt) for p in people]
+        """The people at this time."""
+        since, people = self._placed
+        return [person.after((self._n_steps - since) * self.dt) for person in people]
 
-    def choose(self, robot: int, **changed: Any) -> None:
-        """Set something for one robot: names of `RobotOptions`."""
-        choice = replace(self.choices[robot], **changed)
-        self._controllers[robot], self.choices[robot] = self._controller(choice), choice
+    def configure_robot(self, index: int, **options: Any) -> None:
+        """Change `options` of the robot `index`: fields of `RobotOptions`."""
+        changed = replace(self.robots[index], **options)
+        self._controllers[index], self.robots[index] = self._make_controller(changed), changed
 
     def move(
         self,
@@ -121,56 +171,62 @@ class Experiment:
         walls: Sequence[Sequence[float]] | None = None,
         speed: float | None = None,
     ) -> None:
-        """Put something elsewhere: the goal, people by number, all walls [m]; or set people's speed [m/s].
+        """Move parts of the scene. Before the first step, this changes the start as well.
 
-        Before the first step that is where they begin.  Raises SolverError for what is no place, and then
-        everything stays.
+        Parameters
+        ----------
+        goal : new goal (x, y) [m].
+        people : index -> new position (x, y) of a person [m].
+        walls : all walls, each with two ends [m].
+        speed : new speed of all people [m/s]; it changes the start at any time.
+
+        Raises
+        ------
+        SolverError : a position is invalid. Nothing has moved then.
         """
         moved = self.people
         for i, place in (people or {}).items():
             x, y = check_array("a person's position", place, (2,)).tolist()
             moved[i] = replace(moved[i], position=(x, y))
+        start = moved if self._n_steps == 0 else list(self.scenario.people)
         if speed is not None:
-            moved = [_walking(person, speed) for person in moved]
+            moved, start = ([_with_speed(person, speed) for person in group] for group in (moved, start))
         segments = [np.reshape(wall, (2, 2)) for wall in (self.scenario.walls if walls is None else walls)]
         changed = replace(
             self.scenario,
             goal=self.scenario.goal if goal is None else check_array("goal", goal, (2,)),
             walls=np.reshape([check_wall(wall) for wall in segments], (-1, 2, 2)),
-            people=tuple(moved) if self._step == 0 else self.scenario.people,
+            people=tuple(start),
         )
         if walls is not None:
             for controller in self._controllers:
                 controller.set_walls(changed.walls)
-        if speed is not None:
-            changed = replace(changed, people=tuple(_walking(p, speed) for p in changed.people))
-        self.scenario, self._put = changed, (self._step, moved)
+        self.scenario, self._placed = changed, (self._n_steps, moved)
 
-    def look(self) -> list[Step]:
-        """What each robot decides now."""
-        pairs, people = zip(self._controllers, self.states, strict=True), self.people
-        return [controller.step(state, self.scenario.goal, people) for controller, state in pairs]
+    def decide(self) -> list[Step]:
+        """The step of each robot at this time; no time passes."""
+        robots, people = zip(self._controllers, self.states, strict=True), self.people
+        return [controller.step(state, self.scenario.goal, people) for controller, state in robots]
 
     def step(self) -> list[Step]:
-        """What each robot decides now; then dt passes."""
-        steps, dt = self.look(), self._controllers[0].settings.dt
-        self.states = [advance(x, step.control, dt) for x, step in zip(self.states, steps, strict=True)]
-        self._step += 1
+        """The step of each robot at this time; then one time step passes."""
+        steps = self.decide()
+        self.states = [advance(x, step.control, self.dt) for x, step in zip(self.states, steps, strict=True)]
+        self._n_steps += 1
         return steps
 
-    def cell(self) -> str:
-        """The parameter cell that begins with this scene and these choices."""
+    def parameter_cell(self) -> str:
+        """Text of a parameter cell that starts with this scene and these robots."""
         lines = [f"goal = {self.scenario.goal.round(2).tolist()}  # x, y [m]"]
         for person in self.scenario.people[:1]:
             facing = degrees(person.heading or 0.0)
             place = [round(number, 2) for number in (*person.position, facing)]
             lines.append(f"person = {place}  # x, y [m], walks towards [deg]")
             lines.append(f"speed = {round(float(np.hypot(*person.velocity)), 2)}  # of the person [m/s]")
-        lines.append(
-            f"walls = {self.scenario.walls.round(2).reshape(-1).tolist()}  # xa, ya, xb, yb of each [m]"
-        )
-        for choice, suffix in zip(self.choices, ("", "_b"), strict=False):
-            lines += [f"{name}{suffix} = {value!r}" for name, value in asdict(choice).items()]
+        walls = self.scenario.walls.round(2).reshape(-1).tolist()
+        lines.append(f"walls = {walls}  # xa, ya, xb, yb of each [m]")
+        for options, suffix in zip(self.robots, ("", "_b"), strict=False):
+            lines += [f"{name}{suffix} = {value!r}" for name, value in asdict(options).items()]
         return "\n".join(lines)
 
 
@@ -179,140 +235,175 @@ def make_scene(
     person: Sequence[float],
     speed: float,
     walls: Sequence[float],
+    *,
     start: Sequence[float],
 ) -> Scenario:
-    """The scene of a parameter cell (see `Experiment.cell`), the robot at rest at `start`, (x, y) [m]."""
+    """Make the scene of a parameter cell (see `Experiment.parameter_cell`).
+
+    Parameters
+    ----------
+    goal : (x, y) [m].
+    person : position and direction (x, y, facing) [m, m, deg].
+    speed : speed of the person [m/s].
+    walls : ends of all walls (xa, ya, xb, yb, ...) [m].
+    start : (x, y) where the robot starts at rest [m].
+
+    Examples
+    --------
+    >>> from szlib.workbook import laboratory
+    >>> scene = laboratory.make_scene((4, 0), (2, 0, 180), 0.5, [], start=(-4, 0))
+    >>> scene.people[0].position
+    (2.0, 0.0)
+    """
     x, y, facing = person
-    who = _walking(Person((x, y), heading=radians(facing)), speed)
-    there = np.reshape(np.asarray(walls, float), (-1, 2, 2))
-    begin = np.array([*start, 0.0, 0.0])
-    return Scenario("laboratory", begin, np.asarray(goal, float), (who,), there, title="The laboratory")
+    people = (_with_speed(Person((x, y), heading=radians(facing)), speed),)
+    segments = np.reshape(np.asarray(walls, float), (-1, 2, 2))
+    state = np.array([*start, 0.0, 0.0])
+    return Scenario("laboratory", state, np.asarray(goal, float), people, segments, title="The laboratory")
 
 
-def _walking(person: Person, speed: float) -> Person:
+def _with_speed(person: Person, speed: float) -> Person:
     heading = person.heading or 0.0
     return replace(person, velocity=(speed * cos(heading), speed * sin(heading)), heading=heading)
 
 
-SLIDERS = [
-    {"name": "gamma", "label": "gamma", "low": 0.01, "high": 1.0, "step": 0.01},
-    {"name": "N_h", "label": "N_h [steps]", "low": 1, "high": 24, "step": 1},
-    {"name": "a_max", "label": "a_max [m/s\u00b2]", "low": 0.2, "high": 3.0, "step": 0.1},
-    {"name": "size", "label": "size of the zone [times]", "low": 0.3, "high": 2.0, "step": 0.05},
-]
-"""What can be set of each robot."""
-SPEED = {"label": "speed of the person [m/s]", "low": 0.0, "high": 2.0, "step": 0.05}
-_AROUND = 0.7
-"""Room left around everything that can be dragged [m]."""
-_FINE = 0.01
-"""To this the polygon of accelerations is drawn [m/s2]."""
-
-
 def is_interactive() -> bool:
-    """Whether the kernel was started by a page: JupyterLab or the classic notebook; never in `szlib run`."""
+    """Return True if a page of JupyterLab or of the classic notebook started the kernel, not `szlib run`.
+
+    Examples
+    --------
+    >>> from szlib.workbook import laboratory
+    >>> laboratory.is_interactive()
+    False
+    """
     return "JPY_SESSION_NAME" in os.environ and places.RUN_VARIABLE not in os.environ
 
 
 def show_sliders(draw: Callable[..., object], **sliders: tuple[float, float, float, float]) -> None:
-    """Draw with sliders where a page is open, and not at all headless.
+    """Draw with sliders on a page of a notebook; do nothing in a headless run.
 
-    Each is (value, least, greatest, step); `draw` gets their values by name.
+    Parameters
+    ----------
+    draw : function of the sliders' values, by name.
+    sliders : name -> (value, least, greatest, step).
+
+    Examples
+    --------
+    >>> from szlib.workbook import laboratory
+    >>> laboratory.show_sliders(lambda speed: print(speed), speed=(1.0, 0.5, 1.5, 0.1))
     """
     if not is_interactive():
         return
     from ipywidgets import FloatSlider, interact
 
-    made = {
+    widgets = {
         name: FloatSlider(value, min=low, max=high, step=step, continuous_update=False)
         for name, (value, low, high, step) in sliders.items()
     }
 
-    def drawn(**values: float) -> None:
-        """What ipywidgets takes for a function of all of them."""
+    def draw_silently(**values: float) -> None:
+        """Draw, and return nothing that the page would show."""
         draw(**values)
 
-    interact(drawn, **made)
+    interact(draw_silently, **widgets)
 
 
 class LaboratoryWidget(anywidget.AnyWidget):
-    """A bench on a page: drag the person, the goal, the ends of walls; set each robot; run, pause, share.
+    """An experiment on a page: drag the person, the goal and the ends of walls; set each robot; run, share.
 
     Parameters
     ----------
-    bench : what is shown.
+    experiment : the scene and its robots.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import laboratory
+    >>> zones = {"quantile": szlib.Ellipse((0.05, 0.0), (0.95, 0.75))}
+    >>> scene = laboratory.make_scene((4, 0), (2, 0, 180), 0.5, [], start=(-4, 0))
+    >>> experiment = laboratory.Experiment(scene, zones, [laboratory.RobotOptions()])
+    >>> widget = laboratory.LaboratoryWidget(experiment)
+    >>> widget.answer({"kind": "step", "changes": {}})["snapshots"][0]["safe"]
+    True
     """
 
-    _esm = script("scene", "laboratory")
-    begin = traitlets.Dict().tag(sync=True)
+    _esm = read_scripts("scene", "laboratory")
+    content = traitlets.Dict().tag(sync=True)
 
-    def __init__(self, bench: Experiment) -> None:
-        self.bench = bench
-        people = bench.scenario.people
+    def __init__(self, experiment: Experiment) -> None:
+        self.experiment = experiment
+        people = experiment.scenario.people
         speed = float(np.hypot(*people[0].velocity)) if people else 0.0
-        begin = {
-            "stage": self._stage(),
-            "choices": [asdict(choice) for choice in bench.choices],
-            "estimators": list(bench.zones),
-            "sliders": SLIDERS,
-            "speed": {**SPEED, "value": round(speed, 2)},
+        content = {
+            "layout": self._layout(),
+            "robots": [asdict(options) for options in experiment.robots],
+            "estimators": list(experiment.zones),
+            "sliders": _SLIDERS,
+            "speed": {**_SPEED_SLIDER, "value": round(speed, 2)},
         }
-        super().__init__(begin=begin)
-        self._thread = ThreadPoolExecutor(1)  # controllers belong to one thread, messages come in several
-        self.on_msg(lambda _, asked, __: self.send(self._thread.submit(self.answer, asked).result()))
+        super().__init__(content=content)
+        self._thread = ThreadPoolExecutor(1)  # controllers belong to one thread; messages come in several
+        self.on_msg(lambda _, request, __: self.send(self._thread.submit(self.answer, request).result()))
 
-    def _stage(self) -> dict[str, Any]:
-        scene, settings = self.bench.scenario, self.bench.choices[0].settings()
+    def _layout(self) -> dict[str, Any]:
+        scene = self.experiment.scenario
         places = [scene.start[:2], scene.goal, *(person.position for person in scene.people)]
         points = np.vstack([np.array(places), scene.walls.reshape(-1, 2)])
-        low, high = points.min(axis=0) - _AROUND, points.max(axis=0) + _AROUND
-        limits = [low[0], high[0], min(low[1], -2.0), max(high[1], 2.0)]
-        walls = scene.walls.reshape(-1, 4).tolist()
-        return Stage(
-            walls, scene.goal.tolist(), [float(x) for x in limits], settings.r_robot, settings.dt
-        ).told()
+        (x0, y0), (x1, y1) = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+        limits = x0, x1, min(y0, -2.0), max(y1, 2.0)
+        return scene_layout(scene, self.experiment.robots[0].settings(), limits)
 
-    def answer(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        """What the page is told: it says what was `changed`, and the `kind` of what it asks for.
+    def answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """Answer a message of the page.
 
-        "look" and "step" give what each robot decides now, the second lets dt pass then; "share" gives the
-        parameter cell. What cannot be is refused in words, and nothing has changed.
+        Parameters
+        ----------
+        request : `changes` to apply first (robots, people, goal, walls, speed, restart), and the `kind`:
+            "decide" and "step" ask for the step of each robot, and "step" lets one time step pass; "share"
+            asks for the parameter cell.
+
+        Returns
+        -------
+        The answer, with its `kind`: "snapshots", "cell", or "error" for an invalid change. After an error
+        nothing has changed.
         """
         try:
-            self._change(asked["changed"])
-            if asked["kind"] == "share":
-                return {"kind": "cell", "text": self.bench.cell()}
-            t, states, people = self.bench.t, self.bench.states, self.bench.people
-            steps = self.bench.step() if asked["kind"] == "step" else self.bench.look()
-            zones = [choice.zone(self.bench.zones) for choice in self.bench.choices]
-            told = zip(states, steps, zones, strict=True)
-            moments = [told_of(t, state, people, zone, step) for state, step, zone in told]
-            return {"kind": "moments", "moments": moments}
+            self._apply(request["changes"])
+            if request["kind"] == "share":
+                return {"kind": "cell", "text": self.experiment.parameter_cell()}
+            t, states, people = self.experiment.t, self.experiment.states, self.experiment.people
+            steps = self.experiment.step() if request["kind"] == "step" else self.experiment.decide()
+            zones = [options.zone(self.experiment.zones) for options in self.experiment.robots]
+            robots = zip(states, steps, zones, strict=True)
+            snapshots = [_robot_snapshot(t, state, people, zone, step) for state, step, zone in robots]
+            return {"kind": "snapshots", "snapshots": snapshots}
         except SzlibError as error:
-            return {"kind": "refused", "text": str(error), "stage": self._stage()}
+            return {"kind": "error", "text": str(error), "layout": self._layout()}
 
-    def _change(self, changed: Mapping[str, Any]) -> None:
-        for robot, names in changed.get("choices", {}).items():
-            self.bench.choose(int(robot), **names)
-        people = {int(i): place for i, place in changed.get("people", {}).items()}
-        moved = {name: changed[name] for name in ("goal", "walls", "speed") if name in changed}
+    def _apply(self, changes: Mapping[str, Any]) -> None:
+        for index, options in changes.get("robots", {}).items():
+            self.experiment.configure_robot(int(index), **options)
+        people = {int(i): place for i, place in changes.get("people", {}).items()}
+        moved = {name: changes[name] for name in ("goal", "walls", "speed") if name in changes}
         if people or moved:
-            self.bench.move(people=people, **moved)
-        if changed.get("restart"):
-            self.bench.restart()
+            self.experiment.move(people=people, **moved)
+        if changes.get("restart"):
+            self.experiment.restart()
 
 
-def told_of(t: float, state: Array, people: Sequence[Person], zone: Ellipse, step: Step) -> dict[str, Any]:
-    """One instant of one robot, as `static/laboratory.js` shows it."""
+def _robot_snapshot(
+    t: float, state: Array, people: Sequence[Person], zone: Ellipse, step: Step
+) -> dict[str, Any]:
+    """One time of one robot, for `static/laboratory.js`."""
     placed = np.array([(*p.position, p.heading or 0.0) for p in people]).reshape(-1, 3)
-    free = admissible(step).polygon.simplify(_FINE)
-    parts = [part for part in getattr(free, "geoms", [free]) if not part.is_empty]
-    return moment(t, state, placed, [zone] * len(people), step.predicted, step.h, step.rung) | {
+    allowed = admissible(step).polygon.simplify(_POLYGON_TOLERANCE)
+    parts = [part for part in getattr(allowed, "geoms", [allowed]) if part.geom_type == "Polygon"]
+    zones = [zone] * len(people)
+    return snapshot(t, state, placed, zones, step.predicted, step.h, step.rung) | {
         "control": step.control.round(3).tolist(),
         "a_max": step.scene.settings.a_max,
-        "free": [
-            np.asarray(part.exterior.coords).round(3).tolist()
-            for part in parts
-            if part.geom_type == "Polygon"
+        "allowed": [
+            np.asarray(part.exterior.coords).round(3).tolist() for part in parts if not part.is_empty
         ],
-        "told": "safe" if step.safe else "NOT SAFE",
+        "safe": step.safe,
     }

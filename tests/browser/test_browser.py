@@ -155,8 +155,8 @@ def check_player(page):
 def test_the_laboratory_is_dragged_set_run_and_shared(notebook):
     opened = notebook("20_laboratory")
     opened.run()
-    page, told = opened.page, opened.page.locator(".szlib-told")
-    page.wait_for_function("[...document.querySelectorAll('.szlib-told')].every(it => it.textContent)")
+    page, status = opened.page, opened.page.locator(".szlib-status")
+    page.wait_for_function("[...document.querySelectorAll('.szlib-status')].every(e => e.textContent)")
     scenes = [panel.locator("canvas").first for panel in page.locator(".szlib-panel").all()]
     before = [picture(scene) for scene in scenes]
     scenes[0].scroll_into_view_if_needed()
@@ -189,10 +189,10 @@ def test_the_laboratory_is_dragged_set_run_and_shared(notebook):
     assert shared["goal"] == pytest.approx([5, -1], abs=0.1)
     assert shared["walls"][:4] == pytest.approx([-6, 2.3, 6, 1.5], abs=0.1)
     page.locator(".szlib-run").click()
-    page.wait_for_function("parseFloat(document.querySelector('.szlib-told').textContent.slice(4)) > 2")
+    page.wait_for_function("parseFloat(document.querySelector('.szlib-status').textContent.slice(4)) > 2")
     print(page.locator(".szlib-rate").text_content())
     page.locator(".szlib-run").click()
-    assert page.locator(".szlib-refused").text_content() == "" and told.count() == 2
+    assert page.locator(".szlib-error").text_content() == "" and status.count() == 2
     saved = opened.save()
     assert errors(saved) == []
     check_pair(opened.file, saved)

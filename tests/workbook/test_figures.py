@@ -78,9 +78,9 @@ def paths():
 MAPS = {
     "map": lambda f: figures.plot_map(f("tracks"), szlib.ATC_SQUARE),
     "space": lambda f: figures.plot_attentional_space(
-        szlib.AttentionalSpace(), szlib.ATC_SQUARE, (-13, 0, 1.0)
+        szlib.AttentionalSpace(), szlib.ATC_SQUARE, pose=(-13, 0, 1.0)
     ),
-    "paths": lambda f: figures.plot_encounter_paths(paths(), count=3),
+    "paths": lambda f: figures.plot_encounter_paths(paths(), n_shown=3),
     "los": lambda f: figures.plot_relative_positions(f("samples")),
     "outliers": lambda f: figures.plot_outliers(np.eye(2).repeat(3, axis=0), np.arange(6) < 1),
     "zone": lambda f: figures.plot_zone(f("zone"), 1.1, truth=ZONE),
@@ -106,14 +106,14 @@ def test_maps_are_square_and_in_metres(name, request):
     ax.figure.savefig(io.BytesIO())
 
 
-def test_what_is_counted_in_cells_is_every_sample_near_enough(samples):
+def test_the_cells_count_every_sample_within_r_max(samples):
     for plot in (figures.plot_relative_positions, figures.plot_distance_by_direction):
         (cells,) = [c for c in plot(samples).collections if c.get_array() is not None]
         assert cells.get_array().sum() == (samples["distance"] <= 2).sum()
 
 
-def test_an_arrow_tells_where_each_path_leads():
-    ax = figures.plot_encounter_paths(paths(), count=3)
+def test_an_arrow_points_along_the_end_of_each_path():
+    ax = figures.plot_encounter_paths(paths(), n_shown=3)
     marks = [line for line in ax.lines if isinstance(line.get_marker(), tuple) and len(line.get_xdata())]
     assert sorted(round(line.get_marker()[2] + 90) % 360 for line in marks) == [0] * 3 + [180] * 3
 
@@ -126,40 +126,40 @@ def test_graphs_name_units(name, request):
     ax.figure.savefig(io.BytesIO())
 
 
-def test_a_figure_given_is_drawn_into(zone):
+def test_given_axes_are_drawn_on(zone):
     _, ax = plt.subplots()
     assert figures.plot_zone(zone, 1.1, ax=ax) is ax
 
 
-def test_a_path_count_limits_what_is_drawn():
-    ax = figures.plot_encounter_paths(paths(), count=3)
+def test_n_shown_limits_the_number_of_paths():
+    ax = figures.plot_encounter_paths(paths(), n_shown=3)
     assert all(len(c.get_segments()) == 3 for c in ax.collections)
 
 
-def test_the_zone_is_drawn_where_the_ellipse_is(zone):
+def test_the_drawn_curve_is_the_ellipse(zone):
     ax = figures.plot_zone(zone, 1.1)
     drawn = ax.lines[0].get_xydata()
     assert np.abs(zone.ellipse(1.1).level(drawn) - 1).max() < 1e-9
 
 
-def few(samples):
+def fit_few(samples):
     with pytest.warns(szlib.DataWarning, match="fewer than 20"):
         return szlib.SocialZone.fit(
             samples[samples["encounter"] < 15], method="quantile", speeds=(0.9, 1.1), resamples=20
         )
 
 
-def test_what_is_not_adequate_is_dashed_and_what_is_has_a_whole_line(zone, samples):
-    for known, line in ((zone, "-"), (few(samples), "--")):
+def test_only_an_inadequate_zone_is_dashed(zone, samples):
+    for known, line in ((zone, "-"), (fit_few(samples), "--")):
         ellipse = figures.plot_zone(known, 1.1).lines[known.method != "hull"]
         assert ellipse.get_linestyle() == line
         ax = figures.plot_zones(known)
         assert [each.get_linestyle() for each in ax.lines[:2]] == [line] * 2
-        told = [text.get_text() for text in ax.get_legend().get_texts()]
-        assert all(("not adequate" in label) == (line == "--") for label in told)
+        labels = [text.get_text() for text in ax.get_legend().get_texts()]
+        assert all(("not adequate" in label) == (line == "--") for label in labels)
 
 
-def test_the_band_is_the_interval_and_there_is_none_without(zone, samples):
+def test_the_band_is_drawn_exactly_where_an_interval_is_known(zone, samples):
     band = figures.plot_zone(zone, 1.1).collections[0]
     reach = np.hypot(*np.concatenate([path.vertices for path in band.get_paths()]).T)
     known = zone.uncertainty.bands.query("speed == 1.1")
@@ -170,7 +170,7 @@ def test_the_band_is_the_interval_and_there_is_none_without(zone, samples):
     assert "interval" not in figures.plot_zones(plain).get_title()
 
 
-def test_a_zone_of_another_method_has_its_radii_but_no_hull(samples):
+def test_a_quantile_zone_shows_its_radii_and_has_no_hull(samples):
     zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), resamples=0)
     labels = [text.get_text() for text in figures.plot_zone(zone, 1.1).get_legend().get_texts()]
     assert labels == ["radius by direction (quantile)", "fitted ellipse"]
@@ -178,7 +178,7 @@ def test_a_zone_of_another_method_has_its_radii_but_no_hull(samples):
         figures.plot_hull(zone)
 
 
-def test_a_run_shows_speed_and_every_h_to_its_greatest(log):
+def test_speed_and_barriers_show_the_whole_range(log):
     speed, h = figures.plot_speed(log), figures.plot_barriers(log)
     assert "[m/s]" in speed.get_ylabel() and "[m]" in h.get_ylabel()
     assert len(h.lines) == 3, "the person, the nearest of two walls, zero"
@@ -186,17 +186,17 @@ def test_a_run_shows_speed_and_every_h_to_its_greatest(log):
     assert h.get_ylim()[0] <= log.h.min() and h.get_ylim()[1] >= log.h.max()
 
 
-def test_the_admissible_polygon_shows_what_is_chosen_and_who_forbids_the_rest(step):
+def test_admissible_controls_name_the_person_and_the_walls_that_forbid_others(step):
     ax = figures.plot_admissible_controls(step)
     assert ax.get_xlabel().endswith("[m/s²]") and ax.get_aspect() == 1
-    told = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert {"allowed", "chosen"} <= set(told)
-    assert {name.split(",")[0] for name in told} >= {"person 0", "wall 1"}
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"allowed", "chosen"} <= set(labels)
+    assert {name.split(",")[0] for name in labels} >= {"person 0", "wall 1"}
     styles = [line.get_linestyle() for line in ax.lines if "step" in str(line.get_label())]
-    assert len(set(styles)) == len(styles) == 2  # told apart without colour
+    assert len(set(styles)) == len(styles) == 2  # readable without colour
 
 
-def test_nothing_is_clipped_that_is_drawn_later(log):
+def test_the_limits_hold_everything_that_is_drawn(log):
     ax = figures.plot_scenario(log, every=1.0)
     limits = np.array([ax.get_xlim(), ax.get_ylim()])
     drawn = [
@@ -219,24 +219,24 @@ def test_every_plot_takes_axes_or_makes_them_and_needs_no_title(name):
     assert "title" not in parameters
 
 
-def test_every_plot_is_offered():
+def test_every_plot_is_exported():
     folder = Path(figures.__file__).parent
     defined = {d for f in folder.glob("*.py") for d in re.findall(r"^def (plot_\w+)", f.read_text(), re.M)}
     assert defined == set(PLOTS)
 
 
-def test_a_log_draws_itself(log):
+def test_a_log_has_plot_and_animate(log):
     assert in_metres(log.plot())
     assert log.animate(every=2.0, width=2.0).startswith(b"GIF8")
 
 
-def test_an_animation_has_a_frame_for_every_time_asked(log):
+def test_an_animation_has_a_frame_for_each_interval(log):
     with Image.open(io.BytesIO(figures.animate(log, every=1.0, width=3.0))) as movie:
         assert movie.format == "GIF"
         assert movie.n_frames == int(np.floor(log.table["t"].iloc[-1] + 1e-9)) + 1
 
 
-def test_a_figure_in_words():
+def test_alt_text_holds_titles_axes_and_legends():
     fig, (left, right) = plt.subplots(1, 2)
     left.plot([0], [0], label="robot")
     left.set(title="A run", xlabel="time [s]", ylabel="h [m]")
@@ -245,25 +245,25 @@ def test_a_figure_in_words():
     assert figures.alt_text(fig) == "A run: h [m] over time [s], with robot; speed [m/s]"
 
 
-# --- respect, claims, what moves a zone --------------------------------------------------------------
+# --- respect, claims, sensitivity, many runs ----------------------------------------------------------
 
 
-def test_the_map_of_g_is_in_metres_and_names_its_contour():
+def test_the_pair_correlation_is_in_metres_and_names_its_radius():
     direction, distance = np.linspace(0.1, 6.1, 36), np.linspace(0.05, 1.95, 40)
     g = np.tile(1 / (1 + np.exp(-(distance - 0.8) / 0.1)), (36, 1))
     ax = figures.plot_pair_correlation(szlib.PairCorrelation(distance, direction, g), radius=0.8)
     assert in_metres(ax)
-    assert "all bearings: 0.80 m" in [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "all directions: 0.80 m" in [text.get_text() for text in ax.get_legend().get_texts()]
 
 
-def test_sizes_by_number_have_a_band_each():
+def test_each_zone_size_has_a_band():
     sizes = {"a": [1.2, 1.0], "a_low": [1.0, 0.9], "a_high": [1.5, 1.1]}
     ax = figures.plot_zone_sizes(pd.DataFrame({"encounters": [10, 100], **sizes}), {"a": "hull"})
     assert ax.get_xscale() == "log" and "[m]" in ax.get_ylabel()
     assert len(ax.collections) == len(ax.lines) == 1
 
 
-def test_a_tornado_puts_what_moves_most_on_top():
+def test_the_largest_sensitivity_is_on_top():
     rows = [("default", "", 2.0), ("r_max", "1.5", 1.9), ("speed", "0.9", 0.5), ("speed", "1.3", 4.0)]
     ax = figures.plot_sensitivity(pd.DataFrame(rows, columns=["parameter", "value", "area"]))
     assert [label.get_text() for label in ax.get_yticklabels()] == ["r_max\n1.5", "speed\n0.9; 1.3"]
@@ -276,7 +276,7 @@ def test_a_map_of_manners_has_a_letter_for_each_cell():
     assert ax.get_xlabel() == "width" and [each.get_text() for each in ax.get_yticklabels()] == ["0.2", "0.1"]
 
 
-def test_findings_are_told_apart_by_more_than_colour():
+def test_claims_differ_by_more_than_colour():
     table = pd.DataFrame(
         {"claim": list("abc"), "effect": [1.0, -1.0, 0.1], "low": [0.5, -2, -1], "high": [2.0, -0.5, 1],
          "verdict": ["supported", "contradicted", "not decidable with n = 3"]}
@@ -286,7 +286,7 @@ def test_findings_are_told_apart_by_more_than_colour():
     assert [label.get_text() for label in ax.get_yticklabels()] == list("abc")
 
 
-def test_a_grid_has_a_panel_for_each_metric_and_one_legend():
+def test_an_interval_grid_has_a_panel_for_each_metric_and_one_legend():
     rows = [(w, c, m, 0.5, 0.4, 0.6) for w in ("a", "b") for c in ("x", "y") for m in ("s", "t", "u", "v")]
     table = pd.DataFrame(rows, columns=["crowd", "who", "metric", "mean", "low", "high"])
     labels = {"s": "share", "t": "time [s]", "u": "u", "v": "v"}
@@ -295,9 +295,9 @@ def test_a_grid_has_a_panel_for_each_metric_and_one_legend():
     assert [text.get_text() for text in grid.legends[0].get_texts()] == ["x", "y"]
 
 
-def test_a_crowd_is_drawn_where_it_is_nearest(log):
+def test_a_crowd_is_drawn_at_the_nearest_approach(log):
     ax = figures.plot_crowd(log)
-    (robot,) = ax.patches
+    robot = ax.patches[-1]
     row = int(np.hypot(log.relative[:, 0, 0], log.relative[:, 0, 1]).argmin())
     assert robot.center == pytest.approx(tuple(log.states[row, :2]))
     assert in_metres(ax)

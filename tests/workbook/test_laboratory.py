@@ -1,4 +1,4 @@
-"""The laboratory: what it computes is the simulation's, and nothing that is dragged or set breaks it."""
+"""The laboratory computes what the simulation computes; no drag and no setting breaks it."""
 
 from dataclasses import asdict
 from threading import Thread
@@ -7,123 +7,120 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.errors import SolverError
 from szlib.workbook import laboratory
 
 ZONES = {"quantile": szlib.Ellipse((0.05, 0.0), (0.95, 0.75)), "hull": szlib.Ellipse((0.0, 0.0), (0.9, 0.7))}
 WALLS = [-6.0, 2.3, 7.0, 2.3, -6.0, -2.3, 7.0, -2.3]
 
 
-def make_bench(*choices):
+def make_experiment():
     scene = laboratory.make_scene([4.0, 0.0], [4.0, 0.0, 180.0], 0.5, WALLS, start=[-4.0, 0.0])
-    return laboratory.Experiment(
-        scene, ZONES, choices or (laboratory.RobotOptions(), laboratory.RobotOptions(gamma=0.2, N_h=9))
-    )
+    robots = laboratory.RobotOptions(), laboratory.RobotOptions(gamma=0.2, N_h=9)
+    return laboratory.Experiment(scene, ZONES, robots)
 
 
-def test_robots_side_by_side_go_as_if_alone():
-    bench, driven = make_bench(), []
+def test_each_robot_moves_as_in_a_simulation_of_its_own():
+    experiment, states = make_experiment(), []
     for _ in range(30):
-        driven.append([*bench.states])
-        bench.step()
-    for i, choice in enumerate(bench.choices):
-        controller = szlib.MPCCBF(choice.zone(ZONES), walls=bench.scenario.walls, settings=choice.settings())
-        alone = szlib.simulate(bench.scenario, controller, max_time=2.9)
-        assert np.array_equal([states[i] for states in driven], alone.states)
+        states.append([*experiment.states])
+        experiment.step()
+    for i, options in enumerate(experiment.robots):
+        walls = experiment.scenario.walls
+        controller = szlib.MPCCBF(options.zone(ZONES), walls=walls, settings=options.settings())
+        alone = szlib.simulate(experiment.scenario, controller, max_time=2.9)
+        assert np.array_equal([each[i] for each in states], alone.states)
 
 
-def test_to_look_lets_no_time_pass():
-    bench = make_bench()
-    bench.step()
-    t, states, people = bench.t, [*bench.states], [*bench.people]
-    bench.look()
-    assert (bench.t, bench.people) == (t, people)
-    assert np.array_equal(bench.states, states)
+def test_deciding_lets_no_time_pass():
+    experiment = make_experiment()
+    experiment.step()
+    t, states, people = experiment.t, [*experiment.states], [*experiment.people]
+    experiment.decide()
+    assert (experiment.t, experiment.people) == (t, people)
+    assert np.array_equal(experiment.states, states)
 
 
-def test_what_is_set_reaches_the_robot_it_is_set_for():
-    bench = make_bench()
-    bench.choose(1, a_max=0.5, size=2.0, estimator="hull")
-    first, second = bench.look()
+def test_an_option_changes_its_robot_only():
+    experiment = make_experiment()
+    experiment.configure_robot(1, a_max=0.5, size=2.0, estimator="hull")
+    first, second = experiment.decide()
     assert first.scene.settings.a_max == 1.0 and second.scene.settings.a_max == 0.5
     assert second.scene.kept[0].semi_axes == pytest.approx((1.8, 1.4))
-    with pytest.raises(SolverError, match="estimator must be one of quantile, hull; got 'circle'"):
-        bench.choose(0, estimator="circle")
-    with pytest.raises(SolverError, match="gamma"):
-        bench.choose(0, gamma=2.0)
-    assert bench.choices[0] == laboratory.RobotOptions()
+    with pytest.raises(szlib.SolverError, match="estimator must be one of quantile, hull; got 'circle'"):
+        experiment.configure_robot(0, estimator="circle")
+    with pytest.raises(szlib.SolverError, match="gamma"):
+        experiment.configure_robot(0, gamma=2.0)
+    assert experiment.robots[0] == laboratory.RobotOptions()
 
 
-def test_what_is_moved_is_where_it_was_put():
-    bench = make_bench()
-    bench.step()
-    bench.move(goal=[3.0, 1.0], people={0: [1.0, -0.5]}, walls=[[-6, 2, 7, 2]], speed=1.0)
-    step = bench.look()[0]
+def test_a_move_during_the_run_does_not_change_the_start():
+    experiment = make_experiment()
+    experiment.step()
+    experiment.move(goal=[3.0, 1.0], people={0: [1.0, -0.5]}, walls=[[-6, 2, 7, 2]], speed=1.0)
+    step = experiment.decide()[0]
     assert step.scene.goal == (3.0, 1.0)
     assert step.scene.people[0].position == (1.0, -0.5)
     assert step.scene.people[0].velocity == pytest.approx((-1.0, 0.0))
     assert step.scene.walls == [[-6, 2, 7, 2]]
-    bench.restart()
-    assert bench.people[0].position == (4.0, 0.0)  # moved in the middle of a run, they begin where they did
-    bench.move(people={0: [2.0, 0.0]})
-    bench.step()
-    bench.restart()
-    assert bench.people[0].position == (2.0, 0.0)
+    experiment.restart()
+    assert experiment.people[0].position == (4.0, 0.0)
+    experiment.move(people={0: [2.0, 0.0]})  # before the first step: the start
+    experiment.step()
+    experiment.restart()
+    assert experiment.people[0].position == (2.0, 0.0)
 
 
-def test_a_wall_without_length_is_refused_in_words_and_nothing_moves():
-    widget = laboratory.LaboratoryWidget(make_bench())
-    said = widget.answer({"kind": "step", "changed": {"goal": [1, 1], "walls": [[0, 0, 0, 0]]}})
-    assert said["kind"] == "refused"
-    assert "two different end points" in said["text"]
-    assert said["stage"]["goal"] == [4, 0] and len(said["stage"]["walls"]) == 2
-    assert widget.bench.t == 0
+def test_a_wall_without_length_gives_an_error_and_moves_nothing():
+    widget = laboratory.LaboratoryWidget(make_experiment())
+    answer = widget.answer({"kind": "step", "changes": {"goal": [1, 1], "walls": [[0, 0, 0, 0]]}})
+    assert answer["kind"] == "error"
+    assert "two different end points" in answer["text"]
+    assert answer["layout"]["goal"] == [4, 0] and len(answer["layout"]["walls"]) == 2
+    assert widget.experiment.t == 0
 
 
-def test_the_page_is_told_every_instant():
-    widget = laboratory.LaboratoryWidget(make_bench())
+def test_the_page_gets_a_snapshot_of_each_robot():
+    widget = laboratory.LaboratoryWidget(make_experiment())
     for k in range(3):
-        said = widget.answer(
-            {"kind": "step", "changed": {"choices": {"0": {"gamma": 0.1}}} if k == 1 else {}}
-        )
-    (first, second) = said["moments"]
+        changes = {"robots": {"0": {"gamma": 0.1}}} if k == 1 else {}
+        answer = widget.answer({"kind": "step", "changes": changes})
+    first, second = answer["snapshots"]
     assert first["t"] == second["t"] == 0.2
-    assert first["rung"] == "warm" and first["told"] == "safe"
-    assert first["free"] and len(first["control"]) == 2
-    assert widget.bench.choices[0].gamma == 0.1
-    again = widget.answer({"kind": "look", "changed": {"restart": True}})["moments"][0]
+    assert first["fallback"] == "warm" and first["safe"]
+    assert first["allowed"] and len(first["control"]) == 2
+    assert widget.experiment.robots[0].gamma == 0.1
+    again = widget.answer({"kind": "decide", "changes": {"restart": True}})["snapshots"][0]
     assert (again["t"], again["robot"]) == (0.0, [-4, 0])
 
 
 def test_messages_may_come_in_any_thread():
-    widget, said = laboratory.LaboratoryWidget(make_bench()), []
-    widget.send = said.append
-    asked = {"kind": "step", "changed": {}}
-    widget._handle_custom_msg(asked, [])
-    other = Thread(target=widget._handle_custom_msg, args=(asked, []))
+    widget, answers = laboratory.LaboratoryWidget(make_experiment()), []
+    widget.send = answers.append
+    request = {"kind": "step", "changes": {}}
+    widget._handle_custom_msg(request, [])
+    other = Thread(target=widget._handle_custom_msg, args=(request, []))
     other.start()
     other.join()
-    assert [message["kind"] for message in said] == ["moments", "moments"]
+    assert [answer["kind"] for answer in answers] == ["snapshots", "snapshots"]
 
 
-def test_what_is_shared_begins_with_the_same_scene():
-    bench = make_bench()
-    bench.move(goal=[3.0, 1.0], people={0: [2.0, 0.5]}, walls=[[-6, 2, 7, 2.5]], speed=0.7)
-    bench.choose(1, size=1.5)
-    said = laboratory.LaboratoryWidget(bench).answer({"kind": "share", "changed": {}})["text"]
+def test_a_shared_cell_starts_with_the_same_scene():
+    experiment = make_experiment()
+    experiment.move(goal=[3.0, 1.0], people={0: [2.0, 0.5]}, walls=[[-6, 2, 7, 2.5]], speed=0.7)
+    experiment.configure_robot(1, size=1.5)
+    cell = laboratory.LaboratoryWidget(experiment).answer({"kind": "share", "changes": {}})["text"]
     found = {}
-    exec(said, found)
-    scene = laboratory.make_scene(
-        *(found[name] for name in ("goal", "person", "speed", "walls")), start=[-4, 0]
-    )
-    assert np.array_equal(scene.walls, bench.scenario.walls) and np.array_equal(scene.goal, [3, 1])
+    exec(cell, found)
+    given = [found[name] for name in ("goal", "person", "speed", "walls")]
+    scene = laboratory.make_scene(*given, start=[-4, 0])
+    assert np.array_equal(scene.walls, experiment.scenario.walls) and np.array_equal(scene.goal, [3, 1])
     assert scene.people[0].position == (2.0, 0.5)
-    assert scene.people[0].velocity == pytest.approx(bench.people[0].velocity)
-    for choice, suffix in zip(bench.choices, ("", "_b"), strict=True):
-        assert laboratory.RobotOptions(**{name: found[name + suffix] for name in asdict(choice)}) == choice
+    assert scene.people[0].velocity == pytest.approx(experiment.people[0].velocity)
+    for options, suffix in zip(experiment.robots, ("", "_b"), strict=True):
+        assert laboratory.RobotOptions(**{name: found[name + suffix] for name in asdict(options)}) == options
 
 
-def test_without_a_page_nothing_is_shown(monkeypatch):
+def test_a_headless_run_shows_no_sliders(monkeypatch):
     monkeypatch.delenv("JPY_SESSION_NAME", raising=False)
     assert not laboratory.is_interactive()
     laboratory.show_sliders(lambda speed: pytest.fail("drawn"), speed=(1.0, 0.5, 1.5, 0.1))

@@ -1,19 +1,28 @@
-"""Every figure: `plot_*` draws on the axes it is given, or on new ones, and returns them.
+"""Every figure of the workbook.
 
-style        colours, sizes, labels in metres
-tracks       where people were, how fast, and what became of the rows
-encounters   the attentional space and the other person
-zones        outliers, the hull, zones by speed
-control      distances and barriers, and what they leave to a step
-movies       runs with controls, in a browser
+`plot_*` draws on the axes it is given, or on new ones, and returns them.  `draw_*` makes a whole figure.
+
+style        colours, sizes, labels in metres, legends
+tracks       where people walked, how fast, and how many rows each stage keeps
+encounters   the attentional space, paths, and where the other person is
+zones        outliers, the hull, zones by speed, the pair correlation
+control      distances and barriers, and the accelerations that a step allows
 simulation   runs of the robot, and their animations
-comparisons  many runs: sweeps, manners, intervals side by side
-crowds       robots among other people's crowds
+movies       runs as players in a browser
+comparisons  many runs or fits: sweeps, strategies, intervals, claims
 """
 
-from .comparisons import add_shared_legend, draw_interval_grid, plot_intervals, plot_strategies, plot_sweep
+from .comparisons import (
+    draw_interval_grid,
+    plot_claims,
+    plot_intervals,
+    plot_safety_claims,
+    plot_sensitivity,
+    plot_strategies,
+    plot_sweep,
+    plot_zone_sizes,
+)
 from .control import draw_step, plot_admissible_controls, plot_distance, plot_distance_error, plot_step
-from .crowds import plot_crowd, plot_safety_claims
 from .encounters import (
     plot_attentional_space,
     plot_distance_by_direction,
@@ -21,7 +30,15 @@ from .encounters import (
     plot_relative_positions,
 )
 from .movies import Movie
-from .simulation import animate, draw_run_grid, plot_barriers, plot_robot_paths, plot_scenario, plot_speed
+from .simulation import (
+    animate,
+    draw_run_grid,
+    plot_barriers,
+    plot_crowd,
+    plot_robot_paths,
+    plot_scenario,
+    plot_speed,
+)
 from .style import (
     BLACK,
     BLUE,
@@ -30,6 +47,8 @@ from .style import (
     ORANGE,
     RED,
     SEQUENCE,
+    add_legend_below,
+    add_shared_legend,
     alt_text,
     area_patch,
     get_axes,
@@ -37,16 +56,7 @@ from .style import (
     pick_colours,
 )
 from .tracks import plot_funnel, plot_map, plot_speed_histogram
-from .zones import (
-    plot_claims,
-    plot_hull,
-    plot_outliers,
-    plot_pair_correlation,
-    plot_sensitivity,
-    plot_zone,
-    plot_zone_sizes,
-    plot_zones,
-)
+from .zones import plot_hull, plot_outliers, plot_pair_correlation, plot_zone, plot_zones
 
 __all__ = [
     "BLACK",
@@ -57,6 +67,7 @@ __all__ = [
     "RED",
     "SEQUENCE",
     "Movie",
+    "add_legend_below",
     "add_shared_legend",
     "alt_text",
     "animate",

@@ -1,8 +1,9 @@
-"""Figures of many runs: sweeps of a setting, manners of runs, intervals side by side."""
+"""Figures of many runs or fits: sweeps, maps of strategies, intervals, claims, safety claims."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,54 +11,111 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, get_axes
+from ...simulation.safety_claims import MOTION_CHANGES
+from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, add_legend_below, add_shared_legend, get_axes
+
+_BARS = {
+    "came": (BLACK, ""),
+    "turned": (RED, "///"),
+    "slowed down": (GREEN, "..."),
+    "sped up": (ORANGE, "xxx"),
+    "faced elsewhere": (BLUE, "|||"),
+}
+"""Colour and hatching of each kind of safety violation."""
 
 
 def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> Axes:
-    """A table as a heat map with its numbers: index down, columns across, pale at 0 and dark at `worst`."""
-    ax = get_axes(ax, size=(5, 3.5))
+    """Plot a table as a heat map with its numbers.
+
+    Parameters
+    ----------
+    table : numbers by two parameters, its index and its columns.
+    worst : value with the darkest colour; 0 has the palest.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.workbook import figures
+    >>> index, columns = pd.Index([0.05, 0.1], name="gamma"), pd.Index([1, 2], name="speed [m/s]")
+    >>> ax = figures.plot_sweep(pd.DataFrame([[0, 0.1], [0.2, 0.4]], index, columns), worst=0.4)
+    """
     values = table.to_numpy(float)
-    ax.imshow(np.clip(values / worst, 0, 1), cmap="Oranges", vmin=0, vmax=1.3, aspect="auto")
-    for (row, column), value in np.ndenumerate(values):
-        ax.text(column, row, f"{round(value, 3) + 0.0:.3g}", ha="center", va="center", fontsize=9)
-    ax.set_xticks(range(table.shape[1]), [f"{name:g}" for name in table.columns])
-    ax.set_yticks(range(table.shape[0]), [f"{name:g}" for name in table.index])
-    ax.set(xlabel=str(table.columns.name), ylabel=str(table.index.name))
-    return ax
+    labels = [f"{round(value, 3) + 0.0:.3g}" for value in values.flat]
+    return _draw_heat_map(
+        get_axes(ax, size=(5, 3.5)), table, np.clip(values / worst, 0, 1), labels, "Oranges"
+    )
 
 
 def plot_strategies(
     table: pd.DataFrame, *, names: Sequence[str], rows: str, columns: str, ax: Axes | None = None
 ) -> Axes:
-    """A map of what a robot did, as from `simulation.atlas`: one value of "strategy" a cell, as a letter.
+    """Plot which strategy a robot used for each pair of parameters, as a letter.
 
-    `names` are all that may occur, from pale to dark; the letter is the place in them: A, B, C, ...
+    Parameters
+    ----------
+    table : one row for each pair, with the column "strategy".
+    names : all strategies, from pale to dark; the first has the letter A.
+    rows : parameter of the rows.
+    columns : parameter of the columns.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.workbook import figures
+    >>> table = pd.DataFrame({"gamma": [0.1, 0.2], "width": [1.0, 1.0], "strategy": ["passes", "waits"]})
+    >>> ax = figures.plot_strategies(table, names=["passes", "waits"], rows="gamma", columns="width")
     """
-    ax = get_axes(ax, size=(4, 3.2))
     found = table.pivot(index=rows, columns=columns, values="strategy").sort_index(ascending=False)
-    places = found.map(list(names).index).to_numpy()
-    ax.imshow(places, cmap="YlOrBr", vmin=0, vmax=1.3 * len(names), aspect="auto")
-    for (row, column), place in np.ndenumerate(places):
-        ax.text(column, row, chr(ord("A") + place), ha="center", va="center", fontsize=9)
-    ax.set_xticks(range(found.shape[1]), [f"{value:g}" for value in found.columns])
-    ax.set_yticks(range(found.shape[0]), [f"{value:g}" for value in found.index])
-    ax.set(xlabel=columns, ylabel=rows)
+    number = found.map(list(names).index).to_numpy()
+    labels = [chr(ord("A") + n) for n in number.flat]
+    return _draw_heat_map(get_axes(ax, size=(4, 3.2)), found, number / len(names), labels, "YlOrBr")
+
+
+def _draw_heat_map(
+    ax: Axes, table: pd.DataFrame, shade: np.ndarray, labels: Iterable[str], colours: str
+) -> Axes:
+    ax.imshow(shade, cmap=colours, vmin=0, vmax=1.3, aspect="auto")
+    for (row, column), label in zip(np.ndindex(shade.shape), labels, strict=True):
+        ax.text(column, row, label, ha="center", va="center", fontsize=9)
+    ax.set_xticks(range(table.shape[1]), [f"{value:g}" for value in table.columns])
+    ax.set_yticks(range(table.shape[0]), [f"{value:g}" for value in table.index])
+    ax.set(xlabel=str(table.columns.name), ylabel=str(table.index.name))
     return ax
 
 
 def plot_intervals(
     table: pd.DataFrame, metric: str, *, rows: str, colour: str, label: str, ax: Axes | None = None
 ) -> Axes:
-    """Means with intervals of one metric, as from `comparisons.summarise`: `rows` down, `colour` aside."""
+    """Plot means of one metric with their intervals.
+
+    Parameters
+    ----------
+    table : one row for each mean, with metric, mean, low and high.
+    metric : metric to draw.
+    rows : column of `table` with the names beside the axis.
+    colour : column of `table` with the names of the colours.
+    label : label of the axis, with its unit.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.workbook import figures
+    >>> row = {"crowd": "ETH", "robot": "MPC-CBF", "metric": "time", "mean": 9.0, "low": 8.0, "high": 10.0}
+    >>> table = pd.DataFrame([row])
+    >>> ax = figures.plot_intervals(table, "time", rows="crowd", colour="robot", label="time [s]")
+    """
     ax = get_axes(ax, size=(5.5, 3.5))
     shown = table[table["metric"] == metric]
     names, groups = list(dict.fromkeys(shown[rows])), list(dict.fromkeys(shown[colour]))
     styles = zip(groups, (BLUE, ORANGE, GREEN, RED, BLACK), ("o", "s", "^", "D", "v"), strict=False)
     for i, (group, shade, marker) in enumerate(styles):
-        of = shown[shown[colour] == group].set_index(rows).reindex(names)
+        part = shown[shown[colour] == group].set_index(rows).reindex(names)
         at = np.arange(len(names)) + 0.16 * (i - (len(groups) - 1) / 2)
-        ax.hlines(at, of["low"], of["high"], color=shade, linewidth=1.5)
-        ax.plot(of["mean"], at, marker, color=shade, markersize=5, label=group)
+        ax.hlines(at, part["low"], part["high"], color=shade, linewidth=1.5)
+        ax.plot(part["mean"], at, marker, color=shade, markersize=5, label=group)
     ax.set_yticks(range(len(names)), names)
     ax.set(xlabel=label, ylim=(len(names) - 0.5, -0.5))
     ax.grid(axis="x", color=GREY, alpha=0.3)
@@ -73,11 +131,30 @@ def draw_interval_grid(
     columns: int = 3,
     title: str = "",
 ) -> Figure:
-    """A panel of `plot_intervals` for each metric of `labels`, metric -> axis label, with one legend."""
-    down = -(-len(labels) // columns)
-    names = table[rows].nunique()
-    size = (4.4 * columns, down * (0.36 * names + 1.3) + 0.6)
-    figure, grid = plt.subplots(down, columns, figsize=size, layout="constrained", sharey=True, squeeze=False)
+    """Draw a panel of `plot_intervals` for each metric, with one legend.
+
+    Parameters
+    ----------
+    table : as for `plot_intervals`.
+    labels : metric -> label of the axis.
+    rows : column of `table` with the names beside the axes.
+    colour : column of `table` with the names of the colours.
+    columns : number of panels side by side.
+    title : title of the figure.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.workbook import figures
+    >>> row = {"crowd": "ETH", "robot": "MPC-CBF", "metric": "time", "mean": 9.0, "low": 8.0, "high": 10.0}
+    >>> table = pd.DataFrame([row])
+    >>> figure = figures.draw_interval_grid(table, {"time": "time [s]"}, rows="crowd", colour="robot")
+    """
+    n_rows = -(-len(labels) // columns)
+    size = (4.4 * columns, n_rows * (0.36 * table[rows].nunique() + 1.3) + 0.6)
+    figure, grid = plt.subplots(
+        n_rows, columns, figsize=size, layout="constrained", sharey=True, squeeze=False
+    )
     for ax, (metric, label) in zip(grid.flat, labels.items(), strict=False):
         plot_intervals(table, metric, rows=rows, colour=colour, label=label, ax=ax)
     for ax in grid.flat[len(labels) :]:
@@ -87,7 +164,134 @@ def draw_interval_grid(
     return figure
 
 
-def add_shared_legend(panels: Sequence[Axes]) -> None:
-    """One legend below several panels that show the same things: that of the first."""
-    handles, names = panels[0].get_legend_handles_labels()
-    panels[0].figure.legend(handles, names, loc="outside lower center", ncols=len(names))
+def plot_zone_sizes(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes | None = None) -> Axes:
+    """Plot sizes of zones by the number of encounters, with their intervals.
+
+    Parameters
+    ----------
+    table : one row for each number of encounters: `encounters`, and for each name its mean, <name>_low and
+        <name>_high [m].
+    columns : name in `table` -> label in the legend.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.workbook import figures
+    >>> sizes = {"encounters": [10, 100], "a": [1.2, 1.0], "a_low": [1.0, 0.9], "a_high": [1.5, 1.1]}
+    >>> ax = figures.plot_zone_sizes(pd.DataFrame(sizes), {"a": "hull"})
+    """
+    ax = get_axes(ax, size=(6, 4))
+    styles = zip(("-o", "--s", ":^", "-.D"), (RED, BLUE, GREY, GREEN), strict=True)
+    for (name, label), (style, colour) in zip(columns.items(), styles, strict=False):
+        n = table["encounters"]
+        ax.fill_between(n, table[f"{name}_low"], table[f"{name}_high"], color=colour, alpha=0.18, linewidth=0)
+        ax.plot(n, table[name], style, color=colour, markersize=4, label=label)
+    ax.set(xscale="log", xlabel="encounters", ylabel="size of the zone [m]", ylim=(0, None))
+    ax.legend(fontsize=8)
+    return ax
+
+
+def plot_sensitivity(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+    """Plot how far each parameter moves the zone's area: a tornado chart, the largest range on top.
+
+    Parameters
+    ----------
+    table : table as from `szlib.zones.sensitivity.sensitivity`: parameter, value, area [m2]; the first row
+        holds the defaults.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.workbook import figures
+    >>> table = {"parameter": ["default", "r_max", "r_max"], "value": ["", 1.5, 2.5], "area": [2.0, 1.8, 2.1]}
+    >>> ax = figures.plot_sensitivity(pd.DataFrame(table))
+    """
+    ax = get_axes(ax, size=(8, 4.5))
+    default = float(table["area"].iloc[0])
+    varied = table.iloc[1:].dropna(subset=["area"])
+    groups = varied.groupby("parameter", sort=False)["area"]
+    low, high = groups.min().clip(upper=default), groups.max().clip(lower=default)
+    width = (high - low).sort_values()
+    ax.barh(range(len(width)), width, left=low[width.index], color=BLUE, alpha=0.35, height=0.6)
+    names = []
+    for row, name in enumerate(width.index):
+        values = varied[varied["parameter"] == name].sort_values("area")
+        ax.plot(values["area"], np.full(len(values), row), "o", color=BLUE, markersize=5)
+        names.append(f"{name}\n{'; '.join(map(str, values['value']))}")  # beside the axis: no overlap
+    ax.axvline(default, color=BLACK, linewidth=1.2, label=f"defaults: {default:.2f} m$^2$")
+    ax.set_yticks(range(len(width)), names, fontsize=8)
+    ax.set(xlabel="area of the zone [m$^2$]; values from left to right", ylim=(-0.6, len(width) - 0.2))
+    ax.use_sticky_edges = False
+    ax.margins(x=0.1)
+    add_legend_below(ax, gap=0.14)
+    return ax
+
+
+def plot_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+    """Plot the effect of each claim with its interval, scaled to the largest end of the interval.
+
+    Parameters
+    ----------
+    table : one row for each claim, as from `szlib.simulation.paper_claims.findings_table`: claim, effect,
+        low, high, verdict, and perhaps method.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.workbook import figures
+    >>> claim = {"claim": "zones grow with speed", "effect": 0.1, "low": 0.05, "high": 0.2}
+    >>> ax = figures.plot_claims(pd.DataFrame([claim | {"verdict": "supported"}]))
+    """
+    ax = get_axes(ax, size=(9, 0.45 * len(table) + 1.2))
+    styles = {"supported": (GREEN, "o"), "contradicted": (RED, "X"), "not": (GREY, "s")}
+    numbers = table[["effect", "low", "high", "verdict"]].itertuples(index=False)
+    for at, (effect, low, high, verdict) in enumerate(numbers):
+        scale = max(abs(low), abs(high), 1e-9)
+        colour, marker = styles[verdict.split()[0]]
+        ax.hlines(at, low / scale, high / scale, color=colour, linewidth=2)
+        ax.plot(effect / scale, at, marker, color=colour)
+    ax.axvline(0, color=BLACK, linewidth=1)
+    names = table["claim"] + (" (" + table["method"] + ")" if "method" in table else "")
+    ax.set_yticks(range(len(table)), list(names), fontsize=8)
+    ax.invert_yaxis()
+    for name, (colour, marker) in styles.items():
+        ax.plot([], [], marker, color=colour, label="not decidable" if name == "not" else name)
+    ax.set(xlabel="against the paper < 0 < as the paper says (each scaled to its interval)", xlim=(-1.1, 1.1))
+    add_legend_below(ax, gap=0.6 / (0.45 * len(table) + 0.4), ncols=3)  # 0.6 inch below the axes
+    return ax
+
+
+def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
+    """Plot how often h < 0 follows a step that was claimed safe, by what the people did.
+
+    Parameters
+    ----------
+    table : one row for each crowd, its name in the index: `claimed_safe_steps`, and the number of violations
+        of each kind in `szlib.simulation.MOTION_CHANGES`.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.simulation.safety_claims import MOTION_CHANGES
+    >>> from szlib.workbook import figures
+    >>> table = pd.DataFrame(1, index=["ETH"], columns=[*MOTION_CHANGES, "claimed_safe_steps"])
+    >>> ax = figures.plot_safety_claims(table)
+    """
+    ax = get_axes(ax, size=(8, 3.5))
+    left = np.zeros(len(table))
+    for kind in MOTION_CHANGES:
+        share = 1000 * table[kind].to_numpy(float) / table["claimed_safe_steps"].to_numpy(float)
+        if kind in _BARS or share.any():
+            colour, hatch = _BARS.get(kind, ("magenta", "ooo"))
+            style: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": "white"}
+            ax.barh(table.index, share, left=left, label=kind, **style)
+        left += share
+    ax.set_xlim(0, 1.08 * max(float(left.max(initial=0)), 1e-9))
+    ax.set(xlabel="steps that led to h < 0, per 1,000 steps claimed safe")
+    ax.invert_yaxis()
+    ax.legend(fontsize=8, title="what the people did", loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return ax

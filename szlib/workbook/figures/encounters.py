@@ -1,4 +1,4 @@
-"""Figures of encounters: the attentional space, paths, and where the other person was."""
+"""Figures of encounters: the attentional space, paths, and where the other person is."""
 
 from __future__ import annotations
 
@@ -12,98 +12,163 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle, Polygon
 
 from ...encounters.geometry import Area, AttentionalSpace
-from .style import BLACK, BLUE, GREY, ORANGE, RED, SEQUENCE, area_patch, get_axes, label_metres
+from .style import (
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    RED,
+    SEQUENCE,
+    add_legend_below,
+    area_patch,
+    draw_person,
+    get_axes,
+    label_metres,
+)
 
-_BINS = 40
-"""Cells across r_max, or twice r_max: 5 or 10 cm in the paper's 2 m."""
+_N_BINS = 40
+"""Cells across r_max, or twice r_max: 5 or 10 cm for the paper's 2 m."""
 
 
 def plot_attentional_space(
-    space: AttentionalSpace, area: Area, at: Sequence[float] = (), *, ax: Axes | None = None
+    space: AttentionalSpace, area: Area, *, pose: Sequence[float] = (), ax: Axes | None = None
 ) -> Axes:
-    """The attentional space of a person at (x, y, heading), by default towards the middle of the area."""
+    """Plot the attentional space of a person in an area.
+
+    Parameters
+    ----------
+    space : attentional space.
+    area : area around it.
+    pose : (x, y, heading) of the person [m, rad]; by default in the first quarter of the area, to its middle.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> ax = figures.plot_attentional_space(szlib.AttentionalSpace(), szlib.ATC_SQUARE)
+    """
     ax = get_axes(ax, size=(4.5, 5.5))
     (x0, x1), (y0, y1) = area.box.x, area.box.y
-    x, y, heading = at or (0.75 * x0 + 0.25 * x1, 0.75 * y0 + 0.25 * y1, np.pi / 4)
+    x, y, heading = pose or (0.75 * x0 + 0.25 * x1, 0.75 * y0 + 0.25 * y1, np.pi / 4)
     cos, sin = np.cos(heading), np.sin(heading)
     corners = space.corners @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
+    label = f"attentional space {space.width:g} m x {space.length:g} m"
     ax.add_patch(area_patch(area, edgecolor=BLACK, label="the area"))
-    ax.add_patch(
-        Polygon(
-            corners,
-            facecolor=BLUE,
-            alpha=0.3,
-            label=f"attentional space {space.width:g} m x {space.length:g} m",
-        )
-    )
+    ax.add_patch(Polygon(corners, facecolor=BLUE, alpha=0.3, label=label))
     ax.annotate("", (x + cos, y + sin), (x, y), arrowprops={"arrowstyle": "->", "color": RED, "lw": 2})
     ax.plot(x, y, "o", color=RED, label="reference pedestrian")
     ax.set(xlim=(x0 - 1, x1 + 1), ylim=(y0 - 1, y1 + 1))
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), fontsize=8)
-    return label_metres(ax, "The space stays inside the area")
+    add_legend_below(ax, ncols=1)
+    return label_metres(ax, "The space lies inside the area")
 
 
-def plot_encounter_paths(paths: pd.DataFrame, *, count: int = 200, ax: Axes | None = None) -> Axes:
-    """Paths of the other person in the reference pedestrian's frame at the opening (paper, fig. 2).
+def plot_encounter_paths(paths: pd.DataFrame, *, n_shown: int = 200, ax: Axes | None = None) -> Axes:
+    """Plot the paths of both people in the reference pedestrian's first frame (paper, fig. 2).
 
-    `paths` as from `szlib.encounters.samples.reference_frame`; `count` encounters, evenly spread, are drawn,
-    from a dot at the opening to an arrow's head, in the direction of the last half second, at the end.
+    A dot is the start of the other person's path. An arrow's head is the end of a path; it points in the
+    direction of the last half second.
+
+    Parameters
+    ----------
+    paths : table as from `szlib.encounters.reference_frame`.
+    n_shown : number of encounters to draw, evenly spread over all.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd
+    >>> from szlib.workbook import figures
+    >>> t = np.arange(31) / 10
+    >>> paths = pd.DataFrame({"encounter": 0, "t": t, "ref_x": t, "ref_y": 0.0, "other_x": 5 - t})
+    >>> paths["other_y"] = 1.0
+    >>> figures.plot_encounter_paths(paths).get_title()
+    "Paths in the reference pedestrian's first frame, n = 1"
     """
     ax = get_axes(ax, size=(7, 5.5))
     every = [g for _, g in paths.groupby("encounter", sort=True)]
-    shown = [every[i] for i in np.unique(np.linspace(0, len(every) - 1, count).round().astype(int))]
-    for who, colour, name in (("other", BLUE, "other person"), ("ref", ORANGE, "reference pedestrian")):
-        lines = [g[[f"{who}_x", f"{who}_y"]].to_numpy() for g in shown]
+    shown = [every[i] for i in np.unique(np.linspace(0, len(every) - 1, n_shown).round().astype(int))]
+    for prefix, colour, name in (("other", BLUE, "other person"), ("ref", ORANGE, "reference pedestrian")):
+        lines = [g[[f"{prefix}_x", f"{prefix}_y"]].to_numpy() for g in shown]
         ax.add_collection(LineCollection(lines, colors=colour, linewidths=0.6, alpha=0.5, label=name))
         ends, before = (np.array([line[at] for line in lines]) for at in (-1, max(-6, -len(lines[0]))))
-        for (x, y), heading in zip(ends, np.degrees(np.arctan2(*(ends - before).T[::-1])), strict=True):
-            ax.plot(x, y, marker=(3, 0, heading - 90), color=colour, markersize=4, markeredgewidth=0)
+        for (x, y), heading in zip(ends, np.arctan2(*(ends - before).T[::-1]), strict=True):
+            draw_person(ax, x, y, heading, color=colour, markersize=4, markeredgewidth=0)
     starts = np.array([[g["other_x"].iloc[0], g["other_y"].iloc[0]] for g in shown])
-    ax.plot(*starts.T, ".", color=BLACK, markersize=3, label="other person at the opening")
+    ax.plot(*starts.T, ".", color=BLACK, markersize=3, label="start of the other person's path")
     ax.autoscale_view()
-    ax.plot([], [], marker=(3, 0, -90), color=GREY, linestyle="", label="where they go")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, fontsize=8)
-    return label_metres(ax, f"{len(shown)} encounters, in the frame of their opening", person=True)
+    ax.plot([], [], marker=(3, 0, -90), color=GREY, linestyle="", label="end of a path, and its direction")
+    add_legend_below(ax)
+    return label_metres(ax, f"Paths in the reference pedestrian's first frame, n = {len(shown)}", person=True)
 
 
 def plot_relative_positions(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:
-    """How often the other person was where, around the reference pedestrian (paper, fig. 3a).
+    """Plot where the other person is around the reference pedestrian (paper, fig. 3a).
 
-    The dotted circle: nearer than that came one encounter in twenty.
+    One encounter in twenty comes nearer than the dotted circle.
+
+    Parameters
+    ----------
+    samples : table as from `szlib.find_encounters`.
+    r_max : largest distance [m].
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd
+    >>> from szlib.workbook import figures
+    >>> angle = np.linspace(-3, 3, 90)
+    >>> samples = pd.DataFrame({"encounter": range(90), "los_angle": angle, "distance": 1.0})
+    >>> figures.plot_relative_positions(samples).get_title()
+    'One encounter in twenty comes nearer than 1.00 m'
     """
     ax = get_axes(ax, size=(6.2, 4.8))
     close = samples[samples["distance"] <= r_max]
     x, y = (close["distance"] * part(close["los_angle"]) for part in (np.cos, np.sin))
-    edges = np.linspace(-r_max, r_max, _BINS + 1)
-    _density(ax, x, y, (edges, edges))
+    edges = np.linspace(-r_max, r_max, _N_BINS + 1)
+    _draw_density(ax, x, y, (edges, edges))
     radius = float(close.groupby("encounter")["distance"].min().quantile(0.05))
     ax.add_patch(Circle((0, 0), radius, fill=False, linestyle=":", linewidth=2, color=RED))
-    ax.plot(0, 0, marker=(3, 0, -90), color=RED, markersize=12)
+    draw_person(ax, 0, 0, 0, color=RED, markersize=12)
     return label_metres(ax, f"One encounter in twenty comes nearer than {radius:.2f} m", person=True)
 
 
 def plot_distance_by_direction(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:
-    """How often the other person was how far away, by line-of-sight angle (paper, fig. 3b).
+    """Plot the distance of the other person by line-of-sight angle (paper, fig. 3b).
 
-    The line: the nearest in each 15 deg, of at least five encounters, but for one in twenty.
+    The line is the 5 % quantile of the nearest approaches in each 15 deg, where there are at least five.
+
+    Parameters
+    ----------
+    samples : table as from `szlib.find_encounters`.
+    r_max : largest distance [m].
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd
+    >>> from szlib.workbook import figures
+    >>> angle = np.linspace(-3, 3, 90)
+    >>> samples = pd.DataFrame({"encounter": range(90), "los_angle": angle, "distance": 1.0})
+    >>> ax = figures.plot_distance_by_direction(samples)
     """
     ax = get_axes(ax, size=(7, 4))
     close = samples[samples["distance"] <= r_max]
     angle = np.degrees(close["los_angle"])
-    _density(ax, angle, close["distance"], (np.linspace(-180, 180, 73), np.linspace(0, r_max, _BINS + 1)))
+    edges = np.linspace(-180, 180, 73), np.linspace(0, r_max, _N_BINS + 1)
+    _draw_density(ax, angle, close["distance"], edges)
     sector = (np.floor(angle / 15) * 15 + 7.5).rename("sector")
     nearest = close.groupby([sector, "encounter"])["distance"].min().groupby("sector")
     edge = nearest.quantile(0.05).where(nearest.size() >= 5).reindex(np.arange(-172.5, 180, 15))
-    ax.plot(edge.index, edge, "o-", color=RED, markersize=4, label="nearer: one encounter in twenty")
+    ax.plot(edge.index, edge, "o-", color=RED, markersize=4, label="one encounter in twenty comes nearer")
     ax.set(xlabel="line-of-sight angle [deg] (left is positive)", ylabel="distance [m]", ylim=(0, r_max))
-    ax.set(xlim=(-180, 180), xticks=range(-180, 181, 45))
-    ax.set_title("How close people come, by where they are seen")
-    ax.legend(loc="lower right", fontsize=8)
+    ax.set(xlim=(-180, 180), xticks=range(-180, 181, 45), title="How near people come, by direction")
+    add_legend_below(ax, gap=0.16)
     return ax
 
 
-def _density(ax: Axes, x: pd.Series, y: pd.Series, edges: tuple[np.ndarray, np.ndarray]) -> None:
-    """How many samples are in each cell, on a log scale: the darker, the more; empty cells stay white."""
+def _draw_density(ax: Axes, x: pd.Series, y: pd.Series, edges: tuple[np.ndarray, np.ndarray]) -> None:
+    """Draw the number of samples in each cell on a log scale; empty cells stay white."""
     counts = np.histogram2d(x, y, bins=edges)[0].T
     shown = np.ma.masked_equal(counts, 0)
     top = max(float(counts.max(initial=0)), 2.0)

@@ -1,4 +1,4 @@
-"""Figures of runs: scenarios with colours deepening over time, and animations."""
+"""Figures of runs: the scene over time, speeds and barriers, paths, crowds, animations."""
 
 from __future__ import annotations
 
@@ -20,217 +20,355 @@ from matplotlib.patheffects import Normal, Stroke
 from PIL import Image
 
 from ...checks import Array
-from ...simulation.log import SimulationLog
+from ...simulation.replay import Replay
+from ...simulation.run import Run
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
 from .movies import Movie
-from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, get_axes, label_metres
+from .style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    add_legend_below,
+    draw_person,
+    get_axes,
+    label_metres,
+)
 
-_ROBOT = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
-_PADDING = 0.2
-"""Room left around what is drawn [m]."""
-_STAYS = 0.35
-"""Moves no longer than this share one time label [m]."""
-_WHOLE = 3.0
-"""A wall that leads no farther than this beyond all else is drawn to its end [m]."""
+_ROBOT_COLOURS = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
+_ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
 _DARK_RED = "#7A2E00"
-"""Of letters, for `RED` is too pale for them."""
-_PERSON = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
+"""Colour of letters; `RED` is too pale for them."""
+_PADDING = 0.2
+"""Margin around everything that is drawn [m]."""
+_SAME_PLACE = 0.35
+"""Positions nearer than this share one time label [m]."""
+_WALL_EXTENT = 3.0
+"""A wall is drawn to its end if the end is at most this far from all else [m]."""
+_CROWD_MARGIN = 3.0
+"""Margin around the robot's path in a crowd [m]."""
 
 
-def plot_scenario(log: SimulationLog, *, every: float = 2.0, ax: Axes | None = None) -> Axes:
-    """Robot, zones and walls, every so many seconds, colours deepening over time (paper, fig. 6).
+def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Axes:
+    """Plot robot, zones and walls at several times; later is darker (paper, fig. 6).
 
-    The times [s] are written on the robot's path and on everybody's, so that they can be matched; where
-    somebody stays within `_STAYS`, from when to when.
+    The times [s] are written on the paths of the robot and of each person.  A person who stays in one place
+    has one label with both times.
+
+    Parameters
+    ----------
+    run : the run.
+    every : time between two drawings [s].
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
+    >>> ax = figures.plot_scenario(log, every=1.0)
     """
     ax = get_axes(ax, size=(9, 4.5))
-    step = max(1, round(every / log.settings.dt))
-    shown = np.arange(0, len(log.states), step)
-    _stage(ax, log.scenario)
-    ax.plot(*log.states[:, :2].T, "o-", color=BLUE, markersize=1.5, linewidth=0.6, label="robot's path")
+    step = max(1, round(every / run.settings.dt))
+    shown = np.arange(0, len(run.states), step)
+    _draw_scenery(ax, run.scenario)
+    ax.plot(*run.states[:, :2].T, "o-", color=BLUE, markersize=1.5, linewidth=0.6, label="robot's path")
     for row in shown.tolist():
-        depth = log.time[row] / max(log.time[-1], 1e-9)
-        _draw_moment(ax, log, row, robot=_ROBOT(depth), zone=_PERSON(depth))
-    _write_times(ax, log.time[shown], log.states[shown, :2], colour=BLACK, above=0)
-    for i in range(len(log.zones)):
-        _write_times(ax, log.time[shown], log.people[shown, i, :2], colour=_DARK_RED, above=8)
+        depth = run.time[row] / max(run.time[-1], 1e-9)
+        _draw_moving(ax, run, row, robot=_ROBOT_COLOURS(depth), zone=_ZONE_COLOURS(depth))
+    _write_times(ax, run.time[shown], run.states[shown, :2], colour=BLACK, above=0)
+    for i in range(len(run.zones)):
+        _write_times(ax, run.time[shown], run.people[shown, i, :2], colour=_DARK_RED, above=8)
     ax.plot([], [], "o", color=BLUE, label="robot")
     ax.plot([], [], color=RED, label="zone")
     ax.plot([], [], marker=(3, 0, 0), color=RED, linestyle="", label="person")
-    _frame(ax, [(log, shown)])
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=6, fontsize=8)
-    return label_metres(ax, f"{log.scenario.title} (times in s; later is darker)")
+    _set_limits(ax, [(run, shown)])
+    add_legend_below(ax, gap=0.14, ncols=6)
+    return label_metres(ax, f"{run.scenario.title} (times in s; later is darker)")
 
 
-def plot_speed(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
-    """Speed of the robot over time, and its limit."""
+def plot_speed(run: Run, *, ax: Axes | None = None) -> Axes:
+    """Plot the robot's speed over time, and its limit.
+
+    Parameters
+    ----------
+    run : the run.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
+    >>> ax = figures.plot_speed(log)
+    """
     ax = get_axes(ax, size=(8, 2.5))
-    ax.plot(log.time, log.speed, color=BLUE, label="robot")
-    ax.axhline(log.settings.v_max, color=GREY, linestyle="--", label="limit")
-    top = 1.15 * max(log.settings.v_max, float(log.speed.max()))
+    ax.plot(run.time, run.speed, color=BLUE, label="robot")
+    ax.axhline(run.settings.v_max, color=GREY, linestyle="--", label="limit")
+    top = 1.15 * max(run.settings.v_max, float(run.speed.max()))
     ax.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, top))
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
     return ax
 
 
-def plot_barriers(log: SimulationLog, *, ax: Axes | None = None) -> Axes:
-    """h of every person, and of the nearest wall, over time: safe where >= 0; logarithmic above 0.5 m."""
+def plot_barriers(run: Run, *, ax: Axes | None = None) -> Axes:
+    """Plot h of each person and of the nearest wall over time, on a log scale above 0.5 m; safe is h >= 0.
+
+    Parameters
+    ----------
+    run : the run.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
+    >>> ax = figures.plot_barriers(log)
+    """
     ax = get_axes(ax, size=(8, 2.5))
-    n = len(log.scenario.people)
-    for i, h in enumerate(log.h[:, :n].T):
-        ax.plot(log.time, h, color=RED, label="person" if i == 0 else None)
-    if log.h.shape[1] > n:
-        walls = log.h[:, n:].min(axis=1)
-        ax.plot(log.time, walls, color=BLACK, linestyle=":", label="nearest wall")
+    n = len(run.scenario.people)
+    for i, h in enumerate(run.h[:, :n].T):
+        ax.plot(run.time, h, color=RED, label="person" if i == 0 else None)
+    if run.h.shape[1] > n:
+        ax.plot(run.time, run.h[:, n:].min(axis=1), color=BLACK, linestyle=":", label="nearest wall")
     ax.axhline(0, color=GREY, linewidth=1)
     ax.set_yscale("symlog", linthresh=0.5, linscale=1.5)
-    ax.set_yticks([0, 0.25, 0.5, 1, 2, 5, 10], ["0", "0.25", "0.5", "1", "2", "5", "10"])
-    low, high = log.h.min(initial=0.0), log.h.max(initial=0.5)
+    ticks = [0, 0.25, 0.5, 1, 2, 5, 10]
+    ax.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    low, high = run.h.min(initial=0.0), run.h.max(initial=0.5)
     ax.set(xlabel="time [s]", ylabel="h [m]", ylim=(1.2 * low - 0.05, 1.3 * high))
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
     return ax
 
 
-def plot_robot_paths(logs: Mapping[str, SimulationLog], *, ax: Axes | None = None) -> Axes:
-    """Paths of several runs of one scene, by name; zones as they were at the start."""
+def plot_robot_paths(runs: Mapping[str, Run], *, ax: Axes | None = None) -> Axes:
+    """Plot the paths of several runs of one scene, with the zones at the start.
+
+    Parameters
+    ----------
+    runs : name -> run, at most four.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
+    >>> ax = figures.plot_robot_paths({"gamma = 0.05": log})
+    """
     ax = get_axes(ax, size=(9, 4))
-    first = next(iter(logs.values()))
-    _stage(ax, first.scenario)
-    for zone in _zones(first, 0):
-        _draw_zone(ax, zone, _PERSON(0.5))
+    first = next(iter(runs.values()))
+    _draw_scenery(ax, first.scenario)
+    for zone in _zones_in_world(first, 0):
+        _draw_zone(ax, zone, _ZONE_COLOURS(0.5))
     styles = zip((BLUE, ORANGE, GREEN, BLACK), ("-", "--", "-.", ":"), strict=True)
-    for (name, log), (colour, line) in zip(logs.items(), styles, strict=False):
-        ax.plot(*log.states[:, :2].T, color=colour, linestyle=line, linewidth=2, label=name)
-    _frame(ax, [(log, np.zeros(1, int)) for log in logs.values()])
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=4, fontsize=8)
+    for (name, run), (colour, line) in zip(runs.items(), styles, strict=False):
+        ax.plot(*run.states[:, :2].T, color=colour, linestyle=line, linewidth=2, label=name)
+    _set_limits(ax, [(run, np.zeros(1, int)) for run in runs.values()])
+    add_legend_below(ax, gap=0.15, ncols=4)
     return label_metres(ax, first.scenario.title)
 
 
-def draw_run_grid(logs: Mapping[str, SimulationLog], *, every: float) -> Figure:
-    """Pictures of several runs of one scene every so many seconds: a row for each run, by name."""
-    longest = max(float(log.time[-1]) for log in logs.values())
+def plot_crowd(run: Run, *, replay: Replay | None = None, ax: Axes | None = None) -> Axes:
+    """Plot the paths of the robot and of all people, with a dot each second.
+
+    The robot, people and zones are drawn at the time when the robot is nearest to a person.
+
+    Parameters
+    ----------
+    run : the run.
+    replay : the replay of the run; it gives the path of the person whom the robot replaces.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
+    >>> ax = figures.plot_crowd(log)
+    """
+    ax = get_axes(ax, size=(6, 5))
+    second = max(1, round(1 / run.settings.dt))
+    distance = np.hypot(run.relative[..., 0], run.relative[..., 1])
+    row = int(np.nanargmin(np.where(np.isnan(distance), np.inf, distance).min(axis=1, initial=np.inf)))
+    for i, (x, y) in enumerate(np.moveaxis(run.people[:, :, :2], 0, -1)):
+        ax.plot(x, y, color=RED, linewidth=1, alpha=0.5, label="people" if i == 0 else None)
+        ax.plot(x[::second], y[::second], ".", color=RED, markersize=3, alpha=0.5)
+    if replay is not None:
+        ax.plot(*replay.walker.states[:, :2].T, "--", color=GREEN, linewidth=2, label="person replaced")
+    ax.plot(*run.states[:, :2].T, color=BLUE, linewidth=2, label="robot")
+    ax.plot(*run.states[::second, :2].T, ".", color=BLUE, markersize=5)
+    _draw_scenery(ax, run.scenario)
+    _draw_moving(ax, run, row, robot=BLUE, zone=RED)
+    path = np.vstack([run.states[:, :2], run.scenario.goal])
+    low, high = path.min(axis=0) - _CROWD_MARGIN, path.max(axis=0) + _CROWD_MARGIN
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    return label_metres(ax, run.scenario.title)
+
+
+def draw_run_grid(runs: Mapping[str, Run], *, every: float) -> Figure:
+    """Draw several runs of one scene at several times: a row for each run.
+
+    Parameters
+    ----------
+    runs : name -> run.
+    every : time between two pictures [s].
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
+    >>> len(figures.draw_run_grid({"gamma = 0.05": log}, every=1.0).axes)
+    3
+    """
+    longest = max(float(run.time[-1]) for run in runs.values())
     times = np.arange(0.0, longest + 1e-9, every)
-    figure = plt.figure(figsize=(3.2 * len(times), 1.7 * len(logs) + 0.3), layout="constrained")
-    grid = figure.subplots(len(logs), len(times), squeeze=False, sharex=True, sharey=True)
-    for panels, (name, log) in zip(grid, logs.items(), strict=True):
+    figure = plt.figure(figsize=(3.2 * len(times), 1.7 * len(runs) + 0.3), layout="constrained")
+    grid = figure.subplots(len(runs), len(times), squeeze=False, sharex=True, sharey=True)
+    for panels, (name, run) in zip(grid, runs.items(), strict=True):
         for ax, time in zip(panels, times.tolist(), strict=True):
-            row = min(round(time / log.settings.dt), len(log.states) - 1)
-            _stage(ax, log.scenario)
-            ax.plot(*log.states[: row + 1, :2].T, color=BLUE, linewidth=1, label="robot's path")
-            _draw_moment(ax, log, row, robot=BLUE, zone=RED)
-            _frame(ax, [(each, np.arange(len(each.states))) for each in logs.values()])
-            ax.set_title(
-                f"{name}, {log.time[row]:g} s, h = {log.h[row].min(initial=np.inf):.2f} m", fontsize=9
-            )
-            label_metres(ax)
+            row = min(round(time / run.settings.dt), len(run.states) - 1)
+            _draw_scenery(ax, run.scenario)
+            ax.plot(*run.states[: row + 1, :2].T, color=BLUE, linewidth=1, label="robot's path")
+            _draw_moving(ax, run, row, robot=BLUE, zone=RED)
+            _set_limits(ax, [(each, np.arange(len(each.states))) for each in runs.values()])
+            title = f"{name}, {run.time[row]:g} s, h = {run.h[row].min(initial=np.inf):.2f} m"
+            label_metres(ax).set_title(title, fontsize=9)
             ax.label_outer()
     return figure
 
 
-def animate(log: SimulationLog, *, every: float = 0.4, width: float = 6.0) -> Movie:
-    """The run as an animated GIF, a frame every so many seconds, twice as fast; a player in notebooks."""
-    step = max(1, round(every / log.settings.dt))
-    rows = np.unique(np.r_[np.arange(0, len(log.states), step), len(log.states) - 1])
+def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
+    """Animate a run, at twice its speed; in a notebook it is a player with controls.
+
+    Parameters
+    ----------
+    run : the run.
+    every : time between two frames of the GIF [s].
+    width : width of the GIF [inch].
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=1.0)
+    >>> movie = figures.animate(log, width=3.0)
+    """
+    step = max(1, round(every / run.settings.dt))
+    rows = np.unique(np.r_[np.arange(0, len(run.states), step), len(run.states) - 1])
     figure = Figure(figsize=(width, width * 0.55), layout="constrained", dpi=70)
     canvas, ax = FigureCanvasAgg(figure), figure.subplots()
-    _stage(ax, log.scenario)
-    _frame(ax, [(log, rows)])
+    _draw_scenery(ax, run.scenario)
+    _set_limits(ax, [(run, rows)])
     label_metres(ax, "t")
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # settled
-    standing: list[Artist] = [*ax.lines, ax.title]
-    for artist in standing:
-        artist.set_animated(True)  # left out of what is drawn once: axes, and nothing in them
+    figure.set_layout_engine("none")  # the layout is done
+    fixed: list[Artist] = [*ax.lines, ax.title]
+    for artist in fixed:
+        artist.set_animated(True)  # not in the background: the axes are, and nothing in them
     canvas.draw()  # type: ignore[no-untyped-call]
-    empty = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
+    background = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
 
-    def picture(row: int) -> Image.Image:
+    def draw_frame(row: int) -> Image.Image:
         """The scene at a row of the run."""
-        moving: list[Artist] = [*ax.plot(*log.states[: row + 1, :2].T, color=BLUE, linewidth=1)]
-        moving += ax.plot(*log.predicted[row, :, :2].T, ".", color=GREEN, markersize=3)
-        moving += _draw_moment(ax, log, row, robot=BLUE, zone=RED)
-        ax.set_title(f"t = {log.time[row]:4.1f} s, robot at {log.speed[row]:.2f} m/s (shown twice as fast)")
-        canvas.restore_region(empty)  # type: ignore[no-untyped-call]
-        for artist in sorted((*standing, *moving), key=Artist.get_zorder):
+        moving: list[Artist] = [*ax.plot(*run.states[: row + 1, :2].T, color=BLUE, linewidth=1)]
+        moving += ax.plot(*run.predicted[row, :, :2].T, ".", color=GREEN, markersize=3)
+        moving += _draw_moving(ax, run, row, robot=BLUE, zone=RED)
+        ax.set_title(f"t = {run.time[row]:4.1f} s, robot at {run.speed[row]:.2f} m/s (shown twice as fast)")
+        canvas.restore_region(background)  # type: ignore[no-untyped-call]
+        for artist in sorted((*fixed, *moving), key=Artist.get_zorder):
             ax.draw_artist(artist)
         for artist in moving:
             artist.remove()
-        drawn = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-        return Image.fromarray(drawn).convert("RGB")
+        pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+        return Image.fromarray(pixels).convert("RGB")
 
-    first, *others = [picture(row) for row in rows.tolist()]
-    movie = io.BytesIO()
-    first.save(movie, "GIF", save_all=True, append_images=others, duration=500 * every, loop=0)
-    return Movie.of(movie.getvalue(), log, (*ax.get_xlim(), *ax.get_ylim()))
+    first, *more = [draw_frame(row) for row in rows.tolist()]
+    gif = io.BytesIO()
+    first.save(gif, "GIF", save_all=True, append_images=more, duration=500 * every, loop=0)
+    return Movie(gif.getvalue(), run, (*ax.get_xlim(), *ax.get_ylim()))
 
 
-def _stage(ax: Axes, scenario: Scenario) -> None:
+def _draw_scenery(ax: Axes, scenario: Scenario) -> None:
+    """Draw what does not move: walls and the goal."""
     for i, wall in enumerate(scenario.walls):
         ax.plot(*wall.T, color=BLACK, linewidth=3, solid_capstyle="round", label="wall" if i == 0 else None)
     ax.plot(*scenario.goal, "D", color=BLUE, markersize=8, markeredgecolor=BLACK, label="goal")
 
 
 def _draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
-    a, b = zone.semi_axes
-    patch = EllipsePatch(
-        zone.center, 2 * a, 2 * b, angle=np.degrees(zone.angle), fill=False, edgecolor=colour, lw=1.6
-    )
+    (a, b), angle = zone.semi_axes, np.degrees(zone.angle)
+    patch = EllipsePatch(zone.center, 2 * a, 2 * b, angle=angle, fill=False, edgecolor=colour, lw=1.6)
     return ax.add_patch(patch)
 
 
-def _draw_moment(ax: Axes, log: SimulationLog, row: int, *, robot: Any, zone: Any) -> list[Artist]:
-    """Robot and zones at one time; a triangle for each person, its tip where they face."""
-    x, y = log.states[row, :2].tolist()
-    drawn = [_draw_zone(ax, ellipse, zone) for ellipse in _zones(log, row)]
-    drawn.append(ax.add_patch(Circle((x, y), log.settings.r_robot, color=robot, alpha=0.6, lw=0)))
-    for px, py, heading in log.people[row, :, :3].tolist():
-        drawn += ax.plot(px, py, marker=(3, 0, np.degrees(heading) - 90), color=RED, markersize=6)
+def _draw_moving(ax: Axes, run: Run, row: int, *, robot: Any, zone: Any) -> list[Artist]:
+    """Draw robot, zones and people at one time."""
+    drawn = [_draw_zone(ax, ellipse, zone) for ellipse in _zones_in_world(run, row)]
+    position = run.states[row, :2].tolist()
+    drawn.append(ax.add_patch(Circle(position, run.settings.r_robot, color=robot, alpha=0.6, lw=0)))
+    for x, y, heading in run.people[row, :, :3].tolist():
+        drawn += draw_person(ax, x, y, heading, color=RED, markersize=6)
     return drawn
 
 
-def _zones(log: SimulationLog, row: int) -> list[Ellipse]:
-    """The zone in the world of everybody who is there at one time."""
-    at = zip(log.zones, log.people[row, :, :3].tolist(), strict=True)
-    return [zone.placed((x, y), heading) for zone, (x, y, heading) in at if not isnan(x)]
+def _zones_in_world(run: Run, row: int) -> list[Ellipse]:
+    """The zone of each person who is present at one time, in the world frame."""
+    people = zip(run.zones, run.people[row, :, :3].tolist(), strict=True)
+    return [zone.placed((x, y), heading) for zone, (x, y, heading) in people if not isnan(x)]
 
 
-def _write_times(ax: Axes, time: Array, at: Array, *, colour: str, above: float) -> None:
-    """Write along a path when somebody was there, shape (n,) [s] and (n, 2) [m]; NaN where they were not."""
+def _write_times(ax: Axes, time: Array, positions: Array, *, colour: str, above: float) -> None:
+    """Write the times, shape (n,) [s], beside the positions, shape (n, 2) [m]; NaN for an absent person."""
     labels: list[tuple[Array, list[str]]] = []
     first = 0
     for row in range(1, len(time) + 1):
-        if row < len(time) and np.hypot(*(at[row] - at[first])) < _STAYS:
+        if row < len(time) and np.hypot(*(positions[row] - positions[first])) < _SAME_PLACE:
             continue
-        if not isnan(at[first, 0]):
-            here, until = at[first:row].mean(axis=0), f"-{time[row - 1]:.3g}" if row - 1 > first else ""
-            near = [told for place, told in labels if np.hypot(*(here - place)) < _STAYS]
+        if not isnan(positions[first, 0]):
+            here, until = (
+                positions[first:row].mean(axis=0),
+                f"-{time[row - 1]:.3g}" if row - 1 > first else "",
+            )
+            near = [texts for place, texts in labels if np.hypot(*(here - place)) < _SAME_PLACE]
             if not near:
                 labels.append((here, []))
                 near = [labels[-1][1]]
             near[0].append(f"{time[first]:.3g}{until}")
         first = row
     halo = [Stroke(linewidth=2, foreground="white"), Normal()]
-    for here, told in labels:
-        label = ax.annotate(", ".join(told), (here[0], here[1]), (0, above), textcoords="offset points")
+    for here, texts in labels:
+        label = ax.annotate(", ".join(texts), (here[0], here[1]), (0, above), textcoords="offset points")
         label.set(color=colour, ha="center", va="center", fontsize=8, path_effects=halo)
 
 
-def _frame(ax: Axes, shown: Sequence[tuple[SimulationLog, Any]]) -> None:
-    """Limits that hold all that is ever drawn of these runs: paths, goal, and zones in the rows shown.
+def _set_limits(ax: Axes, shown: Sequence[tuple[Run, Any]]) -> None:
+    """Set limits that hold the paths, the goal, and the zones in the rows shown of each run.
 
-    Walls that lead much farther (`_WHOLE`) are drawn as far as that.
+    Much longer walls (`_WALL_EXTENT`) are cut off.
     """
     first = shown[0][0]
     radius = first.settings.r_robot + 0.3
     points = [first.scenario.goal + radius, first.scenario.goal - radius]
-    for log, rows in shown:
-        points += [log.states[:, :2] + radius, log.states[:, :2] - radius]
-        points += [zone.curve(25) for row in rows.tolist() for zone in _zones(log, row)]
-    everything = np.vstack(points)
-    low, high = everything.min(axis=0) - _PADDING, everything.max(axis=0) + _PADDING
+    for run, rows in shown:
+        points += [run.states[:, :2] + radius, run.states[:, :2] - radius]
+        points += [zone.curve(25) for row in rows.tolist() for zone in _zones_in_world(run, row)]
+    drawn = np.vstack(points)
+    low, high = drawn.min(axis=0) - _PADDING, drawn.max(axis=0) + _PADDING
     ends = first.scenario.walls.reshape(-1, 2)
-    near = ((ends > low - _WHOLE) & (ends < high + _WHOLE)).all(axis=1)
+    near = ((ends > low - _WALL_EXTENT) & (ends < high + _WALL_EXTENT)).all(axis=1)
     low = np.minimum(low, ends[near].min(axis=0, initial=np.inf) - _PADDING)
     high = np.maximum(high, ends[near].max(axis=0, initial=-np.inf) + _PADDING)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))

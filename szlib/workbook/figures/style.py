@@ -1,4 +1,4 @@
-"""The style that all figures share: colours, sizes, labels in metres."""
+"""The style that all figures share: colours, sizes, labels in metres, legends beside the data."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
@@ -20,12 +21,37 @@ SEQUENCE = "viridis"
 
 
 def get_axes(ax: Axes | None, *, size: tuple[float, float] = (6.0, 4.5)) -> Axes:
-    """The axes given, or those of a new figure of that size [inch]."""
+    """Return `ax`, or the axes of a new figure of this `size` [inch] if `ax` is None.
+
+    Examples
+    --------
+    >>> from szlib.workbook import figures
+    >>> ax = figures.get_axes(None, size=(4, 3))
+    >>> figures.get_axes(ax) is ax
+    True
+    """
     return plt.subplots(figsize=size, layout="constrained")[1] if ax is None else ax
 
 
 def label_metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
-    """Label both axes in metres with equal aspect; of the world, or of a person who walks to the right."""
+    """Label both axes in metres, with equal aspect.
+
+    Parameters
+    ----------
+    ax : axes to label.
+    title : title of the axes; "" keeps the one they have.
+    person : True for the frame of a person who walks to the right, False for the world.
+
+    Returns
+    -------
+    The same axes.
+
+    Examples
+    --------
+    >>> from szlib.workbook import figures
+    >>> figures.label_metres(figures.get_axes(None), person=True).get_xlabel()
+    'x, ahead [m]'
+    """
     ax.set(xlabel="x, ahead [m]" if person else "x [m]", ylabel="y, to the left [m]" if person else "y [m]")
     if title:
         ax.set_title(title)
@@ -34,24 +60,81 @@ def label_metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
 
 
 def area_patch(area: Area, **style: Any) -> PathPatch:
-    """The borders of an area, pillars included, as one patch."""
+    """Return the borders of `area`, with its holes, as one patch; `style` as for matplotlib's PathPatch.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> patch = figures.area_patch(szlib.ATC_SQUARE, edgecolor=figures.RED)
+    """
     rings = [Path(ring, closed=True) for ring in area.outlines]
     return PathPatch(Path.make_compound_path(*rings), fill=False, **style)
 
 
 def pick_colours(values: Sequence[Any]) -> list[Any]:
-    """One colour of the sequence for each value, dark to light, leaving out the palest."""
+    """Return one colour for each of the `values`, from dark to light, without the palest.
+
+    Examples
+    --------
+    >>> from szlib.workbook import figures
+    >>> len(figures.pick_colours([0.7, 1.1, 1.5]))
+    3
+    """
     return list(plt.get_cmap(SEQUENCE)(np.linspace(0, 0.85, len(values))))
 
 
+def add_legend_below(ax: Axes, *, gap: float = 0.13, ncols: int = 2) -> Legend:
+    """Add a legend below `ax`, at a distance of `gap` times its height, with `ncols` columns.
+
+    Examples
+    --------
+    >>> from szlib.workbook import figures
+    >>> ax = figures.get_axes(None)
+    >>> line = ax.plot([0, 1], [0, 1], label="robot")
+    >>> legend = figures.add_legend_below(ax)
+    """
+    return ax.legend(loc="upper center", bbox_to_anchor=(0.5, -gap), ncols=ncols, fontsize=8)
+
+
+def add_shared_legend(panels: Sequence[Axes]) -> None:
+    """Add one legend below all `panels` that show the same things: the legend of the first panel.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> from szlib.workbook import figures
+    >>> figure, panels = plt.subplots(1, 2, layout="constrained")
+    >>> line = panels[0].plot([0, 1], [0, 1], label="robot")
+    >>> figures.add_shared_legend(panels)
+    """
+    handles, names = panels[0].get_legend_handles_labels()
+    panels[0].figure.legend(handles, names, loc="outside lower center", ncols=len(names))
+
+
+def draw_person(ax: Axes, x: float, y: float, heading: float, **style: Any) -> list[Any]:
+    """Draw a triangle on `ax` at the position (`x`, `y`) [m]; its tip points along `heading` [rad].
+
+    The options of `style` are those of matplotlib's lines.  Returns the lines.
+    """
+    return ax.plot(x, y, marker=(3, 0, np.degrees(heading) - 90), linestyle="", **style)
+
+
 def alt_text(figure: Figure) -> str:
-    """What a figure shows, for who cannot see it: titles, what is over what, and the names in legends."""
-    told = []
+    """Describe `figure` for readers who cannot see it: titles, axes, and names in legends.
+
+    Examples
+    --------
+    >>> from szlib.workbook import figures
+    >>> ax = figures.get_axes(None)
+    >>> labels = ax.set(title="A run", xlabel="time [s]", ylabel="h [m]")
+    >>> figures.alt_text(ax.figure)
+    'A run: h [m] over time [s]'
+    """
+    parts = [figure.get_suptitle()]
     for ax in figure.axes:
-        across, up, legend = ax.get_xlabel(), ax.get_ylabel(), ax.get_legend()
-        names = [text.get_text() for text in legend.get_texts()] if legend else []
-        axes = f"{up} over {across}" if up and across else up or across
-        parts = [ax.get_title(), axes, f"with {', '.join(names)}" if names else ""]
-        told.append(": ".join(part for part in parts[:2] if part) + (f", {parts[2]}" if parts[2] else ""))
-    title = figure.get_suptitle()
-    return " ".join("; ".join(([title] if title else []) + [part for part in told if part]).split())
+        x, y, legend = ax.get_xlabel(), ax.get_ylabel(), ax.get_legend()
+        part = ": ".join(text for text in (ax.get_title(), f"{y} over {x}" if x and y else x or y) if text)
+        names = ", ".join(text.get_text() for text in legend.get_texts()) if legend else ""
+        parts.append(f"{part}, with {names}" if names else part)
+    return " ".join("; ".join(part for part in parts if part).split())

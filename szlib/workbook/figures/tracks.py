@@ -1,4 +1,4 @@
-"""Figures of tracks: where people were, how fast, and what became of the rows."""
+"""Figures of tracks: where people walked, how fast, and how many rows each stage keeps."""
 
 from __future__ import annotations
 
@@ -7,19 +7,35 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from ...encounters.geometry import Area
-from .style import BLUE, GREY, RED, SEQUENCE, area_patch, get_axes, label_metres
+from .style import BLUE, GREY, RED, SEQUENCE, add_legend_below, area_patch, get_axes, label_metres
 
-_MOST_CELLS = 2000
-"""Of a map, along each axis: cells grow with the site."""
+_MAX_CELLS = 2000
+"""Most cells of a map along each axis; the cells of a larger site are larger."""
 _MARGIN = 0.02
-"""Left free around a map, as a share of it: an area may end where the data ends."""
+"""Margin around a map, as a share of its size."""
 
 
 def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes | None = None) -> Axes:
-    """Where people were: person-seconds per square metre on a log scale, and the area (paper, fig. 1)."""
+    """Plot where people walked: person-seconds per square metre on a log scale (paper, fig. 1).
+
+    Parameters
+    ----------
+    tracks : table as from `szlib.read_tracks`.
+    area : area in which encounters are counted.
+    cell : side of a cell of the map [m].
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd, szlib
+    >>> from szlib.workbook import figures
+    >>> t = np.arange(50) / 10
+    >>> tracks = pd.DataFrame({"day": "d", "id": 1, "t": t, "x": t - 13, "y": 0 * t, "vx": 1.0, "vy": 0.0})
+    >>> ax = figures.plot_map(tracks, szlib.ATC_SQUARE)
+    """
     ax = get_axes(ax, size=(9, 5))
     x, y = tracks["x"].to_numpy(), tracks["y"].to_numpy()
-    while max(np.ptp(x), np.ptp(y)) / cell > _MOST_CELLS:
+    while max(np.ptp(x), np.ptp(y)) / cell > _MAX_CELLS:
         cell *= 2
     edges = [np.arange(np.floor(v.min()), np.ceil(v.max()) + cell, cell) for v in (x, y)]
     seconds = np.histogram2d(x, y, bins=edges)[0] / 10 / cell**2
@@ -27,49 +43,62 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     image = ax.pcolormesh(edges[0], edges[1], shown.T, cmap=SEQUENCE, rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$")
     ax.add_patch(area_patch(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12))
+    add_legend_below(ax)
     for axis, edge, ends in zip("xy", edges, (area.box.x, area.box.y), strict=True):
         low, high = min(edge[0], ends[0]), max(edge[-1], ends[1])
         ax.set(**{f"{axis}lim": (low - _MARGIN * (high - low), high + _MARGIN * (high - low))})
-    return label_metres(ax, "Where people were seen, and where they are watched")
+    return label_metres(ax, "Where people walked, and the area")
 
 
-def plot_speed_histogram(
-    by_column: np.ndarray, by_displacement: np.ndarray, *, ax: Axes | None = None
-) -> Axes:
-    """Speed as recorded against speed from displacement [m/s], both shape (n,)."""
+def plot_speed_histogram(recorded: np.ndarray, displaced: np.ndarray, *, ax: Axes | None = None) -> Axes:
+    """Plot the distribution of recorded speeds and of speeds from displacement.
+
+    Parameters
+    ----------
+    recorded : speeds in the file's column, shape (n,) [m/s].
+    displaced : speeds from displacement, shape (n,) [m/s].
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from szlib.workbook import figures
+    >>> ax = figures.plot_speed_histogram(np.full(9, 1.0), np.linspace(0, 1.6, 9))
+    """
     ax = get_axes(ax)
-    bins = np.linspace(0, 2.5, 101)
-    for values, name, colour, line in (
-        (by_displacement, "from displacement", BLUE, "-"),
-        (by_column, "the file's column", RED, "--"),
-    ):
-        ax.hist(
-            values,
-            bins=bins.tolist(),
-            histtype="step",
-            color=colour,
-            linestyle=line,
-            linewidth=1.6,
-            label=name,
-        )
-    ax.set(xlabel="speed [m/s]", ylabel="samples", title="The velocity column never stands still")
-    ax.legend()
+    style = {"bins": np.linspace(0, 2.5, 101).tolist(), "histtype": "step", "linewidth": 1.6}
+    ax.hist(displaced, color=BLUE, label="from displacement", **style)
+    ax.hist(recorded, color=RED, linestyle="--", label="the file's column", **style)
+    ax.set(xlabel="speed [m/s]", ylabel="samples", title="The velocity column never falls to zero")
+    add_legend_below(ax)
     return ax
 
 
 def plot_funnel(funnel: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
-    """What each stage kept, as points on a log scale; `funnel` as from `szlib.tracks.funnels.table`.
+    """Plot how many rows each stage keeps, as points on a log scale; a log scale has no zero for bars.
 
-    A bar would have no length there: a log scale has no zero.
+    Parameters
+    ----------
+    funnel : table as from `szlib.tracks.funnels.table`.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.workbook import figures
+    >>> stages = pd.DataFrame({"stage": ["read", "in the area"], "what": "kept", "rows": [9000, 200]})
+    >>> figures.plot_funnel(stages).get_title()
+    '200 of 9,000 rows remain'
     """
     kept = funnel[funnel["what"] == "kept"]
+    rows = kept["rows"]
     ax = get_axes(ax, size=(8, 0.4 * len(kept) + 1))
-    ax.plot(kept["rows"], kept["stage"], "o-", color=BLUE, markersize=7, linewidth=1)
-    for at, rows in enumerate(kept["rows"]):
-        ax.annotate(f"{rows:,}", (rows, at), (9, 0), textcoords="offset points", va="center", fontsize=8)
+    ax.plot(rows, kept["stage"], "o-", color=BLUE, markersize=7, linewidth=1)
+    for at, n in enumerate(rows):
+        ax.annotate(f"{n:,}", (n, at), (9, 0), textcoords="offset points", va="center", fontsize=8)
     ax.invert_yaxis()
     ax.grid(axis="x", color=GREY, alpha=0.3)
-    ax.set(xscale="log", xlabel="rows kept (log scale)", title="From rows of tracks to a hull")
-    ax.set_xlim(left=max(float(kept["rows"].min()), 1) / 4, right=float(kept["rows"].max()) * 8)
+    ax.set(xscale="log", xlabel="rows kept (log scale)")
+    ax.set_title(f"{rows.iloc[-1]:,} of {rows.iloc[0]:,} rows remain")
+    ax.set_xlim(left=max(float(rows.min()), 1) / 4, right=float(rows.max()) * 8)
     return ax

@@ -1,9 +1,10 @@
-// The laboratory: a scene for each robot, side by side, that can be dragged and set while it runs.
-// The kernel computes every step; this page asks for the next one when the last has come.
+// The laboratory: a panel for each robot, side by side, that a user drags and sets while it runs.
+// The kernel computes each step; this page asks for the next step when the last one has arrived.
 
-const GRASP = 16;  // pixels within which something is taken hold of
+const GRAB_RADIUS = 16;  // distance within which the pointer takes hold of a thing [pixels]
 
-function between(before, now, share) {
+// The snapshot between two snapshots: `share` of the way from `before` to `now`.
+function interpolate(before, now, share) {
   const mix = (a, b) => (a && b && a.length === b.length ? b.map((v, i) => a[i] + share * (v - a[i])) : b);
   const moved = (a, b) => mix(a, b).concat();
   const zones = now.zones.map((zone, i) => [...moved(before.zones[i]?.slice(0, 2), zone.slice(0, 2)), ...zone.slice(2)]);
@@ -11,19 +12,18 @@ function between(before, now, share) {
   return { ...now, robot: mix(before.robot, now.robot), zones, people };
 }
 
-// What could have been chosen, and what was: accelerations ahead to the right, as x is.
-function accelerations(context, size, moment, colours) {
-  const reach = 1.2 * moment.a_max, at = view([-reach, reach, -reach, reach], size, size);
+// Draws the allowed accelerations, and the chosen one.
+function drawAccelerations(context, size, snapshot, colours) {
+  const a = snapshot.a_max, reach = 1.2 * a, view = makeView([-reach, reach, -reach, reach], size, size);
   context.clearRect(0, 0, size, size);
   context.fillStyle = "white";
   context.fillRect(0, 0, size, size);
-  const a = moment.a_max;
-  line(context, at, [[-a, -a], [a, -a], [a, a], [-a, a], [-a, -a]], "#555555", 1, [4, 3]);
-  line(context, at, [[-reach, 0], [reach, 0]], "#cccccc", 1);
-  line(context, at, [[0, -reach], [0, reach]], "#cccccc", 1);
-  for (const ring of moment.free) {
+  drawLine(context, view, [[-a, -a], [a, -a], [a, a], [-a, a], [-a, -a]], "#555555", 1, [4, 3]);
+  drawLine(context, view, [[-reach, 0], [reach, 0]], "#cccccc", 1);
+  drawLine(context, view, [[0, -reach], [0, reach]], "#cccccc", 1);
+  for (const ring of snapshot.allowed) {
     context.beginPath();
-    for (const [x, y] of ring) context.lineTo(...at.pixel(x, y));
+    for (const [x, y] of ring) context.lineTo(...view.pixel(x, y));
     context.closePath();
     context.fillStyle = `${colours.plan}55`;
     context.fill();
@@ -31,211 +31,214 @@ function accelerations(context, size, moment, colours) {
     context.lineWidth = 1.5;
     context.stroke();
   }
-  diamond(context, at.pixel(...moment.control), 5, colours.robot);
+  drawDiamond(context, view.pixel(...snapshot.control), 5, colours.robot);
   context.fillStyle = "#555555";
   context.font = "11px sans-serif";
   context.fillText(`\u00b1${a.toFixed(1)} m/s\u00b2`, 3, 11);
 }
 
-// One robot: its canvases, what it is doing in words, its sliders.
-function panel(parent, index, begin, change) {
-  const { stage } = begin, width = 430, [x0, x1, y0, y1] = stage.limits;
+// Adds the panel of one robot: its canvases, its status, its sliders. `configure` sends a changed option.
+function addPanel(parent, index, content, configure) {
+  const { layout } = content, width = 430, [x0, x1, y0, y1] = layout.limits;
   const height = Math.round(Math.max(180, Math.min(400, (width * (y1 - y0)) / (x1 - x0))));
-  const box = element(parent, "div", { className: "szlib-panel" }, { width: `${width}px` });
+  const box = addElement(parent, "div", { className: "szlib-panel" }, { width: `${width}px` });
   const name = String.fromCharCode(65 + index);
-  element(box, "strong", { textContent: `Robot ${name}` });
-  const canvas = element(box, "canvas", { role: "img", ariaLabel: `scene of robot ${name}` }, { display: "block", touchAction: "none" });
-  const row = element(box, "div", {}, { display: "flex", gap: "4px", marginTop: "4px" });
-  const chart = element(row, "canvas", { role: "img", ariaLabel: `the least h of robot ${name} over time` });
-  const choice = element(row, "canvas", { role: "img", ariaLabel: `admissible accelerations of robot ${name}, and the one chosen` });
-  const told = element(box, "div", { className: "szlib-told", role: "status" }, { fontSize: "12px", fontVariantNumeric: "tabular-nums", minHeight: "2.6em" });
-  const it = {
-    at: view(stage.limits, width, height), canvas, told, moment: null, before: null, path: [], times: [], values: [],
-    forget() { it.path = []; it.times = []; it.values = []; it.before = null; },
-    take(moment) {
-      it.before = it.moment;
-      it.moment = moment;
-      if (it.times.length && moment.t === it.times[it.times.length - 1]) return;
-      it.path.push(moment.robot);
-      it.times.push(moment.t);
-      it.values.push(moment.h);
+  addElement(box, "strong", { textContent: `Robot ${name}` });
+  const canvas = addElement(box, "canvas", { role: "img", ariaLabel: `scene of robot ${name}` }, { display: "block", touchAction: "none" });
+  const row = addElement(box, "div", {}, { display: "flex", gap: "4px", marginTop: "4px" });
+  const chartCanvas = addElement(row, "canvas", { role: "img", ariaLabel: `the least h of robot ${name} over time` });
+  const controlCanvas = addElement(row, "canvas", { role: "img", ariaLabel: `allowed accelerations of robot ${name}, and the chosen one` });
+  const status = addElement(box, "div", { className: "szlib-status", role: "status" }, { fontSize: "12px", fontVariantNumeric: "tabular-nums", minHeight: "2.6em" });
+  const scene = prepareCanvas(canvas, width, height), chart = prepareCanvas(chartCanvas, 310, 112), controls = prepareCanvas(controlCanvas, 112, 112);
+  const panel = {
+    view: makeView(layout.limits, width, height), canvas, snapshot: null, before: null, path: [], times: [], values: [],
+    clear() { panel.path = []; panel.times = []; panel.values = []; panel.before = null; },
+    add(snapshot) {
+      panel.before = panel.snapshot;
+      panel.snapshot = snapshot;
+      if (panel.times.length && snapshot.t === panel.times[panel.times.length - 1]) return;
+      panel.path.push(snapshot.robot);
+      panel.times.push(snapshot.t);
+      panel.values.push(snapshot.h);
     },
     draw(share) {
-      if (!it.moment) return;
-      const shown = it.before && share < 1 ? between(it.before, it.moment, share) : it.moment;
-      scene(on, it.at, stage, shown, [...it.path.slice(0, -1), shown.robot]);
-      for (const [xa, ya, xb, yb] of stage.walls) {
+      const { snapshot, before, view } = panel;
+      if (!snapshot) return;
+      const shown = before && share < 1 ? interpolate(before, snapshot, share) : snapshot;
+      drawScene(scene, view, layout, shown, [...panel.path.slice(0, -1), shown.robot]);
+      for (const [xa, ya, xb, yb] of layout.walls) {
         for (const end of [[xa, ya], [xb, yb]]) {
-          const [px, py] = it.at.pixel(...end);
-          on.strokeStyle = "black";
-          on.fillStyle = "white";
-          on.lineWidth = 1.5;
-          on.fillRect(px - 4, py - 4, 8, 8);
-          on.strokeRect(px - 4, py - 4, 8, 8);
+          const [px, py] = view.pixel(...end);
+          scene.strokeStyle = "black";
+          scene.fillStyle = "white";
+          scene.lineWidth = 1.5;
+          scene.fillRect(px - 4, py - 4, 8, 8);
+          scene.strokeRect(px - 4, py - 4, 8, 8);
         }
       }
-      const now = it.moment.t;
-      barriers(under, 310, 112, it.times, it.values, now, [Math.max(0, now - 20), Math.max(20, now)], stage.colours);
-      accelerations(aside, 112, it.moment, stage.colours);
-      const h = it.moment.h === null ? "" : `, least h ${it.moment.h.toFixed(2)} m`;
-      told.textContent = `t = ${now.toFixed(1)} s, ${it.moment.speed.toFixed(2)} m/s${h}, rung: ${it.moment.rung}, ${it.moment.told}`;
+      const now = snapshot.t, span = [Math.max(0, now - 20), Math.max(20, now)];
+      drawBarriers(chart, 310, 112, panel.times, panel.values, now, span, layout.colours);
+      drawAccelerations(controls, 112, snapshot, layout.colours);
+      const h = snapshot.h === null ? "" : `, least h ${snapshot.h.toFixed(2)} m`;
+      const safety = snapshot.safe ? "safe" : "NOT SAFE";
+      status.textContent = `t = ${now.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}, solver: ${snapshot.fallback}, ${safety}`;
     },
   };
-  const on = surface(canvas, width, height), under = surface(chart, 310, 112), aside = surface(choice, 112, 112);
-  for (const control of begin.sliders) slider(box, control, begin.choices[index][control.name], (value) => change(index, control.name, value));
-  const line = element(box, "label", {}, { display: "flex", gap: "8px", fontSize: "12px" });
-  element(line, "span", { textContent: "estimator" }, { width: "150px" });
-  const select = element(line, "select", { ariaLabel: `estimator of robot ${name}` });
-  for (const one of begin.estimators) element(select, "option", { value: one, textContent: one, selected: one === begin.choices[index].estimator });
-  select.onchange = () => change(index, "estimator", select.value);
-  return it;
+  for (const options of content.sliders) addSlider(box, options, content.robots[index][options.name], (value) => configure(index, options.name, value));
+  const label = addElement(box, "label", {}, { display: "flex", gap: "8px", fontSize: "12px" });
+  addElement(label, "span", { textContent: "estimator" }, { width: "150px" });
+  const select = addElement(label, "select", { ariaLabel: `estimator of robot ${name}` });
+  for (const estimator of content.estimators) addElement(select, "option", { value: estimator, textContent: estimator, selected: estimator === content.robots[index].estimator });
+  select.onchange = () => configure(index, "estimator", select.value);
+  return panel;
 }
 
-function slider(parent, control, value, set) {
-  const row = element(parent, "label", {}, { display: "flex", gap: "8px", alignItems: "center", fontSize: "12px" });
-  element(row, "span", { textContent: control.label }, { width: "150px" });
-  const range = { min: control.low, max: control.high, step: control.step };
-  const input = element(row, "input", { type: "range", ...range, name: control.name }, { flex: "1" });
+function addSlider(parent, options, value, set) {
+  const row = addElement(parent, "label", {}, { display: "flex", gap: "8px", alignItems: "center", fontSize: "12px" });
+  addElement(row, "span", { textContent: options.label }, { width: "150px" });
+  const range = { min: options.low, max: options.high, step: options.step };
+  const input = addElement(row, "input", { type: "range", ...range, name: options.name }, { flex: "1" });
   input.value = value;
-  const shown = element(row, "output", { textContent: value }, { width: "40px", fontVariantNumeric: "tabular-nums" });
+  const output = addElement(row, "output", { textContent: value }, { width: "40px", fontVariantNumeric: "tabular-nums" });
   input.oninput = () => {
-    shown.textContent = input.value;
+    output.textContent = input.value;
     set(Number(input.value));
   };
 }
 
-// What lies under the pointer: {what, index, end}, or null.
-function held(it, stage, [px, py]) {
+// Returns what lies under the pointer, {kind, index, end}, or null.
+function findHandle(panel, layout, [px, py]) {
   const found = [];
-  const near = (x, y, what) => {
-    const [qx, qy] = it.at.pixel(x, y), far = Math.hypot(px - qx, py - qy);
-    if (far <= GRASP) found.push({ ...what, far });
+  const addIfNear = (x, y, handle) => {
+    const [qx, qy] = panel.view.pixel(x, y), distance = Math.hypot(px - qx, py - qy);
+    if (distance <= GRAB_RADIUS) found.push({ ...handle, distance });
   };
-  it.moment.people.forEach(([x, y], index) => near(x, y, { what: "person", index }));
-  near(...stage.goal, { what: "goal" });
-  stage.walls.forEach(([xa, ya, xb, yb], index) => {
-    near(xa, ya, { what: "wall", index, end: 0 });
-    near(xb, yb, { what: "wall", index, end: 2 });
+  panel.snapshot.people.forEach(([x, y], index) => addIfNear(x, y, { kind: "person", index }));
+  addIfNear(...layout.goal, { kind: "goal" });
+  layout.walls.forEach(([xa, ya, xb, yb], index) => {
+    addIfNear(xa, ya, { kind: "wall", index, end: 0 });
+    addIfNear(xb, yb, { kind: "wall", index, end: 2 });
   });
-  return found.sort((a, b) => a.far - b.far)[0] || null;
+  return found.sort((a, b) => a.distance - b.distance)[0] || null;
 }
 
 function render({ model, el }) {
-  const begin = structuredClone(model.get("begin")), { stage } = begin;
+  const content = structuredClone(model.get("content")), { layout } = content;
   el.dataset.lmSuppressShortcuts = "true";  // keys move the slider that has the focus, not JupyterLab's cells
-  let changed = {}, running = false, waiting = false, asked = 0, came = 0, alive = true, drawn = 0, steps = 0, since = 0;
+  let changes = {}, running = false, waiting = false, alive = true;
+  let requested = 0, arrived = 0, counted = 0, frames = 0, steps = 0;  // times [ms], and counts since the last one
 
-  const bar = element(el, "div", {}, { display: "flex", gap: "10px", alignItems: "center", flexWrap: "wrap", margin: "4px 0" });
-  const start = element(bar, "button", { type: "button", className: "szlib-run" });
-  const again = element(bar, "button", { type: "button", textContent: "restart" });
-  const pace = element(bar, "select", { ariaLabel: "pace" });
-  for (const times of [0.5, 1, 2, 4]) element(pace, "option", { value: times, textContent: `${times}\u00d7`, selected: times === 2 });
-  const speed = element(bar, "div", {}, { width: "330px" });
-  slider(speed, { ...begin.speed, name: "speed" }, begin.speed.value, (value) => { changed.speed = value; look(); });
-  const share = element(bar, "button", { type: "button", textContent: "share", className: "szlib-share" });
-  const rate = element(bar, "span", { className: "szlib-rate" }, { fontSize: "12px" });
-  const row = element(el, "div", {}, { display: "flex", gap: "14px", flexWrap: "wrap" });
-  const change = (index, name, value) => {
-    changed.choices = { ...changed.choices, [index]: { ...changed.choices?.[index], [name]: value } };
-    look();
+  const bar = addElement(el, "div", {}, { display: "flex", gap: "10px", alignItems: "center", flexWrap: "wrap", margin: "4px 0" });
+  const runButton = addElement(bar, "button", { type: "button", className: "szlib-run" });
+  const restartButton = addElement(bar, "button", { type: "button", textContent: "restart" });
+  const pace = addElement(bar, "select", { ariaLabel: "playback speed" });
+  for (const factor of [0.5, 1, 2, 4]) addElement(pace, "option", { value: factor, textContent: `${factor}\u00d7`, selected: factor === 2 });
+  const speed = addElement(bar, "div", {}, { width: "330px" });
+  addSlider(speed, { ...content.speed, name: "speed" }, content.speed.value, (value) => { changes.speed = value; update(); });
+  const shareButton = addElement(bar, "button", { type: "button", textContent: "share", className: "szlib-share" });
+  const rate = addElement(bar, "span", { className: "szlib-rate" }, { fontSize: "12px" });
+  const row = addElement(el, "div", {}, { display: "flex", gap: "14px", flexWrap: "wrap" });
+  const configure = (index, name, value) => {
+    changes.robots = { ...changes.robots, [index]: { ...changes.robots?.[index], [name]: value } };
+    update();
   };
-  const panels = begin.choices.map((_, index) => panel(row, index, begin, change));
-  legend(el, stage.colours);
-  element(el, "div", { textContent: "Drag the person, the goal (\u25c6) and the ends of walls (\u25a1)." }, { fontSize: "12px" });
-  const refused = element(el, "div", { className: "szlib-refused", role: "alert" }, { fontSize: "12px", color: "#a00000" });
-  const cell = element(el, "textarea", { className: "szlib-cell", ariaLabel: "parameter cell", readOnly: true, rows: 12, hidden: true }, { width: "95%", fontFamily: "monospace" });
+  const panels = content.robots.map((_, index) => addPanel(row, index, content, configure));
+  addLegend(el, layout.colours);
+  addElement(el, "div", { textContent: "Drag the person, the goal (\u25c6) or the ends of walls (\u25a1)." }, { fontSize: "12px" });
+  const error = addElement(el, "div", { className: "szlib-error", role: "alert" }, { fontSize: "12px", color: "#a00000" });
+  const cell = addElement(el, "textarea", { className: "szlib-cell", ariaLabel: "parameter cell", readOnly: true, rows: 12, hidden: true }, { width: "95%", fontFamily: "monospace" });
 
-  const ask = (kind) => {
+  const request = (kind) => {
     waiting = true;
-    asked = performance.now();
-    model.send({ kind, changed });
-    changed = {};
+    requested = performance.now();
+    model.send({ kind, changes });
+    changes = {};
   };
-  const look = () => { if (!waiting && !running) ask("look"); };
-  const frame = (now) => {
+  const update = () => { if (!waiting && !running) request("decide"); };
+  const drawFrame = (now) => {
     if (!alive) return;
-    requestAnimationFrame(frame);
-    const every = (1000 * stage.dt) / Number(pace.value);
-    if (running && !waiting && now - asked >= every - 8) ask("step");
-    else if (!running && !waiting && Object.keys(changed).length) ask("look");
-    const share = running ? Math.min(1, (now - came) / every) : 1;
-    panels.forEach((it) => it.draw(share));
-    drawn += 1;
-    if (now - since >= 1000) {
-      const rates = [drawn, steps].map((n) => ((1000 * n) / (now - since)).toFixed(0));
+    requestAnimationFrame(drawFrame);
+    const period = (1000 * layout.dt) / Number(pace.value);
+    if (running && !waiting && now - requested >= period - 8) request("step");
+    else if (!running && !waiting && Object.keys(changes).length) request("decide");
+    const share = running ? Math.min(1, (now - arrived) / period) : 1;
+    panels.forEach((panel) => panel.draw(share));
+    frames += 1;
+    if (now - counted >= 1000) {
+      const rates = [frames, steps].map((n) => ((1000 * n) / (now - counted)).toFixed(0));
       rate.textContent = running ? `${rates[0]} frames/s, ${rates[1]} steps/s` : "";
-      [drawn, steps, since] = [0, 0, now];
+      [frames, steps, counted] = [0, 0, now];
     }
   };
-  const answer = (message) => {
-    if (message.kind === "moments") {
+  const receive = (message) => {
+    if (message.kind === "snapshots") {
       waiting = false;
-      refused.textContent = "";
-      came = performance.now();
+      error.textContent = "";
+      arrived = performance.now();
       steps += 1;
-      if (message.moments[0].t < (panels[0].moment?.t ?? 0)) panels.forEach((it) => it.forget());
-      message.moments.forEach((moment, i) => panels[i].take(moment));
-    } else if (message.kind === "refused") {
+      if (message.snapshots[0].t < (panels[0].snapshot?.t ?? 0)) panels.forEach((panel) => panel.clear());
+      message.snapshots.forEach((snapshot, i) => panels[i].add(snapshot));
+    } else if (message.kind === "error") {
       waiting = false;
       running = false;
-      label();
-      refused.textContent = message.text;
-      Object.assign(stage, message.stage);
+      labelButton();
+      error.textContent = message.text;
+      Object.assign(layout, message.layout);
     } else if (message.kind === "cell") {
       cell.value = message.text;
       cell.hidden = false;
       cell.select();
     }
   };
-  const label = () => { start.textContent = running ? "\u275a\u275a pause" : "\u25b6 run"; };
-  start.onclick = () => { running = !running; label(); };
-  again.onclick = () => { changed.restart = true; if (!waiting) ask("look"); };
-  share.onclick = () => {
-    model.send({ kind: "share", changed });
-    changed = {};
+  const labelButton = () => { runButton.textContent = running ? "\u275a\u275a pause" : "\u25b6 run"; };
+  runButton.onclick = () => { running = !running; labelButton(); };
+  restartButton.onclick = () => { changes.restart = true; if (!waiting) request("decide"); };
+  shareButton.onclick = () => {
+    model.send({ kind: "share", changes });
+    changes = {};
   };
 
-  panels.forEach((it) => {
-    let grip = null;
-    const place = (event) => [event.offsetX, event.offsetY];
-    it.canvas.onpointerdown = (event) => {
-      grip = it.moment && held(it, stage, place(event));
-      if (grip) it.canvas.setPointerCapture(event.pointerId);
+  panels.forEach((panel) => {
+    let handle = null;
+    const pointer = (event) => [event.offsetX, event.offsetY];
+    panel.canvas.onpointerdown = (event) => {
+      handle = panel.snapshot && findHandle(panel, layout, pointer(event));
+      if (handle) panel.canvas.setPointerCapture(event.pointerId);
     };
-    it.canvas.onpointermove = (event) => {
-      if (!grip) {
-        it.canvas.style.cursor = it.moment && held(it, stage, place(event)) ? "grab" : "default";
+    panel.canvas.onpointermove = (event) => {
+      if (!handle) {
+        panel.canvas.style.cursor = panel.snapshot && findHandle(panel, layout, pointer(event)) ? "grab" : "default";
         return;
       }
-      const at = it.at.world(...place(event)).map((v) => Math.round(100 * v) / 100);
-      if (grip.what === "person") {
-        changed.people = { ...changed.people, [grip.index]: at };
+      const position = panel.view.world(...pointer(event)).map((v) => Math.round(100 * v) / 100);
+      if (handle.kind === "person") {
+        changes.people = { ...changes.people, [handle.index]: position };
         panels.forEach((other) => {
-          const [x, y, ...rest] = other.moment.people[grip.index];
-          const zone = other.moment.zones[grip.index];
-          other.moment.people[grip.index] = [...at, ...rest];
-          other.moment.zones[grip.index] = [zone[0] + at[0] - x, zone[1] + at[1] - y, ...zone.slice(2)];
+          const [x, y, ...rest] = other.snapshot.people[handle.index];
+          const zone = other.snapshot.zones[handle.index];
+          other.snapshot.people[handle.index] = [...position, ...rest];
+          other.snapshot.zones[handle.index] = [zone[0] + position[0] - x, zone[1] + position[1] - y, ...zone.slice(2)];
           other.before = null;
         });
-      } else if (grip.what === "goal") {
-        stage.goal = at;
-        changed.goal = at;
+      } else if (handle.kind === "goal") {
+        layout.goal = position;
+        changes.goal = position;
       } else {
-        stage.walls[grip.index].splice(grip.end, 2, ...at);
-        changed.walls = stage.walls;
+        layout.walls[handle.index].splice(handle.end, 2, ...position);
+        changes.walls = layout.walls;
       }
-      look();
+      update();
     };
-    it.canvas.onpointerup = it.canvas.onpointercancel = () => { grip = null; };
+    panel.canvas.onpointerup = panel.canvas.onpointercancel = () => { handle = null; };
   });
 
-  model.on("msg:custom", answer);
-  label();
-  ask("look");
-  requestAnimationFrame(frame);
+  model.on("msg:custom", receive);
+  labelButton();
+  request("decide");
+  requestAnimationFrame(drawFrame);
   return () => {
     alive = false;
-    model.off("msg:custom", answer);
+    model.off("msg:custom", receive);
   };
 }
 

@@ -1,36 +1,37 @@
-// Plays a finished run in place of its picture: play and pause, a slider for the time, the pace.
+// Replaces the picture of a finished run by a player: play and pause, a slider for the time, the playback speed.
 function play(figure, run) {
   figure.dataset.ready = "";
   figure.style.margin = "0";
-  const { stage, moments } = run, last = moments.length - 1;
+  const { layout, snapshots } = run, last = snapshots.length - 1;
   figure.textContent = "";
   const width = Math.max(280, Math.min(figure.clientWidth || 640, 640));
-  const [x0, x1, y0, y1] = stage.limits;
+  const [x0, x1, y0, y1] = layout.limits;
   const height = Math.round(Math.min(420, (width * (y1 - y0)) / (x1 - x0)));
-  const canvas = element(figure, "canvas", { role: "img", ariaLabel: run.alt });
-  const chart = element(figure, "canvas", { role: "img", ariaLabel: "the least h over time" }, { display: "block", marginTop: "6px" });
-  const on = surface(canvas, width, height), below = surface(chart, width, 100);
-  const bar = element(figure, "div", {}, { display: "flex", gap: "8px", alignItems: "center", maxWidth: `${width}px` });
-  const button = element(bar, "button", { type: "button" });
-  const slider = element(bar, "input", { type: "range", min: 0, max: last, value: 0, ariaLabel: "time" }, { flex: "1" });
-  const pace = element(bar, "select", { ariaLabel: "pace" });
-  for (const times of [1, 2, 4]) element(pace, "option", { value: times, textContent: `${times}\u00d7`, selected: times === 2 });
-  const told = element(figure, "div", {}, { fontSize: "12px", fontVariantNumeric: "tabular-nums" });
-  legend(figure, stage.colours);
-  const at = view(stage.limits, width, height);
-  const times = moments.map((m) => m.t), values = moments.map((m) => m.h);
-  let begun = null;
+  const sceneCanvas = addElement(figure, "canvas", { role: "img", ariaLabel: run.alt });
+  const chartCanvas = addElement(figure, "canvas", { role: "img", ariaLabel: "the least h over time" }, { display: "block", marginTop: "6px" });
+  const scene = prepareCanvas(sceneCanvas, width, height), chart = prepareCanvas(chartCanvas, width, 100);
+  const bar = addElement(figure, "div", {}, { display: "flex", gap: "8px", alignItems: "center", maxWidth: `${width}px` });
+  const button = addElement(bar, "button", { type: "button" });
+  const slider = addElement(bar, "input", { type: "range", min: 0, max: last, value: 0, ariaLabel: "time" }, { flex: "1" });
+  const pace = addElement(bar, "select", { ariaLabel: "playback speed" });
+  for (const factor of [1, 2, 4]) addElement(pace, "option", { value: factor, textContent: `${factor}\u00d7`, selected: factor === 2 });
+  const status = addElement(figure, "div", {}, { fontSize: "12px", fontVariantNumeric: "tabular-nums" });
+  addLegend(figure, layout.colours);
+  const view = makeView(layout.limits, width, height);
+  const times = snapshots.map((s) => s.t), values = snapshots.map((s) => s.h);
+  let started = null;
 
   const show = () => {
-    const row = Number(slider.value), moment = moments[row];
-    scene(on, at, stage, moment, moments.slice(0, row + 1).map((m) => m.robot));
-    barriers(below, width, 100, times, values, moment.t, [0, times[last]], stage.colours);
-    const h = moment.h === null ? "" : `, least h ${moment.h.toFixed(2)} m`;
-    told.textContent = `t = ${moment.t.toFixed(1)} s, ${moment.speed.toFixed(2)} m/s${h}${moment.rung ? `, ${moment.rung}` : ""}`;
+    const row = Number(slider.value), snapshot = snapshots[row];
+    drawScene(scene, view, layout, snapshot, snapshots.slice(0, row + 1).map((s) => s.robot));
+    drawBarriers(chart, width, 100, times, values, snapshot.t, [0, times[last]], layout.colours);
+    const h = snapshot.h === null ? "" : `, least h ${snapshot.h.toFixed(2)} m`;
+    const fallback = snapshot.fallback ? `, solver: ${snapshot.fallback}` : "";
+    status.textContent = `t = ${snapshot.t.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}${fallback}`;
   };
   const tick = (now) => {
-    if (begun === null || !figure.isConnected) return;
-    const row = begun.row + Math.floor(((now - begun.time) / 1000 / stage.dt) * Number(pace.value));
+    if (started === null || !figure.isConnected) return;
+    const row = started.row + Math.floor(((now - started.time) / 1000 / layout.dt) * Number(pace.value));
     slider.value = Math.min(row, last);
     show();
     if (row >= last) stop();
@@ -38,17 +39,17 @@ function play(figure, run) {
   };
   const start = () => {
     if (Number(slider.value) >= last) slider.value = 0;
-    begun = { time: performance.now(), row: Number(slider.value) };
+    started = { time: performance.now(), row: Number(slider.value) };
     button.textContent = "\u275a\u275a pause";
     requestAnimationFrame(tick);
   };
   const stop = () => {
-    begun = null;
+    started = null;
     button.textContent = "\u25b6 play";
   };
-  button.onclick = () => (begun ? stop() : start());
+  button.onclick = () => (started ? stop() : start());
   slider.oninput = () => { stop(); show(); };
-  pace.onchange = () => { if (begun) start(); };
+  pace.onchange = () => { if (started) start(); };
   stop();
   slider.value = Math.floor(last / 3);
   show();

@@ -1,11 +1,13 @@
-// Draws one scene on a canvas: what the players of finished runs and the laboratory share.
+// Draws one scene on a canvas, for the players of finished runs and for the laboratory.
 //
-// stage   what stays: walls [[xa, ya, xb, yb]], goal [x, y], radius [m], colours, limits [x0, x1, y0, y1]
-// moment  what moves: robot [x, y], people [[x, y, heading]], zones [[x, y, a, b, angle]], plan [[x, y]],
-//         h [m], the least of all barriers; world frame, metres, radians
+// layout    what does not move: walls [[xa, ya, xb, yb]], goal [x, y], limits [x0, x1, y0, y1], radius [m], colours
+// snapshot  what moves: robot [x, y], people [[x, y, heading]], zones [[x, y, a, b, angle]], plan [[x, y]],
+//           h [m], the least of all barriers
+//
+// Positions are in the world frame, in metres and radians.
 
-// A canvas of that many CSS pixels, sharp on every screen; its 2D context.
-function surface(canvas, width, height) {
+// Sets the size of a canvas in CSS pixels, sharp on every screen, and returns its 2D context.
+function prepareCanvas(canvas, width, height) {
   const ratio = window.devicePixelRatio || 1;
   canvas.width = Math.round(width * ratio);
   canvas.height = Math.round(height * ratio);
@@ -16,8 +18,8 @@ function surface(canvas, width, height) {
   return context;
 }
 
-// How metres become pixels: as large as fits, y upwards.
-function view([x0, x1, y0, y1], width, height) {
+// Converts metres to pixels and back: as large as possible, y upwards.
+function makeView([x0, x1, y0, y1], width, height) {
   const scale = Math.min(width / (x1 - x0), height / (y1 - y0));
   const left = (width - scale * (x1 - x0)) / 2, top = (height - scale * (y1 - y0)) / 2;
   return {
@@ -27,9 +29,9 @@ function view([x0, x1, y0, y1], width, height) {
   };
 }
 
-function line(context, at, points, colour, width, dash = []) {
+function drawLine(context, view, points, colour, width, dash = []) {
   context.beginPath();
-  for (const [x, y] of points) context.lineTo(...at.pixel(x, y));
+  for (const [x, y] of points) context.lineTo(...view.pixel(x, y));
   context.strokeStyle = colour;
   context.lineWidth = width;
   context.setLineDash(dash);
@@ -37,7 +39,7 @@ function line(context, at, points, colour, width, dash = []) {
   context.setLineDash([]);
 }
 
-function diamond(context, [x, y], size, fill) {
+function drawDiamond(context, [x, y], size, fill) {
   context.beginPath();
   for (const [dx, dy] of [[0, -size], [size, 0], [0, size], [-size, 0]]) context.lineTo(x + dx, y + dy);
   context.closePath();
@@ -48,43 +50,43 @@ function diamond(context, [x, y], size, fill) {
   context.stroke();
 }
 
-// A grid of metres with its numbers, every so many as there is room for.
-function grid(context, at, [x0, x1, y0, y1]) {
-  const every = [1, 2, 5, 10, 20, 50].find((d) => d * at.scale >= 45) || 100;
+// Draws a grid in metres with numbers; the spacing depends on the scale.
+function drawGrid(context, view, [x0, x1, y0, y1]) {
+  const spacing = [1, 2, 5, 10, 20, 50].find((d) => d * view.scale >= 45) || 100;
   context.font = "11px sans-serif";
   context.fillStyle = "#555555";
-  for (let x = Math.ceil(x0 / every) * every; x <= x1; x += every) {
-    line(context, at, [[x, y0], [x, y1]], "#eeeeee", 1);
-    const [px, py] = at.pixel(x, y0);
-    context.fillText(x + every > x1 ? `x = ${x} m` : `${x}`, Math.min(px + 2, at.width - 50), py - 3);
+  for (let x = Math.ceil(x0 / spacing) * spacing; x <= x1; x += spacing) {
+    drawLine(context, view, [[x, y0], [x, y1]], "#eeeeee", 1);
+    const [px, py] = view.pixel(x, y0);
+    context.fillText(x + spacing > x1 ? `x = ${x} m` : `${x}`, Math.min(px + 2, view.width - 50), py - 3);
   }
-  for (let y = Math.ceil((y0 + 0.3) / every) * every; y <= y1; y += every) {
-    line(context, at, [[x0, y], [x1, y]], "#eeeeee", 1);
-    const [px, py] = at.pixel(x0, y);
-    context.fillText(y + every > y1 ? `y = ${y} m` : `${y}`, px + 2, Math.max(py - 2, 11));
+  for (let y = Math.ceil((y0 + 0.3) / spacing) * spacing; y <= y1; y += spacing) {
+    drawLine(context, view, [[x0, y], [x1, y]], "#eeeeee", 1);
+    const [px, py] = view.pixel(x0, y);
+    context.fillText(y + spacing > y1 ? `y = ${y} m` : `${y}`, px + 2, Math.max(py - 2, 11));
   }
 }
 
-function scene(context, at, stage, moment, path) {
-  const { colours } = stage;
-  context.clearRect(0, 0, at.width, at.height);
+function drawScene(context, view, layout, snapshot, path) {
+  const { colours } = layout;
+  context.clearRect(0, 0, view.width, view.height);
   context.fillStyle = "white";
-  context.fillRect(0, 0, at.width, at.height);
-  grid(context, at, stage.limits);
-  for (const [xa, ya, xb, yb] of stage.walls) line(context, at, [[xa, ya], [xb, yb]], "black", 4);
-  diamond(context, at.pixel(...stage.goal), 7, colours.robot);
-  line(context, at, path, colours.robot, 1.5);
-  moment.zones.forEach(([x, y, a, b, angle]) => {
+  context.fillRect(0, 0, view.width, view.height);
+  drawGrid(context, view, layout.limits);
+  for (const [xa, ya, xb, yb] of layout.walls) drawLine(context, view, [[xa, ya], [xb, yb]], "black", 4);
+  drawDiamond(context, view.pixel(...layout.goal), 7, colours.robot);
+  drawLine(context, view, path, colours.robot, 1.5);
+  snapshot.zones.forEach(([x, y, a, b, angle]) => {
     context.beginPath();
-    context.ellipse(...at.pixel(x, y), at.scale * a, at.scale * b, -angle, 0, 2 * Math.PI);
+    context.ellipse(...view.pixel(x, y), view.scale * a, view.scale * b, -angle, 0, 2 * Math.PI);
     context.fillStyle = `${colours.person}18`;
     context.fill();
     context.strokeStyle = colours.person;
     context.lineWidth = 2;
     context.stroke();
   });
-  for (const [x, y, heading] of moment.people) {
-    const [px, py] = at.pixel(x, y);
+  for (const [x, y, heading] of snapshot.people) {
+    const [px, py] = view.pixel(x, y);
     context.beginPath();
     for (const turn of [0, 2.5, -2.5]) {
       context.lineTo(px + 8 * Math.cos(heading + turn), py - 8 * Math.sin(heading + turn));
@@ -94,19 +96,19 @@ function scene(context, at, stage, moment, path) {
     context.fill();
   }
   context.beginPath();
-  context.arc(...at.pixel(...moment.robot), at.scale * stage.radius, 0, 2 * Math.PI);
+  context.arc(...view.pixel(...snapshot.robot), view.scale * layout.radius, 0, 2 * Math.PI);
   context.fillStyle = `${colours.robot}99`;
   context.fill();
   context.fillStyle = colours.plan;
-  for (const [x, y] of moment.plan) {
+  for (const [x, y] of snapshot.plan) {
     context.beginPath();
-    context.arc(...at.pixel(x, y), 1.8, 0, 2 * Math.PI);
+    context.arc(...view.pixel(x, y), 1.8, 0, 2 * Math.PI);
     context.fill();
   }
 }
 
-// h over time, up to `top` metres, with a mark at `now`: safe where it is not below the line of zero.
-function barriers(context, width, height, times, values, now, span, colours) {
+// Draws h over time, up to `top` metres, with a mark at `now`. It is safe where h >= 0.
+function drawBarriers(context, width, height, times, values, now, span, colours) {
   const top = 2, low = Math.min(-0.1, ...values.slice(-2000)), left = 34, bottom = 16;
   const x = (t) => left + ((t - span[0]) / Math.max(span[1] - span[0], 1e-9)) * (width - left - 8);
   const y = (h) => 18 + ((top - Math.min(h, top)) / (top - low)) * (height - bottom - 22);
@@ -135,26 +137,26 @@ function barriers(context, width, height, times, values, now, span, colours) {
   context.fillRect(x(now) - 1, 16, 2, height - bottom - 14);
 }
 
-function element(parent, name, properties = {}, style = {}) {
-  const made = document.createElement(name);
-  Object.assign(made, properties);
-  Object.assign(made.style, style);
-  parent.appendChild(made);
-  return made;
+function addElement(parent, name, properties = {}, style = {}) {
+  const added = document.createElement(name);
+  Object.assign(added, properties);
+  Object.assign(added.style, style);
+  parent.appendChild(added);
+  return added;
 }
 
-// What is what: a mark that tells without colour, and its name.
-function legend(parent, colours) {
-  const row = element(parent, "div", {}, { fontSize: "12px", display: "flex", gap: "14px", flexWrap: "wrap" });
+// Adds a legend; its marks can be distinguished without colour.
+function addLegend(parent, colours) {
+  const row = addElement(parent, "div", {}, { fontSize: "12px", display: "flex", gap: "14px", flexWrap: "wrap" });
   const marks = [
     ["\u25cf", colours.robot, "robot"], ["\u25c6", colours.robot, "goal"], ["\u25b6", colours.person, "person"],
     ["\u25cb", colours.person, "zone"], ["\u2026", colours.plan, "plan"], ["\u2500", colours.robot, "path"],
     ["\u2501", "black", "wall"],
   ];
   for (const [mark, colour, name] of marks) {
-    const item = element(row, "span");
-    element(item, "span", { textContent: `${mark} `, ariaHidden: "true" }, { color: colour, fontWeight: "bold" });
-    element(item, "span", { textContent: name });
+    const item = addElement(row, "span");
+    addElement(item, "span", { textContent: `${mark} `, ariaHidden: "true" }, { color: colour, fontWeight: "bold" });
+    addElement(item, "span", { textContent: name });
   }
   return row;
 }
