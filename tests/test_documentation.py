@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -154,6 +155,7 @@ def test_every_example_runs(module: str, tmp_path: Path, monkeypatch: pytest.Mon
     report: list[str] = []
     for example in examples(module):
         runner.run(example, out=report.append)
+        plt.close("all")
     assert not report, "".join(report)
 
 

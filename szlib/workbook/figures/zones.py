@@ -94,7 +94,7 @@ def plot_hull(
     >>> import numpy as np, pandas as pd, szlib
     >>> from szlib.workbook import figures
     >>> n, rng = 1200, np.random.default_rng(0)
-    >>> samples = pd.DataFrame({"encounter": np.arange(n) // 30, "los_angle": rng.uniform(-3.1, 3.1, n)})
+    >>> samples = pd.DataFrame({"encounter": np.arange(n) // 4, "los_angle": rng.uniform(-3.1, 3.1, n)})
     >>> samples["distance"], samples["speed"] = rng.uniform(0.9, 2.5, n), rng.uniform(0.4, 1.6, n)
     >>> zone = szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1), resamples=0)
     >>> ax = figures.plot_hull(zone, (0.9, 1.1))
@@ -139,9 +139,12 @@ def plot_zone(
 
     Examples
     --------
-    >>> import szlib
+    >>> import numpy as np, pandas as pd, szlib
     >>> from szlib.workbook import figures
-    >>> zone = szlib.reference_zone("grand-central-strangers")
+    >>> n, rng = 1200, np.random.default_rng(0)
+    >>> samples = pd.DataFrame({"encounter": np.arange(n) // 4, "los_angle": rng.uniform(-3.1, 3.1, n)})
+    >>> samples["distance"], samples["speed"] = rng.uniform(0.9, 2.5, n), rng.uniform(0.4, 1.6, n)
+    >>> zone = szlib.SocialZone.fit(samples, method="hull", speeds=(1.1,), resamples=0)
     >>> figures.plot_zone(zone, 1.1).get_title()
     'Minimum social zone at 1.1 m/s'
     """
