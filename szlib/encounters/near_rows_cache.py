@@ -29,8 +29,8 @@ from .blocks import FileRows, FileSummary
 
 Content = Callable[[], tuple[int, str]]
 """Returns size and checksum of a file; waits until they are known."""
-PURPOSE = "rows near an area"
-"""Purpose of the folder of the entries, as its marker states it."""
+PURPOSE = "rows near a square"
+"""Purpose of the folder of the entries, as its marker states it (in the words of the first version)."""
 LIMIT = 2_000_000_000
 """Bytes of all entries; the 92 days of the paper take 1.6e9."""
 _VERSION = 2

@@ -246,7 +246,7 @@ def test_sigterm_ends_a_command_as_ctrl_c_does(tmp_path):
     _, printed = done.communicate()
     assert done.returncode == 143
     assert "szlib: stopped; finished results stay" in printed
-    assert not list(tmp_path.rglob(".szlib-*"))
+    assert not list(tmp_path.rglob(".szlib-part-*"))
 
 
 def test_sigterm_ends_a_run_and_its_kernels(notebooks, tmp_path):

@@ -37,6 +37,7 @@ def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp
     assert "report.html" in printed and (tmp_path / "out" / "mine" / "report.html").exists()
 
 
+@pytest.mark.usefixtures("at_once")
 def test_a_changed_parameter_makes_observations_and_ends_with_0_but_a_promise_fails(
     notebooks, tmp_path, capsys
 ):

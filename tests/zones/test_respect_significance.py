@@ -46,11 +46,11 @@ def test_p_values_are_even_where_nobody_minds() -> None:
 def test_a_crowd_that_minds_nobody_is_found_out() -> None:
     """100 seeds stand in notebooks/tables/15_nobody.csv."""
     p = []
-    for seed in range(12):
+    for seed in range(6):
         tracks = noninteracting_crowd(seed=seed, people=600, minutes=40)
         null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
         p.append(null_test(szlib.find_encounters(tracks), null, radii=False).p_value)
-    assert np.sum(np.array(p) <= 0.05) <= 3  # 3 and more of 12: 2 %
+    assert np.sum(np.array(p) <= 0.05) <= 1  # 2 and more of 6: 3 %
     assert np.median(p) > 0.15
 
 
