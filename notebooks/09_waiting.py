@@ -35,7 +35,7 @@ import pandas as pd
 from IPython.display import Markdown
 
 import szlib
-from szlib.control.acceleration_polygon import admissible
+from szlib.control.acceleration_polygon import find_admissible_controls
 from szlib.simulation.atlas import AtlasCell
 from szlib.simulation.metrics import find_yielding_steps
 from szlib.simulation.strategies import classify_strategy
@@ -131,7 +131,7 @@ step = controller.step(*log.controller_inputs(middle))
 record.figure(figures.draw_step(step), "admissible")
 
 # %%
-ahead = admissible(step).polygon.bounds[2]
+ahead = find_admissible_controls(step).polygon.bounds[2]
 record.check("while it waits no admissible acceleration leads towards the passage", ahead < 0.1, ahead)
 Markdown(
     f"At {middle:.1f} s: h is {step.h[0]:.2f} m to the person, and {step.h[1:].min():.2f} m to the "

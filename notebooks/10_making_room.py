@@ -34,7 +34,7 @@ import pandas as pd
 from IPython.display import Markdown
 
 import szlib
-from szlib.control.acceleration_polygon import admissible
+from szlib.control.acceleration_polygon import find_admissible_controls
 from szlib.simulation.atlas import AtlasCell
 from szlib.simulation.strategies import classify_strategy, compute_retreat
 from szlib.workbook import figures
@@ -146,7 +146,7 @@ step = controller.step(*log.controller_inputs(turns))
 record.figure(figures.draw_step(step), "admissible")
 
 # %%
-ahead = admissible(step).polygon.bounds[2]
+ahead = find_admissible_controls(step).polygon.bounds[2]
 record.check("as it turns back every admissible acceleration leads back", ahead < 0, ahead)
 Markdown(
     f"At {turns:.1f} s, h = {step.h[0]:.2f} m: the gentlest of them is {ahead:.2f} m/s². "

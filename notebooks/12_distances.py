@@ -95,7 +95,7 @@ record.figure(fig, "maps")
 # %%
 points = np.random.default_rng(seed).uniform(-4, 4, (100_000, 2))
 true = distances.euclidean_to_ellipse(points, zone)
-over = distances.overestimate(points, zone)[true > 0]
+over = distances.compute_distance_error(points, zone)[true > 0]
 most = 100 * float(over.max())
 record.check("the focal distance never over-estimates [cm]", most <= 1e-7, most, always=True)
 
@@ -104,13 +104,13 @@ a = zone.semi_axes[0]
 rows = {}
 for e in eccentricities:
     like = szlib.Ellipse((0.0, 0.0), (a, a * np.sqrt(1 - e**2)))
-    rows[e] = distances.audit(like, r_robot=r, eps=eps)
+    rows[e] = distances.compare_distances(like, r_robot=r, eps=eps)
 zones = (100 * pd.DataFrame(rows.values(), index=rows.keys())).rename_axis("eccentricity").round(1)
 zones.columns = ["least gap [cm]", "greatest gap [cm]", "margin required [cm]"]
 zones
 
 # %%
-learned = distances.audit(zone, r_robot=r, eps=eps)
+learned = distances.compare_distances(zone, r_robot=r, eps=eps)
 beside = learned.farthest - eps
 record.claim("eps covers the error around the learned zone", learned.required <= eps, learned.required)
 enough = learned.nearest >= eps - 1e-6
@@ -131,7 +131,7 @@ print(f"beside the learned zone the robot keeps {100 * beside:.1f} cm more than 
 # leaves between the robot's disc and the wall, at worst: negative is a collision with $h \ge 0$.
 
 # %%
-walls = {length: distances.audit([(0, 0), (length, 0)], r_robot=r, eps=eps) for length in lengths}
+walls = {length: distances.compare_distances([(0, 0), (length, 0)], r_robot=r, eps=eps) for length in lengths}
 table = (100 * pd.DataFrame(walls.values(), index=walls.keys())).rename_axis("wall [m]").round(1)
 table.columns = ["least gap [cm]", "greatest gap [cm]", "margin required [cm]"]
 table
@@ -140,7 +140,7 @@ table
 for length, found in walls.items():
     record.claim(f"eps covers the error of a wall of {length:g} m", found.nearest >= -1e-9, found.nearest)
     enough = max(eps, found.required)
-    mended = distances.audit([(0, 0), (length, 0)], r_robot=r, eps=enough)
+    mended = distances.compare_distances([(0, 0), (length, 0)], r_robot=r, eps=enough)
     claim = f"r^2/L is enough for it: eps = {100 * enough:.1f} cm"
     record.check(claim, mended.nearest >= -1e-9, mended.nearest, always=True)
 

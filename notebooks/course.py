@@ -114,7 +114,9 @@ GLOSSARY: dict[str, Word] = {
     "quantile zone": Word("what all but a share q of encounters keep out of", new=False),
     "reference pedestrian": Word("the one of two people from whom the other is looked at"),
     "respect zone": Word("where people were half as often as by chance", new=False),
-    "rung": Word("which of the controller's ways to a control was taken: hard, relaxed, shifted, braking"),
+    "fallback": Word(
+        "which of the controller's ways to a control was taken: hard, relaxed, shifted, braking"
+    ),
     "slack": Word("by how much a row is violated"),
     "social force": Word("people who are pushed by others and by walls, and drawn to their goal", new=False),
     "SQP": Word(

@@ -122,7 +122,7 @@ class SocialDrive(Node):
             return
         if not step.safe:
             least = min(step.h, default=np.inf)
-            self.say(f"not safe: {step.rung}, h = {least:.2f} m, {step.point.lost} lost")
+            self.say(f"not safe: {step.fallback}, h = {least:.2f} m, {step.point.unknown} lost")
         twist = Twist()
         twist.linear.x, twist.angular.z = step.control.tolist()
         self.command.publish(twist)

@@ -6,12 +6,66 @@ distances             approximate against Euclidean distances, and the margin th
 person                a person as the controller sees them: `Person`
 tracker               people from one measurement to the next: `Tracker`
 head_on               on which side the robot passes a person whom it meets head-on
-scene                 what a step was asked
-step_report           a step checked again by formulas of its own
+controller            the base class of controllers, and the robots that they drive: `Controller`
+scene                 what a step is asked
+step_report           a step checked again by formulas of its own: `StepReport`
 step                  what the controller decided: `Step`
-acceleration_polygon  the accelerations that a step could have chosen
+acceleration_polygon  the accelerations that a step could have chosen: `find_admissible_controls`
 problem               the optimal control problem, in symbols
 solvers               the solvers of the problem, and the fallbacks where there is no solution
 mpc                   the controller: `MPCCBF`
 differential_drive    a robot with two wheels: `DifferentialDrive`
 """
+
+from .acceleration_polygon import AdmissibleControls, BarrierLimit, find_admissible_controls
+from .barriers import barrier, cbf_residual, compute_h, ellipse_distance, read_walls, segment_distance
+from .controller import Controller, DoubleIntegrator, Robot, advance, as_controller
+from .differential_drive import DifferentialDrive, DriveStep, Unicycle
+from .distances import (
+    compare_distances,
+    euclidean_to_ellipse,
+    euclidean_to_segment,
+    required_margin,
+    wall_margin,
+)
+from .mpc import MPCCBF
+from .person import Person
+from .scene import Scene
+from .settings import MPCSettings
+from .step import FALLBACKS, Step
+from .step_report import StepReport
+from .tracker import TrackedPeople, Tracker
+
+__all__ = [
+    "FALLBACKS",
+    "MPCCBF",
+    "AdmissibleControls",
+    "BarrierLimit",
+    "Controller",
+    "DifferentialDrive",
+    "DoubleIntegrator",
+    "DriveStep",
+    "MPCSettings",
+    "Person",
+    "Robot",
+    "Scene",
+    "Step",
+    "StepReport",
+    "TrackedPeople",
+    "Tracker",
+    "Unicycle",
+    "advance",
+    "as_controller",
+    "barrier",
+    "cbf_residual",
+    "compare_distances",
+    "compute_h",
+    "ellipse_distance",
+    "euclidean_to_ellipse",
+    "euclidean_to_segment",
+    "find_admissible_controls",
+    "read_walls",
+    "required_margin",
+    "segment_distance",
+    "wall_margin",
+]

@@ -10,16 +10,14 @@ side of a curve that is nearly straight, for in one step the robot moves by mill
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import shapely
 
 from ..checks import Array
-from .barriers import barrier, cbf_residual, ellipse_formula, segment_formula
-
-if TYPE_CHECKING:
-    from .step import Step
+from .barriers import cbf_residual, compute_h
+from .step import Step
 
 _REACH = 3
 """The box of accelerations ends within so many times its half-width of any point in it."""
@@ -29,19 +27,19 @@ _BISECTIONS = 20
 """Halvings after which nothing is left of the width of the box that could be seen."""
 
 
-class Limit(NamedTuple):
+class BarrierLimit(NamedTuple):
     """The edge of what one barrier row allows: of which person or wall, from k to k+1, shape (n, 2) [m/s2].
 
     The curve passes what is allowed on its left.
     """
 
     kind: Literal["person", "wall"]
-    which: int
+    number: int
     k: int
     curve: Array
 
 
-class Admissible(NamedTuple):
+class AdmissibleControls(NamedTuple):
     """All accelerations that obey every row, with the rest of the plan kept [m/s2, world frame].
 
     `polygon` is a Shapely polygon, of several parts or empty where the rows leave it so; `limits` are the
@@ -49,10 +47,10 @@ class Admissible(NamedTuple):
     """
 
     polygon: Any
-    limits: tuple[Limit, ...]
+    limits: tuple[BarrierLimit, ...]
 
 
-def admissible(step: Step) -> Admissible:
+def find_admissible_controls(step: Step) -> AdmissibleControls:
     """The accelerations among which a step could choose: bounds, speed limit, and every barrier row.
 
     A terminal condition is left out: with the rest of the plan kept it leaves the chosen one alone.  Of a
@@ -69,9 +67,11 @@ def admissible(step: Step) -> Admissible:
         i, k = divmod(row, s.N_h)
         allowed = shapely.Polygon(np.vstack([curve, curve[::-1] + 2 * _REACH * s.a_max * inward]))
         if not allowed.covers(free):
-            limits.append(Limit("person" if i < people else "wall", i - people * (i >= people), k, curve))
+            limits.append(
+                BarrierLimit("person" if i < people else "wall", i - people * (i >= people), k, curve)
+            )
             polygon = polygon.intersection(allowed)
-    return Admissible(polygon, tuple(limits))
+    return AdmissibleControls(polygon, tuple(limits))
 
 
 def _edges(step: Step) -> list[tuple[Array, Array]]:
@@ -109,12 +109,9 @@ def _residuals(step: Step, first: Array) -> Array:
     return np.reshape(np.array(left, float), first.shape[:-1])
 
 
-def _barrier(step: Step, i: int, at: Array, seconds: Any) -> Any:
-    """h of a row of `Step.h` at positions (..., 2), so many seconds ahead, shape (...) [m]."""
-    scene, s, (x, y) = step.scene, step.scene.settings, np.moveaxis(at, -1, 0)
-    if i < len(scene.zones):
-        zone = scene.zones[i]
-        distance = ellipse_formula(x - seconds * zone.vx, y - seconds * zone.vy, *zone[:5])
-        return barrier(distance, s.r_robot, s.eps)
-    wall = i - len(scene.zones)
-    return barrier(segment_formula(x, y, *scene.walls[wall]), s.r_robot, scene.margins[wall])
+def _barrier(step: Step, i: int, points: Array, time: Any) -> Any:
+    """h of row `i` of `Step.h` at points (..., 2), `time` seconds from now, shape (...) [m]."""
+    scene, s, people = step.scene, step.scene.settings, len(step.scene.people)
+    zones, walls = scene.zones[i : i + 1], scene.walls[i - people :][:1] if i >= people else ()
+    x, y = np.moveaxis(points, -1, 0)
+    return compute_h(x, y, zones, walls, r_robot=s.r_robot, eps=s.eps, time=time)[0]

@@ -54,6 +54,46 @@ def barrier(distance: Any, radius: float, margin: Any) -> Any:
     return distance - (radius + margin)
 
 
+def compute_h(
+    x: Any,
+    y: Any,
+    zones: Iterable[Sequence[float]],
+    walls: Iterable[Sequence[float]],
+    *,
+    r_robot: float,
+    eps: float,
+    time: float = 0.0,
+) -> list[Any]:
+    """h of every zone and then of every wall, for a robot at (x, y): a list, each of the shape of `x` [m].
+
+    Parameters
+    ----------
+    x, y : position of the robot, numbers or arrays [m].
+    zones : foci, semi-major axis and velocity of each zone, (xa, ya, xb, yb, a, vx, vy) [m, m/s].
+    walls : end points and margin of each wall, (xa, ya, xb, yb, margin) [m].
+    r_robot : radius of the robot [m].
+    eps : margin around zones [m].
+    time : how long the zones have moved at their velocities, a number or an array [s].
+
+    Examples
+    --------
+    >>> from szlib.control import compute_h
+    >>> zone = (0.0, 0.0, 0.0, 0.0, 1.0, -0.5, 0.0)  # a circle of 1 m that moves to the left
+    >>> wall = (-5.0, 2.0, 5.0, 2.0, 0.0)
+    >>> compute_h(-4.0, 0.0, [zone], [wall], r_robot=0.5, eps=0.0)
+    [2.5, 1.5]
+    >>> compute_h(-4.0, 0.0, [zone], [wall], r_robot=0.5, eps=0.0, time=2.0)
+    [1.5, 1.5]
+    """
+    h = []
+    for xa, ya, xb, yb, a, vx, vy in zones:
+        distance = ellipse_formula(x - time * vx, y - time * vy, xa, ya, xb, yb, a)
+        h.append(barrier(distance, r_robot, eps))
+    for xa, ya, xb, yb, margin in walls:
+        h.append(barrier(segment_formula(x, y, xa, ya, xb, yb), r_robot, margin))
+    return h
+
+
 def cbf_residual(h_next: Any, h: Any, gamma: float) -> Any:
     """What the discrete CBF condition leaves over [m]: satisfied where it is not negative (paper, eq. 1)."""
     return h_next - (1 - gamma) * h
@@ -115,7 +155,7 @@ def check_wall(wall: ArrayLike) -> Array:
     return ends
 
 
-def walls_of(walls: Any) -> Array:
+def read_walls(walls: Any) -> Array:
     """Walls as segments, shape (n, 2, 2) [m], in the order in which they are given.
 
     Parameters

@@ -54,13 +54,13 @@ from numpy.typing import ArrayLike
 from ..checks import Array, check_array, check_point, check_vector
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .barriers import barrier, segment_formula
-from .distances import wall_margin
+from .barriers import compute_h
+from .controller import Controller
+from .distances import walls_with_margins
 from .mpc import MPCCBF
-from .person import Person, PlacedZone, SpeedZone, place
-from .problem import TOLERANCE
-from .settings import MPCSettings
-from .step import Rung, Step
+from .person import Person, SpeedZone, place_zone
+from .settings import TOLERANCE, MPCSettings
+from .step import Fallback, Step
 from .tracker import People, Tracker
 
 OMEGA_MAX = 4.0
@@ -120,9 +120,9 @@ class DriveStep:
     solve_time: float
 
     @property
-    def rung(self) -> Rung:
-        """The rung of the ladder that gave the plan: see `Step.rung`."""
-        return self.point.rung
+    def fallback(self) -> Fallback:
+        """The fallback of the ladder that gave the plan: see `Step.fallback`."""
+        return self.point.fallback
 
     @property
     def slack(self) -> float:
@@ -142,7 +142,7 @@ class _Point(MPCCBF):
         pass
 
 
-class DifferentialDrive:
+class DifferentialDrive(Controller):
     """Drives a robot with two wheels to a goal, outside the social zones of people and clear of walls.
 
     Parameters
@@ -167,6 +167,11 @@ class DifferentialDrive:
     ------
     SolverError : a limit is not usable, or as of `MPCCBF`.
     """
+
+    settings: MPCSettings
+    zone: Ellipse
+    walls: Array
+    robot: Unicycle
 
     def __init__(
         self,
@@ -195,17 +200,17 @@ class DifferentialDrive:
         self.room = radius + self.ahead
         self._point = _Point(zone, walls=walls, settings=grown, max_people=max_people, tracker=tracker)
         self.zone = self._point.zone
-        self._measure_walls()
+        self._take_walls()
         self.reset()
 
     def set_walls(self, walls: Any) -> None:
         """Know these walls from the next step on: as of `MPCCBF.set_walls`."""
         self._point.set_walls(walls)
-        self._measure_walls()
+        self._take_walls()
 
-    def _measure_walls(self) -> None:
+    def _take_walls(self) -> None:
         self.walls = self._point.walls
-        self._margins = [wall_margin(wall, self.settings) for wall in self.walls]
+        self._wall_rows = walls_with_margins(self.walls, self.settings)
 
     def reset(self) -> None:
         """Forget the last plan, command and goal."""
@@ -246,31 +251,23 @@ class DifferentialDrive:
         point = self._point.step(start, there + lever, people, ids=ids, stamps=stamps, now=now)
         states, controls = self._follow(own, point.predicted[1:, :2])
         self._told, self._planned = controls[0].tolist(), point.predicted[1, 2:].tolist()
-        scene, dt = point.scene._replace(settings=self.settings), self.settings.dt
-        h, (x1, y1) = self._barriers(scene.zones, x, y), states[1][:2].tolist()
-        least = min([*h, *self._barriers(scene.zones, x1, y1, dt)], default=0.0)
-        gap = min([*scene.gaps(x, y, 0.0), *scene.gaps(x1, y1, dt)], default=0.0)
+        scene, dt = point.scene._replace(settings=self.settings, walls=self._wall_rows), self.settings.dt
+        h, (x1, y1) = scene.h(x, y), states[1][:2].tolist()
+        smallest = min(h + scene.h(x1, y1, dt) + scene.gaps(x, y) + scene.gaps(x1, y1, dt), default=0.0)
         return DriveStep(
             control=controls[0],
             predicted=np.array(states),
             h=np.array(h),
-            safe=point.feasible and not point.lost and min(least, gap) >= -TOLERANCE,
+            safe=point.feasible and not point.unknown and smallest >= -TOLERANCE,
             point=point,
             solve_time=perf_counter() - began,
         )
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h of every person and then of every wall, for the disc there, shape (people + walls,) [m]."""
-        x, y = check_point("position", position)
-        return np.array(self._barriers([place(who, self._point.zone_of(who)) for who in people], x, y))
-
-    def _barriers(self, zones: Sequence[PlacedZone], x: float, y: float, t: float = 0.0) -> list[float]:
-        """h of the disc at (x, y), with people t seconds later."""
-        s = self.settings
-        h = [barrier(z.distance(x - t * z.vx, y - t * z.vy), s.r_robot, s.eps) for z in zones]
-        for wall, margin in zip(self.walls, self._margins, strict=True):
-            h.append(barrier(segment_formula(x, y, *wall.ravel().tolist()), s.r_robot, margin))
-        return h
+        (x, y), s = check_point("position", position), self.settings
+        zones = [place_zone(person, self._point.zone_of(person)) for person in people]
+        return np.array(compute_h(x, y, zones, self._wall_rows, r_robot=s.r_robot, eps=s.eps))
 
     def _velocity(self, theta: float, given: list[float]) -> list[float]:
         """Velocity of the point: planned, unless the robot moves otherwise than it was told."""

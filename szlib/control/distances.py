@@ -21,7 +21,6 @@ disc of radius r, and nothing is lost.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,18 +83,19 @@ def wall_margin(wall: ArrayLike, settings: MPCSettings) -> float:
     return max(settings.eps, needed)
 
 
-def with_margin(settings: MPCSettings, walls: Iterable[ArrayLike]) -> MPCSettings:
-    """The same settings with eps as large as the walls require; never smaller than it was.
+def walls_with_margins(walls: Array, settings: MPCSettings) -> list[list[float]]:
+    """End points and margin of each wall, (xa, ya, xb, yb, margin) [m].
 
-    For `margin="paper"`, where one margin serves people and walls: give a row of short walls as one long
-    wall where you can.
+    Parameters
+    ----------
+    walls : segments, shape (n, 2, 2) [m].
+    settings : say which margin is used: see `wall_margin`.
     """
-    needed = max((required_margin(wall, settings.r_robot) for wall in walls), default=0.0)
-    return replace(settings, eps=max(settings.eps, needed))
+    return [[*wall.ravel().tolist(), wall_margin(wall, settings)] for wall in walls]
 
 
 @dataclass(frozen=True)
-class Audit:
+class DistanceComparison:
     """What the approximate distance does on the line h = 0, where it decides.
 
     Attributes
@@ -110,17 +110,19 @@ class Audit:
     required: float
 
 
-def audit(of: Ellipse | ArrayLike, *, r_robot: float, eps: float, n: int = 2001) -> Audit:
+def compare_distances(
+    of: Ellipse | ArrayLike, *, r_robot: float, eps: float, n: int = 2001
+) -> DistanceComparison:
     """Compare the distances on n points of each arc of h = 0 around a zone, or a wall given by its ends."""
-    points = safe_edge(of, r_robot + eps, n)
+    points = find_safe_boundary(of, r_robot + eps, n)
     if isinstance(of, Ellipse):
         gap = euclidean_to_ellipse(points, of) - r_robot
     else:
         gap = euclidean_to_segment(points, *check_wall(of)) - r_robot
-    return Audit(float(gap.min()), float(gap.max()), required_margin(of, r_robot))
+    return DistanceComparison(float(gap.min()), float(gap.max()), required_margin(of, r_robot))
 
 
-def safe_edge(of: Ellipse | ArrayLike, distance: float, n: int = 2001) -> Array:
+def find_safe_boundary(of: Ellipse | ArrayLike, distance: float, n: int = 2001) -> Array:
     """Points where the approximate distance is `distance` > 0, shape (m, 2) [m].
 
     Around a zone the confocal ellipse of semi-major axis a + distance. Around a wall, in its own frame,
@@ -140,7 +142,7 @@ def safe_edge(of: Ellipse | ArrayLike, distance: float, n: int = 2001) -> Array:
     return np.asarray((start + end) / 2 + local @ np.array([along, [-along[1], along[0]]]))
 
 
-def overestimate(points: ArrayLike, of: Ellipse | ArrayLike) -> Array:
+def compute_distance_error(points: ArrayLike, of: Ellipse | ArrayLike) -> Array:
     """Approximate less Euclidean distance at points (..., 2), shape (...) [m]: dangerous where positive."""
     if isinstance(of, Ellipse):
         return ellipse_distance(points, of) - euclidean_to_ellipse(points, of)

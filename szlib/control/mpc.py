@@ -37,19 +37,20 @@ from numpy.typing import ArrayLike
 from ..checks import Array, check_point, check_vector
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
-from .barriers import barrier, segment_formula, walls_of
-from .distances import wall_margin
-from .head_on import subgoal
-from .person import Person, SpeedZone, as_ellipse, circle_around, place
+from .barriers import compute_h, read_walls
+from .controller import Controller
+from .distances import walls_with_margins
+from .head_on import find_target
+from .person import Person, SpeedZone, as_ellipse, circle_around, place_zone
 from .scene import Scene
 from .settings import MPCSettings
 from .solvers.fallbacks import solve_with_fallbacks
 from .solvers.solver_pool import Sizes, slots, taken
-from .step import Step, terminal_of
-from .tracker import People, Seen, Tracker
+from .step import Step
+from .tracker import People, TrackedPeople, Tracker
 
 
-class MPCCBF:
+class MPCCBF(Controller):
     """Drives a double integrator to a goal, outside the social zones of people and clear of walls.
 
     A controller belongs to the thread that first asks it for a step; give each thread one of its own, for
@@ -60,7 +61,7 @@ class MPCCBF:
     zone : the social zone of a person, in the person's frame [m]; or anything with `.ellipse(speed)`,
         such as a `SocialZone`, which is asked for `settings.zone_speed`.
     walls : segments, shape (n, 2, 2): end points [m]; or polylines, Shapely's lines and polygons, or whatever
-        else `barriers.walls_of` takes; `self.walls` are their segments.
+        else `barriers.read_walls` takes; `self.walls` are their segments.
     settings : every other parameter.
     max_people : how many people to be ready for; None: for 8, and in time for more, built in a thread of its
         own from when half of the slots are taken. More people than it is ready for make the controller grow
@@ -72,6 +73,10 @@ class MPCCBF:
     SolverError : a wall is not finite or has no length, or settings and walls do not go together.
     ZoneError : `zone` is no zone.
     """
+
+    settings: MPCSettings
+    zone: Ellipse
+    walls: Array
 
     def __init__(
         self,
@@ -87,19 +92,15 @@ class MPCCBF:
         if max_people is not None and not (isinstance(max_people, int) and max_people >= 0):
             raise SolverError(f"max_people must be a whole number >= 0, or None; got {max_people!r}")
         self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
-        self._take(walls)
+        self._take_walls(walls)
         self._sizes = Sizes(self.settings, max_people, len(self.walls))
         self.reset()
 
-    def _take(self, walls: Any) -> None:
-        segments = walls_of(walls)
+    def _take_walls(self, walls: Any) -> None:
+        segments = read_walls(walls)
         if self.settings.terminal == "person" and len(segments):
             raise SolverError(f"terminal='person' is for open space; got {len(segments)} walls; use 'rest'")
-        self.walls = segments
-        self._segments: list[list[float]] = self.walls.reshape(-1, 4).tolist()
-        self._margins = [wall_margin(wall, self.settings) for wall in self.walls]
-        pairs = zip(self._segments, self._margins, strict=True)
-        self._wall_numbers = [number for segment, margin in pairs for number in (*segment, margin)]
+        self.walls, self._wall_rows = segments, walls_with_margins(segments, self.settings)
 
     def set_walls(self, walls: Any) -> None:
         """Know these walls from the next step on, in place of those before; given as to the controller.
@@ -111,7 +112,7 @@ class MPCCBF:
         SolverError : as the controller, which then keeps its walls; or another thread has it.
         """
         self._own()
-        self._take(walls)
+        self._take_walls(walls)
         self._sizes.of(self._n_people, len(self.walls))
 
     def _own(self) -> None:
@@ -139,31 +140,31 @@ class MPCCBF:
         stamps: ArrayLike | None = None,
         now: float | None = None,
     ) -> Step:
-        """The acceleration to apply for the next `dt`.
+        """Decide the acceleration for the next `dt`.
 
-        Whatever people do, and whatever a sensor says of them, the robot gets a control: where they leave it
-        no way, `Step.rung` and `Step.slack` say so, and `Step.goal_blocked` where the goal cannot be reached.
+        The robot always gets a control, whatever people do and whatever a sensor measures. `Step.fallback`
+        and `Step.slack` tell if people leave it no way, `Step.goal_blocked` if the goal cannot be reached.
 
-        People with numbers that cannot be used are set aside and counted (`Step.set_aside`); in their place
-        the tracker puts where they must be by now. Out of the zone of those of whom it knows nothing
-        (`Step.lost`) no plan can be proved to keep, but a robot at rest hits nobody. So while somebody is
-        lost the step is not `safe`, and the robot is drawn to where full braking ends, not to the goal; out
-        of the zones of those whom it sees, and off walls, it keeps all the same.
+        Measurements of people that cannot be used are rejected and counted (`Step.rejected`); the last known
+        state of the same person, moved forward, takes their place. If nothing is known of a person
+        (`Step.unknown`), no plan can be proved safe, but a robot at rest hits nobody. So the step is not
+        `safe`, and the target is the point where full braking ends, instead of the goal. The robot still
+        keeps out of all known zones, and away from walls.
 
         Parameters
         ----------
         state : (x, y, vx, vy) [m, m/s].
         goal : (x, y) [m].
         people : everybody to be respected: `Person`s, or an array, shape (n, 4): x, y [m], vx, vy [m/s].
-        ids : of each of them, by which they are known again, None for who has none; default: those of the
-            `Person`s. See `Tracker` for what is remembered.
-        stamps : when they were seen, a time for each or one for all [s]; default: now.
-        now : time [s], of the same clock; default: `dt` after the last step.
+        ids : by which the tracker recognises them, None for a person without an id; default: those of the
+            `Person`s. See `Tracker`.
+        stamps : when they were measured, one time for each or one for all [s]; default: now.
+        now : time, by the same clock [s]; default: `dt` after the last step.
 
         Raises
         ------
-        SolverError : an error of the program: state or goal is no number, a shape is wrong, the goal of the
-            first step lies too close to a wall, or another thread has this controller.
+        SolverError : an error of the program: a number or a shape cannot be used, the goal of the first step
+            lies too close to a wall, or the controller belongs to another thread.
         """
         began = perf_counter()
         self._own()
@@ -177,13 +178,13 @@ class MPCCBF:
         self._sizes.budget.begin()
         size = solver.evaluate.size
         parameters = self._parameters(x, scene, size)
-        rung, numbers, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
+        fallback, numbers, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
         self._change = np.zeros(numbers.inputs.size) if first else numbers.inputs - self._plan
         self._plan, rows = numbers.inputs, taken(self._n_people, len(self.walls), size)
         return Step(
             control=self._plan[:2].copy(),
             predicted=numbers.states,
-            rung=rung,
+            fallback=fallback,
             slack=numbers.slack,
             residual=numbers.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h)[rows],
             h=numbers.h[rows, 0],
@@ -194,23 +195,20 @@ class MPCCBF:
             scene=scene,
         )
 
-    def _scene(self, x: list[float], goal: tuple[float, float], seen: Seen) -> Scene:
-        """Everything that the step is asked, with the zone that is kept of everybody."""
-        kept = [self.zone_of(person) for person in seen.people]
-        placed = [place(person, zone) for person, zone in zip(seen.people, kept, strict=True)]
-        return Scene(tuple(x), goal, seen, kept, placed, self._segments, self._margins, self.settings)
+    def _scene(self, x: list[float], goal: tuple[float, float], tracked: TrackedPeople) -> Scene:
+        """What the step is asked, with the zone of everybody."""
+        zones = [self.zone_of(person) for person in tracked.people]
+        placed = [place_zone(person, zone) for person, zone in zip(tracked.people, zones, strict=True)]
+        return Scene(tuple(x), goal, tracked, zones, placed, self._wall_rows, self.settings)
 
     def _parameters(self, x: list[float], scene: Scene, size: tuple[int, int]) -> Array:
-        """The numbers of the problem of this size: state, target, the pace at its end, people and walls."""
-        if scene.seen.lost:
-            target = self._stop(x)
+        """Parameters of the problem of this size: state, target, terminal velocity, people and walls."""
+        if scene.tracked.unknown:
+            target = self._stopping_point(x)
         else:
-            target = subgoal(
-                (x[0], x[1]), scene.goal, scene.zones, self._segments, self._margins, self.settings
-            )
-        first_pace = terminal_of(self.settings, len(scene.zones)) == "person"
-        pace = scene.zones[0][5:] if first_pace else (0.0, 0.0)
-        return np.array([*x, *target, *pace, *slots(x, scene.zones, self._wall_numbers, size)])
+            target = find_target((x[0], x[1]), scene.goal, scene.zones, self._wall_rows, self.settings)
+        end_velocity = scene.zones[0][5:] if scene.terminal == "person" else (0.0, 0.0)
+        return np.array([*x, *target, *end_velocity, *slots(x, scene.zones, self._wall_rows, size)])
 
     def _clock(self, now: float | None, stamps: ArrayLike | None) -> float:
         """The time of this step [s]: as given, or `dt` after the last."""
@@ -224,41 +222,60 @@ class MPCCBF:
             raise SolverError(f"now must be a finite time [s]; got {now!r}")
         return float(now)
 
-    def _stop(self, x: list[float]) -> tuple[float, float]:
-        """Where full braking along the way ends [m]."""
+    def _stopping_point(self, x: list[float]) -> tuple[float, float]:
+        """Where full braking along the path ends [m]."""
         px, py, vx, vy = x
         time = max(abs(vx), abs(vy)) / self.settings.a_max
         return px + vx * time / 2, py + vy * time / 2
 
     def zone_of(self, person: Person) -> Ellipse:
-        """The zone that is kept for a person: their own, or the controller's; in the person's frame.
+        """Zone of a `person` in their own frame: their own, or the controller's.
 
-        Of somebody whose heading is unknown it is `circle_around` that.
+        If their heading is unknown, it is the circle around that zone.
         """
         zone = self.zone if person.zone is None else person.zone
         if not isinstance(zone, Ellipse):
             zone = as_ellipse(zone, self.settings.zone_speed)
         return circle_around(zone) if person.heading is None else zone
 
-    def placed_zones(self, people: Sequence[Person]) -> list[Ellipse]:
-        """The zone of each person, in the world frame."""
-        return [self.zone_of(p).placed(p.position, p.heading or 0.0) for p in people]
-
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
-        """h of every person and then of every wall at a position, shape (people + walls,) [m]."""
-        x, y = check_point("position", position)
-        distances = [place(person, self.zone_of(person)).distance(x, y) for person in people]
-        distances += [segment_formula(x, y, *segment) for segment in self._segments]
-        margins = [self.settings.eps] * len(people) + self._margins
-        return np.asarray(barrier(np.array(distances), self.settings.r_robot, np.array(margins)), float)
+        """h of all `people` and then of all walls at a `position`, shape (people + walls,) [m]."""
+        (x, y), s = check_point("position", position), self.settings
+        zones = [place_zone(person, self.zone_of(person)) for person in people]
+        return np.array(compute_h(x, y, zones, self._wall_rows, r_robot=s.r_robot, eps=s.eps), float)
 
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
-        """True if the goal cannot be reached, h < 0 there: for a wall, or for somebody who stands."""
-        x, y = check_point("goal", goal)
-        placed = [place(who, self.zone_of(who)) for who in people]
-        return any(zone.blocks((x, y), self.settings) for zone in placed) or bool(
-            (self.barriers(goal) < 0).any()
-        )
+        """True if h < 0 at the `goal`, because of a wall or of one of `people` who stands."""
+        point = check_point("goal", goal)
+        zones = [place_zone(person, self.zone_of(person)) for person in people]
+        blocked = any(zone.blocks(point, self.settings) for zone in zones)
+        return blocked or bool((self.barriers(goal) < 0).any())
+
+    def check_start(self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()) -> None:
+        """Raise SolverError if no run can start in this state.
+
+        Parameters
+        ----------
+        state : (x, y, vx, vy) [m, m/s], which must keep every barrier and the speed limit.
+        goal : (x, y) [m], which must be free of walls and of people who stand.
+        people : everybody who is present.
+        """
+        x, y, vx, vy = check_vector("state", state, 4)
+        h, limit = self.barriers((x, y), people), self.settings.v_max
+        if len(h) and h.min() < 0:
+            i = int(h.argmin())
+            obstacle = f"person {i}" if i < len(people) else f"wall {i - len(people)}"
+            raise SolverError(
+                f"the run starts in violation: h = {h[i]:.3f} m for {obstacle} at {[x, y]}; "
+                "start where h >= 0"
+            )
+        if self.goal_blocked(goal, people):
+            raise SolverError(
+                f"the goal {list(check_point('goal', goal))} cannot be reached: it lies in the zone of a "
+                "person who stands; choose one where h >= 0"
+            )
+        if (speed := float(np.hypot(vx, vy))) > limit:
+            raise SolverError(f"the run starts at {speed:.3f} m/s; the limit is {limit} m/s")
 
     def _check_goal(self, goal: tuple[float, float]) -> None:
         h = self.barriers(goal)

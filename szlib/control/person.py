@@ -9,25 +9,25 @@ from typing import NamedTuple, Protocol
 
 from ..checks import LARGEST, check_number, check_point
 from ..errors import SolverError, ZoneError
-from ..zones.costmaps import BODY_RADIUS as BODY_RADIUS
-from ..zones.costmaps import circle_around as circle_around
+from ..zones.ellipses import BODY_RADIUS as BODY_RADIUS
 from ..zones.ellipses import Ellipse
+from ..zones.ellipses import circle_around as circle_around
 from .barriers import barrier, ellipse_formula
 from .settings import MPCSettings
 
-STANDS = 0.1
-"""Who is slower does not leave the goal free by going on, whatever a tracker's noise says [m/s] (assumed)."""
+STANDING_SPEED = 0.1
+"""Below this speed a person counts as standing, to allow for a tracker's noise [m/s] (assumed)."""
 
 
 class SpeedZone(Protocol):
     """Anything that has a zone for each walking speed, such as `SocialZone`."""
 
     def ellipse(self, speed: float) -> Ellipse:
-        """The zone at a walking speed [m/s], in the person's frame."""
+        """The zone at a walking `speed` [m/s], in the person's frame."""
 
 
 def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
-    """The zone at a walking speed [m/s]; ZoneError for what is none, or reaches beyond `LARGEST`."""
+    """Ellipse of `zone` at a walking `speed` [m/s]; ZoneError if it is none or reaches beyond `LARGEST`."""
     if not isinstance(zone, Ellipse):
         if not hasattr(zone, "ellipse"):
             raise ZoneError(f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}")
@@ -40,23 +40,34 @@ def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
 
 @dataclass(frozen=True)
 class Person:
-    """A person as the controller sees them: here, and at constant velocity from now on.
+    """A person as the controller sees them: a state now, and constant velocity from now on.
 
     Parameters
     ----------
     position : (x, y) [m].
     velocity : (vx, vy) [m/s].
-    heading : where they face, counter-clockwise from x [rad]; None: where they walk. Where nobody knows, for
-        they stand or `heading_unknown`, it stays None, and `circle_around` their zone is kept.
+    heading : direction in which they face, counter-clockwise from x [rad]; None: in which they walk. It stays
+        None if they stand, or with `heading_unknown`; then the circle around their zone is used.
     zone : their social zone, in their own frame; None: the controller's.
-    id : by which a `Tracker` knows them again; None: they are new at each step.
-    heading_unknown : True: do not take where they walk for where they face; they are too slow.
+    id : by which a `Tracker` recognises them; None: they are new at each step.
+    heading_unknown : True if they are too slow for the velocity to give the heading.
 
     Raises
     ------
-    SolverError : a number is not usable (give what a sensor says to `MPCCBF.step` as an array), or a heading
-        is both given and unknown.
+    SolverError : a number cannot be used (give measurements to `MPCCBF.step` as an array), or a heading is
+        both given and unknown.
     ZoneError : the zone reaches beyond `LARGEST`.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> person = szlib.Person(position=(4.0, 0.0), velocity=(-0.5, 0.0))
+    >>> round(person.heading, 3)
+    3.142
+    >>> person.after(2.0).position
+    (3.0, 0.0)
+    >>> szlib.Person((0.0, 0.0)).heading is None  # they stand: the direction is unknown
+    True
     """
 
     position: tuple[float, float]
@@ -75,7 +86,7 @@ class Person:
             object.__setattr__(self, "heading", check_number("a person's heading", self.heading))
             if self.heading_unknown:
                 raise SolverError(
-                    f"a heading is given or unknown; got {self.heading} for the one at {(x, y)}"
+                    f"a heading is given or unknown; got {self.heading} and heading_unknown for {(x, y)}"
                 )
         elif not (self.stands or self.heading_unknown):
             object.__setattr__(self, "heading", atan2(vy, vx))
@@ -88,21 +99,28 @@ class Person:
         return self.velocity == (0.0, 0.0)
 
     def after(self, seconds: float) -> Person:
-        """The same person, so many seconds later."""
+        """The same person, `seconds` later."""
         if self.stands:
             return self
         (x, y), (vx, vy) = self.position, self.velocity
         return self.at((x + vx * seconds, y + vy * seconds))
 
     def at(self, position: tuple[float, float]) -> Person:
-        """The same person elsewhere [m]; what else they are was checked before, and is not again."""
-        there = object.__new__(type(self))
-        there.__dict__.update(self.__dict__, position=check_point("a person's position", position))
-        return there
+        """The same person at another `position` [m]; only the position is checked, for speed."""
+        moved = object.__new__(type(self))
+        moved.__dict__.update(self.__dict__, position=check_point("a person's position", position))
+        return moved
 
 
 class PlacedZone(NamedTuple):
-    """A person's zone in the world: the two foci and the semi-major axis [m], and its velocity [m/s]."""
+    """A person's zone in the world.
+
+    Attributes
+    ----------
+    xa, ya, xb, yb : the two foci [m].
+    a : semi-major axis [m].
+    vx, vy : velocity [m/s].
+    """
 
     xa: float
     ya: float
@@ -113,16 +131,18 @@ class PlacedZone(NamedTuple):
     vy: float
 
     def distance(self, x: float, y: float) -> float:
-        """Approximate distance of (x, y) to the zone now [m]."""
+        """Approximate distance of (`x`, `y`) to the zone now [m]."""
         return float(ellipse_formula(x, y, *self[:5]))
 
-    def blocks(self, goal: tuple[float, float], s: MPCSettings) -> bool:
-        """True if somebody slower than `STANDS` is here with the goal in their zone: h < 0 there."""
-        return hypot(self.vx, self.vy) < STANDS and barrier(self.distance(*goal), s.r_robot, s.eps) < 0
+    def blocks(self, goal: tuple[float, float], settings: MPCSettings) -> bool:
+        """True if a person slower than `STANDING_SPEED` has the `goal` in their zone: h < 0 by `settings`."""
+        if hypot(self.vx, self.vy) >= STANDING_SPEED:
+            return False
+        return bool(barrier(self.distance(*goal), settings.r_robot, settings.eps) < 0)
 
 
-def place(person: Person, zone: Ellipse) -> PlacedZone:
-    """The zone, of the person's own frame, around a person; of unknown heading: `circle_around` it."""
+def place_zone(person: Person, zone: Ellipse) -> PlacedZone:
+    """Place `zone`, in the person's own frame, around `person`; without a heading the circle around it."""
     (x, y), (vx, vy), heading = person.position, person.velocity, person.heading
     if heading is None:
         zone, heading = circle_around(zone), 0.0

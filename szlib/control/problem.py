@@ -10,7 +10,7 @@
         (vx, vy)_N = w                                                if there is a terminal condition
 
 (paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., k) takes person i at constant
-velocity, k steps ahead. `g` is the goal at rest, but for people met head-on (`head_on.subgoal`); w is 0
+velocity, k steps ahead. `g` is the goal at rest, but for people met head-on (`head_on.find_target`); w is 0
 or the velocity of a person. The states are eliminated: 2 N unknowns remain. The *relaxed* problem
 adds a slack s >= 0 to each barrier row, and to the speed rows if the robot is already too fast, and
 penalises their sum: exactly, so wherever the hard problem has a solution near by, both have the
@@ -31,10 +31,9 @@ import numpy as np
 
 from ..checks import Array
 from .barriers import barrier, cbf_residual, ellipse_formula, segment_formula
+from .settings import TOLERANCE as TOLERANCE
 from .settings import MPCSettings
 
-TOLERANCE = 1e-6
-"""Largest violation of a hard row, in its own unit, that still counts as satisfied."""
 HARD_SHARE = 0.4
 """Share of a step's time for the hard problem. Its second try begins within half of that, or not at all, so
 that as much again is left for the relaxed problem."""

@@ -1,4 +1,4 @@
-"""What a step was asked: the robot, its goal, people and walls, as the controller took them."""
+"""What a step is asked: the robot, its goal, people and walls, as the controller took them."""
 
 from __future__ import annotations
 
@@ -6,52 +6,61 @@ from collections.abc import Sequence
 from math import hypot
 from typing import NamedTuple
 
-from ..zones.ellipses import Ellipse
-from .barriers import barrier, euclidean_segment_formula, segment_formula
-from .person import BODY_RADIUS, Person, PlacedZone
-from .settings import MPCSettings
-from .tracker import Seen
+from ..zones.ellipses import BODY_RADIUS, Ellipse
+from .barriers import compute_h, euclidean_segment_formula
+from .person import Person, PlacedZone
+from .settings import MPCSettings, Terminal
+from .tracker import TrackedPeople
 
 
 class Scene(NamedTuple):
-    """What was asked.
+    """What a step is asked [m, m/s].
 
-    The robot's state (x, y, vx, vy) and its goal (x, y); people as the tracker sees them, the zone that is
-    kept of each, in their own frame, and in the world; the ends of walls (xa, ya, xb, yb) and their margins;
-    and the settings [m, m/s].
+    Attributes
+    ----------
+    state : (x, y, vx, vy) of the robot.
+    goal : (x, y).
+    tracked : people to be respected, as the tracker knows them.
+    person_zones : the zone of each person, in their own frame.
+    zones : the same zones in the world.
+    walls : end points and margin of each wall, (xa, ya, xb, yb, margin).
+    settings : parameters of the controller.
     """
 
     state: tuple[float, ...]
     goal: tuple[float, float]
-    seen: Seen
-    kept: Sequence[Ellipse]
+    tracked: TrackedPeople
+    person_zones: Sequence[Ellipse]
     zones: Sequence[PlacedZone]
     walls: Sequence[Sequence[float]]
-    margins: Sequence[float]
     settings: MPCSettings
 
     @property
     def people(self) -> tuple[Person, ...]:
         """Everybody to be respected, in the order of `Step.h`."""
-        return self.seen.people
+        return self.tracked.people
+
+    @property
+    def terminal(self) -> Terminal:
+        """What the plan ends in: see `MPCSettings.terminal_for`."""
+        return self.settings.terminal_for(len(self.people))
 
     @property
     def goal_blocked(self) -> bool:
-        """True if h < 0 at the goal, for a wall or for somebody who stands there."""
-        if any(zone.blocks(self.goal, self.settings) for zone in self.zones):
-            return True
-        h = (
-            barrier(segment_formula(*self.goal, *wall), self.settings.r_robot, margin)
-            for wall, margin in zip(self.walls, self.margins, strict=True)
-        )
-        return any(each < 0 for each in h)
+        """True if h < 0 at the goal, because of a wall or of a person who stands there."""
+        s = self.settings
+        at_walls = compute_h(*self.goal, (), self.walls, r_robot=s.r_robot, eps=s.eps)
+        return any(zone.blocks(self.goal, s) for zone in self.zones) or any(h < 0 for h in at_walls)
 
-    def gaps(self, x: float, y: float, seconds: float) -> list[float]:
-        """Euclidean gaps from the robot's disc at (x, y) to bodies, so many seconds ahead, and walls [m]."""
+    def h(self, x: float, y: float, time: float = 0.0) -> list[float]:
+        """Barriers of people and then of walls for the robot at (`x`, `y`), `time` seconds from now [m]."""
+        s = self.settings
+        return compute_h(x, y, self.zones, self.walls, r_robot=s.r_robot, eps=s.eps, time=time)
+
+    def gaps(self, x: float, y: float, time: float = 0.0) -> list[float]:
+        """Euclidean gaps of the disc at (`x`, `y`) to bodies and walls, `time` seconds from now [m]."""
         gaps, radius = [], self.settings.r_robot
         for person in self.people:
             (px, py), (vx, vy) = person.position, person.velocity
-            gaps.append(hypot(x - px - seconds * vx, y - py - seconds * vy) - BODY_RADIUS - radius)
-        for xa, ya, xb, yb in self.walls:
-            gaps.append(euclidean_segment_formula(x, y, xa, ya, xb, yb) - radius)
-        return gaps
+            gaps.append(hypot(x - px - time * vx, y - py - time * vy) - BODY_RADIUS - radius)
+        return gaps + [euclidean_segment_formula(x, y, *wall[:4]) - radius for wall in self.walls]

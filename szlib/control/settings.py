@@ -10,6 +10,8 @@ import numpy as np
 from ..checks import check_array
 from ..errors import SolverError
 
+TOLERANCE = 1e-6
+"""Largest violation of a hard row, in its own unit, that still counts as satisfied."""
 Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
 Solver = Literal["sqp", "ipopt"]
@@ -42,14 +44,14 @@ class MPCSettings:
     zone_speed : walking speed whose social zone is kept, where a zone depends on speed [m/s].
     pass_side : the robot's own hand on which it passes a person whom it meets head-on.
     tie : a meeting is head-on while the goal lies within this share of the half-angle under which the
-        robot sees the person's zone; see `head_on.subgoal`. At most 0.5.
+        robot sees the person's zone; see `head_on.find_target`. At most 0.5.
     terminal : what the plan ends in: "none", as in the paper; "rest", zero velocity; "person", the
         velocity of the one person there is, in open space ("rest" while there is not exactly one; see
-        `Step.terminal`). See the proof in `szlib.control.mpc`.
+        `terminal_for`). See the proof in `szlib.control.mpc`.
     solver : "sqp", the condensed SQP of `szlib.control.solvers.sqp`, or "ipopt", as in the paper.
     slack_weight : penalty of slack [cost per m, and per m of distance to the goal (at least 1 m)],
         to which the multipliers of the barriers are in proportion.
-    max_iterations : iterations that a solver may take before the next rung of the ladder.
+    max_iterations : iterations that a solver may take before the next fallback of the ladder.
     time_limit : computing time of the step's thread after which the best plan so far, or full braking, is
         taken; see `Step.timed_out` [s]. `inf` for none. What other processes take does not count, so that
         runs stay the same on a busy machine.
@@ -110,6 +112,10 @@ class MPCSettings:
         for name, literal in choices.items():
             given, allowed = getattr(self, name), get_args(literal)
             _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
+
+    def terminal_for(self, n_people: int) -> Terminal:
+        """What a plan among `n_people` ends in: "rest" in place of "person", unless there is one person."""
+        return "rest" if self.terminal == "person" and n_people != 1 else self.terminal
 
     @classmethod
     def badges(cls) -> dict[str, str]:

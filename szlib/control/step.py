@@ -1,4 +1,4 @@
-"""What the controller decided, and how far it can be relied upon."""
+"""What the controller decided, and how far it can be relied upon: `Step`."""
 
 from __future__ import annotations
 
@@ -8,14 +8,21 @@ from typing import Literal, cast, get_args
 import numpy as np
 
 from ..checks import Array
-from .problem import TOLERANCE
 from .scene import Scene
-from .settings import MPCSettings, Terminal
-from .step_report import Report, described, verified
+from .settings import TOLERANCE, Terminal
+from .step_report import Claims, ProblemRow, StepReport, verify_plan
 
-Rung = Literal["warm", "cold", "kept", "relaxed", "braking"]
-RUNGS: tuple[Rung, ...] = get_args(Rung)
+Fallback = Literal["warm", "cold", "kept", "relaxed", "braking"]
+FALLBACKS: tuple[Fallback, ...] = get_args(Fallback)
+"""The ways to a control, in the order in which they are tried: see `szlib.control.solvers.fallbacks`."""
 Status = Literal["optimal", "kept", "relaxed", "braking"]
+_MEANING = {
+    "warm": "optimal, from the last plan",
+    "cold": "optimal, from full braking",
+    "kept": "the last plan, shifted, which ends at rest",
+    "relaxed": "relaxed, with the smallest possible violation",
+    "braking": "full braking, because no solver found a plan",
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -26,22 +33,36 @@ class Step:
     ----------
     control : acceleration (ax, ay) to apply now, within its bounds, shape (2,) [m/s2].
     predicted : states x_0 .. x_N of the plan, shape (N+1, 4) [m, m/s].
-    rung : the rung of the ladder that gave the plan; see `szlib.control.solvers.fallbacks`.
+    fallback : the way in which the plan was found; see `szlib.control.solvers.fallbacks`.
     slack : largest violation of a hard row by the plan, 0 if none [m for barriers, m2/s2 for speed,
         m/s for the terminal velocity].
     residual : h_{k+1} - (1-gamma) h_k, people before walls, shape (people + walls, N_h) [m].
-    h : barriers in the state itself, people before walls, shape (people + walls,) [m]; where one is
+    h : barriers in the state itself, people before walls, shape (people + walls,) [m]. Where one is
         negative, the robot already is where it should not be, and the plan leads out again.
-    target : where the plan is drawn to: the goal, but for a meeting head-on, shape (2,) [m].
-    cost : the cost of the plan, without any penalty.
+    target : point that attracts the plan: the goal, except where the robot meets a person head-on, shape
+        (2,) [m].
+    cost : cost of the plan, without any penalty.
     solve_time : wall-clock time of the whole step [s].
-    timed_out : a rung was cut short or left out because the time was up (`MPCSettings.time_limit`).
-    scene : what was asked.
+    timed_out : True if a solver was stopped or skipped because time was up (`MPCSettings.time_limit`).
+    scene : what the step was asked.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> person = szlib.Person((0.0, 0.3), (-0.5, 0.0))
+    >>> step = controller.step(state=(-4.0, 0.0, 0.0, 0.0), goal=(4.0, 0.0), people=[person])
+    >>> step.status, step.safe, step.control.shape
+    ('optimal', True, (2,))
+    >>> step.verify().ok
+    True
+    >>> print(step.explain().splitlines()[0])
+    Step: optimal, from the last plan; safe
     """
 
     control: Array
     predicted: Array
-    rung: Rung
+    fallback: Fallback
     slack: float
     residual: Array
     h: Array
@@ -53,80 +74,136 @@ class Step:
 
     @property
     def status(self) -> Status:
-        """ "optimal": a solver converged and every hard row holds; else the rung."""
-        return status_of(self.rung)
+        """ "optimal": a solver converged and every hard row holds; else the fallback."""
+        return status_of(self.fallback)
 
     @property
     def feasible(self) -> bool:
-        """True if the plan satisfies the hard problem, whatever rung it comes from; else see `slack`."""
+        """True if the plan satisfies the hard problem, whatever fallback it comes from; else see `slack`."""
         return self.slack <= TOLERANCE
 
     @property
     def goal_blocked(self) -> bool:
-        """True if the goal cannot be reached, h < 0 there: for a wall, or for somebody who stands.
+        """True if the goal cannot be reached, h < 0 there: because of a wall, or of a person who stands.
 
-        Who is slower than `person.STANDS` counts as standing. The robot waits beside them.
+        A person slower than `person.STANDING_SPEED` counts as standing. The robot waits beside them.
         """
         return self.scene.goal_blocked
 
     @property
-    def set_aside(self) -> int:
-        """How many people were given with numbers that could not be used; see `MPCCBF.step`."""
-        return self.scene.seen.set_aside
+    def rejected(self) -> int:
+        """Number of people whose measurement cannot be used; see `MPCCBF.step`."""
+        return self.scene.tracked.rejected
 
     @property
-    def lost(self) -> int:
-        """Of how many of those nothing is known that could stand in: the robot brakes."""
-        return self.scene.seen.lost
+    def unknown(self) -> int:
+        """Number of rejected people of whom no earlier measurement is known; the robot then brakes."""
+        return self.scene.tracked.unknown
 
     @property
     def terminal(self) -> Terminal:
-        """What the plan ends in: see `terminal_of`."""
-        return terminal_of(self.scene.settings, len(self.scene.people))
+        """What the plan ends in: see `MPCSettings.terminal_for`."""
+        return self.scene.terminal
 
     @property
     def clearance(self) -> Array:
         """Euclidean gaps from the robot's disc to bodies (of `BODY_RADIUS`) and walls [m].
 
-        Shape (people + walls, N+1): now, and at each state of the plan, with people who keep their
-        velocity; people before walls. Negative is an overlap.
+        Shape (people + walls, N+1), people before walls: now, and at each state of the plan, with people who
+        keep their velocity. Negative is an overlap.
         """
         gaps = [self._gaps(k) for k in range(len(self.predicted))]
         return np.reshape(np.array(gaps, float), (len(gaps), -1)).T
 
     @property
     def safe(self) -> bool:
-        """True if this step keeps every promise to people who keep their velocity, and to walls.
+        """True if this step keeps the robot safe from walls, and from people who keep their velocity.
 
-        That is: nobody is lost (see `MPCCBF.step`), the plan satisfies the hard problem, from a state that
-        satisfies every barrier, and the robot's disc overlaps nobody's body and no wall, neither now nor when
-        the control has been applied, by Euclidean distance. People who turn, stop or speed up within a step
-        may still bring about h < 0 after a step that was safe (notebook 13 counts them); the next step then
-        says so.
+        That is: no person is unknown (see `MPCCBF.step`); the plan satisfies the hard problem, from a state
+        that satisfies every barrier; and the robot's disc overlaps no body and no wall, by Euclidean
+        distance, neither now nor after the control. People who turn, stop or speed up within a step may still
+        cause h < 0 after a safe step (notebook 13 counts them); the next step then says so.
         """
-        if not self.feasible or self.scene.seen.lost or min(self.h.tolist(), default=0.0) < -TOLERANCE:
+        if not self.feasible or self.unknown or min(self.h.tolist(), default=0.0) < -TOLERANCE:
             return False
-        (x, y), (x_next, y_next) = self.predicted[:2, :2].tolist()
-        gaps = self.scene.gaps(x, y, 0.0) + self.scene.gaps(x_next, y_next, self.scene.settings.dt)
-        return min(gaps, default=0.0) >= -TOLERANCE
+        return min(self._gaps(0) + self._gaps(1), default=0.0) >= -TOLERANCE
 
-    def verify(self) -> Report:
-        """Check this step again, by formulas of the report's own, from the scene as it was given."""
-        return verified(self)
+    def verify(self) -> StepReport:
+        """Check this step again, by formulas that share no code with the controller."""
+        claims = Claims(self.h, self.residual, self.slack, self.feasible, self.safe)
+        return verify_plan(self.scene, self.predicted, self.control, claims)
 
     def __repr__(self) -> str:
-        return described(self, self.verify())
+        ax, ay = self.control.tolist()
+        safe, h = "safe" if self.safe else "not safe", min(self.h.tolist(), default=np.inf)
+        return f"Step({self.fallback}, {safe}, control=({ax:.3g}, {ay:.3g}) m/s2, min h={h:.3g} m)"
+
+    def explain(self) -> str:
+        """Explain the step in sentences, after it is verified: what happened, and why no plan is feasible."""
+        scene, (ax, ay), report = self.scene, self.control.tolist(), self.verify()
+        verdict = "safe" if self.safe else f"not safe: {self._why_not_safe()}"
+        lines = [f"Step: {_MEANING[self.fallback]}; {verdict}"]
+        lines.append(f"  control ({ax:.3g}, {ay:.3g}) m/s2 after {1e3 * self.solve_time:.2g} ms")
+        if len(self.h):
+            i = int(np.argmin(self.h))
+            lines.append(f"  nearest is {self._obstacle(i)}: h = {self.h[i]:.3g} m")
+        if not self.feasible:
+            lines.append(f"  the plan violates {self._name_row(report.worst)} by {report.slack:.2g}")
+            lines.append(f"  what helps: {self._advise(report.worst)}")
+        if self.timed_out:
+            lines.append(
+                f"  time was up after {scene.settings.time_limit} s; what helps: a larger time_limit"
+            )
+        if self.goal_blocked:
+            lines.append(f"  the goal {scene.goal} cannot be reached: h < 0 there; the robot waits beside it")
+        if self.rejected:
+            lines.append(
+                f"  {self.rejected} measurements of people were rejected; {self.unknown} are unknown"
+            )
+        return "\n".join(lines + [f"  WRONG: {fault}" for fault in report.faults])
 
     def _gaps(self, k: int) -> list[float]:
+        """Euclidean gaps at state k of the plan."""
         x, y = self.predicted[k, :2].tolist()
         return self.scene.gaps(x, y, k * self.scene.settings.dt)
 
+    def _why_not_safe(self) -> str:
+        if self.unknown:
+            return "the position of a person is unknown, so the robot comes to rest"
+        if (self.h < -TOLERANCE).any():
+            return f"the robot is already too close to {self._obstacle(int(np.argmin(self.h)))}"
+        return "its plan is not feasible" if not self.feasible else "its disc overlaps a body or a wall"
 
-def terminal_of(settings: MPCSettings, n_people: int) -> Terminal:
-    """What a plan ends in: as in the settings, but at rest for "person" while there is not exactly one."""
-    return "rest" if settings.terminal == "person" and n_people != 1 else settings.terminal
+    def _obstacle(self, i: int) -> str:
+        """Name of the person or wall of row `i` of `h`."""
+        people = len(self.scene.people)
+        if i >= people:
+            return f"wall {i - people}"
+        known = self.scene.people[i].id
+        return f"person {i}" + ("" if known is None else f" (id {known!r})")
+
+    def _row_of_h(self, row: ProblemRow) -> int:
+        return row.number + (len(self.scene.people) if row.kind == "wall" else 0)
+
+    def _name_row(self, row: ProblemRow) -> str:
+        if row.kind == "speed":
+            return f"the speed limit at k = {row.k}"
+        if row.kind == "end":
+            return "the terminal velocity"
+        return f"the barrier of {self._obstacle(self._row_of_h(row))} from k = {row.k} to {row.k + 1}"
+
+    def _advise(self, row: ProblemRow) -> str:
+        s = self.scene.settings
+        if row.kind in ("person", "wall") and self.h[self._row_of_h(row)] < -TOLERANCE:
+            return "nothing now, because the robot is already too close; the plan leads out again"
+        if row.kind == "speed":
+            return f"start at v_max = {s.v_max:g} m/s or slower, or raise v_max"
+        if row.kind == "end":
+            return f"more than N = {s.N} steps, an a_max above {s.a_max:g}, or a v_max below {s.v_max:g}"
+        longer = f"an N_h above {s.N_h}" if s.N_h < s.N else f"an N above {s.N}"
+        return f"brake earlier: a gamma below {s.gamma:g}, {longer}, or a v_max below {s.v_max:g}"
 
 
-def status_of(rung: Rung) -> Status:
-    """What a rung says of its plan: see `Step.status`."""
-    return "optimal" if rung in ("warm", "cold") else cast(Status, rung)
+def status_of(fallback: Fallback) -> Status:
+    """Status of a plan by its `fallback`: see `Step.status`."""
+    return "optimal" if fallback in ("warm", "cold") else cast(Status, fallback)

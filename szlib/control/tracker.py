@@ -1,13 +1,13 @@
-"""People from one look to the next: which way they face, where they are by now, and who is not seen any more.
+"""People from one measurement to the next: their headings, their positions now, and people not seen any more.
 
-A sensor has noise, comes late, and loses people. By their ids,
+A sensor is noisy and late, and loses people. By the ids of people,
 
-    heading     where they walked when last seen at `walking` or faster; unknown before that, and of people
-                without an id whenever they are slower
-    now         who was seen at an earlier time is brought forward at constant velocity
-    unseen      who is not seen any more is kept, at constant velocity, for `keep` seconds
-    set aside   numbers that are not finite, or beyond `LARGEST`, are never used. In their place stands what
-                was last known of this id, brought forward; of whom nothing is known is *lost*
+    heading     is the direction in which they walked when last seen at `walking_speed` or faster; unknown
+                before that, and for people without an id whenever they are slower
+    position    is moved forward to now at constant velocity, for people who were seen earlier
+    unseen      people stay, at constant velocity, for `memory` seconds
+    rejected    are measurements that are not finite, or beyond `LARGEST`. The last known state of the same id
+                takes their place, moved forward; people without such a state are *unknown*
 """
 
 from __future__ import annotations
@@ -23,23 +23,26 @@ from ..checks import LARGEST
 from ..errors import SolverError
 from .person import Person
 
-_Known = tuple[Person, float]
-"""Somebody as last seen, and when [s]."""
+_LastSeen = tuple[Person, float]
+"""A person as last seen, and when [s]."""
 People = Sequence[Person] | ArrayLike
-"""Everybody: as `Person`s, or as an array, shape (n, 4): x, y [m], vx, vy [m/s]."""
+"""People as `Person`s, or as an array, shape (n, 4): x, y [m], vx, vy [m/s]."""
 
 
-class Seen(NamedTuple):
-    """Everybody to be respected now: those given, in their order, then those unseen for a while.
+class TrackedPeople(NamedTuple):
+    """Everybody to be respected now.
 
-    `set_aside` counts those given with numbers that could not be used. Of these, `lost` counts those of whom
-    nothing is known that could stand in. They are among `people` only if their position could be used, as
-    standing there; so `people` is not all that there is to be respected.
+    Attributes
+    ----------
+    people : those given, in their order, then those who are remembered.
+    rejected : number of those given whose measurement cannot be used.
+    unknown : number of rejected people of whom nothing is known that could take the place of the
+        measurement. They are among `people`, as standing, only if their position can be used.
     """
 
     people: tuple[Person, ...]
-    set_aside: int = 0
-    lost: int = 0
+    rejected: int = 0
+    unknown: int = 0
 
 
 class Tracker:
@@ -47,25 +50,36 @@ class Tracker:
 
     Parameters
     ----------
-    walking : speed from which on a velocity says which way somebody faces [m/s] (assumed: ten times the noise
-        of a sensor that is 2 cm/s off).
-    keep : how long somebody is remembered, and kept out of, who is not seen any more [s] (assumed).
+    walking_speed : speed from which on the velocity gives the heading [m/s] (assumed: ten times the noise of
+        a sensor that is 2 cm/s off).
+    memory : time for which people who are not seen any more are remembered and respected [s] (assumed).
 
     Raises
     ------
     SolverError : a parameter is not a finite number >= 0.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> tracker = szlib.Tracker(memory=1.0)
+    >>> tracker.see([[0.0, 0.0, 1.0, 0.0]], ids=["ann"], now=0.0).people[0].position
+    (0.0, 0.0)
+    >>> tracker.see([], ids=[], now=0.5).people[0].position  # hidden, and remembered
+    (0.5, 0.0)
+    >>> tracker.see([], ids=[], now=2.0).people
+    ()
     """
 
-    def __init__(self, *, walking: float = 0.2, keep: float = 1.0) -> None:
-        for name, value in (("walking", walking), ("keep", keep)):
+    def __init__(self, *, walking_speed: float = 0.2, memory: float = 1.0) -> None:
+        for name, value in (("walking_speed", walking_speed), ("memory", memory)):
             if not (isinstance(value, int | float | np.number) and 0 <= value < inf):
                 raise SolverError(f"{name} must be a finite number >= 0; got {value!r}")
-        self.walking, self.keep = float(walking), float(keep)
-        self._known: dict[Hashable, _Known] = {}
+        self.walking_speed, self.memory = float(walking_speed), float(memory)
+        self._last_seen: dict[Hashable, _LastSeen] = {}
 
     def reset(self) -> None:
         """Forget everybody."""
-        self._known.clear()
+        self._last_seen.clear()
 
     def see(
         self,
@@ -74,86 +88,86 @@ class Tracker:
         now: float,
         ids: Iterable[Hashable] | None = None,
         stamps: ArrayLike | None = None,
-    ) -> Seen:
-        """Everybody as they are now, from what was seen of them.
+    ) -> TrackedPeople:
+        """Bring what was measured of people to the present.
 
         Parameters
         ----------
         people : `Person`s, or an array, shape (n, 4): x, y [m], vx, vy [m/s]. A heading that a `Person` was
-            given is theirs.
+            given is used.
         now : time, of any clock [s].
-        ids : of each of them, None for who has none; default: those of the `Person`s.
-        stamps : when they were seen, a time for each or one for all [s]; default: now.
+        ids : one for each of them, None for a person without an id; default: those of the `Person`s.
+        stamps : when they were measured, one time for each or one for all [s]; default: now.
 
         Raises
         ------
-        SolverError : what is given has not the right shape: an error of the program, not of a sensor.
+        SolverError : an argument has the wrong shape: an error of the program, not of a sensor.
         """
-        if ids is None and stamps is None and not self._known and _are_new(people):
-            return Seen(tuple(people))
-        rows = _rows(people)
+        if ids is None and stamps is None and not self._last_seen and _have_no_ids(people):
+            return TrackedPeople(tuple(people))
+        rows = _split_rows(people)
         names = [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
         if len(names) != len(rows):
             raise SolverError(f"ids must be one for each of {len(rows)} people; got {len(names)}")
-        times = _times(stamps, len(rows), now)
-        self._known = {k: known for k, known in self._known.items() if abs(now - known[1]) <= self.keep}
-        here: list[Person | None] = []
-        set_aside = lost = 0
+        times = _check_stamps(stamps, len(rows), now)
+        self._last_seen = {k: v for k, v in self._last_seen.items() if abs(now - v[1]) <= self.memory}
+        present: list[Person | None] = []
+        rejected = unknown = 0
         row: Person | list[float]
         for row, name, time in zip(rows, names, times, strict=True):
-            last = None if name is None else self._known.get(name)
-            found, usable = self._look(row, name, time, now, last)
+            last = None if name is None else self._last_seen.get(name)
+            found, usable = self._update(row, name, time, now, last)
             if found is not None and name is not None and (usable or last is not None):
-                self._known[name] = found
-            here.append(None if found is None else _forward(*found, now))
-            set_aside += not usable or here[-1] is None
-            lost += (not usable and last is None) or here[-1] is None
+                self._last_seen[name] = found
+            present.append(None if found is None else _move_forward(*found, now))
+            rejected += not usable or present[-1] is None
+            unknown += (not usable and last is None) or present[-1] is None
         given = set(names)
-        here += [_forward(*known, now) for name, known in self._known.items() if name not in given]
-        return Seen(tuple(person for person in here if person is not None), set_aside, lost)
+        present += [_move_forward(*seen, now) for name, seen in self._last_seen.items() if name not in given]
+        return TrackedPeople(tuple(person for person in present if person is not None), rejected, unknown)
 
-    def _look(
-        self, row: Person | list[float], name: Hashable, time: float, now: float, last: _Known | None
-    ) -> tuple[_Known | None, bool]:
-        """What is known of them by now, if anything, and whether all of their numbers could be used."""
+    def _update(
+        self, row: Person | list[float], name: Hashable, time: float, now: float, last: _LastSeen | None
+    ) -> tuple[_LastSeen | None, bool]:
+        """The last known state of a person, if any, and True if all numbers of the measurement are usable."""
         if isinstance(row, Person) and name is None and time == now:
             return (row, now), True
         x, y, vx, vy = (*row.position, *row.velocity) if isinstance(row, Person) else row
-        if not _usable(x, y, now - time):
+        if not _are_usable(x, y, now - time):
             return last, False
-        if _usable(vx, vy):
-            return (self._turned(row, name, last), time), True
+        if _are_usable(vx, vy):
+            return (self._with_heading(row, name, last), time), True
         if last is None:
             return (Person((x, y), id=name), now), False
         return (last[0].at((x, y)), time), False
 
-    def _turned(self, row: Person | list[float], name: Hashable, last: _Known | None) -> Person:
-        """Somebody whose numbers can be used, facing where they are known to."""
+    def _with_heading(self, row: Person | list[float], name: Hashable, last: _LastSeen | None) -> Person:
+        """A person with usable numbers, and the heading that is known."""
         x, y, vx, vy = (*row.position, *row.velocity) if isinstance(row, Person) else row
         heading, zone = (row.heading, row.zone) if isinstance(row, Person) else (None, None)
-        told = heading is not None and (vx == vy == 0 or name is None or heading != atan2(vy, vx))
-        if not told and hypot(vx, vy) >= self.walking:
+        is_given = heading is not None and (vx == vy == 0 or name is None or heading != atan2(vy, vx))
+        if not is_given and hypot(vx, vy) >= self.walking_speed:
             heading = atan2(vy, vx)
-        elif not told:
+        elif not is_given:
             heading = None if last is None else last[0].heading
         return Person((x, y), (vx, vy), heading, zone, name, heading is None)
 
 
-def _forward(person: Person, time: float, now: float) -> Person | None:
-    """Somebody seen at a time, by now; None if that is beyond `LARGEST`."""
+def _move_forward(person: Person, time: float, now: float) -> Person | None:
+    """A person seen at `time`, moved to `now` at constant velocity; None if that is beyond `LARGEST`."""
     if time == now:
         return person
     (x, y), (vx, vy) = person.position, person.velocity
-    reached = (x + (now - time) * vx, y + (now - time) * vy)
-    return person.at(reached) if _usable(*reached) else None
+    position = (x + (now - time) * vx, y + (now - time) * vy)
+    return person.at(position) if _are_usable(*position) else None
 
 
-def _usable(*numbers: float) -> bool:
+def _are_usable(*numbers: float) -> bool:
     return all(abs(number) <= LARGEST for number in numbers)
 
 
-def _are_new(people: People) -> TypeGuard[Sequence[Person]]:
-    """True if these are `Person`s of whom nobody has an id."""
+def _have_no_ids(people: People) -> TypeGuard[Sequence[Person]]:
+    """True if these are `Person`s without ids."""
     if not isinstance(people, list | tuple):
         return False
     for person in people:  # noqa: SIM110 - all() takes three times as long
@@ -162,8 +176,8 @@ def _are_new(people: People) -> TypeGuard[Sequence[Person]]:
     return True
 
 
-def _rows(people: People) -> Sequence[Person | list[float]]:
-    """Everybody, one by one: `Person`s, or (x, y, vx, vy), finite or not."""
+def _split_rows(people: People) -> Sequence[Person | list[float]]:
+    """People one by one: `Person`s, or (x, y, vx, vy), finite or not."""
     if not isinstance(people, np.ndarray):
         given = list(cast(Sequence[Person], people))
         if all(isinstance(person, Person) for person in given):
@@ -177,8 +191,8 @@ def _rows(people: People) -> Sequence[Person | list[float]]:
     return cast(list[list[float]], numbers.reshape(-1, 4).tolist())
 
 
-def _times(stamps: ArrayLike | None, n: int, now: float) -> list[float]:
-    """When each was seen [s], finite or not."""
+def _check_stamps(stamps: ArrayLike | None, n: int, now: float) -> list[float]:
+    """When each person was measured [s], finite or not."""
     if stamps is None:
         return [now] * n
     times = np.asarray(stamps, float)

@@ -17,13 +17,14 @@ avoidance", IEEE Robotics & Automation Magazine 4(1), 1997.  World frame, metres
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..checks import Array
 from ..control.barriers import euclidean_segment_formula
+from ..control.controller import Controller
 from ..control.person import BODY_RADIUS, Person
 from ..control.settings import MPCSettings
 from .scenario import Scenario
@@ -36,14 +37,11 @@ class Command(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Baseline:
+class Baseline(Controller):
     """What the baselines share: `settings` for their limits, the walls, and a velocity that each wants."""
 
-    settings: MPCSettings
-    walls: Array
-
-    def reset(self) -> None:
-        """Nothing is remembered."""
+    settings: MPCSettings = field()
+    walls: Array = field()
 
     def step(self, state: Array, goal: Array, people: Sequence[Person]) -> Command:
         """The acceleration that brings the robot nearest to the velocity that it wants."""

@@ -17,13 +17,12 @@ import numpy as np
 import pandas as pd
 
 from ..checks import Array
-from ..control.mpc import MPCCBF
+from ..control.controller import Controller, Robot, advance, as_controller
 from ..control.person import BODY_RADIUS, Person, SpeedZone, as_ellipse, circle_around
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from .log import SimulationLog
-from .robots import Controller, DoubleIntegrator, Robot, StepLike, advance
 from .scenario import GOAL_RADIUS, STOPPED_SPEED, UNAFFECTED, Crowd, CrowdModel, Scenario
 
 __all__ = ["BODY", "Zones", "advance", "drive", "simulate"]
@@ -61,14 +60,16 @@ def simulate(
         the start violates a barrier or the speed limit, or the goal cannot be reached: it lies too close to
         a wall, or in the zone of somebody who stands.
     """
-    walls = np.asarray(getattr(controller, "walls", scenario.walls))
-    if not np.array_equal(walls, scenario.walls):
+    known = as_controller(controller)
+    if known.walls is not None and not np.array_equal(known.walls, scenario.walls):
         raise SolverError(
-            f"the controller knows {len(walls)} walls, and not the {len(scenario.walls)} of "
+            f"the controller knows {len(known.walls)} walls, and not the {len(scenario.walls)} of "
             f"{scenario.name!r}; build it with walls=scenario.walls"
         )
-    if isinstance(controller, MPCCBF):
-        _check_start(scenario, controller, scenario.people if crowd is None else ())
+    try:
+        known.check_start(scenario.start, scenario.goal, scenario.people if crowd is None else ())
+    except SolverError as error:
+        raise SolverError(f"{scenario.name!r}: {error}") from error
     return drive(scenario, controller, crowd=crowd, max_time=max_time)
 
 
@@ -103,10 +104,11 @@ def drive(
     SolverError : a control is not finite, the crowd changes its size, the controller's dt is not that of
         `settings`; of an `MPCCBF`: the goal lies too close to a wall.
     """
+    controller = as_controller(controller)
     s = _settings(controller, settings)
-    robot: Robot = getattr(controller, "robot", None) or DoubleIntegrator()
+    robot = controller.robot
     end = scenario.duration if max_time is None else max_time
-    cast = _Cast(getattr(controller, "zone", None) or BODY, zones, s.zone_speed)
+    cast = _Cast(BODY if controller.zone is None else controller.zone, zones, s.zone_speed)
     people = tuple(replace(p, zone=cast.zone(i, p)) for i, p in enumerate(scenario.people))
     if crowd is None:
         crowd = behaviour.crowd(replace(scenario, people=people), seed)
@@ -150,8 +152,7 @@ def _facing(people: Array) -> Array:
 
 def _settings(controller: Controller, given: MPCSettings | None) -> MPCSettings:
     """What a run is measured by."""
-    own = getattr(controller, "settings", None)
-    own = own if isinstance(own, MPCSettings) else None
+    own = controller.settings
     if given and own and given.dt != own.dt:
         raise SolverError(f"the controller steps every {own.dt} s, the loop every {given.dt} s; give one")
     return given or own or MPCSettings()
@@ -194,15 +195,15 @@ class _Cast:
         return tuple(self.zone(i, None) for i in range(size))
 
 
-def _told(step: StepLike, took: float) -> tuple[Any, ...]:
-    """What is logged of a step, empty where it does not tell it: control, plan, conditions, rung, whether it
+def _told(step: Any, took: float) -> tuple[Any, ...]:
+    """What is logged of a step, empty where it does not tell it: control, plan, conditions, fallback, whether it
     is safe, slack, time. The step itself is let go: a thousand objects that stay cost a garbage collection.
     """
     return (
         np.asarray(step.control, float),
         np.asarray(getattr(step, "predicted", _NO_PLAN), float),
         getattr(step, "residual", None),
-        getattr(step, "rung", ""),
+        getattr(step, "fallback", ""),
         getattr(step, "safe", None),
         getattr(step, "slack", np.nan),
         getattr(step, "solve_time", took),
@@ -270,22 +271,3 @@ def _residuals(rows: Sequence[Any], given: Sequence[list[int]], people: int, wal
         each[of] = row[: len(of)]
         each[people:] = row[len(row) - walls :]
     return full
-
-
-def _check_start(scenario: Scenario, controller: MPCCBF, people: tuple[Person, ...]) -> None:
-    h = controller.barriers(scenario.start[:2], people)
-    if len(h) and h.min() < 0:
-        i = int(h.argmin())
-        of = f"person {i}" if i < len(people) else f"wall {i - len(people)}"
-        raise SolverError(
-            f"{scenario.name!r} starts in violation: h = {h[i]:.3f} m for {of} at "
-            f"{scenario.start[:2].tolist()}; start where h >= 0"
-        )
-    if controller.goal_blocked(scenario.goal, people):
-        raise SolverError(
-            f"{scenario.name!r}: the goal {scenario.goal.tolist()} cannot be reached: it lies in the zone of "
-            "somebody who stands; choose one where h >= 0"
-        )
-    speed, limit = float(np.hypot(*scenario.start[2:])), controller.settings.v_max
-    if speed > limit:
-        raise SolverError(f"{scenario.name!r} starts at {speed:.3f} m/s; the limit is {limit} m/s")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..checks import Array
 from ..control.problem import TOLERANCE
-from ..control.step import RUNGS
+from ..control.step import FALLBACKS
 from .outcomes import classify_outcome
 from .run import Run, nanmin
 from .scenario import GOAL_RADIUS, STOPPED_SPEED
@@ -106,7 +106,7 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "flagged_steps": int(run.flagged[applied].sum()),
         "unflagged_violations": int((run.safe[applied] & violated).sum()),
         "unflagged_overlaps": int((run.safe[applied] & overlap).sum()),
-        **{f"steps_{name}": int((run.fallback[applied] == name).sum()) for name in RUNGS},
+        **{f"steps_{name}": int((run.fallback[applied] == name).sum()) for name in FALLBACKS},
         "max_slack": float(run.slack[applied].max(initial=0.0)),
         **dict(zip(SOLVE_TIMES, solve_times, strict=True)),
     }

@@ -19,7 +19,7 @@ import numpy as np
 import traitlets
 
 from ..checks import Array, check_array
-from ..control.acceleration_polygon import admissible
+from ..control.acceleration_polygon import find_admissible_controls
 from ..control.barriers import check_wall
 from ..control.mpc import MPCCBF
 from ..control.person import Person
@@ -396,10 +396,10 @@ def _robot_snapshot(
 ) -> dict[str, Any]:
     """One time of one robot, for `static/laboratory.js`."""
     placed = np.array([(*p.position, p.heading or 0.0) for p in people]).reshape(-1, 3)
-    allowed = admissible(step).polygon.simplify(_POLYGON_TOLERANCE)
+    allowed = find_admissible_controls(step).polygon.simplify(_POLYGON_TOLERANCE)
     parts = [part for part in getattr(allowed, "geoms", [allowed]) if part.geom_type == "Polygon"]
     zones = [zone] * len(people)
-    return snapshot(t, state, placed, zones, step.predicted, step.h, step.rung) | {
+    return snapshot(t, state, placed, zones, step.predicted, step.h, step.fallback) | {
         "control": step.control.round(3).tolist(),
         "a_max": step.scene.settings.a_max,
         "allowed": [

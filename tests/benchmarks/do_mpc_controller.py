@@ -9,7 +9,7 @@ import numpy as np
 import szlib
 from szlib.checks import Array
 from szlib.control.barriers import barrier, cbf_residual, ellipse_formula
-from szlib.control.person import place
+from szlib.control.person import place_zone
 
 
 def do_mpc_step(settings: szlib.MPCSettings, zone: szlib.Ellipse) -> Callable[..., Array]:
@@ -50,7 +50,7 @@ def do_mpc_step(settings: szlib.MPCSettings, zone: szlib.Ellipse) -> Callable[..
     def predictions(_: float) -> object:
         for k in range(s.N + 1):
             template["_tvp", k, "target"] = known["target"]
-            seen = [place(known["person"].after(j * s.dt), zone)[:5] for j in (k, k + 1)]
+            seen = [place_zone(known["person"].after(j * s.dt), zone)[:5] for j in (k, k + 1)]
             template["_tvp", k, "here"], template["_tvp", k, "after"] = (np.array(each) for each in seen)
             template["_tvp", k, "active"] = float(k < s.N_h)
         return template

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 import szlib
-from szlib.control.acceleration_polygon import admissible
+from szlib.control.acceleration_polygon import find_admissible_controls
 from szlib.control.step import Step
 
 ZONE = szlib.Ellipse((0.05, 0.0), (0.97, 0.75))
@@ -39,7 +39,7 @@ def with_first(step: Step, a: np.ndarray) -> Step:
 @pytest.mark.parametrize("moment", MOMENTS)
 def test_inside_every_row_is_obeyed_and_outside_one_is_not(moment: str, n_h: int) -> None:
     step = step_at(*MOMENTS[moment], N_h=n_h)
-    polygon = admissible(step).polygon
+    polygon = find_admissible_controls(step).polygon
     edge, inside = polygon.boundary, 0
     for a in np.random.default_rng(n_h).uniform(-1, 1, (300, 2)):
         point = shapely.Point(a)
@@ -52,27 +52,27 @@ def test_inside_every_row_is_obeyed_and_outside_one_is_not(moment: str, n_h: int
 
 def test_nothing_beyond_the_bounds_of_the_acceleration_is_allowed() -> None:
     step = step_at(*MOMENTS["at full speed"])
-    assert shapely.box(-1, -1, 1, 1).buffer(1e-9).covers(admissible(step).polygon)
+    assert shapely.box(-1, -1, 1, 1).buffer(1e-9).covers(find_admissible_controls(step).polygon)
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
 def test_the_control_of_a_feasible_step_is_allowed(moment: str) -> None:
     step = step_at(*MOMENTS[moment])
     assert step.feasible
-    assert admissible(step).polygon.distance(shapely.Point(step.control)) < 1e-3
+    assert find_admissible_controls(step).polygon.distance(shapely.Point(step.control)) < 1e-3
 
 
 def test_alone_at_rest_every_acceleration_is_allowed() -> None:
     step = step_at([0.0, 0.0, 0.0, 0.0], szlib.Person((500.0, 0.0), heading=0.0), [])
-    found = admissible(step)
+    found = find_admissible_controls(step)
     assert found.limits == ()
     slow = szlib.MPCCBF(ZONE).step([0.0, 0.0, 0.0, 0.0], (0.0, 0.0))
-    assert admissible(slow).polygon.area == pytest.approx(4.0)
+    assert find_admissible_controls(slow).polygon.area == pytest.approx(4.0)
 
 
 def test_each_limit_says_who_and_has_what_is_allowed_on_its_left() -> None:
-    found = admissible(step_at(*MOMENTS["backing out"]))
-    assert {(each.kind, each.which) for each in found.limits} == {("person", 0), ("wall", 1)}
+    found = find_admissible_controls(step_at(*MOMENTS["backing out"]))
+    assert {(each.kind, each.number) for each in found.limits} == {("person", 0), ("wall", 1)}
     inner = np.array(found.polygon.representative_point().coords[0])
     for limit in found.limits:
         along, off = limit.curve[-1] - limit.curve[0], inner - limit.curve[0]
@@ -82,4 +82,4 @@ def test_each_limit_says_who_and_has_what_is_allowed_on_its_left() -> None:
 def test_where_no_plan_is_feasible_the_control_is_not_called_allowed() -> None:
     step = step_at([0.0, 0.0, 1.0, 0.0], szlib.Person((1.6, 0.0), (-0.5, 0.0)), [])
     assert not step.feasible
-    assert not admissible(step).polygon.covers(shapely.Point(step.control))
+    assert not find_admissible_controls(step).polygon.covers(shapely.Point(step.control))

@@ -288,7 +288,7 @@ def test_people_come_as_an_array_with_ids_and_whoever_is_lost_makes_the_step_uns
     assert step.safe
     lost = by_row.step(np.zeros(3), OPEN, np.vstack([rows, np.full(4, np.nan)]), ids=["a", "b", "c"])
     assert not lost.safe
-    assert lost.point.lost == 1
+    assert lost.point.unknown == 1
 
 
 def test_walls_may_change_between_steps_and_a_copy_goes_on_alike():

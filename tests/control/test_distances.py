@@ -8,13 +8,12 @@ from hypothesis import strategies as st
 
 import szlib
 from szlib.control.distances import (
-    audit,
+    compare_distances,
+    compute_distance_error,
     euclidean_to_ellipse,
     euclidean_to_segment,
-    overestimate,
+    find_safe_boundary,
     required_margin,
-    safe_edge,
-    with_margin,
 )
 
 coordinate = st.floats(-3, 3, allow_subnormal=False)
@@ -58,7 +57,7 @@ def test_on_the_axes_of_an_ellipse(angle):
 def test_focal_distance_never_overestimates(some, ellipse):
     true = euclidean_to_ellipse(some, ellipse)
     assert (np.abs(szlib.ellipse_distance(some, ellipse)) <= np.abs(true) + 1e-9).all()
-    assert (overestimate(some, ellipse)[true > 0] <= 1e-9).all()
+    assert (compute_distance_error(some, ellipse)[true > 0] <= 1e-9).all()
 
 
 @given(lengths, radii, st.floats(0, 2 * np.pi), st.floats(0, 1))
@@ -83,37 +82,36 @@ def test_and_no_smaller_one_is(length, radius):
 
 
 @given(ellipses, st.floats(0.05, 1.5))
-def test_safe_edge_of_an_ellipse(ellipse, distance):
-    assert szlib.ellipse_distance(safe_edge(ellipse, distance, 50), ellipse) == pytest.approx(
+def test_safe_boundary_of_an_ellipse(ellipse, distance):
+    assert szlib.ellipse_distance(find_safe_boundary(ellipse, distance, 50), ellipse) == pytest.approx(
         distance, abs=1e-9
     )
 
 
 @given(points, points, st.floats(0.05, 1.5))
-def test_safe_edge_of_a_wall(a, b, distance):
+def test_safe_boundary_of_a_wall(a, b, distance):
     if np.hypot(*np.subtract(a, b)) < 1e-2:
         return
-    edge = safe_edge([a, b], distance, 50)
+    edge = find_safe_boundary([a, b], distance, 50)
     assert szlib.segment_distance(edge, a, b) == pytest.approx(distance, abs=1e-6)
 
 
 def test_the_papers_margin():
     wall = lambda length: [(-length / 2, 0.0), (length / 2, 0.0)]  # noqa: E731
-    one = audit(wall(1.0), r_robot=0.5, eps=0.05)
+    one = compare_distances(wall(1.0), r_robot=0.5, eps=0.05)
     assert one.nearest == pytest.approx((np.sqrt(1 + 4 * 0.55) - 1) / 2 - 0.5)  # d = s + s^2/L on the line
-    assert audit(wall(5.0), r_robot=0.5, eps=0.05).nearest == pytest.approx(0, abs=1e-12)
+    assert compare_distances(wall(5.0), r_robot=0.5, eps=0.05).nearest == pytest.approx(0, abs=1e-12)
     for length in (0.3, 1.0, 3.0):
-        enough = audit(wall(length), r_robot=0.5, eps=required_margin(wall(length), 0.5))
+        enough = compare_distances(wall(length), r_robot=0.5, eps=required_margin(wall(length), 0.5))
         assert enough.nearest == pytest.approx(0, abs=1e-9)
-    zone = audit(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), r_robot=0.5, eps=0.05)
+    zone = compare_distances(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), r_robot=0.5, eps=0.05)
     assert zone.nearest == pytest.approx(0.05)
     assert zone.farthest > 0.05
 
 
 def test_controller_uses_the_margin():
     walls = [[(0.0, 0.0), (1.0, 0.0)], [(0.0, 5.0), (9.0, 5.0)]]
-    settings = with_margin(szlib.MPCSettings(), walls)
+    settings = szlib.MPCSettings(margin="paper", eps=max(required_margin(wall, 0.5) for wall in walls))
     assert settings.eps == 0.25
-    assert with_margin(settings, []) == settings
     controller = szlib.MPCCBF(szlib.Ellipse((0.0, 0.0), (1.0, 0.7)), walls=walls, settings=settings)
     assert controller.barriers((1.5, 0.0))[0] == pytest.approx(0)

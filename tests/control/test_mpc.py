@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import minimize
 
 import szlib
-from szlib.control.person import place
+from szlib.control.person import place_zone
 from szlib.control.problem import TOLERANCE, build_problem
 from szlib.control.solvers.ipopt import Ipopt
 from szlib.control.solvers.sqp import Sqp
@@ -345,7 +345,7 @@ def test_where_the_hard_problem_has_a_solution_the_relaxed_one_finds_it(kind):
     while compared < 25:
         state = np.r_[rng.uniform((-5, -1), (-2, 1)), rng.uniform(-0.5, 0.5, 2)]
         goal = (10 ** rng.uniform(0.7, 2), 0.0)
-        parameters = np.r_[state, goal, 0.0, 0.0, place(FACING, ZONE)]
+        parameters = np.r_[state, goal, 0.0, 0.0, place_zone(FACING, ZONE)]
         hard, converged = solver.hard(np.zeros(16), parameters)
         if converged and hard.slack <= TOLERANCE:
             compared += 1
@@ -357,7 +357,7 @@ def test_where_the_hard_problem_has_a_solution_the_relaxed_one_finds_it(kind):
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_where_a_distance_has_no_gradient_the_robot_still_gets_a_control(solver):
     controller = szlib.MPCCBF(ZONE, walls=[((-1, 3), (1, 3))], settings=szlib.MPCSettings(solver=solver))
-    focus = controller.placed_zones([FACING])[0].foci[0]
+    focus = controller.zone_of(FACING).placed(FACING.position, FACING.heading).foci[0]
     for position in (focus, (0.0, 3.0)):
         step = controller.step((*position, 0, 0), GOAL, [FACING])
         assert not step.safe

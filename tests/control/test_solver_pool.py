@@ -12,7 +12,7 @@ import shapely
 from helpers.random_states import ZONE, questions
 
 import szlib
-from szlib.control.barriers import walls_of
+from szlib.control.barriers import read_walls
 from szlib.control.solvers import solver_pool
 from szlib.control.solvers.solver_pool import UNFELT, rounded
 from szlib.simulation.closed_loop import advance
@@ -75,7 +75,7 @@ def test_empty_slots_do_not_change_the_control(monkeypatch, solver, count, formu
         assert controller._sizes.of(len(question.people), len(question.walls)).evaluate.size == (4, 4)
         for exact, padded in zip(*answers, strict=True):
             assert padded.control == pytest.approx(exact.control, abs=1e-6)
-            assert padded.rung == exact.rung
+            assert padded.fallback == exact.fallback
             assert padded.slack == pytest.approx(exact.slack, abs=1e-6)
             assert padded.h == pytest.approx(exact.h) and padded.residual.shape == exact.residual.shape
             assert padded.residual == pytest.approx(exact.residual, abs=1e-5)
@@ -147,7 +147,7 @@ BOX = shapely.box(0, 0, 4, 2)
     ids=lambda each: type(each).__name__ if not isinstance(each, int) else str(each),
 )
 def test_walls_may_be_segments_lines_and_shapes(walls, count):
-    segments = walls_of(walls)
+    segments = read_walls(walls)
     assert segments.shape == (count, 2, 2)
     if hasattr(walls, "boundary") and hasattr(walls, "length"):
         assert np.hypot(*(segments[:, 1] - segments[:, 0]).T).sum() == pytest.approx(walls.length)
@@ -155,7 +155,7 @@ def test_walls_may_be_segments_lines_and_shapes(walls, count):
 
 
 def test_the_same_wall_in_any_shape_gives_the_same_control():
-    rings = [BOX, BOX.exterior, list(BOX.exterior.coords), walls_of(BOX)]
+    rings = [BOX, BOX.exterior, list(BOX.exterior.coords), read_walls(BOX)]
     steps = [controller_of(walls=walls).step((-1.0, 1.0, 0.4, 0), (5.0, -2.0)) for walls in rings]
     assert all(np.array_equal(step.control, steps[0].control) for step in steps)
     assert len(steps[0].h) == 4

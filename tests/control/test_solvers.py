@@ -1,4 +1,4 @@
-"""The two solvers side by side, the rungs of the ladder, and what the terminal conditions promise."""
+"""The two solvers side by side, the fallbacks of the ladder, and what the terminal conditions promise."""
 
 import ast
 from dataclasses import replace
@@ -109,7 +109,7 @@ def test_steps_that_raise_the_merit_for_a_while_end_in_the_same_plan(monkeypatch
         monkeypatch.setattr(sqp, "RISES", rises)
         answers.append([question.ask(settings_of("sqp", **formulation)) for question in asked])
     for steps in zip(*answers, strict=True):
-        assert len({step.rung for step in steps}) == 1
+        assert len({step.fallback for step in steps}) == 1
         for step in steps[1:]:
             assert step.control == pytest.approx(steps[0].control, abs=1e-5)
 
@@ -130,7 +130,7 @@ def test_the_rungs_warm_and_cold_give_the_same_control(solver):
     warm = controller.step(state, GOAL, [FACING])
     controller._plan[:] = np.nan
     cold = controller.step(state, GOAL, [FACING])
-    assert (warm.rung, cold.rung) == ("warm", "cold")
+    assert (warm.fallback, cold.fallback) == ("warm", "cold")
     assert cold.control == pytest.approx(warm.control, abs=1e-5)
     assert warm.feasible and cold.feasible
 
@@ -144,7 +144,7 @@ def test_the_rung_kept_goes_on_with_a_plan_that_still_holds(solver, monkeypatch)
     for k in range(1, 8):
         state = advance(state, before.control if k == 1 else step.control, 0.1)  # noqa: F821
         step = controller.step(state, GOAL, [FACING])
-        assert step.rung == step.status == "kept" and step.feasible
+        assert step.fallback == step.status == "kept" and step.feasible
         assert state == pytest.approx(before.predicted[k])
     assert step.predicted[1, 2:] == pytest.approx((0, 0), abs=TOLERANCE)
 
@@ -153,7 +153,7 @@ def test_the_rung_kept_goes_on_with_a_plan_that_still_holds(solver, monkeypatch)
 @pytest.mark.parametrize("formulation", ({}, {"N_h": 8}), ids=str)
 def test_the_rung_relaxed_says_by_how_much_the_hard_problem_is_violated(solver, formulation):
     step = controller_of(solver, **formulation).step((-1.9, 0.0, 0.7, 0.0), GOAL, [FACING])
-    assert step.rung == step.status == "relaxed"
+    assert step.fallback == step.status == "relaxed"
     assert step.slack == pytest.approx(-step.residual.min()) and step.slack > 1e-3
     assert not step.feasible and not step.safe
 
@@ -163,7 +163,7 @@ def test_the_rung_braking_is_what_remains_when_no_solver_has_an_answer(solver, m
     controller = controller_of(solver)
     broken(monkeypatch, controller, "hard", "relaxed")
     step = controller.step((-3.0, 0.0, 0.8, -0.4), GOAL, [FACING])
-    assert step.rung == step.status == "braking"
+    assert step.fallback == step.status == "braking"
     assert step.control == pytest.approx((-1.0, 0.5))
     assert step.predicted[-1, 2:] == pytest.approx((0, 0), abs=1e-12)
 
@@ -172,7 +172,7 @@ def test_the_rung_braking_is_what_remains_when_no_solver_has_an_answer(solver, m
 def test_a_robot_too_fast_to_stop_within_the_horizon_brakes(solver):
     controller = controller_of(solver, terminal="rest")
     step = controller.step((-4.0, 0.0, 1.0, 0.0), GOAL, [FACING])
-    assert step.rung == "braking"
+    assert step.fallback == "braking"
     assert step.slack == pytest.approx(0.2) and not step.feasible
     assert step.control == pytest.approx((-1.0, 0.0))
 
@@ -210,7 +210,7 @@ def test_with_rest_at_its_end_no_plan_among_walls_and_standing_people_is_ever_in
             continue
         for x, step, _ in drive(controller, state, question.goal, people, 120):
             asked += 1
-            assert step.feasible, (x, step.rung, step.slack)
+            assert step.feasible, (x, step.fallback, step.slack)
             assert step.h.min(initial=0) >= -TOLERANCE
             assert np.abs(step.predicted[-1, 2:]).max() <= TOLERANCE
     assert asked > 40 * worlds
@@ -234,17 +234,17 @@ def rooms(seed):
 
 @pytest.mark.parametrize(("solver", "worlds"), [("sqp", 60), ("ipopt", 3)])
 def test_with_rest_at_its_end_nobody_who_walks_as_predicted_is_hit_by_a_moving_robot(solver, worlds):
-    rungs, reached = set(), 0
+    fallbacks, reached = set(), 0
     for state, goal, people, walls in islice(rooms(seed=3), worlds):
         controller = controller_of(solver, walls, terminal="rest")
         for x, step, _ in drive(controller, state, goal, people, 150):
-            rungs.add(step.rung)
+            fallbacks.add(step.fallback)
             if step.h.min() < -10 * TOLERANCE:
                 reached += 1
                 assert x[2:] == pytest.approx((0, 0), abs=1e-5)
                 break
     assert reached >= worlds // 10
-    assert solver == "ipopt" or {"warm", "kept", "relaxed"} <= rungs
+    assert solver == "ipopt" or {"warm", "kept", "relaxed"} <= fallbacks
 
 
 @pytest.mark.parametrize(("solver", "worlds"), [("sqp", 30), ("ipopt", 3)])
@@ -258,7 +258,7 @@ def test_at_a_persons_pace_at_its_end_no_plan_is_infeasible_although_they_walk(s
             continue
         for x, step, _ in drive(controller, state, -state[:2], [person], 100):
             asked += 1
-            assert step.feasible, (x, step.rung, step.slack)
+            assert step.feasible, (x, step.fallback, step.slack)
             assert step.h.min() >= -TOLERANCE
             assert step.predicted[-1, 2:] == pytest.approx(person.velocity, abs=TOLERANCE)
 

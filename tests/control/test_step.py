@@ -232,7 +232,7 @@ def test_a_step_whose_time_is_up_takes_the_next_rung_and_says_so(monkeypatch, ti
         assert np.isfinite(step.control).all() and np.abs(step.control).max() <= 1
         assert step.timed_out <= (step.status != "optimal")
         assert step.feasible == (step.slack <= 1e-6)
-        if tick == 1.0 and step.rung not in ("warm", "kept"):
+        if tick == 1.0 and step.fallback not in ("warm", "kept"):
             assert step.timed_out
         if tick == 1e-4 and not step.timed_out:
             unhurried = question.ask(replace(s, time_limit=np.inf))

@@ -102,13 +102,13 @@ def test_people_are_brought_forward_to_now():
 
 
 def test_who_is_not_seen_any_more_is_kept_for_a_while_at_constant_velocity():
-    tracker = szlib.Tracker(keep=0.5)
+    tracker = szlib.Tracker(memory=0.5)
     tracker.see([[0, 0, 1.0, 0], [5, 5, 0, 0.5]], ids=["a", "b"], now=0.0)
     for k in range(1, 6):
         seen = tracker.see([[5, 5, 0, 0.5]], ids=["b"], now=0.1 * k)
         assert [p.id for p in seen.people] == ["b", "a"]
         assert seen.people[1].position == pytest.approx((0.1 * k, 0))
-        assert seen.set_aside == seen.lost == 0
+        assert seen.rejected == seen.unknown == 0
     assert [p.id for p in tracker.see([[5, 5, 0, 0.5]], ids=["b"], now=0.6).people] == ["b"]
     tracker.reset()
     assert tracker.see(now=0.6).people == ()
@@ -121,7 +121,7 @@ def test_a_clock_that_is_set_back_forgets():
 
 
 def test_a_controller_counts_its_own_steps_where_it_is_given_no_time():
-    controller = controller_of(tracker=szlib.Tracker(keep=0.25))
+    controller = controller_of(tracker=szlib.Tracker(memory=0.25))
     controller.step((-3, 0, 0, 0), GOAL, [[0, 1, 0.5, 0]], ids=["a"])
     there = [controller.step((-3, 0, 0, 0), GOAL).scene.people for _ in range(3)]
     assert [len(people) for people in there] == [1, 1, 0]
@@ -144,13 +144,13 @@ def test_known_people_with_bad_numbers_go_on_and_are_counted(bad):
         row = [0.1, 0, 1.0, 0]
         row[column] = bad
         seen = tracker.see([row], ids=["a"], now=0.2)
-        assert (seen.set_aside, seen.lost) == (1, 0)
+        assert (seen.rejected, seen.unknown) == (1, 0)
         assert seen.people[0].position == pytest.approx((0.2, 0))
     seen = tracker.see([[0.3, 0.1, bad, 0]], ids=["a"], now=0.3)
-    assert (seen.set_aside, seen.lost) == (1, 0)
+    assert (seen.rejected, seen.unknown) == (1, 0)
     assert seen.people[0].position == (0.3, 0.1) and seen.people[0].velocity == (1.0, 0.0)
     seen = tracker.see([[0.3, 0.1, 1, 0]], ids=["a"], stamps=bad, now=0.4)
-    assert (seen.set_aside, seen.lost) == (1, 0)
+    assert (seen.rejected, seen.unknown) == (1, 0)
     assert seen.people[0].position == pytest.approx((0.4, 0.1))
     assert tracker.see([[bad] * 4], ids=["a"], now=2.0)[1:] == (1, 1), "too long ago"
 
@@ -163,7 +163,7 @@ def test_a_robot_that_does_not_know_where_somebody_is_comes_to_rest_and_says_so(
     assert controller.step(state, GOAL, [[0, 0, 0, 0]]).safe
     for _ in range(15):
         step = controller.step(state, GOAL, [[0, 0, 0, 0], [bad, 0, 0, 0]])
-        assert (step.set_aside, step.lost, step.safe) == (1, 1, False)
+        assert (step.rejected, step.unknown, step.safe) == (1, 1, False)
         assert len(step.h) == 1 and step.h.min() >= 0, "the other one is kept out of"
         state = advance(state, step.control, dt)
     assert np.hypot(*state[2:]) < 0.05
@@ -173,7 +173,7 @@ def test_a_robot_that_does_not_know_where_somebody_is_comes_to_rest_and_says_so(
 
 def test_somebody_with_a_place_and_no_velocity_is_kept_out_of_and_counts_as_lost():
     step = controller_of().step((-3, 0, 0.5, 0), GOAL, [[0, 0, np.nan, np.nan]], ids=["new"])
-    assert (step.set_aside, step.lost) == (1, 1) and not step.safe
+    assert (step.rejected, step.unknown) == (1, 1) and not step.safe
     assert step.h == pytest.approx(controller_of().barriers((-3, 0), [szlib.Person((0, 0))]))
 
 
@@ -195,10 +195,11 @@ def test_errors_of_a_program_are_refused(people, more, message):
         controller_of().step((-4, 0, 0, 0), GOAL, people, **more)
 
 
-@pytest.mark.parametrize("options", [{"keep": -1}, {"keep": np.inf}, {"walking": np.nan}, {"walking": "1"}])
-def test_a_tracker_without_a_meaning_is_refused(options):
-    with pytest.raises(szlib.SolverError, match=f"{next(iter(options))} must be"):
-        szlib.Tracker(**options)
+@pytest.mark.parametrize("name", ["memory", "walking_speed"])
+@pytest.mark.parametrize("value", [-1, np.inf, np.nan, "1"])
+def test_tracker_parameters_must_be_finite_and_not_negative(name, value):
+    with pytest.raises(szlib.SolverError, match=f"{name} must be"):
+        szlib.Tracker(**{name: value})
 
 
 # arrays

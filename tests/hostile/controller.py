@@ -194,7 +194,7 @@ def attack_steps(count: int, tally: Counter[str], seed: int = 0, solver: str = "
                     continue
                 tally["steps"] += 1
                 tally["steps safe"] += int(step.safe)
-                tally[f"steps {step.rung}"] += 1
+                tally[f"steps {step.fallback}"] += 1
                 tally["steps timed out"] += int(step.timed_out)
                 for fault in judge.faults(state, goal, step):
                     tally[f"broken: {fault}"] += 1

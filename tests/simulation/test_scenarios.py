@@ -213,7 +213,7 @@ def test_turning_everybody_around_turns_only_the_headings():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"start": (-1.2, 0, 0, 0)}, r"'passing' starts in violation: h = -0\.\d+ m for person 0"),
+        ({"start": (-1.2, 0, 0, 0)}, r"'passing': the run starts in violation: h = -0\.\d+ m for person 0"),
         ({"start": (-4, 0, 1.2, 0)}, "starts at 1.200 m/s; the limit is 1.0 m/s"),
         ({"goal": (0.3, 0.0)}, "cannot be reached"),
         ({"walls": [((-5, 0.3), (5, 0.3))]}, "starts in violation: .* for wall 0"),

@@ -45,7 +45,7 @@ def test_an_option_changes_its_robot_only():
     experiment.configure_robot(1, a_max=0.5, size=2.0, estimator="hull")
     first, second = experiment.decide()
     assert first.scene.settings.a_max == 1.0 and second.scene.settings.a_max == 0.5
-    assert second.scene.kept[0].semi_axes == pytest.approx((1.8, 1.4))
+    assert second.scene.person_zones[0].semi_axes == pytest.approx((1.8, 1.4))
     with pytest.raises(szlib.SolverError, match="estimator must be one of quantile, hull; got 'circle'"):
         experiment.configure_robot(0, estimator="circle")
     with pytest.raises(szlib.SolverError, match="gamma"):
@@ -61,7 +61,7 @@ def test_a_move_during_the_run_does_not_change_the_start():
     assert step.scene.goal == (3.0, 1.0)
     assert step.scene.people[0].position == (1.0, -0.5)
     assert step.scene.people[0].velocity == pytest.approx((-1.0, 0.0))
-    assert step.scene.walls == [[-6, 2, 7, 2]]
+    assert [wall[:4] for wall in step.scene.walls] == [[-6, 2, 7, 2]]
     experiment.restart()
     assert experiment.people[0].position == (4.0, 0.0)
     experiment.move(people={0: [2.0, 0.0]})  # before the first step: the start

@@ -1,4 +1,4 @@
-"""What is done where a solver has no answer: each step climbs down a ladder until a rung holds.
+"""What is done where a solver has no answer: each step climbs down a ladder until a fallback holds.
 
     warm      the problem, from the last plan, changed as it changed in the step before
     cold      the problem, from full braking
@@ -8,7 +8,7 @@
     braking   to rest as soon as the bounds allow
 
 Where the time of a step is up, what is left of the ladder is skipped; a relaxed plan that was cut short is
-taken if it violates no more than braking would. What the rung "kept" is good for: see `szlib.control.mpc`.
+taken if it violates no more than braking would. For the reason of "kept" see `szlib.control.mpc`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ import numpy as np
 from ...checks import Array
 from ..problem import HARD_SHARE, TOLERANCE, Numbers, ProblemSolver
 from ..settings import MPCSettings
-from ..step import Rung
+from ..step import Fallback
 
 
 def solve_with_fallbacks(
     solver: ProblemSolver, last_plan: Array, change: Array, parameters: Array
-) -> tuple[Rung, Numbers, bool]:
-    """The first rung that holds, its plan in numbers, and whether the time was up.
+) -> tuple[Fallback, Numbers, bool]:
+    """The first fallback that holds, its plan in numbers, and whether the time was up.
 
     Plans are inputs, shape (2N,) [m/s2], `change` is that of the last one; `parameters` as in `Problem`.
     A plan changes little from step to step, seen from the robot: which of its inputs a barrier holds depends
@@ -33,18 +33,18 @@ def solve_with_fallbacks(
     """
     s = solver.settings
     ends, late, start = s.terminal != "none", False, None
-    rung: Rung
-    for rung in ("warm", "cold"):
-        if rung == "cold" and solver.budget.spent(HARD_SHARE / 2):
+    fallback: Fallback
+    for fallback in ("warm", "cold"):
+        if fallback == "cold" and solver.budget.spent(HARD_SHARE / 2):
             late = True
             break
-        if rung == "warm":
+        if fallback == "warm":
             guess = np.minimum(np.maximum(last_plan + change, -s.a_max), s.a_max)
         else:
             guess = _brake(s, parameters[2:4])
         plan, converged = solver.hard(guess, parameters)
         if converged and plan.slack <= TOLERANCE:
-            return rung, plan, late
+            return fallback, plan, late
         late |= solver.late
         start = plan.inputs if solver.late and np.isfinite(plan.inputs).all() else start
     shifted = np.zeros(last_plan.size)
@@ -59,8 +59,8 @@ def solve_with_fallbacks(
     if (converged or solver.late) and np.isfinite(plan.inputs).all():
         better = converged or plan.slack <= braking.slack
         if better and (not safe_end or _safe_to_its_end(plan, parameters)):
-            rung = "warm" if converged and plan.slack <= TOLERANCE else "relaxed"
-            return rung, plan, late
+            fallback = "warm" if converged and plan.slack <= TOLERANCE else "relaxed"
+            return fallback, plan, late
     if safe_end:
         return "kept", kept, late
     return "braking", braking, late

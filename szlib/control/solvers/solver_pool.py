@@ -120,7 +120,10 @@ def _solver(settings: MPCSettings, n_people: int, n_walls: int) -> ProblemSolver
 
 
 def slots(
-    x: Sequence[float], zones: Sequence[Sequence[float]], walls: Sequence[float], size: tuple[int, int]
+    x: Sequence[float],
+    zones: Sequence[Sequence[float]],
+    walls: Sequence[Sequence[float]],
+    size: tuple[int, int],
 ) -> list[float]:
     """Zones (7 numbers each) and walls (5) as in `Problem.parameters`, with empty slots up to `size`.
 
@@ -131,8 +134,9 @@ def slots(
     for zone in zones:
         numbers += zone
     numbers += (size[0] - len(zones)) * (there, y, there, y, -UNFELT, 0.0, 0.0)
-    numbers += walls
-    numbers += (size[1] - len(walls) // 5) * (there, y, there, y + 1.0, -UNFELT)
+    for wall in walls:
+        numbers += wall
+    numbers += (size[1] - len(walls)) * (there, y, there, y + 1.0, -UNFELT)
     return numbers
 
 

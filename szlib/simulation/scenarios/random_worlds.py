@@ -13,7 +13,7 @@ import numpy as np
 from ...checks import Array
 from ...control.barriers import barrier, euclidean_segment_formula, segment_formula
 from ...control.distances import required_margin
-from ...control.person import BODY_RADIUS, Person, PlacedZone, place
+from ...control.person import BODY_RADIUS, Person, PlacedZone, place_zone
 from ...control.settings import MPCSettings
 from ...errors import SolverError
 from ...zones.ellipses import Ellipse
@@ -107,7 +107,7 @@ def make_world(seed: int, worlds: Worlds | None = None) -> Scenario:
         if not w.travel[0] <= np.hypot(*(goal - x)) <= w.travel[1]:
             continue
         eps = max([_DRIVER.eps, *(required_margin(wall, _DRIVER.r_robot) for wall in walls)])
-        everybody = [place(person, zone) for person in people]
+        everybody = [place_zone(person, zone) for person in people]
         standing = [where for where, person in zip(everybody, people, strict=True) if person.stands]
         stop = x + velocity * speed / (2 * _DRIVER.a_max)
         held = ((x, everybody), (stop, everybody), (goal, standing))

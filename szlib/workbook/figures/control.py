@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike
 from shapely.plotting import patch_from_polygon
 
 from ...checks import Array
-from ...control.acceleration_polygon import Limit, admissible
+from ...control.acceleration_polygon import BarrierLimit, find_admissible_controls
 from ...control.barriers import barrier, check_wall, ellipse_distance, segment_distance
 from ...control.distances import (
+    compute_distance_error,
     euclidean_to_ellipse,
     euclidean_to_segment,
-    overestimate,
+    find_safe_boundary,
     required_margin,
-    safe_edge,
 )
 from ...control.step import Step
 from ...zones.ellipses import Ellipse
@@ -104,13 +104,13 @@ def plot_distance_error(
         true = euclidean_to_ellipse(grid, shape)
     else:
         true = euclidean_to_segment(grid, *check_wall(shape))
-    error = np.ma.masked_where((true < 0) | (true > _MAX_DISTANCE), 100 * overestimate(grid, shape))
+    error = np.ma.masked_where((true < 0) | (true > _MAX_DISTANCE), 100 * compute_distance_error(grid, shape))
     image = ax.pcolormesh(x, y, error, cmap="RdBu_r", vmin=-25, vmax=25, rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.85, label="d - Euclidean [cm]; red is dangerous")
     ax.plot(*_outline(shape).T, color=BLACK, linewidth=3)
     margins = dict.fromkeys((eps, max(eps, required_margin(shape, r_robot))))
     for margin, line in zip(margins, ("-", "--"), strict=False):
-        edge = safe_edge(shape, r_robot + margin)
+        edge = find_safe_boundary(shape, r_robot + margin)
         label = f"h = 0, eps = {100 * margin:.0f} cm"
         ax.plot(*np.vstack([edge, edge[:1]]).T, line, color=BLACK, linewidth=1.8, label=label)
     ax.contour(x, y, true, levels=[r_robot], colors=[BLACK], linestyles=[":"], linewidths=1.8)
@@ -156,15 +156,15 @@ def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
     'a_x [m/s²]'
     """
     ax, a_max = get_axes(ax, size=(5, 4.6)), step.scene.settings.a_max
-    found, reach = admissible(step), 1.25 * a_max
+    found, reach = find_admissible_controls(step), 1.25 * a_max
     if not found.polygon.is_empty:
         ax.add_patch(patch_from_polygon(found.polygon, facecolor=GREEN, alpha=0.45, label="allowed"))
     bounds = Rectangle((-a_max, -a_max), 2 * a_max, 2 * a_max, fill=False, edgecolor=GREY, lw=1)
     ax.add_patch(bounds).set_label("bound of the acceleration")
     for limit, forbidden in _strictest_limits(found.limits, reach):
-        wall_line = _WALL_LINES[limit.which % len(_WALL_LINES)]
+        wall_line = _WALL_LINES[limit.number % len(_WALL_LINES)]
         colour, line = (RED, "-") if limit.kind == "person" else (BLACK, wall_line)
-        name = f"{limit.kind} {limit.which}, step {limit.k} to {limit.k + 1}"
+        name = f"{limit.kind} {limit.number}, step {limit.k} to {limit.k + 1}"
         ax.plot(*limit.curve.T, linestyle=line, color=colour, linewidth=1.8, label=name)
         if not forbidden.is_empty:
             hatched = patch_from_polygon(
@@ -180,14 +180,17 @@ def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _strictest_limits(limits: tuple[Limit, ...], reach: float) -> list[tuple[Limit, Any]]:
+def _strictest_limits(limits: tuple[BarrierLimit, ...], reach: float) -> list[tuple[BarrierLimit, Any]]:
     """The limit of each person and wall that forbids most of the figure, and the part that it forbids."""
-    box, strictest = shapely.box(-reach, -reach, reach, reach), dict[tuple[str, int], tuple[Limit, Any]]()
+    box, strictest = (
+        shapely.box(-reach, -reach, reach, reach),
+        dict[tuple[str, int], tuple[BarrierLimit, Any]](),
+    )
     for limit in limits:
         (x0, y0), (x1, y1) = limit.curve[0], limit.curve[-1]
         right = np.array([y1 - y0, x0 - x1]) / np.hypot(x1 - x0, y1 - y0)
         side = shapely.Polygon(np.vstack([limit.curve, limit.curve[::-1] + 4 * reach * right]))
-        forbidden, source = side.intersection(box), (limit.kind, limit.which)
+        forbidden, source = side.intersection(box), (limit.kind, limit.number)
         if source not in strictest or forbidden.area > strictest[source][1].area:
             strictest[source] = limit, forbidden
     return list(strictest.values())
@@ -233,13 +236,13 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
     arrow: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.008, "zorder": 3}
     ax.quiver(x, y, vx, vy, color=BLUE, **arrow)
     ax.plot(*step.predicted[:, :2].T, ".-", color=GREEN, markersize=4, linewidth=1, label="plan")
-    for person, zone in zip(scene.people, scene.kept, strict=True):
+    for person, zone in zip(scene.people, scene.person_zones, strict=True):
         (px, py), heading = person.position, person.heading or 0.0
         curves.append(zone.placed((px, py), heading).curve())
         ax.plot(*curves[-1].T, color=RED, linewidth=1.8, label="zone")
         draw_person(ax, px, py, heading, color=RED, markersize=7)
         ax.quiver(px, py, *person.velocity, color=RED, **arrow)
-    for j, (xa, ya, xb, yb) in enumerate(scene.walls):
+    for j, (xa, ya, xb, yb, _) in enumerate(scene.walls):
         ax.plot((xa, xb), (ya, yb), color=BLACK, linewidth=3, solid_capstyle="round", label="wall")
         wall = shapely.LineString([(xa, ya), (xb, yb)])
         beside = np.clip(wall.project(shapely.Point(x, y)), 0.6, max(0.6, wall.length - 0.6))
