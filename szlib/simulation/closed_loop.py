@@ -196,7 +196,7 @@ class _Cast:
 
 
 def _told(step: Any, took: float) -> tuple[Any, ...]:
-    """What is logged of a step, empty where it does not tell it: control, plan, conditions, fallback, whether it
+    """What is logged of a step, empty where it does not tell it: control, plan, conditions, fallback, if it
     is safe, slack, time. The step itself is let go: a thousand objects that stay cost a garbage collection.
     """
     return (
