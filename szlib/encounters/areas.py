@@ -1,11 +1,9 @@
-"""Which area: as it is written (`as_area`), or where people walked everywhere (`walked_area`)."""
+"""Areas: one in any form (`as_area`), or the area in which people walked everywhere (`walked_area`)."""
 
 from __future__ import annotations
 
-import json
 import re
 import warnings
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,35 +26,35 @@ EXPECTED = (
     f'"{AUTO}"'
 )
 
-CELL, PEOPLE = 0.5, 3
-"""People walked everywhere where on each cell so wide [m] so many walked (measured: finds the rectangle of
-the ATC mall that was found by eye, and the open hall of Grand Central; cells of 1 m overlook pillars)."""
-TYPICAL, WIDEST = 4 * PEOPLE, 2.0
-"""While the median cell where anybody walked saw no more people, cells are doubled, up to this width [m]:
-with few people a cell is empty by chance (measured on plazas of 100 to 2,600 encounters)."""
-WALKING = 0.4
-"""Who is slower [m/s] stands, queues or sits (paper: 0.4 for a reference pedestrian)."""
-NARROWEST = float(np.hypot(PAPER_SPACE.length, PAPER_SPACE.width))
-"""In less [m] the attentional space cannot turn."""
-SHORTEST = PAPER_SPACE.length + 3 * 1.2
+_CELL, _PEOPLE = 0.5, 3
+"""People walked everywhere where at least so many walked on each cell of this width [m] (measured: it finds
+the rectangle of the ATC mall that was found by eye, and the hall of Grand Central; 1 m misses pillars)."""
+_SPARSE, _WIDEST = 4 * _PEOPLE, 2.0
+"""While the median visited cell saw no more people, cells are doubled, up to this width [m]: with few people
+a cell is empty by chance (measured on plazas of 100 to 2,600 encounters)."""
+_WALKING = 0.4
+"""A slower person [m/s] stands, queues or sits (paper: 0.4 for a reference pedestrian)."""
+_MIN_WIDTH = float(np.hypot(PAPER_SPACE.length, PAPER_SPACE.width))
+"""The attentional space cannot turn in a narrower rectangle [m]."""
+_MIN_LENGTH = PAPER_SPACE.length + 3 * 1.2
 """The space, and 3 s of walking behind it [m]."""
 _LOSS = 2.0
-"""Where no rectangle is wide enough, a cell where nobody walked costs as much as so many are worth (measured
-on THOR-MAGNI, a laboratory with furniture, and ETH, an entrance: 16 % and 8 % of their areas)."""
+"""Where no rectangle is wide enough, a cell where nobody walked costs as much as this number of other cells
+is worth (measured on THOR-MAGNI, a laboratory with furniture, and ETH, an entrance: 16 % and 8 %)."""
 _MOST_CELLS = 400
-"""Along each axis; cells grow with the site."""
-_REAL_TRACKS = 1e-3
-"""This share of positions on either side is left out of the site's extent: trackers jump."""
+"""Largest number of cells along an axis; cells grow with the site."""
+_OUTLYING = 1e-3
+"""Share of positions on either side that does not belong to the site: trackers jump."""
 
 
 def as_area(area: object) -> Area:
-    """An area in one form, whatever it was given as; its text ``str(area)`` gives the same area again.
+    """Convert an area in any form; the text ``str(area)`` gives the same area again.
 
     Parameters
     ----------
-    area : a `Square` or `Region`; a Shapely polygon; what has a ``polygon`` (PedPy's ``WalkableArea`` and
-        ``MeasurementArea``); four numbers x0, x1, y0, y1; or text: these numbers, well-known text, GeoJSON,
-        or the path of a file of one of these.  All in metres, in the frame of the tracks.
+    area : a `Square` or `Region`; a Shapely polygon; an object with a ``polygon`` (PedPy's ``WalkableArea``
+        and ``MeasurementArea``); four numbers x0, x1, y0, y1; or text: these numbers, well-known text,
+        GeoJSON, or the path of a file of one of these.  All in metres, in the frame of the tracks.
 
     Returns
     -------
@@ -64,7 +62,15 @@ def as_area(area: object) -> Area:
 
     Raises
     ------
-    DataError : it is none of these, is not valid, or has no inside.
+    DataError : `area` has another form, is not valid, or has no inside.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> szlib.as_area("0 12 0 8")
+    Square(x=(0.0, 12.0), y=(0.0, 8.0))
+    >>> szlib.as_area("POLYGON ((0 0, 12 0, 12 8, 0 0))").area
+    48.0
     """
     if isinstance(area, Square | Region):
         return area
@@ -85,53 +91,64 @@ def as_area(area: object) -> Area:
 
 
 def area_for(tracks: pd.DataFrame, area: object) -> Area:
-    """`as_area`, but for "auto", which is the `walked_area` of these tracks."""
+    """Convert `area` as `as_area` does; "auto" stands for the `walked_area` of the `tracks`."""
     return walked_area(tracks) if isinstance(area, str) and area.strip() == AUTO else as_area(area)
 
 
-def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, people: int = PEOPLE) -> Square:
-    """The largest rectangle along the axes in which people walked everywhere, wide enough to watch them in.
+def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, n_people: int = _PEOPLE) -> Square:
+    """Find the largest rectangle along the axes in which people walked everywhere.
 
-    Everywhere means: on each square `cell` [m] at least `people` different people walked, at `WALKING`
-    or faster.  The rectangle is at least `NARROWEST` wide and `SHORTEST` long: the attentional space can turn
-    in it.  Where there is none, the area may hold places where nobody walked (furniture, pillars, walls),
-    each of which counts against it, and a DataWarning says how much of it they are: look at the map
-    (`szlib.workbook.figures.plot_map`) before you use it.
+    Everywhere means: on each square cell at least `n_people` different people walked, at 0.4 m/s or faster.
+    The rectangle is so wide and long that the attentional space can turn in it.  If there is none, the area
+    may hold places where nobody walked (furniture, pillars, walls).  Each of them counts against the area,
+    and a DataWarning states their share: look at the map (`szlib.workbook.figures.plot_map`) before you use
+    the area.
 
     Parameters
     ----------
     tracks : a track table as from `szlib.read_tracks`.
-    cell, people : see above; by default the cell is `CELL`, or wider where few people walked (`TYPICAL`);
-        it grows with sites wider than 200 m.
+    cell : width of a cell [m]; None takes 0.5, or more where few people walked.  It grows with sites wider
+        than 200 m.
+    n_people : number of people who must have walked on each cell.
+
+    Returns
+    -------
+    The rectangle.
 
     Raises
     ------
     DataError : there is no such rectangle, or the table lacks a column.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=100))
+    >>> isinstance(szlib.walked_area(szlib.read_tracks(plaza)), szlib.Square)
+    True
     """
     check_columns(tracks, COLUMNS)
-    if not ((cell is None or 0.05 <= cell < np.inf) and people >= 1):
-        raise DataError(f"expected cell >= 0.05 m and people >= 1; got {cell} m, {people}")
-    walks = tracks[np.hypot(*tracks[["vx", "vy"]].to_numpy(float).T) >= WALKING]
+    if not ((cell is None or 0.05 <= cell < np.inf) and n_people >= 1):
+        raise DataError(f"expected cell >= 0.05 m and n_people >= 1; got {cell} m, {n_people}")
+    walks = tracks[np.hypot(*tracks[["vx", "vy"]].to_numpy(float).T) >= _WALKING]
     if len(walks) == 0:
-        raise DataError(f"nobody walks at {WALKING} m/s or faster in these tracks: no area can be found")
-    count, corner, width = _counted(walks, cell or CELL)
-    while cell is None and np.median(count[count > 0]) <= TYPICAL and 2 * width <= WIDEST:
-        count, corner, width = _counted(walks, 2 * width)
-    walked, cell = count >= people, width
-    side = int(np.ceil(NARROWEST / cell))
-    rows, columns, share = _largest(walked, side, np.inf)
-    if cell * max(rows[1] - rows[0], columns[1] - columns[0]) < SHORTEST:
-        rows, columns, share = _largest(walked, side, _LOSS)
-    (i0, i1), (j0, j1) = rows, columns
-    if cell * max(i1 - i0, j1 - j0) < SHORTEST:
-        far = cell * np.array(walked.shape)
+        raise DataError(f"nobody walks at {_WALKING} m/s or faster in these tracks: no area can be found")
+    count, corner, width = _count_people(walks, cell or _CELL)
+    while cell is None and np.median(count[count > 0]) <= _SPARSE and 2 * width <= _WIDEST:
+        count, corner, width = _count_people(walks, 2 * width)
+    walked, side = count >= n_people, int(np.ceil(_MIN_WIDTH / width))
+    for loss in (np.inf, _LOSS):
+        first, end, share = _largest_rectangle(walked, side, loss)
+        if width * (end - first).max() >= _MIN_LENGTH:
+            break
+    else:
+        far = width * np.array(walked.shape)
         raise DataError(
             f"no area was found: within the {far[0]:g} m x {far[1]:g} m of these tracks there is no "
-            f"rectangle of {NARROWEST:.1f} m x {SHORTEST:.1f} m in which {people} people walked on nearly "
-            f"every spot of {cell:g} m; more data may have one, or give the area yourself: {EXPECTED}"
+            f"rectangle of {_MIN_WIDTH:.1f} m x {_MIN_LENGTH:.1f} m in which {n_people} people walked on "
+            f"nearly every cell of {width:g} m; use more data, or give the area yourself: {EXPECTED}"
         )
-    x, y = (tuple(float(c + cell * k) for k in ends) for c, ends in zip(corner, (rows, columns), strict=True))
-    found = Square((x[0], x[1]), (y[0], y[1]))
+    (x0, y0), (x1, y1) = (corner + width * first).tolist(), (corner + width * end).tolist()
+    found = Square((x0, x1), (y0, y1))
     if share < 1:
         warnings.warn(
             f"in {1 - share:.0%} of the area found ({found}) nobody walked, perhaps for furniture, pillars "
@@ -141,10 +158,10 @@ def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, people: int 
     return found
 
 
-def _counted(walks: pd.DataFrame, cell: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """How many people walked on each cell, (nx, ny); the lowest corner [m]; the side of a cell [m]."""
+def _count_people(walks: pd.DataFrame, cell: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Number of people who walked on each cell, (nx, ny); the lowest corner [m]; the width of a cell [m]."""
     at = walks[["x", "y"]].to_numpy(float)
-    low, high = np.quantile(at, [_REAL_TRACKS, 1 - _REAL_TRACKS], axis=0)
+    low, high = np.quantile(at, [_OUTLYING, 1 - _OUTLYING], axis=0)
     while (high - low).max() / cell > _MOST_CELLS:
         cell *= 2
     first, size = np.floor(low / cell), np.floor(high / cell) - np.floor(low / cell) + 1
@@ -158,41 +175,34 @@ def _counted(walks: pd.DataFrame, cell: float) -> tuple[np.ndarray, np.ndarray, 
     return count.reshape(shape), first * cell, cell
 
 
-def _largest(walked: np.ndarray, side: int, loss: float) -> tuple[tuple[int, int], tuple[int, int], float]:
-    """The rectangle with the most cells walked on, less `loss` for each other one; at least `side` wide.
+def _largest_rectangle(walked: np.ndarray, side: int, loss: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """The rectangle with the most cells walked on, minus `loss` for each other cell; at least `side` wide.
 
-    Its rows (first, end), its columns (first, end), and the share walked on; all 0 where there is none.
+    Returns its first cell and its end, each (2,), and the share walked on; all 0 where there is none.
     """
-    none = (0, 0), (0, 0), 0.0
+    best, found = 0.0, (np.zeros(2, int), np.zeros(2, int), 0.0)
     if min(walked.shape) < side:
-        return none
+        return found
     total = np.zeros((walked.shape[0] + 1, walked.shape[1] + 1))
     total[1:, 1:] = np.where(walked, 1.0, -min(loss, walked.size)).cumsum(axis=0).cumsum(axis=1)
-    best, found = 0.0, none
     for top in range(walked.shape[0] - side + 1):
         strips = total[top + side :] - total[top]  # by last row: sums over columns from the first
         least = np.minimum.accumulate(strips[:, :-side], axis=1)
         gain = strips[:, side:] - least
         row, column = np.unravel_index(int(gain.argmax()), gain.shape)
         if gain[row, column] > best:
-            left = int(np.argmax(strips[row] == least[row, column]))
-            rows, columns = (top, top + side + int(row)), (left, int(column) + side)
             best = gain[row, column]
-            found = rows, columns, float(walked[slice(*rows), slice(*columns)].mean())
+            left = int(np.argmax(strips[row] == least[row, column]))
+            first, end = np.array([top, left]), np.array([top + side + int(row), int(column) + side])
+            found = first, end, float(walked[first[0] : end[0], first[1] : end[1]].mean())
     return found
 
 
 def _is_area(text: str) -> bool:
     """Whether a text is an area itself, not the path of a file."""
-    wkt = r"(MULTI)?POLYGON\b.*|\{.*"
-    return bool(re.fullmatch(wkt, text.strip(), flags=re.IGNORECASE | re.DOTALL)) or _all_numbers(text)
-
-
-def _all_numbers(text: str) -> bool:
-    parts = text.replace(",", " ").split()
-    return bool(parts) and all(
-        re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", part, re.I) for part in parts
-    )
+    number = r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?"
+    numbers, polygon = rf"[\s,]*{number}([\s,]+{number})*[\s,]*", r"\s*((MULTI)?POLYGON\b.*|\{.*)"
+    return bool(re.fullmatch(f"{numbers}|{polygon}", text, flags=re.IGNORECASE | re.DOTALL))
 
 
 def _from_numbers(numbers: Any) -> Square:
@@ -224,17 +234,13 @@ def _from_geojson(text: str) -> Area:
     import shapely
 
     try:
-        known = json.loads(text)
-        shapes = [shapely.from_geojson(json.dumps(each)) for each in _geometries(known)]
-    except (ValueError, KeyError, TypeError, shapely.errors.ShapelyError) as error:
+        shape = shapely.from_geojson(text)
+    except shapely.errors.ShapelyError as error:
         raise DataError(f"{printable(text[:40])!r}: is no GeoJSON ({error}); {EXPECTED}") from error
-    return _from_shape(shapely.union_all(shapes) if len(shapes) != 1 else shapes[0])
-
-
-def _geometries(known: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    if known["type"] == "FeatureCollection":
-        return [geometry for feature in known["features"] for geometry in _geometries(feature)]
-    return [known["geometry"]] if known["type"] == "Feature" else [known]
+    if shape.geom_type == "GeometryCollection":
+        parts = shapely.get_parts(shape)
+        shape = shapely.union_all(parts) if len(parts) != 1 else parts[0]
+    return _from_shape(shape)
 
 
 def _from_shape(shape: BaseGeometry) -> Area:

@@ -1,4 +1,4 @@
-"""Where encounters are looked for: an open area and the attentional space (paper, sec. 2)."""
+"""Where encounters are searched: an open area and the attentional space (paper, sec. 2)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Square:
-    """An open rectangle of the world, x and y each (lowest, highest) [m]."""
+    """An open rectangle along the axes of the world.
+
+    Parameters
+    ----------
+    x, y : extent along each axis, (lowest, highest) [m].
+
+    Raises
+    ------
+    DataError : a value is not finite, or the lowest is not below the highest.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> square = szlib.Square(x=(0, 12), y=(0, 8))
+    >>> square.area
+    96
+    >>> square.grown(-1)
+    Square(x=(1, 11), y=(1, 7))
+    """
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -33,12 +51,12 @@ class Square:
 
     @property
     def box(self) -> Square:
-        """The smallest square around it: itself."""
+        """The smallest rectangle around it: itself."""
         return self
 
     @property
     def area(self) -> float:
-        """Its area [m2]."""
+        """Its size [m2]."""
         return (self.x[1] - self.x[0]) * (self.y[1] - self.y[0])
 
     @property
@@ -48,16 +66,17 @@ class Square:
         return [np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)])]
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which points (any shape, the same for x and y) lie inside or on the border."""
+        """Whether each point (arrays `x`, `y` of one shape) lies inside or on the border."""
         return np.asarray((x >= self.x[0]) & (x <= self.x[1]) & (y >= self.y[0]) & (y <= self.y[1]))
 
     def covers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which quadrilaterals lie inside; x and y of their corners in order, each (4, n) [m]; shape (n,)."""
+        """Whether each quadrilateral lies inside; `x`, `y` of its corners in order, each (4, n) [m]."""
         return np.asarray(self.contains(x, y).all(axis=0))
 
-    def grown(self, by: float) -> Square:
-        """The square with `by` metres more on each side."""
-        return Square((self.x[0] - by, self.x[1] + by), (self.y[0] - by, self.y[1] + by))
+    def grown(self, margin: float) -> Square:
+        """The square with a `margin` [m] on each side; smaller where it is negative."""
+        (x0, x1), (y0, y1) = self.x, self.y
+        return Square((x0 - margin, x1 + margin), (y0 - margin, y1 + margin))
 
 
 @dataclass(frozen=True)
@@ -68,6 +87,17 @@ class Region:
     ----------
     wkt : the polygon in metres as well-known text, such as "POLYGON ((0 0, 12 0, 12 8, 0 0))".
         `szlib.as_area` makes it from Shapely's polygons, PedPy's areas and files.
+
+    Raises
+    ------
+    DataError : the text is not a valid polygon.
+
+    Examples
+    --------
+    >>> import numpy as np, szlib
+    >>> region = szlib.Region("POLYGON ((0 0, 12 0, 12 8, 0 0))")
+    >>> region.contains(np.array([8.0, 1.0]), np.array([1.0, 7.0]))
+    array([ True, False])
     """
 
     wkt: str
@@ -80,7 +110,7 @@ class Region:
 
     @cached_property
     def polygon(self) -> BaseGeometry:
-        """The polygon as a Shapely geometry; DataError where the text is none, or it is not valid."""
+        """The polygon as a Shapely geometry; raises DataError if it is not valid."""
         import shapely
 
         try:
@@ -101,13 +131,13 @@ class Region:
 
     @property
     def box(self) -> Square:
-        """The smallest square around it."""
+        """The smallest rectangle along the axes around it."""
         x0, y0, x1, y1 = self.polygon.bounds
         return Square((x0, x1), (y0, y1))
 
     @property
     def area(self) -> float:
-        """Its area [m2]."""
+        """Its size [m2]."""
         return float(self.polygon.area)
 
     @property
@@ -119,15 +149,15 @@ class Region:
         return [shapely.get_coordinates(ring) for ring in rings]
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which points (any shape, the same for x and y) lie inside or on the border."""
+        """Whether each point (arrays `x`, `y` of one shape) lies inside or on the border."""
         import shapely
 
         return np.asarray(shapely.intersects_xy(self.polygon, x, y))
 
     def covers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which quadrilaterals lie inside; x and y of their corners in order, each (4, n) [m]; shape (n,).
+        """Whether each quadrilateral lies inside; `x`, `y` of its corners in order, each (4, n) [m].
 
-        Where the area is not convex, four corners inside are not enough: no pillar may stand between them.
+        Where the area is not convex, four corners inside are not enough: a pillar can stand between them.
         """
         import shapely
 
@@ -140,20 +170,20 @@ class Region:
 
     @cached_property
     def convex(self) -> bool:
-        """Whether it is its own convex hull."""
+        """Whether the area is convex."""
         return bool(self.polygon.equals(self.polygon.convex_hull))
 
     def simplest(self) -> Area:
         """The same area, as a `Square` where it is a rectangle along the axes."""
         return self.box if self.convex and self.polygon.equals(self.polygon.envelope) else self
 
-    def grown(self, by: float) -> Region:
-        """The area with `by` metres more on each side, corners kept; less where `by` is negative."""
-        return Region(self.polygon.buffer(by, join_style="mitre").wkt)
+    def grown(self, margin: float) -> Region:
+        """The area with a `margin` [m] on each side, corners kept; smaller where it is negative."""
+        return Region(self.polygon.buffer(margin, join_style="mitre").wkt)
 
 
 Area = Square | Region
-"""Where encounters are looked for."""
+"""Where encounters are searched."""
 
 ATC_SQUARE = Square(*ATC_AREA)
 """The central square of the ATC mall (assumed; free of pillars, walls and queues on the real day)."""
@@ -161,13 +191,23 @@ ATC_SQUARE = Square(*ATC_AREA)
 
 @dataclass(frozen=True)
 class AttentionalSpace:
-    """The rectangle a pedestrian attends to: 4 m by 5 m in the paper (sec. 2).
+    """The rectangle to which a pedestrian attends: 4 m by 5 m in the paper (sec. 2).
 
     Parameters
     ----------
     length : extent along the direction of motion [m] (paper: 5).
     width : extent across it [m] (paper: 4).
     centred : False puts it ahead of the person, True around them (assumed: ahead).
+
+    Raises
+    ------
+    DataError : a side is not positive.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> szlib.AttentionalSpace(length=3.0, centred=True).ahead
+    (-1.5, 1.5)
     """
 
     length: float = 5.0
@@ -192,7 +232,7 @@ class AttentionalSpace:
         return np.array([(near, -side), (far, -side), (far, side), (near, side)])
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which points of the reference pedestrian's frame lie inside or on the border."""
+        """Whether points `x` ahead and `y` to the left of the person [m] lie inside or on the border."""
         return np.asarray((x >= self.ahead[0]) & (x <= self.ahead[1]) & (np.abs(y) <= self.width / 2))
 
 
@@ -201,5 +241,5 @@ PAPER_SPACE = AttentionalSpace()
 
 
 def wrap_angle(angle: np.ndarray) -> np.ndarray:
-    """Angles [rad] wrapped to (-pi, pi]."""
+    """Wrap each `angle` [rad] to (-pi, pi]."""
     return np.asarray(np.pi - np.mod(np.pi - angle, 2 * np.pi))

@@ -1,9 +1,8 @@
-"""Kinds of encounter: who walks together, in line, towards each other, across, or past somebody who stands.
+"""Kinds of encounter: companions, standing, same direction, opposite, crossing.
 
 A kind belongs to two people, not to a window, and is the same for both of them.  It is decided on their
-whole *common track*: every tick of the day at which both are seen within the square or `REACH` around it.
-(Not on what they do elsewhere: a streamed day keeps no more, and so finds the very same kinds.)  By the
-first rule that holds they are
+whole *common track*: every tick of the day at which both are in the area or `REACH` around it.  (Rows
+farther away are not used, because a streamed day does not hold them.)  By the first rule that holds they are
 
 1. companions       5 s or more together, at most 2 m apart for 80 % of that time, at equal velocity (their
                     relative velocity at most 0.4 m/s) for half of it;
@@ -12,13 +11,13 @@ first rule that holds they are
 4. opposite         at least 135 deg,
 5. crossing         in between.
 
-Measured: of the people of THOR-MAGNI whose groups are known (198 pairs, 24 of them companions) 23 are found
-and nobody else; of the ETH sequence's (2,044 pairs of 2 s or more, 177 in `groups.txt`) 121, and 33 others,
-24 of whom keep within 2 m all the way; most of the 56 missed are the outer pairs of larger groups.  Seen once
-in 0.8 s and 10 cm off (16 cm), as at Grand Central, 117 (95) are found, of THOR-MAGNI's still 23.  On the
-real ATC day 69 of 210 pairs are companions; where each person is shifted in time by 1 to 10 min, and nobody
-can be, 2.4 % are (44 of 1,803, eight shifts): strangers who happen to walk alike.  So about 7 % of the
-day's companions are none.
+Measured.  The groups of THOR-MAGNI are known: of 24 pairs of companions among 198 pairs, 23 are found, and
+no other pair.  In the ETH sequence (2,044 pairs of 2 s or more, 177 of them in `groups.txt`) 121 are found,
+and 33 others, 24 of which keep within 2 m all the way.  Most of the 56 missed pairs are the outer pairs of
+larger groups.  Sampled once in 0.8 s and with an error of 10 cm (16 cm), as at Grand Central, 117 (95) of
+the ETH pairs are found, and still 23 of THOR-MAGNI's.  On the real ATC day 69 of 210 pairs are companions.
+Where each person is shifted in time by 1 to 10 min, no pair can be, but 2.4 % are found (44 of 1,803, eight
+shifts): strangers who happen to walk alike.  So about 7 % of the day's companions are strangers.
 """
 
 from __future__ import annotations
@@ -38,33 +37,47 @@ COMPANIONS, STANDING, SAME, OPPOSITE, CROSSING = KINDS = (
     "companions", "standing", "same direction", "opposite", "crossing",
 )  # fmt: skip
 STRANGERS = "strangers"
-"""Everybody but companions."""
+"""All kinds but companions."""
 
 REACH = 5.0
-"""The common track goes so far beyond the square [m] (measured: finds all 62 pairs of the real day that the
-rule finds on their whole tracks, and 7 more; 10 m gives one fewer, at twice the rows of a raw day)."""
+"""The common track reaches this far beyond the area [m] (measured: it finds all 62 pairs of the real day that
+the rule finds on whole tracks, and 7 more; 10 m finds one fewer, with twice the rows of a raw day)."""
 TOGETHER, NEAR, NEAR_SHARE = 5.0, 2.0, 0.8
-"""Companions: seconds together, at most so far apart [m], for so much of the time (measured, see above)."""
+"""Companions: shortest time together [s], largest distance [m], for this share of the time (measured)."""
 EQUAL_VELOCITY, EQUAL_SHARE = 0.4, 0.5
-"""Companions: relative velocity at most this [m/s], for so much of the time (measured, see above)."""
+"""Companions: largest relative velocity [m/s], for this share of the time (measured)."""
 WALKING = 0.4
-"""Who is slower [m/s] than a reference pedestrian may be (paper: 0.4) is standing."""
+"""A slower person [m/s] is standing (paper: 0.4 for a reference pedestrian)."""
 ALONG = np.pi / 4
 """Directions at most this far apart [rad] are the same, from pi less this on opposite (assumed)."""
 
 
-def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, square: object = None) -> pd.Categorical:
-    """The kind of each pair of people, one of `KINDS`; missing where two people were never there at once.
+def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, area: object = None) -> pd.Categorical:
+    """Decide the kind of each pair of people, one of `KINDS`.
 
     Parameters
     ----------
     tracks : a track table as from `szlib.read_tracks` (any row order).
     pairs : a table with columns day, ref_id, other_id (such as samples of encounters), any order.
-    square : that of `szlib.find_encounters`; None takes the whole tracks.
+    area : as in `szlib.find_encounters`; None takes the whole tracks.
+
+    Returns
+    -------
+    A kind for each row of `pairs`; missing where the two people were never there at the same time.
 
     Raises
     ------
-    DataError : a column is missing, or somebody is not in `tracks`.
+    DataError : a column is missing, or a person is not in `tracks`.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd, szlib
+    >>> t = np.arange(0, 8, 0.1).round(1)
+    >>> left = pd.DataFrame({"day": "a", "id": 1, "t": t, "x": t, "y": 0.0, "vx": 1.0, "vy": 0.0})
+    >>> tracks = pd.concat([left, left.assign(id=2, y=1.0)])
+    >>> pairs = pd.DataFrame({"day": ["a"], "ref_id": [1], "other_id": [2]})
+    >>> list(szlib.encounter_kinds(tracks, pairs))
+    ['companions']
     """
     check_columns(pairs, ["day", "ref_id", "other_id"])
     order, tick, _ = clock_index(tracks)
@@ -73,40 +86,62 @@ def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, square: object
     person, begins = number_people(days, ids)
     known = pd.MultiIndex.from_arrays([days[begins], ids[begins]])
     ref, other = (
-        known.get_indexer(pd.MultiIndex.from_arrays([pairs["day"].astype(str), pairs[who]]))
-        for who in ("ref_id", "other_id")
+        known.get_indexer(pd.MultiIndex.from_arrays([pairs["day"].astype(str), pairs[column]]))
+        for column in ("ref_id", "other_id")
     )
-    if (lost := (ref < 0) | (other < 0)).any():
-        found = pairs[["day", "ref_id", "other_id"]].iloc[int(np.flatnonzero(lost)[0])].to_dict()
+    if (unknown := (ref < 0) | (other < 0)).any():
+        found = pairs[["day", "ref_id", "other_id"]].iloc[int(np.flatnonzero(unknown)[0])].to_dict()
         raise DataError(f"{found}: not in these tracks; pass the tracks in which the pairs were found")
-    there = np.ones(len(x), bool) if square is None else as_area(square).grown(REACH).contains(x, y)
-    return kinds_of_pairs(ref, other, person, tick, (x, y), (vx, vy), there)
+    counts = np.ones(len(x), bool) if area is None else as_area(area).grown(REACH).contains(x, y)
+    return kinds_of_pairs(ref, other, person, tick, (x, y), (vx, vy), counts)
 
 
 def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.DataFrame:
-    """Samples of encounters of some kinds: one of `KINDS`, several, "strangers", or None for all.
+    """Select the samples of some kinds of encounter.
 
-    Encounters keep their numbers.  Raises DataError for an unknown kind, and for samples without kinds.
+    Parameters
+    ----------
+    samples : samples as from `szlib.find_encounters`; encounters keep their numbers.
+    kinds : one of `KINDS`, several of them, "strangers" (all but companions), or None for all.
+
+    Returns
+    -------
+    The selected samples; the funnel counts the others by kind.
+
+    Raises
+    ------
+    DataError : a kind is unknown, or the samples have no column kind.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=20))
+    >>> samples = szlib.find_encounters(szlib.read_tracks(plaza))
+    >>> len(szlib.of_kind(samples, "strangers")) <= len(samples)
+    True
     """
     if kinds is None:
         return samples
-    asked = [kinds] if isinstance(kinds, str) else list(kinds)
-    wanted = {k for name in asked for k in (KINDS[1:] if name == STRANGERS else [name])}
+    names = [kinds] if isinstance(kinds, str) else list(kinds)
+    wanted = {k for name in names for k in (KINDS[1:] if name == STRANGERS else [name])}
     if not wanted or not wanted <= set(KINDS):
         raise DataError(f"unknown kinds {kinds!r}; expected some of {list(KINDS)}, or {STRANGERS!r}")
     if "kind" not in samples.columns:
         raise DataError(
             f"the samples have no column kind; found {list(samples.columns)}; find_encounters gives it"
         )
-    kept = samples[samples["kind"].isin(wanted)].copy()
+    selected = samples[samples["kind"].isin(wanted)].copy()
     counts = samples["kind"].value_counts()
-    dropped = {kind: int(counts[kind]) for kind in KINDS if kind not in wanted}
-    stage = funnels.stage(f"samples: {', '.join(asked)}", len(samples), len(kept), dropped)
-    return funnels.attach(kept, [*funnels.get(samples), stage])
+    rejected = {kind: int(counts[kind]) for kind in KINDS if kind not in wanted}
+    stage = funnels.stage(f"samples: {', '.join(names)}", len(samples), len(selected), rejected)
+    return funnels.attach(selected, [*funnels.get(samples), stage])
 
 
 def number_people(days: np.ndarray, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For rows sorted by person: the number of each row's person, from 0, and each person's first row."""
+    """Number the people of rows sorted by person, from `days` and `ids` of the rows.
+
+    Returns the number of each row's person, from 0, and the first row of each person.
+    """
     begins = np.flatnonzero(np.r_[True, (ids[1:] != ids[:-1]) | (days[1:] != days[:-1])][: len(ids)])
     return np.repeat(np.arange(len(begins)), np.diff(np.r_[begins, len(ids)])), begins
 
@@ -118,22 +153,22 @@ def kinds_of_pairs(
     tick: np.ndarray,
     position: tuple[np.ndarray, np.ndarray],
     velocity: tuple[np.ndarray, np.ndarray],
-    there: np.ndarray,
+    counts: np.ndarray,
 ) -> pd.Categorical:
-    """The kinds of pairs of people (numbers, each (n,)) from rows sorted by person and tick.
+    """Decide the kinds of pairs of people from rows sorted by person and tick.
 
-    `person`, `tick`, `there` (whether the row counts), and x and y of `position` [m] and `velocity` [m/s]
-    have shape (rows,).
+    `first` and `second` are the numbers of the two people of each pair, (n,).  `person`, `tick`, `counts`
+    (whether the row counts), and x and y of `position` [m] and `velocity` [m/s] have shape (rows,).
     """
-    pairs, of = np.unique(np.sort(np.column_stack([first, second]), axis=1), axis=0, return_inverse=True)
-    pair, a, b = _common_track(pairs, person, tick, there)
+    pairs, index = np.unique(np.sort(np.column_stack([first, second]), axis=1), axis=0, return_inverse=True)
+    pair, a, b = _common_track(pairs, person, tick, counts)
     apart = np.hypot(*(each[a] - each[b] for each in position))
     relative = np.hypot(*(each[a] - each[b] for each in velocity))
     slow = [np.hypot(*(each[rows] for each in velocity)) < WALKING for rows in (a, b)]
     (ax, ay), (bx, by) = ([np.nan_to_num(each[rows]) for each in velocity] for rows in (a, b))
 
     def over_time(values: np.ndarray) -> np.ndarray:
-        """Sum of the values of each pair, over the ticks at which both are there."""
+        """Sum of the `values` of each pair over its common track."""
         return np.bincount(pair, weights=values, minlength=len(pairs))
 
     ticks = over_time(np.ones(len(pair)))
@@ -145,22 +180,22 @@ def kinds_of_pairs(
     rules = [ticks == 0, together, stands, angle <= ALONG, angle >= np.pi - ALONG]
     found = [-1, *map(KINDS.index, (COMPANIONS, STANDING, SAME, OPPOSITE))]
     codes = np.select(rules, found, KINDS.index(CROSSING)).astype(np.int8)
-    return pd.Categorical(np.array([*KINDS, None])[codes[of.ravel()]], categories=list(KINDS))
+    return pd.Categorical(np.array([*KINDS, None])[codes[index.ravel()]], categories=list(KINDS))
 
 
 def _common_track(
-    pairs: np.ndarray, person: np.ndarray, tick: np.ndarray, there: np.ndarray
+    pairs: np.ndarray, person: np.ndarray, tick: np.ndarray, counts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Every tick at which both people of a pair are `there`: the pair's number, and the row of either."""
-    met = np.zeros(person[-1] + 1 if len(person) else 0, bool)
-    met[pairs] = True
-    rows = np.flatnonzero(there & met[person])
+    """Every tick at which the rows of both people of a pair count: the pair's number, and the two rows."""
+    in_pair = np.zeros(person[-1] + 1 if len(person) else 0, bool)
+    in_pair[pairs] = True
+    rows = np.flatnonzero(counts & in_pair[person])
     if len(rows) == 0:
         return rows, rows, rows
-    begin = np.searchsorted(person[rows], pairs[:, 0])
-    count = np.searchsorted(person[rows], pairs[:, 0], side="right") - begin
+    start = np.searchsorted(person[rows], pairs[:, 0])
+    count = np.searchsorted(person[rows], pairs[:, 0], side="right") - start
     pair = np.repeat(np.arange(len(pairs)), count)
-    a = np.repeat(begin - np.cumsum(count) + count, count) + np.arange(count.sum())
+    a = np.repeat(start - np.cumsum(count) + count, count) + np.arange(count.sum())
     first, span = tick[rows].min(), int(np.ptp(tick[rows])) + 1
     moment = person[rows] * span + tick[rows] - first  # sorted, as rows are
     sought = pairs[pair, 1] * span + tick[rows[a]] - first

@@ -18,7 +18,7 @@ from .. import __version__
 from ..errors import DataError, DataWarning
 from ..files import file_content, load_cached, store_cached
 from ..tracks import funnels
-from ..tracks.clock import to_clock
+from ..tracks.clock import COLUMNS, to_clock
 from ..tracks.formats import find_format
 from ..tracks.options import ReadOptions
 from ..tracks.readers import read_raw
@@ -28,7 +28,7 @@ from .geometry import Area, Region, Square
 from .kinds import KINDS
 from .near_rows import read_near_area
 from .near_rows_cache import Content
-from .samples import SAMPLE_COLUMNS
+from .samples import sample_windows
 from .settings import EncounterSettings
 
 _ADVICE = {
@@ -68,7 +68,10 @@ def find_encounters_in_files(
         )
     tracks = to_clock(raw, max_gap=options.max_gap) if len(raw) else raw
     if len(tracks) == 0:
-        return funnels.attach(_no_samples(), funnels.get(tracks))
+        nothing = np.zeros(0, np.int64)
+        samples = sample_windows(tracks.reindex(columns=COLUMNS), nothing, nothing, nothing, settings.steps)
+        samples["kind"] = pd.Categorical([], categories=list(KINDS))
+        return funnels.attach(samples, funnels.get(tracks))
     return find_encounters(tracks, settings=replace(settings, area=area or walked_area(tracks)))
 
 
@@ -117,16 +120,6 @@ def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
         f"there is no encounter in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
         f"({emptied['stage']}) none is left: {rows}.  The last condition: {last}; {advice}"
     )
-
-
-def _no_samples() -> pd.DataFrame:
-    """A table of samples without a row."""
-    integers, numbers = np.zeros(0, np.int64), np.zeros(0)
-    columns: Mapping[str, Any] = dict.fromkeys(SAMPLE_COLUMNS, numbers) | dict.fromkeys(
-        ("encounter", "ref_id", "other_id"), integers
-    )
-    samples = pd.DataFrame({**columns, "day": pd.Categorical([])})[SAMPLE_COLUMNS]
-    return samples.assign(kind=pd.Categorical([], categories=list(KINDS)))
 
 
 @contextmanager

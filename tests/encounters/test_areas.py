@@ -19,7 +19,7 @@ from hypothesis import given, strategies
 from matplotlib.path import Path as Outline
 
 import szlib
-from szlib.encounters.areas import _largest, area_for
+from szlib.encounters.areas import _largest_rectangle, area_for
 from szlib.encounters.finding import find_encounters
 from szlib.encounters.geometry import Region, Square
 from szlib.encounters.null_model import null_encounters
@@ -269,8 +269,8 @@ def test_the_largest_rectangle_is_the_best_of_all(loss: float, side: int) -> Non
     rng = np.random.default_rng(4)
     for _ in range(60):
         walked = rng.random(rng.integers(1, 9, 2)) < rng.choice([0.3, 0.7, 0.9])
-        (i0, i1), (j0, j1), share = _largest(walked, side, loss)
-        block = walked[i0:i1, j0:j1]
+        first, end, share = _largest_rectangle(walked, side, loss)
+        block = walked[first[0] : end[0], first[1] : end[1]]
         worth = block.sum() - (loss * (~block).sum() if not block.all() else 0)
         assert worth == best(walked, side, loss)
         assert worth == 0 or (share == block.mean() and min(block.shape) >= side)
@@ -326,7 +326,7 @@ def test_where_there_is_no_area_it_is_told() -> None:
     with pytest.raises(szlib.DataError, match="no area was found"):
         szlib.walked_area(make_hall(size=(30, 3)))
     with pytest.raises(szlib.DataError, match="people >= 1"):
-        szlib.walked_area(make_hall(), people=0)
+        szlib.walked_area(make_hall(), n_people=0)
 
 
 def test_the_square_of_the_mall_is_found_again(real_tracks: pd.DataFrame) -> None:

@@ -102,7 +102,7 @@ def test_a_kind_is_of_the_whole_common_track_and_of_the_pair(crowd: pd.DataFrame
         pair=[(day, *sorted(pair)) for day, *pair in kinds.iloc[:, :3].itertuples(index=False)]
     )
     assert (pairs.groupby("pair")["kind"].nunique() == 1).all()
-    asked = encounter_kinds(crowd, samples, square=ROOM)
+    asked = encounter_kinds(crowd, samples, area=ROOM)
     assert list(asked) == list(samples["kind"])
     renamed = find_encounters(crowd.assign(id=-crowd["id"]), square=ROOM)
     assert renamed["kind"].value_counts().to_dict() == samples["kind"].value_counts().to_dict()
@@ -133,11 +133,9 @@ def test_plain_loops_find_the_same_kinds(crowd: pd.DataFrame) -> None:
 
 def test_beyond_the_reach_of_the_square_nothing_counts() -> None:
     tracks = two(((-17, 0), (1.2, 0)), ((-17, 1.2), (1.2, 0)))  # for 12 s, to x = -2.6
-    assert list(encounter_kinds(tracks, PAIR, square=szlib.Square(x=(0, 20), y=(-5, 5)))) == [
-        "same direction"
-    ]
-    assert list(encounter_kinds(tracks, PAIR, square=szlib.Square(x=(-4, 20), y=(-5, 5)))) == [COMPANIONS]
-    assert encounter_kinds(tracks, PAIR, square=szlib.Square(x=(30, 40), y=(-5, 5))).isna().all()
+    assert list(encounter_kinds(tracks, PAIR, area=szlib.Square(x=(0, 20), y=(-5, 5)))) == ["same direction"]
+    assert list(encounter_kinds(tracks, PAIR, area=szlib.Square(x=(-4, 20), y=(-5, 5)))) == [COMPANIONS]
+    assert encounter_kinds(tracks, PAIR, area=szlib.Square(x=(30, 40), y=(-5, 5))).isna().all()
 
 
 def test_people_who_were_never_there_at_once_have_no_kind() -> None:
