@@ -46,8 +46,9 @@
 
 # %%
 import szlib
+from szlib.workbook import folders
 from szlib.workbook.exercises import SHEETS
-from szlib.workbook.record import NotebookRecord, places
+from szlib.workbook.record import NotebookRecord
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -58,10 +59,10 @@ results = "../results"
 # %%
 record = NotebookRecord("00_start_here", globals())
 tasks = [task for sheet in SHEETS.values() for task in sheet]
-print(f"szlib {szlib.__version__}: {len(places.notebooks())} notebooks, {len(tasks)} exercises")
+print(f"szlib {szlib.__version__}: {len(folders.list_notebooks())} notebooks, {len(tasks)} exercises")
 record.key["exercises"] = len(tasks)
 for sheet in SHEETS:
-    there = all((places.NOTEBOOKS / part / f"{sheet}.py").exists() for part in ("exercises", "solutions"))
+    there = all((folders.NOTEBOOKS / part / f"{sheet}.py").exists() for part in ("exercises", "solutions"))
     record.check(f"{sheet} and its solutions are there", there)
 
 # %% [markdown]

@@ -75,7 +75,7 @@ parameters(
 # and counted.
 
 # %%
-files = record.files()
+files = record.cache.files()
 raw = readers.read_raw(files)
 print(f"{len(files)} file(s), {len(raw):,} rows, {raw.groupby('day')['id'].nunique().sum():,} people")
 raw.head(3)
@@ -112,10 +112,12 @@ record.key |= {
 # you trust it: a pillar or a shelf may stand where nobody walked.
 
 # %%
-square = record.square(people)
+square = record.cache.find_area(people)
 ax = figures.plot_map(people, square)
 record.figure(ax.figure, "map")
-parameters([("area", str(square), ASSUMED, record.area or "the data's own; see --square, --polygon, --auto")])
+parameters(
+    [("area", str(square), ASSUMED, record.cache.area or "the data's own; see --square, --polygon, --auto")]
+)
 
 # %%
 inside = square.contains(people["x"], people["y"])

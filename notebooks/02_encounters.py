@@ -56,8 +56,8 @@ examples = 100  # paths drawn
 
 # %%
 record = NotebookRecord("02_encounters", globals())
-search = record.method.search()  # keywords of find_encounters
-space = search["space"]
+conditions = record.cache.method.encounter_settings()  # of an encounter
+space = conditions.space
 parameters(
     [
         ("attentional space", f"{space.width:g} m x {space.length:g} m", PAPER, "sec. 2"),
@@ -78,10 +78,10 @@ parameters(
 # `min_speed` in the parameter cell; what is turned there reaches every notebook of the same run.)
 
 # %%
-tracks = record.tracks()
-square = record.square(tracks)
-samples = szlib.find_encounters(tracks, square=square, **search)
-record.keep_encounters(samples)
+tracks = record.cache.tracks()
+square = record.cache.find_area(tracks)
+samples = szlib.find_encounters(tracks, square=square, settings=conditions)
+record.cache.store_encounters(samples)
 count = samples["encounter"].nunique()
 per_day = count / max(tracks["day"].nunique(), 1)
 print(f"{count} encounters, {len(samples):,} samples; {per_day:.0f} a day")
@@ -148,11 +148,11 @@ record.figure(ax.figure, "paths")
 # more samples.
 
 # %%
-ax = figures.plot_relative_positions(samples, r_max=record.method.r_max)
+ax = figures.plot_relative_positions(samples, r_max=record.cache.method.r_max)
 record.figure(ax.figure, "los")
 
 # %%
-ax = figures.plot_distance_by_direction(samples, r_max=record.method.r_max)
+ax = figures.plot_distance_by_direction(samples, r_max=record.cache.method.r_max)
 record.figure(ax.figure, "los-distance")
 
 # %% [markdown]
@@ -172,8 +172,8 @@ readings = {
 }
 rows = []
 for name, options in readings.items():
-    found = szlib.find_encounters(tracks, square=square, **search | options)
-    close = found[found["distance"] <= record.method.r_max]
+    found = szlib.find_encounters(tracks, square=square, settings=conditions, **options)
+    close = found[found["distance"] <= record.cache.method.r_max]
     behind = (close["los_angle"].abs() > np.pi / 2).sum()
     rows.append((name, found["encounter"].nunique(), len(close), behind))
 compared = pd.DataFrame(

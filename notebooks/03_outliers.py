@@ -83,7 +83,7 @@ parameters(
 # $$(x', y') = (r_{max} - r)\,(\cos\theta_{LOS}, \sin\theta_{LOS})$$
 
 # %%
-samples = record.encounters()
+samples = record.cache.encounters()
 close = samples[samples["distance"] <= r_max]
 points = outliers.complementary_points(close, r_max=r_max)
 print(f"{len(close):,} of {len(samples):,} samples are within {r_max:g} m")
@@ -146,7 +146,7 @@ record.claim(
 # %%
 settings = szlib.PlazaSettings(intruders=intruders, pace=SLOW_INTRUDERS)
 file = szlib.make_plaza(record.out / "03_intruders.csv", seed=seed, settings=settings)
-people = szlib.find_encounters(szlib.read_tracks(file), **record.method.search())
+people = szlib.find_encounters(szlib.read_tracks(file), **record.cache.method.search_options())
 people = people[people["distance"] <= r_max]
 intruder = accuracy.true_kinds(people, seed=seed, settings=settings) == "intruder"
 crossed = people.loc[intruder, "encounter"].nunique()

@@ -57,7 +57,7 @@ parameters(
 )
 
 # %%
-samples = record.encounters()
+samples = record.cache.encounters()
 inliers = szlib.remove_outliers(samples, r_max=r_max)
 points = np.column_stack([outliers.complementary_points(inliers, r_max=r_max), inliers["speed"]])
 vertices = hulls.hull_vertices(points)

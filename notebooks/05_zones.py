@@ -69,8 +69,8 @@ parameters(
 # the interval of a hull lies below its value.
 
 # %%
-samples = record.encounters()
-fit = record.method.fit()  # r_max, q, speeds: what the robot's zone is fitted with
+samples = record.cache.encounters()
+fit = record.cache.method.fit_options()  # r_max, q, speeds: what the robot's zone is fitted with
 hull = {"method": "hull", "outlier_fraction": fraction, "neighbours": 20}
 paper = szlib.SocialZone.fit(samples, r_max=r_max, speeds=fit["speeds"], **hull)
 shown = ["speed", "center_x", "a", "a_low", "a_high", "b", "area", "influence", "encounters", "adequate"]
@@ -78,7 +78,7 @@ paper.table()[shown].round(2)
 
 # %%
 settings = PlazaSettings()
-truth = {v: settings.true_zone(v) for v in paper.ellipses} if record.synthetic else {}
+truth = {v: settings.true_zone(v) for v in paper.ellipses} if record.cache.is_synthetic else {}
 ax = figures.plot_zone(paper, zone_speed, truth=truth.get(zone_speed))
 record.figure(ax.figure, "zone")
 
@@ -113,7 +113,7 @@ if len(ellipse.support) > 3:
 # direction, and an ellipse fitted to that. This one is kept for the robot.
 
 # %%
-zone = record.keep_zone(szlib.SocialZone.fit(samples, **fit))
+zone = record.cache.store_zone(szlib.SocialZone.fit(samples, **fit))
 zone.table()[shown].round(2)
 
 # %%
@@ -150,7 +150,7 @@ record.figure(ax.figure, "zones")
 # sensor noise, gaps, clock, conditions, outliers, zone - must find it again.
 
 # %%
-for name, found in (("quantile", zone), ("the paper's hull", paper)) if record.synthetic else ():
+for name, found in (("quantile", zone), ("the paper's hull", paper)) if record.cache.is_synthetic else ():
     for v in (0.7, 0.9, 1.1, 1.3):
         one, true = found.ellipses[v], truth[v]
         off = np.abs([*np.subtract(one.center, true.center), *np.subtract(one.semi_axes, true.semi_axes)])

@@ -83,7 +83,7 @@ parameters(
 # is zero there, positive outside, smooth, and cheap.
 
 # %%
-zone = record.ellipse()
+zone = record.cache.ellipse()
 print(
     f"semi-axes {zone.semi_axes[0]:.2f} m and {zone.semi_axes[1]:.2f} m, centre {zone.center[0]:+.2f} m ahead"
 )

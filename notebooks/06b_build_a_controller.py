@@ -248,7 +248,7 @@ record.figure(fig, "weights")
 # parameters of the program, which is written down once.
 
 # %%
-zone = record.ellipse()
+zone = record.cache.ellipse()
 scene = szlib.SCENARIOS["corridor"]
 opti = ca.Opti()
 x, u = opti.variable(4, N + 1), opti.variable(2, N)

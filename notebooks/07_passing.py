@@ -62,7 +62,7 @@ settings_table(settings)
 # person is at 4, too.
 
 # %%
-zone = record.ellipse()
+zone = record.cache.ellipse()
 scenario = szlib.SCENARIOS["passing"]
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
 log = szlib.simulate(scenario, controller)

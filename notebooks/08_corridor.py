@@ -66,7 +66,7 @@ parameters(
 )
 
 # %%
-zone = record.ellipse()
+zone = record.cache.ellipse()
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
 log = szlib.simulate(scenario, controller)
 metrics = log.metrics()

@@ -147,7 +147,7 @@ def follow(answer: str, settings: szlib.MPCSettings) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["t", "x", "y", "vx", "vy", "h", "feasible"])
 
 
-zone = record.ellipse()
+zone = record.cache.ellipse()
 hasty = szlib.MPCSettings(gamma=0.8, tie=0.0)
 answers = {answer: follow(answer, hasty) for answer in ("dropped", "relaxed", "braking")}
 

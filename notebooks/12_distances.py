@@ -70,7 +70,7 @@ parameters(
 # disc may touch although $h \ge 0$.
 
 # %%
-zone = record.ellipse()
+zone = record.cache.ellipse()
 fig, sides = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
 figures.plot_distance_error(zone, r_robot=r, eps=eps, ax=sides[0]).set_title("Around the learned zone")
 short = np.array([(-0.5, 0.0), (0.5, 0.0)])

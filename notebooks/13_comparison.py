@@ -76,7 +76,7 @@ parameters(
 #   below has.
 
 # %%
-zone = record.ellipse()
+zone = record.cache.ellipse()
 of_zone = replace(WORLDS, zone=zone)  # worlds in which everybody has this zone
 ax = figures.get_axes(None, size=(5.5, 5))
 shades = (figures.GREY, figures.GREEN, figures.ORANGE, figures.RED, figures.BLUE)

@@ -55,7 +55,7 @@ parameters(
     [
         ("standing", f"< {quality.STANDING:g} m in 1 s", MEASURED, "the sensor's noise stays below it"),
         ("gap that ends a track", "0.5 s raw, 1.6 s at 1 Hz", MEASURED, "nobody is bridged across it"),
-        ("area", str(record.square()), ASSUMED, "only rows near it leave the scan"),
+        ("area", str(record.cache.find_area()), ASSUMED, "only rows near it leave the scan"),
         ("excluded days", exclude or "none", ASSUMED, "event days, chosen by hand as in the paper"),
     ]
 )
@@ -65,8 +65,8 @@ parameters(
 # them stand.
 
 # %%
-files = record.files()
-if record.synthetic:
+files = record.cache.files()
+if record.cache.is_synthetic:
     for day, (encounters, standing) in enumerate(((700, 0.08), (700, 0.08), (1000, 0.8))):
         file = record.out / f"plaza-day{day + 2}-{seed}.csv"
         date = f"2000-01-{3 + day:02}"
@@ -190,8 +190,10 @@ record.figure(figure, "hours")
 # The same as `szlib inspect FILE` prints; over all days, each stage added up.
 
 # %%
-search = record.method.search()
-extraction = szlib.extract_days(files, out=record.out / "days", exclude=exclude, progress=False, **search)
+conditions = record.cache.method.encounter_settings()
+extraction = szlib.extract_days(
+    files, out=record.out / "days", exclude=exclude, progress=False, settings=conditions
+)
 extraction.table.drop(columns="seconds")
 
 # %%

@@ -76,10 +76,10 @@ parameters(
 # of the two people (`szlib.encounters.kinds`).
 
 # %%
-tracks = record.tracks()
-square = record.square(tracks)
-search = record.method.search()  # as in notebook 02
-samples = szlib.find_encounters(tracks, square=square, **search)
+tracks = record.cache.tracks()
+square = record.cache.find_area(tracks)
+conditions = record.cache.method.encounter_settings()  # as in notebook 02
+samples = szlib.find_encounters(tracks, square=square, settings=conditions)
 pairs = samples.drop_duplicates("encounter")
 counts = pairs["kind"].value_counts()
 record.key |= {"encounters": len(pairs), "companions": int(counts["companions"])}
@@ -94,7 +94,13 @@ counts.to_frame("encounters")
 
 # %%
 null = szlib.null_encounters(
-    tracks, square=square, shifts=shifts, seed=seed, r_max=record.method.r_max, progress=shifts > 20, **search
+    tracks,
+    square=square,
+    shifts=shifts,
+    seed=seed,
+    r_max=record.cache.method.r_max,
+    progress=shifts > 20,
+    settings=conditions,
 )
 by_chance = null.encounters.drop_duplicates("encounter")["kind"].value_counts() / shifts
 compared = pd.DataFrame({"seen": counts, "by chance": by_chance.round(1)})
@@ -189,8 +195,8 @@ alarms.rename(columns={"sum": "false alarms", "size": "crowds"})
 # %%
 def zone_at(people: pd.DataFrame, model: szlib.NullEncounters, method: str) -> pd.Series:
     """The row of the table at `zone_speed`; empty where there is no zone."""
-    more = {"respect": {"null": model}, "quantile": {"q": record.method.q}}.get(method, {})
-    options = {"r_max": record.method.r_max, "speeds": (zone_speed,), "resamples": resamples} | more
+    more = {"respect": {"null": model}, "quantile": {"q": record.cache.method.q}}.get(method, {})
+    options = {"r_max": record.cache.method.r_max, "speeds": (zone_speed,), "resamples": resamples} | more
     try:
         zone = szlib.SocialZone.fit(people, method=method, **options)
     except szlib.ZoneError as error:

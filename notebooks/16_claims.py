@@ -79,12 +79,12 @@ parameters(
 # how many people were seen.
 
 # %%
-samples = record.encounters()
+samples = record.cache.encounters()
 speeds = (0.7, zone_speed, 1.3)
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", szlib.DataWarning)  # what is not adequate cannot decide, and says so
     fit = partial(szlib.SocialZone.fit, samples, r_max=r_max, speeds=speeds, resamples=resamples, seed=seed)
-    zones = {"hull": fit(method="hull"), "quantile": fit(method="quantile", q=record.method.q)}
+    zones = {"hull": fit(method="hull"), "quantile": fit(method="quantile", q=record.cache.method.q)}
 
 # %%
 found, methods = [claims.passes_on_the_right(samples)], ["-"]
@@ -100,7 +100,7 @@ for each, method in zip(found, methods, strict=True):
     record.claim(f"{each.claim} ({method})", each.verdict == "supported", str(each))
 
 # %%
-if record.synthetic:
+if record.cache.is_synthetic:
     settings = szlib.PlazaSettings()
     close = samples[samples["distance"] <= r_max]
     intruder = true_kinds(close, seed=seed) == "intruder"
@@ -222,8 +222,8 @@ record.claim("and its axes as well", worst <= 0.05, f"{worst:.3f} m")
 # on the real day with both estimators (`python tests/studies/claims.py`).
 
 # %%
-tracks = record.tracks()
-moved = sensitivity(tracks, square=record.square(tracks), speed=zone_speed)
+tracks = record.cache.tracks()
+moved = sensitivity(tracks, square=record.cache.find_area(tracks), speed=zone_speed)
 record.table(moved, "16_sensitivity")
 most = moved.iloc[1:].assign(change=lambda t: (t["area"] / moved["area"].iloc[0] - 1).abs())
 strongest = most.loc[most["change"].idxmax()]

@@ -106,7 +106,7 @@ missing = [name for name in packages if name not in models]
 print("here:", ", ".join(models) or "none", "- not installed:", ", ".join(missing) or "none")
 
 # %%
-zone = record.ellipse()
+zone = record.cache.ellipse()
 angles = np.radians([30, 90, 150, 210, 270, 330])
 starts = 4 * np.column_stack([np.cos(angles), np.sin(angles)])
 people = tuple(szlib.Person((x, y), (-0.2 * x, -0.2 * y)) for x, y in starts.tolist())
@@ -209,8 +209,8 @@ record.figure(fig, "reacting")
 # along their own path by the same loop.
 
 # %%
-floor = record.encounters().attrs.get("area", szlib.ATC_SQUARE)
-made = replay.find_replays(record.tracks(), walkers, seed=seed, area=floor, zone=zone)
+floor = record.cache.encounters().attrs.get("area", szlib.ATC_SQUARE)
+made = replay.find_replays(record.cache.tracks(), walkers, seed=seed, area=floor, zone=zone)
 runs = [drive(each.scenario, szlib.MPCCBF(zone), behaviour=each) for each in made]
 own = [drive(each.scenario, replay.ReplacedWalker(each), behaviour=each) for each in made]
 table = pd.DataFrame(

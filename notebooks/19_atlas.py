@@ -179,7 +179,7 @@ Markdown(f"In the whole atlas it never *{'*, never *'.join(missing)}*." if missi
 
 # %%
 SIZES = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)
-zone = record.ellipse()
+zone = record.cache.ellipse()
 cells = [AtlasCell(scene, gamma, width, size=size) for scene, width in SCENES.items() for size in SIZES]
 curve = run_atlas(cells, zone, n_jobs=n_jobs)
 curve.pivot(index="size", columns="scene", values=["time_yielding", "time_to_goal"]).round(1)

@@ -78,10 +78,10 @@ parameters(
 # notebook 08; robot B is set by the parameters that end in `_b`.
 
 # %%
-samples = record.encounters()
-pace = record.method.zone_speed
+samples = record.cache.encounters()
+pace = record.cache.method.zone_speed
 hull = szlib.SocialZone.fit(samples, method="hull", speeds=(pace,), resamples=0)
-zones = {"quantile": record.ellipse(), "hull": hull.ellipse(pace)}
+zones = {"quantile": record.cache.ellipse(), "hull": hull.ellipse(pace)}
 first = laboratory.RobotOptions(gamma, N_h, a_max, size, estimator)
 second = laboratory.RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)
 

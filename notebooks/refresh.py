@@ -9,7 +9,7 @@ import jupytext
 import nbformat
 from nbclient import NotebookClient
 
-from szlib.workbook.record import places
+from szlib.workbook import folders
 
 HERE = Path(__file__).parent
 LAB = HERE.parent / "results" / "lab"
@@ -61,14 +61,14 @@ def refresh(source: Path, data: str = "") -> None:
 
 def main(names: list[str]) -> None:
     if names == ["real_day"]:
-        for source in places.notebooks():
-            if any(places.is_called(source, name) for name in REAL_DAY):
+        for source in folders.list_notebooks():
+            if any(folders.has_name(source, name) for name in REAL_DAY):
                 print(source.stem, flush=True)
                 refresh(source, "atc-1hz")
         shutil.copyfile(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", HERE / "figures" / "mall.png")
         return
-    for source in places.notebooks():
-        if not names or any(places.is_called(source, name) for name in names):
+    for source in folders.list_notebooks():
+        if not names or any(folders.has_name(source, name) for name in names):
             print(source.stem, flush=True)
             refresh(source)
     (HERE / "figures").mkdir(exist_ok=True)

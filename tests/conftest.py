@@ -6,9 +6,9 @@ import contextlib
 import os
 import warnings
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: threads of BLAS that wait take a core
 
@@ -56,12 +56,12 @@ record.key["seed"] = seed
 
 @pytest.fixture
 def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
-    """A workbook of one's own: `notebooks(name=code)` writes them and gives their folder; few data."""
-    from szlib.workbook.record import places
+    """A workbook of its own: `notebooks(_01_name=code)` writes notebooks and returns their folder."""
+    from szlib.workbook import folders
 
     folder = tmp_path / "notebooks"
     folder.mkdir()
-    monkeypatch.setattr(places, "NOTEBOOKS", folder)
+    monkeypatch.setattr(folders, "NOTEBOOKS", folder)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.csv").write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n")
 
@@ -75,31 +75,24 @@ def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., 
 
 
 @pytest.fixture
-def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Notebooks of a run are executed in this process, without kernels: for what a run does around them."""
-    from szlib.workbook.runner import execution, worker
+def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run the cells of notebooks in this process, to test what a run does around them."""
+    from szlib.workbook import notebook_execution
 
-    class Here(Executor):
-        def submit(self, function: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
-            future: Future[Any] = Future()
-            future.set_result(function(*args, **named))
-            return future
-
-    def execute(temporary: Path, script: Path, folder: Path, given: dict[str, Any]) -> dict[str, Any]:
+    def run_cells(script: Path, given: dict[str, Any], folder: Path, environment: dict[str, str]) -> None:
         notebook, variables = jupytext.read(script), dict[str, Any]()
         try:
-            with contextlib.chdir(script.parent), warnings.catch_warnings():
+            with (
+                contextlib.chdir(script.parent),
+                mock.patch.dict(os.environ, environment),
+                warnings.catch_warnings(),
+            ):
                 warnings.simplefilter("default")
                 for cell in notebook.cells:
                     exec(cell.source, variables)
                     if "parameters" in cell.metadata.get("tags", []):
                         variables |= given
-        except Exception as error:
-            name = type(error).__name__
-            return {"status": "refused" if name in worker.REFUSED else "error", "error": f"{name}: {error}"}
         finally:
             jupytext.write(notebook, folder / f"{script.stem}.ipynb")
-        return {}
 
-    monkeypatch.setattr(execution, "_pool", lambda *_: contextlib.nullcontext(Here()))
-    monkeypatch.setattr(worker, "_execute_in", execute)
+    monkeypatch.setattr(notebook_execution, "run_cells", run_cells)

@@ -171,7 +171,7 @@ def loaded_after(code: str) -> set[str]:
 
 
 def test_importing_szlib_loads_nothing_heavy() -> None:
-    heavy = {"casadi", "matplotlib", "sklearn", "scipy", "pandas", "polars", "numpy", "papermill"}
+    heavy = {"casadi", "matplotlib", "sklearn", "scipy", "pandas", "polars", "numpy", "nbclient"}
     assert heavy.isdisjoint(loaded_after("import szlib"))
 
 
@@ -188,7 +188,7 @@ def test_the_way_to_a_robot_loads_no_figures() -> None:
 
 def test_the_command_line_loads_neither_numbers_nor_notebooks() -> None:
     loaded = loaded_after("from szlib.workbook.cli import build_parser; build_parser()")
-    assert {"numpy", "pandas", "matplotlib", "papermill", "jupytext", "casadi"}.isdisjoint(loaded)
+    assert {"numpy", "pandas", "matplotlib", "nbclient", "jupytext", "casadi"}.isdisjoint(loaded)
 
 
 # --- names -------------------------------------------------------------------------------------------

@@ -1,12 +1,14 @@
-"""How is it presented: figures, the records of notebooks, their headless execution, the command line.
+"""How is it presented? Figures, records of notebooks, their execution, and the command line.
 
 figures       every figure, one file a room
 claims        what data says of the paper's claims: effects, intervals, verdicts
 sensitivity   what moves a zone most
 exercises     the tasks of the exercise sheets, with their checkers and hints
-record        what a notebook writes down, and where it goes
+folders       the folders of results
+record        what a notebook records, and the data that notebooks share
 laboratory    a scene that can be dragged and set while it runs
-report        a run to read without running anything
-runner        the whole workbook, headless, and what came of it
+runner        execution of all notebooks, with a summary
+notebook_execution, forked_kernel  execution of one notebook; kernels that start at once
+report        a run as one HTML file
 cli           `szlib run | report | inspect | extract`
 """

@@ -28,7 +28,7 @@ from .. import __version__, memory
 from ..errors import DataError, DataWarning, SzlibError
 from ..files import printable
 
-_WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbconvert", "papermill")
+_WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbclient", "nbconvert")
 """Packages of the extra `workbook`, which the commands `run` and `report` need."""
 _BROKEN_STREAM = (OSError, ValueError, AttributeError)
 """Errors of standard output or standard error that is full, closed or missing."""
@@ -176,19 +176,18 @@ def _run(options: argparse.Namespace) -> int:
     if area := _area_text(options):
         parameters["area"] = area
     _require_workbook_packages()
-    from .record import places
-    from .runner.execution import run
-    from .runner.summary import render
+    from . import folders
+    from .runner import format_summary, run
 
     summary = run(
         options.data[0] if len(options.data) == 1 else options.data,
-        out=options.out or places.RESULTS,
+        out=options.out or folders.RESULTS,
         jobs=options.jobs,
         only=options.only,
         parameters=parameters,
         scheduler=options.scheduler,
     )
-    print(render(summary))
+    print(format_summary(summary))
     if "report" in summary:
         print(f"report: {printable(os.path.relpath(summary['report']))}")
     refused = {name: n["error"] for name, n in summary["notebooks"].items() if n["status"] == "refused"}
@@ -201,11 +200,11 @@ def _run(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     """Write the report of a run again."""
     _require_workbook_packages()
-    from .record import places
-    from .report import document
+    from . import folders
+    from .report import write_report
 
-    home = Path(options.folder) if options.folder else places.root(places.RESULTS) / "synthetic"
-    print(printable(os.path.relpath(file := document.write(home))))
+    home = Path(options.folder) if options.folder else folders.results_root(folders.RESULTS) / "synthetic"
+    print(printable(os.path.relpath(file := write_report(home))))
     if options.open:
         import webbrowser
 

@@ -29,8 +29,8 @@ from ..errors import SolverError, SzlibError
 from ..simulation.closed_loop import advance
 from ..simulation.scenario import Scenario
 from ..zones.ellipses import Ellipse
+from . import folders
 from .figures.movies import read_scripts, scene_layout, snapshot
-from .record import places
 
 __all__ = ["Experiment", "LaboratoryWidget", "RobotOptions", "is_interactive", "make_scene", "show_sliders"]
 
@@ -276,7 +276,7 @@ def is_interactive() -> bool:
     >>> laboratory.is_interactive()
     False
     """
-    return "JPY_SESSION_NAME" in os.environ and places.RUN_VARIABLE not in os.environ
+    return "JPY_SESSION_NAME" in os.environ and folders.RUN_VARIABLE not in os.environ
 
 
 def show_sliders(draw: Callable[..., object], **sliders: tuple[float, float, float, float]) -> None:

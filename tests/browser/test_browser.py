@@ -6,7 +6,7 @@ import jupytext
 import nbformat
 import pytest
 
-from szlib.workbook.report import document
+from szlib.workbook.report import write_report
 
 MINUTES = 60_000
 COMMANDS = "window.jupyterapp.commands"
@@ -128,7 +128,7 @@ def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
     page.on("console", lambda message: messages.append(message.text))
     page.on("pageerror", lambda error: messages.append(str(error)))
     page.on("request", lambda r: messages.append(r.url) if r.url.startswith("http") else None)
-    page.goto(document.write(home).as_uri())
+    page.goto(write_report(home).as_uri())
     check_player(page)
     broken = page.evaluate("[...document.images].filter((i) => !i.complete || !i.naturalWidth).length")
     assert (messages, broken) == ([], 0)

@@ -29,8 +29,8 @@ import szlib.zones.social_zone  # noqa: F401 - before the first fork
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks.clock import read_tracks
+from szlib.workbook import folders
 from szlib.workbook.cli import main
-from szlib.workbook.record import places
 
 COUNT = {False: 40, True: 1000}
 LONGEST = 60
@@ -45,7 +45,7 @@ speeds = [0.7, 0.9]
 # %%
 from szlib.workbook.record import NotebookRecord
 record = NotebookRecord("01_one", globals())
-record.check("files", len(record.files()) > 0)
+record.check("files", len(record.cache.files()) > 0)
 record.close()
 """
 NAMES = ["day.csv", "two.csv", "packed.csv.gz", "tidy.parquet", "link.csv", "empty.csv", "binary.csv",
@@ -173,7 +173,7 @@ def execute(line: list[str], place: Path) -> tuple[int, str]:
         handle = os.open(".printed", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(handle, 1)
         os.dup2(handle, 2)
-        places.NOTEBOOKS = place / "notebooks"
+        folders.NOTEBOOKS = place / "notebooks"
         sys.exit(main(line))
 
     code = _in_a_fork(command)

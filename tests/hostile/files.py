@@ -18,6 +18,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +31,7 @@ from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.scenarios.random_worlds import Worlds
-from szlib.workbook.record import NotebookRecord
-from szlib.workbook.record.method import Method
+from szlib.workbook.record import NotebookRecord, ZoneMethod
 
 DAMAGES = {False: 4, True: 300}
 JUMPS = {False: 2, True: 40}
@@ -162,19 +162,19 @@ def _rollouts(_: Path, out: Path) -> None:
     rollouts(2, worlds=Worlds(duration=0.5), out=out, progress=False)
 
 
-class _Quick(Method):
+class _Quick(ZoneMethod):
     """One speed and few resamples: the attack is on files."""
 
-    def fit(self) -> dict[str, Any]:
-        return super().fit() | {"speeds": [self.zone_speed], "resamples": 10}
+    def fit_options(self) -> dict[str, Any]:
+        return super().fit_options() | {"speeds": [self.zone_speed], "resamples": 10}
 
 
 def _notebook(data: Path, out: Path) -> None:
     record = NotebookRecord("05_attack", {"data": [str(data / "day0.csv")], "results": out})
-    record.method = _Quick()
-    record.square()
-    record.check("encounters", len(record.encounters()) > 0)
-    record.zone()
+    record.cache = replace(record.cache, method=_Quick())
+    record.cache.find_area()
+    record.check("encounters", len(record.cache.encounters()) > 0)
+    record.cache.zone()
     record.table(pd.DataFrame({"a": [1, 2]}), "table")
     record.animation(b"GIF89a", "movie")
     record.close()

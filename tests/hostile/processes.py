@@ -27,10 +27,10 @@ LOCK, UNFINISHED = ".szlib-lock", ".szlib-part-"
 PROGRAM = """
 import sys
 from pathlib import Path
-from szlib.workbook.record import places
+from szlib.workbook import folders
 from szlib.workbook.cli import main
 if __name__ == "__main__":
-    places.NOTEBOOKS = Path({notebooks!r})
+    folders.NOTEBOOKS = Path({notebooks!r})
     sys.exit(main())
 """
 NOTEBOOK = """# %% tags=["parameters"]
@@ -42,7 +42,7 @@ results = "../results"
 import time
 from szlib.workbook.record import NotebookRecord
 record = NotebookRecord("{name}", globals())
-record.check("somebody met", record.encounters()["encounter"].nunique() > 0)
+record.check("somebody met", record.cache.encounters()["encounter"].nunique() > 0)
 time.sleep(1.5)
 record.animation(b"GIF89a", "movie")
 record.close()

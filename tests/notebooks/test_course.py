@@ -8,12 +8,12 @@ import jupytext
 import pytest
 
 import szlib
+from szlib.workbook import folders
 from szlib.workbook.exercises import SHEETS
-from szlib.workbook.record import places
 
 
 def _course():
-    spec = importlib.util.spec_from_file_location("course", places.NOTEBOOKS / "course.py")
+    spec = importlib.util.spec_from_file_location("course", folders.NOTEBOOKS / "course.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -21,8 +21,8 @@ def _course():
 
 course = _course()
 STORY = course.pages()
-START = (places.NOTEBOOKS / "00_start_here.py").read_text(encoding="utf-8")
-FOLDERS = (places.NOTEBOOKS, places.NOTEBOOKS / "exercises", places.NOTEBOOKS / "solutions")
+START = (folders.NOTEBOOKS / "00_start_here.py").read_text(encoding="utf-8")
+FOLDERS = (folders.NOTEBOOKS, folders.NOTEBOOKS / "exercises", folders.NOTEBOOKS / "solutions")
 TIME = re.compile(r"(\d+ h )?\d+\s(#\s)?min\b")
 
 

@@ -9,13 +9,10 @@ import jupytext
 import nbformat
 import pytest
 
-from szlib.workbook.record import places
-from szlib.workbook.record.method import DEFAULTS
-from szlib.workbook.record.validation import defaults_of
-from szlib.workbook.runner import execution
-from szlib.workbook.runner import summary as summaries
+from szlib.workbook import folders, runner
+from szlib.workbook.record.parameters import METHOD_DEFAULTS, read_defaults
 
-SOURCES = places.notebooks()
+SOURCES = folders.list_notebooks()
 MAX_LINES = 25
 
 
@@ -31,7 +28,7 @@ def test_none_is_missing_and_no_copy_is_stray():
     numbers = [s.stem.split("_")[0] for s in SOURCES]
     assert len(set(numbers)) == len(numbers)
     assert {f"{n:02d}" for n in range(1, 19)} <= set(numbers)
-    assert [p.stem for p in sorted(places.NOTEBOOKS.glob("*.ipynb"))] == [s.stem for s in SOURCES]
+    assert [p.stem for p in sorted(folders.NOTEBOOKS.glob("*.ipynb"))] == [s.stem for s in SOURCES]
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.stem)
@@ -73,23 +70,23 @@ class TestEach:
 
 
 def test_each_knob_of_the_method_is_a_parameter_where_it_acts_with_the_default_that_it_has_elsewhere():
-    found = [(n, v) for s in SOURCES for n, v in defaults_of(s).items() if n in DEFAULTS]
-    assert {name for name, _ in found} == set(DEFAULTS)
-    assert all(value == DEFAULTS[name] for name, value in found)
+    found = [(n, v) for s in SOURCES for n, v in read_defaults(s).items() if n in METHOD_DEFAULTS]
+    assert {name for name, _ in found} == set(METHOD_DEFAULTS)
+    assert all(value == METHOD_DEFAULTS[name] for name, value in found)
 
 
-def test_parameters_are_read_as_papermill_finds_them():
+def test_read_defaults_finds_what_the_cell_sets():
     for source in SOURCES:
         (tagged,) = [c for c in cells(source) if "parameters" in c.metadata.get("tags", [])]
         variables: dict[str, object] = {}
         exec(tagged.source, variables)
-        assert variables == defaults_of(source) | {"__builtins__": variables["__builtins__"]}
+        assert variables == read_defaults(source) | {"__builtins__": variables["__builtins__"]}
 
 
 def test_a_parameter_has_one_type_wherever_it_stands():
     types: dict[str, set[type]] = {}
     for source in SOURCES:
-        for name, value in defaults_of(source).items():
+        for name, value in read_defaults(source).items():
             types.setdefault(name, set()).add(type(value))
     assert all(len(found) == 1 for found in types.values()), types
 
@@ -99,7 +96,7 @@ OF_DATA = ("01", "02", "03", "04", "05", "14")
 
 
 def proven(summary: dict, home: Path, only: tuple[str, ...] = ("",)) -> None:
-    assert summary["passed"], summaries.render(summary)
+    assert summary["passed"], runner.format_summary(summary)
     assert json.loads((home / "summary.json").read_text(encoding="utf-8"))["passed"]
     assert list(summary["notebooks"]) == [s.stem for s in SOURCES if s.stem.startswith(only)]
     for name, record in summary["notebooks"].items():
@@ -112,7 +109,7 @@ def proven(summary: dict, home: Path, only: tuple[str, ...] = ("",)) -> None:
 
 
 def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
-    summary = execution.run(out=tmp_path, jobs=2)
+    summary = runner.run(out=tmp_path, jobs=2)
     proven(summary, tmp_path / "synthetic")
     claims = [c for record in summary["notebooks"].values() for c in record["checks"] if c["kind"] == "claim"]
     assert sum(c["passed"] for c in claims) > len(claims) / 2
@@ -123,7 +120,7 @@ def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
     not os.environ.get("SZLIB_DATA_DIR"), reason="SZLIB_DATA_DIR names no folder with real data"
 )
 def test_the_workbook_completes_on_the_real_day(tmp_path):
-    summary = execution.run("atc-1hz", out=tmp_path, jobs=2, only=OF_DATA)
+    summary = runner.run("atc-1hz", out=tmp_path, jobs=2, only=OF_DATA)
     proven(summary, tmp_path / "atc-1hz", only=OF_DATA)
     assert summary["notebooks"]["01_tracks"]["key_figures"]["rows"] == 624_951
     results = {c["name"]: c["result"] for record in summary["notebooks"].values() for c in record["checks"]}

@@ -6,13 +6,13 @@ import re
 import nbformat
 import pytest
 
-from szlib.workbook.record import places
+from szlib.workbook import folders
 
-COPIES = sorted((places.NOTEBOOKS / "real_day").glob("*.ipynb"))
+COPIES = sorted((folders.NOTEBOOKS / "real_day").glob("*.ipynb"))
 
 
 def _refresh():
-    spec = importlib.util.spec_from_file_location("refresh", places.NOTEBOOKS / "refresh.py")
+    spec = importlib.util.spec_from_file_location("refresh", folders.NOTEBOOKS / "refresh.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -25,7 +25,7 @@ refresh = _refresh()
 class TestCopy:
     def test_it_is_of_the_notebook_as_it_is(self, copy):
         executed = nbformat.read(copy, as_version=4)
-        now = refresh.on(places.NOTEBOOKS / f"{copy.stem}.py", "atc-1hz")
+        now = refresh.on(folders.NOTEBOOKS / f"{copy.stem}.py", "atc-1hz")
         again = "python notebooks/refresh.py real_day"
         assert [c.source for c in executed.cells] == [c.source for c in now.cells], again
         code = [c for c in executed.cells if c.cell_type == "code"]
@@ -39,7 +39,7 @@ class TestCopy:
 
 
 def test_a_copy_has_the_data_asked_for_and_links_from_its_folder():
-    notebook = refresh.on(places.NOTEBOOKS / "01_tracks.py", "atc-1hz")
+    notebook = refresh.on(folders.NOTEBOOKS / "01_tracks.py", "atc-1hz")
     (tagged,) = (c.source for c in notebook.cells if "parameters" in c.metadata.get("tags", []))
     assert tagged.startswith('data = "atc-1hz"')
     links = re.findall(r"\]\(([^)]+)\)", notebook.cells[1].source)

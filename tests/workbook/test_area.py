@@ -66,9 +66,9 @@ def test_one_area_only(hall, capsys):
     assert "no/such.wkt" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("at_once")
+@pytest.mark.usefixtures("without_kernels")
 def test_a_run_records_the_area_whatever_it_was_given_as(notebooks, tmp_path, capsys):
-    folder = notebooks(_01_a='record.key["area"] = record.area')
+    folder = notebooks(_01_a='record.key["area"] = record.cache.area')
     script = folder / "01_a.py"
     script.write_text(script.read_text().replace("seed = 0\n", 'seed = 0\narea = ""\n'))
     (tmp_path / "hall.json").write_text(
@@ -87,21 +87,23 @@ def test_a_run_records_the_area_whatever_it_was_given_as(notebooks, tmp_path, ca
 
 
 def test_the_plaza_has_the_malls_square(tmp_path):
-    assert record_of(tmp_path, "", data="synthetic").square() == szlib.ATC_SQUARE
+    assert record_of(tmp_path, "", data="synthetic").cache.find_area() == szlib.ATC_SQUARE
 
 
 def test_an_area_is_found_once_and_kept(hall, tmp_path, monkeypatch):
     record = record_of(tmp_path, hall)
-    found = record.square(record.tracks())
+    found = record.cache.find_area(record.cache.tracks())
     assert str(found) == (record.out / "area.txt").read_text()
     monkeypatch.setattr("szlib.encounters.one_day.walked_area", None)
-    assert record_of(tmp_path, hall).square() == found
-    assert record.encounters().attrs["area"] == str(found)
+    assert record_of(tmp_path, hall).cache.find_area() == found
+    assert record.cache.encounters().attrs["area"] == str(found)
 
 
 def test_an_area_that_is_given_is_taken(hall, tmp_path):
-    assert record_of(tmp_path, hall, area="0 6 0 8").square() == szlib.Square(x=(0, 6), y=(0, 8))
-    assert record_of(tmp_path, hall, area=HALL.buffer(1).wkt).square() == szlib.as_area(HALL.buffer(1))
+    assert record_of(tmp_path, hall, area="0 6 0 8").cache.find_area() == szlib.Square(x=(0, 6), y=(0, 8))
+    assert record_of(tmp_path, hall, area=HALL.buffer(1).wkt).cache.find_area() == szlib.as_area(
+        HALL.buffer(1)
+    )
 
 
 # --- where nobody met --------------------------------------------------------------------------------
@@ -140,9 +142,9 @@ def test_where_people_met_nothing_is_said():
     assert require_encounters(samples) is samples
 
 
-@pytest.mark.usefixtures("at_once")
+@pytest.mark.usefixtures("without_kernels")
 def test_a_run_stops_at_the_first_empty_stage(notebooks, tmp_path, capsys):
-    look = "import szlib\nrecord.keep_encounters(szlib.find_encounters(record.tracks()))"
+    look = "import szlib\nrecord.cache.store_encounters(szlib.find_encounters(record.cache.tracks()))"
     notebooks(_01_fine='record.check("ok", True)', _02_nobody=look, _03_never="1 / 0", _07_never="1 / 0")
     straight = [(k / 2, person, 30 + k / 2, person) for person in (1, 9) for k in range(40)]
     pd.DataFrame(straight, columns=["t", "id", "x", "y"]).to_csv(tmp_path / "mine.csv", index=False)

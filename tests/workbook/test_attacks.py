@@ -20,12 +20,16 @@ from szlib.errors import DataError, StorageError
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import datasets
+from szlib.workbook import folders, runner
 from szlib.workbook.cli import main
-from szlib.workbook.record import NotebookRecord, notebook, places
-from szlib.workbook.record.validation import check_parameters
-from szlib.workbook.runner import execution
+from szlib.workbook.record import DataCache, NotebookRecord, data_cache
+from szlib.workbook.record.parameters import check_parameters
 
 HERE = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
+
+
+def interrupt(*_):
+    raise KeyboardInterrupt
 
 
 def refused(arguments, capsys, message):
@@ -41,17 +45,17 @@ def test_tracks_are_never_overwritten_by_encounters(tmp_path, monkeypatch, capsy
     day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=5))
     szlib.read_tracks(day).to_parquet(tmp_path / "tracks" / "day.parquet")
     before = (tmp_path / "tracks" / "day.parquet").read_bytes()
-    refused(["extract", "tracks", "--out", "tracks"], capsys, "holds data that is to be read")
-    refused(["extract", "day.csv", "--out", "tracks"], capsys, "holds what szlib did not write")
+    refused(["extract", "tracks", "--out", "tracks"], capsys, "holds input data")
+    refused(["extract", "day.csv", "--out", "tracks"], capsys, "holds files that szlib did not write")
     assert (tmp_path / "tracks" / "day.parquet").read_bytes() == before
 
 
 def test_results_go_nowhere_but_into_folders_of_our_own(notebooks, tmp_path, capsys):
     notebooks(_01_one="")
-    refused(["run", "--data", "mine.csv", "--out", "."], capsys, "holds what szlib did not write")
+    refused(["run", "--data", "mine.csv", "--out", "."], capsys, "holds files that szlib did not write")
 
 
-@pytest.mark.usefixtures("at_once")
+@pytest.mark.usefixtures("without_kernels")
 def test_one_data_set_has_one_folder_by_whatever_name(notebooks, tmp_path):
     notebooks(_01_one='record.table(__import__("pandas").DataFrame({"a": [1]}), "table")')
     (tmp_path / "dir").mkdir()
@@ -61,34 +65,34 @@ def test_one_data_set_has_one_folder_by_whatever_name(notebooks, tmp_path):
         assert main(["run", "--data", data, "--out", "out", "--jobs", "1"]) == 0, data
         left = {path.name for path in (tmp_path / "out" / name).iterdir()}
         assert {"summary.json", "01_one.ipynb", "table.csv", "records"} <= left, data
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {".szlib", "dir", "files", "today"}
+    assert {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()} == {"dir", "files", "today"}
 
 
 def test_data_sets_of_one_name_do_not_share_results(tmp_path):
-    homes = {places.home(tmp_path / "out", str(tmp_path / name / "day.csv")) for name in "ab"}
+    homes = {folders.claim_results(tmp_path / "out", str(tmp_path / name / "day.csv")) for name in "ab"}
     assert len(homes) == 2
-    again = places.home(tmp_path / "out", str(tmp_path / "a" / "day.csv"))
+    again = folders.claim_results(tmp_path / "out", str(tmp_path / "a" / "day.csv"))
     assert again == tmp_path / "out" / "day" and again in homes
-    assert places.home(tmp_path / "out", str(tmp_path / "synthetic.csv")).name == "synthetic"
-    assert places.home(tmp_path / "out", "synthetic").name.startswith("synthetic-")
+    assert folders.claim_results(tmp_path / "out", str(tmp_path / "synthetic.csv")).name == "synthetic"
+    assert folders.claim_results(tmp_path / "out", "synthetic").name.startswith("synthetic-")
     assert datasets.label("a/dir/.") == "dir"
 
 
 def test_encounters_and_zone_of_another_day_of_the_same_name_and_size_are_not_served(tmp_path, monkeypatch):
     file = tmp_path / "day.csv"
     make_plaza(file, settings=PlazaSettings(encounters=60))
-    samples = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"}).encounters()
+    samples = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"}).cache.encounters()
     size, content = file.stat().st_size, file.read_text().splitlines(keepends=True)
     file.write_text("".join(content[len(content) // 2 :]))
     with file.open("a") as stream:  # a row that cannot be used, to make up the size
         stream.write("9" * (size - file.stat().st_size - 1) + "\n")
     later = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"})
     with pytest.warns(szlib.DataWarning):
-        assert len(later.encounters()) < len(samples)
+        assert len(later.cache.encounters()) < len(samples)
     artefact = later.out / "encounters.parquet"
     artefact.write_bytes(artefact.read_bytes()[:-100])
     with pytest.warns(szlib.DataWarning):
-        assert len(later.encounters()) > 0, "what is damaged is healed"
+        assert len(later.cache.encounters()) > 0, "what is damaged is healed"
     assert len(pd.read_parquet(artefact)) > 0
 
 
@@ -96,12 +100,13 @@ def test_a_foreign_plaza_is_not_taken_for_ours(tmp_path, monkeypatch):
     (tmp_path / "plaza-0.csv").write_text("1,2,3,4,5,6,7,8\n")
     small = PlazaSettings(encounters=3)
     monkeypatch.setattr(
-        notebook, "make_plaza", lambda file, seed: make_plaza(file, seed=seed, settings=small)
+        data_cache, "make_plaza", lambda file, seed: make_plaza(file, seed=seed, settings=small)
     )
-    (file,) = notebook.data_files("synthetic", folder=tmp_path, seed=0)
+    cache = DataCache(tmp_path, "synthetic")
+    (file,) = cache.files()
     assert len(file.read_text().splitlines()) > 100
-    monkeypatch.setattr(notebook, "make_plaza", None)
-    assert notebook.data_files("synthetic", folder=tmp_path, seed=0) == [file], "ours is not made again"
+    monkeypatch.setattr(data_cache, "make_plaza", None)
+    assert cache.files() == [file], "ours is not made again"
 
 
 def test_an_extraction_gives_its_own_samples_or_none(tmp_path):
@@ -134,26 +139,26 @@ def test_a_poisoned_day_is_a_line_and_the_others_are_done(tmp_path, monkeypatch)
     assert "rename the file" in done["why"][r"latin\xe4"]
 
 
-@pytest.mark.usefixtures("at_once")
+@pytest.mark.usefixtures("without_kernels")
 def test_a_run_that_fails_leaves_no_summary_that_passed(notebooks, tmp_path, monkeypatch):
     notebooks(_01_one='record.check("ok", True)')
     arguments = ["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]
     assert main(arguments) == 0
-    monkeypatch.setattr(execution, "_submit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(runner, "execute_notebook", interrupt)
     assert main(arguments) == 130
     assert not (tmp_path / "out" / "mine" / "summary.json").exists()
     assert not list((tmp_path / "out" / "mine" / "records").iterdir())
 
 
-@pytest.mark.parametrize("garbage", ["summary.json", "zone.json", "records"])
+@pytest.mark.parametrize("garbage", ["summary.json", "records"])
 def test_results_with_garbage_in_them(notebooks, tmp_path, capsys, garbage):
     notebooks(_01_one="")
-    home = places.home(tmp_path / "out", str(tmp_path / "mine.csv"))
+    home = folders.claim_results(tmp_path / "out", str(tmp_path / "mine.csv"))
     (home / garbage).write_text("") if garbage == "records" else (home / garbage).mkdir()
-    refused(["run", "--data", "mine.csv", "--out", "out"], capsys, f"{garbage}: is in the way")
+    refused(["run", "--data", "mine.csv", "--out", "out"], capsys, garbage)
 
 
-@pytest.mark.usefixtures("at_once")
+@pytest.mark.usefixtures("without_kernels")
 def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks, tmp_path, capsys):
     full = 'from szlib.errors import StorageError\nraise StorageError("no room")'
     notebooks(_00_fine='record.check("ok", True)', _01_full=full, _06_later="")
@@ -184,19 +189,19 @@ def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks
         ({"speeds": [-1.0]}, "speeds: expected 0.01 to 10"),
         ({"fraction": 0.9}, "fraction: expected 1e-06 to 0.5"),
         ({"n_jobs": 0}, "n_jobs"),
-        ({"results": "x"}, "is set by --out"),
+        ({"results": "x"}, "use the option --out"),
     ],
 )
 def test_parameters_are_checked_before_any_notebook_starts(given, message):
     with pytest.raises(DataError, match=message):
-        check_parameters(given, places.notebooks())
+        check_parameters(given, folders.list_notebooks())
 
 
 def test_what_the_notebooks_set_themselves_is_in_range():
-    from szlib.workbook.record.validation import defaults_of
+    from szlib.workbook.record.parameters import read_defaults
 
-    for source in places.notebooks():
-        given = {n: v for n, v in defaults_of(source).items() if n not in ("data", "results")}
+    for source in folders.list_notebooks():
+        given = {n: v for n, v in read_defaults(source).items() if n not in ("data", "results")}
         check_parameters(given, [source])
 
 
@@ -205,7 +210,7 @@ def test_a_parameter_is_text_to_a_notebook_and_never_code(notebooks, tmp_path):
     source = tmp_path / "notebooks" / "01_one.py"
     source.write_text(source.read_text().replace("seed = 0\n", 'seed = 0\nword = ""\n', 1))
     evil = "\"; __import__('pathlib').Path('pwned').touch(); '\"\"\""
-    summary = execution.run("mine.csv", out="out", parameters={"word": evil})
+    summary = runner.run("mine.csv", out="out", parameters={"word": evil})
     assert summary["notebooks"]["01_one"]["key_figures"]["word"] == evil
     assert not list(tmp_path.rglob("pwned"))
 
@@ -257,9 +262,9 @@ time.sleep(120)"""
     folder = notebooks(_01_sleeper=sleeper)
     program = tmp_path / "program.py"
     program.write_text(
-        "import sys\nfrom pathlib import Path\nfrom szlib.workbook.record import places\n"
+        "import sys\nfrom pathlib import Path\nfrom szlib.workbook import folders\n"
         "from szlib.workbook.cli import main\nif __name__ == '__main__':\n"
-        f"    places.NOTEBOOKS = Path({str(folder)!r})\n    sys.exit(main())\n"
+        f"    folders.NOTEBOOKS = Path({str(folder)!r})\n    sys.exit(main())\n"
     )
     run = subprocess.Popen(
         [sys.executable, str(program), "run", "--data", "mine.csv", "--out", "out"],
@@ -283,7 +288,7 @@ time.sleep(120)"""
 def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypatch, capsys):
     notebooks(_01_one="", _06_two="")
     done = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
-    monkeypatch.setattr(execution, "_outcomes", lambda sources, *_: {s.stem: done for s in sources})
+    monkeypatch.setattr(runner, "execute_notebook", lambda script, *_: (Path(script).stem, done))
     fill, command = files._fill, ["run", "--data", "mine.csv", "--out", "out"]
     for full in itertools.count():
         shutil.rmtree(tmp_path / "out", ignore_errors=True)
@@ -297,7 +302,7 @@ def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypa
         monkeypatch.setattr(files, "_fill", disk)
         if main(command) == 0:
             break
-        (line,) = capsys.readouterr().err.splitlines()
+        *_, line = capsys.readouterr().err.splitlines()  # after the progress bar
         assert "No space left on device" in line
         assert not list(tmp_path.rglob("summary.json"))
         monkeypatch.setattr(files, "_fill", fill)
@@ -311,7 +316,7 @@ def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypa
 def test_jobs_are_capped_and_that_is_said(tmp_path, capsys):
     day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=3))
     assert main(["extract", str(day), "--out", str(tmp_path / "out"), "--jobs", "100000"]) == 0
-    assert "of 100000 processes 1 are used" in capsys.readouterr().err
+    assert "n_jobs=100000 is reduced to 1" in capsys.readouterr().err
 
 
 def test_memory_is_granted_by_the_command_line(tmp_path, capsys):
@@ -324,4 +329,4 @@ def test_memory_is_granted_by_the_command_line(tmp_path, capsys):
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     with pytest.raises(StorageError, match="cannot be made or read"):
-        places.home("/proc/nowhere", "synthetic")
+        folders.claim_results("/proc/nowhere", "synthetic")

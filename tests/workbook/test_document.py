@@ -11,7 +11,7 @@ import szlib
 from szlib.errors import DataError
 from szlib.workbook.cli import main
 from szlib.workbook.record import PAPER, parameters
-from szlib.workbook.report import document
+from szlib.workbook.report import write_report
 
 PIXEL = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNkYPhfDwAChwGA60e6kgAAAABJRU5ErkJggg=="
 ZONE = szlib.Ellipse((0.05, 0.0), (0.95, 0.75))
@@ -58,7 +58,7 @@ def page(tmp_path_factory, movie):
     record = {"status": "done", "seconds": 1.2, "checks": checks, "key_figures": {}, "figures": []}
     summary = {"data": "mine", "passed": False, "notebooks": {"08_corridor": record}}
     (home / "summary.json").write_text(json.dumps(summary))
-    return BeautifulSoup(document.write(home).read_text(encoding="utf-8"), "html.parser")
+    return BeautifulSoup(write_report(home).read_text(encoding="utf-8"), "html.parser")
 
 
 def test_it_needs_no_other_file_and_no_network(page):
@@ -94,7 +94,7 @@ def test_the_front_page_says_what_came_out(page):
     assert ["08", "It slows down.", "supported", "0.1235"] in rows
     assert ["08", "gamma", "0.05", "paper", "sec. 4"] in rows
     assert ["08 corridor", "Does it barge past?", "0/1", "1", "done"] in rows
-    assert page.text.count("Not made in this run") == 5  # funnel, zone, three scenarios
+    assert page.text.count("Not part of this run") == 5  # funnel, zone, three scenarios
 
 
 def test_the_run_is_on_the_front_page_and_in_its_notebook_with_its_data(page, movie):
@@ -114,7 +114,7 @@ def test_code_is_there_but_folded(page):
 
 def test_where_nothing_was_executed_it_says_what_to_do(tmp_path, capsys):
     with pytest.raises(DataError, match="holds no executed notebooks; `szlib run` makes them"):
-        document.write(tmp_path)
+        write_report(tmp_path)
     assert main(["report", str(tmp_path)]) == 2
     (tmp_path / "01_one.ipynb").write_text("{")
     assert main(["report", str(tmp_path)]) == 2
@@ -126,7 +126,7 @@ def test_pictures_beside_the_notebooks_are_taken_along(tmp_path):
     cells = [nbformat.v4.new_markdown_cell(f"# 0 - Pictures\n\n{text}")]
     nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "00_pictures.ipynb")
     (tmp_path / "summary.json").write_text(json.dumps({"data": "mine", "passed": True, "notebooks": {}}))
-    page = BeautifulSoup(document.write(tmp_path).read_text(encoding="utf-8"), "html.parser")
+    page = BeautifulSoup(write_report(tmp_path).read_text(encoding="utf-8"), "html.parser")
     shown = {
         picture["alt"]: picture["src"][:14] for picture in page.find_all("img") if "alt" in picture.attrs
     }

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import szlib
+from szlib.workbook import folders
 from szlib.workbook.exercises import SHEETS, Task, check, hint
 from szlib.workbook.exercises.task import load_texts
-from szlib.workbook.record import places
 
 TASKS = {
     task.name: (sheet, number, task) for sheet, tasks in SHEETS.items() for number, task in enumerate(tasks)
@@ -24,7 +24,7 @@ SEED = 3
 
 
 def _sheets():
-    spec = importlib.util.spec_from_file_location("sheets", places.NOTEBOOKS / "sheets.py")
+    spec = importlib.util.spec_from_file_location("sheets", folders.NOTEBOOKS / "sheets.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

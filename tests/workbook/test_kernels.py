@@ -13,7 +13,7 @@ from nbclient import NotebookClient
 from nbclient.exceptions import DeadKernelError
 from PIL import Image
 
-from szlib.workbook.runner import kernels
+from szlib.workbook import forked_kernel
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="kernels are forked on Linux only")
 
@@ -23,7 +23,7 @@ def execute(folder, *codes):
     cells = [nbformat.v4.new_code_cell(code) for code in codes]
     notebook = nbformat.v4.new_notebook(cells=cells)
     client = NotebookClient(
-        notebook, kernel_name="python3", kernel_manager_class=kernels.KernelManager,
+        notebook, kernel_name="python3", kernel_manager_class=forked_kernel.ForkedKernelManager,
         extra_arguments=["--log-level=CRITICAL"], resources={"metadata": {"path": str(folder)}},
     )  # fmt: skip
     client.execute(env=os.environ | {"WORD": "asked for"})
@@ -62,11 +62,6 @@ def test_a_figure_that_is_recorded_is_shown_once_as_it_was_drawn(tmp_path):
     assert small.width == round(large.width * 2 / 3)
     small, large = (np.asarray(each.convert("L").resize((60, 50)), float) for each in (small, large))
     assert np.abs(small - large).mean() < 2
-
-
-def test_what_was_to_be_done_at_the_end_is_done(tmp_path):
-    execute(tmp_path, "import atexit, pathlib\natexit.register(pathlib.Path('ended').touch)")
-    assert (tmp_path / "ended").exists()
 
 
 def test_an_interrupt_is_one_and_who_is_killed_is_dead(tmp_path):

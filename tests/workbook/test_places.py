@@ -9,16 +9,15 @@ import sys
 import pytest
 
 from szlib.errors import StorageError
-from szlib.files import folder_lock
+from szlib.files import claim_folder, folder_lock
+from szlib.workbook import folders, runner
 from szlib.workbook.cli import main
-from szlib.workbook.record import places
-from szlib.workbook.runner import execution
 
 CHECK = 'record.key = {"gamma": gamma}\nrecord.check("ok", True)'
 
 
 @pytest.fixture
-def workbook(notebooks, at_once):
+def workbook(notebooks, without_kernels):
     """Two notebooks, one with a parameter of its own."""
     folder = notebooks(_01_one='record.check("ok", True)', _08_two=CHECK)
     script = folder / "08_two.py"
@@ -34,7 +33,7 @@ def contents(folder):
     return {
         str(file.relative_to(folder)): file.read_bytes()
         for file in folder.rglob("*")
-        if file.is_file() and places.LAB not in file.parts
+        if file.is_file() and folders.LAB not in file.parts
     }
 
 
@@ -68,7 +67,7 @@ def test_a_notebook_executed_anew_leaves_the_others_in_the_summary(workbook, tmp
 
 def test_while_it_runs_no_summary_has_passed(workbook, tmp_path, monkeypatch):
     run()
-    monkeypatch.setattr(execution, "_submit", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(runner, "as_completed", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
     assert main(["run", "--data", "mine.csv", "--out", "out", "--only", "08"]) == 130
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
     assert (left["passed"], left["unfinished"], list(left["notebooks"])) == (False, ["08_two"], ["01_one"])
@@ -89,13 +88,13 @@ def test_what_is_executed_by_hand_touches_no_run(workbook, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path / "elsewhere")
     runpy.run_path(str(tmp_path / "hand.py"))
     assert contents(tmp_path / "out") == before
-    (left,) = (tmp_path / "out" / places.LAB).glob("mine*/records/08_two.json")
+    (left,) = (tmp_path / "out" / folders.LAB).glob("mine*/records/08_two.json")
     assert json.loads(left.read_text())["key_figures"] == {"gamma": gamma}
 
 
 def test_relative_results_start_at_the_notebooks(workbook, tmp_path, monkeypatch):
     monkeypatch.chdir("/")
-    assert places.root(places.RESULTS) == tmp_path / "results"
+    assert folders.results_root(folders.RESULTS) == tmp_path / "results"
 
 
 def _hold(folder, held_now, release):
@@ -125,9 +124,9 @@ def test_two_runs_of_the_same_do_not_write_into_each_other(workbook, tmp_path, c
 
 
 def test_a_folder_is_free_again_when_its_holder_is_killed(tmp_path):
-    places.own_folder(tmp_path / "own", "a test")
+    claim_folder(tmp_path / "own", "a test")
     program = f"""
-from szlib.files import folder_lock
+from szlib.files import claim_folder, folder_lock
 with folder_lock({str(tmp_path / "own")!r}):
     print("held", flush=True)
     input()

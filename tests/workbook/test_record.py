@@ -1,14 +1,14 @@
 """Records: what a notebook records, and the artefacts it leaves for the next."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import szlib
-from szlib.workbook.record import NotebookRecord, parameters, settings_table
-from szlib.workbook.record import notebook as records
+from szlib.workbook.record import DataCache, NotebookRecord, data_cache, parameters, settings_table
 from szlib.zones.polar import PolarZone
 
 
@@ -35,7 +35,7 @@ def test_checks_and_claims_are_written_down(record, capsys):
 
 
 def test_a_check_of_the_defaults_is_an_observation_elsewhere_and_a_promise_stays_one(record, capsys):
-    given = {"data": record.data, "results": record.out.parents[1], "r_max": 1.5}
+    given = {"data": record.cache.data, "results": record.out.parents[1], "r_max": 1.5}
     other = NotebookRecord("01_test", given)
     other.check("few infeasible steps", False, 4)
     other.check("goal reached", True)
@@ -46,7 +46,7 @@ def test_a_check_of_the_defaults_is_an_observation_elsewhere_and_a_promise_stays
         ("observation", True, "holds with r_max = 1.5"),
         ("check", False, "FAILED"),
     ]
-    assert "with r_max = 1.5: checks of the defaults are observations here" in capsys.readouterr().out
+    assert "with r_max = 1.5: checks that assume the defaults are observations" in capsys.readouterr().out
     assert not NotebookRecord("01_test", given | {"r_max": 2.0, "n_jobs": 7, "area": "auto"}).changed
 
 
@@ -55,20 +55,20 @@ def test_knobs_of_the_method_reach_encounters_and_zone_and_their_names(record, m
     found = pd.DataFrame({"encounter": [0], "distance": [1.0]})
     radii = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
     zone = szlib.SocialZone(None, 1.5, {1.3: szlib.Ellipse((0, 0), (1, 1))}, method="quantile", radii=radii)
-    monkeypatch.setattr(records, "find_encounters", lambda *_, **k: searched.append(k) or found)
-    monkeypatch.setattr(records.SocialZone, "fit", lambda _, **k: fitted.append(k) or zone)
-    given = {"data": record.data, "results": record.out.parents[1], "area": record.area}
-    NotebookRecord("02_test", given).zone()
+    monkeypatch.setattr(data_cache, "find_encounters", lambda *_, **k: searched.append(k) or found)
+    monkeypatch.setattr(data_cache.SocialZone, "fit", lambda _, **k: fitted.append(k) or zone)
+    given = {"data": record.cache.data, "results": record.out.parents[1], "area": record.cache.area}
+    NotebookRecord("02_test", given).cache.zone()
     turned = NotebookRecord(
         "02_test", given | {"min_speed": 0.6, "space_length": 4.0, "r_max": 1.5, "q": 0.1}
     )
-    monkeypatch.setattr(turned, "out", record.out)
+    turned = replace(turned.cache, folder=record.out)
     turned.zone()
     turned.zone()
     assert [each["min_speed"] for each in searched] == [0.4, 0.6]
     assert searched[1]["space"] == szlib.AttentionalSpace(length=4.0)
     assert [(each["r_max"], each["q"]) for each in fitted] == [(2.0, 0.05), (1.5, 0.1)]
-    assert NotebookRecord("02_test", given | {"zone_speed": 1.3}).method.zone_speed == 1.3
+    assert NotebookRecord("02_test", given | {"zone_speed": 1.3}).cache.method.zone_speed == 1.3
 
 
 def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monkeypatch):
@@ -79,25 +79,30 @@ def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monk
         made.append(len(tracks))
         return pd.DataFrame({"encounter": [0], "distance": [1.0]})
 
-    monkeypatch.setattr(records, "find_encounters", fake)
-    record.encounters()
-    record.encounters()
+    monkeypatch.setattr(data_cache, "find_encounters", fake)
+    record.cache.encounters()
+    record.cache.encounters()
     assert len(made) == 1
-    other = {"data": record.data, "results": record.out.parents[1], "seed": 1, "area": record.area}
-    NotebookRecord("02_test", other).encounters()
+    other = {
+        "data": record.cache.data,
+        "results": record.out.parents[1],
+        "seed": 1,
+        "area": record.cache.area,
+    }
+    NotebookRecord("02_test", other).cache.encounters()
     assert len(made) == 2
-    record.files()[0].write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n2,1,2,0\n")
-    record.encounters()
+    record.cache.files()[0].write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n2,1,2,0\n")
+    record.cache.encounters()
     assert len(made) == 3
 
 
 def test_an_unreadable_zone_is_fitted_again_and_said_so(record, monkeypatch, capsys):
     (record.out / "zone.json").write_text("{")
-    monkeypatch.setattr(NotebookRecord, "encounters", lambda self: None)
-    monkeypatch.setattr(records.SocialZone, "fit", lambda samples, **_: "zone")
-    monkeypatch.setattr(NotebookRecord, "keep_zone", lambda self, zone: zone)
-    assert record.zone() == "zone"
-    assert "fitting the zone again" in capsys.readouterr().out
+    monkeypatch.setattr(DataCache, "encounters", lambda self: None)
+    monkeypatch.setattr(data_cache.SocialZone, "fit", lambda samples, **_: "zone")
+    monkeypatch.setattr(DataCache, "store_zone", lambda self, zone: zone)
+    assert record.cache.zone() == "zone"
+    assert "zone is fitted again" in capsys.readouterr().out
 
 
 def test_badges():

@@ -6,10 +6,11 @@ import os
 import pytest
 
 from szlib.errors import DataError
-from szlib.workbook import cli
+from szlib.workbook import cli, runner
 from szlib.workbook.cli import main
-from szlib.workbook.record.validation import check_parameters
-from szlib.workbook.runner import execution, worker
+from szlib.workbook.record.parameters import check_parameters
+
+DONE = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
 
 
 def run(*arguments):
@@ -20,7 +21,7 @@ def summary(tmp_path, folder="mine"):
     return json.loads((tmp_path / "out" / folder / "summary.json").read_text())
 
 
-@pytest.mark.usefixtures("at_once")
+@pytest.mark.usefixtures("without_kernels")
 def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp_path, capsys):
     notebooks(_01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)')
     assert run() == 0
@@ -78,7 +79,7 @@ def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, t
     assert "NOT ALL CHECKS HOLD" in printed
 
 
-@pytest.mark.usefixtures("at_once")
+@pytest.mark.usefixtures("without_kernels")
 def test_only_runs_what_is_asked_for(notebooks, tmp_path):
     notebooks(_01_one='record.check("ok", True)', _07_two='record.check("ok", True)')
     assert run("--only", "07") == 0
@@ -88,31 +89,34 @@ def test_only_runs_what_is_asked_for(notebooks, tmp_path):
 def test_06_is_not_06b_and_00_comes_first(notebooks):
     names = ["00_start", "06_barriers", "06b_build", "07_passing", "10_room"]
     notebooks(**{f"_{name}": "" for name in reversed(names)})
-    chosen = [[s.stem for s in execution._chosen(only)] for only in ([], ["06"], ["06b"], ["10_room", "00"])]
+    chosen = [
+        [s.stem for s in runner.choose_notebooks(only)] for only in ([], ["06"], ["06b"], ["10_room", "00"])
+    ]
     assert chosen == [names, ["06_barriers"], ["06b_build"], ["00_start", "10_room"]]
     with pytest.raises(DataError, match="no notebook 0; there are 00_start"):
-        execution._chosen(["0"])
+        runner.choose_notebooks(["0"])
 
 
 def test_notebooks_wait_for_the_encounters_and_the_zone_and_for_nothing_else(notebooks):
     names = ["00_start", "01_tracks", "02_met", "03_far", "05_zone", "06_robot", "06b_build", "15_respect"]
     notebooks(**{f"_{name}": "" for name in names})
-    stems = [[s.stem for s in batch] for batch in execution._batches(execution._chosen([]))]
+    stems = [[s.stem for s in batch] for batch in runner.split_batches(runner.choose_notebooks([]))]
     assert stems == [names[:3], names[3:5], names[5:]]
-    assert execution._batches(execution._chosen(["06"])) == [[], [], execution._chosen(["06"])]
+    assert runner.split_batches(runner.choose_notebooks(["06"])) == [[], [], runner.choose_notebooks(["06"])]
 
 
-@pytest.mark.parametrize(("jobs", "threads"), [(1, "6"), (2, "3"), (4, "1"), (8, "1")])
-def test_notebooks_side_by_side_share_the_cores(monkeypatch, jobs, threads):
-    ended = []
-    monkeypatch.setattr(worker, "end_with", ended.append)
+@pytest.mark.parametrize(("jobs", "threads"), [(1, "6"), (2, "3"), (4, "1")])
+def test_notebooks_that_run_at_the_same_time_share_the_cores(notebooks, monkeypatch, jobs, threads):
+    given = []
     monkeypatch.setattr(os, "cpu_count", lambda: 6)
+    monkeypatch.setattr(runner, "execute_notebook", lambda *task: given.append(task[-1]) or ("01_a", DONE))
+    notebooks(**{f"_0{n}_a": "" for n in range(1, 5)})
     monkeypatch.delenv("OMP_NUM_THREADS")
-    worker.begin(7, jobs)
-    assert (os.environ["OMP_NUM_THREADS"], ended) == (threads, [7])
+    runner.run("mine.csv", out="out", jobs=jobs)
+    assert {environment["OMP_NUM_THREADS"] for environment in given} == {threads}
     monkeypatch.setenv("OMP_NUM_THREADS", "5")
-    worker.begin(7, jobs)
-    assert os.environ["OMP_NUM_THREADS"] == "5", "what the user asked for stays"
+    runner.run("mine.csv", out="out", jobs=jobs)
+    assert given[-1]["OMP_NUM_THREADS"] == "5", "the user's own value stays"
 
 
 @pytest.mark.parametrize(
@@ -150,14 +154,14 @@ def test_a_number_of_jobs_that_is_none_is_refused_at_once(jobs, capsys):
 
 
 def test_without_the_workbooks_packages_it_says_what_to_install(monkeypatch, capsys):
-    monkeypatch.setattr(cli, "_WORKBOOK_PACKAGES", ("papermill", "no_such_package"))
+    monkeypatch.setattr(cli, "_WORKBOOK_PACKAGES", ("nbclient", "no_such_package"))
     assert main(["run"]) == 2
     assert "need no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
 
 
 def test_without_notebooks_it_says_where_to_find_them(notebooks):
     with pytest.raises(DataError, match="they come with the repository"):
-        execution.run()
+        runner.run()
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["--version"]])
@@ -173,6 +177,6 @@ def test_ctrl_c_exits_with_130(notebooks, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     notebooks(_01_one="")
-    monkeypatch.setattr(execution, "as_completed", interrupted)
+    monkeypatch.setattr(runner, "as_completed", interrupted)
     assert run() == 130
     assert "stopped" in capsys.readouterr().err

@@ -1,13 +1,23 @@
-"""What does a notebook write down, and where does it go?
+"""What a notebook records, and the data that notebooks share.
 
-method      the knobs between tracks and the robot's zone, which reach every notebook
-places      the folder of results that belongs to a data set and its parameters
-validation  parameters known, of the right type and in range, before a notebook starts
-tables      how values, tables and figures are shown
-notebook    the record of one notebook: checks, claims, figures, artefacts
+notebook_record  checks, claims, figures and tables of one notebook
+data_cache       tracks, area, encounters and zone, computed once
+parameters       how the zone is made; checks of parameters before a notebook starts
+display          how tables, figures and parameters are shown
 """
 
-from .notebook import NotebookRecord
-from .tables import ASSUMED, MEASURED, PAPER, parameters, settings_table
+from .data_cache import DataCache
+from .display import ASSUMED, MEASURED, PAPER, parameters, settings_table
+from .notebook_record import NotebookRecord
+from .parameters import ZoneMethod
 
-__all__ = ["ASSUMED", "MEASURED", "PAPER", "NotebookRecord", "parameters", "settings_table"]
+__all__ = [
+    "ASSUMED",
+    "MEASURED",
+    "PAPER",
+    "DataCache",
+    "NotebookRecord",
+    "ZoneMethod",
+    "parameters",
+    "settings_table",
+]

@@ -1,0 +1,105 @@
+"""One notebook, executed in a kernel of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import SzlibError
+from ..files import printable, write_file
+
+REFUSED = {
+    "DataError", "StorageError", "MemoryLimitError", "ZoneError", "SolverError", "SzlibError", "MemoryError",
+    "OSError", "PermissionError", "FileNotFoundError", "IsADirectoryError", "NotADirectoryError",
+    "DeadKernelError",
+}  # fmt: skip
+"""Errors caused by data, disk or memory, not by the notebook."""
+_CLIENTS: set[Any] = set()
+"""The clients of nbclient whose kernels run in this process."""
+EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
+"""The record of a notebook that wrote none."""
+
+
+def execute_notebook(
+    script: str, parameters: Mapping[str, Any], folder: str, environment: Mapping[str, str]
+) -> tuple[str, dict[str, Any]]:
+    """Execute one notebook in a kernel of its own, and save the executed copy.
+
+    Parameters
+    ----------
+    script : path of the notebook's percent script.
+    parameters : values that replace the defaults of the cell tagged "parameters".
+    folder : the results of the run.
+    environment : further environment variables of the kernel.
+
+    Returns
+    -------
+    The name of the notebook, and its outcome: status, seconds, an error if there is one, and its record.
+    """
+    source, results = Path(script), Path(folder)
+    start = time.perf_counter()
+    outcome: dict[str, Any] = {"status": "done"}
+    try:
+        run_cells(source, parameters, results, environment)
+    except Exception as error:  # of szlib, of a cell, or of Jupyter
+        name = getattr(error, "ename", type(error).__name__)
+        is_refused = name in REFUSED or isinstance(error, SzlibError | OSError | MemoryError)
+        text = printable(" ".join(f"{name}: {getattr(error, 'evalue', error)}".split()))
+        outcome = {"status": "refused" if is_refused else "error", "error": text}
+    outcome["seconds"] = round(time.perf_counter() - start, 2)
+    try:
+        record = json.loads((results / "records" / f"{source.stem}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        record = {}
+        if outcome["status"] == "done":
+            missing = "the notebook wrote no record; it must end with record.close()"
+            outcome |= {"status": "error", "error": missing}
+    return source.stem, outcome | {name: record.get(name, empty) for name, empty in EMPTY_RECORD.items()}
+
+
+def run_cells(
+    script: Path, parameters: Mapping[str, Any], folder: Path, environment: Mapping[str, str]
+) -> None:
+    """Run the cells of a notebook, and write the executed copy also if a cell fails.
+
+    `script`, `parameters`, `folder` and `environment` are those of `execute_notebook`.
+    Raises the error of nbclient for a cell that fails or a kernel that ends.
+    """
+    import jupytext
+    import nbformat
+    from nbclient import NotebookClient
+
+    from .forked_kernel import ForkedKernelManager
+
+    notebook = jupytext.read(script)
+    tagged = [n for n, cell in enumerate(notebook.cells) if "parameters" in cell.metadata.get("tags", [])]
+    if tagged:
+        assignments = "\n".join(f"{name} = {value!r}" for name, value in parameters.items())
+        notebook.cells.insert(tagged[0] + 1, nbformat.v4.new_code_cell(assignments))
+    client = NotebookClient(
+        notebook,
+        kernel_name="python3",
+        kernel_manager_class=ForkedKernelManager,
+        resources={"metadata": {"path": str(script.parent)}},
+        extra_arguments=["--log-level=CRITICAL"],  # no messages about the transport
+    )
+    _CLIENTS.add(client)
+    try:
+        asyncio.run(client.async_execute(env={**os.environ, **environment}))
+    finally:
+        _CLIENTS.discard(client)
+        write_file(folder / f"{script.stem}.ipynb", nbformat.writes(notebook))
+
+
+def end_kernels() -> None:
+    """End the kernels of all notebooks that this process executes, and wait for the ends of the notebooks."""
+    while _CLIENTS:
+        for client in list(_CLIENTS):
+            if process := getattr(getattr(client.km, "provisioner", None), "process", None):
+                process.kill()
+        time.sleep(0.1)

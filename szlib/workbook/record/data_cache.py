@@ -1,0 +1,163 @@
+"""The data of a notebook: tracks, area, encounters and zone, computed once for each choice of parameters."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from ... import __version__
+from ...encounters.areas import as_area
+from ...encounters.finding import find_encounters
+from ...encounters.geometry import Area
+from ...encounters.one_day import require_encounters, with_area
+from ...encounters.settings import EncounterSettings
+from ...errors import DataError, ZoneError
+from ...files import file_content, load_cached, store_cached, write_checksum
+from ...plaza.generation import make_plaza
+from ...plaza.settings import PlazaSettings
+from ...tracks import datasets
+from ...tracks.clock import read_tracks
+from ...tracks.options import ReadOptions
+from ...zones.ellipses import Ellipse
+from ...zones.social_zone import SocialZone
+from .parameters import ZoneMethod
+
+
+@dataclass(frozen=True)
+class DataCache:
+    """Tracks, area, encounters and zone of a data set, kept in a folder of results.
+
+    A file in the folder is used if it was made from the same data, parameters and version of szlib, and is
+    not damaged. Otherwise it is made again.
+
+    Parameters
+    ----------
+    folder : where the files are, `encounters.parquet`, `zone.json` and `area.txt`.
+    data : "synthetic" (the plaza, which is then written into the folder), the name of another data set, or
+        paths of track files.
+    area : where encounters are found, as for `szlib.as_area`; "auto"; or "" for the default of the data.
+    seed : of the synthetic plaza.
+    method : how encounters are found and the zone is fitted.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook.record import DataCache
+    >>> szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=3)).name
+    'plaza.csv'
+    >>> cache = DataCache("results", "plaza.csv")
+    >>> cache.encounters()["encounter"].nunique() > 0
+    True
+    """
+
+    folder: str | Path
+    data: str | Sequence[str]
+    area: str = ""
+    seed: int = 0
+    method: ZoneMethod = field(default_factory=ZoneMethod)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", Path(self.folder))
+
+    @property
+    def is_synthetic(self) -> bool:
+        """Whether the data is the synthetic plaza, whose true zone is known."""
+        return self.data == datasets.SYNTHETIC
+
+    def files(self) -> list[Path]:
+        """The files of the data set; the plaza is written first if it is missing or damaged."""
+        if not self.is_synthetic:
+            return datasets.find(self.data)
+        file = self._path(f"plaza-{self.seed}.csv")
+        source = {"plaza": repr(PlazaSettings()), "seed": self.seed, "szlib": __version__}
+        if load_cached(file, source) is None:
+            try:
+                make_plaza(file, seed=self.seed)
+                write_checksum(file, file.read_bytes(), source)
+            except OSError as error:
+                raise DataError(
+                    f"{file}: the plaza cannot be written ({error}); choose another folder"
+                ) from error
+        return [file]
+
+    def tracks(self) -> pd.DataFrame:
+        """The track table of the data set."""
+        return read_tracks(self.files())
+
+    def find_area(self, tracks: pd.DataFrame | None = None) -> Area:
+        """The area in which encounters are found: the one given, or the default of the data.
+
+        `tracks`, the table of the data, saves reading the files again where the area depends on them.
+        """
+        if content := load_cached(self._path("area.txt"), self._source()):
+            return as_area(content.decode())
+        settings = EncounterSettings(area=self.area or None)
+        area = as_area(with_area(settings, self.files(), ReadOptions(), tracks).area)
+        store_cached(self._path("area.txt"), str(area).encode(), self._source())
+        return area
+
+    def encounters(self) -> pd.DataFrame:
+        """The encounters that notebook 02 stored, or the same found now."""
+        if content := load_cached(self._path("encounters.parquet"), self._source()):
+            return pd.read_parquet(io.BytesIO(content))
+        tracks = self.tracks()
+        settings = self.method.encounter_settings(self.find_area(tracks))
+        return self.store_encounters(find_encounters(tracks, settings=settings))
+
+    def store_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
+        """Store the `samples` of encounters for later notebooks, and return them.
+
+        Raises DataError, which names the condition that rejected the last rows, if there are none.
+        """
+        require_encounters(samples)
+        content = io.BytesIO()
+        samples.to_parquet(content)
+        store_cached(self._path("encounters.parquet"), content.getvalue(), self._source())
+        return samples
+
+    def zone(self) -> SocialZone:
+        """The zone that notebook 05 stored, or the same fitted now."""
+        file = self._path("zone.json")
+        try:
+            if load_cached(file, self._zone_source()) is not None:
+                return SocialZone.load(file)
+            if file.exists():
+                print("The zone is fitted again: zone.json was made from other data, or is damaged.")
+        except ZoneError as error:
+            print(f"The zone is fitted again: {error}")
+        return self.store_zone(SocialZone.fit(self.encounters(), **self.method.fit_options()))
+
+    def ellipse(self) -> Ellipse:
+        """The ellipse that the robot keeps out of: the zone at `zone_speed`, in the person's frame."""
+        return self.zone().ellipse(self.method.zone_speed)
+
+    def store_zone(self, zone: SocialZone) -> SocialZone:
+        """Store the `zone` for later notebooks, and return it with its source."""
+        source, file = self._zone_source(), self._path("zone.json")
+        zone = replace(zone, provenance={**zone.provenance, "source": source})
+        zone.save(file)
+        write_checksum(file, file.read_bytes(), source)
+        return zone
+
+    def _path(self, name: str) -> Path:
+        """A file in the folder, which is made if it is missing."""
+        folder = Path(self.folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder / name
+
+    def _source(self) -> dict[str, Any]:
+        """What encounters are made from: content of the files, parameters, version of szlib."""
+        files = [[file.name, *file_content(file)] for file in self.files()]
+        source = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "area": self.area}
+        source |= {"szlib": __version__, "parameters": self.method.encounter_settings().as_json()}
+        return json.loads(json.dumps(source))  # type: ignore[no-any-return]
+
+    def _zone_source(self) -> dict[str, Any]:
+        """What the zone is made from."""
+        return self._source() | {"fit": self.method.fit_options()}

@@ -1,0 +1,135 @@
+"""How a notebook shows tables, figures and the parameters with their sources."""
+
+from __future__ import annotations
+
+import inspect
+import io
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+from pandas.io.formats.style import Styler
+
+from ...control.settings import MPCSettings
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
+"""Badges: the source of a parameter."""
+_SHOWN_WIDTH = 2 / 3
+"""Width of a figure in the notebook, as a fraction of the saved figure's."""
+
+
+def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
+    """Make a table of parameters for a notebook.
+
+    Parameters
+    ----------
+    rows : name, value, badge (`PAPER`, `ASSUMED` or `MEASURED`) and reason of each parameter.
+
+    Examples
+    --------
+    >>> from szlib.workbook.record import PAPER, parameters
+    >>> parameters([("window", "3 s", PAPER, "sec. 2")])
+    parameter value badge    why
+       window   3 s paper sec. 2
+    """
+    unknown = {badge for _, _, badge, _ in rows} - {PAPER, ASSUMED, MEASURED}
+    if unknown:
+        raise ValueError(f"badges must be {PAPER}, {ASSUMED} or {MEASURED}; got {sorted(unknown)}")
+    return style_table(pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"]))
+
+
+def settings_table(settings: MPCSettings) -> Styler:
+    """Make a table of the controller's `settings`, with the descriptions of the class's docstring."""
+    descriptions: dict[str, str] = {}
+    names: list[str] = []
+    for line in (inspect.getdoc(type(settings)) or "").splitlines():
+        entry = re.fullmatch(r"([A-Za-z_]\w*(?:, \w+)*) : (.*)", line)
+        if entry:
+            names = entry[1].split(", ")
+            descriptions |= dict.fromkeys(names, entry[2])
+        elif line.startswith("    ") and names:
+            descriptions |= {name: f"{descriptions[name]} {line.strip()}" for name in names}
+        else:
+            names = []
+    badges = settings.badges()
+    return parameters(
+        [(name, getattr(settings, name), badge, descriptions[name]) for name, badge in badges.items()]
+    )
+
+
+class _Table(Styler):
+    """A table whose text and HTML are the same at every execution."""
+
+    def __repr__(self) -> str:
+        return str(self.data.to_string(index=False))  # type: ignore[attr-defined]
+
+
+def style_table(table: pd.DataFrame) -> Styler:
+    """Style a `table` so that long texts are shown in full, aligned to the left."""
+    left = [{"selector": "td, th", "props": "text-align: left"}]
+    styled = _Table(table, uuid="szlib", cell_ids=False).format(format_value).hide(axis="index")
+    return styled.set_table_styles(left)  # type: ignore[arg-type]
+
+
+def format_value(value: Any) -> str:
+    """The `value` of a check or a claim as text: four digits of a number, all entries of a dictionary."""
+    if value is None:
+        return ""
+    if isinstance(value, dict):
+        return ", ".join(f"{k}: {format_value(v)}" for k, v in value.items())
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def show_figure(figure: Figure, picture: bytes) -> None:
+    """Show a saved `picture` of a `figure` in the notebook, smaller and in 256 colours, with its alt text.
+
+    The figure is not drawn a second time. Nothing is shown if the backend is not inline (such as ipympl).
+    """
+    import matplotlib.pyplot as plt
+    from IPython.display import display
+    from PIL import Image
+
+    from ..figures.style import alt_text
+
+    if "inline" not in plt.get_backend():
+        return
+    drawn = Image.open(io.BytesIO(picture)).convert("RGB")
+    size = round(drawn.width * _SHOWN_WIDTH), round(drawn.height * _SHOWN_WIDTH)
+    shown = io.BytesIO()
+    drawn.resize(size, Image.Resampling.LANCZOS).quantize(dither=Image.Dither.NONE).save(shown, "PNG")
+    content = {"image/png": shown.getvalue(), "text/plain": repr(figure)}
+    metadata = {"image/png": {"alt": alt_text(figure)}}
+    display(content, raw=True, metadata=metadata)  # type: ignore[no-untyped-call]
+    plt.close(figure)
+
+
+def format_outputs() -> None:
+    """In a notebook, show tables with three decimals and figures with an alt text.
+
+    This registers display functions with the notebook's IPython; pandas and matplotlib are not changed.
+    """
+    from IPython.core.getipython import get_ipython
+
+    shell = get_ipython()
+    if shell is None or shell.display_formatter is None:
+        return
+
+    def describe(figure: Figure, **_: object) -> tuple[dict[str, str], dict[str, Any]]:
+        """The alt text as metadata of the picture."""
+        from ..figures.style import alt_text
+
+        return {}, {"image/png": {"alt": alt_text(figure)}}
+
+    def show_rounded(table: pd.DataFrame) -> str:
+        """The table as HTML with three decimals."""
+        with pd.option_context("display.precision", 3):
+            return str(table._repr_html_())  # type: ignore[operator]
+
+    shell.display_formatter.mimebundle_formatter.for_type_by_name("matplotlib.figure", "Figure", describe)
+    formatters = shell.display_formatter.formatters
+    formatters["text/html"].for_type(pd.DataFrame, show_rounded)
+    formatters["text/plain"].for_type(Styler, lambda table, printer, _: printer.text(table.data.to_string()))

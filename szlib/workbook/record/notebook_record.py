@@ -1,0 +1,166 @@
+"""The record of one notebook: its checks, claims, figures, tables and key figures.
+
+A *check* must hold, or the run fails. With other parameters than the defaults it becomes an *observation*,
+which cannot fail the run, unless it holds for all parameters (`always`). A *claim* of the paper is measured:
+if the data does not support it, the record says "not supported here", and the run goes on.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from pandas.io.formats.style import Styler
+
+from ...files import claim_folder, write_file
+from .. import folders
+from .data_cache import DataCache
+from .display import format_outputs, format_value, show_figure, style_table
+from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, ZoneMethod, read_defaults
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class NotebookRecord:
+    """The record of one notebook.
+
+    Parameters
+    ----------
+    name : of the notebook, "NN_topic".
+    variables : the variables of the notebook, ``globals()``. It reads those of the cell tagged "parameters":
+        data: "synthetic" or as for `szlib.tracks.datasets.find`; area: where encounters are found, as for
+        `szlib.as_area`, "auto", or "" for the default of the data; seed: of everything random; results:
+        folder of all results; and those of `ZoneMethod`.
+
+    Attributes
+    ----------
+    cache : the data of the notebook, a `DataCache`: tracks, area, encounters and zone.
+    changed : name and value of the parameters, of this notebook or of `ZoneMethod`, that differ from the
+        defaults. They turn checks into observations.
+    out : the folder of its results: that of the run, or one in `results/lab` if executed by hand.
+    key : key figures by name, for the summary of the run.
+
+    Examples
+    --------
+    >>> from szlib.workbook.record import NotebookRecord
+    >>> record = NotebookRecord("99_example", {"data": "synthetic", "results": "results"})
+    >>> record.check("two is even", 2 % 2 == 0, 2)
+    check: two is even: holds (2)
+    >>> record.close()
+    kind        name result value
+    check two is even  holds     2
+    """
+
+    def __init__(self, name: str, variables: Mapping[str, Any]) -> None:
+        self.name = name
+        self.checks: list[dict[str, Any]] = []
+        self.figures: list[str] = []
+        self.key: dict[str, Any] = {}
+        script = folders.NOTEBOOKS / f"{name}.py"
+        own_defaults = read_defaults(script) if script.exists() else {"area": "", "seed": 0}
+        defaults = {**METHOD_DEFAULTS, **own_defaults}
+        changed = {n: variables[n] for n, v in defaults.items() if variables.get(n, v) != v}
+        self.changed = {n: v for n, v in changed.items() if n not in NEUTRAL}
+        if self.changed:
+            print(f"{self._settings()}: checks that assume the defaults are observations; text may not apply")
+        data = variables["data"]
+        if run := os.environ.get(folders.RUN_VARIABLE):
+            self.out = Path(run)
+        else:
+            results = folders.results_root(variables.get("results", folders.RESULTS))
+            claim_folder(results, folders.PURPOSE)
+            given = {n: v for n, v in changed.items() if n not in OPTIONS}
+            self.out = folders.claim_results(results / folders.LAB, data, given)
+        for part in ("records", "figures"):
+            (self.out / part).mkdir(exist_ok=True)
+        method, area = ZoneMethod.from_variables(variables), variables.get("area", "")
+        self.cache = DataCache(self.out, data, area=area, seed=variables.get("seed", 0), method=method)
+        format_outputs()
+
+    def check(self, what: str, passed: object, value: object = None, *, always: bool = False) -> None:
+        """Record a check.
+
+        Parameters
+        ----------
+        what : the property that must hold, as a statement.
+        passed : whether it holds.
+        value : the number, or the numbers, that decide it.
+        always : whether it must hold with all parameters. Otherwise a check with `changed` parameters is an
+            observation. A failed check fails the run after the notebook has finished.
+        """
+        if self.changed and not always:
+            result = f"{'holds' if passed else 'does not hold'} {self._settings()}"
+            self._record("observation", what, bool(passed), value, result)
+        else:
+            self._record("check", what, bool(passed), value, "holds" if passed else "FAILED")
+
+    def claim(self, what: str, supported: object, value: object = None) -> None:
+        """Record whether the data supports a claim of the paper.
+
+        Parameters
+        ----------
+        what : the claim, as a statement.
+        supported : whether the data supports it. If not, the run goes on.
+        value : the number, or the numbers, that decide it.
+        """
+        result = "supported" if supported else "not supported here"
+        self._record("claim", what, bool(supported), value, result)
+
+    def figure(self, figure: Figure, name: str) -> None:
+        """Save a `figure` in the results as NN_topic-`name`.png, and show it."""
+        content = io.BytesIO()
+        figure.savefig(content, dpi=150, bbox_inches="tight")
+        self._save_picture(content.getvalue(), f"{self.name}-{name}.png")
+        show_figure(figure, content.getvalue())
+
+    def animation(self, content: bytes, name: str) -> None:
+        """Save the `content` of an animated GIF in the results as NN_topic-`name`.gif."""
+        self._save_picture(content, f"{self.name}-{name}.gif")
+
+    def table(self, table: pd.DataFrame, name: str) -> None:
+        """Save a `table` in the results as `name`.csv."""
+        write_file(self.out / f"{name}.csv", table.to_csv(index=False))
+
+    def close(self) -> Styler:
+        """Write the record for the summary of the run, and return a table of its checks and claims."""
+        record = {
+            "notebook": self.name,
+            "checks": self.checks,
+            "key_figures": self.key,
+            "figures": self.figures,
+        }
+        text = json.dumps(record, indent=1, default=_to_plain)
+        write_file(self.out / "records" / f"{self.name}.json", text)
+        rows = [(c["kind"], c["name"], c["result"], format_value(c["value"])) for c in self.checks]
+        return style_table(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
+
+    def _settings(self) -> str:
+        """The changed parameters as text: "with gamma = 0.2"."""
+        return "with " + ", ".join(f"{name} = {value}" for name, value in self.changed.items())
+
+    def _record(self, kind: str, name: str, passed: bool, value: object, result: str) -> None:
+        value = _to_plain(value)
+        self.checks.append({"kind": kind, "name": name, "passed": passed, "value": value, "result": result})
+        print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({format_value(value)})"))
+
+    def _save_picture(self, content: bytes, name: str) -> None:
+        write_file(self.out / "figures" / name, content, durable=False)
+        self.figures.append(name)
+
+
+def _to_plain(value: Any) -> Any:
+    """Convert numbers of NumPy to Python's, rounded to six digits."""
+    if isinstance(value, Mapping):
+        return {str(k): _to_plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_to_plain(v) for v in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    return round(value, 6) if isinstance(value, float) else value

@@ -1,0 +1,170 @@
+"""The parameters of the notebooks: how the zone is made, and checks before a notebook starts."""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from ...control.settings import MPCSettings
+from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
+from ...encounters.settings import EncounterSettings
+from ...errors import DataError, SolverError
+from ...files import printable
+from ...zones.outliers import R_MAX
+from ...zones.quantile import SHARE
+from ...zones.social_zone import SPEEDS
+
+SETTINGS = {"gamma": "gamma", "gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
+SETTINGS |= {f"{name}_b": name for name in ("gamma", "N_h", "a_max")}
+"""Parameters that set the controller under another name, or that list values of one of its settings."""
+_LARGEST = 2**31
+RANGES: dict[str, tuple[float, float]] = {
+    "seed": (0, 2**63), "space_width": (0.1, 100), "space_length": (0.1, 100), "duration": (0.1, 60),
+    "min_distance": (0, 100), "min_speed": (0.01, 10), "q": (0.001, 0.5), "zone_speed": (0.01, 10),
+    "intruders": (0, 0.5), "examples": (1, _LARGEST), "worlds": (1, _LARGEST), "n_jobs": (-1, _LARGEST),
+    "fraction": (1e-6, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
+    "eccentricities": (0, 0.999999), "size": (0.05, 20), "size_b": (0.05, 20), "speed": (0, 10),
+}  # fmt: skip
+"""Lowest and highest value of a parameter that is not a setting of the controller."""
+OPTIONS = {"data": "--data", "results": "--out"}
+"""Parameters that are options of the command line."""
+NEUTRAL = {*OPTIONS, "area", "n_jobs", "examples"}
+"""Parameters that no check depends on: the data, the way of computing, and the amount shown."""
+
+
+@dataclass(frozen=True)
+class ZoneMethod:
+    """How the zone of the robot is made; every notebook of a run receives the same values.
+
+    Parameters
+    ----------
+    space_width, space_length : size of the attentional space [m] (notebook 02).
+    duration, min_distance, min_speed : conditions of an encounter [s, m, m/s] (notebook 02).
+    r_max : distance up to which samples count [m] (notebook 03).
+    q : fraction of encounters that may enter the quantile zone (notebook 05).
+    zone_speed : walking speed whose zone the robot keeps out of [m/s] (notebook 05).
+
+    Examples
+    --------
+    >>> from szlib.workbook.record import ZoneMethod
+    >>> ZoneMethod.from_variables({"r_max": 1.5, "seed": 7}).r_max
+    1.5
+    """
+
+    space_width: float = PAPER_SPACE.width
+    space_length: float = PAPER_SPACE.length
+    duration: float = EncounterSettings.duration
+    min_distance: float = EncounterSettings.min_distance
+    min_speed: float = EncounterSettings.min_speed
+    r_max: float = R_MAX
+    q: float = SHARE
+    zone_speed: float = MPCSettings.zone_speed
+
+    @classmethod
+    def from_variables(cls, variables: Mapping[str, Any]) -> ZoneMethod:
+        """Take the values from the `variables` of a notebook; a missing variable has its default."""
+        return cls(**{each.name: variables[each.name] for each in fields(cls) if each.name in variables})
+
+    def encounter_settings(self, area: object = None) -> EncounterSettings:
+        """Settings of `szlib.find_encounters` for encounters in an `area`."""
+        space = AttentionalSpace(self.space_length, self.space_width)
+        return EncounterSettings(area, space, self.duration, self.min_distance, self.min_speed)
+
+    def fit_options(self) -> dict[str, Any]:
+        """Keywords of `szlib.SocialZone.fit`."""
+        return {"r_max": self.r_max, "q": self.q, "speeds": sorted({*SPEEDS, self.zone_speed})}
+
+
+METHOD_DEFAULTS: Mapping[str, Any] = asdict(ZoneMethod())
+"""The default values of `ZoneMethod`."""
+
+
+def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dict[str, Any]:
+    """Check parameters before any notebook starts.
+
+    Parameters
+    ----------
+    given : parameters by name.
+    notebooks : scripts of the notebooks that receive them.
+
+    Returns
+    -------
+    The parameters that differ from the default of at least one of the notebooks.
+
+    Raises
+    ------
+    DataError : a parameter is unknown to all notebooks, has another type, or is out of its range.
+    """
+    defaults: dict[str, list[Any]] = {}
+    for notebook in notebooks:
+        for name, value in read_defaults(notebook).items():
+            defaults.setdefault(name, []).append(value)
+    if unknown := sorted(given.keys() - defaults.keys()):
+        raise DataError(
+            f"unknown parameter {', '.join(map(printable, unknown))}; the notebooks know "
+            f"{', '.join(sorted(defaults))}"
+        )
+    for name, value in given.items():
+        if name in OPTIONS:
+            raise DataError(f"parameter {name}: use the option {OPTIONS[name]} instead")
+        default = defaults[name][0]
+        _check_type(name, value, default)
+        if isinstance(default, list) and default and not value:
+            raise DataError(f"parameter {name}: expected values such as {default!r}; got an empty list")
+        for each in value if isinstance(value, list) else [value]:
+            if isinstance(default, list):
+                _check_type(name, each, default[0] if default else "")
+            _check_range(name, each)
+    return {name: value for name, value in given.items() if any(value != each for each in defaults[name])}
+
+
+def read_defaults(notebook: Path) -> dict[str, Any]:
+    """Read the default parameters from the cell tagged "parameters" of a `notebook` (a percent script)."""
+    cells = re.split(r"^# %%", notebook.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {
+        node.targets[0].id: ast.literal_eval(node.value)
+        for head, _, body in (cell.partition("\n") for cell in cells)
+        if re.search(r'tags=\[[^]]*"parameters"', head)
+        for node in ast.parse(body).body
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+    }
+
+
+def _check_type(name: str, value: Any, default: Any) -> None:
+    is_whole = isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool)
+    if not is_whole and type(value) is not type(default):
+        raise DataError(
+            f"parameter {name}: expected {type(default).__name__}, such as {default!r}; got {_short(value)}"
+        )
+
+
+def _check_range(name: str, value: Any) -> None:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise DataError(f"parameter {name}: expected a finite number; got {value!r}")
+    if isinstance(value, str) and printable(value) != value:
+        raise DataError(f"parameter {name}: expected readable text; got {_short(value)}")
+    low, high = RANGES.get(name, (-math.inf, math.inf))
+    if not isinstance(value, str) and not low <= value <= high:
+        raise DataError(f"parameter {name}: expected {low:g} to {high:g}; got {_short(value)}")
+    if name == "n_jobs" and value == 0:
+        raise DataError("parameter n_jobs: expected a number of processes, or -1 for every core; got 0")
+    setting = SETTINGS.get(name, name)
+    if setting in MPCSettings.__dataclass_fields__:
+        try:
+            MPCSettings(**{"N": max(value, 1), "N_h": value} if setting == "N_h" else {setting: value})
+        except (SolverError, TypeError, OverflowError) as error:
+            raise DataError(f"parameter {name}: {error}") from error
+
+
+def _short(value: Any) -> str:
+    """The value as text of at most 80 characters."""
+    try:
+        text = ascii(value)
+    except ValueError:  # Python refuses to print an integer of more than 4,300 digits
+        return "a number too long to print"
+    return text if len(text) <= 80 else f"{text[:77]}..."

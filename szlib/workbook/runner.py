@@ -1,0 +1,232 @@
+"""Execution of all notebooks: in their order, several at a time, with a summary of their checks.
+
+Each notebook is executed in a kernel of its own and leaves a record. The run collects the records in
+summary.json and writes the report.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from .. import __version__, memory
+from ..encounters.areas import AUTO, as_area
+from ..errors import DataError
+from ..files import file_content, folder_lock, write_file
+from ..parallel import cluster, limit_jobs
+from ..tracks import datasets
+from . import folders
+from .notebook_execution import EMPTY_RECORD, end_kernels, execute_notebook
+from .record.data_cache import DataCache
+from .record.display import format_value
+from .record.parameters import check_parameters
+
+PRODUCERS = ("02", "05")
+"""Notebooks whose results later ones need: the encounters and the zone. All others are independent."""
+NOT_STARTED = "not started"
+"""Status of a notebook that needs the result of one that was refused."""
+PARAMETERS, SUMMARY = "parameters.json", "summary.json"
+"""Files of a run: its data and parameters, and its outcome."""
+
+
+def run(
+    data: str | Sequence[str] = datasets.SYNTHETIC,
+    *,
+    out: str | Path = folders.RESULTS,
+    jobs: int = 1,
+    only: Iterable[str] = (),
+    parameters: Mapping[str, Any] | None = None,
+    scheduler: str | None = None,
+) -> dict[str, Any]:
+    """Execute the notebooks on a data set, and collect their results.
+
+    Parameters
+    ----------
+    data : "synthetic", the name of another data set, or paths of track files.
+    out : folder of all results; those of this run go to a folder inside, see `szlib.workbook.folders`.
+    jobs : number of notebooks that run at the same time.
+    only : numbers ("07") or names of the notebooks; empty: all.
+    parameters : parameters of the notebooks by name, such as {"seed": 1}.
+    scheduler : address of a Dask cluster that shares this file system.
+
+    Returns
+    -------
+    The summary: passed; notebooks, for each one its status ("done"; "error": a cell failed; "refused": data,
+    disk or memory do not allow it; "not started": an earlier one was refused), seconds, checks and key
+    figures; and the path of the report. The same, with notebooks of earlier runs on the same data,
+    parameters and version, is in ``summary.json``.
+
+    Raises
+    ------
+    DataError : the data set, a notebook or a parameter is unknown, or a parameter is out of its range.
+    StorageError : the results cannot be written, or another run writes to the same folder.
+    """
+    scripts = choose_notebooks(only)
+    known = sorted({*scripts, *(s for s in folders.list_notebooks() if s.stem[:2] <= PRODUCERS[-1])})
+    given = check_parameters(parameters or {}, known)
+    if given.get("area", AUTO) != AUTO:  # the same text for each way to give an area
+        given["area"] = str(as_area(given["area"]))
+    data = folders.absolute_data(data)
+    results = folders.results_root(out)
+    files = [] if data == datasets.SYNTHETIC else datasets.find(data)
+    home = folders.claim_results(results, data, given, inputs=files)
+    with folder_lock(home):
+        names = [script.stem for script in scripts]
+        files = files or DataCache(home, data, seed=given.get("seed", 0)).files()
+        source = {
+            "szlib": __version__,
+            "data": datasets.label(data),
+            "files": [[file.name, *file_content(file)] for file in files],
+            "parameters": dict(given),
+        }
+        earlier = _start_summary(home, source, names)
+        folders.remove_outputs(home, names)
+        outcomes = _execute_all(
+            scripts, given | {"data": data, "results": str(results)}, home, jobs, scheduler
+        )
+        everything = _summarise(source, {**earlier, **outcomes})
+        write_file(home / SUMMARY, json.dumps(everything, indent=1))
+        summary = _summarise(source, outcomes)
+        if any((home / f"{name}.ipynb").exists() for name in everything["notebooks"]):
+            from .report import write_report  # importing it takes longer than all other imports
+
+            summary["report"] = str(write_report(home))
+        return summary
+
+
+def choose_notebooks(only: Iterable[str]) -> list[Path]:
+    """The scripts of the notebooks whose numbers or names are in `only`; all if it is empty.
+
+    Raises DataError for an unknown name, and if there are no notebooks.
+    """
+    scripts, wanted = folders.list_notebooks(), list(only)
+    if not scripts:
+        raise DataError(
+            f"{folders.NOTEBOOKS}: there are no notebooks; they come with the repository, not with the "
+            "package: clone it, and call `make run` there"
+        )
+    if unknown := [name for name in wanted if not any(folders.has_name(script, name) for script in scripts)]:
+        raise DataError(
+            f"no notebook {', '.join(unknown)}; there are {', '.join(script.stem for script in scripts)}"
+        )
+    return [s for s in scripts if not wanted or any(folders.has_name(s, name) for name in wanted)]
+
+
+def _execute_all(
+    scripts: Sequence[Path], given: Mapping[str, Any], home: Path, jobs: int, scheduler: str | None
+) -> dict[str, dict[str, Any]]:
+    """Execute the notebooks; the outcome of each by its name, in their order."""
+    jobs = max(limit_jobs(jobs, len(scripts)), 1)
+    environment = {folders.RUN_VARIABLE: str(home)}
+    if not scheduler:
+        threads = max(1, (os.cpu_count() or 1) // jobs)
+        environment |= {
+            memory.VARIABLE: str(memory.limit() // jobs),
+            "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", str(threads)),
+        }
+    not_started = {"status": NOT_STARTED, "seconds": 0.0, **EMPTY_RECORD}
+    outcomes = {script.stem: not_started for script in scripts}
+    bar = tqdm(total=len(scripts), unit="notebook", desc=datasets.label(given["data"]))
+    with bar, cluster(scheduler) as client, _open_executor(client, jobs) as executor:
+        for batch in split_batches(scripts):
+            if any(outcome["status"] == "refused" for outcome in outcomes.values()):
+                break  # the later notebooks need its result
+            arguments = (dict(given), str(home), environment)
+            futures = [executor.submit(execute_notebook, str(script), *arguments) for script in batch]
+            for future in as_completed(futures):
+                name, outcomes[name] = future.result()
+                bar.update()
+                bar.set_postfix_str(f"{name} {outcomes[name]['status']}")
+    return outcomes
+
+
+def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:
+    """Split `scripts` after each of `PRODUCERS`; the notebooks of a batch can run at the same time."""
+    batch = [sum(script.stem[:2] > producer for producer in PRODUCERS) for script in scripts]
+    return [[s for s, n in zip(scripts, batch, strict=True) if n == k] for k in range(len(PRODUCERS) + 1)]
+
+
+@contextmanager
+def _open_executor(client: Any, jobs: int) -> Iterator[Executor]:
+    """The workers of a Dask `client`, or threads that wait for kernels; an interruption ends the kernels."""
+    with client.get_executor(pure=False) if client else ThreadPoolExecutor(jobs) as executor:
+        try:
+            yield executor
+        except BaseException:
+            if not client:
+                executor.shutdown(wait=False, cancel_futures=True)
+                end_kernels()
+            raise
+
+
+def _start_summary(home: Path, source: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Remove the outcomes of the notebooks `names`, and return those of the others by name.
+
+    The others stay only if parameters.json equals `source`: version, content of the data, parameters. Until
+    the run is finished, the summary in the folder has not passed.
+    """
+    earlier = {}
+    if _read_json(home / PARAMETERS) == json.loads(json.dumps(source)):
+        outcomes = _read_json(home / SUMMARY).get("notebooks", {})
+        earlier = {name: outcome for name, outcome in outcomes.items() if name not in names}
+    (home / SUMMARY).unlink(missing_ok=True)
+    if earlier:
+        unfinished = {"passed": False, "unfinished": list(names), "notebooks": earlier}
+        write_file(home / SUMMARY, json.dumps(unfinished, indent=1))
+    write_file(home / PARAMETERS, json.dumps(source, indent=1))
+    return earlier
+
+
+def _summarise(source: Mapping[str, Any], notebooks: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "szlib": source["szlib"],
+        "data": source["data"],
+        "seed": source["parameters"].get("seed", 0),
+        "parameters": source["parameters"],
+        "passed": all(has_passed(outcome) for outcome in notebooks.values()),
+        "notebooks": dict(sorted(notebooks.items())),
+    }
+
+
+def has_passed(outcome: Mapping[str, Any]) -> bool:
+    """Whether a notebook with this `outcome` has finished, and none of its checks failed."""
+    return outcome["status"] == "done" and all(c["passed"] for c in outcome["checks"] if c["kind"] == "check")
+
+
+def format_summary(summary: Mapping[str, Any]) -> str:
+    """Format the `summary` of a run: a row for each notebook, each result that does not hold, the verdict."""
+    rows, notes = [("notebook", "seconds", "checks", "observed", "key figures")], []
+    for name, outcome in summary["notebooks"].items():
+        done = outcome["status"] == "done"
+        held = [_count_passed(outcome, kind) for kind in ("check", "observation")]
+        key = ", ".join(f"{k} {format_value(v)}" for k, v in outcome["key_figures"].items())
+        rows.append((name, f"{outcome['seconds']:.1f}", held[0] if done else outcome["status"], held[1], key))
+        notes += [
+            f"{name}: {c['name']}: {c['result']} ({c['value']})" for c in outcome["checks"] if not c["passed"]
+        ]
+        if "error" in outcome:
+            notes.append(f"{name}: {outcome['error']}")
+    table = [f"{row[0]:<24} {row[1]:>7} {row[2]:>11} {row[3]:>9}  {row[4]}" for row in rows]
+    return "\n".join([*table, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
+
+
+def _count_passed(outcome: Mapping[str, Any], kind: str) -> str:
+    """How many of a kind hold, of how many, such as "3/4"; "-" if there are none."""
+    passed = [c["passed"] for c in outcome["checks"] if c["kind"] == kind]
+    return f"{sum(passed)}/{len(passed)}" if passed else "-"
+
+
+def _read_json(file: Path) -> dict[str, Any]:
+    """The object in a JSON file; empty if the file is missing or damaged."""
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
