@@ -65,8 +65,8 @@ def test_knobs_of_the_method_reach_encounters_and_zone_and_their_names(record, m
     turned = replace(turned.cache, folder=record.out)
     turned.zone()
     turned.zone()
-    assert [each["min_speed"] for each in searched] == [0.4, 0.6]
-    assert searched[1]["space"] == szlib.AttentionalSpace(length=4.0)
+    assert [each["settings"].min_speed for each in searched] == [0.4, 0.6]
+    assert searched[1]["settings"].space == szlib.AttentionalSpace(length=4.0)
     assert [(each["r_max"], each["q"]) for each in fitted] == [(2.0, 0.05), (1.5, 0.1)]
     assert NotebookRecord("02_test", given | {"zone_speed": 1.3}).cache.method.zone_speed == 1.3
 
@@ -74,8 +74,8 @@ def test_knobs_of_the_method_reach_encounters_and_zone_and_their_names(record, m
 def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monkeypatch):
     made = []
 
-    def fake(tracks, area, **_):
-        assert area == szlib.Square(x=(0, 12), y=(0, 8))
+    def fake(tracks, settings):
+        assert settings.area == szlib.Square(x=(0, 12), y=(0, 8))
         made.append(len(tracks))
         return pd.DataFrame({"encounter": [0], "distance": [1.0]})
 

@@ -72,8 +72,13 @@ class ZoneMethod:
 
     def encounter_settings(self, area: object = None) -> EncounterSettings:
         """Settings of `szlib.find_encounters` for encounters in an `area`."""
-        space = AttentionalSpace(self.space_length, self.space_width)
-        return EncounterSettings(area, space, self.duration, self.min_distance, self.min_speed)
+        return EncounterSettings(
+            area=area,
+            space=AttentionalSpace(length=self.space_length, width=self.space_width),
+            duration=self.duration,
+            min_distance=self.min_distance,
+            min_speed=self.min_speed,
+        )
 
     def fit_options(self) -> dict[str, Any]:
         """Keywords of `szlib.SocialZone.fit`."""
