@@ -185,7 +185,7 @@ for sheet in SHEETS:
 # | gap that ends a track | 0.5 s in raw files, 1.6 s at 1 Hz | measured |
 # | $r_{max}$ | 2 m | paper |
 # | outliers: encounters nearer than half of all, with a local outlier factor above | 2, among 2 % of all (at least 20) | measured |
-# | outliers by samples (`fraction=0.002, neighbours=20`): share; neighbours | 0.2 %; 20 | paper; assumed |
+# | outliers by samples (`fraction=0.002, n_neighbours=20`): share; neighbours | 0.2 %; 20 | paper; assumed |
 # | zone that the robot keeps | the one at 1.1 m/s | paper |
 # | time step; N; $N_h$; speed limit (Euclidean) | 0.1 s; 8; 2; 1 m/s | paper |
 # | robot radius; margin $\epsilon$ | 0.5 m; 0.05 m, more at the ends of short walls ($r^2 / L$) | paper; measured |

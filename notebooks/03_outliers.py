@@ -62,14 +62,19 @@ parameters(
             PAPER,
             "a quota, not a detection: it removes that share whatever the data",
         ),
-        ("neighbours of a sample", outliers.NEIGHBOURS, ASSUMED, "scikit-learn's default"),
+        ("neighbours of a sample", outliers.N_NEIGHBOURS, ASSUMED, "scikit-learn's default"),
         (
             "neighbours of an encounter",
-            f"{outliers.SHARE:.0%} of all, at least {outliers.NEIGHBOURS}",
+            f"{outliers.NEIGHBOUR_SHARE:.0%} of all, at least {outliers.N_NEIGHBOURS}",
             MEASURED,
             "1 % miss crowds of intruders, 5 % those who come less near",
         ),
-        ("factor of an outlier", f"> {outliers.FACTOR:g}", MEASURED, "at the edge of a zone: up to 1.7"),
+        (
+            "factor of an outlier",
+            f"> {outliers.OUTLIER_FACTOR:g}",
+            MEASURED,
+            "at the edge of a zone: up to 1.7",
+        ),
         ("features", "x', y'", ASSUMED, "speed would need a scale: metres for a difference of 1 m/s"),
     ]
 )
@@ -114,7 +119,7 @@ plain = close["distance"].to_numpy()[:, None] * np.column_stack(
     [np.cos(close["los_angle"]), np.sin(close["los_angle"])]
 )
 plain_outlier = (
-    LocalOutlierFactor(n_neighbors=outliers.NEIGHBOURS, contamination=fraction).fit_predict(plain) == -1
+    LocalOutlierFactor(n_neighbors=outliers.N_NEIGHBOURS, contamination=fraction).fit_predict(plain) == -1
 )
 fig, both = plt.subplots(1, 2, figsize=(10, 4.5), layout="constrained", sharex=True, sharey=True)
 for ax, mask, title in zip(both, (outlier, plain_outlier), ("complementary", "plain"), strict=True):
@@ -144,7 +149,7 @@ record.claim(
 # removed, how many are of intruders? *Recall*: of the intruders' samples, how many are removed?
 
 # %%
-settings = szlib.PlazaSettings(intruders=intruders, pace=SLOW_INTRUDERS)
+settings = szlib.PlazaSettings(intruders=intruders, intruder_speeds=SLOW_INTRUDERS)
 file = szlib.make_plaza(record.out / "03_intruders.csv", seed=seed, settings=settings)
 people = szlib.find_encounters(szlib.read_tracks(file), **record.cache.method.search_options())
 people = people[people["distance"] <= r_max]
@@ -176,13 +181,13 @@ record.claim(
 # %%
 nearest = outliers.nearest_approaches(people)
 places = outliers.complementary_points(nearest, r_max=r_max)
-compared = max(outliers.NEIGHBOURS, int(np.ceil(outliers.SHARE * len(nearest))))
+compared = max(outliers.N_NEIGHBOURS, int(np.ceil(outliers.NEIGHBOUR_SHARE * len(nearest))))
 factor = outliers.local_outlier_factors(places, compared)
 crosses = nearest["encounter"].isin(people.loc[intruder, "encounter"]).to_numpy()
 fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 ax.plot(nearest["distance"][~crosses], factor[~crosses], ".", color=figures.GREY, ms=3, label="respect zones")
 ax.plot(nearest["distance"][crosses], factor[crosses], "x", color=figures.RED, mew=1.8, label="intrude")
-ax.axhline(outliers.FACTOR, color=figures.BLACK, linestyle=":", label="outliers lie above")
+ax.axhline(outliers.OUTLIER_FACTOR, color=figures.BLACK, linestyle=":", label="outliers lie above")
 ax.axvline(nearest["distance"].median(), color=figures.BLUE, linestyle=":", label="half of all are nearer")
 ax.set(xlabel="nearest approach [m]", ylabel="local outlier factor of the encounter")
 ax.set_title(f"{len(nearest):,} encounters, {compared} neighbours each, first round")
@@ -210,7 +215,7 @@ record.figure(fig, "found")
 # %%
 errors = {}
 for rule, mask in rules.items():
-    options = {"method": "hull", "outlier_fraction": 0, "speeds": accuracy.SPEEDS, "resamples": 0}
+    options = {"method": "hull", "fraction": 0, "speeds": accuracy.SPEEDS, "n_resamples": 0}
     zone = szlib.SocialZone.fit(people[~mask], r_max=r_max, **options)
     errors[rule] = accuracy.largest_error(zone, settings)
     print(f"{rule}: centre or axes of the zone off by up to {errors[rule]:.3f} m")

@@ -70,12 +70,12 @@ record.key |= {"inliers": len(points), "vertices": len(vertices)}
 # Each dot is a sample: the farther from the axis, the nearer the other person was. Each line is a slice.
 
 # %%
-zone = szlib.SocialZone.fit(samples, method="hull", r_max=r_max, speeds=[*speeds, zone_speed], resamples=0)
+zone = szlib.SocialZone.fit(samples, method="hull", r_max=r_max, speeds=[*speeds, zone_speed], n_resamples=0)
 low, high = zone.speed_range
 print(f"slices at {list(zone.ellipses)} m/s; the data covers {low:.2f} to {high:.2f} m/s")
 ax = figures.plot_hull(zone, list(zone.ellipses), points=points)
 record.figure(ax.figure, "hull")
-same = np.array_equal(zone.vertices, vertices)
+same = np.array_equal(zone.shape.vertices, vertices)
 record.check("SocialZone.fit finds the same vertices", same, len(vertices), always=True)
 
 # %% [markdown]
@@ -123,7 +123,7 @@ some = some[some["speed"].between(low, high, inclusive="neither")]
 margins = []
 for v, angle, distance in zip(some["speed"], some["los_angle"], some["distance"], strict=True):
     try:
-        margins.append(distance - (r_max - zone.slice(v).reach(angle)))
+        margins.append(distance - (r_max - zone.shape.slice(v).reach(angle)))
     except szlib.ZoneError:  # of speeds at which nobody was seen on some side there is no zone
         continue
 print(f"{len(margins)} of {len(some)} samples have a zone of their own speed")

@@ -131,7 +131,7 @@ for who, kinds in (("everybody", None), ("strangers", "strangers")):
     for method in ("hull", "quantile"):
         people = szlib.of_kind(samples, kinds)
         options = {"q": q} if method == "quantile" else {}
-        options |= {"r_max": r_max, "speeds": (zone_speed,), "resamples": 0}
+        options |= {"r_max": r_max, "speeds": (zone_speed,), "n_resamples": 0}
         one = szlib.SocialZone.fit(people, method=method, **options).ellipses[zone_speed]
         rows[who, method] = [people["encounter"].nunique(), *one.center, *one.semi_axes, one.area]
 pd.DataFrame(rows, index=["encounters", "center_x", "center_y", "a", "b", "area"]).T.round(2)

@@ -70,7 +70,7 @@ if record.cache.is_synthetic:
     for day, (encounters, standing) in enumerate(((700, 0.08), (700, 0.08), (1000, 0.8))):
         file = record.out / f"plaza-day{day + 2}-{seed}.csv"
         date = f"2000-01-{3 + day:02}"
-        settings = PlazaSettings(encounters=encounters, standing=standing, date=date)
+        settings = PlazaSettings(n_encounters=encounters, standing=standing, date=date)
         files.append(make_plaza(file, seed=seed + day + 1, settings=settings))
 seconds = pd.concat([quality.summarise_seconds(file).assign(file=file.name) for file in files])
 print(f"{len(files)} files, {seconds['rows'].sum():,} rows, {len(seconds):,} person-seconds")

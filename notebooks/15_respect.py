@@ -151,7 +151,7 @@ tests = {
 for name, test in tests.items():
     print(f"{name}: {test}")
     record.key[f"p-value, {name}"] = test.p_value
-found = tests["strangers"].respect
+found = tests["strangers"].is_significant
 record.claim("people keep out of each other's way more than by chance", found, str(tests["strangers"]))
 
 # %%

@@ -104,7 +104,7 @@ if record.cache.is_synthetic:
     settings = szlib.PlazaSettings()
     close = samples[samples["distance"] <= r_max]
     intruder = true_kinds(close, seed=seed) == "intruder"
-    removed = is_outlier(close, fraction=fraction, neighbours=20, r_max=r_max)
+    removed = is_outlier(close, fraction=fraction, n_neighbours=20, r_max=r_max)
     lof = claims.outliers_are_intruders(int((removed & intruder).sum()), int(removed.sum()))
     record.claim(f"{lof.claim} (20 neighbours, {fraction:.1%})", lof.low > 0, str(lof))
 

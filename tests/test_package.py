@@ -228,5 +228,5 @@ def test_the_keywords_of_the_paper_are_there() -> None:
 
     assert {"area", "space", "min_speed"} <= parameters(szlib.EncounterSettings)
     assert {"fraction", "r_max"} <= parameters(szlib.remove_outliers)
-    assert {"r_max", "outlier_fraction", "speeds"} <= parameters(szlib.SocialZone.fit)
+    assert {"method", "r_max", "speeds"} <= parameters(szlib.SocialZone.fit)
     assert {"gamma", "N", "N_h", "dt", "pass_side"} <= parameters(szlib.MPCSettings)

@@ -33,7 +33,7 @@ def test_the_program_goes_from_tracks_to_a_robot_that_respects_the_zone(tmp_path
 @pytest.mark.filterwarnings("ignore:.*fewer than 20 encounters:szlib.DataWarning")
 def test_a_file_with_other_columns_frames_and_origin_gives_the_zone(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    plaza = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(encounters=1000))
+    plaza = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=1000))
     tracks = szlib.read_tracks(plaza)
     hall = pd.DataFrame(
         {

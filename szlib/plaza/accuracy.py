@@ -1,4 +1,4 @@
-"""How near to the truth: whom a rule for outliers found, and how far a zone is off."""
+"""The precision of a rule for outliers, and the error of a zone, against the truth of the plaza."""
 
 from __future__ import annotations
 
@@ -15,55 +15,110 @@ from .generation import FIRST_ID, ID_STEP, stage_encounters
 from .settings import PlazaSettings
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
-"""Speeds at which a zone is compared with the truth [m/s]: well inside the plaza's range."""
+"""Speeds at which a zone is compared with the true zone [m/s], well inside the plaza's range."""
 
 
 def true_kinds(
     samples: pd.DataFrame, *, seed: int = 0, settings: PlazaSettings | None = None
 ) -> NDArray[np.str_]:
-    """What kind of encounter (one of `szlib.plaza.generation.KINDS`) each sample of a plaza comes from, (n,).
+    """Find the true kind of encounter of each sample of a plaza.
 
-    `samples` are those of `szlib.find_encounters` on the plaza of this seed and these settings.
-    Raises DataError where two people are no pair of that plaza.
+    Parameters
+    ----------
+    samples : as from `szlib.find_encounters` on the plaza.
+    seed, settings : of the plaza.
+
+    Returns
+    -------
+    One of `szlib.plaza.generation.KINDS` for each sample, shape (n,).
+
+    Raises
+    ------
+    DataError : two people are not a pair of the plaza.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.plaza import true_kinds
+    >>> settings = szlib.PlazaSettings(n_encounters=40)
+    >>> samples = szlib.find_encounters(szlib.read_tracks(szlib.make_plaza("plaza.csv", settings=settings)))
+    >>> len(true_kinds(samples, settings=settings)) == len(samples)
+    True
     """
     check_columns(samples, ["ref_id", "other_id"])
     kinds = stage_encounters(seed=seed, settings=settings)["kind"].to_numpy(str)
     people = (samples[["ref_id", "other_id"]].to_numpy() - FIRST_ID) // ID_STEP
     pair = people.min(axis=1) // 2
-    met = (people.sum(axis=1) == 4 * pair + 1) & (pair >= 0) & (pair < len(kinds))
-    if not met.all():
-        row = int(np.flatnonzero(~met)[0])
+    is_pair = (people.sum(axis=1) == 4 * pair + 1) & (pair >= 0) & (pair < len(kinds))
+    if not is_pair.all():
+        row = int(np.flatnonzero(~is_pair)[0])
         two = samples[["ref_id", "other_id"]].iloc[row].tolist()
         raise DataError(
             f"row {samples.index[row]}: {two} are no pair of a plaza of {len(kinds)} encounters; "
-            "pass the settings that it was made with"
+            "pass the settings of the plaza"
         )
     return np.asarray(kinds[pair])
 
 
 def precision_and_recall(removed: NDArray[np.bool_], intruders: NDArray[np.bool_]) -> tuple[float, float]:
-    """Share of intruders among what was removed, and share removed of the intruders; nan: of nothing.
+    """Compute the precision and recall of a rule that removes intruders.
 
-    Both arguments are booleans of shape (n,), for samples or for encounters.
-    Raises DataError where their shapes differ.
+    Parameters
+    ----------
+    removed : whether the rule removed each sample (or encounter), shape (n,).
+    intruders : whether each is an intruder's, shape (n,).
+
+    Returns
+    -------
+    The share of intruders among the removed, and the share of the intruders that is removed; nan for a share
+    of nothing.
+
+    Raises
+    ------
+    DataError : the shapes differ.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from szlib.plaza import precision_and_recall
+    >>> precision_and_recall(np.array([True, True, False]), np.array([True, False, False]))
+    (0.5, 1.0)
     """
     removed, intruders = np.asarray(removed, bool), np.asarray(intruders, bool)
     if removed.shape != intruders.shape:
         raise DataError(f"expected two arrays of one shape; got {removed.shape} and {intruders.shape}")
-    found = int((removed & intruders).sum())
-    precision, recall = (found / n if n else np.nan for n in (int(removed.sum()), int(intruders.sum())))
+    n_found = int((removed & intruders).sum())
+    precision, recall = (n_found / n if n else np.nan for n in (int(removed.sum()), int(intruders.sum())))
     return precision, recall
 
 
 def largest_error(
     zone: SocialZone, settings: PlazaSettings | None = None, *, speeds: Iterable[float] = SPEEDS
 ) -> float:
-    """Largest error of centre and both semi-axes over the speeds, against the plaza's true zone [m].
+    """Compute the largest error of centre and semi-axes over some speeds [m].
 
-    Raises ZoneError where the zone is undefined at one of the speeds.
+    Parameters
+    ----------
+    zone : the zone to judge.
+    settings : of the plaza; None: the defaults.
+    speeds : at which the zone is compared with the true zone [m/s].
+
+    Raises
+    ------
+    ZoneError : the zone is undefined at one of the speeds.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.plaza import largest_error
+    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=300))
+    >>> samples = szlib.find_encounters(szlib.read_tracks(path))
+    >>> zone = szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=0)
+    >>> largest_error(zone, speeds=[1.1]) < 0.2
+    True
     """
-    off = []
+    errors = []
     for speed in speeds:
-        found, true = zone.ellipse(speed), (settings or PlazaSettings()).true_zone(speed)
-        off += [*np.subtract(found.center, true.center), *np.subtract(found.semi_axes, true.semi_axes)]
-    return float(np.abs(off).max())
+        fitted, true = zone.ellipse(speed), (settings or PlazaSettings()).true_zone(speed)
+        errors += [*np.subtract(fitted.center, true.center), *np.subtract(fitted.semi_axes, true.semi_axes)]
+    return float(np.abs(errors).max())

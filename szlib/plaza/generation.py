@@ -1,14 +1,14 @@
-"""A synthetic square full of people whose true social zone is known.
+"""How people walk on the synthetic plaza, and what a sensor records of them.
 
-It exists so that the way from tracks to zone can be proved: `make_plaza` writes a day in the raw ATC
-format, and what `szlib.SocialZone.fit` makes of it must be `PlazaSettings.true_zone`.
+The plaza tests the way from tracks to zones: `make_plaza` writes a day in the raw ATC format, and
+`szlib.SocialZone.fit` must find `PlazaSettings.true_zone` in it.
 
-Pairs of people cross the square one after another.  The *walker* goes straight on at constant speed;
-the *other* passes on a path that touches, or nearly touches, the walker's zone, at a bearing and a
-speed of the walker spread over all there are.  In the walker's frame it is a straight line, or it
-bends towards the walker until the two are closest: no straight path from ahead touches the back.
-Each of the two keeps out of the other's zone at every moment, but for a few *intruders* who walk
-right through.  Who stands has no direction of motion, and so no zone.
+Pairs of people cross the square one after another. The *walker* goes straight on at constant speed. The
+*other* passes on a path that touches, or nearly touches, the walker's zone. The bearings and the walkers'
+speeds cover their whole range. In the walker's frame the path is a straight line, or it bends towards the
+walker until the two are closest: no straight path from ahead touches the back. Each of the two stays outside
+the other's zone at every moment, except for a few *intruders* who walk through it. A standing person has no
+direction of motion, and so no zone.
 """
 
 from __future__ import annotations
@@ -26,73 +26,105 @@ from ..errors import ZoneError
 from ..files import write_file
 from .settings import (
     MARGIN,
-    SLOWEST,
+    MIN_WALKING_SPEED,
     SPACE,
     PlazaSettings,
-    direction,
-    first_moment,
-    in_unit_disc,
+    interpolate_zones,
+    rotate,
+    rotate_left,
+    start_time,
     swept_length,
-    to_left,
-    turned,
-    zones_at,
+    to_unit_disc,
+    unit_vectors,
 )
 
 KINDS = ("overtaking", "head-on", "crossing", "together", "standing", "intruder")
 """Kinds of encounter; the first three by the angle between the directions of motion when closest."""
 FIRST_ID, ID_STEP = 9_190_600, 100
-"""Of people's ids, as on the first day of ATC; the two of a pair follow each other."""
+"""First id, and step between ids, as on the first day of ATC. The ids of a pair are successive."""
 
 _VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")  # of staged encounters, each with x and y
 _TRACKED = 3.4  # a pair is tracked for the window of 3 s, wherever the ticks of the clock fall [s]
 _PAUSE = 1.0  # between a pair's end and the start of the next [s]
-_BEFORE = (0.5, 2.5)  # from a pair's start until the two are closest [s]
-_TOGETHER = 0.25  # who walk together drift apart slower than that [m/s]
-_BEND = 1.2  # sharpest curvature of a path in the walker's frame [1/m]
+_TIME_TO_CLOSEST = (0.5, 2.5)  # from a pair's start until the two are closest [s]
+_DRIFT = 0.25  # greatest relative speed of people who walk together [m/s]
+_MAX_CURVATURE = 1.2  # of a path in the walker's frame [1/m]
 _MOMENTS = np.linspace(0, _TRACKED, 52)  # at which a path is checked [s]
-_ROUNDS, _SHIFT, _PATIENCE = 5000, 0.001, 200  # draws; each keeps 1 mm more clear; new bearing after so many
-_FRAMES = (33, 50)  # from one frame to the next [ms]
-_SHORT_GAP, _LONG_GAP = (0.1, 0.4), (0.6, 1.0)  # a track ends after 0.5 s of silence [s]
+_MAX_ROUNDS = 5000  # of draws
+_SHIFT, _NEW_BEARING = 0.001, 200  # each draw is 1 mm farther out; a new bearing after so many draws
+_FRAMES = (33, 50)  # time between frames, (shortest, longest) [ms]
+_SHORT_GAP, _LONG_GAP = (0.1, 0.4), (0.6, 1.0)  # a gap of 0.5 s ends a track [s]
 _HEIGHT = (1.5, 1.8)  # of people [m]
 _VELOCITY_NOISE, _FACING_NOISE = 0.45, 0.3  # of the sensor's own velocity [m/s] and facing angle [rad]
 
 
 def make_plaza(path: str | Path, *, seed: int = 0, settings: PlazaSettings | None = None) -> Path:
-    """Write a day on the plaza in the raw ATC format (method, sec. 1), and return its path.
+    """Write a day on the plaza in the raw ATC format.
 
-    The same seed and settings give the same bytes; the file is replaced as a whole or not at all.
+    Parameters
+    ----------
+    path : of the file; it is replaced as a whole or not at all.
+    seed : the same seed and settings give the same bytes.
+    settings : of the plaza; None: the defaults.
+
+    Returns
+    -------
+    The path.
 
     Raises
     ------
     StorageError : the file cannot be written.
-    ZoneError : people cannot respect the zones of `settings` (see `stage_encounters`).
+    ZoneError : people cannot stay outside the zones of `settings` (see `stage_encounters`).
+
+    Examples
+    --------
+    >>> import szlib
+    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=20))
+    >>> szlib.read_tracks(path)["id"].nunique() >= 40
+    True
     """
     path, settings = Path(path), settings or PlazaSettings()
-    rows = _sensed(stage_encounters(seed=seed, settings=settings), seed, settings)
+    rows = _record(stage_encounters(seed=seed, settings=settings), seed, settings)
     write_file(path, rows.write_csv(include_header=False, float_precision=3))
     return path
 
 
 def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) -> pd.DataFrame:
-    """Who meets whom, exactly as they walk: one row an encounter, for `positions`.
+    """Draw the encounters and the exact paths of both people: one row for each encounter.
 
-    Columns: kind (one of `KINDS`); start, when both are first seen, and closest [s since 1970]; and
-    for the latter moment walker_x, walker_y, other_x, other_y [m], walker_vx, walker_vy, other_vx,
-    other_vy [m/s], swerve_x, swerve_y [m/s2]: the other's acceleration until then.
+    Parameters
+    ----------
+    seed : of the random numbers.
+    settings : of the plaza; None: the defaults.
 
-    Raises ZoneError where no path keeps out of both zones, because they are too large.
+    Returns
+    -------
+    kind (one of `KINDS`); start, when both are first seen, and closest [s since 1970]; for the latter moment
+    walker_x, walker_y, other_x, other_y [m], walker_vx, walker_vy, other_vx, other_vy [m/s]; and
+    swerve_x, swerve_y, the other's acceleration until then [m/s2].
+
+    Raises
+    ------
+    ZoneError : no path stays outside both zones, because they are too large.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.plaza import stage_encounters
+    >>> len(stage_encounters(seed=1, settings=szlib.PlazaSettings(n_encounters=20)))
+    20
     """
     rng, settings = np.random.default_rng(seed), settings or PlazaSettings()
-    plan, speed, before, motion = _approaches(rng, settings)
+    plan, speed, before, motion = _draw_encounters(rng, settings)
     n = len(plan)
     heading = rng.uniform(-np.pi, np.pi, n)
-    ahead, swept = direction(heading), swept_length(speed)
-    half = (np.abs(ahead) * swept[:, None] + np.abs(to_left(ahead)) * SPACE.width) / 2
-    low, high = np.transpose([settings.square.x, settings.square.y])
+    ahead, swept = unit_vectors(heading), swept_length(speed)
+    half = (np.abs(ahead) * swept[:, None] + np.abs(rotate_left(ahead)) * SPACE.width) / 2
+    low, high = np.transpose([settings.area.x, settings.area.y])
     middle = rng.uniform(low + half + MARGIN, high - half - MARGIN)
     walker = middle + (speed * before - swept / 2)[:, None] * ahead
-    start = first_moment(settings) + np.arange(n) * (_TRACKED + _PAUSE)
-    offset, other_v, swerve = np.moveaxis(turned(motion, heading[:, None]), 1, 0)
+    start = start_time(settings) + np.arange(n) * (_TRACKED + _PAUSE)
+    offset, other_v, swerve = np.moveaxis(rotate(motion, heading[:, None]), 1, 0)
     apart = np.abs(np.arctan2(motion[:, 1, 1], motion[:, 1, 0]))
     kind = np.where(
         plan == "passing", np.select([apart < np.pi / 4, apart > 3 * np.pi / 4], KINDS[:2], KINDS[2]), plan
@@ -105,51 +137,67 @@ def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) ->
 
 
 def positions(staged: pd.DataFrame, t: Array) -> tuple[Array, Array]:
-    """Where the two of each staged encounter are at times t (n,) [s since 1970], and how they move.
+    """Compute the positions and velocities of both people of each staged encounter.
 
-    Returns positions [m] and velocities [m/s], both of shape (n, 2, 2): walker and other, x and y.
+    Parameters
+    ----------
+    staged : n encounters, as from `stage_encounters`.
+    t : one time for each encounter, shape (n,) [s since 1970].
+
+    Returns
+    -------
+    Positions [m] and velocities [m/s], both of shape (n, 2, 2): walker and other, x and y.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.plaza import positions, stage_encounters
+    >>> staged = stage_encounters(settings=szlib.PlazaSettings(n_encounters=20))
+    >>> positions(staged, staged["closest"])[0].shape
+    (20, 2, 2)
     """
     since = (np.asarray(t, float) - staged["closest"].to_numpy())[:, None]
     until = np.minimum(since, 0.0)
     walker, other, walker_v, other_v, swerve = (
         staged[[name + "x", name + "y"]].to_numpy() for name in _VECTORS
     )
-    where = [walker + walker_v * since, other + other_v * since + swerve * until**2 / 2]
-    return np.stack(where, axis=1), np.stack([walker_v, other_v + swerve * until], axis=1)
+    position = [walker + walker_v * since, other + other_v * since + swerve * until**2 / 2]
+    return np.stack(position, axis=1), np.stack([walker_v, other_v + swerve * until], axis=1)
 
 
-def _approaches(
+def _draw_encounters(
     rng: np.random.Generator, settings: PlazaSettings
 ) -> tuple[NDArray[np.str_], Array, Array, Array]:
     """Plans, walkers' speeds [m/s], times from start to closest [s], and the others' motion when closest.
 
-    The motion (n, 3, 2) is offset [m], velocity [m/s] and swerve [m/s2] along the walker's axes.
-    Paths are drawn until they keep out of both zones; those that do not are drawn anew, farther out.
+    The motion (n, 3, 2) is offset [m], velocity [m/s] and swerve [m/s2] along the walker's axes. Paths that
+    enter a zone are drawn again, farther out.
     """
-    n = settings.encounters
+    n = settings.n_encounters
     ends = np.rint(n * np.cumsum([settings.standing, settings.together, settings.intruders]))
     plan = np.array(["standing", "together", "intruder", "passing"])[
         np.searchsorted(ends, rng.permutation(n), side="right")
     ]
-    speed, bearing = _spread(rng, n, *settings.speeds), _spread(rng, n, -np.pi, np.pi)
+    speed, bearing = _stratify(rng, n, *settings.speeds), _stratify(rng, n, -np.pi, np.pi)
     clear = rng.exponential(settings.clearance, n)
     before, motion = np.zeros(n), np.zeros((n, 3, 2))
-    todo = np.arange(n)
-    for turn in range(_ROUNDS):
-        anew = todo if turn % _PATIENCE == _PATIENCE - 1 else todo[plan[todo] != "passing"]
-        bearing[anew] = rng.uniform(-np.pi, np.pi, len(anew))
-        clear[anew] = rng.exponential(settings.clearance, len(anew))
-        before[todo] = rng.uniform(*_BEFORE, len(todo))
-        motion[todo] = _draw(
-            rng, settings, plan[todo], speed[todo], bearing[todo], clear[todo], bend=turn % 2 * _BEND
-        )
-        todo = todo[~_possible(settings, plan[todo], speed[todo], before[todo], motion[todo])]
-        if not len(todo):
+    pending = np.arange(n)
+    for number in range(_MAX_ROUNDS):
+        is_last = number % _NEW_BEARING == _NEW_BEARING - 1
+        redrawn = pending if is_last else pending[plan[pending] != "passing"]
+        bearing[redrawn] = rng.uniform(-np.pi, np.pi, len(redrawn))
+        clear[redrawn] = rng.exponential(settings.clearance, len(redrawn))
+        before[pending] = rng.uniform(*_TIME_TO_CLOSEST, len(pending))
+        drawn = (plan[pending], speed[pending], bearing[pending], clear[pending])
+        motion[pending] = _draw(rng, settings, *drawn, bend=number % 2 * _MAX_CURVATURE)
+        drawn = (plan[pending], speed[pending], before[pending], motion[pending])
+        pending = pending[~_is_possible(settings, *drawn)]
+        if not len(pending):
             return plan, speed, before, motion
-        clear[todo] += _SHIFT
+        clear[pending] += _SHIFT
     raise ZoneError(
-        f"{len(todo)} of {n} pairs find no way around each other's zones; expected zones that leave room in "
-        f"the attentional space of {SPACE.length} m by {SPACE.width} m; make `slow` and `fast` smaller"
+        f"{len(pending)} of {n} pairs find no path around each other's zones; the zones must leave space in "
+        f"the attentional space of {SPACE.length} m by {SPACE.width} m; make the zones smaller"
     )
 
 
@@ -163,25 +211,25 @@ def _draw(
     *,
     bend: float,
 ) -> Array:
-    """One motion (n, 3, 2), as in `_approaches`, that touches each zone but for what is kept clear.
+    """One motion (n, 3, 2), as in `_draw_encounters`, that passes each zone at the distance `clear`.
 
-    `bearing` is the touching point's parameter on the ellipse; intruders pass the person at that bearing.
+    `bearing` is the parameter of the nearest point on the ellipse; intruders pass the person at this bearing.
     """
     n, standing, intruder = len(plan), plan == "standing", plan == "intruder"
-    center, semi_axes, angle = zones_at(settings, speed)
+    center, semi_axes, angle = interpolate_zones(settings, speed)
     a, b = semi_axes.T
     beside = np.arctan2(b * np.cos(angle), a * np.sin(angle)) + np.pi * rng.integers(2, size=n)
-    unit = direction(np.where(standing, beside, bearing))
-    edge = turned(to_left(unit) * semi_axes, angle)
-    point = center + turned(unit * semi_axes, angle)
-    tangent = np.where(intruder[:, None], to_left(unit), edge / np.linalg.norm(edge, axis=-1, keepdims=True))
-    normal = -to_left(tangent)
-    intrusion = rng.uniform(*settings.intrusion, n)
+    unit = unit_vectors(np.where(standing, beside, bearing))
+    edge = rotate(rotate_left(unit) * semi_axes, angle)
+    point = center + rotate(unit * semi_axes, angle)
+    edge /= np.linalg.norm(edge, axis=-1, keepdims=True)
+    tangent = np.where(intruder[:, None], rotate_left(unit), edge)
+    normal = -rotate_left(tangent)
+    intrusion = rng.uniform(*settings.intruder_distances, n)
     offset = np.where(intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal)
-    slowest = np.where(intruder, settings.pace[0], _TOGETHER)
-    quickest = np.where(intruder, min(settings.pace[1], 2 * settings.fastest), 2 * settings.fastest)
-    pace = rng.uniform(slowest, quickest)
-    pace = np.where(plan == "together", rng.uniform(0, _TOGETHER, n), np.where(standing, speed, pace))
+    (low, high), limit = settings.intruder_speeds, 2 * settings.max_speed
+    pace = rng.uniform(np.where(intruder, low, _DRIFT), np.where(intruder, min(high, limit), limit))
+    pace = np.where(plan == "together", rng.uniform(0, _DRIFT, n), np.where(standing, speed, pace))
     side = np.where(standing, -np.sign(tangent[:, 0]), rng.choice([-1.0, 1.0], n))
     passing = (side * pace)[:, None] * tangent
     curvature = np.where(plan == "passing", rng.uniform(0, bend, n), 0.0)
@@ -189,35 +237,42 @@ def _draw(
     return np.stack([offset, passing + speed[:, None] * [1.0, 0.0], swerve], axis=1)
 
 
-def _possible(
+def _is_possible(
     settings: PlazaSettings, plan: NDArray[np.str_], speed: Array, before: Array, motion: Array
 ) -> NDArray[np.bool_]:
-    """Which motions start ahead of the walker, at speeds that people walk, and keep out of both zones."""
+    """Which motions start ahead of the walker, have walking speeds, and stay outside both zones."""
     since = (_MOMENTS - before[:, None])[..., None]
     until = np.minimum(since, 0.0)
     offset, velocity, swerve = (motion[:, None, k] for k in range(3))
     passing = velocity - speed[:, None, None] * [1.0, 0.0]
-    where, moves = offset + passing * since + swerve * until**2 / 2, velocity + swerve * until
-    x, y = where[:, 0].T
-    seen = (x >= MARGIN) & (x <= SPACE.length - MARGIN) & (np.abs(y) <= SPACE.width / 2 - MARGIN)
-    pace, standing, minds = np.linalg.norm(moves, axis=-1), plan == "standing", plan != "intruder"
-    natural = ((pace <= settings.fastest) & ((pace >= SLOWEST) | standing[:, None])).all(axis=1)
-    possible = seen & (np.hypot(x, y) >= 1 + MARGIN) & natural
-    some = np.flatnonzero(possible & minds)  # most are out already: to ask for zones takes longest
-    possible[some] = _keeps_out(settings, where[some], np.broadcast_to(speed[some, None], pace[some].shape))
-    some = np.flatnonzero(possible & minds & ~standing)
-    course = np.arctan2(moves[some, :, 1], moves[some, :, 0])
-    possible[some] = _keeps_out(settings, turned(-where[some], -course), pace[some])
+    position = offset + passing * since + swerve * until**2 / 2
+    velocity = velocity + swerve * until
+    x, y = position[:, 0].T
+    is_in_view = (x >= MARGIN) & (x <= SPACE.length - MARGIN) & (np.abs(y) <= SPACE.width / 2 - MARGIN)
+    pace, is_standing, is_respectful = (
+        np.linalg.norm(velocity, axis=-1),
+        plan == "standing",
+        plan != "intruder",
+    )
+    is_fast_enough = (pace >= MIN_WALKING_SPEED) | is_standing[:, None]
+    has_walking_speed = ((pace <= settings.max_speed) & is_fast_enough).all(axis=1)
+    possible = is_in_view & (np.hypot(x, y) >= 1 + MARGIN) & has_walking_speed
+    some = np.flatnonzero(possible & is_respectful)  # checked last, because zones take longest
+    walker_speed = np.broadcast_to(speed[some, None], pace[some].shape)
+    possible[some] = _stays_outside(settings, position[some], walker_speed)
+    some = np.flatnonzero(possible & is_respectful & ~is_standing)
+    course = np.arctan2(velocity[some, :, 1], velocity[some, :, 0])
+    possible[some] = _stays_outside(settings, rotate(-position[some], -course), pace[some])
     return np.asarray(possible)
 
 
-def _keeps_out(settings: PlazaSettings, points: Array, speed: Array) -> NDArray[np.bool_]:
-    """Which paths (n, moments, 2) [m] keep out of zones at speeds (n, moments) all the time; (n,)."""
-    return np.asarray((np.linalg.norm(in_unit_disc(settings, points, speed), axis=-1) >= 1).all(axis=1))
+def _stays_outside(settings: PlazaSettings, points: Array, speed: Array) -> NDArray[np.bool_]:
+    """Which paths (n, moments, 2) [m] stay outside the zones at speeds (n, moments) at all moments; (n,)."""
+    return np.asarray((np.linalg.norm(to_unit_disc(settings, points, speed), axis=-1) >= 1).all(axis=1))
 
 
-def _sensed(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.DataFrame:
-    """What the sensor writes: the eight columns of an ATC file, two rows a frame, without the gaps."""
+def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.DataFrame:
+    """The recording of the sensor: the columns of an ATC file, two rows for each frame, without the gaps."""
     rng = np.random.default_rng([seed, 1])
     n, start = len(staged), staged["start"].to_numpy()
     ms = rng.integers(
@@ -226,35 +281,29 @@ def _sensed(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     frames = start[0] + np.cumsum(ms) / 1000
     pair = np.searchsorted(start, frames, side="right") - 1
     pair, frames = (array[frames <= start[pair] + _TRACKED] for array in (pair, frames))
-    where, moves = positions(staged.iloc[pair], frames)
-    seen = where + rng.normal(0, settings.noise, where.shape)
-    felt = moves + rng.normal(0, _VELOCITY_NOISE, moves.shape)
-    facing = np.arctan2(moves[..., 1], moves[..., 0]) + rng.normal(0, _FACING_NOISE, moves.shape[:2])
-    height = rng.uniform(*_HEIGHT, (n, 2))[pair] + rng.normal(0, settings.noise, moves.shape[:2])
-    kind = rng.choice(3, (n, 2), p=[settings.gaps, settings.losses, 1 - settings.gaps - settings.losses])
+    position, velocity = positions(staged.iloc[pair], frames)
+    measured = position + rng.normal(0, settings.noise, position.shape)
+    sensor_velocity = velocity + rng.normal(0, _VELOCITY_NOISE, velocity.shape)
+    facing = np.arctan2(velocity[..., 1], velocity[..., 0]) + rng.normal(0, _FACING_NOISE, velocity.shape[:2])
+    height = rng.uniform(*_HEIGHT, (n, 2))[pair] + rng.normal(0, settings.noise, velocity.shape[:2])
+    short, long = settings.short_gaps, settings.long_gaps
+    kind = rng.choice(3, (n, 2), p=[short, long, 1 - short - long])
     length = np.stack([rng.uniform(*_SHORT_GAP, (n, 2)), rng.uniform(*_LONG_GAP, (n, 2)), np.zeros((n, 2))])
     length = np.take_along_axis(length, kind[None], axis=0)[0]
-    lost = start[:, None] + rng.uniform(0, _TRACKED - length)
-    there = ~((frames[:, None] > lost[pair]) & (frames[:, None] < (lost + length)[pair]))
-    mm = {
-        name: np.rint(1000 * value).astype(np.int32)
-        for name, value in {
-            "x": seen[..., 0],
-            "y": seen[..., 1],
-            "z": height,
-            "velocity": np.linalg.norm(felt, axis=-1),
-        }.items()
-    }
+    gap_start = start[:, None] + rng.uniform(0, _TRACKED - length)
+    is_recorded = ~((frames[:, None] > gap_start[pair]) & (frames[:, None] < (gap_start + length)[pair]))
+    speed = np.linalg.norm(sensor_velocity, axis=-1)
+    metres = {"x": measured[..., 0], "y": measured[..., 1], "z": height, "velocity": speed}
     columns = {
-        "time": np.broadcast_to(frames[:, None], there.shape),
+        "time": np.broadcast_to(frames[:, None], is_recorded.shape),
         "id": FIRST_ID + ID_STEP * (2 * pair[:, None] + np.arange(2)),
-        **mm,
-        "motion_angle": np.arctan2(felt[..., 1], felt[..., 0]),
+        **{name: np.rint(1000 * value).astype(np.int32) for name, value in metres.items()},
+        "motion_angle": np.arctan2(sensor_velocity[..., 1], sensor_velocity[..., 0]),
         "facing_angle": wrap_angle(facing),
     }
-    return pl.DataFrame({name: column[there] for name, column in columns.items()})
+    return pl.DataFrame({name: column[is_recorded] for name, column in columns.items()})
 
 
-def _spread(rng: np.random.Generator, n: int, low: float, high: float) -> Array:
+def _stratify(rng: np.random.Generator, n: int, low: float, high: float) -> Array:
     """n numbers in random order, one in each nth part from low to high."""
     return low + (high - low) * rng.permutation(np.arange(n) + rng.uniform(size=n)) / n

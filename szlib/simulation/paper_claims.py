@@ -160,13 +160,19 @@ def _interval(zone: SocialZone, speed: float, quantity: str) -> tuple[float, flo
         return np.nan, np.nan, np.nan
     table = zone.table().set_index("speed")
     if speed not in table.index or zone.uncertainty is None:
-        raise ZoneError(f"no interval at {speed:g} m/s; fit with speeds that hold it, and with resamples > 0")
+        raise ZoneError(
+            f"no interval at {speed:g} m/s; fit with speeds that hold it, and with n_resamples > 0"
+        )
     value, low, high = (table[f"{quantity}{end}"].to_dict()[speed] for end in ("", "_low", "_high"))
     return float(value), float(low), float(high)
 
 
 def _encounters(zone: SocialZone, speed: float) -> int:
-    return 0 if zone.seen is None else int(zone.seen.set_index("speed")["encounters"].to_dict()[speed])
+    return (
+        0
+        if zone.side_counts is None
+        else int(zone.side_counts.set_index("speed")["encounters"].to_dict()[speed])
+    )
 
 
 def _share(claim: str, hits: int, of: int) -> Finding:

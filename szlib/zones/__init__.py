@@ -1,16 +1,66 @@
 """How near is too near, and how certain is that: from samples of encounters to the minimum social zone.
 
-ellipses              ellipses, and the smallest one around points or a curve
+ellipses              ellipses in a person's frame
+enclosing_ellipse     the smallest ellipse around points or a curve
 outliers              encounters, or samples, far from all others (local outlier factor)
+estimators            what all estimators and shapes of zones have in common
 polar                 a zone given as a radius in each direction, and the ellipse fitted to it
 hulls                 the zone outside the convex hull over (x', y', speed): estimator "hull"
-quantile              the zone that all but a share of encounters keep out of: estimator "quantile"
+quantile              the zone that all but a share of encounters stay outside: estimator "quantile"
 occupancy             histograms of where people were, and the map of the pair correlation
-respect               the zone where people are half as frequent as in the null model
-respect_estimator     the respect zone at several speeds: estimator "respect"
+respect               the zone where people are half as frequent as in the null model: estimator "respect"
 respect_significance  the test of the data against its null model
 uncertainty           encounters by side, and confidence intervals by resampling people
 zone_file             the JSON file of a social zone
 social_zone           `SocialZone`: all of it behind one name
-costmaps              zones around people as a layer of a costmap
+costmaps              zones around people as a costmap, for navigation stacks
+sensitivity           the zone with each parameter of the method varied alone
 """
+
+from .costmaps import Grid, draw_costmap
+from .ellipses import BODY_RADIUS, Ellipse, circle_around
+from .enclosing_ellipse import minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
+from .hulls import HullEstimator, HullZone, Slice, hull_vertices, slice_hull
+from .occupancy import OccupancyHistogram, PairCorrelation, pair_correlation
+from .outliers import complementary_points, is_outlier, remove_outliers
+from .polar import PolarZone
+from .quantile import QuantileEstimator
+from .respect import Respect, RespectEstimator, fit_respect, respect_boundary, respect_radius
+from .respect_significance import NullTest, null_test
+from .sensitivity import sensitivity
+from .social_zone import SocialZone
+from .uncertainty import Uncertainty, count_by_side
+
+__all__ = [
+    "BODY_RADIUS",
+    "Ellipse",
+    "Grid",
+    "HullEstimator",
+    "HullZone",
+    "NullTest",
+    "OccupancyHistogram",
+    "PairCorrelation",
+    "PolarZone",
+    "QuantileEstimator",
+    "Respect",
+    "RespectEstimator",
+    "Slice",
+    "SocialZone",
+    "Uncertainty",
+    "circle_around",
+    "complementary_points",
+    "count_by_side",
+    "draw_costmap",
+    "fit_respect",
+    "hull_vertices",
+    "is_outlier",
+    "minimum_enclosing_ellipse",
+    "minimum_enclosing_ellipse_of_curve",
+    "null_test",
+    "pair_correlation",
+    "remove_outliers",
+    "respect_boundary",
+    "respect_radius",
+    "sensitivity",
+    "slice_hull",
+]

@@ -1,13 +1,12 @@
-"""The convex hull over (x', y', speed), its slices, and the zone they leave free (paper, sec. 2).
+"""The convex hull over (x', y', speed), its slices, and the zone outside of it (paper, sec. 2).
 
-A slice of the hull at one speed is a convex polygon around the origin of the complementary plane.
-With R'(theta) the distance from the origin to its edge, people at that speed were nowhere nearer
-than
+A slice of the hull at one speed is a convex polygon around the origin of the complementary plane. Let
+R'(theta) be the distance from the origin to the polygon's edge. People at that speed were nowhere nearer than
 
     r_zone(theta) = r_max - R'(theta)
 
-which is the *minimum social zone*.  Map first, enclose second: an ellipse around the slice itself
-is not a zone.
+which is the *minimum social zone*. The order matters: first map to r_zone, then enclose it by an ellipse. An
+ellipse around the slice itself is not a zone.
 """
 
 from __future__ import annotations
@@ -15,30 +14,40 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from ..checks import Array
 from ..errors import ZoneError
 from ..tracks import funnels
-from .enclosing_ellipse import minimum_enclosing_ellipse
+from .ellipses import Ellipse
+from .enclosing_ellipse import minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
+from .estimators import Estimator
 from .outliers import complementary_points, encounter_numbers, remove_outliers
 from .polar import DIRECTIONS
 
 
-def hull_vertices(points: ArrayLike) -> np.ndarray:
-    """Vertices of the convex hull of points (n, 3): x' [m], y' [m], speed [m/s]; shape (k, 3).
+def hull_vertices(points: ArrayLike) -> Array:
+    """Vertices (k, 3) of the convex hull of `points` (n, 3): x' [m], y' [m], speed [m/s].
 
-    Raises ZoneError for fewer than four points, all points in a plane, or a value that is not finite.
+    Raises ZoneError if there are fewer than four points, all lie in a plane, or a value is not finite.
+
+    Examples
+    --------
+    >>> from szlib.zones import hull_vertices
+    >>> corners = [(x, y, v) for x in (-1, 1) for y in (-1, 1) for v in (0.5, 1.5)]
+    >>> len(hull_vertices([*corners, (0, 0, 1)]))
+    8
     """
-    hull = _hull(points)
+    hull = _convex_hull(points)
     return np.asarray(hull.points[hull.vertices])
 
 
-def _hull(points: ArrayLike) -> ConvexHull:
+def _convex_hull(points: ArrayLike) -> ConvexHull:
     points = np.asarray(points, float)
     if points.ndim != 2 or points.shape[1] != 3:
         raise ZoneError(f"a hull needs points of shape (n, 3): x', y', speed; got shape {points.shape}")
@@ -60,16 +69,20 @@ def _hull(points: ArrayLike) -> ConvexHull:
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """One slice of the hull, at one speed.
+    """A slice of the hull at one speed.
 
     Parameters
     ----------
     polygon : corners in the complementary plane, counter-clockwise, shape (k, 2) [m].
-    speed : of the reference pedestrian [m/s].
-    r_max : distance that the complement is taken from [m].
+    speed : speed of the reference pedestrian [m/s].
+    r_max : distance from which complementary distances are measured [m].
+
+    Raises
+    ------
+    ZoneError : the origin is outside the polygon, so no person was seen in some directions.
     """
 
-    polygon: np.ndarray
+    polygon: Array
     speed: float
     r_max: float
 
@@ -77,18 +90,18 @@ class Slice:
         if (self._edges()[1] <= 0).any():
             low, high = np.degrees(self._missing_directions())
             raise ZoneError(
-                f"the zone at {self.speed:g} m/s is undefined: nobody was seen in the directions from "
+                f"the zone at {self.speed:g} m/s is undefined: no person was seen in the directions from "
                 f"{low:.0f} counter-clockwise to {high:.0f} deg (the origin is outside the slice); "
-                "more data, or another speed, is needed"
+                "add data, or choose another speed"
             )
 
     @property
-    def corner_angles(self) -> np.ndarray:
-        """Directions of the corners, sorted [rad]: between them the zone's boundary is smooth."""
+    def corner_angles(self) -> Array:
+        """Sorted directions of the corners [rad]. Between them the zone's boundary is smooth."""
         return np.sort(np.arctan2(self.polygon[:, 1], self.polygon[:, 0]))
 
-    def reach(self, theta: ArrayLike) -> np.ndarray:
-        """R'(theta), distance from the origin to the polygon's edge; same shape as theta [m]."""
+    def reach(self, theta: ArrayLike) -> Array:
+        """R'(theta), the distance from the origin to the polygon's edge; same shape as `theta` [m]."""
         normals, offsets = self._edges()
         theta = np.asarray(theta, float)
         along = np.cos(theta)[..., None] * normals[:, 0] + np.sin(theta)[..., None] * normals[:, 1]
@@ -96,20 +109,20 @@ class Slice:
             np.min(np.where(along > 0, offsets / np.where(along > 0, along, 1.0), np.inf), axis=-1)
         )
 
-    def boundary(self, theta: ArrayLike) -> np.ndarray:
-        """The zone's boundary r_zone(theta) as points in the reference pedestrian's frame, (..., 2) [m]."""
+    def boundary(self, theta: ArrayLike) -> Array:
+        """Boundary of the zone in the directions `theta` (...) [rad], in the person's frame, (..., 2) [m]."""
         theta = np.asarray(theta, float)
         directions = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
         return np.asarray((self.r_max - self.reach(theta))[..., None] * directions)
 
-    def _edges(self) -> tuple[np.ndarray, np.ndarray]:
+    def _edges(self) -> tuple[Array, Array]:
         """Outward unit normals (k, 2) and distances from the origin (k,) of the polygon's edges."""
         along = np.roll(self.polygon, -1, axis=0) - self.polygon
         normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
         return normals, np.einsum("ij,ij->i", normals, self.polygon)
 
     def _missing_directions(self) -> tuple[float, float]:
-        """The range of directions that leaves the origin without meeting the polygon, in (-pi, pi] [rad]."""
+        """The range of directions in which a ray from the origin misses the polygon, in (-pi, pi] [rad]."""
         away = self.polygon[np.hypot(*self.polygon.T) > 0]
         angles = np.sort(np.arctan2(away[:, 1], away[:, 0]))
         widest = int(np.argmax(np.diff(np.r_[angles, angles[0] + 2 * np.pi])))
@@ -117,11 +130,27 @@ class Slice:
 
 
 def slice_hull(points: ArrayLike, speed: float, *, r_max: float) -> Slice:
-    """Section of the hull of points (n, 3) with the plane of one speed.
+    """Cut the hull of points at one speed.
 
-    Raises ZoneError where the speed is not inside the hull's range, or the zone is undefined there.
+    Parameters
+    ----------
+    points : x' [m], y' [m], speed [m/s], shape (n, 3).
+    speed : speed of the slice [m/s].
+    r_max : distance from which complementary distances are measured [m].
+
+    Raises
+    ------
+    ZoneError : the speed is outside the hull's range, or the zone is undefined there.
+
+    Examples
+    --------
+    >>> from szlib.zones import slice_hull
+    >>> corners = [(x, y, v) for x in (-1, 1) for y in (-1, 1) for v in (0.5, 1.5)]
+    >>> section = slice_hull(corners, 1.0, r_max=2.0)
+    >>> section.boundary(0.0).tolist()  # 2 m - 1 m, straight ahead
+    [1.0, 0.0]
     """
-    hull = _hull(points)
+    hull = _convex_hull(points)
     v = hull.points[:, 2]
     low, high = v[hull.vertices].min(), v[hull.vertices].max()
     if not low < speed < high:
@@ -145,100 +174,142 @@ def slice_hull(points: ArrayLike, speed: float, *, r_max: float) -> Slice:
 
 
 @dataclass(frozen=True, eq=False)
-class HullEstimator:
-    """The paper's way to zones: outliers, hull, slices, smallest ellipses; to go again with other people.
+class HullZone:
+    """The zone outside the hull over (x', y', speed).
+
+    Parameters
+    ----------
+    vertices : of the hull, shape (k, 3) [m, m, m/s].
+    r_max : distance from which complementary distances are measured [m].
+
+    Raises
+    ------
+    ZoneError : the vertices have no hull.
+    """
+
+    vertices: Array
+    r_max: float
+
+    def __post_init__(self) -> None:
+        hull_vertices(self.vertices)
+
+    @property
+    def speed_range(self) -> tuple[float, float]:
+        """Lowest and highest speed of the hull [m/s]."""
+        return float(self.vertices[:, 2].min()), float(self.vertices[:, 2].max())
+
+    def slice(self, speed: float) -> Slice:
+        """The slice at a `speed` [m/s]; raises ZoneError if the zone is undefined there."""
+        return slice_hull(self.vertices, speed, r_max=self.r_max)
+
+    def boundary(self, speed: float, theta: ArrayLike) -> Array:
+        """Boundary at a `speed` [m/s] in the directions `theta` (...) [rad], shape (..., 2) [m]."""
+        return self.slice(speed).boundary(theta)
+
+    def ellipse(self, speed: float) -> Ellipse:
+        """The smallest ellipse around the boundary at a `speed` [m/s]; ZoneError if it is undefined."""
+        section = self.slice(speed)
+        return minimum_enclosing_ellipse_of_curve(section.boundary, section.corner_angles)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HullEstimator(Estimator):
+    """The estimator of the paper: remove outliers, take the hull, slice it, enclose the slices by ellipses.
 
     Parameters
     ----------
     points : inliers (x', y', speed), shape (n, 3) [m, m, m/s].
-    encounter : which of `encounters` each belongs to, shape (n,).
-    encounters : the first of each encounter's inliers.
-    r_max : distance that the complement is taken from [m].
-    parameters, funnel : for the provenance.
+    number : row in `encounters` of each point, shape (n,).
+    r_max : distance from which complementary distances are measured [m].
+    encounters, parameters, funnel : see `Estimator`.
     """
 
-    points: np.ndarray
-    encounter: NDArray[np.intp]
-    encounters: pd.DataFrame
+    points: Array
+    number: NDArray[np.intp]
     r_max: float
-    parameters: dict[str, Any]
-    funnel: list[dict[str, Any]]
-    extreme = True
+    is_extreme: ClassVar[bool] = True
 
     @classmethod
-    def of(
+    def from_samples(
         cls,
         samples: pd.DataFrame,
         *,
         r_max: float,
-        outlier_fraction: float | None = None,
-        neighbours: int | None = None,
+        fraction: float | None = None,
+        n_neighbours: int | None = None,
         speed_scale: float | None = None,
     ) -> HullEstimator:
-        """From samples; parameters and errors as in `szlib.remove_outliers`."""
+        """Remove outliers from samples; parameters and errors as in `szlib.remove_outliers`.
+
+        Parameters
+        ----------
+        samples, r_max, fraction, n_neighbours, speed_scale : as in `szlib.remove_outliers`.
+        """
         inliers = remove_outliers(
-            samples, outlier_fraction, r_max, neighbours=neighbours, speed_scale=speed_scale
+            samples, fraction=fraction, r_max=r_max, n_neighbours=n_neighbours, speed_scale=speed_scale
         )
         speed = inliers["speed"].to_numpy(float)
         points = np.column_stack([complementary_points(inliers, r_max=r_max), speed])
-        count = len(hull_vertices(points))
-        parameters = {
-            "outlier_fraction": None if outlier_fraction is None else float(outlier_fraction),
-            "neighbours": None if neighbours is None else int(neighbours),
-            "speed_scale": None if speed_scale is None else float(speed_scale),
-        }
-        inside = {"inside the hull": len(points) - count}
-        funnel = [*funnels.get(inliers), funnels.stage("hull", len(points), count, inside)]
-        return cls(points, *encounter_numbers(inliers), float(r_max), parameters, funnel)
+        n_vertices = len(hull_vertices(points))
+        stage = funnels.stage("hull", len(points), n_vertices, {"inside the hull": len(points) - n_vertices})
+        number, encounters = encounter_numbers(inliers)
+        return cls(
+            points=points,
+            number=number,
+            r_max=float(r_max),
+            encounters=encounters,
+            parameters={
+                "fraction": None if fraction is None else float(fraction),
+                "n_neighbours": None if n_neighbours is None else int(n_neighbours),
+                "speed_scale": None if speed_scale is None else float(speed_scale),
+            },
+            funnel=[*funnels.get(inliers), stage],
+        )
 
-    @property
-    def vertices(self) -> np.ndarray:
-        """Of the hull, shape (k, 3) [m, m, m/s]."""
-        return hull_vertices(self.points)
+    def fit_shape(self, speeds: Sequence[float]) -> HullZone:
+        """The zone outside the hull of all points, whatever the `speeds`."""
+        return HullZone(hull_vertices(self.points), self.r_max)
 
-    def radii(self, speeds: Sequence[float]) -> None:
-        """None: the vertices tell all."""
+    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
+        """Fit ellipses to the encounters with positive `weights` at `speeds`; `rng` is not used.
 
-    def refit(
-        self, weights: np.ndarray, speeds: Sequence[float], rng: np.random.Generator | None = None
-    ) -> np.ndarray:
-        """Ellipses (k, s, 5) of the encounters whose weights (k, n) are above 0; NaN: no zone.
-
-        Straight from the hull's faces, around the boundary in 72 directions.  Nothing else is drawn.
+        They enclose the boundary in 72 directions, which comes directly from the hull's faces: this is faster
+        than slices.
         """
         ellipses = np.full((len(weights), len(speeds), 5), np.nan)
         unit = np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
         start: dict[int, list[int]] = {}
         for i, weight in enumerate(weights):
             with suppress(ZoneError):
-                reach = _reach(_hull(self.points[weight[self.encounter] > 0]), unit, speeds)
+                reach = _hull_reach(_convex_hull(self.points[weight[self.number] > 0]), unit, speeds)
                 for j in map(int, np.flatnonzero(np.isfinite(reach).all(axis=1))):
                     boundary = (self.r_max - reach[j])[:, None] * unit
                     ellipse = minimum_enclosing_ellipse(boundary, start=start.get(j, []))
                     ellipses[i, j] = [*ellipse.center, *ellipse.semi_axes, ellipse.angle]
-                    on = (boundary[:, None] == ellipse.support).all(axis=-1).any(axis=1)
-                    start[j] = np.flatnonzero(on).tolist()
+                    is_support = (boundary[:, None] == ellipse.support).all(axis=-1).any(axis=1)
+                    start[j] = np.flatnonzero(is_support).tolist()
         return ellipses
 
-    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], np.ndarray]:
-        """The encounters that the hull rests on (k,), and the ellipses (k, s, 5) without each of them.
+    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
+        """Row numbers of the encounters with a vertex of the hull, for any `speeds`."""
+        return np.unique(self.number[_convex_hull(self.points).vertices])
 
-        A new vertex is a point of these encounters, or a vertex of the hull of all others.
+    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
+        """As `Estimator.leave_one_out` at `speeds`, with only the points that can become vertices.
+
+        These are the points of influential encounters, and the vertices of the hull of all other points.
         """
-        on = np.unique(self.encounter[_hull(self.points).vertices])
-        theirs = np.isin(self.encounter, on)
-        kept = np.flatnonzero(theirs)
+        of_influential = np.isin(self.number, self.find_influential(speeds))
+        rows = np.flatnonzero(of_influential)
         with suppress(ZoneError):
-            rest = np.flatnonzero(~theirs)
-            kept = np.union1d(kept, rest[_hull(self.points[rest]).vertices])
-        shell = replace(self, points=self.points[kept], encounter=self.encounter[kept])
-        weights = np.ones((len(on), len(self.encounters)))
-        weights[np.arange(len(on)), on] = 0
-        return on, shell.refit(weights, speeds)
+            rest = np.flatnonzero(~of_influential)
+            rows = np.union1d(rows, rest[_convex_hull(self.points[rest]).vertices])
+        shell = replace(self, points=self.points[rows], number=self.number[rows])
+        return Estimator.leave_one_out(shell, speeds)
 
 
-def _reach(hull: ConvexHull, unit: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
-    """R' (s, k) of the hull at speeds along unit vectors (k, 2) [m]; NaN where the zone is undefined."""
+def _hull_reach(hull: ConvexHull, unit: Array, speeds: Sequence[float]) -> Array:
+    """R' (s, k) of the hull at speeds along unit vectors (k, 2) [m]; NaN: undefined zone."""
     along = hull.equations[:, :2] @ unit.T
     v = hull.points[hull.vertices, 2]
     reach = np.full((len(speeds), len(unit)), np.nan)

@@ -1,8 +1,8 @@
-"""A zone told by its radius in every direction, and the ellipse that stands for it.
+"""A zone given as its radius in each direction, and the ellipse fitted to it.
 
-The hull's zone ends where nobody ever was, so the smallest ellipse *around* it is meant.  A radius that
-is estimated in each direction errs to both sides: around its largest errors an ellipse would be too
-large.  So it is *fitted*, such that the sum over directions of (radius - reach of the ellipse)^2 is least.
+The zone of the hull ends where no person ever was, so its ellipse is the smallest one *around* it. A radius
+that is estimated in each direction errs to both sides, and an ellipse around its largest errors would be too
+large. So the ellipse is *fitted*: it minimises the sum over directions of (radius - reach of the ellipse)^2.
 """
 
 from __future__ import annotations
@@ -17,26 +17,35 @@ from ..errors import ZoneError
 from .ellipses import Ellipse
 
 DIRECTIONS: Array = np.radians(np.arange(-180.0, 180.0, 5.0))
-"""Directions in which a radius is told, counter-clockwise from ahead [rad]."""
+"""Directions of the radii, counter-clockwise from ahead [rad]."""
 WIDEST_GAP = np.pi
-"""Unseen directions beyond which there is no zone [rad]: as for the hull, where the origin is outside."""
+"""Range of directions without data from which on there is no zone [rad]; the hull has the same limit."""
 
-_ROUNDS, _SETTLED = 100, 1e-12  # of Gauss, Newton, Levenberg and Marquardt; step relative to the mean radius
+_MAX_ITERATIONS, _CONVERGED = 100, 1e-12  # of Levenberg and Marquardt; step relative to the mean radius
 
 
 @dataclass(frozen=True, eq=False)
 class PolarZone:
-    """Radii of the zone by speed and direction, in the reference pedestrian's frame.
+    """Radii of a zone by speed and direction, in the frame of the reference pedestrian.
 
     Parameters
     ----------
-    speeds : of the reference pedestrian, ascending, shape (m,) [m/s].
+    speeds : speeds of the reference pedestrian, ascending, shape (m,) [m/s].
     directions : counter-clockwise from ahead, ascending within [-pi, pi), shape (n,) [rad].
-    radii : shape (m, n) [m]; NaN where nobody was seen.
+    radii : shape (m, n) [m]; NaN where no person was seen.
 
     Raises
     ------
-    ZoneError : shapes do not fit, or speeds or directions do not ascend.
+    ZoneError : the shapes do not fit, a radius is negative, or speeds or directions do not ascend.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from szlib.zones import PolarZone
+    >>> directions = np.radians(np.arange(-180, 180, 5))
+    >>> zone = PolarZone(speeds=[0.9, 1.1], directions=directions, radii=np.ones((2, 72)))
+    >>> zone.ellipse(1.0).semi_axes
+    (1.0, 1.0)
     """
 
     speeds: Array
@@ -49,16 +58,20 @@ class PolarZone:
         shape = (len(self.speeds), len(self.directions))
         if self.radii.shape != shape or 0 in shape:
             raise ZoneError(f"radii must have shape (speeds, directions) = {shape}; got {self.radii.shape}")
-        if not ((np.diff(self.speeds) > 0).all() and (np.diff(self.directions) > 0).all()):
-            raise ZoneError("speeds and directions of radii must ascend")
-        if not (np.isfinite(self.speeds).all() and np.isfinite(self.directions).all()):
-            raise ZoneError("speeds and directions of radii must be finite")
+        for name, values in (("speeds", self.speeds), ("directions", self.directions)):
+            if not (np.isfinite(values).all() and (np.diff(values) > 0).all()):
+                raise ZoneError(f"{name} of radii must be finite and ascend; got {values.tolist()}")
         if (self.radii < 0).any():
             raise ZoneError(f"radii must not be negative; got {np.nanmin(self.radii)} m")
 
-    def at(self, speed: float) -> Array:
-        """Radii (n,) [m] at a speed [m/s], linear between those fitted; ZoneError outside."""
-        low, high = self.speeds[[0, -1]]
+    @property
+    def speed_range(self) -> tuple[float, float]:
+        """Lowest and highest fitted speed [m/s]."""
+        return float(self.speeds[0]), float(self.speeds[-1])
+
+    def radii_at(self, speed: float) -> Array:
+        """Radii (n,) [m] at a `speed` [m/s], linear between fitted speeds; raises ZoneError outside."""
+        low, high = self.speed_range
         if not low <= speed <= high:
             raise ZoneError(
                 f"the zone at {speed:g} m/s is undefined: it was fitted for {low:g} to {high:g} m/s; "
@@ -71,77 +84,91 @@ class PolarZone:
         return np.asarray((1 - share) * self.radii[after - 1] + share * self.radii[after])
 
     def boundary(self, speed: float, theta: ArrayLike) -> Array:
-        """Boundary in directions theta (...) [rad], linear between those known; (..., 2) [m], NaN: unseen."""
+        """Boundary at a `speed` [m/s] in the directions `theta` (...) [rad], shape (..., 2) [m].
+
+        It is linear between known directions and NaN where no person was seen.
+        """
         theta = np.asarray(theta, float)
-        around = np.append(self.directions, self.directions[0] + 2 * np.pi)
-        radii = np.append(self.at(speed), self.at(speed)[0])
-        r = np.interp((theta - around[0]) % (2 * np.pi) + around[0], around, radii)
+        directions = np.append(self.directions, self.directions[0] + 2 * np.pi)
+        radii = np.append(self.radii_at(speed), self.radii_at(speed)[0])
+        r = np.interp((theta - directions[0]) % (2 * np.pi) + directions[0], directions, radii)
         return np.asarray(r[..., None] * np.stack([np.cos(theta), np.sin(theta)], axis=-1))
 
     def ellipse(self, speed: float) -> Ellipse:
-        """The ellipse fitted to the radii at a speed [m/s]; ZoneError where too few directions were seen."""
-        radii = self.at(speed)
-        whole = closed(radii[None], self.directions)
-        if np.isnan(whole).any():
-            low, high = np.degrees(_widest_gap(radii, self.directions))
+        """The ellipse fitted at a `speed` [m/s]; raises ZoneError if too few directions have data."""
+        radii = self.radii_at(speed)
+        complete = fill_gaps(radii[None], self.directions)
+        if np.isnan(complete).any():
+            low, high = np.degrees(_find_widest_gap(radii, self.directions))
             raise ZoneError(
-                f"the zone at {speed:g} m/s is undefined: nobody was seen in the directions from "
-                f"{low:.0f} counter-clockwise to {high:.0f} deg; more data, or another speed, is needed"
+                f"the zone at {speed:g} m/s is undefined: no person was seen in the directions from "
+                f"{low:.0f} counter-clockwise to {high:.0f} deg; add data, or choose another speed"
             )
-        m, n, a, b, angle = fit_ellipses(whole, self.directions)[0]
+        m, n, a, b, angle = fit_ellipses(complete, self.directions)[0]
         if not b > 0:
             raise ZoneError(
-                f"the zone at {speed:g} m/s is undefined: radii of {radii.min():.2f} to {radii.max():.2f} m "
-                "are those of no ellipse around the person"
+                f"the zone at {speed:g} m/s is undefined: no ellipse around the person fits radii of "
+                f"{radii.min():.2f} to {radii.max():.2f} m"
             )
         return Ellipse((m, n), (a, b), angle)
 
 
-def closed(radii: Array, directions: Array = DIRECTIONS) -> Array:
-    """Radii (k, n) [m] with each gap (NaN) closed, linear in direction; all NaN beyond `WIDEST_GAP`."""
+def fill_gaps(radii: Array, directions: Array = DIRECTIONS) -> Array:
+    """Fill each gap (NaN) of `radii` (k, n) [m] linearly over `directions` (n,) [rad].
+
+    A row is all NaN if its widest gap is `WIDEST_GAP` or more.
+    """
     out = radii.copy()
     for row in np.flatnonzero(np.isnan(radii).any(axis=1)):
-        seen = np.isfinite(radii[row])
-        low, high = _widest_gap(radii[row], directions) if seen.any() else (0.0, np.inf)
+        has_data = np.isfinite(radii[row])
+        low, high = _find_widest_gap(radii[row], directions) if has_data.any() else (0.0, np.inf)
         if high - low >= WIDEST_GAP:
             out[row] = np.nan
         else:
-            out[row] = np.interp(directions, directions[seen], radii[row, seen], period=2 * np.pi)
+            out[row] = np.interp(directions, directions[has_data], radii[row, has_data], period=2 * np.pi)
     return out
 
 
 def fit_ellipses(radii: Array, directions: Array = DIRECTIONS) -> Array:
-    """Ellipses whose reach is nearest to each row of radii (k, n) [m], least squares in metres.
+    """Fit an ellipse to each row of radii by least squares in metres.
 
-    Returns (k, 5): centre m, n, semi-axes a >= b [m], angle in (-pi/2, pi/2] [rad]; NaN for rows with a
-    NaN, or that are those of no ellipse around the person.
+    Parameters
+    ----------
+    radii : shape (k, n) [m].
+    directions : of the radii, shape (n,) [rad].
+
+    Returns
+    -------
+    Ellipses (k, 5): centre m, n, semi-axes a >= b [m], angle in (-pi/2, pi/2] [rad]. NaN for rows that
+    contain a NaN or that no ellipse around the person fits.
     """
-    found = np.full((len(radii), 5), np.nan)
+    ellipses = np.full((len(radii), 5), np.nan)
     rows = np.flatnonzero(np.isfinite(radii).all(axis=1) & (radii.sum(axis=1) > 0))
     if not len(rows):
-        return found
+        return ellipses
     unit = np.stack([np.cos(directions), np.sin(directions)], axis=-1)
     scale = radii[rows].mean(axis=1)
     target = radii[rows] / scale[:, None]
     p = np.tile([0.0, 0.0, 1.0, 0.0, 1.0], (len(rows), 1))  # m, n, and the root [[p, r], [r, s]] of the form
     damping = np.full(len(rows), 1e-3)
-    miss, slope = _reach(p, unit)
-    miss -= target
-    todo = np.arange(len(rows))
-    for _ in range(_ROUNDS):
-        back = slope[todo].transpose(0, 2, 1)
-        normal = back @ slope[todo]
+    residual, jacobian = _parametric_reach(p, unit)
+    residual -= target
+    active = np.arange(len(rows))
+    for _ in range(_MAX_ITERATIONS):
+        transposed = jacobian[active].transpose(0, 2, 1)
+        normal = transposed @ jacobian[active]
         diagonal = np.einsum("kii->ki", normal)
-        damped = normal + (damping[todo, None] * diagonal)[:, :, None] * np.eye(5)
-        step = -np.linalg.solve(damped, back @ miss[todo, :, None])[..., 0]
-        missed, sloped = _reach(p[todo] + step, unit)
-        missed -= target[todo]
-        better = (missed**2).sum(axis=1) <= (miss[todo] ** 2).sum(axis=1)  # False: the origin has left (NaN)
-        p[todo[better]] += step[better]
-        miss[todo[better]], slope[todo[better]] = missed[better], sloped[better]
-        damping[todo] *= np.where(better, 0.1, 10)
-        todo = todo[~(np.abs(step).max(axis=1) < _SETTLED)]
-        if not len(todo):
+        damped = normal + (damping[active, None] * diagonal)[:, :, None] * np.eye(5)
+        step = -np.linalg.solve(damped, transposed @ residual[active, :, None])[..., 0]
+        new_residual, new_jacobian = _parametric_reach(p[active] + step, unit)
+        new_residual -= target[active]
+        better = (new_residual**2).sum(axis=1) <= (residual[active] ** 2).sum(axis=1)  # NaN: False
+        p[active[better]] += step[better]
+        residual[active[better]] = new_residual[better]
+        jacobian[active[better]] = new_jacobian[better]
+        damping[active] *= np.where(better, 0.1, 10)
+        active = active[~(np.abs(step).max(axis=1) < _CONVERGED)]
+        if not len(active):
             break
     root = p[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
     values, vectors = np.linalg.eigh(root)
@@ -150,14 +177,15 @@ def fit_ellipses(radii: Array, directions: Array = DIRECTIONS) -> Array:
     major = vectors[np.arange(len(rows)), :, 1 - minor]
     angle = np.pi / 2 - (np.pi / 2 - np.arctan2(major[:, 1], major[:, 0])) % np.pi
     axes = 1 / np.sort(values, axis=1)
-    found[rows] = np.column_stack([p[:, :2] * scale[:, None], axes * scale[:, None], angle])
-    return found
+    ellipses[rows] = np.column_stack([p[:, :2] * scale[:, None], axes * scale[:, None], angle])
+    return ellipses
 
 
 def ellipse_reach(ellipses: Array, directions: Array = DIRECTIONS) -> Array:
-    """How far ellipses (..., 5), as from `fit_ellipses`, reach from the person in directions (n,) [m].
+    """Distance from the person to the boundary of `ellipses` in `directions` (n,) [rad].
 
-    Shape (..., n); NaN for an ellipse beside the person.
+    `ellipses` (..., 5) are as from `fit_ellipses`. The result has the shape (..., n) [m]; it is NaN if the
+    person is outside the ellipse.
     """
     m, n, a, b, angle = np.moveaxis(ellipses[..., None, :], -1, 0)
     cos, sin, turn = np.cos(angle), np.sin(angle), directions - angle
@@ -168,7 +196,7 @@ def ellipse_reach(ellipses: Array, directions: Array = DIRECTIONS) -> Array:
         return np.asarray(np.where(r < 0, (q + np.sqrt(q * q - p * r)) / p, np.nan))
 
 
-def _reach(p: Array, unit: Array) -> tuple[Array, Array]:
+def _parametric_reach(p: Array, unit: Array) -> tuple[Array, Array]:
     """Reach t (k, n) of ellipses |L (t unit - centre)| = 1 and its slope (k, n, 5); NaN: origin outside."""
     root = p[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
     along = np.einsum("kij,nj->kni", root, unit)
@@ -188,11 +216,11 @@ def _reach(p: Array, unit: Array) -> tuple[Array, Array]:
     return t, slope / (w * along).sum(-1)[..., None]
 
 
-def _widest_gap(radii: Array, directions: Array) -> tuple[float, float]:
+def _find_widest_gap(radii: Array, directions: Array) -> tuple[float, float]:
     """The two known directions around the widest gap, counter-clockwise [rad]."""
-    seen = directions[np.isfinite(radii)]
-    if not len(seen):
+    known = directions[np.isfinite(radii)]
+    if not len(known):
         return -np.pi, np.pi
-    widths = np.diff(np.append(seen, seen[0] + 2 * np.pi))
+    widths = np.diff(np.append(known, known[0] + 2 * np.pi))
     widest = int(np.argmax(widths))
-    return float(seen[widest]), float(seen[widest] + widths[widest])
+    return float(known[widest]), float(known[widest] + widths[widest])

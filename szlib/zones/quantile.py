@@ -1,16 +1,15 @@
-"""The quantile zone: all but a share q of encounters keep out of it, in each direction.
+"""The quantile zone: all but a share q of the encounters stay outside of it, in each direction.
 
-In each direction the radius is the q-quantile, over the encounters in which somebody was seen there, of
-the nearest approach there.  An extreme shrinks as encounters are added; a quantile does not, and up to a
-share q of people who care for nobody do not set it.  Paths are smoothed first: the nearest of several
-noisy samples is too near, by 8 cm for a noise of 5 cm.
+In each direction, the radius is the q-quantile of the nearest approaches there, over the encounters in which
+a person was seen there. The hull shrinks as encounters are added; a quantile does not. People who ignore
+others do not determine it, up to a share q of them. Paths are smoothed first: the nearest of several noisy
+samples is too near, by 8 cm for a noise of 5 cm.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,21 +18,23 @@ from numpy.typing import NDArray
 from ..checks import Array, check_columns
 from ..errors import DataError, ZoneError
 from ..tracks import funnels
+from .estimators import Estimator
 from .outliers import encounter_numbers
-from .polar import DIRECTIONS, PolarZone, closed, fit_ellipses
+from .polar import DIRECTIONS, PolarZone, fill_gaps, fit_ellipses
 
-SHARE = 0.05
-"""Share q of encounters that may enter the zone (assumed)."""
+QUANTILE = 0.05
+"""Share q of the encounters that may enter the zone (assumed)."""
 SECTOR = 7
-"""Directions, 5 deg apart, over which the nearest approach is taken: 35 deg (assumed; 25-45 do as well)."""
-BAND = 0.2
-"""Encounters of reference pedestrians up to so much slower or faster are taken together [m/s] (assumed)."""
+"""Number of directions, 5 deg apart, over which the nearest approach is taken: 35 deg (assumed; 25 to 45 deg
+do as well)."""
+SPEED_BAND = 0.2
+"""Encounters of reference pedestrians up to this much slower or faster are pooled [m/s] (assumed)."""
 SMOOTHING = 0.7
-"""Paths are smoothed over so much time before and after [s] (measured: 0.5 leaves 5 cm of noise felt)."""
+"""Paths are smoothed over this time before and after [s] (measured: 0.5 s leaves an effect of 5 cm noise)."""
 
-_DEGREE = 2  # of the polynomial that smooths
-_TICK = 0.1  # from one sample to the next [s]
-_DEEPEST = 50  # encounters that are left out one by one
+_DEGREE = 2  # of the smoothing polynomial
+_TICK = 0.1  # time between samples [s]
+_MAX_LEFT_OUT = 50  # encounters that are left out one by one
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,37 +43,63 @@ class Approaches:
 
     Parameters
     ----------
-    encounter : which of `encounters` each sample belongs to, shape (n,).
-    direction : which of `DIRECTIONS` it is nearest to, shape (n,).
-    distance : of the other person [m], shape (n,).
-    speed : of the reference pedestrian [m/s], shape (n,).
-    encounters : the first of each encounter's samples.
+    number : row in `encounters` of each sample, shape (n,).
+    direction : index of the nearest of `DIRECTIONS`, shape (n,).
+    distance : distance of the other person [m], shape (n,).
+    speed : speed of the reference pedestrian [m/s], shape (n,).
+    encounters : the first sample of each encounter.
     """
 
-    encounter: NDArray[np.intp]
+    number: NDArray[np.intp]
     direction: NDArray[np.intp]
     distance: Array
     speed: Array
     encounters: pd.DataFrame
 
-    def nearest(self, speed: float) -> tuple[NDArray[np.intp], Array]:
-        """The encounters (k,) of a speed [m/s] (+-`BAND`), and how near each came around every direction.
+    @classmethod
+    def from_samples(cls, samples: pd.DataFrame, *, r_max: float) -> Approaches:
+        """Find the approaches within `r_max` [m] in `samples` as from `szlib.find_encounters`.
 
-        Nearest approaches (k, 72) [m] are over `SECTOR` directions; inf where nobody was seen.
+        Raises DataError if columns are missing, a value is not finite, or no person was within r_max.
         """
-        band = np.abs(self.speed - speed) <= BAND
-        encounters, row = np.unique(self.encounter[band], return_inverse=True)
-        here = np.full((len(encounters), len(DIRECTIONS)), np.inf)
-        np.minimum.at(here, (row, self.direction[band]), self.distance[band])
+        check_columns(samples, ["los_angle", "distance", "speed"])
+        values = samples[["los_angle", "distance", "speed"]].to_numpy(float)
+        if not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+            raise DataError(
+                f"row {samples.index[row]}: los_angle, distance, speed must be finite; "
+                f"got {values[row].tolist()}"
+            )
+        angle, distance = smooth_paths(samples)
+        is_close = distance <= r_max
+        if not is_close.any():
+            raise DataError(
+                f"none of {len(samples)} samples is within r_max = {r_max} m "
+                f"(nearest: {distance.min():.2f} m); are distances in metres?"
+            )
+        step = 2 * np.pi / len(DIRECTIONS)
+        direction = np.rint((angle[is_close] - DIRECTIONS[0]) / step).astype(int) % len(DIRECTIONS)
+        number, encounters = encounter_numbers(samples[is_close])
+        return cls(number, direction, distance[is_close], values[is_close, 2], encounters)
+
+    def nearest(self, speed: float) -> tuple[NDArray[np.intp], Array]:
+        """The encounters (k,) at a `speed` [m/s] (+-`SPEED_BAND`), and their nearest approaches (k, 72) [m].
+
+        Each approach is the nearest within `SECTOR` directions; it is inf if no person was seen there.
+        """
+        in_band = np.abs(self.speed - speed) <= SPEED_BAND
+        encounters, row = np.unique(self.number[in_band], return_inverse=True)
+        distances = np.full((len(encounters), len(DIRECTIONS)), np.inf)
+        np.minimum.at(distances, (row, self.direction[in_band]), self.distance[in_band])
         turns = range(-(SECTOR // 2), SECTOR // 2 + 1)
-        return encounters, np.minimum.reduce([np.roll(here, turn, axis=1) for turn in turns])
+        return encounters, np.minimum.reduce([np.roll(distances, turn, axis=1) for turn in turns])
 
 
-def smoothed(samples: pd.DataFrame) -> tuple[Array, Array]:
-    """Line-of-sight angle [rad] and distance [m] of samples (n,) along smoothed paths, in their order.
+def smooth_paths(samples: pd.DataFrame) -> tuple[Array, Array]:
+    """Line-of-sight angle [rad] and distance [m] of `samples` (n,) along smoothed paths, in the same order.
 
-    Local polynomials of degree 2 over +-`SMOOTHING` (Savitzky & Golay, 1964), by encounter, never across a
-    gap in time; straight and evenly bent paths stay as they are.  Samples without `t` stay as they are.
+    Local polynomials of degree 2 over +-`SMOOTHING` (Savitzky & Golay, 1964) smooth each encounter, but not
+    across a gap in time. Straight and evenly curved paths do not change. Without a column `t`, no path does.
     """
     angle, distance = samples["los_angle"].to_numpy(float), samples["distance"].to_numpy(float)
     if "t" not in samples:
@@ -80,127 +107,112 @@ def smoothed(samples: pd.DataFrame) -> tuple[Array, Array]:
     number, t = encounter_numbers(samples)[0], samples["t"].to_numpy(float)
     order = np.lexsort([t, number])
     path = (distance * np.exp(1j * angle))[order]
-    ends = (np.diff(number[order]) != 0) | (np.abs(np.diff(t[order]) - _TICK) > _TICK / 2)
-    starts = np.flatnonzero(np.append(True, ends))
+    is_end = (np.diff(number[order]) != 0) | (np.abs(np.diff(t[order]) - _TICK) > _TICK / 2)
+    starts = np.flatnonzero(np.append(True, is_end))
     lengths = np.diff(np.append(starts, len(path)))
     for length in np.unique(lengths[lengths > _DEGREE + 1]):
         rows = starts[lengths == length][:, None] + np.arange(length)
-        path[rows] = path[rows] @ _smoother(int(length)).T
+        path[rows] = path[rows] @ _smoothing_matrix(int(length)).T
     out = np.empty_like(path)
     out[order] = path
     return np.angle(out), np.abs(out)
 
 
-def approaches(samples: pd.DataFrame, *, r_max: float) -> Approaches:
-    """Approaches within r_max [m] of samples as from `szlib.find_encounters`.
-
-    Raises DataError where columns are missing, a value is not finite, or nobody was within r_max.
-    """
-    check_columns(samples, ["los_angle", "distance", "speed"])
-    values = samples[["los_angle", "distance", "speed"]].to_numpy(float)
-    if not np.isfinite(values).all():
-        row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
-        raise DataError(
-            f"row {samples.index[row]}: los_angle, distance, speed must be finite; got {values[row].tolist()}"
-        )
-    angle, distance = smoothed(samples)
-    close = distance <= r_max
-    if not close.any():
-        raise DataError(
-            f"none of {len(samples)} samples is within r_max = {r_max} m (nearest: {distance.min():.2f} m); "
-            "are distances in metres?"
-        )
-    step = 2 * np.pi / len(DIRECTIONS)
-    direction = np.rint((angle[close] - DIRECTIONS[0]) / step).astype(int) % len(DIRECTIONS)
-    number, encounters = encounter_numbers(samples[close])
-    return Approaches(number, direction, distance[close], values[close, 2], encounters)
-
-
-def quantile_radii(known: Approaches, speed: float, q: float, weights: Array | None = None) -> Array:
-    """Radii (k, 72) [m] at a speed [m/s]: the least that at least a share q of encounters reach; NaN: unseen.
-
-    `weights` (k, n) weigh the encounters, each row giving one line of radii; None: one line, all alike.
-    """
-    who, nearest = known.nearest(speed)
-    weights = np.ones((1, len(who))) if weights is None else weights[:, who]
-    radii = np.full((len(weights), len(DIRECTIONS)), np.nan)
-    order, seen = np.argsort(nearest, axis=0, kind="stable"), np.isfinite(nearest)
-    enough = q * (weights @ seen) * (1 - 1e-12)
-    for d, count in enumerate(seen.sum(axis=0)):
-        if count:
-            likely = int(q * count + 8 * np.sqrt(q * count) + 8)  # the quantile lies among the first of them
-            for first in (order[: min(likely, count), d], order[:count, d]):
-                below = np.cumsum(weights[:, first], axis=1)
-                if (below[:, -1] >= enough[:, d]).all():
-                    break
-            at = np.argmax(below >= enough[:, d : d + 1], axis=1)
-            radii[:, d] = np.where(enough[:, d] > 0, nearest[first[at], d], np.nan)
-    return radii
-
-
-@dataclass(frozen=True, eq=False)
-class QuantileEstimator:
-    """The quantile's way to zones, to go again with other people.
+def quantile_radii(approaches: Approaches, speed: float, q: float, weights: Array | None = None) -> Array:
+    """Compute the radius in each direction that at least a share q of the encounters enter.
 
     Parameters
     ----------
-    known : the approaches.
-    q : share of encounters that may enter.
-    parameters, funnel : for the provenance.
+    approaches : of all encounters.
+    speed : speed of the reference pedestrian [m/s].
+    q : share of the encounters.
+    weights : weights of the encounters, shape (k, n), one row for each result; None: one result, equal
+        weights.
 
-    Raises ZoneError unless 0 < q < 1.
+    Returns
+    -------
+    Radii (k, 72) [m]; NaN where no person was seen.
+    """
+    encounters, nearest = approaches.nearest(speed)
+    weights = np.ones((1, len(encounters))) if weights is None else weights[:, encounters]
+    radii = np.full((len(weights), len(DIRECTIONS)), np.nan)
+    order, is_seen = np.argsort(nearest, axis=0, kind="stable"), np.isfinite(nearest)
+    needed = q * (weights @ is_seen) * (1 - 1e-12)
+    for d, count in enumerate(is_seen.sum(axis=0)):
+        if count:
+            likely = int(q * count + 8 * np.sqrt(q * count) + 8)  # the quantile lies among the first of them
+            for first in (order[: min(likely, count), d], order[:count, d]):
+                cumulated = np.cumsum(weights[:, first], axis=1)
+                if (cumulated[:, -1] >= needed[:, d]).all():
+                    break
+            at = np.argmax(cumulated >= needed[:, d : d + 1], axis=1)
+            radii[:, d] = np.where(needed[:, d] > 0, nearest[first[at], d], np.nan)
+    return radii
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class QuantileEstimator(Estimator):
+    """The estimator of the quantile zone.
+
+    Parameters
+    ----------
+    approaches : of all encounters.
+    q : share of the encounters that may enter the zone.
+    encounters, parameters, funnel : see `Estimator`.
+
+    Raises
+    ------
+    ZoneError : q is not in 0 < q < 1.
     """
 
-    known: Approaches
+    approaches: Approaches
     q: float
-    parameters: dict[str, Any]
-    funnel: list[dict[str, Any]]
-    extreme = False
-    vertices = None
 
     def __post_init__(self) -> None:
         if not 0 < self.q < 1:
             raise ZoneError(f"q must be a share of encounters, 0 < q < 1; got {self.q}")
 
     @classmethod
-    def of(cls, samples: pd.DataFrame, *, r_max: float, q: float = SHARE) -> QuantileEstimator:
-        """From samples; errors as in `approaches`."""
-        known = approaches(samples, r_max=r_max)
-        entered, kept = len(encounter_numbers(samples)[1]), len(known.encounters)
+    def from_samples(cls, samples: pd.DataFrame, *, r_max: float, q: float = QUANTILE) -> QuantileEstimator:
+        """Prepare `samples` within `r_max` [m] for a share `q`; errors as in `Approaches.from_samples`."""
+        approaches = Approaches.from_samples(samples, r_max=r_max)
+        entered, kept = len(encounter_numbers(samples)[1]), len(approaches.encounters)
         near = funnels.stage("encounters: near", entered, kept, {f"never within {r_max} m": entered - kept})
         sector = 360 * SECTOR / len(DIRECTIONS)
-        parameters = {"q": float(q), "sector_deg": sector, "speed_band": BAND, "smoothing": SMOOTHING}
-        return cls(known, float(q), parameters, [*funnels.get(samples), near])
+        return cls(
+            approaches=approaches,
+            q=float(q),
+            encounters=approaches.encounters,
+            parameters={
+                "q": float(q),
+                "sector_deg": sector,
+                "speed_band": SPEED_BAND,
+                "smoothing": SMOOTHING,
+            },
+            funnel=[*funnels.get(samples), near],
+        )
 
-    @property
-    def encounters(self) -> pd.DataFrame:
-        """The first of each encounter's samples within r_max."""
-        return self.known.encounters
-
-    def radii(self, speeds: Sequence[float]) -> PolarZone:
-        """Radii at speeds, ascending [m/s]."""
-        lines = [quantile_radii(self.known, speed, self.q)[0] for speed in speeds]
-        return PolarZone(np.array(speeds), DIRECTIONS, np.array(lines))
+    def fit_shape(self, speeds: Sequence[float]) -> PolarZone:
+        """Fit the radii at `speeds`, ascending [m/s]."""
+        radii = [quantile_radii(self.approaches, speed, self.q)[0] for speed in speeds]
+        return PolarZone(np.array(speeds), DIRECTIONS, np.array(radii))
 
     def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
-        """Ellipses (k, s, 5) for weights (k, n) of the encounters; NaN: no zone.  Nothing else is drawn."""
-        radii = np.stack([quantile_radii(self.known, v, self.q, weights) for v in speeds], axis=1)
-        return fit_ellipses(closed(radii.reshape(-1, radii.shape[-1]))).reshape(*radii.shape[:2], 5)
+        """Fit ellipses to encounters with `weights` at `speeds` (see `Estimator`); `rng` is not used."""
+        radii = np.stack([quantile_radii(self.approaches, v, self.q, weights) for v in speeds], axis=1)
+        return fit_ellipses(fill_gaps(radii.reshape(-1, radii.shape[-1]))).reshape(*radii.shape[:2], 5)
 
-    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
-        """The encounters that enter the zones most (k,), and the ellipses (k, s, 5) without each of them."""
+    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
+        """Row numbers of the encounters that enter the zones at `speeds` [m/s] in most directions."""
         depth = np.zeros(len(self.encounters))
         for speed in speeds:
-            who, nearest = self.known.nearest(speed)
-            depth[who] += (nearest <= quantile_radii(self.known, speed, self.q)[0]).sum(axis=1)
-        deepest = np.argsort(-depth, kind="stable")[:_DEEPEST]
-        weights = np.ones((len(deepest), len(depth)))
-        weights[np.arange(len(deepest)), deepest] = 0
-        return deepest, self.refit(weights, speeds)
+            encounters, nearest = self.approaches.nearest(speed)
+            depth[encounters] += (nearest <= quantile_radii(self.approaches, speed, self.q)[0]).sum(axis=1)
+        return np.argsort(-depth, kind="stable")[:_MAX_LEFT_OUT]
 
 
-def _smoother(length: int) -> Array:
-    """Matrix (length, length) that puts, for each of evenly spaced samples, the local polynomial there."""
+def _smoothing_matrix(length: int) -> Array:
+    """Matrix (length, length) that replaces each of evenly spaced samples by its local polynomial."""
     half = round(SMOOTHING / _TICK)
     matrix = np.zeros((length, length))
     for i in range(length):

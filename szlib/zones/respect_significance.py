@@ -1,28 +1,29 @@
-"""Is it respect at all?  The data tested against its null model.
+"""Is it respect at all: the test of the data against its null model.
 
-Under the null hypothesis, that nobody minds anybody, the data is one more time-shifted day.  So a statistic
-of the data has any rank among those of the shifts, and
+Under the null hypothesis, people ignore each other, and the data is one more time-shifted day. So a
+statistic of the data has any rank among those of the shifts with the same probability, and
 
     p = (1 + shifts with a statistic at least as large) / (1 + shifts)
 
-is a valid p-value, whatever the statistic (Davison & Hinkley, "Bootstrap methods", 1997, sec. 4.2).
-The statistic asks whether too few come near: of the encounters *of a kind* that come within r_max at all, a
-share F(R), of data and shifts together, comes within R. It is by how many standard deviations fewer came
-than that makes expect, all kinds added up (Mantel & Haenszel, J. Nat. Cancer Inst. 22, 1959), the largest
-over radii R from 0.2 to 1.5 m.
+is a valid p-value for any statistic (Davison & Hinkley, "Bootstrap methods", 1997, sec. 4.2).
 
-Kind by kind, because shifts in time undo more than respect. Who comes in a bunch, as from a train, walks the
-same way as the rest of it without minding anybody, and kept apart by condition 3 (1 m at the opening);
-shifted alone they meet people who cross instead, and nearer. All kinds in one, that mix looked like respect
-in 17 of 100 made crowds, kind by kind in 1 (notebook 15).
+The statistic measures whether too few people come near. For each *kind* of encounter, let F(R) be the share
+of the encounters within r_max that come within R, pooled over data and shifts. The statistic counts by how
+many standard deviations the number of encounters within R is smaller than F(R) predicts, summed over all
+kinds (Mantel & Haenszel, J. Nat. Cancer Inst. 22, 1959). It is the largest value over radii R from 0.2 to
+1.5 m.
+
+Kinds are separate because a shift in time removes more than respect. People who come in a group, as from a
+train, walk in the same direction as the rest of it, and condition 3 (1 m at the opening) keeps them apart
+without any respect. Shifted alone, they meet people who cross, and these come nearer. With all kinds pooled,
+this mix looked like respect in 17 of 100 simulated crowds; with separate kinds in 1 (notebook 15).
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -36,170 +37,181 @@ from .occupancy import OccupancyHistogram
 from .respect import respect_radius
 
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
-"""Within which too few may come [m]; none of them needs to be the zone's."""
-SIGNIFICANT = 0.05
+"""Radii of the statistic [m]; the radius of the zone need not be among them."""
+SIGNIFICANCE_LEVEL = 0.05
 
-_EXPECTED = 30
-"""A kind of encounter expected more often, and never seen, was filtered out on one side only."""
+_MIN_EXPECTED = 30
+"""A kind that is expected more often than this and is missing was filtered out on one side only."""
 
 
 @dataclass(frozen=True)
 class NullTest:
-    """Whether people keep out of each other's way more than the null model does.
+    """The result of the test of the data against its null model.
 
     Parameters
     ----------
-    p_value : of the one-sided test (see the module).
+    p_value : of the one-sided test (see the top of this module).
     statistic, null_statistics : of the data, and of each shift.
-    encounters : of the data, within r_max.
-    radius, null_radii : respect zone of the data, and of each shift against all others (or none was asked
-        for), all bearings [m].
-    beyond : encounters nearer than that were left out [m].
+    n_encounters : of the data, within r_max.
+    radius, null_radii : radius of the respect zone of the data, and of each shift against all others (empty
+        if not asked for), all directions pooled [m].
+    excluded_below : encounters nearer than this were left out [m].
+
+    Examples
+    --------
+    >>> import szlib
+    >>> result = szlib.NullTest(0.25, 0.4, (0.1, 0.6, 0.2), n_encounters=50, radius=0.0, null_radii=())
+    >>> result.is_significant
+    False
+    >>> print(result)
+    no respect shown: p = 0.25 (3 shifts, 50 encounters)
     """
 
     p_value: float
     statistic: float
     null_statistics: tuple[float, ...] = field(repr=False)
-    encounters: int
+    n_encounters: int
     radius: float
     null_radii: tuple[float, ...] = field(repr=False)
-    beyond: float = 0.0
+    excluded_below: float = 0.0
 
     @property
-    def shifts(self) -> int:
-        """How many null models the data was compared with."""
+    def n_shifts(self) -> int:
+        """Number of null models that the data was compared with."""
         return len(self.null_statistics)
 
     @property
-    def respect(self) -> bool:
-        """Whether respect was found: p <= 0.05."""
-        return self.p_value <= SIGNIFICANT
-
-    def record(self) -> dict[str, Any]:
-        """All of it, as JSON values."""
-        return asdict(self)
-
-    @classmethod
-    def from_record(cls, record: dict[str, Any]) -> NullTest:
-        """What `record` has kept; raises ZoneError where it is damaged."""
-        try:
-            lists = {name: tuple(map(float, record[name])) for name in ("null_statistics", "null_radii")}
-            return cls(**{**record, **lists})
-        except (KeyError, TypeError, ValueError) as error:
-            raise ZoneError(f"no record of a test against the null ({error!r}); test it again") from error
+    def is_significant(self) -> bool:
+        """Whether the data shows respect: p <= 0.05."""
+        return self.p_value <= SIGNIFICANCE_LEVEL
 
     def __str__(self) -> str:
-        found = "respect" if self.respect else "no respect shown"
-        return f"{found}: p = {self.p_value:.3g} ({self.shifts} shifts, {self.encounters} encounters)"
+        result = "respect" if self.is_significant else "no respect shown"
+        return f"{result}: p = {self.p_value:.3g} ({self.n_shifts} shifts, {self.n_encounters} encounters)"
 
 
 def null_test(
-    samples: pd.DataFrame, null: NullEncounters, *, beyond: float = 0.0, radii: bool = True
+    samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0, fit_null_radii: bool = True
 ) -> NullTest:
-    """Test whether people keep out of each other's way, one-sided (see the module).
+    """Test whether people keep away from each other, one-sided (see the top of this module).
 
-    Each kind of encounter is compared with its like; without a column kind all are of one.  A kind that the
-    null model has none of (companions, who are taken apart) does not count.
+    Each kind of encounter is compared with the same kind of the null model; without a column `kind`, all
+    encounters are of one kind. A kind that the null model does not have (companions) does not count.
 
     Parameters
     ----------
     samples : as from `szlib.find_encounters`.
-    null : of the same tracks, found with the same parameters, of the same kinds.
-    beyond : leave out encounters that came nearer than that [m]: 0.5 asks for more than that two bodies
-        cannot be in one place.
-    radii : whether to fit the zone of each shift as well, which takes longest.
+    null : the null model of the same tracks, with the same parameters and kinds.
+    excluded_below : leave out encounters nearer than this [m]. With 0.5, respect means more than that two
+        bodies cannot be in one place.
+    fit_null_radii : whether to fit the respect zone of each shift, which takes most of the time.
 
     Raises
     ------
     DataError : the samples lack a column or are empty.
-    ZoneError : no encounter of the data, or of the null, came within r_max.
+    ZoneError : no encounter of the data, or of the null model, is within r_max.
+
+    Warns
+    -----
+    DataWarning : one side lacks a kind of encounter that the other side has.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
+    >>> tracks = szlib.read_tracks(path)
+    >>> null = szlib.null_encounters(tracks, shifts=3, progress=False)
+    >>> test = szlib.null_test(szlib.find_encounters(tracks), null, fit_null_radii=False)
+    >>> test.p_value >= 0.25  # the smallest possible value with 3 shifts
+    True
     """
     check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
-    _warn_of_kinds(samples, null)
+    _warn_about_kinds(samples, null)
     nearest = samples.groupby("encounter", observed=True)["distance"].min().to_numpy(float)
     of_null = null.encounters["nearest"].to_numpy(float)
-    counted = [(each >= beyond) & (each < null.r_max) for each in (nearest, of_null)]
+    counted = [(each >= excluded_below) & (each < null.r_max) for each in (nearest, of_null)]
     if not all(each.any() for each in counted):
         raise ZoneError(
             f"{counted[0].sum()} encounters of the data and {counted[1].sum()} of the null model came within "
-            f"{beyond:g} to {null.r_max:g} m: nothing to test; more data, or more shifts, is needed"
+            f"{excluded_below:g} to {null.r_max:g} m: nothing to test; add data, or use more shifts"
         )
     shift = np.r_[np.zeros(counted[0].sum(), int), 1 + null.encounters["shift"].to_numpy()[counted[1]]]
     near = np.r_[nearest[counted[0]], of_null[counted[1]]][:, None] < RADII
     kind = _kinds(samples, null, counted)
-    statistics = _too_few(shift, near, kind, 1 + null.shifts)
+    statistics = _find_deficits(shift, near, kind, 1 + null.shifts)
     return NullTest(
         p_value=float((1 + (statistics[1:] >= statistics[0]).sum()) / (1 + null.shifts)),
         statistic=float(statistics[0]),
         null_statistics=tuple(map(float, statistics[1:])),
-        encounters=int(counted[0].sum()),
+        n_encounters=int(counted[0].sum()),
         radius=respect_radius(samples, null),
-        null_radii=_null_radii(null) if radii else (),
-        beyond=float(beyond),
+        null_radii=_fit_null_radii(null) if fit_null_radii else (),
+        excluded_below=float(excluded_below),
     )
 
 
 def _kinds(
     samples: pd.DataFrame, null: NullEncounters, counted: Sequence[NDArray[np.bool_]]
 ) -> NDArray[np.intp]:
-    """Number of the kind of each encounter counted, the data's and then the null's; all 0 where unknown."""
+    """Number of the kind of each counted encounter, first of the data, then of the null; all 0 if unknown."""
     if not ("kind" in samples and "kind" in null.encounters):
         return np.zeros(sum(int(each.sum()) for each in counted), int)
     of_data = samples.groupby("encounter", observed=True)["kind"].first()
     both = zip((of_data, null.encounters["kind"]), counted, strict=True)
     return pd.factorize(
-        np.concatenate([each.to_numpy(object)[kept] for each, kept in both]), use_na_sentinel=False
+        np.concatenate([each.to_numpy(object)[is_counted] for each, is_counted in both]),
+        use_na_sentinel=False,
     )[0]
 
 
-def _too_few(
+def _find_deficits(
     shift: NDArray[np.intp], near: NDArray[np.bool_], kind: NDArray[np.intp], shifts: int
 ) -> NDArray[np.float64]:
-    """By how many standard deviations too few encounters of each shift are near (n, radii), at most.
+    """Largest deficit of near encounters over all radii, for each shift, in standard deviations.
 
-    Expected of each kind is the share of all shifts together, drawn without replacement.
+    `near` (n, radii) says whether each encounter is within each radius. The expectation for each kind is the
+    share of all shifts together, drawn without replacement.
     """
-    missed = variance = np.zeros((shifts, near.shape[1]))
+    deficit = variance = np.zeros((shifts, near.shape[1]))
     for each in range(kind.max() + 1):
-        there = kind == each
-        n = np.bincount(shift[there], minlength=shifts)[:, None]
-        k = np.stack([np.bincount(shift[there], c, minlength=shifts) for c in near[there].T], axis=1)
+        is_kind = kind == each
+        n = np.bincount(shift[is_kind], minlength=shifts)[:, None]
+        k = np.stack([np.bincount(shift[is_kind], c, minlength=shifts) for c in near[is_kind].T], axis=1)
         total = n.sum()
         share = k.sum(axis=0) / total
-        missed = missed + n * share - k
+        deficit = deficit + n * share - k
         variance = variance + n * share * (1 - share) * (total - n) / max(total - 1, 1)
-    deviations = np.divide(missed, np.sqrt(variance), out=np.zeros_like(missed), where=variance > 0)
+    deviations = np.divide(deficit, np.sqrt(variance), out=np.zeros_like(deficit), where=variance > 0)
     return np.asarray(deviations.max(axis=1))
 
 
-def _null_radii(null: NullEncounters) -> tuple[float, ...]:
-    """Respect zone of each shift against all others [m]; NaN where nothing of it can be compared."""
-    everybody = OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
+def _fit_null_radii(null: NullEncounters) -> tuple[float, ...]:
+    """Radius of the respect zone of each shift against all others [m]; NaN if there is nothing to compare."""
+    total = OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
     radii = []
     for shift in range(null.shifts):
-        samples = null.one(shift)
-        own = OccupancyHistogram.from_samples(samples, r_max=null.r_max) if len(samples) else None
-        others = None if own is None else OccupancyHistogram(everybody.counts - own.counts, null.r_max)
-        if own is None or others is None or not others.counts.any():
-            radii.append(float("nan"))
-        else:
-            radii.append(respect_radius(own, others))
+        samples, radius = null.one(shift), float("nan")
+        if len(samples):
+            own = OccupancyHistogram.from_samples(samples, r_max=null.r_max)
+            rest = OccupancyHistogram(total.counts - own.counts, null.r_max)
+            radius = respect_radius(own, rest) if rest.counts.any() else radius
+        radii.append(radius)
     return tuple(radii)
 
 
-def _warn_of_kinds(samples: pd.DataFrame, null: NullEncounters) -> None:
-    """Warn where a kind of encounter was left out on one side only; companions, the null model may lack."""
+def _warn_about_kinds(samples: pd.DataFrame, null: NullEncounters) -> None:
+    """Warn if a kind of encounter was left out on one side only; the null model may lack companions."""
     if "kind" not in samples or "kind" not in null.encounters:
         return
     data = samples.drop_duplicates("encounter")["kind"].value_counts()
     model = null.encounters["kind"].value_counts()
     for here, there, name in ((data, model, "the data has"), (model, data, "the null model has")):
         expected = there * here.sum() / max(there.sum(), 1)
-        for kind in expected.index[expected > _EXPECTED]:
+        for kind in expected.index[expected > _MIN_EXPECTED]:
             if here.get(kind, 0) == 0 and (here is data or kind != COMPANIONS):
                 warnings.warn(
-                    f"{name} no encounter of the kind {kind!r}, {expected[kind]:.0f} were expected; treat "
-                    "both alike: szlib.of_kind(samples, kinds) and null.of_kind(kinds)",
+                    f"{name} no encounter of the kind {kind!r}, {expected[kind]:.0f} were expected; select "
+                    "the same kinds on both sides: szlib.of_kind(samples, kinds) and null.of_kind(kinds)",
                     DataWarning,
                     stacklevel=3,
                 )

@@ -26,7 +26,7 @@ SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
 )
 """Values of `szlib.find_encounters`, beside its defaults."""
 FIT: Mapping[str, Sequence[Any]] = MappingProxyType(
-    {"r_max": (1.5, 2.5), "outlier_fraction": (0.0, 0.002, 0.01), "neighbours": (10, 50)}
+    {"r_max": (1.5, 2.5), "fraction": (0.0, 0.002, 0.01), "n_neighbours": (10, 50)}
 )
 """Values of `szlib.SocialZone.fit`, beside its defaults."""
 SPEEDS = (0.9, 1.3)
@@ -68,7 +68,7 @@ def sensitivity(
         try:
             with warnings.catch_warnings():  # few encounters, told by their number here
                 warnings.simplefilter("ignore", DataWarning)
-                zone = SocialZone.fit(samples, speeds=(at,), method=method, resamples=0, **keywords)
+                zone = SocialZone.fit(samples, speeds=(at,), method=method, n_resamples=0, **keywords)
             ellipse = zone.ellipses[at]
             sizes = (*ellipse.semi_axes, ellipse.area)
         except (ZoneError, DataError):

@@ -1,297 +1,310 @@
 """The social zone: from samples of encounters to one ellipse for each speed, and to a file.
 
-`SocialZone.fit` estimates it in one of three ways:
+`SocialZone.fit` has three estimators:
 
-hull      where (nearly) nobody ever was: outliers, hull, slices, smallest ellipses (paper, sec. 2)
-quantile  where all but a share q of encounters keep out: does not shrink as data grows
-respect   where people were half as often as they would be if they took no notice of each other
+quantile  all but a share q of the encounters stay outside; does not shrink as the data grows
+hull      (nearly) no person was ever inside: outliers, hull, slices, smallest ellipses (paper, sec. 2)
+respect   people are half as frequent inside as if they ignored each other
 
-and says how sure it is: intervals, who was seen on which side, and at which speeds that is enough.
+It also estimates how certain the zone is: intervals, the number of encounters on each side, and the speeds at
+which this number is sufficient.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from .. import __version__
-from ..checks import check_columns
+from ..checks import Array, check_columns
 from ..encounters.null_model import NullEncounters
 from ..errors import DataWarning, ZoneError
 from .ellipses import Ellipse
-from .enclosing_ellipse import minimum_enclosing_ellipse_of_curve
-from .hulls import HullEstimator, Slice, hull_vertices, slice_hull
+from .estimators import Estimator, ZoneShape
+from .hulls import HullEstimator, HullZone
 from .outliers import R_MAX, encounter_numbers
-from .polar import PolarZone
 from .quantile import QuantileEstimator
-from .respect_estimator import RespectEstimator
+from .respect import RespectEstimator
 from .respect_significance import NullTest, null_test
-from .uncertainty import QUANTITIES, RESAMPLES, Estimate, Uncertainty, count_seen, measure, missing_sides
-from .zone_file import check_whole, read_zone, write_zone, zone_fields
+from .uncertainty import (
+    N_RESAMPLES,
+    QUANTITIES,
+    Uncertainty,
+    count_by_side,
+    describe_missing_sides,
+    estimate_uncertainty,
+)
+from .zone_file import read_zone, write_zone
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
-"""Speeds of the reference pedestrian whose zones are fitted [m/s] (assumed; the paper shows a range)."""
+"""Default speeds of the reference pedestrian [m/s] (assumed; the paper shows a range)."""
 
-METHODS: dict[str, tuple[Callable[..., Estimate], tuple[str, ...]]] = {
-    "hull": (HullEstimator.of, ("outlier_fraction", "neighbours", "speed_scale")),
-    "quantile": (QuantileEstimator.of, ("q",)),
-    "respect": (RespectEstimator.of, ("speed_width",)),
+METHODS: dict[str, tuple[Any, tuple[str, ...]]] = {
+    "quantile": (QuantileEstimator, ("q",)),
+    "hull": (HullEstimator, ("fraction", "n_neighbours", "speed_scale")),
+    "respect": (RespectEstimator, ("speed_width",)),
 }
-"""Ways to a zone, and the keywords of `SocialZone.fit` that belong to each."""
+"""The estimators, and their options in `SocialZone.fit`."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SocialZone:
-    """Minimum social zones by speed, in the reference pedestrian's frame (paper, fig. 5).
+    """Minimum social zones by speed, in the frame of the reference pedestrian (paper, fig. 5).
 
     Parameters
     ----------
-    vertices : of the hull over (x', y', speed), shape (k, 3) [m, m, m/s]; None: not a hull's zone.
-    r_max : distance within which people count, and that the complement is taken from [m].
+    shape : the boundary by speed and direction, a `HullZone` or a `PolarZone`.
+    r_max : distance within which people count [m].
     ellipses : the fitted ellipse by speed.
-    undefined : why there is none, by speed, where one was asked for and could not be.
-    provenance : data, parameters and the row counts of every stage it came from.
-    method : how it was estimated, one of `METHODS`.
-    radii : by speed and direction, of a zone that is not a hull's.
-    seen : encounters by speed and side (see `szlib.zones.uncertainty.count_seen`); None: not known.
-    uncertainty : intervals; None: not known.
-    null_test : whether it is respect at all; None: not tested.
+    undefined : the reason why there is no zone, by speed.
+    provenance : data, parameters and the row counts of every stage.
+    method : the estimator, one of `METHODS`.
+    side_counts : encounters by speed and side (see `szlib.zones.count_by_side`); None: unknown.
+    uncertainty : intervals; None: unknown.
+    null_test : the test against the null model; None: not tested.
 
     Raises
     ------
-    ZoneError : neither vertices that have a hull nor radii, or both, or r_max is no positive distance.
+    ZoneError : `method` and `shape` do not fit each other, or `r_max` is not a positive distance.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=150))
+    >>> samples = szlib.find_encounters(szlib.read_tracks(path))
+    >>> zone = szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=0)
+    >>> 0.7 < zone.ellipse(1.1).semi_axes[1] < 1.0
+    True
+    >>> zone.save("zone.json")
+    >>> szlib.SocialZone.load("zone.json").ellipse(1.1) == zone.ellipse(1.1)
+    True
     """
 
-    vertices: np.ndarray | None
+    shape: ZoneShape
     r_max: float
     ellipses: dict[float, Ellipse]
     undefined: dict[float, str] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
-    method: str = "hull"
-    radii: PolarZone | None = None
-    seen: pd.DataFrame | None = None
+    method: str = "quantile"
+    side_counts: pd.DataFrame | None = None
     uncertainty: Uncertainty | None = None
     null_test: NullTest | None = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise ZoneError(f"method must be one of {', '.join(METHODS)}; got {self.method!r}")
-        if (self.method == "hull") != (self.radii is None) or (self.vertices is None) == (self.radii is None):
-            raise ZoneError("a zone has either a hull's vertices (method hull) or radii (any other method)")
-        if self.vertices is not None:
-            hull_vertices(self.vertices)
+        if (self.method == "hull") != isinstance(self.shape, HullZone):
+            raise ZoneError(
+                f"a {type(self.shape).__name__} is not the shape of a zone of method {self.method!r}"
+            )
         if not 0 < self.r_max < np.inf:
             raise ZoneError(f"r_max must be a positive distance in metres; got {self.r_max}")
+
+    def __repr__(self) -> str:
+        sizes = [f"{v:g}: {e.semi_axes[0]:.2f} x {e.semi_axes[1]:.2f}" for v, e in self.ellipses.items()]
+        adequate = [f"{speed:g}" for speed in self.ellipses if self.adequate(speed)]
+        intervals = "none" if self.uncertainty is None else self.uncertainty.description
+        return "\n".join(
+            [
+                f"SocialZone: method {self.method!r}, people within {self.r_max:g} m",
+                f"semi-axes at each speed [m/s: m]: {', '.join(sizes) or 'none'}",
+                f"undefined at [m/s]: {', '.join(f'{speed:g}' for speed in self.undefined) or 'none'}",
+                f"enough encounters on every side at [m/s]: {', '.join(adequate) or 'none'}",
+                f"intervals: {intervals}",
+            ]
+        )
 
     @classmethod
     def fit(
         cls,
         samples: pd.DataFrame,
         *,
-        method: str | None = None,
+        method: str = "quantile",
         r_max: float = R_MAX,
         speeds: Iterable[float] = SPEEDS,
-        outlier_fraction: float | None = None,
-        neighbours: int | None = None,
-        speed_scale: float | None = None,
-        q: float | None = None,
         null: NullEncounters | None = None,
-        speed_width: float | None = None,
-        resamples: int = RESAMPLES,
+        n_resamples: int = N_RESAMPLES,
         seed: int = 0,
+        **options: Any,
     ) -> SocialZone:
-        """Fit the zones to samples as from `szlib.find_encounters`.
+        """Fit the zones to samples of encounters.
 
         Parameters
         ----------
-        samples : a table with los_angle [rad], distance [m], speed [m/s], encounter; with ref_id and
-            other_id people are drawn anew, not encounters; with t paths can be smoothed.
-        method : "quantile", "hull" (the paper's) or "respect".  None takes the quantile, which does not
-            shrink as people are added, or the hull where one of its keywords is given.
+        samples : as from `szlib.find_encounters`: los_angle [rad], distance [m], speed [m/s], encounter. With
+            ref_id and other_id, people are resampled, not encounters. With t, paths are smoothed.
+        method : "quantile", "hull" (the paper's) or "respect". The quantile does not shrink as the data
+            grows.
         r_max : distance within which people count [m].
-        speeds : whose zones are fitted [m/s].
-        outlier_fraction, neighbours, speed_scale : of the hull, as in `szlib.remove_outliers`:
-            outlier_fraction=0.002 is the paper's way, None judges whole encounters.
-        q : of the quantile, the share of encounters that may enter (0.05).
-        speed_width : of respect, over how wide a range speeds are taken together (0.2) [m/s]; inf: all.
-        null : the null model, from `szlib.null_encounters`, that respect needs, and that a zone of any
-            method is tested against (`null_test`).
-        resamples : zones estimated anew for the intervals; 0: no intervals.
+        speeds : speeds of the zones [m/s].
+        null : the null model, from `szlib.null_encounters`. "respect" needs it; with any method, the data is
+            tested against it (`null_test`).
+        n_resamples : number of zones estimated again for the intervals; 0: no intervals.
         seed : of the resampling.
-
-        One DataWarning names the speeds that have no zone (`undefined`) or too few people to rely on.
+        options : options of the method. "quantile": `q`, the share of encounters that may enter (0.05).
+            "hull": `fraction`, `n_neighbours` and `speed_scale` as in `szlib.remove_outliers`; the paper has
+            fraction=0.002 and n_neighbours=20, the default judges whole encounters. "respect":
+            `speed_width`, the range over which speeds are pooled (0.2) [m/s]; inf: all speeds.
 
         Raises
         ------
         DataError : the samples lack columns, or are too few.
-        ZoneError : a keyword belongs to another method, or none of the speeds has a zone.
+        ZoneError : an option is unknown or belongs to another method, or no speed has a zone.
+
+        Warns
+        -----
+        DataWarning : names the speeds without a zone (`undefined`) or with too few encounters.
+
+        Examples
+        --------
+        >>> import szlib
+        >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=150))
+        >>> samples = szlib.find_encounters(szlib.read_tracks(path))
+        >>> zone = szlib.SocialZone.fit(samples, method="hull", fraction=0.002, speeds=[1.1], n_resamples=0)
+        >>> zone.method, list(zone.ellipses)
+        ('hull', [1.1])
         """
-        given = {
-            "outlier_fraction": outlier_fraction,
-            "neighbours": neighbours,
-            "speed_scale": speed_scale,
-            "q": q,
-            "speed_width": speed_width,
-        }
-        method, options = _options_of(method, given)
+        _check_options(method, options)
         check_columns(samples, ["los_angle", "distance", "speed"])
-        asked = sorted({float(speed) for speed in speeds})
-        if not asked:
-            raise ZoneError("no speed has a zone: none was asked for")
+        fitted_speeds = sorted({float(speed) for speed in speeds})
+        if not fitted_speeds:
+            raise ZoneError("no speed has a zone: `speeds` is empty")
         if method == "respect":
             options["null"] = null
-        estimate = METHODS[method][0](samples, r_max=r_max, **options)
-        provenance = _provenance(samples, {"method": method, "r_max": float(r_max)}, estimate)
-        zone = cls(estimate.vertices, float(r_max), {}, {}, provenance, method, estimate.radii(asked))
-        ellipses, undefined = zone._fit_all(asked)
+        estimator = METHODS[method][0].from_samples(samples, r_max=r_max, **options)
+        shape = estimator.fit_shape(fitted_speeds)
+        ellipses, undefined = {}, {}
+        for speed in fitted_speeds:
+            try:
+                ellipses[speed] = shape.ellipse(speed)
+            except ZoneError as error:
+                undefined[speed] = str(error)
         if not ellipses:
-            half = f"half of the samples are slower than {samples['speed'].median():.1f} m/s"
-            why = "; ".join(undefined.values())
-            raise ZoneError(f"no speed has a zone: {why}; {half}: ask for a speed near that, or add data")
-        tested = None if null is None else null_test(samples, null)
-        zone = replace(zone, ellipses=ellipses, undefined=undefined, null_test=tested)
+            reasons, median = "; ".join(undefined.values()), samples["speed"].median()
+            raise ZoneError(
+                f"no speed has a zone: {reasons}; half of the samples are slower than {median:.1f} m/s: "
+                "choose a speed near that, or add data"
+            )
+        provenance = _provenance(samples, {"method": method, "r_max": float(r_max)}, estimator)
+        zone = cls(shape, float(r_max), ellipses, undefined, provenance, method)
+        zone = replace(zone, null_test=None if null is None else null_test(samples, null))
         if "encounter" in samples:
-            zone = replace(zone, seen=count_seen(samples, asked, r_max=r_max))
-            if resamples:
-                sure = measure(estimate, list(ellipses), resamples=resamples, seed=seed)
-                zone = replace(zone, uncertainty=sure)
-        told = [*undefined.values(), *filter(None, map(zone.missing, ellipses))]
-        if told:
-            warnings.warn("; ".join(dict.fromkeys(told)), DataWarning, stacklevel=2)
+            zone = replace(zone, side_counts=count_by_side(samples, fitted_speeds, r_max=r_max))
+            if n_resamples:
+                uncertainty = estimate_uncertainty(
+                    estimator, list(ellipses), n_resamples=n_resamples, seed=seed
+                )
+                zone = replace(zone, uncertainty=uncertainty)
+        problems = [*undefined.values(), *filter(None, map(zone.missing_data, ellipses))]
+        if problems:
+            warnings.warn("; ".join(dict.fromkeys(problems)), DataWarning, stacklevel=2)
         return zone
 
     @property
     def speed_range(self) -> tuple[float, float]:
-        """Lowest and highest speed of the hull's data, or of the speeds that radii were fitted for [m/s]."""
-        v = self.radii.speeds if self.radii else self._hull()[:, 2]
-        return float(v.min()), float(v.max())
+        """Lowest and highest speed of the shape [m/s]."""
+        return self.shape.speed_range
 
-    def slice(self, speed: float) -> Slice:
-        """The hull's slice at a speed [m/s]; ZoneError where the zone is undefined, or not a hull's."""
-        return slice_hull(self._hull(), speed, r_max=self.r_max)
+    def boundary(self, speed: float, n: int = 361) -> Array:
+        """Boundary of the zone at a `speed` [m/s]: `n` points in the person's frame, shape (n, 2) [m].
 
-    def boundary(self, speed: float, n: int = 361) -> np.ndarray:
-        """The zone's boundary r_zone(theta) at a speed [m/s], n points in the person's frame, (n, 2) [m].
-
-        Not a hull's: linear between directions and fitted speeds, NaN where nobody was seen.
+        The boundary of a `PolarZone` is linear between directions and fitted speeds, and NaN without data.
         """
-        theta = np.linspace(-np.pi, np.pi, n)
-        return self.radii.boundary(speed, theta) if self.radii else self.slice(speed).boundary(theta)
+        return self.shape.boundary(speed, np.linspace(-np.pi, np.pi, n))
 
     def ellipse(self, speed: float) -> Ellipse:
-        """The zone's ellipse at any speed [m/s] inside the data's range.
+        """The ellipse at any `speed` [m/s] in the range of the data.
 
-        A DataWarning says what is missing where the speed is not `adequate`.  Raises ZoneError, naming the
-        speed, the range and the missing directions, where it is undefined.
+        A DataWarning says what is missing if the speed is not `adequate`. Raises ZoneError, with the speed,
+        the range and the missing directions, if the zone is undefined.
         """
         known = self.ellipses.get(float(speed))
-        ellipse = known if known is not None else self._fitted(speed)
-        if missing := self.missing(speed):
+        ellipse = known if known is not None else self.shape.ellipse(speed)
+        if missing := self.missing_data(speed):
             warnings.warn(missing, DataWarning, stacklevel=2)
         return ellipse
 
     def adequate(self, speed: float) -> bool:
-        """Whether enough encounters were seen on every side to rely on the zone at a speed [m/s]."""
-        return not self.missing(speed)
+        """Whether every side has enough encounters to rely on the zone at a `speed` [m/s]."""
+        return not self.missing_data(speed)
 
-    def missing(self, speed: float) -> str:
-        """What the zone at a speed [m/s] lacks to be relied on; "" where it is adequate."""
-        if self.seen is None:
+    def missing_data(self, speed: float) -> str:
+        """Describe the data that is missing to rely on the zone at a `speed` [m/s]; "" if none is."""
+        if self.side_counts is None:
             return (
-                "the zone is of unknown worth: who was seen on which side is not known (an older file, or "
+                "the quality of the zone is unknown: encounters were not counted by side (an older file, or "
                 "samples without `encounter`); fit it again"
             )
-        return missing_sides(self.seen, float(speed))
+        return describe_missing_sides(self.side_counts, float(speed))
 
     def table(self) -> pd.DataFrame:
-        """One row a fitted speed.
+        """One row for each fitted speed.
 
-        speed [m/s]; center_x, center_y, a, b [m], angle_deg [deg], area [m2], each with _low and _high (its
-        interval, NaN where there is none); influence: what one encounter's absence moves at most [m];
-        encounters within r_max at that speed; adequate.
+        Columns: speed [m/s]; center_x, center_y, a, b [m], angle_deg [deg], area [m2], each with _low and
+        _high (its interval, NaN if there is none); influence: the greatest change if one encounter is left
+        out [m]; encounters within r_max at that speed; adequate.
         """
         rows = [
             (v, *e.center, *e.semi_axes, np.degrees(e.angle), e.area)
             for v, e in sorted(self.ellipses.items())
         ]
         table = pd.DataFrame(rows, columns=["speed", *QUANTITIES]).set_index("speed")
-        sure, seen = self.uncertainty, self.seen
-        for name in QUANTITIES:
-            for end in ("low", "high"):
-                table[f"{name}_{end}"] = (
-                    np.nan
-                    if sure is None
-                    else sure.intervals.pivot(index="speed", columns="quantity")[end][name]
-                )
-        table["influence"] = np.nan if sure is None else sure.influence.set_index("speed")["metres"]
-        table["encounters"] = np.nan if seen is None else seen.set_index("speed")["encounters"]
+        ends = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
+        table[[*ends, "influence", "encounters"]] = np.nan
+        if self.uncertainty is not None:
+            intervals = self.uncertainty.intervals.pivot(index="speed", columns="quantity")
+            for name in QUANTITIES:
+                table[f"{name}_low"], table[f"{name}_high"] = intervals["low"][name], intervals["high"][name]
+            table["influence"] = self.uncertainty.influence.set_index("speed")["metres"]
+        if self.side_counts is not None:
+            table["encounters"] = self.side_counts.set_index("speed")["encounters"]
         return table.assign(adequate=[self.adequate(v) for v in table.index]).reset_index()
 
+    def plot(self, speed: float | None = None, *, ax: Axes | None = None) -> Axes:
+        """Plot the zone at a `speed` [m/s] with its interval, or all ellipses (None), into the axes `ax`."""
+        from ..workbook.figures.zones import plot_zone, plot_zones
+
+        return plot_zones(self, ax=ax) if speed is None else plot_zone(self, speed, ax=ax)
+
     def save(self, path: str | Path) -> None:
-        """Write the zone as JSON; the file is replaced as a whole or not at all."""
+        """Write the zone as JSON to the file `path`, as a whole or not at all."""
         write_zone(Path(path), vars(self))
 
     @classmethod
     def load(cls, path: str | Path) -> SocialZone:
-        """Read a zone written by `save`; raises ZoneError where the file is none, or of a newer szlib."""
-        content = read_zone(Path(path))
-        try:
-            zone = cls(**zone_fields(content))
-        except (KeyError, TypeError, IndexError, ValueError, OverflowError, AttributeError) as error:
-            raise ZoneError(
-                f"{path}: the zone in it is damaged ({error!r}); fit and save it again"
-            ) from error
-        check_whole(content, Path(path))
-        return zone
-
-    def _hull(self) -> np.ndarray:
-        if self.vertices is None:
-            raise ZoneError(f"a zone of method {self.method!r} has no hull; ask its boundary or ellipse")
-        return self.vertices
-
-    def _fit_all(self, speeds: Sequence[float]) -> tuple[dict[float, Ellipse], dict[float, str]]:
-        """The ellipses by speed, and why there is none."""
-        ellipses, undefined = {}, {}
-        for speed in speeds:
-            try:
-                ellipses[speed] = self._fitted(speed)
-            except ZoneError as error:
-                undefined[speed] = str(error)
-        return ellipses, undefined
-
-    def _fitted(self, speed: float) -> Ellipse:
-        if self.radii is not None:
-            return self.radii.ellipse(speed)
-        section = self.slice(speed)
-        return minimum_enclosing_ellipse_of_curve(section.boundary, section.corner_angles)
+        """Read a zone that `save` wrote to the file `path`; raises ZoneError if it is damaged or no zone."""
+        return read_zone(Path(path), cls)
 
 
-def _provenance(samples: pd.DataFrame, parameters: Mapping[str, Any], estimate: Estimate) -> dict[str, Any]:
-    """Where a zone comes from: version, days, encounters, parameters and funnel."""
+def _provenance(samples: pd.DataFrame, parameters: Mapping[str, Any], estimator: Estimator) -> dict[str, Any]:
+    """Origin of a zone: version, days, encounters, parameters and funnel."""
     return {
         "szlib": __version__,
         "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
         "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
-        "parameters": {**parameters, **estimate.parameters},
-        "funnel": estimate.funnel,
+        "parameters": {**parameters, **estimator.parameters},
+        "funnel": estimator.funnel,
     }
 
 
-def _options_of(method: str | None, given: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
-    """The method, and the keywords given, all its own; ZoneError for an unknown one or a stray keyword."""
-    options = {name: value for name, value in given.items() if value is not None}
-    if method is None:
-        method = "hull" if options.keys() & set(METHODS["hull"][1]) else "quantile"
+def _check_options(method: str, options: Mapping[str, Any]) -> None:
+    """Raise ZoneError if the method is unknown, or an option does not belong to it."""
     if method not in METHODS:
         raise ZoneError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
-    for name in options:
-        if name not in METHODS[method][1]:
-            home = next(m for m, (_, names) in METHODS.items() if name in names)
-            raise ZoneError(f'{name} belongs to method="{home}"; got method="{method}": drop one of them')
-    return method, options
+    for name in options.keys() - set(METHODS[method][1]):
+        owners = [owner for owner, (_, names) in METHODS.items() if name in names]
+        if owners:
+            raise ZoneError(
+                f'{name} belongs to method="{owners[0]}"; got method="{method}": drop {name}, or pass '
+                f'method="{owners[0]}"'
+            )
+        raise ZoneError(f"unknown option {name!r}; method {method!r} has {', '.join(METHODS[method][1])}")

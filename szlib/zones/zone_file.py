@@ -1,16 +1,16 @@
-"""The file of a social zone: versioned JSON, whole or not at all, and what is wrong with one that is none.
+"""The JSON file of a social zone: written as a whole or not at all, and checked when it is read.
 
-Version 2 adds the method, radii by direction, who was seen, intervals, and a checksum of all of it; version 1
-(hulls only) loads.
+Version 2 holds the estimation method, polar zones, encounters by side, intervals, and a checksum of all of
+it. Version 1, which holds hulls only, can be read.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -19,13 +19,16 @@ from .. import __version__
 from ..errors import SzlibError, ZoneError
 from ..files import write_file
 from .ellipses import Ellipse
+from .hulls import HullZone
 from .polar import PolarZone
 from .respect_significance import NullTest
-from .uncertainty import SECTORS, Uncertainty
+from .uncertainty import SIDES, Uncertainty
+
+Zone = TypeVar("Zone")
 
 FORMAT, VERSION = "szlib.SocialZone", 2
-THINNEST_ZONE = 0.05
-"""Semi-axis below which a zone of a file without a checksum is damage and no zone [m]: nobody is so thin."""
+MIN_SEMI_AXIS = 0.05
+"""Smallest semi-axis in a file without a checksum [m]: a thinner zone is a sign of damage."""
 UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
 
 _TABLES = {
@@ -33,12 +36,17 @@ _TABLES = {
     "bands": ("speed", "direction", "low", "high"),
     "influence": ("speed", "encounter", "metres"),
 }
-_SEEN = ("speed", "encounters", *SECTORS)
+_SIDE_COUNTS = ("speed", "encounters", *SIDES)
+_KEYS = {
+    "n_resamples": "resamples", "description": "how", "n_encounters": "encounters", "excluded_below": "beyond"
+}  # fmt: skip
+"""Keys in the file of attributes that have another name."""
 
 
 def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
-    """Write the fields of a `SocialZone` to `path`; raises ZoneError where that is impossible."""
-    radii, seen, uncertainty = fields["radii"], fields["seen"], fields["uncertainty"]
+    """Write the `fields` of a `SocialZone` to `path`; raises ZoneError if this is impossible."""
+    shape, side_counts = fields["shape"], fields["side_counts"]
+    uncertainty, null_test = fields["uncertainty"], fields["null_test"]
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -49,13 +57,13 @@ def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
             {"speed": v, "center": e.center, "semi_axes": e.semi_axes, "angle": e.angle}
             for v, e in sorted(fields["ellipses"].items())
         ],
-        "undefined": [{"speed": v, "why": why} for v, why in sorted(fields["undefined"].items())],
+        "undefined": [{"speed": v, "why": reason} for v, reason in sorted(fields["undefined"].items())],
         "provenance": fields["provenance"],
-        "seen": None if seen is None else _columns(seen),
-        "uncertainty": None if uncertainty is None else _record(uncertainty),
-        "null_test": None if fields["null_test"] is None else fields["null_test"].record(),
-        "radii": None if radii is None else {name: _plain(value) for name, value in vars(radii).items()},
-        "hull_vertices": None if fields["vertices"] is None else fields["vertices"].tolist(),
+        "seen": None if side_counts is None else _to_json(side_counts),
+        "uncertainty": None if uncertainty is None else _to_json(vars(uncertainty)),
+        "null_test": None if null_test is None else _to_json(vars(null_test)),
+        "radii": _to_json(vars(shape)) if isinstance(shape, PolarZone) else None,
+        "hull_vertices": _to_json(shape.vertices) if isinstance(shape, HullZone) else None,
     }
     try:
         content["checksum"] = _checksum(content)
@@ -63,12 +71,31 @@ def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
     except (SzlibError, OSError, TypeError, ValueError) as error:
         raise ZoneError(
             f"{path}: cannot write the zone ({error}); choose a file in a folder that exists and is "
-            "writable, and keep to JSON values in the provenance"
+            "writable, and use only JSON values in the provenance"
         ) from error
 
 
-def read_zone(path: Path) -> dict[str, Any]:
-    """The fields of the zone in a file; raises ZoneError where it is none, or of a newer szlib."""
+def read_zone(path: Path, build: Callable[..., Zone]) -> Zone:
+    """Read the file at `path` and pass the fields of its zone to `build`.
+
+    Raises ZoneError if the file holds no zone, is damaged, or was written by a newer szlib.
+    """
+    content = _read_content(path)
+    try:
+        zone = build(**_fields(content))
+    except (KeyError, TypeError, IndexError, ValueError, OverflowError, AttributeError) as error:
+        raise ZoneError(f"{path}: the zone in it is damaged ({error!r}); fit and save it again") from error
+    expected = content.get("checksum")
+    if content["version"] > 1 and expected != _checksum(content):
+        raise ZoneError(
+            f"{path}: the zone in it is damaged: its checksum is {expected!r}, which is not that of its "
+            "content; do not edit zone files: fit and save the zone again"
+        )
+    return zone
+
+
+def _read_content(path: Path) -> dict[str, Any]:
+    """The content of the file, a zone of a known version."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:  # ValueError: bad UTF-8, JSON or numbers
@@ -85,44 +112,47 @@ def read_zone(path: Path) -> dict[str, Any]:
             f"1 to {VERSION}; install a newer szlib or fit the zone again"
         )
     if content["version"] == 1:
-        unknown = dict.fromkeys(("seen", "uncertainty", "null_test", "radii"))
-        content = {"method": "hull", **unknown, **content}
+        content = {
+            "method": "hull",
+            **dict.fromkeys(("seen", "uncertainty", "null_test", "radii")),
+            **content,
+        }
     return content
 
 
-def zone_fields(content: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a `SocialZone` from the content of its file; damage shows as an ordinary Python error."""
-    radii, seen, uncertainty = content["radii"], content["seen"], content["uncertainty"]
-    vertices = content["hull_vertices"]
+def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a `SocialZone` from the content of its file; damage raises an ordinary Python error."""
+    r_max, side_counts = _number(content["r_max"]), content["seen"]
     ellipses = {_number(e["speed"]): _ellipse(e) for e in content["ellipses"]}
-    if content["version"] == 1 and any(e.semi_axes[1] < THINNEST_ZONE for e in ellipses.values()):
-        raise ValueError(f"an ellipse is thinner than {THINNEST_ZONE} m")
+    if content["version"] == 1 and any(e.semi_axes[1] < MIN_SEMI_AXIS for e in ellipses.values()):
+        raise ValueError(f"an ellipse is thinner than {MIN_SEMI_AXIS} m")
+    if (content["radii"] is None) == (content["hull_vertices"] is None):
+        raise ValueError("expected either radii or hull_vertices")
+    uncertainty, null_test = (_rename_keys(content[name]) for name in ("uncertainty", "null_test"))
+    if uncertainty is not None:
+        uncertainty = Uncertainty(
+            **{**uncertainty, **{name: _table(uncertainty[name], c) for name, c in _TABLES.items()}}
+        )
+    if null_test is not None:
+        lists = {name: tuple(map(float, null_test[name])) for name in ("null_statistics", "null_radii")}
+        null_test = NullTest(**{**null_test, **lists})
     return {
-        "vertices": None if vertices is None else np.array(vertices, float),
-        "r_max": _number(content["r_max"]),
+        "shape": HullZone(np.array(content["hull_vertices"], float), r_max)
+        if content["radii"] is None
+        else PolarZone(**{name: np.array(values, float) for name, values in content["radii"].items()}),
+        "r_max": r_max,
         "ellipses": ellipses,
         "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
         "provenance": dict(content["provenance"]),
         "method": str(content["method"]),
-        "radii": None if radii is None else PolarZone(**{k: np.array(v, float) for k, v in radii.items()}),
-        "seen": None if seen is None else _table(seen, _SEEN),
-        "uncertainty": None if uncertainty is None else _uncertainty(uncertainty),
-        "null_test": None if content["null_test"] is None else NullTest.from_record(content["null_test"]),
+        "side_counts": None if side_counts is None else _table(side_counts, _SIDE_COUNTS),
+        "uncertainty": uncertainty,
+        "null_test": null_test,
     }
 
 
-def check_whole(content: Mapping[str, Any], path: Path) -> None:
-    """ZoneError unless the content of the file is what was written; version 1 has no checksum."""
-    expected = content.get("checksum")
-    if content["version"] > 1 and expected != _checksum(content):
-        raise ZoneError(
-            f"{path}: the zone in it is damaged: its checksum is {expected!r}, and not that of its content; "
-            "a zone is not to be edited: fit and save it again"
-        )
-
-
 def _checksum(content: Mapping[str, Any]) -> str:
-    """SHA-256 of everything else, as it is once written and read."""
+    """SHA-256 of everything else, in the form in which it is read."""
     rest = json.loads(json.dumps({name: value for name, value in content.items() if name != "checksum"}))
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
@@ -138,14 +168,10 @@ def _ellipse(record: Mapping[str, Any]) -> Ellipse:
     return Ellipse((m, n), (a, b), _number(record["angle"]))
 
 
-def _record(uncertainty: Uncertainty) -> dict[str, Any]:
-    tables = {name: _columns(getattr(uncertainty, name)) for name in _TABLES}
-    return {**vars(uncertainty), **tables}
-
-
-def _uncertainty(record: Mapping[str, Any]) -> Uncertainty:
-    tables = {name: _table(record[name], columns) for name, columns in _TABLES.items()}
-    return Uncertainty(**{**record, **tables})
+def _rename_keys(record: Mapping[str, Any] | None) -> Any:
+    """The record with attribute names instead of the keys of the file."""
+    names = {key: name for name, key in _KEYS.items()}
+    return None if record is None else {names.get(key, key): value for key, value in record.items()}
 
 
 def _table(content: Mapping[str, Any], columns: Sequence[str]) -> pd.DataFrame:
@@ -154,14 +180,14 @@ def _table(content: Mapping[str, Any], columns: Sequence[str]) -> pd.DataFrame:
     return table.astype(dict.fromkeys(numbers, float))
 
 
-def _columns(table: pd.DataFrame) -> dict[str, list[Any]]:
-    return {str(name): _plain(table[name].to_numpy()) for name in table}
-
-
-def _plain(values: np.ndarray) -> list[Any]:
-    """Lists of JSON values; NaN and infinity, which JSON has no words for, become null and text."""
-    if values.dtype.kind != "f":
-        return list(values.tolist())
-    out = values.astype(object)
-    out[np.isnan(values)], out[np.isposinf(values)] = None, "Infinity"
-    return list(out.tolist())
+def _to_json(value: Any) -> Any:
+    """JSON values; NaN and infinity, which JSON does not have, become null and "Infinity"."""
+    if isinstance(value, pd.DataFrame):
+        return {str(name): _to_json(value[name].to_numpy()) for name in value}
+    if isinstance(value, Mapping):
+        return {_KEYS.get(name, name): _to_json(each) for name, each in value.items()}
+    if not isinstance(value, np.ndarray) or value.dtype.kind != "f":
+        return value.tolist() if isinstance(value, np.ndarray) else value
+    out = value.astype(object)
+    out[np.isnan(value)], out[np.isposinf(value)] = None, "Infinity"
+    return out.tolist()

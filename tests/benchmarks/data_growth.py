@@ -27,7 +27,7 @@ LINEAR: measuring.Bars = {"exponent": ("<=", 1.15)}
 def raw_plaza(encounters: int | None = None) -> pd.DataFrame:
     """Rows of a plaza as they are in its file: 0.4 million by default."""
     with tempfile.TemporaryDirectory() as folder:
-        settings = PlazaSettings() if encounters is None else PlazaSettings(encounters=encounters)
+        settings = PlazaSettings() if encounters is None else PlazaSettings(n_encounters=encounters)
         return read_raw(make_plaza(Path(folder) / "plaza.csv", seed=0, settings=settings))
 
 
@@ -86,7 +86,7 @@ def bench_fit(method: str) -> dict[str, float]:
     """A zone without intervals, of samples from 1/64 to 1/8 of the paper's."""
     tables = {n: paper_samples(n * PAPER_SAMPLES // 64 // 31 * 31) for n in TIMES}
     return over(
-        tables, lambda samples: szlib.SocialZone.fit(samples, method=method, speeds=SPEEDS, resamples=0)
+        tables, lambda samples: szlib.SocialZone.fit(samples, method=method, speeds=SPEEDS, n_resamples=0)
     )
 
 

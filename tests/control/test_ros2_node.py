@@ -112,8 +112,8 @@ def make(monkeypatch, tmp_path):
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "ros2_node", module)
     spec.loader.exec_module(module)
-    radii = PolarZone(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
-    szlib.SocialZone(None, 2.0, {1.1: ZONE}, {}, {}, "quantile", radii).save(tmp_path / "zone.json")
+    shape = PolarZone(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
+    szlib.SocialZone(shape, 2.0, {1.1: ZONE}).save(tmp_path / "zone.json")
 
     def node(**parameters):
         monkeypatch.setattr(Node, "now", 1.75e9)

@@ -36,7 +36,7 @@ def days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         make_plaza(
             folder / f"atc-{date.replace('-', '')}.csv",
             seed=seed,
-            settings=PlazaSettings(encounters=60, date=date),
+            settings=PlazaSettings(n_encounters=60, date=date),
         )
         for seed, date in enumerate(DATES)
     ]

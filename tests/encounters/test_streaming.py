@@ -126,7 +126,7 @@ def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_the_plaza_and_a_place_where_nobody_is(tmp_path: Path) -> None:
-    path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(encounters=100))
+    path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=100))
     assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=3.0) > 0
     elsewhere = read_near_area(path, area=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0)
     assert len(elsewhere) == 0

@@ -66,7 +66,7 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
         place = Path(folder)
         (place / "data").mkdir()
         for number, date in enumerate(("2012-10-24", "2012-10-28")):
-            settings = PlazaSettings(encounters=30, date=date)
+            settings = PlazaSettings(n_encounters=30, date=date)
             make_plaza(place / "data" / f"day{number}.csv", seed=number, settings=settings)
         for name, work in WORKS.items():
             reference = _reference(work, place, name)
@@ -182,7 +182,7 @@ def _notebook(data: Path, out: Path) -> None:
 
 def _plaza(_: Path, out: Path) -> None:
     out.mkdir(exist_ok=True)
-    make_plaza(out / "plaza.csv", settings=PlazaSettings(encounters=5))
+    make_plaza(out / "plaza.csv", settings=PlazaSettings(n_encounters=5))
 
 
 WORKS = {"days": _extract, "worlds": _rollouts, "notebook": _notebook, "plaza": _plaza}

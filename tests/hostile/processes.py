@@ -72,7 +72,7 @@ def furnish(place: Path) -> dict[str, list[str]]:
     (place / "data").mkdir()
     (place / "tmp").mkdir()
     for day in range(4):
-        settings = PlazaSettings(encounters=150, date=f"2012-11-{day + 1:02}")
+        settings = PlazaSettings(n_encounters=150, date=f"2012-11-{day + 1:02}")
         make_plaza(place / "data" / f"day{day}.csv", seed=day, settings=settings)
     subprocess.run(["gzip", str(place / "data" / "day3.csv")], check=True)
     (place / "notebooks").mkdir()

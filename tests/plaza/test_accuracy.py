@@ -32,7 +32,7 @@ def test_every_sample_knows_its_kind(plazas: list[pd.DataFrame]) -> None:
 
 def test_people_of_another_plaza_have_no_kind(plazas: list[pd.DataFrame]) -> None:
     with pytest.raises(szlib.DataError, match=r"row \d+: .* no pair of a plaza of 40 encounters"):
-        accuracy.true_kinds(plazas[0], settings=szlib.PlazaSettings(encounters=40))
+        accuracy.true_kinds(plazas[0], settings=szlib.PlazaSettings(n_encounters=40))
     strangers = plazas[0].assign(other_id=plazas[0]["other_id"] + 400)
     with pytest.raises(szlib.DataError, match=r"row 0: .* no pair"):
         accuracy.true_kinds(strangers)
@@ -53,7 +53,7 @@ def test_precision_and_recall() -> None:
 
 def test_the_error_is_the_largest_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:
     zone, truth = (
-        szlib.SocialZone.fit(plazas[0], method="hull", speeds=accuracy.SPEEDS, resamples=0),
+        szlib.SocialZone.fit(plazas[0], method="hull", speeds=accuracy.SPEEDS, n_resamples=0),
         szlib.PlazaSettings(),
     )
     off = [
@@ -63,7 +63,7 @@ def test_the_error_is_the_largest_of_centre_and_axes(plazas: list[pd.DataFrame])
     assert accuracy.largest_error(zone) == np.max(off)
     assert accuracy.largest_error(zone, speeds=(1.1,)) == np.max(off[2])
     larger = szlib.PlazaSettings(
-        slow=szlib.Ellipse((0.04, 0.0), (0.98, 0.78)), fast=szlib.Ellipse((0.06, 0.0), (1.1, 0.88))
+        slow_zone=szlib.Ellipse((0.04, 0.0), (0.98, 0.78)), fast_zone=szlib.Ellipse((0.06, 0.0), (1.1, 0.88))
     )
     assert accuracy.largest_error(zone, larger) == pytest.approx(0.1, abs=accuracy.largest_error(zone))
     with pytest.raises(szlib.ZoneError, match="at 5 m/s is undefined"):
@@ -75,7 +75,7 @@ def test_the_error_is_the_largest_of_centre_and_axes(plazas: list[pd.DataFrame])
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_pipeline_finds_the_true_zone(plazas: list[pd.DataFrame], seed: int) -> None:
-    zone = szlib.SocialZone.fit(plazas[seed], method="hull", speeds=accuracy.SPEEDS, resamples=0)
+    zone = szlib.SocialZone.fit(plazas[seed], method="hull", speeds=accuracy.SPEEDS, n_resamples=0)
     assert accuracy.largest_error(zone) < 0.05
     turned = [zone.ellipse(v).angle - szlib.PlazaSettings().true_zone(v).angle for v in accuracy.SPEEDS]
     assert np.abs((np.degrees(turned) + 90) % 180 - 90).max() < 10
@@ -83,7 +83,7 @@ def test_the_pipeline_finds_the_true_zone(plazas: list[pd.DataFrame], seed: int)
 
 @pytest.mark.parametrize(("share", "pace"), [(0.0, "rushing"), (0.01, "slow"), (0.02, "rushing")])
 def test_whole_encounters_find_every_intruder(share: float, pace: str) -> None:
-    settings = szlib.PlazaSettings(intruders=share, pace=PACES[pace])
+    settings = szlib.PlazaSettings(intruders=share, intruder_speeds=PACES[pace])
     found = judged(plaza_samples(7, settings), settings, {})
     assert found["error"] < (TOO_FAR_WITH_MANY if share else TOO_FAR)
     assert found["removed"] < 0.01 + 2 * share

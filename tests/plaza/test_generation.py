@@ -16,16 +16,17 @@ from szlib.plaza.settings import RUSHING_INTRUDERS, SLOW_INTRUDERS, PlazaSetting
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
 DEFAULT = PlazaSettings()
 ASIDE = PlazaSettings(
-    slow=szlib.Ellipse((0.0, -0.06), (0.80, 0.58), 0.2), fast=szlib.Ellipse((0.0, -0.06), (0.86, 0.62), 0.2)
+    slow_zone=szlib.Ellipse((0.0, -0.06), (0.80, 0.58), 0.2),
+    fast_zone=szlib.Ellipse((0.0, -0.06), (0.86, 0.62), 0.2),
 )
 """Tilted, and off to the person's right."""
 NAMES = ["time", "id", "x", "y", "z", "velocity", "motion_angle", "facing_angle"]
-FEW = PlazaSettings(encounters=150)
+FEW = PlazaSettings(n_encounters=150)
 
 
 def hull_of(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
     """The hull's zone, without its intervals."""
-    return szlib.SocialZone.fit(samples, method="hull", resamples=0, **options)
+    return szlib.SocialZone.fit(samples, method="hull", n_resamples=0, **options)
 
 
 def samples_of(folder: Path, seed: int, settings: PlazaSettings) -> pd.DataFrame:
@@ -96,7 +97,7 @@ def test_without_intruders_it_is_found_too_and_without_outlier_removal(tmp_path:
     polite = PlazaSettings(intruders=0.0)
     samples = samples_of(tmp_path, 2, polite)
     for fraction in (0.002, 0.0):
-        metres, degrees = errors(hull_of(samples, outlier_fraction=fraction), polite)
+        metres, degrees = errors(hull_of(samples, fraction=fraction), polite)
         assert metres < 0.05
         assert degrees < 10
 
@@ -105,7 +106,7 @@ def test_intruders_spoil_the_zone_unless_outliers_are_removed(tmp_path: Path) ->
     samples = samples_of(tmp_path, 2, DEFAULT)
     assert errors(hull_of(samples), DEFAULT)[0] < 0.05
     try:
-        metres = errors(hull_of(samples, outlier_fraction=0.0), DEFAULT)[0]
+        metres = errors(hull_of(samples, fraction=0.0), DEFAULT)[0]
     except szlib.ZoneError:  # intruders so near that nothing is left of the zone
         return
     assert metres > 0.15
@@ -158,7 +159,7 @@ def test_all_kinds_of_motion_are_there(staged: pd.DataFrame) -> None:
 
 def test_shares_are_as_set() -> None:
     counts = stage_encounters(
-        settings=PlazaSettings(encounters=400, standing=0.1, together=0.2, intruders=0.05)
+        settings=PlazaSettings(n_encounters=400, standing=0.1, together=0.2, intruders=0.05)
     )
     counts = counts["kind"].value_counts()
     assert (counts["standing"], counts["together"], counts["intruder"]) == (40, 80, 20)
@@ -168,7 +169,7 @@ def test_intruders_have_a_pace(tmp_path: Path) -> None:
     """Slow ones leave many samples deep within the zone, rushing ones a few; both pass as near."""
     inside, nearest = {}, {}
     for pace in (RUSHING_INTRUDERS, SLOW_INTRUDERS):
-        settings = PlazaSettings(encounters=300, intruders=0.3, pace=pace)
+        settings = PlazaSettings(n_encounters=300, intruders=0.3, intruder_speeds=pace)
         staged = stage_encounters(settings=settings).query("kind == 'intruder'")
         relative = np.hypot(
             staged["other_vx"] - staged["walker_vx"], staged["other_vy"] - staged["walker_vy"]
@@ -215,14 +216,14 @@ def test_the_file_is_as_the_sensor_writes_it(raw: tuple[Path, pl.DataFrame]) -> 
 
 
 def test_the_velocity_column_is_inflated(tmp_path: Path) -> None:
-    standing = PlazaSettings(encounters=50, standing=1.0, together=0.0, intruders=0.0)
+    standing = PlazaSettings(n_encounters=50, standing=1.0, together=0.0, intruders=0.0)
     rows = raw_rows(make_plaza(tmp_path / "standing.csv", settings=standing))
     still = rows.filter(pl.col("id") % 200 == 100)
     assert 400 < still["velocity"].median() < 700
 
 
 def test_tracks_have_gaps_short_and_long(tmp_path: Path) -> None:
-    broken = PlazaSettings(encounters=300, gaps=0.5, losses=0.3)
+    broken = PlazaSettings(n_encounters=300, short_gaps=0.5, long_gaps=0.3)
     rows = raw_rows(make_plaza(tmp_path / "gaps.csv", settings=broken))
     steps = rows.select(pl.col("time").diff().over("id")).drop_nulls().to_series().to_numpy()
     assert 250 < ((steps > 0.1) & (steps < 0.5)).sum() < 350  # 300 of 600 tracks
@@ -231,15 +232,15 @@ def test_tracks_have_gaps_short_and_long(tmp_path: Path) -> None:
 
 def test_a_day_is_the_day_that_was_asked_for(tmp_path: Path) -> None:
     tracks = szlib.read_tracks(
-        make_plaza(tmp_path / "p.csv", settings=PlazaSettings(encounters=5, date="2001-05-06"))
+        make_plaza(tmp_path / "p.csv", settings=PlazaSettings(n_encounters=5, date="2001-05-06"))
     )
     assert list(tracks["day"].unique()) == ["2001-05-06"]
 
 
 def test_the_truth_is_linear_in_speed_and_turns_the_shorter_way() -> None:
     settings = PlazaSettings(
-        slow=szlib.Ellipse((0.0, 0.0), (0.80, 0.70), np.pi / 2 - 0.04),
-        fast=szlib.Ellipse((0.04, 0.02), (0.84, 0.72), 0.04 - np.pi / 2),
+        slow_zone=szlib.Ellipse((0.0, 0.0), (0.80, 0.70), np.pi / 2 - 0.04),
+        fast_zone=szlib.Ellipse((0.04, 0.02), (0.84, 0.72), 0.04 - np.pi / 2),
     )
     middle = settings.true_zone(1.0)
     assert middle.center == pytest.approx((0.02, 0.01))
@@ -250,18 +251,18 @@ def test_the_truth_is_linear_in_speed_and_turns_the_shorter_way() -> None:
 @pytest.mark.parametrize(
     "given",
     [
-        {"encounters": 0},
+        {"n_encounters": 0},
         {"noise": -0.01},
         {"intruders": 1.5},
-        {"gaps": 0.7, "losses": 0.7},
+        {"short_gaps": 0.7, "long_gaps": 0.7},
         {"speeds": (1.2, 0.6)},
-        {"fastest": 1.0},
-        {"intrusion": (0.4, 0.2)},
-        {"pace": (0.1, 0.3)},
-        {"pace": (1.0, 0.5)},
-        {"pace": (5.0, 6.0)},
+        {"max_speed": 1.0},
+        {"intruder_distances": (0.4, 0.2)},
+        {"intruder_speeds": (0.1, 0.3)},
+        {"intruder_speeds": (1.0, 0.5)},
+        {"intruder_speeds": (5.0, 6.0)},
         {"date": "02.01.2000"},
-        {"square": szlib.Square(x=(0, 8), y=(0, 20))},
+        {"area": szlib.Square(x=(0, 8), y=(0, 20))},
     ],
 )
 def test_settings_without_meaning_are_refused(given: dict[str, object]) -> None:
@@ -273,13 +274,13 @@ def test_settings_without_meaning_are_refused(given: dict[str, object]) -> None:
     ("zone", "why"),
     [
         (szlib.Ellipse((0.0, 0.0), (1.1, 0.6)), "not convex"),
-        (szlib.Ellipse((1.0, 0.0), (0.9, 0.7)), "own place"),
-        (szlib.Ellipse((0.0, 0.0), (2.1, 2.0)), "own place"),
+        (szlib.Ellipse((1.0, 0.0), (0.9, 0.7)), "contain the person"),
+        (szlib.Ellipse((0.0, 0.0), (2.1, 2.0)), "contain the person"),
     ],
 )
 def test_a_truth_that_no_hull_finds_is_refused(zone: szlib.Ellipse, why: str) -> None:
     with pytest.raises(szlib.ZoneError, match=why):
-        PlazaSettings(slow=zone, fast=zone)
+        PlazaSettings(slow_zone=zone, fast_zone=zone)
 
 
 def test_a_folder_that_is_not_there_is_told_and_nothing_is_left_behind(tmp_path: Path) -> None:

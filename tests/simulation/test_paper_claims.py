@@ -84,7 +84,7 @@ def zone_of(people: pd.DataFrame, **options: object) -> szlib.SocialZone:
 
 def test_the_plaza_is_larger_ahead_and_grows_as_it_was_made_to(tmp_path) -> None:
     tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=3))
-    zone = zone_of(szlib.find_encounters(tracks), resamples=60)
+    zone = zone_of(szlib.find_encounters(tracks), n_resamples=60)
     ahead, growth = claims.larger_ahead(zone), claims.grows_with_speed(zone)
     assert ahead.verdict == growth.verdict == "supported"
     true = szlib.PlazaSettings().true_zone
@@ -104,7 +104,7 @@ def test_a_larger_zone_makes_the_robot_later() -> None:
 
 
 def test_sensitivity_varies_one_parameter_at_a_time(tmp_path) -> None:
-    settings = szlib.PlazaSettings(encounters=400)
+    settings = szlib.PlazaSettings(n_encounters=400)
     tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=0, settings=settings))
     table = sensitivity(tracks, square=szlib.ATC_SQUARE)
     assert table.loc[0, "parameter"] == "default" and np.isfinite(table.loc[0, "area"])
@@ -124,6 +124,6 @@ def test_where_there_is_no_zone_nothing_is_decided() -> None:
         }
     )
     with pytest.warns(szlib.DataWarning):
-        zone = szlib.SocialZone.fit(fast, method="hull", speeds=(0.7, 1.5), resamples=5)
+        zone = szlib.SocialZone.fit(fast, method="hull", speeds=(0.7, 1.5), n_resamples=5)
     found = claims.grows_with_speed(zone, slow=0.7, fast=1.5)
     assert np.isnan(found.effect) and found.verdict.startswith("not decidable")

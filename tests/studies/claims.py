@@ -76,7 +76,7 @@ def lof(name: str, samples: pd.DataFrame) -> claims.Finding:
     if name != "plaza":
         return claims.outliers_are_intruders(0, 0)
     close = samples[samples["distance"] <= 2.0]
-    removed = is_outlier(close, fraction=0.002, neighbours=20)
+    removed = is_outlier(close, fraction=0.002, n_neighbours=20)
     intruder = true_kinds(close) == "intruder"
     return claims.outliers_are_intruders(int((removed & intruder).sum()), int(removed.sum()))
 
@@ -103,7 +103,7 @@ def of_zone(people: pd.DataFrame, method: str) -> Iterator[claims.Finding]:
         (later, claims.LATER, (1.1,)),
     ):
         try:
-            zone = szlib.SocialZone.fit(people, method=method, speeds=speeds, resamples=RESAMPLES)
+            zone = szlib.SocialZone.fit(people, method=method, speeds=speeds, n_resamples=RESAMPLES)
             yield claim(zone)
         except szlib.SzlibError as error:
             print(f"{method}: {error}", file=sys.stderr)

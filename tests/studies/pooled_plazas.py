@@ -21,10 +21,10 @@ from szlib.plaza.settings import RUSHING_INTRUDERS, SLOW_INTRUDERS
 
 TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "03_outliers.csv"
 RULES: dict[str, dict[str, float | None]] = {
-    "encounters": {"fraction": None, "neighbours": None},
-    "0.2 %, 20 neighbours": {"fraction": 0.002, "neighbours": 20},
-    "0.2 %, 200 neighbours": {"fraction": 0.002, "neighbours": 200},
-    "1 %, 200 neighbours": {"fraction": 0.01, "neighbours": 200},
+    "encounters": {"fraction": None, "n_neighbours": None},
+    "0.2 %, 20 neighbours": {"fraction": 0.002, "n_neighbours": 20},
+    "0.2 %, 200 neighbours": {"fraction": 0.002, "n_neighbours": 200},
+    "1 %, 200 neighbours": {"fraction": 0.01, "n_neighbours": 200},
 }
 INTRUDERS = [
     (0.0, "rushing"),
@@ -37,7 +37,7 @@ INTRUDERS = [
 PACES = {"rushing": RUSHING_INTRUDERS, "slow": SLOW_INTRUDERS}
 FAMILIES = (0, 100)
 POOLED = (1, 3, 5, 6, 8)
-HULL = {"method": "hull", "outlier_fraction": 0.0, "speeds": accuracy.SPEEDS, "resamples": 0}
+HULL = {"method": "hull", "fraction": 0.0, "speeds": accuracy.SPEEDS, "n_resamples": 0}
 COSTLY = {
     (share, pace, 0, plazas)
     for share, pace in (INTRUDERS[1], INTRUDERS[3], INTRUDERS[5])
@@ -80,14 +80,14 @@ def main() -> None:
     rows = []
     cases = [(*intruders, family) for intruders in INTRUDERS for family in FAMILIES]
     for share, pace, family in tqdm(cases):
-        settings = szlib.PlazaSettings(intruders=share, pace=PACES[pace])
+        settings = szlib.PlazaSettings(intruders=share, intruder_speeds=PACES[pace])
         tables = [plaza_samples(family + k, settings) for k in range(max(POOLED))]
         for plazas in POOLED:
             samples = pooled(tables[:plazas])
             case = {"intruders": share, "pace": pace, "first_seed": family, "plazas": plazas}
             case["encounters"] = samples["encounter"].nunique()
             for name, rule in RULES.items():
-                if rule["neighbours"] != 200 or (share, pace, family, plazas) in COSTLY:
+                if rule["n_neighbours"] != 200 or (share, pace, family, plazas) in COSTLY:
                     rows.append(case | {"rule": name} | judged(samples, settings, rule))
             pd.DataFrame(rows).round(4).to_csv(TABLE, index=False)
 

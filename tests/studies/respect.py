@@ -81,8 +81,8 @@ def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
     rows = []
     for name in ("all", "opposite, crossing"):
         data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
-        test = szlib.null_test(data, against, radii=False)
-        told = {"p_value": test.p_value, "encounters": test.encounters, "radius": test.radius}
+        test = szlib.null_test(data, against, fit_null_radii=False)
+        told = {"p_value": test.p_value, "encounters": test.n_encounters, "radius": test.radius}
         rows.append({"bunch": bunch, "kinds": name, "seed": seed, "shifts": null.shifts} | told)
     return rows
 
@@ -122,12 +122,12 @@ def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
             for name, kinds in SETS.items():
                 data, against = szlib.of_kind(samples, kinds), null.of_kind(kinds)
                 test = szlib.null_test(data, against)
-                bodies = szlib.null_test(data, against, beyond=0.5, radii=False)
+                bodies = szlib.null_test(data, against, excluded_below=0.5, fit_null_radii=False)
                 fit = szlib.fit_respect(data, against)
                 radii = [np.r_[test.radius, fit.radii(theta)], *resampled(data, against, theta)]
                 low, high = np.percentile(radii[1:], [2.5, 97.5], axis=0)
                 row = {"site": site, "min_distance": min_distance, "kinds": name}
-                row |= {"encounters": data["encounter"].nunique(), "within_2m": test.encounters}
+                row |= {"encounters": data["encounter"].nunique(), "within_2m": test.n_encounters}
                 row |= {"null_encounters": len(against.encounters) / null.shifts, "shifts": null.shifts}
                 for i, where in enumerate(("radius", "ahead", "left", "behind", "right")):
                     row |= {where: radii[0][i], f"{where}_low": low[i], f"{where}_high": high[i]}
@@ -164,7 +164,7 @@ def pairs(samples: pd.DataFrame) -> np.ndarray:
 def hull_a(samples: pd.DataFrame) -> float:
     """Semi-major axis of the paper's zone at 1.1 m/s [m]; NaN where it is undefined."""
     try:
-        kept = szlib.remove_outliers(samples, fraction=0.002, r_max=2.0, neighbours=20)
+        kept = szlib.remove_outliers(samples, fraction=0.002, r_max=2.0, n_neighbours=20)
         points = np.column_stack([complementary_points(kept, r_max=2.0), kept["speed"]])
         section = slice_hull(hull_vertices(points), SPEED, r_max=2.0)
         return minimum_enclosing_ellipse_of_curve(section.boundary, section.corner_angles).semi_axes[0]

@@ -31,12 +31,15 @@ from scipy.optimize import least_squares
 import szlib
 from szlib.plaza.settings import PlazaSettings
 from szlib.zones.ellipses import Ellipse
-from szlib.zones.quantile import smoothed
+from szlib.zones.quantile import smooth_paths
 from szlib.zones.uncertainty import QUANTITIES
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
 TRUTHS: dict[str, dict[str, Any]] = {
-    "centred": {"slow": Ellipse((0.0, 0.0), (0.88, 0.68)), "fast": Ellipse((0.0, 0.0), (1.0, 0.78))},
+    "centred": {
+        "slow_zone": Ellipse((0.0, 0.0), (0.88, 0.68)),
+        "fast_zone": Ellipse((0.0, 0.0), (1.0, 0.78)),
+    },
     "default": {},
 }
 """Truths: the default plaza's is 5 cm longer ahead than behind, which no one-sided fit can tell."""
@@ -49,7 +52,7 @@ CASES: dict[str, dict[str, Any]] = {
 METHODS: dict[str, dict[str, Any]] = {
     "quantile": {"method": "quantile"},
     "hull": {"method": "hull"},
-    "hull, as in the paper": {"method": "hull", "outlier_fraction": 0.002, "neighbours": 20},
+    "hull, as in the paper": {"method": "hull", "fraction": 0.002, "n_neighbours": 20},
 }
 
 
@@ -84,19 +87,19 @@ def coverage(plazas: int, method: str, *truths: str) -> pd.DataFrame:
     for truth in truths:
         zones, everybody = [], []
         for seed in range(plazas):
-            samples, tracks, known = people(seed, encounters=600, **TRUTHS[truth])
+            samples, tracks, known = people(seed, n_encounters=600, **TRUTHS[truth])
             everybody.append(samples)
             options: dict[str, Any] = {"speeds": SPEEDS, "method": method}
             if method == "respect":
                 null = szlib.null_encounters(tracks, shifts=20, seed=seed, progress=False)
-                options |= {"speeds": (1.1,), "resamples": 40, "null": null}
+                options |= {"speeds": (1.1,), "n_resamples": 40, "null": null}
             zones.append(szlib.SocialZone.fit(samples, **options))
             print(truth, seed, file=sys.stderr, flush=True)
         intervals = pd.concat([zone.uncertainty.intervals for zone in zones])
         intervals["truth"] = _holds(intervals, {v: known.true_zone(v) for v in SPEEDS})
         intervals["limit"] = np.nan
         if method == "quantile":  # a hull has none: it shrinks
-            everyone = szlib.SocialZone.fit(pooled(everybody), method=method, speeds=SPEEDS, resamples=0)
+            everyone = szlib.SocialZone.fit(pooled(everybody), method=method, speeds=SPEEDS, n_resamples=0)
             intervals["limit"] = _holds(intervals, everyone.ellipses)
         intervals["half_width"] = (intervals["high"] - intervals["low"]) / 2
         table = intervals.groupby(["quantity", "speed"])[["truth", "limit", "half_width"]].mean()
@@ -113,7 +116,7 @@ def levels(plazas: int) -> pd.DataFrame:
         settings = {"clearance": clearance, **TRUTHS["centred"]}
         samples, _, known = zip(*(people(seed, **settings) for seed in range(plazas)), strict=True)
         for q in (0.02, 0.03, 0.05):
-            zone = szlib.SocialZone.fit(pooled(list(samples)), speeds=SPEEDS, q=q, resamples=0)
+            zone = szlib.SocialZone.fit(pooled(list(samples)), speeds=SPEEDS, q=q, n_resamples=0)
             outside = [
                 np.subtract(zone.ellipses[v].semi_axes, known[0].true_zone(v).semi_axes) for v in SPEEDS
             ]
@@ -136,7 +139,7 @@ def errors(plazas: int) -> pd.DataFrame:
         for seed in range(plazas):
             samples, _, known = people(seed, **settings)
             for name, options in METHODS.items():
-                zone = szlib.SocialZone.fit(samples, speeds=SPEEDS, resamples=0, **options)
+                zone = szlib.SocialZone.fit(samples, speeds=SPEEDS, n_resamples=0, **options)
                 rows.append((case, name, seed, samples["encounter"].nunique(), error(zone, known)))
             print(case, seed, file=sys.stderr, flush=True)
     return pd.DataFrame(rows, columns=["case", "method", "seed", "encounters", "error_m"])
@@ -148,7 +151,7 @@ def sizes(plazas: int) -> pd.DataFrame:
     rows = []
     for count in (n for n in (1, 2, 4, 8, 16) if n <= plazas):
         samples = pooled(days[:count])
-        zone = szlib.SocialZone.fit(samples, method="quantile", speeds=SPEEDS, resamples=0)
+        zone = szlib.SocialZone.fit(samples, method="quantile", speeds=SPEEDS, n_resamples=0)
         rows.append(
             (count, samples.groupby("day")["encounter"].nunique().sum(), error(zone, PlazaSettings()))
         )
@@ -168,7 +171,7 @@ def subsets(draws: int, *files: str) -> pd.DataFrame:
             for _ in range(draws if share < 1 else 1):
                 some = samples[samples["encounter"].isin(rng.permutation(every)[: round(share * len(every))])]
                 with suppress(szlib.SzlibError):  # counted: zones, of so many draws
-                    zone = szlib.SocialZone.fit(some, speeds=(1.1,), resamples=0, **options)
+                    zone = szlib.SocialZone.fit(some, speeds=(1.1,), n_resamples=0, **options)
                     found.append(zone.ellipses[1.1].semi_axes)
             quartiles = np.quantile(found, [0.25, 0.5, 0.75], axis=0) if found else np.full((3, 2), np.nan)
             rows.append((name, share, draws if share < 1 else 1, len(found), *quartiles.T.ravel()))
@@ -195,11 +198,14 @@ def two_sided(plazas: int) -> pd.DataFrame:
     """What one- and two-sided fits make of a zone shifted ahead, from two starts."""
     rows = []
     for ahead, (slow, fast) in SHIFTED.items():
-        settings = {"slow": Ellipse((ahead, 0), (0.88, slow)), "fast": Ellipse((ahead, 0), (1.0, fast))}
+        settings = {
+            "slow_zone": Ellipse((ahead, 0), (0.88, slow)),
+            "fast_zone": Ellipse((ahead, 0), (1.0, fast)),
+        }
         for seed in range(plazas):
             samples, tracks, known = people(seed, **settings)
             pairs = _both_sides(samples, tracks)
-            alone = szlib.SocialZone.fit(samples, method="quantile", speeds=SPEEDS, resamples=0)
+            alone = szlib.SocialZone.fit(samples, method="quantile", speeds=SPEEDS, n_resamples=0)
             fits = {"one-sided": (alone.ellipses, np.nan)}
             for start, shift in (("middle", 0.0), ("other side", -ahead)):
                 fits[f"two-sided, from the {start}"] = _two_sided_fit(*pairs, shift)
@@ -231,7 +237,7 @@ def _both_sides(samples: pd.DataFrame, tracks: pd.DataFrame) -> tuple[np.ndarray
     ).ngroup()
     sides = []
     for side in (both, theirs):
-        angle, distance = smoothed(side)
+        angle, distance = smooth_paths(side)
         use = (distance <= 2.0) & (side["speed"].to_numpy() >= 0.4)
         points = [distance * np.cos(angle), distance * np.sin(angle), side["speed"], pair]
         sides.append(np.column_stack(points)[use])

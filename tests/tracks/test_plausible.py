@@ -106,7 +106,7 @@ def test_people_who_stand_are_people() -> None:
 def test_good_tables_pass_in_silence(tmp_path: Path, seed: int) -> None:
     read_raw(in_seconds(people(seed, count=30)))
     plaza = pd.read_csv(
-        make_plaza(tmp_path / "plaza.csv", seed=seed, settings=PlazaSettings(encounters=60)), header=None
+        make_plaza(tmp_path / "plaza.csv", seed=seed, settings=PlazaSettings(n_encounters=60)), header=None
     )
     read_raw(pd.DataFrame({"t": plaza[0], "id": plaza[1], "x": plaza[2] / 1e3, "y": plaza[3] / 1e3}))
     standing = pd.DataFrame({"t": np.arange(9.0), "id": 1, "x": 0.0, "y": 0.0})

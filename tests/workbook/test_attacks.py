@@ -42,7 +42,7 @@ def refused(arguments, capsys, message):
 def test_tracks_are_never_overwritten_by_encounters(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "tracks").mkdir()
-    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=5))
+    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=5))
     szlib.read_tracks(day).to_parquet(tmp_path / "tracks" / "day.parquet")
     before = (tmp_path / "tracks" / "day.parquet").read_bytes()
     refused(["extract", "tracks", "--out", "tracks"], capsys, "holds input data")
@@ -98,7 +98,7 @@ def test_encounters_and_zone_of_another_day_of_the_same_name_and_size_are_not_se
 
 def test_a_foreign_plaza_is_not_taken_for_ours(tmp_path, monkeypatch):
     (tmp_path / "plaza-0.csv").write_text("1,2,3,4,5,6,7,8\n")
-    small = PlazaSettings(encounters=3)
+    small = PlazaSettings(n_encounters=3)
     monkeypatch.setattr(
         data_cache, "make_plaza", lambda file, seed: make_plaza(file, seed=seed, settings=small)
     )
@@ -110,7 +110,7 @@ def test_a_foreign_plaza_is_not_taken_for_ours(tmp_path, monkeypatch):
 
 
 def test_an_extraction_gives_its_own_samples_or_none(tmp_path):
-    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=30))
+    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=30))
     first = szlib.extract_days(day, out=tmp_path / "out", progress=False)
     assert len(first.samples()) > 0
     szlib.extract_days(day, out=tmp_path / "out", progress=False, min_speed=1.2)
@@ -119,7 +119,7 @@ def test_an_extraction_gives_its_own_samples_or_none(tmp_path):
 
 
 def test_a_poisoned_day_is_a_line_and_the_others_are_done(tmp_path, monkeypatch):
-    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=5))
+    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=5))
     (tmp_path / os.fsdecode(b"latin\xe4.csv")).write_bytes(day.read_bytes())
     (tmp_path / "other.csv").write_bytes(day.read_bytes())
     import szlib.encounters.days as days
@@ -229,7 +229,7 @@ def command(*arguments, **options):
 
 
 def test_standard_output_that_is_full_or_knows_ascii_only(tmp_path):
-    make_plaza(tmp_path / "plätze.csv", settings=PlazaSettings(encounters=3))
+    make_plaza(tmp_path / "plätze.csv", settings=PlazaSettings(n_encounters=3))
     with Path("/dev/full").open("w") as full:
         done = command("inspect", str(tmp_path / "plätze.csv"), stdout=full)
         _, printed = done.communicate()
@@ -242,7 +242,7 @@ def test_standard_output_that_is_full_or_knows_ascii_only(tmp_path):
 
 
 def test_sigterm_ends_a_command_as_ctrl_c_does(tmp_path):
-    days = [make_plaza(tmp_path / f"d{k}.csv", settings=PlazaSettings(encounters=300, date=f"2000-01-0{k}"))
+    days = [make_plaza(tmp_path / f"d{k}.csv", settings=PlazaSettings(n_encounters=300, date=f"2000-01-0{k}"))
             for k in range(1, 6)]  # fmt: skip
     done = command("extract", *map(str, days), "--out", str(tmp_path / "out"))
     while not list(tmp_path.glob("out/*.json")) and done.poll() is None:
@@ -314,7 +314,7 @@ def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypa
 
 @pytest.mark.filterwarnings("default")
 def test_jobs_are_capped_and_that_is_said(tmp_path, capsys):
-    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(encounters=3))
+    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=3))
     assert main(["extract", str(day), "--out", str(tmp_path / "out"), "--jobs", "100000"]) == 0
     assert "n_jobs=100000 is reduced to 1" in capsys.readouterr().err
 

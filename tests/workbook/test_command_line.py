@@ -16,7 +16,7 @@ from szlib.workbook.cli import main
 @pytest.fixture(scope="module")
 def day(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("day") / "atc-20121024.csv"
-    return make_plaza(path, settings=PlazaSettings(encounters=40))
+    return make_plaza(path, settings=PlazaSettings(n_encounters=40))
 
 
 def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureFixture[str]) -> None:

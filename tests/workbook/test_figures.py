@@ -145,7 +145,7 @@ def test_the_drawn_curve_is_the_ellipse(zone):
 def fit_few(samples):
     with pytest.warns(szlib.DataWarning, match="fewer than 20"):
         return szlib.SocialZone.fit(
-            samples[samples["encounter"] < 15], method="quantile", speeds=(0.9, 1.1), resamples=20
+            samples[samples["encounter"] < 15], method="quantile", speeds=(0.9, 1.1), n_resamples=20
         )
 
 
@@ -165,7 +165,7 @@ def test_the_band_is_drawn_exactly_where_an_interval_is_known(zone, samples):
     known = zone.uncertainty.bands.query("speed == 1.1")
     assert reach.min() == pytest.approx(known["low"].min())
     assert reach.max() == pytest.approx(known["high"].max())
-    plain = szlib.SocialZone.fit(samples, speeds=(1.1,), resamples=0)
+    plain = szlib.SocialZone.fit(samples, speeds=(1.1,), n_resamples=0)
     assert not figures.plot_zone(plain, 1.1).collections
     assert "interval" not in figures.plot_zones(plain).get_title()
 

@@ -93,10 +93,10 @@ def test_person_zone_replaces_the_common_zone_and_social_zone_depends_on_speed()
     own = szlib.Ellipse((0.0, 0.0), (0.5, 0.5))
     drawn = draw_costmap(ZONE, [szlib.Person((0.0, 0.0), (1.0, 0.0), zone=own)], GRID)
     assert np.array_equal(drawn, draw_costmap(own, [[0.0, 0.0, 1.0, 0.0]], GRID))
-    radii = PolarZone(np.array([0.5, 1.1]), DIRECTIONS, np.ones((2, len(DIRECTIONS))))
-    zone = szlib.SocialZone(None, 2.0, {0.5: own, 1.1: ZONE}, {}, {}, "quantile", radii)
+    shape = PolarZone(np.array([0.5, 1.1]), DIRECTIONS, np.ones((2, len(DIRECTIONS))))
+    zone = szlib.SocialZone(shape, 2.0, {0.5: own, 1.1: ZONE})
     people = [[0.0, 0.0, 1.0, 0.0], [1.0, 1.0, 1.0, 0.0]]
-    with pytest.warns(szlib.DataWarning, match="of unknown worth") as caught:
+    with pytest.warns(szlib.DataWarning, match="quality of the zone is unknown") as caught:
         assert np.array_equal(draw_costmap(zone, people, GRID), draw_costmap(ZONE, people, GRID))
     assert len(caught) == 1
     with pytest.warns(szlib.DataWarning):
@@ -116,7 +116,7 @@ def test_costs_do_not_depend_on_the_grid_border():
 
 
 def test_invalid_arguments_are_refused():
-    with pytest.raises(szlib.ZoneError, match="number 1 is"):
+    with pytest.raises(szlib.ZoneError, match="person 1 is"):
         draw_costmap(ZONE, [[0, 0, 1, 0], [0, np.nan, 1, 0]], GRID)
     with pytest.raises(szlib.ZoneError, match=r"array \(n, 4\)"):
         draw_costmap(ZONE, np.zeros((3, 2)), GRID)

@@ -52,7 +52,7 @@ def test_points_inside_and_copies_add_no_vertex() -> None:
 
 
 @pytest.mark.parametrize(
-    ("points", "told"),
+    ("points", "message"),
     [
         (CUBE[:3], "needs at least 4 points; got 3"),
         (CUBE[:0], "needs at least 4 points; got 0"),
@@ -64,10 +64,10 @@ def test_points_inside_and_copies_add_no_vertex() -> None:
         (np.vstack([[0, 0, np.inf], CUBE]), "point 0 of the hull is not finite"),
     ],
 )
-def test_points_without_a_hull(points: np.ndarray, told: str) -> None:
-    with pytest.raises(szlib.ZoneError, match=told):
+def test_points_without_a_hull(points: np.ndarray, message: str) -> None:
+    with pytest.raises(szlib.ZoneError, match=message):
         hull_vertices(points)
-    with pytest.raises(szlib.ZoneError, match=told):
+    with pytest.raises(szlib.ZoneError, match=message):
         slice_hull(points, 1.0, r_max=R_MAX)
 
 
@@ -194,7 +194,7 @@ def test_the_missing_directions_are_those_that_miss_the_slice(towards: int) -> N
     corners = np.array([(0.2, 0.1), (1.0, -0.3), (1.4, 0.2), (0.9, 0.6)])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     box = np.vstack([np.column_stack([corners @ turn.T, np.full(4, v)]) for v in (0.5, 1.5)])
-    with pytest.raises(szlib.ZoneError, match=r"at 1\.1 m/s is undefined: nobody was seen") as error:
+    with pytest.raises(szlib.ZoneError, match=r"at 1\.1 m/s is undefined: no person was seen") as error:
         slice_hull(box, 1.1, r_max=R_MAX)
     low, high = missing_directions(str(error.value))
     assert max(abs(low), abs(high)) <= 180

@@ -13,11 +13,11 @@ from sklearn.neighbors import LocalOutlierFactor
 import szlib
 from szlib.tracks import funnels
 from szlib.zones.outliers import (
-    FACTOR,
     FRACTION,
     JITTER,
-    NEIGHBOURS,
-    SHARE,
+    N_NEIGHBOURS,
+    NEIGHBOUR_SHARE,
+    OUTLIER_FACTOR,
     complementary_points,
     is_outlier,
     local_outlier_factors,
@@ -172,7 +172,7 @@ def test_the_middle_of_a_crowd_is_found_in_a_later_round() -> None:
     samples = make_encounters(2000, intruders=100)
     samples.loc[samples["encounter"] < 100, "los_angle"] *= 0.25
     nearest = nearest_approaches(close(samples))
-    once = local_outlier_factors(complementary_points(nearest), 40)[:100] > FACTOR
+    once = local_outlier_factors(complementary_points(nearest), 40)[:100] > OUTLIER_FACTOR
     assert not once.all()
     assert set(range(100)) <= removed_encounters(samples)
 
@@ -181,18 +181,18 @@ def test_who_keeps_away_more_than_most_is_no_outlier() -> None:
     ring = make_samples(300, nearest=0.9, farthest=1.1)
     two = pd.DataFrame({"los_angle": [1.0, 1.0], "distance": [0.2, 1.95], "speed": 1.0})
     samples = pd.concat([ring, two], ignore_index=True).assign(encounter=range(302))
-    factors = local_outlier_factors(complementary_points(samples), NEIGHBOURS)
-    assert (factors[-2:] > FACTOR).all()
+    factors = local_outlier_factors(complementary_points(samples), N_NEIGHBOURS)
+    assert (factors[-2:] > OUTLIER_FACTOR).all()
     assert removed_encounters(samples) == {300}
 
 
 def test_the_neighbours_are_a_share_of_the_encounters() -> None:
     samples = make_encounters(2000, intruders=40)
-    expected = math.ceil(SHARE * samples["encounter"].nunique())
-    assert expected > NEIGHBOURS
-    assert removed_encounters(samples) == removed_encounters(samples, neighbours=expected)
+    expected = math.ceil(NEIGHBOUR_SHARE * samples["encounter"].nunique())
+    assert expected > N_NEIGHBOURS
+    assert removed_encounters(samples) == removed_encounters(samples, n_neighbours=expected)
     few = make_encounters(300, intruders=5)
-    assert removed_encounters(few) == removed_encounters(few, neighbours=NEIGHBOURS)
+    assert removed_encounters(few) == removed_encounters(few, n_neighbours=N_NEIGHBOURS)
 
 
 def test_numbers_order_and_direction_of_encounters_change_nothing() -> None:
@@ -230,11 +230,11 @@ def test_the_funnel_counts_the_samples_of_outlying_encounters() -> None:
 
 
 def test_a_few_encounters_are_told_and_kept() -> None:
-    few = make_encounters(NEIGHBOURS, intruders=1)
-    with pytest.warns(szlib.DataWarning, match=r"20 encounters are too few to tell an outlier .* add data"):
+    few = make_encounters(N_NEIGHBOURS, intruders=1)
+    with pytest.warns(szlib.DataWarning, match=r"20 encounters are too few to find outliers .* add data"):
         kept = remove_outliers(few)
     assert len(kept) == len(close(few))
-    remove_outliers(few, neighbours=5)  # asked for, so without a warning
+    remove_outliers(few, n_neighbours=5)  # asked for, so without a warning
 
 
 def test_copies_of_an_encounter_count_once() -> None:
@@ -263,8 +263,10 @@ def test_samples_that_tell_no_encounter_count_as_one_each() -> None:
 
 
 def test_more_neighbours_than_encounters() -> None:
-    with pytest.raises(szlib.DataError, match=r"more samples \(or encounters\) than .* got 600 neigh"):
-        remove_outliers(make_encounters(), neighbours=600)
+    with pytest.raises(
+        szlib.DataError, match=r"smaller than the number of samples \(or encounters\) .* got 600 neigh"
+    ):
+        remove_outliers(make_encounters(), n_neighbours=600)
 
 
 def test_nobody_is_taken_from_the_real_day(real_samples: pd.DataFrame) -> None:
@@ -286,7 +288,7 @@ def test_it_is_the_local_outlier_factor(fraction: float, neighbours: int, speed_
         features.append(speed_scale * samples["speed"])
     lof = LocalOutlierFactor(n_neighbors=neighbours, contamination=fraction)
     expected = lof.fit_predict(np.column_stack(features)) == -1
-    found = is_outlier(samples, fraction=fraction, neighbours=neighbours, speed_scale=speed_scale)
+    found = is_outlier(samples, fraction=fraction, n_neighbours=neighbours, speed_scale=speed_scale)
     np.testing.assert_array_equal(found, expected)
 
 
@@ -294,7 +296,7 @@ def test_it_is_the_local_outlier_factor(fraction: float, neighbours: int, speed_
 def test_the_quota_is_kept(fraction: float) -> None:
     samples = make_samples()
     n = len(close(samples))
-    kept = remove_outliers(samples, fraction)
+    kept = remove_outliers(samples, fraction=fraction)
     assert n - len(kept) == math.ceil(fraction * (n - 1))
     assert (len(kept) == n) == (fraction == 0)
 
@@ -309,10 +311,10 @@ def test_planted_intruders_are_found(seed: int) -> None:
 
 def test_row_order_and_turning_the_world_change_nothing() -> None:
     samples = with_intruders(make_samples())
-    kept = remove_outliers(samples, 0.01)
-    shuffled = remove_outliers(samples.sample(frac=1, random_state=1), 0.01)
+    kept = remove_outliers(samples, fraction=0.01)
+    shuffled = remove_outliers(samples.sample(frac=1, random_state=1), fraction=0.01)
     pd.testing.assert_frame_equal(shuffled.sort_index(), kept)
-    turned = remove_outliers(samples.assign(los_angle=samples["los_angle"] + 1.1), 0.01)
+    turned = remove_outliers(samples.assign(los_angle=samples["los_angle"] + 1.1), fraction=0.01)
     assert turned.index.equals(kept.index)
 
 
@@ -336,11 +338,11 @@ def test_identical_samples_are_told_and_parted() -> None:
         [close(make_samples(600)), close(make_samples(30))] + [close(make_samples(30)).head(1)] * 40
     )
     with pytest.warns(szlib.DataWarning, match=r"up to 4\d samples coincide.*1 mm of noise"):
-        kept = remove_outliers(samples, 0.05)
+        kept = remove_outliers(samples, fraction=0.05)
     assert not kept.empty
     assert set(kept["distance"]) <= set(samples["distance"])  # the noise is for LOF only
     with pytest.warns(szlib.DataWarning):
-        pd.testing.assert_frame_equal(remove_outliers(samples, 0.05), kept)
+        pd.testing.assert_frame_equal(remove_outliers(samples, fraction=0.05), kept)
     assert JITTER < 0.01
 
 
@@ -355,7 +357,7 @@ def test_a_few_identical_samples_need_no_noise() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         ({"fraction": -0.1}, r"fraction must be within \[0, 0.5\], or None .*; got -0.1"),
         ({"fraction": 0.6}, "got 0.6"),
@@ -364,15 +366,15 @@ def test_a_few_identical_samples_need_no_noise() -> None:
         ({"r_max": np.nan}, "r_max must be a positive distance"),
         ({"r_max": np.inf}, "r_max must be a positive distance"),
         ({"r_max": 0.5}, r"none of 1000 samples is within r_max = 0.5 m \(nearest: 0.90 m\)"),
-        ({"neighbours": 0}, "got 0 neighbours"),
-        ({"neighbours": 2.5}, "got 2.5 neighbours"),
-        ({"neighbours": 1000}, r"got 1000 neighbours, \d+ samples; add data, or pass fewer"),
+        ({"n_neighbours": 0}, "got 0 neighbours"),
+        ({"n_neighbours": 2.5}, "got 2.5 neighbours"),
+        ({"n_neighbours": 1000}, r"got 1000 neighbours, \d+ samples; add data, or pass a smaller"),
         ({"speed_scale": 0}, "speed_scale must be a positive number"),
         ({"speed_scale": np.nan}, "speed_scale must be a positive number"),
     ],
 )
-def test_parameters_without_a_meaning(options: dict, told: str) -> None:
-    with pytest.raises(szlib.DataError, match=told):
+def test_parameters_without_a_meaning(options: dict, message: str) -> None:
+    with pytest.raises(szlib.DataError, match=message):
         remove_outliers(make_samples(), **{"fraction": FRACTION, **options})
 
 

@@ -34,16 +34,14 @@ def test_many_copies_do_not_make_lof_explode(share: float, fraction: float | Non
     samples = paper_samples(MANY)
     copies = np.arange(MANY) < share * MANY
     samples.loc[copies, ["los_angle", "distance", "speed"]] = [0.3, 1.2, 1.0]
-    told = pytest.warns(szlib.DataWarning, match="samples coincide") if fraction else nullcontext()
-    with told:
+    message = pytest.warns(szlib.DataWarning, match="samples coincide") if fraction else nullcontext()
+    with message:
         outlier = outliers.is_outlier(samples, fraction=fraction)
-    with told:
-        zone = szlib.SocialZone.fit(
-            samples, method="hull", resamples=0, speeds=(1.1,), outlier_fraction=fraction
-        )
+    with message:
+        zone = szlib.SocialZone.fit(samples, method="hull", n_resamples=0, speeds=(1.1,), fraction=fraction)
     assert outlier.sum() == (pytest.approx(fraction * MANY, abs=1) if fraction else 0)
     plain = szlib.SocialZone.fit(
-        samples[~copies], method="hull", resamples=0, speeds=(1.1,), outlier_fraction=fraction
+        samples[~copies], method="hull", n_resamples=0, speeds=(1.1,), fraction=fraction
     )
     assert zone.ellipse(1.1).area == pytest.approx(plain.ellipse(1.1).area, rel=0.15)
 
@@ -52,14 +50,14 @@ def test_many_copies_do_not_make_lof_explode(share: float, fraction: float | Non
 def test_the_zone_does_not_depend_on_the_order_of_samples(fraction: float | None) -> None:
     samples = paper_samples(MANY)
     shuffled = samples.sample(frac=1, random_state=1)
-    options = {"speeds": (0.9, 1.1), "outlier_fraction": fraction}
+    options = {"speeds": (0.9, 1.1), "fraction": fraction}
     zones = [
-        szlib.SocialZone.fit(table, method="hull", resamples=0, **options) for table in (samples, shuffled)
+        szlib.SocialZone.fit(table, method="hull", n_resamples=0, **options) for table in (samples, shuffled)
     ]
     for speed in (0.9, 1.1):
         one, other = (zone.ellipse(speed) for zone in zones)
         np.testing.assert_allclose(
             [*one.center, *one.semi_axes], [*other.center, *other.semi_axes], rtol=1e-9
         )
-    kept = [outliers.remove_outliers(table, fraction).sort_index() for table in (samples, shuffled)]
+    kept = [outliers.remove_outliers(table, fraction=fraction).sort_index() for table in (samples, shuffled)]
     pd.testing.assert_frame_equal(kept[0], kept[1])

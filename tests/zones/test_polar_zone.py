@@ -1,4 +1,4 @@
-"""PolarZone by direction: the ellipse they are of is found, gaps are told, nonsense is refused."""
+"""Polar zones: the fit finds a known ellipse, gaps have messages, invalid radii are refused."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.zones.polar import DIRECTIONS, PolarZone, closed, ellipse_reach, fit_ellipses
+from szlib.zones.polar import DIRECTIONS, PolarZone, ellipse_reach, fill_gaps, fit_ellipses
 
 KNOWN = np.array(
     [
@@ -65,13 +65,13 @@ def test_gaps_are_closed_up_to_half_of_all_directions() -> None:
     radii = ellipse_reach(KNOWN[:1])
     radii[0, 3:9] = np.nan
     radii[0, -1] = np.nan  # across the seam
-    whole = closed(radii)
+    whole = fill_gaps(radii)
     assert np.isfinite(whole).all()
     seen = np.isfinite(radii)
     np.testing.assert_array_equal(whole[seen], radii[seen])
     assert min(radii[0, 2], radii[0, 9]) <= whole[0, 5] <= max(radii[0, 2], radii[0, 9])
     radii[0, :36] = np.nan
-    assert np.isnan(closed(radii)).all()
+    assert np.isnan(fill_gaps(radii)).all()
 
 
 def test_a_half_circle_is_no_zone_and_the_error_names_it() -> None:
@@ -82,34 +82,34 @@ def test_a_half_circle_is_no_zone_and_the_error_names_it() -> None:
         zone.ellipse(1.1)
     assert np.isnan(zone.boundary(1.1, np.radians([0.0]))).all()
     assert np.isfinite(zone.boundary(1.1, np.radians([100.0]))).all()
-    nobody = PolarZone(np.array([1.1]), DIRECTIONS, np.full((1, 72), np.nan))
-    with pytest.raises(szlib.ZoneError, match="nobody was seen"):
-        nobody.ellipse(1.1)
-    with pytest.raises(szlib.ZoneError, match="of no ellipse around the person"):
+    empty = PolarZone(np.array([1.1]), DIRECTIONS, np.full((1, 72), np.nan))
+    with pytest.raises(szlib.ZoneError, match="no person was seen"):
+        empty.ellipse(1.1)
+    with pytest.raises(szlib.ZoneError, match="no ellipse around the person fits"):
         PolarZone(np.array([1.1]), DIRECTIONS, np.zeros((1, 72))).ellipse(1.1)
 
 
 def test_between_speeds_radii_are_linear() -> None:
     zone = PolarZone(np.array([0.5, 1.5]), DIRECTIONS, np.array([np.full(72, 0.8), np.full(72, 1.0)]))
-    np.testing.assert_allclose(zone.at(1.0), 0.9)
-    np.testing.assert_array_equal(zone.at(1.5), 1.0)
+    np.testing.assert_allclose(zone.radii_at(1.0), 0.9)
+    np.testing.assert_array_equal(zone.radii_at(1.5), 1.0)
     np.testing.assert_allclose(np.hypot(*zone.boundary(0.75, DIRECTIONS).T), 0.85)
     for speed in (0.4, 1.6, np.nan):
         with pytest.raises(szlib.ZoneError, match=r"undefined: it was fitted for 0\.5 to 1\.5 m/s"):
-            zone.at(speed)
+            zone.radii_at(speed)
 
 
 @pytest.mark.parametrize(
-    ("speeds", "directions", "radii", "told"),
+    ("speeds", "directions", "radii", "message"),
     [
         ([1.0], [0.0, 1.0], [[1.0]], "must have shape"),
         ([], [0.0], [], "must have shape"),
-        ([1.0, 0.9], [0.0], [[1.0], [1.0]], "must ascend"),
-        ([1.0], [1.0, 0.0], [[1.0, 1.0]], "must ascend"),
+        ([1.0, 0.9], [0.0], [[1.0], [1.0]], "must be finite and ascend"),
+        ([1.0], [1.0, 0.0], [[1.0, 1.0]], "must be finite and ascend"),
         ([np.inf], [0.0], [[1.0]], "must be finite"),
         ([1.0], [0.0], [[-1.0]], "must not be negative; got -1"),
     ],
 )
-def test_radii_without_meaning(speeds: list, directions: list, radii: list, told: str) -> None:
-    with pytest.raises(szlib.ZoneError, match=told):
+def test_radii_without_meaning(speeds: list, directions: list, radii: list, message: str) -> None:
+    with pytest.raises(szlib.ZoneError, match=message):
         PolarZone(np.array(speeds), np.array(directions), np.array(radii))

@@ -9,11 +9,11 @@ from helpers.passers import TRUTH, passers
 
 import szlib
 from szlib.zones.polar import DIRECTIONS, ellipse_reach
-from szlib.zones.quantile import BAND, approaches, encounter_numbers, quantile_radii, smoothed
+from szlib.zones.quantile import SPEED_BAND, Approaches, encounter_numbers, quantile_radii, smooth_paths
 
 
 def ellipse(samples: pd.DataFrame, **options: object) -> np.ndarray:
-    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), resamples=0, **options)
+    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), n_resamples=0, **options)
     found = zone.ellipses[1.1]
     return np.array([*found.center, *found.semi_axes, found.angle])
 
@@ -42,9 +42,9 @@ def test_a_few_who_walk_right_through_change_little(samples: pd.DataFrame) -> No
 
 
 def test_at_most_a_share_q_of_encounters_is_nearer(samples: pd.DataFrame) -> None:
-    known = approaches(samples, r_max=2.0)
+    known = Approaches.from_samples(samples, r_max=2.0)
     who, nearest = known.nearest(1.1)
-    assert (np.abs(samples.groupby("encounter")["speed"].mean()[who] - 1.1) <= BAND).all()
+    assert (np.abs(samples.groupby("encounter")["speed"].mean()[who] - 1.1) <= SPEED_BAND).all()
     for q in (0.01, 0.05, 0.3):
         radii = quantile_radii(known, 1.1, q)[0]
         seen = np.isfinite(nearest).sum(axis=0)
@@ -53,7 +53,7 @@ def test_at_most_a_share_q_of_encounters_is_nearer(samples: pd.DataFrame) -> Non
 
 
 def test_more_may_enter_a_larger_zone(samples: pd.DataFrame) -> None:
-    known = approaches(samples, r_max=2.0)
+    known = Approaches.from_samples(samples, r_max=2.0)
     lines = [quantile_radii(known, 1.1, q)[0] for q in (0.005, 0.02, 0.05, 0.2, 0.9)]
     assert (np.diff(lines, axis=0) >= 0).all()
     areas = [np.prod(ellipse(samples, q=q)[2:4]) for q in (0.01, 0.05, 0.2)]
@@ -91,7 +91,7 @@ def test_neither_order_nor_numbers_of_encounters_matter(samples: pd.DataFrame) -
 
 
 def test_weights_are_copies(samples: pd.DataFrame) -> None:
-    known = approaches(samples, r_max=2.0)
+    known = Approaches.from_samples(samples, r_max=2.0)
     weights = np.random.default_rng(0).integers(0, 4, (3, len(known.encounters))).astype(float)
     lines = quantile_radii(known, 1.1, 0.05, weights)
     for weight, line in zip(weights, lines, strict=True):
@@ -102,9 +102,11 @@ def test_weights_are_copies(samples: pd.DataFrame) -> None:
                 for k in range(int(weight.max()))
             ]
         )
-        np.testing.assert_array_equal(quantile_radii(approaches(copies, r_max=2.0), 1.1, 0.05)[0], line)
-    nobody = quantile_radii(known, 1.1, 0.05, np.zeros((1, len(known.encounters))))
-    assert np.isnan(nobody).all()
+        np.testing.assert_array_equal(
+            quantile_radii(Approaches.from_samples(copies, r_max=2.0), 1.1, 0.05)[0], line
+        )
+    empty = quantile_radii(known, 1.1, 0.05, np.zeros((1, len(known.encounters))))
+    assert np.isnan(empty).all()
 
 
 # --- smoothing ---------------------------------------------------------------------------------------
@@ -114,7 +116,7 @@ def test_straight_and_evenly_bent_paths_stay_as_they_are() -> None:
     t = np.arange(31) / 10
     x, y = 3 - 1.5 * t + 0.2 * t**2, 0.7 + 0.1 * t - 0.05 * t**2
     path = pd.DataFrame({"encounter": 0, "t": t, "los_angle": np.arctan2(y, x), "distance": np.hypot(x, y)})
-    angle, distance = smoothed(path)
+    angle, distance = smooth_paths(path)
     np.testing.assert_allclose(angle, path["los_angle"], atol=1e-12)
     np.testing.assert_allclose(distance, path["distance"], atol=1e-12)
 
@@ -122,18 +124,20 @@ def test_straight_and_evenly_bent_paths_stay_as_they_are() -> None:
 def test_smoothing_stops_at_gaps_and_at_other_encounters(samples: pd.DataFrame) -> None:
     some = samples[samples["encounter"] < 3].reset_index(drop=True)
     gap = some[(some["encounter"] != 1) | ((some["t"] - 10).abs() > 0.25)]
-    together = smoothed(gap)
+    together = smooth_paths(gap)
     parts = [gap[gap["encounter"] == 0], gap[(gap["encounter"] == 1) & (gap["t"] < 10)]]
     parts += [gap[(gap["encounter"] == 1) & (gap["t"] > 10)], gap[gap["encounter"] == 2]]
     for k in (0, 1):
-        np.testing.assert_allclose(np.concatenate([smoothed(p)[k] for p in parts]), together[k], atol=1e-12)
-    untimed = smoothed(some.drop(columns="t"))
+        np.testing.assert_allclose(
+            np.concatenate([smooth_paths(p)[k] for p in parts]), together[k], atol=1e-12
+        )
+    untimed = smooth_paths(some.drop(columns="t"))
     np.testing.assert_array_equal(untimed[1], some["distance"])
 
 
 def test_smoothing_takes_noise_away() -> None:
     still, noisy = passers(200), passers(200, noise=0.05)
-    error = smoothed(noisy)[1] - still["distance"]
+    error = smooth_paths(noisy)[1] - still["distance"]
     assert error.std() < 0.6 * (noisy["distance"] - still["distance"]).std()
 
 
@@ -141,7 +145,7 @@ def test_smoothing_takes_noise_away() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "error", "told"),
+    ("change", "error", "message"),
     [
         ({"speed": np.nan}, szlib.DataError, "row 0: los_angle, distance, speed must be finite; got"),
         (
@@ -149,14 +153,14 @@ def test_smoothing_takes_noise_away() -> None:
             szlib.DataError,
             "none of 77500 samples is within r_max = 2.0 m",
         ),
-        ({"speed": 3.0}, szlib.ZoneError, r"at 1\.1 m/s is undefined: nobody was seen"),
+        ({"speed": 3.0}, szlib.ZoneError, r"at 1\.1 m/s is undefined: no person was seen"),
         ({"los_angle": 0.3}, szlib.ZoneError, r"from 35 counter-clockwise to 360 deg|no speed has a zone"),
     ],
 )
 def test_samples_without_a_quantile(
-    samples: pd.DataFrame, change: dict, error: type[Exception], told: str
+    samples: pd.DataFrame, change: dict, error: type[Exception], message: str
 ) -> None:
-    with pytest.raises(error, match=told):
+    with pytest.raises(error, match=message):
         ellipse(samples.assign(**change))
     with pytest.raises(szlib.DataError, match=r"columns \['distance'\] are missing"):
         ellipse(samples.drop(columns="distance"))
@@ -172,7 +176,7 @@ def test_encounters_are_numbered_in_order_of_appearance() -> None:
 
 def test_radii_are_those_of_the_truth_within_a_sector() -> None:
     """Who touches a nearer part of the rim within 17.5 deg counts as well: so much too small they may be."""
-    radii = quantile_radii(approaches(passers(4000, clearance=1e-6), r_max=2.0), 1.1, 0.02)[0]
+    radii = quantile_radii(Approaches.from_samples(passers(4000, clearance=1e-6), r_max=2.0), 1.1, 0.02)[0]
     truth = ellipse_reach(TRUTH)
     around = np.min([np.roll(truth, turn) for turn in range(-4, 5)], axis=0)
     assert (around - 0.005 < radii).all()

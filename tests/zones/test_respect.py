@@ -11,8 +11,7 @@ import pytest
 import szlib
 from szlib.errors import ZoneError
 from szlib.zones.occupancy import OccupancyHistogram, pair_correlation
-from szlib.zones.respect import fit_respect, respect_boundary, respect_radius
-from szlib.zones.respect_estimator import RespectEstimator
+from szlib.zones.respect import RespectEstimator, fit_respect, respect_boundary, respect_radius
 
 R_MAX = 2.0
 THETA = np.linspace(-np.pi, np.pi, 24, endpoint=False)
@@ -36,12 +35,12 @@ def null_of(samples: pd.DataFrame) -> szlib.NullEncounters:
 
 
 def kept_out(
-    samples: pd.DataFrame, zone: szlib.Ellipse, careless: float = 0.0, seed: int = 0
+    samples: pd.DataFrame, zone: szlib.Ellipse, ignoring: float = 0.0, seed: int = 0
 ) -> pd.DataFrame:
     """Those outside of a zone, and a share of those inside of it."""
     angle, distance = samples["los_angle"], samples["distance"]
     points = distance.to_numpy()[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    cares = np.random.default_rng(seed).random(len(samples)) >= careless
+    cares = np.random.default_rng(seed).random(len(samples)) >= ignoring
     return samples[(zone.level(points) >= 1) | ~cares]
 
 
@@ -95,11 +94,11 @@ def test_it_is_flat_in_the_number_of_samples(null: szlib.NullEncounters) -> None
     assert nearest[0] - nearest[-1] > 0.3
 
 
-@pytest.mark.parametrize("careless", [0.05, 0.2, 0.4])
-def test_some_who_do_not_care_change_little(null: szlib.NullEncounters, careless: float) -> None:
-    data = kept_out(scattered(3, 50_000), ZONE, careless)
+@pytest.mark.parametrize("ignoring", [0.05, 0.2, 0.4])
+def test_some_who_do_not_care_change_little(null: szlib.NullEncounters, ignoring: float) -> None:
+    data = kept_out(scattered(3, 50_000), ZONE, ignoring)
     fit = fit_respect(data, null)
-    assert fit.careless == pytest.approx(careless, abs=0.03)
+    assert fit.ignoring_share == pytest.approx(ignoring, abs=0.03)
     assert fit.radii(THETA) == pytest.approx(reach(ZONE, THETA), abs=0.06)
 
 
@@ -172,13 +171,13 @@ def test_what_is_far_does_not_matter(null: szlib.NullEncounters) -> None:
 def test_a_null_of_few_shifts_is_drawn_anew_as_well(null: szlib.NullEncounters) -> None:
     few = szlib.NullEncounters(null.samples[:2000], null.encounters[:2000], 11, R_MAX)  # nobody in the last
     data = kept_out(scattered(1, 2000), szlib.Ellipse((0, 0), (0.9, 0.7)))
-    zones = RespectEstimator.of(data, r_max=R_MAX, null=few)
+    zones = RespectEstimator.from_samples(data, r_max=R_MAX, null=few)
     alike = np.ones((5, len(zones.encounters)))
     same = zones.refit(alike, [1.0])
     assert np.ptp(same, axis=0).max() == 0
     drawn = zones.refit(alike, [1.0], np.random.default_rng(0))
     assert np.ptp(drawn[:, 0, 2]) > 0.005
-    np.testing.assert_allclose(zones.shifts.sum(axis=0), zones.null.counts)
+    np.testing.assert_allclose(zones.counts_by_shift.sum(axis=0), zones.null.counts)
 
 
 def test_shapes(null: szlib.NullEncounters) -> None:
@@ -231,4 +230,4 @@ def test_the_plaza_truth_comes_back(tmp_path: Path) -> None:
         found = respect_boundary(samples, null, THETA, speed=speed)
         assert found == pytest.approx(reach(settings.true_zone(speed), THETA), abs=0.08)
         assert found.mean() == pytest.approx(reach(settings.true_zone(speed), THETA).mean(), abs=0.03)
-    assert szlib.null_test(samples, null).respect
+    assert szlib.null_test(samples, null).is_significant

@@ -36,7 +36,7 @@ def null_of(seed: int, shifts: int = SHIFTS) -> szlib.NullEncounters:
 
 
 def test_p_values_are_even_where_nobody_minds() -> None:
-    tests = [null_test(encounters(seed, SHIFTS), null_of(seed), radii=False) for seed in range(100)]
+    tests = [null_test(encounters(seed, SHIFTS), null_of(seed), fit_null_radii=False) for seed in range(100)]
     p = np.array([test.p_value for test in tests])
     assert (p <= 0.05).mean() <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / len(p))
     share = np.searchsorted(np.sort(p), [0.25, 0.5, 0.75], side="right") / len(p)
@@ -72,8 +72,8 @@ def test_another_mix_of_kinds_is_no_respect() -> None:
         found = rows[["shift", "encounter", "kind"]].assign(nearest=rows["distance"])
         null = szlib.NullEncounters(rows[rows["distance"] <= 2], found, SHIFTS, 2.0)
         data = mixed(seed, SHIFTS, 0.2)
-        by_kind.append(null_test(data, null, radii=False).p_value)
-        in_one.append(null_test(data.drop(columns="kind"), null, radii=False).p_value)
+        by_kind.append(null_test(data, null, fit_null_radii=False).p_value)
+        in_one.append(null_test(data.drop(columns="kind"), null, fit_null_radii=False).p_value)
     assert max(in_one) <= 0.05
     assert np.sum(np.array(by_kind) <= 0.05) <= 3  # 4 and more of 20: 2 %
     assert np.median(by_kind) > 0.3
@@ -82,13 +82,15 @@ def test_another_mix_of_kinds_is_no_respect() -> None:
 def test_people_drawn_to_each_other_show_no_respect(tmp_path: Path) -> None:
     """A plaza without clearance whose zones are tiny: everybody walks right at everybody."""
     tiny = szlib.Ellipse((0, 0), (0.15, 0.15))
-    settings = szlib.PlazaSettings(encounters=250, clearance=0, slow=tiny, fast=tiny, intruders=0, together=0)
+    settings = szlib.PlazaSettings(
+        n_encounters=250, clearance=0, slow_zone=tiny, fast_zone=tiny, intruders=0, together=0
+    )
     tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", settings=settings))
     null = szlib.null_encounters(tracks, shifts=39, minutes=(1, 6), progress=False)
     test = null_test(szlib.find_encounters(tracks), null)
     assert test.p_value > 0.5
     assert test.radius == 0
-    assert not test.respect
+    assert not test.is_significant
 
 
 # --- people mind -------------------------------------------------------------------------------------
@@ -99,7 +101,7 @@ def test_who_keeps_away_is_seen_to() -> None:
     test = null_test(encounters(1, SHIFTS, away=0.5), null)
     assert test.p_value == 1 / (1 + SHIFTS)
     assert test.statistic > max(test.null_statistics)
-    assert test.respect
+    assert test.is_significant
     assert test.radius == pytest.approx(0.5, abs=0.15)
     assert np.nanmedian(test.null_radii) < 0.2
     assert "respect: p = 0.025 (39 shifts" in str(test)
@@ -114,15 +116,15 @@ def test_who_comes_near_is_no_respect() -> None:
 def test_more_than_bodies() -> None:
     """0.5 m that no two bodies can be within: no respect in that alone."""
     null = null_of(0)
-    assert null_test(encounters(1, SHIFTS, n=200, away=0.5), null).respect
-    assert not null_test(encounters(1, SHIFTS, n=200, away=0.5), null, beyond=0.55).respect
-    assert null_test(encounters(1, SHIFTS, n=200, away=1.0), null, beyond=0.55).respect
+    assert null_test(encounters(1, SHIFTS, n=200, away=0.5), null).is_significant
+    assert not null_test(encounters(1, SHIFTS, n=200, away=0.5), null, excluded_below=0.55).is_significant
+    assert null_test(encounters(1, SHIFTS, n=200, away=1.0), null, excluded_below=0.55).is_significant
 
 
 def test_the_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.DataFrame) -> None:
     null = szlib.null_encounters(real_tracks, shifts=20, progress=False)
     for kinds in ("strangers", KINDS):
-        test = null_test(szlib.of_kind(real_samples, kinds), null.of_kind(kinds), beyond=0.5)
+        test = null_test(szlib.of_kind(real_samples, kinds), null.of_kind(kinds), excluded_below=0.5)
         assert test.p_value == pytest.approx(1 / 21)
         assert 0.78 < test.radius < 1.27  # 0.98 m (0.78-1.27) for strangers
         assert np.nanpercentile(test.null_radii, 95) < 0.5
@@ -154,6 +156,6 @@ def test_errors() -> None:
     with pytest.raises(ZoneError, match="nothing to test"):
         null_test(data.assign(distance=2.5), null)
     with pytest.raises(ZoneError, match="nothing to test"):
-        null_test(data, null, beyond=2.0)
+        null_test(data, null, excluded_below=2.0)
     with pytest.raises(DataError, match="columns"):
         null_test(data[["distance"]], null)

@@ -10,13 +10,13 @@ from helpers.passers import passers
 import szlib
 from szlib.zones.quantile import QuantileEstimator
 from szlib.zones.uncertainty import (
-    DAYS_NEEDED,
-    NEEDED,
+    MIN_DAYS,
+    MIN_ENCOUNTERS,
     QUANTITIES,
-    SECTORS,
-    count_seen,
-    measure,
-    missing_sides,
+    SIDES,
+    count_by_side,
+    describe_missing_sides,
+    estimate_uncertainty,
     resampling_units,
 )
 
@@ -40,21 +40,23 @@ def test_each_side_counts_encounters_not_samples() -> None:
         (4, np.pi / 4, 3.0, 1.0), (5, np.pi / 4, 1.0, 1.5),  # too far, too fast
     ]  # fmt: skip
     table = pd.DataFrame(rows, columns=["encounter", "los_angle", "distance", "speed"])
-    seen = count_seen(table, (1.0, 1.5), r_max=2.0)
+    seen = count_by_side(table, (1.0, 1.5), r_max=2.0)
     assert seen["encounters"].tolist() == [4, 1]
     one = {"ahead": 1, "behind": 2, "left": 1, "right": 1}
-    assert seen.loc[0, list(SECTORS)].to_dict() == {side: one.get(side, 0) for side in SECTORS}
-    assert seen.loc[1, list(SECTORS)].sum() == seen.loc[1, "ahead left"] == 1
+    assert seen.loc[0, list(SIDES)].to_dict() == {side: one.get(side, 0) for side in SIDES}
+    assert seen.loc[1, list(SIDES)].sum() == seen.loc[1, "ahead left"] == 1
 
 
 def test_what_is_missing_is_named_side_by_side() -> None:
-    seen = pd.DataFrame([[1.0, 99, *[NEEDED] * 8], [1.2, 99, *[NEEDED] * 7, NEEDED - 1]])
-    seen.columns = ["speed", "encounters", *SECTORS]
-    assert missing_sides(seen, 1.0) == ""
+    seen = pd.DataFrame(
+        [[1.0, 99, *[MIN_ENCOUNTERS] * 8], [1.2, 99, *[MIN_ENCOUNTERS] * 7, MIN_ENCOUNTERS - 1]]
+    )
+    seen.columns = ["speed", "encounters", *SIDES]
+    assert describe_missing_sides(seen, 1.0) == ""
     for speed in (1.1, 1.2):  # between, the poorer neighbour counts
-        told = f"at {speed:g} m/s fewer than 20 encounters were seen ahead right (19)"
-        assert missing_sides(seen, speed) == told
-    assert missing_sides(seen, 1.3) == "at 1.3 m/s nobody was counted (only at 1 to 1.2 m/s)"
+        message = f"at {speed:g} m/s fewer than 20 encounters were seen ahead right (19)"
+        assert describe_missing_sides(seen, speed) == message
+    assert describe_missing_sides(seen, 1.3) == "at 1.3 m/s no encounters were counted (only at 1 to 1.2 m/s)"
 
 
 def test_pairs_of_people_are_drawn_and_days_where_there_are_many() -> None:
@@ -65,23 +67,23 @@ def test_pairs_of_people_are_drawn_and_days_where_there_are_many() -> None:
     assert len(set(member)) == 3
     unit, member = resampling_units(table.drop(columns=["ref_id"]))
     assert (unit, member.tolist()) == ("encounters", [0, 1, 2, 3])
-    days = pd.DataFrame({"day": np.arange(2 * DAYS_NEEDED) // 2, "ref_id": 1, "other_id": 2})
+    days = pd.DataFrame({"day": np.arange(2 * MIN_DAYS) // 2, "ref_id": 1, "other_id": 2})
     unit, member = resampling_units(days)
     assert (unit, member.tolist()) == ("days", days["day"].tolist())
 
 
 def test_intervals_are_the_same_for_the_same_seed_only(samples: pd.DataFrame) -> None:
-    one, same, other = (fit(samples, resamples=30, seed=seed).uncertainty for seed in (0, 0, 1))
+    one, same, other = (fit(samples, n_resamples=30, seed=seed).uncertainty for seed in (0, 0, 1))
     pd.testing.assert_frame_equal(one.intervals, same.intervals)
     assert not one.intervals.equals(other.intervals)
     assert one.intervals["quantity"].tolist() == list(QUANTITIES)
     assert (one.intervals["low"] < one.intervals["high"]).all()
     assert (one.bands["low"] < one.bands["high"]).all()
-    assert (one.unit, one.level, one.resamples) == ("pairs", 0.95, 30)
+    assert (one.unit, one.level, one.n_resamples) == ("pairs", 0.95, 30)
 
 
 def test_more_people_make_narrower_intervals() -> None:
-    few, many = (fit(passers(n), resamples=60).uncertainty.intervals for n in (150, 2400))
+    few, many = (fit(passers(n), n_resamples=60).uncertainty.intervals for n in (150, 2400))
     ratio = (many["high"] - many["low"]) / (few["high"] - few["low"])
     assert ratio.median() == pytest.approx(1 / 4, abs=0.12)
 
@@ -90,58 +92,58 @@ def test_more_people_make_narrower_intervals() -> None:
 def test_a_pair_seen_twice_is_no_new_evidence(samples: pd.DataFrame, method: str) -> None:
     """The other person's view of the same encounter makes the interval no narrower."""
     twice = pd.concat([samples, samples.assign(encounter=samples["encounter"] + 1000, t=samples["t"] + 0.01)])
-    options = {"method": method, "resamples": 60}
+    options = {"method": method, "n_resamples": 60}
     if method == "hull":
-        options |= {"outlier_fraction": 0.0}
+        options |= {"fraction": 0.0}
     one, two = (fit(table, **options).uncertainty for table in (samples, twice))
-    assert f"of {samples['encounter'].nunique()} pairs" in one.how
-    assert one.how == two.how
+    assert f"of {samples['encounter'].nunique()} pairs" in one.description
+    assert one.description == two.description
     np.testing.assert_allclose(one.intervals[["low", "high"]], two.intervals[["low", "high"]], atol=1e-9)
 
 
 def test_the_hull_is_taken_back_behind_its_nearest_people() -> None:
     """People keep out of a zone that no sample shows whole: the interval reaches farther in than the hull."""
     samples = passers(300)
-    zone = fit(samples, method="hull", outlier_fraction=0.0, resamples=60)
+    zone = fit(samples, method="hull", fraction=0.0, n_resamples=60)
     area = zone.table().iloc[0]
     assert area["area_low"] < area["area_high"] < area["area"]
-    assert "subsampling: 75 of 300 pairs" in zone.uncertainty.how
+    assert "subsampling: 75 of 300 pairs" in zone.uncertainty.description
     truth = np.pi * 0.95 * 0.75
     assert area["area_low"] < truth < area["area"]
 
 
 def test_intervals_hold_the_limit() -> None:
     """In short: 25 data sets of 200 pairs; 200 plazas are in notebooks/tables/16_coverage.csv."""
-    limit = fit(passers(20_000, seed=99), resamples=0).table().iloc[0]
+    limit = fit(passers(20_000, seed=99), n_resamples=0).table().iloc[0]
     held = []
     for seed in range(25):
-        known = fit(passers(200, seed=seed), resamples=60).uncertainty.intervals.set_index("quantity")
+        known = fit(passers(200, seed=seed), n_resamples=60).uncertainty.intervals.set_index("quantity")
         held.append([known.loc[q, "low"] <= limit[q] <= known.loc[q, "high"] for q in QUANTITIES])
     assert np.mean(held) >= 0.85  # 95 %, less four standard errors of 25 x 6 that are not independent
 
 
 def test_influence_is_what_leaving_one_out_does(samples: pd.DataFrame) -> None:
-    for method, options in (("quantile", {}), ("hull", {"outlier_fraction": 0.0})):
-        zone = fit(samples, method=method, resamples=2, **options)
-        told = zone.uncertainty.influence.iloc[0]
+    for method, options in (("quantile", {}), ("hull", {"fraction": 0.0})):
+        zone = fit(samples, method=method, n_resamples=2, **options)
+        influence = zone.uncertainty.influence.iloc[0]
         without = fit(
-            samples[samples["encounter"] != told["encounter"]], method=method, resamples=0, **options
+            samples[samples["encounter"] != influence["encounter"]], method=method, n_resamples=0, **options
         )
         before, after = zone.table().iloc[0], without.table().iloc[0]
         moved = max(abs(before[q] - after[q]) for q in QUANTITIES[:4])
-        assert moved == pytest.approx(told["metres"], abs=2e-3)  # the hull's, around 72 directions
+        assert moved == pytest.approx(influence["metres"], abs=2e-3)  # the hull's, around 72 directions
         some = np.random.default_rng(0).choice(samples["encounter"].unique(), 8, replace=False)
         for encounter in some:
-            rest = fit(samples[samples["encounter"] != encounter], method=method, resamples=0, **options)
+            rest = fit(samples[samples["encounter"] != encounter], method=method, n_resamples=0, **options)
             other = max(abs(before[q] - rest.table().iloc[0][q]) for q in QUANTITIES[:4])
-            assert other <= told["metres"] + 2e-3
+            assert other <= influence["metres"] + 2e-3
 
 
 def test_resamples_without_a_zone_leave_no_interval() -> None:
     """Three people seen around more than half of the circle: without one of them there is no zone."""
     three = passers(3, seed=4)
     with pytest.warns(szlib.DataWarning, match="fewer than 20"):
-        zone = fit(three, resamples=40)
+        zone = fit(three, n_resamples=40)
     assert zone.table().filter(regex="_low$|_high$").isna().all(axis=None)
     assert zone.uncertainty.influence["metres"].tolist() == [np.inf]
 
@@ -149,4 +151,6 @@ def test_resamples_without_a_zone_leave_no_interval() -> None:
 @pytest.mark.parametrize("resamples", [1, -3, 2.5])
 def test_resamples_without_meaning(samples: pd.DataFrame, resamples: float) -> None:
     with pytest.raises(szlib.DataError, match="resamples must be a whole number"):
-        measure(QuantileEstimator.of(samples, r_max=2.0), SPEEDS, resamples=resamples, seed=0)
+        estimate_uncertainty(
+            QuantileEstimator.from_samples(samples, r_max=2.0), SPEEDS, n_resamples=resamples, seed=0
+        )

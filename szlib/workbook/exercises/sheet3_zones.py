@@ -84,7 +84,9 @@ def _circumscribed(triangle: Any) -> float:
 def _plaza(seed: int, a: float, b: float) -> tuple[pd.DataFrame, Ellipse]:
     """Samples from a plaza with a random zone, and that zone."""
     slow, fast = (Ellipse((0.05, 0.0), (a + grow, b + grow)) for grow in (-0.04, 0.04))
-    settings = PlazaSettings(encounters=_PAIRS, slow=slow, fast=fast, intruders=0.01, pace=SLOW_INTRUDERS)
+    settings = PlazaSettings(
+        n_encounters=_PAIRS, slow_zone=slow, fast_zone=fast, intruders=0.01, intruder_speeds=SLOW_INTRUDERS
+    )
     with tempfile.TemporaryDirectory() as folder:
         file = make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings)
         return find_encounters(read_tracks(file)), settings.true_zone(_SPEED)

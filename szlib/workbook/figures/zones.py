@@ -109,7 +109,7 @@ def plot_hull(
         shown = points[:: max(1, len(points) // _MAX_DOTS)]
         ax.plot(*shown.T, ".", color=BLUE, markersize=1.5, alpha=0.35, label=f"{len(shown):,} of the samples")
     for speed, colour, line in zip(speeds, pick_colours(speeds), cycle(_LINES), strict=False):
-        corners = zone.slice(speed).polygon
+        corners = zone.shape.slice(speed).polygon
         closed = np.vstack([corners, corners[:1]])
         level = np.full(len(closed), speed)
         ax.plot(*closed.T, level, color=colour, linestyle=line, linewidth=2.5, label=f"{speed:g} m/s")

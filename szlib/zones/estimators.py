@@ -1,0 +1,77 @@
+"""What all estimators of zones, and all shapes of zones, have in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from ..checks import Array
+from .ellipses import Ellipse
+
+
+class ZoneShape(Protocol):
+    """The boundary of a zone by speed and direction: a `HullZone` or a `PolarZone`."""
+
+    @property
+    def speed_range(self) -> tuple[float, float]:
+        """Lowest and highest speed with data [m/s]."""
+
+    def boundary(self, speed: float, theta: ArrayLike) -> Array:
+        """Boundary at a `speed` [m/s] in the directions `theta` (...) [rad], shape (..., 2) [m]."""
+
+    def ellipse(self, speed: float) -> Ellipse:
+        """The ellipse at a `speed` [m/s]; raises ZoneError if the zone is undefined there."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Estimator(ABC):
+    """A zone estimator that can be fitted again to resampled encounters.
+
+    Parameters
+    ----------
+    encounters : one row for each encounter, with its number and, if known, its day and people.
+    parameters : the options of the estimator, for the provenance of the zone.
+    funnel : row counts of all stages, for the provenance of the zone.
+    """
+
+    encounters: pd.DataFrame
+    parameters: dict[str, Any]
+    funnel: list[dict[str, Any]]
+    is_extreme: ClassVar[bool] = False
+    """Whether the nearest people alone determine the zone."""
+
+    @abstractmethod
+    def fit_shape(self, speeds: Sequence[float]) -> ZoneShape:
+        """Fit the zone to all encounters at `speeds`, ascending [m/s]."""
+
+    @abstractmethod
+    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
+        """Fit ellipses to weighted encounters.
+
+        Parameters
+        ----------
+        weights : weight of each encounter in each fit, shape (k, n).
+        speeds : speeds of the zones, shape (s,) [m/s].
+        rng : source of randomness to resample the null model, if the estimator has one; None: no resampling.
+
+        Returns
+        -------
+        Ellipses (k, s, 5): centre, semi-axes [m] and angle [rad]; NaN where there is no zone.
+        """
+
+    @abstractmethod
+    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
+        """Row numbers of the encounters that determine the zones at `speeds` [m/s] most."""
+
+    def leave_one_out(self, speeds: Sequence[float]) -> tuple[NDArray[np.intp], Array]:
+        """The influential encounters (k,), and the ellipses (k, s, 5) at `speeds` without each of them."""
+        left_out = self.find_influential(speeds)
+        weights = np.ones((len(left_out), len(self.encounters)))
+        weights[np.arange(len(left_out)), left_out] = 0
+        return left_out, self.refit(weights, speeds)
