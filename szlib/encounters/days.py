@@ -60,7 +60,7 @@ class Extraction:
     Examples
     --------
     >>> import szlib
-    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=20))
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=20))
     >>> days = szlib.extract_days(plaza, out="days", progress=False)
     >>> days.table["status"].tolist(), len(days.failed)
     (['done'], 0)
@@ -166,7 +166,7 @@ def extract_days(
     Examples
     --------
     >>> import szlib
-    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=20))
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=20))
     >>> days = szlib.extract_days(plaza, out="days", min_speed=0.5, progress=False)
     >>> days.samples()["encounter"].nunique() > 0
     True

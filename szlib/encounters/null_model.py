@@ -49,7 +49,7 @@ class NullEncounters:
     Examples
     --------
     >>> import szlib
-    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=100))
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> tracks = szlib.read_tracks(plaza)
     >>> null = szlib.null_encounters(tracks, shifts=2, minutes=(0.2, 1), progress=False)
     >>> len(null.one(0)) + len(null.one(1)) == len(null.samples)
@@ -113,7 +113,7 @@ def null_encounters(
     Examples
     --------
     >>> import szlib
-    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=100))
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> tracks = szlib.read_tracks(plaza)
     >>> null = szlib.null_encounters(tracks, shifts=2, minutes=(0.2, 1), progress=False)
     >>> list(null.encounters.columns)

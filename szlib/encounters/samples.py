@@ -59,7 +59,8 @@ def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame
     --------
     >>> import szlib
     >>> from szlib.encounters import reference_frame
-    >>> tracks = szlib.read_tracks(szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=20)))
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=20))
+    >>> tracks = szlib.read_tracks(plaza)
     >>> paths = reference_frame(tracks, szlib.find_encounters(tracks))
     >>> list(paths.columns)
     ['encounter', 't', 'ref_x', 'ref_y', 'other_x', 'other_y']

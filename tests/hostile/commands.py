@@ -128,7 +128,7 @@ def draw(rng: random.Random) -> list[str]:
 
 def furnish(place: Path) -> None:
     """Make a folder with every file that the command lines name."""
-    day = make_plaza(place / "day.csv", settings=PlazaSettings(encounters=20))
+    day = make_plaza(place / "day.csv", settings=PlazaSettings(n_encounters=20))
     (place / "two.csv").write_bytes(day.read_bytes()[:100_000].rsplit(b"\n", 1)[0] + b"\n")
     (place / "packed.csv.gz").write_bytes(gzip.compress(day.read_bytes()))
     (place / "damaged.csv.gz").write_bytes(gzip.compress(day.read_bytes())[:5000])

@@ -171,7 +171,7 @@ def test_the_band_is_drawn_exactly_where_an_interval_is_known(zone, samples):
 
 
 def test_a_quantile_zone_shows_its_radii_and_has_no_hull(samples):
-    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), resamples=0)
+    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), n_resamples=0)
     labels = [text.get_text() for text in figures.plot_zone(zone, 1.1).get_legend().get_texts()]
     assert labels == ["radius by direction (quantile)", "fitted ellipse"]
     with pytest.raises(szlib.ZoneError, match="'quantile' has no hull to draw"):

@@ -322,7 +322,7 @@ def test_rows_come_as_they_are_and_the_input_stays() -> None:
     samples = make_samples().assign(note="x")
     funnels.attach(samples, [funnels.stage("before", 1000, 1000, {})])
     before = samples.copy(deep=True)
-    kept = remove_outliers(samples, FRACTION)
+    kept = remove_outliers(samples, fraction=FRACTION)
     pd.testing.assert_frame_equal(samples, before)
     pd.testing.assert_frame_equal(kept, samples.loc[kept.index])
     first, near, inliers = funnels.get(kept)
@@ -350,7 +350,7 @@ def test_a_few_identical_samples_need_no_noise() -> None:
     samples = close(make_samples())
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        remove_outliers(pd.concat([samples, samples]), FRACTION)
+        remove_outliers(pd.concat([samples, samples]), fraction=FRACTION)
 
 
 # --- nonsense ----------------------------------------------------------------------------------------
@@ -387,12 +387,12 @@ def test_samples_that_cannot_be_used() -> None:
     with pytest.raises(szlib.DataError, match="row 4: distance is NaN"):
         remove_outliers(samples.assign(distance=samples["distance"].where(samples.index != 4)))
     with pytest.raises(szlib.DataError, match=r"row \d+: speed is nan"):
-        remove_outliers(samples.assign(speed=np.nan), FRACTION, speed_scale=1.0)
+        remove_outliers(samples.assign(speed=np.nan), fraction=FRACTION, speed_scale=1.0)
     with pytest.raises(szlib.DataError, match=r"columns \['speed'\] are missing"):
-        remove_outliers(samples.drop(columns="speed"), FRACTION, speed_scale=1.0)
+        remove_outliers(samples.drop(columns="speed"), fraction=FRACTION, speed_scale=1.0)
 
 
 def test_the_real_day_keeps_its_quota(real_samples: pd.DataFrame) -> None:
-    kept = remove_outliers(real_samples, FRACTION)
+    kept = remove_outliers(real_samples, fraction=FRACTION)
     *_, near, inliers = funnels.get(kept)
     assert inliers["rejected"]["outlier (LOF)"] == math.ceil(0.002 * (near["kept"] - 1))

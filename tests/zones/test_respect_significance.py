@@ -49,7 +49,7 @@ def test_a_crowd_that_minds_nobody_is_found_out() -> None:
     for seed in range(6):
         tracks = noninteracting_crowd(seed=seed, people=600, minutes=40)
         null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
-        p.append(null_test(szlib.find_encounters(tracks), null, radii=False).p_value)
+        p.append(null_test(szlib.find_encounters(tracks), null, fit_null_radii=False).p_value)
     assert np.sum(np.array(p) <= 0.05) <= 1  # 2 and more of 6: 3 %
     assert np.median(p) > 0.15
 

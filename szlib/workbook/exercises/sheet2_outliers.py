@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ...plaza.accuracy import precision_and_recall
-from ...zones.outliers import NEIGHBOURS, complementary_points, local_outlier_factors, nearest_approaches
+from ...zones.outliers import N_NEIGHBOURS, complementary_points, local_outlier_factors, nearest_approaches
 from .task import Case, Rng, formula, make_task
 
 _WINDOW = 31
@@ -66,12 +66,12 @@ def _judge_intruder(args: tuple[Any, ...], _: Any, got: Any) -> str:
         return f"this is not an intruder: the cloud is {gap:.2f} m away; expected {_MIN_GAP} m or more"
     if len(np.unique(points, axis=0)) < _WINDOW:
         return "some of your samples are the same point, where LOF has no density; a person moves"
-    factors = local_outlier_factors(np.vstack([cloud, points]), NEIGHBOURS)
+    factors = local_outlier_factors(np.vstack([cloud, points]), N_NEIGHBOURS)
     found = int((factors[len(cloud) :] > np.quantile(factors, 1 - _REMOVED_SHARE)).sum())
     if not found:
         return ""
     return (
-        f"LOF removes {found} of your {_WINDOW} samples: each sample and its {NEIGHBOURS} nearest samples "
+        f"LOF removes {found} of your {_WINDOW} samples: each sample and its {N_NEIGHBOURS} nearest samples "
         "must lie in equally dense places"
     )
 

@@ -19,6 +19,7 @@ from scipy.spatial import ConvexHull
 
 from ...errors import DataWarning, ZoneError
 from ...zones.ellipses import Ellipse
+from ...zones.hulls import HullZone
 from ...zones.occupancy import PairCorrelation
 from ...zones.social_zone import SocialZone
 from .style import (
@@ -96,14 +97,14 @@ def plot_hull(
     >>> n, rng = 1200, np.random.default_rng(0)
     >>> samples = pd.DataFrame({"encounter": np.arange(n) // 4, "los_angle": rng.uniform(-3.1, 3.1, n)})
     >>> samples["distance"], samples["speed"] = rng.uniform(0.9, 2.5, n), rng.uniform(0.4, 1.6, n)
-    >>> zone = szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1), resamples=0)
+    >>> zone = szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1), n_resamples=0)
     >>> ax = figures.plot_hull(zone, (0.9, 1.1))
     """
-    if zone.vertices is None:
+    if not isinstance(zone.shape, HullZone):
         raise ZoneError(f'a zone of method {zone.method!r} has no hull to draw; fit it with method="hull"')
     if ax is None:
         ax = plt.figure(figsize=(7, 6), layout="constrained").add_subplot(projection="3d")
-    faces = zone.vertices[ConvexHull(zone.vertices).simplices]
+    faces = zone.shape.vertices[ConvexHull(zone.shape.vertices).simplices]
     ax.add_collection3d(Poly3DCollection(faces, facecolor=GREY, edgecolor=GREY, alpha=0.12, linewidth=0.3))
     if points is not None:
         shown = points[:: max(1, len(points) // _MAX_DOTS)]
@@ -115,7 +116,7 @@ def plot_hull(
         ax.plot(*closed.T, level, color=colour, linestyle=line, linewidth=2.5, label=f"{speed:g} m/s")
         right = closed[closed[:, 0].argmax()]
         ax.text(right[0] + 0.15, right[1], speed, f"{speed:g}", color=colour, fontsize=9, weight="bold")
-    ax.auto_scale_xyz(*zone.vertices.T)
+    ax.auto_scale_xyz(*zone.shape.vertices.T)
     ax.set(xlabel="x' [m]", ylabel="y' [m]", zlabel="speed [m/s]")
     ax.set_title("The hull of the inliers, and its slices by speed")
     ax.legend(loc="upper left", fontsize=8)
@@ -144,7 +145,7 @@ def plot_zone(
     >>> n, rng = 1200, np.random.default_rng(0)
     >>> samples = pd.DataFrame({"encounter": np.arange(n) // 4, "los_angle": rng.uniform(-3.1, 3.1, n)})
     >>> samples["distance"], samples["speed"] = rng.uniform(0.9, 2.5, n), rng.uniform(0.4, 1.6, n)
-    >>> zone = szlib.SocialZone.fit(samples, method="hull", speeds=(1.1,), resamples=0)
+    >>> zone = szlib.SocialZone.fit(samples, method="hull", speeds=(1.1,), n_resamples=0)
     >>> figures.plot_zone(zone, 1.1).get_title()
     'Minimum social zone at 1.1 m/s'
     """
