@@ -71,7 +71,7 @@ parameters(
 # %%
 samples = record.cache.encounters()
 fit = record.cache.method.fit_options()  # r_max, q, speeds: what the robot's zone is fitted with
-hull = {"method": "hull", "outlier_fraction": fraction, "neighbours": 20}
+hull = {"method": "hull", "fraction": fraction, "n_neighbours": 20}
 paper = szlib.SocialZone.fit(samples, r_max=r_max, speeds=fit["speeds"], **hull)
 shown = ["speed", "center_x", "a", "a_low", "a_high", "b", "area", "influence", "encounters", "adequate"]
 paper.table()[shown].round(2)

@@ -196,7 +196,7 @@ alarms.rename(columns={"sum": "false alarms", "size": "crowds"})
 def zone_at(people: pd.DataFrame, model: szlib.NullEncounters, method: str) -> pd.Series:
     """The row of the table at `zone_speed`; empty where there is no zone."""
     more = {"respect": {"null": model}, "quantile": {"q": record.cache.method.q}}.get(method, {})
-    options = {"r_max": record.cache.method.r_max, "speeds": (zone_speed,), "resamples": resamples} | more
+    options = {"r_max": record.cache.method.r_max, "speeds": (zone_speed,), "n_resamples": resamples} | more
     try:
         zone = szlib.SocialZone.fit(people, method=method, **options)
     except szlib.ZoneError as error:

@@ -83,7 +83,7 @@ samples = record.cache.encounters()
 speeds = (0.7, zone_speed, 1.3)
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", szlib.DataWarning)  # what is not adequate cannot decide, and says so
-    fit = partial(szlib.SocialZone.fit, samples, r_max=r_max, speeds=speeds, resamples=resamples, seed=seed)
+    fit = partial(szlib.SocialZone.fit, samples, r_max=r_max, speeds=speeds, n_resamples=resamples, seed=seed)
     zones = {"hull": fit(method="hull"), "quantile": fit(method="quantile", q=record.cache.method.q)}
 
 # %%

@@ -80,7 +80,7 @@ parameters(
 # %%
 samples = record.cache.encounters()
 pace = record.cache.method.zone_speed
-hull = szlib.SocialZone.fit(samples, method="hull", speeds=(pace,), resamples=0)
+hull = szlib.SocialZone.fit(samples, method="hull", speeds=(pace,), n_resamples=0)
 zones = {"quantile": record.cache.ellipse(), "hull": hull.ellipse(pace)}
 first = laboratory.RobotOptions(gamma, N_h, a_max, size, estimator)
 second = laboratory.RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)

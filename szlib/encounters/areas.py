@@ -122,7 +122,7 @@ def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, n_people: in
     Examples
     --------
     >>> import szlib
-    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=100))
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> isinstance(szlib.walked_area(szlib.read_tracks(plaza)), szlib.Square)
     True
     """

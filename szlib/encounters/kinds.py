@@ -115,7 +115,7 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
     Examples
     --------
     >>> import szlib
-    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=20))
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=20))
     >>> samples = szlib.find_encounters(szlib.read_tracks(plaza))
     >>> len(szlib.of_kind(samples, "strangers")) <= len(samples)
     True

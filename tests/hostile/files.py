@@ -166,7 +166,7 @@ class _Quick(ZoneMethod):
     """One speed and few resamples: the attack is on files."""
 
     def fit_options(self) -> dict[str, Any]:
-        return super().fit_options() | {"speeds": [self.zone_speed], "resamples": 10}
+        return super().fit_options() | {"speeds": [self.zone_speed], "n_resamples": 10}
 
 
 def _notebook(data: Path, out: Path) -> None:

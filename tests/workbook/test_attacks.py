@@ -80,7 +80,7 @@ def test_data_sets_of_one_name_do_not_share_results(tmp_path):
 
 def test_encounters_and_zone_of_another_day_of_the_same_name_and_size_are_not_served(tmp_path, monkeypatch):
     file = tmp_path / "day.csv"
-    make_plaza(file, settings=PlazaSettings(encounters=60))
+    make_plaza(file, settings=PlazaSettings(n_encounters=60))
     samples = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"}).cache.encounters()
     size, content = file.stat().st_size, file.read_text().splitlines(keepends=True)
     file.write_text("".join(content[len(content) // 2 :]))

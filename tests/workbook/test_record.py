@@ -53,8 +53,8 @@ def test_a_check_of_the_defaults_is_an_observation_elsewhere_and_a_promise_stays
 def test_knobs_of_the_method_reach_encounters_and_zone_and_their_names(record, monkeypatch):
     searched, fitted = [], []
     found = pd.DataFrame({"encounter": [0], "distance": [1.0]})
-    radii = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
-    zone = szlib.SocialZone(None, 1.5, {1.3: szlib.Ellipse((0, 0), (1, 1))}, method="quantile", radii=radii)
+    shape = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
+    zone = szlib.SocialZone(shape, 1.5, {1.3: szlib.Ellipse((0, 0), (1, 1))})
     monkeypatch.setattr(data_cache, "find_encounters", lambda *_, **k: searched.append(k) or found)
     monkeypatch.setattr(data_cache.SocialZone, "fit", lambda _, **k: fitted.append(k) or zone)
     given = {"data": record.cache.data, "results": record.out.parents[1], "area": record.cache.area}

@@ -49,7 +49,7 @@ class DataCache:
     --------
     >>> import szlib
     >>> from szlib.workbook.record import DataCache
-    >>> szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(encounters=3)).name
+    >>> szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=3)).name
     'plaza.csv'
     >>> cache = DataCache("results", "plaza.csv")
     >>> cache.encounters()["encounter"].nunique() > 0

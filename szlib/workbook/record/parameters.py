@@ -16,7 +16,7 @@ from ...encounters.settings import EncounterSettings
 from ...errors import DataError, SolverError
 from ...files import printable
 from ...zones.outliers import R_MAX
-from ...zones.quantile import SHARE
+from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
 
 SETTINGS = {"gamma": "gamma", "gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
@@ -62,7 +62,7 @@ class ZoneMethod:
     min_distance: float = EncounterSettings.min_distance
     min_speed: float = EncounterSettings.min_speed
     r_max: float = R_MAX
-    q: float = SHARE
+    q: float = QUANTILE
     zone_speed: float = MPCSettings.zone_speed
 
     @classmethod
