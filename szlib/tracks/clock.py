@@ -1,6 +1,6 @@
 """Pedestrian tracks on one clock, in one table.
 
-The track table has a row for each person and each tick of the clock:
+The track table has a row for each person at each tick of the clock:
 
     day  local calendar date of the time stamp, "YYYY-MM-DD" (EWAP files: the file's name)
     id   person; unique within a day only, the key is (day, id)
@@ -8,8 +8,8 @@ The track table has a row for each person and each tick of the clock:
     x y  position in the world [m]
     vx vy  velocity [m/s], central difference over +-0.5 s
 
-It is sorted by day, id, t, without duplicates.  Two ticks further apart than one step of the clock
-mean that the person was lost in between: nobody is bridged across a gap.
+It is sorted by day, id, t, without duplicates.  Where two successive ticks of a person are further apart than
+one step of the clock, the person was not seen in between; positions are not interpolated across such a gap.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ VELOCITY_SPAN = 0.5
 """Half the time over which displacement gives velocity [s] (assumed)."""
 
 _LONGEST_INTERVAL = 5.0
-"""Of samples further apart [s] nobody can tell what a person did in between (assumed)."""
+"""Longest gap across which positions are interpolated, unless the user allows more [s] (assumed)."""
 
 _ROUNDING = 1e-6
-"""Of time stamps of ms near 1e9 s, which doubles hold to 2e-7 [s]."""
+"""Rounding error of time stamps [s]; those near 1e9 s are exact to 2e-7 s."""
 
 _LAST_SECOND = 1e11
-"""Later times [s] are no times of people; up to here ticks are exact."""
+"""Latest time [s]; up to here ticks are exact."""
 
 _ROWS_AT_ONCE = 1 << 17
-"""Rows brought to the clock at a time: their arrays stay in the processor's cache, so that time is linear."""
+"""Rows brought to the clock at a time; their arrays fit into the processor's cache."""
 
-_TICK = 160
-"""Bytes that a tick takes while a table is brought to the clock (measured: 147 to 153)."""
+_BYTES_PER_TICK = 160
+"""Memory of a tick while a table is brought to the clock [bytes] (measured: 147 to 153)."""
 
 COLUMNS = ["day", "id", "t", "x", "y", "vx", "vy"]
 
@@ -105,10 +105,32 @@ def read_tracks(
 def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame:
     """Bring positions to multiples of 0.1 s by linear interpolation within gap-free pieces.
 
-    `raw` has day, id, t [s], x, y [m], any order; `max_gap` [s] as in `read_tracks`.  Each piece
-    gives the ticks between its first and its last sample; a piece that covers no tick is counted
-    in the funnel.  Velocity is the displacement over +-0.5 s (less at the ends of a piece) divided
-    by its duration; a piece of a single tick has none (NaN).
+    Parameters
+    ----------
+    raw : a table of day, id, t [s], x, y [m], in any order.
+    max_gap : a longer gap between two samples ends a piece [s]; as in `szlib.ReadOptions`.
+
+    Returns
+    -------
+    The track table.  Each piece gives the ticks between its first and its last sample; samples of a piece
+    without a tick are counted in the funnel.  Velocity is the displacement over +-0.5 s (less at the ends of
+    a piece) divided by its duration; a piece of a single tick has none (NaN).
+
+    Raises
+    ------
+    DataError : a column is missing, a value is not finite, a person has two rows at one time, or the samples
+        are further apart than `max_gap`.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.tracks import to_clock
+    >>> raw = pd.DataFrame({"day": "any", "id": 1, "t": [0.0, 0.25], "x": [0.0, 0.5], "y": 0.0})
+    >>> to_clock(raw)[["t", "x", "vx"]]
+         t    x   vx
+    0  0.0  0.0  2.0
+    1  0.1  0.2  2.0
+    2  0.2  0.4  2.0
     """
     check_columns(raw, ["day", "id", "t", "x", "y"])
     _check_values(raw)
@@ -126,7 +148,7 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
         raise DataError(f"max_gap must be longer than the clock's 0.1 s; got {max_gap}")
     within = np.r_[False, same & (step <= max_gap + _ROUNDING)]
     ticks = float(step.sum(where=within[1:])) * TICKS_PER_SECOND
-    memory.require(ticks * _TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows")
+    memory.require(ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows")
     x, y = raw["x"].to_numpy(float), raw["y"].to_numpy(float)
     blocks = [(_on_clock(t[rows], x[rows], y[rows], within[rows]), rows.start) for rows in _blocks(within)]
     row = np.concatenate([block.pop("row") + start for block, start in blocks])
@@ -134,20 +156,20 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
     day = raw["day"].astype("category").array.take(row)
     columns = {name: np.concatenate([block[name] for block, _ in blocks]) for name in COLUMNS[2:]}
     table = pd.DataFrame({"day": day, "id": raw["id"].to_numpy()[row], **columns}, copy=False)
-    lost = {"in a gap-free piece that covers no tick": len(t) - covered}
-    stages = [*funnels.get(raw), funnels.stage("clock: samples", len(t), covered, lost)]
+    rejected = {"in a gap-free piece that covers no tick": len(t) - covered}
+    stages = [*funnels.get(raw), funnels.stage("clock: samples", len(t), covered, rejected)]
     return funnels.attach(table, stages)
 
 
 def _blocks(within: np.ndarray) -> Iterator[slice]:
-    """Rows in blocks that end where a piece does; `within` (n,): whether a row goes on with a piece."""
+    """Blocks of rows that end where a piece does; `within` (n,): whether a row continues a piece."""
     begins = np.flatnonzero(~within)
     cuts = np.unique(begins[np.searchsorted(begins, np.arange(0, begins[-1] + 1, _ROWS_AT_ONCE))])
     return map(slice, cuts, np.r_[cuts[1:], len(within)])
 
 
 def _on_clock(t: np.ndarray, x: np.ndarray, y: np.ndarray, within: np.ndarray) -> dict[str, np.ndarray]:
-    """The ticks of whole pieces: t, x, y, vx, vy, the row just before each; and how many rows are covered."""
+    """The ticks of whole pieces: t, x, y, vx, vy, the row before each; and how many rows are covered."""
     piece = np.cumsum(~within) - 1
     row, tick = _ticks(t, piece)
     after = row + np.r_[within[1:], False][row]
@@ -161,15 +183,34 @@ def _on_clock(t: np.ndarray, x: np.ndarray, y: np.ndarray, within: np.ndarray) -
 
 
 def nearest_tick(t: np.ndarray) -> np.ndarray:
-    """Number of the clock's tick nearest to each time [s], counted from t = 0."""
+    """Number of the clock's tick nearest to each time `t` [s], counted from t = 0."""
     return np.asarray(np.rint(t * TICKS_PER_SECOND).astype(np.int64))
 
 
 def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Order and ticks of a track table: row order by person and time, tick number, gap-free piece.
+    """Order and ticks of a track table.
 
-    Returns integer arrays (order, tick, piece), the latter two in that order.  Raises DataError for
-    times off the clock and for two rows of a person at one tick.
+    Parameters
+    ----------
+    tracks : a track table, sorted or not.
+
+    Returns
+    -------
+    Integer arrays: the order of rows by person and time; in that order, the number of the tick, and of the
+    gap-free piece.
+
+    Raises
+    ------
+    DataError : a time is not on the clock, or a person has two rows at one tick.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.tracks import clock_index, to_clock
+    >>> raw = pd.DataFrame({"day": "any", "id": 1, "t": [0.0, 0.2, 9.0, 9.1], "x": 0.0, "y": 0.0})
+    >>> _, tick, piece = clock_index(to_clock(raw))
+    >>> tick.tolist(), piece.tolist()
+    ([0, 1, 2, 90, 91], [0, 0, 0, 1, 1])
     """
     check_columns(tracks, COLUMNS)
     _check_values(tracks)
@@ -210,21 +251,21 @@ def _check_values(frame: pd.DataFrame) -> None:
 
 
 def _usual_gap(intervals: np.ndarray, of_format: float | None) -> float:
-    """The silence that ends a track [s]: the format's, or that of samples at these intervals [s]."""
+    """The longest gap within a track [s]: the format's, or 4 times the median of the sampling intervals."""
     if of_format and 2 * np.count_nonzero(intervals > of_format) < len(intervals) - 1:
         return of_format  # longer than the median
     usual = float(np.median(intervals)) if len(intervals) else 0.0
     max_gap = of_format or float(np.clip(4 * usual, 0.5, _LONGEST_INTERVAL))
     if usual > max_gap:
         raise DataError(
-            f"a person's samples are {usual:.3g} s apart (median), expected at most {max_gap:g} s, or every "
-            "track falls to pieces; are times in seconds? if so, pass max_gap"
+            f"a person's samples are {usual:.3g} s apart (median), expected at most {max_gap:g} s; "
+            "are times in seconds? if so, pass max_gap"
         )
     return max_gap
 
 
 def _ticks(t: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every tick within every piece: the input row just before it, and its number."""
+    """Every tick within every piece: the input row before it, and its number."""
     tolerance = TICKS_PER_SECOND * _ROUNDING
     first = np.ceil(t * TICKS_PER_SECOND - tolerance).astype(np.int64)
     last_of_piece = np.r_[piece[1:] != piece[:-1], True]
@@ -234,7 +275,7 @@ def _ticks(t: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = np.maximum(end - first, 0)
     row = np.repeat(np.arange(len(t)), count)
     tick = np.arange(len(row)) + np.repeat(first - np.cumsum(count) + count, count)
-    # the row just before a tick must not be the last of its piece, or there is nothing to interpolate to
+    # the row before a tick must not be the last of its piece, as interpolation needs a row after it
     alone = last_of_piece & np.r_[True, last_of_piece[:-1]]
     return row - (last_of_piece & ~alone)[row], tick
 
@@ -252,7 +293,7 @@ def _velocities(piece: np.ndarray, *positions: np.ndarray) -> Iterator[np.ndarra
 
 
 def _person_codes(frame: pd.DataFrame) -> np.ndarray:
-    """One integer for each (day, id), ordered by day, then id; looked up once for rows in succession."""
+    """One integer for each (day, id), ordered by day, then id."""
     days, ids = frame["day"].array, frame["id"].to_numpy()
     begins = np.flatnonzero(np.r_[True, (ids[1:] != ids[:-1]) | np.asarray(days[1:] != days[:-1])])
     day = pd.factorize(days[begins], sort=True)[0].astype(np.int64)

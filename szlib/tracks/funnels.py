@@ -1,7 +1,7 @@
-"""The funnel: how many rows entered each stage, how many were set aside, for which reason.
+"""The funnel: how many rows entered each stage, how many were rejected, and why.
 
-Tables carry their funnel in ``DataFrame.attrs["funnel"]`` (Parquet keeps it), each stage a plain
-dict, so that provenance travels with the data and nothing is dropped in silence.
+A table has its funnel in ``DataFrame.attrs["funnel"]``, which Parquet preserves.  Each stage is a plain dict
+with the keys stage, entered, kept and rejected, so that the funnel stays with the data.
 """
 
 from __future__ import annotations
@@ -18,7 +18,24 @@ KEY = "funnel"
 
 
 def stage(name: str, entered: int, kept: int, rejected: Mapping[str, int]) -> dict[str, Any]:
-    """One stage of a funnel; raises SzlibError where entered != kept + set aside."""
+    """One stage of a funnel.
+
+    Parameters
+    ----------
+    name : name of the stage.
+    entered, kept : number of rows before and after the stage.
+    rejected : number of rejected rows by reason.
+
+    Raises
+    ------
+    SzlibError : `entered` is not `kept` plus the rejected rows.
+
+    Examples
+    --------
+    >>> from szlib.tracks import funnels
+    >>> funnels.stage("read a.csv", 10, 9, {"not finite": 1, "no day": 0})
+    {'stage': 'read a.csv', 'entered': 10, 'kept': 9, 'rejected': {'not finite': 1}}
+    """
     reasons = {reason: int(count) for reason, count in rejected.items() if count}
     if int(entered) != int(kept) + sum(reasons.values()):
         raise SzlibError(f"funnel stage '{name}' does not add up: {entered} != {kept} + {reasons}")
@@ -26,18 +43,37 @@ def stage(name: str, entered: int, kept: int, rejected: Mapping[str, int]) -> di
 
 
 def get(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """The stages a table has gone through so far (a copy; empty for a table made by hand)."""
+    """The stages that `frame` has gone through (a copy); empty for a table made by hand.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.tracks import funnels
+    >>> table = funnels.attach(pd.DataFrame({"x": [1]}), [funnels.stage("read", 2, 1, {"not finite": 1})])
+    >>> funnels.get(table)[0]["rejected"]
+    {'not finite': 1}
+    """
     return list(frame.attrs.get(KEY, []))
 
 
 def attach(frame: pd.DataFrame, stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """Attach the stages to a table and return it."""
+    """Attach `stages` to `frame` and return it; example at `get`."""
     frame.attrs[KEY] = [dict(s) for s in stages]
     return frame
 
 
 def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
-    """The funnel to read: one line for what entered and was kept, one for each reason."""
+    """The funnel `stages` as a table: a row for entered and for kept, and one for each reason.
+
+    Examples
+    --------
+    >>> from szlib.tracks import funnels
+    >>> funnels.table([funnels.stage("read", 10, 9, {"not finite": 1})])
+      stage          what  rows
+    0  read       entered    10
+    1  read  - not finite     1
+    2  read          kept     9
+    """
     rows: list[tuple[str, str, int]] = []
     for s in stages:
         rows.append((s["stage"], "entered", s["entered"]))
@@ -47,7 +83,7 @@ def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
 
 
 def text(stages: Sequence[Mapping[str, Any]]) -> str:
-    """The same in columns of plain text, each stage named once."""
+    """The table of `stages` as plain text in which each stage is named once."""
     lines = table(stages)
     lines["stage"] = lines["stage"].where(~lines["stage"].duplicated(), "")
     wide = {name: int(lines[name].str.len().max()) for name in ("stage", "what")}
@@ -58,7 +94,15 @@ def text(stages: Sequence[Mapping[str, Any]]) -> str:
 
 
 def add(funnels: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
-    """One funnel of many: stages of the same name are added up, in the order in which they first come."""
+    """Add up several `funnels`, stage by stage of the same name, in the order of first occurrence.
+
+    Examples
+    --------
+    >>> from szlib.tracks import funnels
+    >>> days = [[funnels.stage("read", 10, 9, {"not finite": 1})], [funnels.stage("read", 5, 5, {})]]
+    >>> funnels.add(days)
+    [{'stage': 'read', 'entered': 15, 'kept': 14, 'rejected': {'not finite': 1}}]
+    """
     sums: dict[str, list[Mapping[str, Any]]] = {}
     for stages in funnels:
         for s in stages:

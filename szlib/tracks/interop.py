@@ -1,7 +1,7 @@
-"""Other people's data: what a data set must give, who walks together, and the way to PedPy and back.
+"""What a track table must be, groups of people who walk together, and the conversion to PedPy.
 
-The loader contract.  A loader for a new data set is a function that returns a **track table**; everything
-after it (`find_encounters`, `SocialZone.fit`, every plot) takes the table and asks no more.  It needs
+A loader for a new data set is a function that returns a **track table**; everything after it
+(`find_encounters`, `SocialZone.fit`, every plot) needs only
 
     day  str or category   recording: a calendar day "YYYY-MM-DD" in local time, or any other name
     id   integer           person, unique within the day
@@ -9,13 +9,11 @@ after it (`find_encounters`, `SocialZone.fit`, every plot) takes the table and a
     x y  float [m]         position in the world, finite, right-handed (y is to the left of x)
     vx vy  float [m/s]     displacement over +-0.5 s within a gap-free piece; NaN in a piece of one tick
 
-sorted by day, id, t, without duplicates, with its funnel in ``.attrs["funnel"]``, each stage of which adds
-up and takes what the one before has kept.  Nobody is carried across a gap: where a person was lost, ticks are
-missing.
+sorted by day, id, t, without duplicates.  Its funnel is in ``.attrs["funnel"]``; each stage adds up.
+Positions are not interpolated across a gap: while a person is not seen, ticks are missing.
 
-The short way there: collect day, id, t [s], x, y [m] in any order and at any rate, count what you set aside
-with `funnels.stage`, and let `clock.to_clock` do the rest.  `check_tracks` holds any loader to the contract;
-put it into your test.
+The short way: collect day, id, t [s], x, y [m] in any order and at any rate, count rejected rows with
+`funnels.stage`, and call `clock.to_clock`.  `check_tracks` checks the result; use it in your test.
 """
 
 from __future__ import annotations
@@ -34,12 +32,32 @@ from .clock import COLUMNS, TICKS_PER_SECOND, clock_index, nearest_tick, to_cloc
 if TYPE_CHECKING:
     from pedpy import TrajectoryData
 
-_EXACT = 1e-6
-"""Velocities agree with positions up to this [m/s]."""
+_TOLERANCE = 1e-6
+"""Greatest difference between velocities and those from positions [m/s]."""
 
 
 def check_tracks(tracks: pd.DataFrame) -> None:
-    """Hold a track table to the contract; raises DataError that says where it does not keep it."""
+    """Check that a table is a track table.
+
+    Parameters
+    ----------
+    tracks : the table.
+
+    Raises
+    ------
+    DataError : says what is wrong, and where.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.tracks import check_tracks, to_clock
+    >>> raw = pd.DataFrame({"day": "any", "id": 1, "t": [0.0, 0.4], "x": [0.0, 0.5], "y": 0.0})
+    >>> check_tracks(to_clock(raw))
+    >>> check_tracks(to_clock(raw).iloc[::-1])
+    Traceback (most recent call last):
+    ...
+    szlib.errors.DataError: row 4 is out of order; expected rows sorted by day, id, t
+    """
     order, tick, piece = clock_index(tracks)
     if (order != np.arange(len(order))).any():
         at = int(np.flatnonzero(order != np.arange(len(order)))[0])
@@ -57,11 +75,13 @@ def check_tracks(tracks: pd.DataFrame) -> None:
 
 
 def _check_velocities(tracks: pd.DataFrame, tick: np.ndarray, piece: np.ndarray) -> None:
-    """Raise DataError where velocity is not displacement over +-0.5 s within its piece."""
+    """Raise DataError where velocity is not the displacement over +-0.5 s within its piece."""
     raw = tracks[["day", "id", "t", "x", "y"]].copy()
     raw.attrs.clear()
     expected = to_clock(raw, max_gap=1.5 / TICKS_PER_SECOND)[["vx", "vy"]].to_numpy()
-    wrong = ~np.isclose(tracks[["vx", "vy"]].to_numpy(float), expected, rtol=0, atol=_EXACT, equal_nan=True)
+    wrong = ~np.isclose(
+        tracks[["vx", "vy"]].to_numpy(float), expected, rtol=0, atol=_TOLERANCE, equal_nan=True
+    )
     if wrong.any():
         at = int(np.flatnonzero(wrong.any(axis=1))[0])
         found = tracks[["day", "id", "t", "vx", "vy"]].iloc[at].to_dict()
@@ -72,11 +92,28 @@ def _check_velocities(tracks: pd.DataFrame, tick: np.ndarray, piece: np.ndarray)
 
 
 def read_groups(path: str | Path) -> pd.DataFrame:
-    """Who walks together, from an EWAP ``groups.txt``: the ids of one group a line, parted by blanks.
+    """Read which people walk together, from an EWAP file ``groups.txt``.
 
-    Returns a table with columns group (numbered from 0) and id, in the order of the file.  Whoever is in
-    no line walks alone.  Lines that share a person make one group, with a DataWarning: the ETH sequence
-    has such lines.  Raises DataError, with the line, for what is no id and for a group of one.
+    Parameters
+    ----------
+    path : a file of the ids of one group a line, separated by blanks.
+
+    Returns
+    -------
+    Columns group (numbered from 0) and id, in the order of the file.  People in no line walk alone.
+    Lines that share a person make one group, with a DataWarning: the ETH sequence has such lines.
+
+    Raises
+    ------
+    DataError : a line holds something else than ids, or a single id.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from szlib.tracks import read_groups
+    >>> _ = Path("groups.txt").write_text("1 2\\n5 3 4\\n")
+    >>> read_groups("groups.txt").groupby("group")["id"].apply(list).tolist()
+    [[1, 2], [5, 3, 4]]
     """
     path = Path(path)
     try:
@@ -92,7 +129,7 @@ def read_groups(path: str | Path) -> pd.DataFrame:
         if not fields:
             continue
         if not all(field.isdecimal() for field in fields) or len(set(fields)) < 2:
-            raise DataError(f"{path}, line {number}: {line[:80]!r} is no group; expected two ids or more")
+            raise DataError(f"{path}, line {number}: {line[:80]!r} is no group; expected two or more ids")
         group = dict.fromkeys(map(int, fields))
         shared = [known for known in groups if not known.keys().isdisjoint(group)]
         if shared:
@@ -115,9 +152,18 @@ def read_groups(path: str | Path) -> pd.DataFrame:
 
 
 def to_pedpy(tracks: pd.DataFrame) -> TrajectoryData:
-    """A track table of one day as PedPy's TrajectoryData, at 10 frames/s; frame is t in ticks of 0.1 s.
+    """Convert the track table `tracks` of one day to PedPy's TrajectoryData, at 10 frames/s.
 
-    Needs the extra `pedpy`.  Raises DataError for tables of several days, for PedPy has ids only.
+    The frame is t in ticks of 0.1 s.  `szlib.read_tracks` converts back.  Needs the extra `pedpy`.  Raises
+    DataError for a table of several days, which PedPy does not distinguish.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.tracks import to_clock, to_pedpy
+    >>> raw = pd.DataFrame({"day": "any", "id": 1, "t": [0.0, 0.4], "x": [0.0, 0.5], "y": 0.0})
+    >>> to_pedpy(to_clock(raw)).frame_rate  # doctest: +SKIP
+    10.0
     """
     from pedpy import TrajectoryData
 

@@ -24,7 +24,15 @@ distance [m]; pairs of rows that are farther apart than this time [s] are not co
 
 
 class LoadedFile(NamedTuple):
-    """The usable rows of one file: day, id, t [s], x, y [m]; the stages of its funnel; its format."""
+    """A file that has been read.
+
+    Attributes
+    ----------
+    path : the file.
+    rows : its usable rows: day, id, t [s], x, y [m].
+    stages : its funnel.
+    layout : its format.
+    """
 
     path: Path
     rows: pl.DataFrame

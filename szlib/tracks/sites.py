@@ -1,8 +1,8 @@
 """Other sites than the ATC mall: Grand Central, Edinburgh's Informatics Forum, THOR-MAGNI.
 
-Each reader gives a track table that keeps the contract of `szlib.tracks.interop`.  EWAP files (ETH, hotel,
-zara, students) are read by `szlib.read_tracks`.  No data comes with szlib: these were issued without a
-licence, or with one of their own.
+Each reader returns a track table as described in `szlib.tracks.interop`.  EWAP files (ETH, hotel, zara,
+students) are read by `szlib.read_tracks`.  szlib ships none of these data: they have no licence, or one of
+their own.
 
     site            sampled every   max_gap   what else to know
     Grand Central   0.8 s           0.9 s     marked by hand, 7-16 cm off; its scale is uncertain
@@ -11,8 +11,8 @@ licence, or with one of their own.
     EWAP            0.4 s           0.9 s     ETH at 15 frames/s, the others at 25
     ATC 1 Hz        1.0 s           1.6 s
 
-Nobody is carried across a longer silence; within it positions are interpolated, which cuts the corners of a
-path: reading 1 Hz at 10 Hz costs 3 to 6 cm RMS (95 % within 4 to 12 cm; see `quality.thinning_error`).
+Positions are not interpolated across a longer gap.  Interpolation within it cuts the corners of a path: the
+error of 1 Hz data at 10 Hz is 3 to 6 cm RMS (95 % within 4 to 12 cm).
 """
 
 from __future__ import annotations
@@ -31,17 +31,18 @@ from ..checks import check_columns
 from ..errors import DataError
 from . import funnels
 from .clock import to_clock
+from .options import ReadOptions
 
 GRAND_CENTRAL_RATE = 25.0
 """Frames a second of the video of Grand Central; every 20th is annotated."""
 GRAND_CENTRAL_SCALE = 0.8
 """Metres in one unit of its homography (OpenTraj)."""
 EDINBURGH_RATE = 9.0
-"""About so many frames a second reach Edinburgh's files; the rate varies over short times."""
+"""Approximate frames a second of Edinburgh's files; the rate varies over short times."""
 EDINBURGH_PIXEL, EDINBURGH_ROWS = 0.0247, 480
 """Metres in a pixel on the floor, and rows of an image."""
 _SESSION = 0.2
-"""Samples of THOR-MAGNI nearer than this [s] belong to two sessions (0.01 s between them, 0.4 within)."""
+"""Samples of THOR-MAGNI closer than this [s] belong to two sessions (0.01 s between them, 0.4 within)."""
 _MAGNI = ["Time", "ag_id", "x", "y", "data_label"]
 _TRACK = re.compile(r"TRACK\.R(\d+)\s*=\s*\[(.*?)\]\s*;\s*$", flags=re.MULTILINE)
 
@@ -49,7 +50,7 @@ _TRACK = re.compile(r"TRACK\.R(\d+)\s*=\s*\[(.*?)\]\s*;\s*$", flags=re.MULTILINE
 def read_grand_central(
     path: str | Path, *, homography: str | Path | None = None, max_gap: float = 0.9
 ) -> pd.DataFrame:
-    """Grand Central Station, New York (Zhou et al., CVPR 2011; annotated by Yi et al., CVPR 2015).
+    """Read Grand Central Station, New York (Zhou et al., CVPR 2011; annotated by Yi et al., CVPR 2015).
 
     Parameters
     ----------
@@ -65,6 +66,11 @@ def read_grand_central(
     Raises
     ------
     DataError : archive or homography is missing or damaged, or a file does not hold triples of numbers.
+
+    Examples
+    --------
+    >>> from szlib.tracks import read_grand_central
+    >>> tracks = read_grand_central("gc/Annotation.zip")  # doctest: +SKIP
     """
     path = Path(path)
     matrix = _homography(path, homography)
@@ -84,13 +90,13 @@ def read_grand_central(
     floor = np.column_stack([row, column, np.ones(len(row))]) @ matrix.T
     raw = pd.DataFrame({"day": "grand-central", "id": np.concatenate(ids), "t": frame / GRAND_CENTRAL_RATE})
     raw[["x", "y"]] = GRAND_CENTRAL_SCALE * floor[:, :2] / floor[:, 2:]
-    return _on_the_clock(raw, path.name, max_gap, {})
+    return _finish(raw, path.name, max_gap, {})
 
 
 def read_edinburgh(
     paths: str | Path | Iterable[str | Path], *, frame_rate: float = EDINBURGH_RATE, max_gap: float = 0.5
 ) -> pd.DataFrame:
-    """The Edinburgh Informatics Forum (Majecka, 2009): files of ``TRACK.Rn=[[x y frame];[x y frame];...];``.
+    """Read the Edinburgh Informatics Forum (Majecka, 2009): ``TRACK.Rn=[[x y frame];[x y frame];...];``.
 
     Parameters
     ----------
@@ -101,67 +107,113 @@ def read_edinburgh(
     Returns
     -------
     A track table; id is the number of the track, x [m] points to the right of the image and y up.  A blob
-    that the tracker gave to several tracks stays with the first: the others are its ghosts.
+    that the tracker gave to several tracks is kept in the first one only.
 
     Raises
     ------
     DataError : there is no such file, it has no track, or a track does not hold triples of numbers.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from szlib.tracks import read_edinburgh
+    >>> _ = Path("tracks.Aug24.txt").write_text("TRACK.R1=[[601 23 9];[595 24 10];[589 25 11]];")
+    >>> read_edinburgh("tracks.Aug24.txt")[["day", "id", "t"]]
+                day  id    t
+    0  tracks.Aug24   1  1.0
+    1  tracks.Aug24   1  1.1
+    2  tracks.Aug24   1  1.2
     """
     files = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
     if not files:
         raise DataError("no file of Edinburgh was given; pass at least one path")
-    if not 1 <= frame_rate <= 240:
-        raise DataError(f"frame_rate must be frames a second from 1 to 240; got {frame_rate}")
+    ReadOptions(frame_rate=frame_rate)  # checks the rate
     if doubled := sorted({file.stem for file in files if [each.stem for each in files].count(file.stem) > 1}):
         raise DataError(f"several files are called {', '.join(doubled)}: their people would be mixed")
-    parts, ghosts = zip(*(_edinburgh(file, frame_rate) for file in files), strict=True)
+    parts, n_repeated = zip(*(_read_edinburgh_file(file, frame_rate) for file in files), strict=True)
     name = files[0].name if len(files) == 1 else f"{len(files)} files"
-    reasons = {"a blob of an earlier track": sum(ghosts)}
-    return _on_the_clock(pd.concat(parts, ignore_index=True), name, max_gap, reasons)
+    reasons = {"a blob of an earlier track": sum(n_repeated)}
+    return _finish(pd.concat(parts, ignore_index=True), name, max_gap, reasons)
 
 
 def read_magni(path: str | Path, *, max_gap: float = 0.9) -> pd.DataFrame:
-    """THOR-MAGNI (Schreiter et al., 2024), as CSV with Time [s], ag_id, x, y [m], data_label.
+    """Read THOR-MAGNI (Schreiter et al., 2024).
 
-    A helmet (`ag_id`) goes from head to head: a person is one helmet under one label (`data_label`) in one
-    session of about four minutes; id = 100 * session + helmet, both from 1.  Sessions begin where the clock
-    does not go on at its pace of 0.4 s.  The recording is called by the file's name.
+    Parameters
+    ----------
+    path : CSV with Time [s], ag_id, x, y [m], data_label.
+    max_gap : a longer gap ends a track [s]; people are sampled every 0.4 s.
 
-    Raises DataError where the file cannot be read, a column is missing or a helmet has no number.
+    Returns
+    -------
+    A track table of one recording, which has the name of the file.  Different people wear the same helmet
+    (ag_id) one after the other: a person is one helmet in one session of about four minutes;
+    id = 100 * session + helmet, both from 1.  A session begins where two samples are not 0.4 s apart.
+
+    Raises
+    ------
+    DataError : the file cannot be read, a column is missing or a helmet has no number.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd
+    >>> from szlib.tracks import read_magni
+    >>> rows = pd.DataFrame({"Time": 0.4 * np.arange(4), "ag_id": "Helmet_4", "x": 0.0, "y": 0.0})
+    >>> rows.assign(data_label="Visitors-Alone").to_csv("A.csv", index=False)
+    >>> read_magni("A.csv")["id"].unique()
+    array([104])
     """
-    rows = _magni(Path(path))
-    return _on_the_clock(rows[["day", "id", "t", "x", "y"]], Path(path).name, max_gap, {})
+    rows = _read_magni_rows(Path(path))
+    return _finish(rows[["day", "id", "t", "x", "y"]], Path(path).name, max_gap, {})
 
 
-def magni_groups(path: str | Path) -> pd.DataFrame:
-    """Who belongs together in a file of THOR-MAGNI: columns group (from 0) and id, as from `read_groups`.
+def read_magni_groups(path: str | Path) -> pd.DataFrame:
+    """Read which people of THOR-MAGNI belong together.
 
-    The label says how large a group is ("Visitors-Group 3"), the session who was there.  Where two groups of
-    one size were there at once, people go with those nearest to them (median; in the file at hand 0.7 to
-    1.3 m, and 5.9 m or more to the other group).  Whoever is in no row was alone.
+    Parameters
+    ----------
+    path : as in `read_magni`.
 
-    Raises DataError as `read_magni`, and where people do not make whole groups.
+    Returns
+    -------
+    Columns group (from 0) and id, as from `read_groups`.  The label gives the size of a group
+    ("Visitors-Group 3").  Where two groups of one size are in a session, people belong to those nearest to
+    them (median distance; in the published file 0.7 to 1.3 m, and at least 5.9 m to the other group).  People
+    in no row are alone.
+
+    Raises
+    ------
+    DataError : as in `read_magni`, or people do not make whole groups.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.tracks import read_magni_groups
+    >>> rows = pd.DataFrame({"Time": 0.4, "ag_id": ["Helmet_1", "Helmet_2"], "x": [0.0, 1.0], "y": 0.0})
+    >>> rows.assign(data_label="Visitors-Group 2").to_csv("A.csv", index=False)
+    >>> read_magni_groups("A.csv")["id"].tolist()
+    [101, 102]
     """
-    rows, found = _magni(Path(path)), 0
+    rows, n_groups = _read_magni_rows(Path(path)), 0
     members: list[tuple[int, int]] = []
     for (session, label), people in rows.groupby(["session", "label"]):
-        said = re.search(r"Group (\d+)", str(label))
-        if not said:
+        match = re.search(r"Group (\d+)", str(label))
+        if not match:
             continue
-        size, left = int(said[1]), sorted(people["id"].unique())
+        size, left = int(match[1]), sorted(people["id"].unique())
         if len(left) % size:
             raise DataError(f"{path}: {len(left)} people are labelled {label!r} in session {session}")
         at = people.pivot_table(index="t", columns="id", values=["x", "y"])
         while left:
             one = left.pop(0)
-            apart = {
-                who: np.hypot(at["x"][one] - at["x"][who], at["y"][one] - at["y"][who]).median()
-                for who in left
+            distance = {
+                each: np.hypot(at["x"][one] - at["x"][each], at["y"][one] - at["y"][each]).median()
+                for each in left
             }
-            near = sorted(left, key=lambda who: apart[who])[: size - 1]
-            members += [(found, int(who)) for who in (one, *near)]
-            left = [who for who in left if who not in near]
-            found += 1
+            nearest = sorted(left, key=distance.__getitem__)[: size - 1]
+            members += [(n_groups, int(each)) for each in (one, *nearest)]
+            left = [each for each in left if each not in nearest]
+            n_groups += 1
     return pd.DataFrame(members, columns=["group", "id"]).astype("int64")
 
 
@@ -170,8 +222,8 @@ def _homography(path: Path, homography: str | Path | None) -> np.ndarray:
     places = [Path(homography)] if homography else [path.parent / "H.json", path / "H.json"]
     file = next((place for place in places if place.is_file()), None)
     if file is None:
-        told = " or ".join(map(str, places))
-        raise DataError(f"{told}: no such file; expected the homography of Grand Central, pass homography=")
+        looked = " or ".join(map(str, places))
+        raise DataError(f"{looked}: no such file; expected the homography of Grand Central, pass homography=")
     try:
         matrix = np.array(json.loads(file.read_text(encoding="utf-8"))["homog"], float)
     except (OSError, ValueError, KeyError, TypeError) as error:
@@ -197,8 +249,8 @@ def _annotations(path: Path) -> dict[str, bytes]:
     return found
 
 
-def _edinburgh(path: Path, frame_rate: float) -> tuple[pd.DataFrame, int]:
-    """Detections of one file without its ghosts, and how many these are."""
+def _read_edinburgh_file(path: Path, frame_rate: float) -> tuple[pd.DataFrame, int]:
+    """Detections of one file without repeated blobs, and the number of these."""
     try:
         tracks = _TRACK.findall(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -216,15 +268,15 @@ def _edinburgh(path: Path, frame_rate: float) -> tuple[pd.DataFrame, int]:
         parts.append(np.column_stack([np.full(len(rows), int(number)), rows]))
     columns = np.concatenate(parts).T
     blobs = pd.DataFrame(dict(zip(("id", "column", "row", "frame"), columns, strict=True)))
-    ghosts = blobs.duplicated(["column", "row", "frame"]) & ~blobs.duplicated()
-    blobs = blobs[~ghosts]
+    repeated = blobs.duplicated(["column", "row", "frame"]) & ~blobs.duplicated()
+    blobs = blobs[~repeated]
     raw = pd.DataFrame({"day": path.stem, "id": blobs["id"].astype(int), "t": blobs["frame"] / frame_rate})
     raw["x"] = EDINBURGH_PIXEL * blobs["column"]
     raw["y"] = EDINBURGH_PIXEL * (EDINBURGH_ROWS - blobs["row"])
-    return raw, int(ghosts.sum())
+    return raw, int(repeated.sum())
 
 
-def _magni(path: Path) -> pd.DataFrame:
+def _read_magni_rows(path: Path) -> pd.DataFrame:
     """Rows of THOR-MAGNI as day, t, x, y, session, label, id."""
     try:
         rows = pd.read_csv(path)
@@ -242,17 +294,17 @@ def _magni(path: Path) -> pd.DataFrame:
     return people.assign(id=100 * (session + 1) + helmet.astype(int))
 
 
-def _on_the_clock(raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str, int]) -> pd.DataFrame:
-    """Rows as read, less some that were set aside before, to a track table."""
+def _finish(raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str, int]) -> pd.DataFrame:
+    """The track table of rows from which some were `rejected` before."""
     finite = np.isfinite(raw[["t", "x", "y"]].to_numpy(float)).all(axis=1)
     doubled = raw.duplicated(["day", "id", "t"]).to_numpy() & finite
-    kept = raw[finite & ~doubled].reset_index(drop=True)
-    if len(kept) == 0:
+    usable = raw[finite & ~doubled].reset_index(drop=True)
+    if len(usable) == 0:
         raise DataError(f"{name}: holds no row that can be used")
     reasons = {
         **rejected,
         "not finite": int((~finite).sum()),
         "second position at a time": int(doubled.sum()),
     }
-    stage = funnels.stage(f"read {name}", len(raw) + sum(rejected.values()), len(kept), reasons)
-    return to_clock(funnels.attach(kept, [stage]), max_gap=max_gap)
+    stage = funnels.stage(f"read {name}", len(raw) + sum(rejected.values()), len(usable), reasons)
+    return to_clock(funnels.attach(usable, [stage]), max_gap=max_gap)

@@ -200,7 +200,7 @@ def test_the_groups_of_the_eth_sequence() -> None:
 
 def test_the_groups_of_thor_magni() -> None:
     file = real_data("magni") / "A.csv"
-    pairs, true, found, right = confusion(sites.read_magni(file), sites.magni_groups(file))
+    pairs, true, found, right = confusion(sites.read_magni(file), sites.read_magni_groups(file))
     assert (pairs, true) == (198, 24)
     assert (found, right) == (23, 23), "the one missed is of three who walk in a line"
 

@@ -198,12 +198,12 @@ def test_a_helmet_goes_from_head_to_head(tmp_path: Path) -> None:
 
 
 def test_who_belongs_together_at_magni(tmp_path: Path) -> None:
-    groups = sites.magni_groups(magni(tmp_path / "A.csv", MADE))
+    groups = sites.read_magni_groups(magni(tmp_path / "A.csv", MADE))
     found = {frozenset(people) for people in groups.groupby("group")["id"].apply(set)}
     assert found == {frozenset(g) for g in ((102, 110), (103, 104, 105), (202, 203), (204, 205))}
     file = magni(tmp_path / "B.csv", [{1: "Alone", 2: "Group 2"}])
     with pytest.raises(szlib.DataError, match="1 people are labelled 'Visitors-Group 2' in session 0"):
-        sites.magni_groups(file)
+        sites.read_magni_groups(file)
 
 
 def test_magni_that_is_not_is_refused(tmp_path: Path) -> None:
@@ -238,7 +238,7 @@ def test_the_real_grand_central() -> None:
 
 def test_the_real_magni() -> None:
     file = real_data("magni") / "A.csv"
-    tracks, groups = sites.read_magni(file), sites.magni_groups(file)
+    tracks, groups = sites.read_magni(file), sites.read_magni_groups(file)
     check_tracks(tracks)
     assert tracks["id"].nunique() == 60
     assert groups.groupby("group").size().value_counts().to_dict() == {2: 12, 3: 4}

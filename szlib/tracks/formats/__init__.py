@@ -21,7 +21,7 @@ from ..options import ReadOptions
 from .atc import ATC_1HZ, ATC_RAW
 from .base import EXPECTED, TrackFormat
 from .ewap import EWAP
-from .pedpy import PEDPY_FORMATS, PedPyFormat
+from .pedpy import PEDPY_FORMATS
 from .tidy import PARQUET, TIDY
 from .unpack import LONGEST_LINE, read_first_line, require_memory, unpacked
 
@@ -65,4 +65,4 @@ def recognise(head: bytes, options: ReadOptions) -> TrackFormat:
     if options.file_format:
         return FORMATS[options.file_format]
     found = next(each for each in FORMATS.values() if each.recognises(head))
-    return TIDY if options.columns and not isinstance(found, PedPyFormat) else found
+    return TIDY if options.columns and not found.has_known_columns else found

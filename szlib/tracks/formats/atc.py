@@ -16,7 +16,7 @@ _COLUMNS = {"t": 0, "id": 1, "x": 2, "y": 3}
 
 
 @dataclass(frozen=True)
-class AtcRaw(TrackFormat):
+class _AtcRaw(TrackFormat):
     """Rows of 8 numbers: time [s], id, x, y, z [mm], speed [mm/s], two angles."""
 
     area = ATC_AREA
@@ -29,7 +29,7 @@ class AtcRaw(TrackFormat):
 
 
 @dataclass(frozen=True)
-class Atc1Hz(AtcRaw):
+class _Atc1Hz(_AtcRaw):
     """Rows of 6 numbers: time [s], id, x, y [m], speed [m/s], angle."""
 
     is_ambiguous = True
@@ -49,5 +49,5 @@ class Atc1Hz(AtcRaw):
         return day.timestamp() if 0 <= since < _DAY else 0.0
 
 
-ATC_RAW = AtcRaw("atc-raw", n_fields=8, columns=_COLUMNS, metres=1e-3, max_gap=0.5)
-ATC_1HZ = Atc1Hz("atc-1hz", n_fields=6, columns=_COLUMNS, max_gap=1.6)
+ATC_RAW = _AtcRaw("atc-raw", n_fields=8, columns=_COLUMNS, metres=1e-3, max_gap=0.5)
+ATC_1HZ = _Atc1Hz("atc-1hz", n_fields=6, columns=_COLUMNS, max_gap=1.6)

@@ -51,6 +51,7 @@ class TrackFormat:
     is_ambiguous : whether a file in other units or with other columns can look the same; speeds are checked.
     is_streamed : whether files are too large to be read as a whole.
     is_sequence : whether each file is a recording of its own, without a calendar.
+    has_known_columns : whether `ReadOptions.columns` is refused.
     has_optional_end : whether the last field of a row may be missing.
     speed_field : number of the field that holds the sensor's speed, and its unit [m/s].
     """
@@ -70,6 +71,7 @@ class TrackFormat:
     is_streamed: ClassVar[bool] = False
     is_sequence: ClassVar[bool] = False
     has_optional_end: ClassVar[bool] = False
+    has_known_columns: ClassVar[bool] = False
     speed_field: ClassVar[tuple[int, float] | None] = None
 
     def recognises(self, head: bytes) -> bool:

@@ -32,7 +32,7 @@ _STEP = 0.02
 
 
 @dataclass(frozen=True)
-class Ewap(TrackFormat):
+class _Ewap(TrackFormat):
     """Rows of 8 numbers: frame, id, x, z, y [m], vx, vz, vy [m/s]; z is the height."""
 
     is_sequence = True
@@ -45,7 +45,7 @@ class Ewap(TrackFormat):
         return replace(self, seconds=seconds, max_gap=max_gap), rows.lazy()
 
 
-EWAP = Ewap("ewap", 8, {"t": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}, separator=" ")
+EWAP = _Ewap("ewap", 8, {"t": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}, separator=" ")
 
 
 def measure_frames(rows: pl.DataFrame, path: Path, given: float | None) -> tuple[float, float | None]:

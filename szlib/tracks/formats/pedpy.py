@@ -21,7 +21,7 @@ _VADERE_RATE = 10.0
 
 
 @dataclass(frozen=True)
-class PedPyFormat(TrackFormat):
+class _PedPyFormat(TrackFormat):
     """A format that one of PedPy's loaders reads.
 
     Attributes
@@ -30,6 +30,7 @@ class PedPyFormat(TrackFormat):
     begins : beginnings of the first line of a file.
     """
 
+    has_known_columns = True
     loader: str = ""
     begins: tuple[bytes, ...] = ()
 
@@ -78,7 +79,7 @@ class PedPyFormat(TrackFormat):
 
 
 @dataclass(frozen=True)
-class JuelichText(PedPyFormat):
+class _JuelichText(_PedPyFormat):
     """Text of Juelich's archive; its header may not state the frame rate and the unit."""
 
     units: ClassVar[dict[str | None, str]] = {"m": "METER", "cm": "CENTIMETER"}
@@ -94,7 +95,7 @@ class JuelichText(PedPyFormat):
 
 
 @dataclass(frozen=True)
-class Vadere(PedPyFormat):
+class _Vadere(_PedPyFormat):
     """Footsteps of Vadere; files of old versions begin with their column names."""
 
     def recognises(self, head: bytes) -> bool:
@@ -107,11 +108,11 @@ class Vadere(PedPyFormat):
         return super().loader_options(path, options) | {"frame_rate": _VADERE_RATE}
 
 
-PEDPY_FORMATS: tuple[PedPyFormat, ...] = (
-    PedPyFormat("jupedsim", loader="load_trajectory_from_jupedsim_sqlite", begins=(b"SQLite format 3\0",)),
-    PedPyFormat("juelich-hdf5", loader="load_trajectory_from_ped_data_archive_hdf5", begins=(b"\x89HDF",)),
-    PedPyFormat("viswalk", loader="load_trajectory_from_viswalk", begins=(b"$VISION", b"$PEDESTRIAN")),
-    Vadere("vadere", loader="load_trajectory_from_vadere", begins=(b"#IDXCOL",)),
-    JuelichText("juelich-text", loader="load_trajectory_from_txt", begins=(b"#",)),
+PEDPY_FORMATS: tuple[_PedPyFormat, ...] = (
+    _PedPyFormat("jupedsim", loader="load_trajectory_from_jupedsim_sqlite", begins=(b"SQLite format 3\0",)),
+    _PedPyFormat("juelich-hdf5", loader="load_trajectory_from_ped_data_archive_hdf5", begins=(b"\x89HDF",)),
+    _PedPyFormat("viswalk", loader="load_trajectory_from_viswalk", begins=(b"$VISION", b"$PEDESTRIAN")),
+    _Vadere("vadere", loader="load_trajectory_from_vadere", begins=(b"#IDXCOL",)),
+    _JuelichText("juelich-text", loader="load_trajectory_from_txt", begins=(b"#",)),
 )
 """In the order of recognition."""

@@ -20,7 +20,7 @@ from .unpack import BYTES_PER_ROW
 
 
 @dataclass(frozen=True)
-class TidyText(TrackFormat):
+class _TidyText(TrackFormat):
     """Text whose first line names the columns, or whose columns `ReadOptions.columns` counts."""
 
     is_ambiguous = True
@@ -84,7 +84,7 @@ class TidyText(TrackFormat):
 
 
 @dataclass(frozen=True)
-class TidyParquet(TidyText):
+class _TidyParquet(_TidyText):
     """A Parquet file."""
 
     def recognises(self, head: bytes) -> bool:
@@ -109,8 +109,8 @@ class TidyParquet(TidyText):
         return found, scan_table(pl.from_arrow(named))  # type: ignore[arg-type]
 
 
-TIDY = TidyText("tidy", has_header=True)
-PARQUET = TidyParquet("tidy", has_header=True)
+TIDY = _TidyText("tidy", has_header=True)
+PARQUET = _TidyParquet("tidy", has_header=True)
 
 
 def is_table(source: object) -> bool:
