@@ -101,7 +101,7 @@ def test_the_bow_and_the_limits_are_attained():
 def test_where_the_point_is_safe_the_disc_is_whatever_its_heading():
     """For people and walls, of any length: also those so short that their own margin is more than eps."""
     rng, near = np.random.default_rng(3), 0
-    for _ in range(400):
+    for _ in range(150):
         s = szlib.MPCSettings(eps=rng.choice([0.0, 0.05]), margin=rng.choice(["euclidean", "paper"]))
         wall = rng.uniform(-2, 2, 2) + np.outer([-1, 1], rng.uniform(-1, 1, 2)) * rng.choice([0.1, 2.0])
         drive = szlib.DifferentialDrive(
@@ -120,7 +120,7 @@ def test_where_the_point_is_safe_the_disc_is_whatever_its_heading():
                 assert drive.barriers(disc, [person]).min() >= -1e-12
             assert euclidean_to_segment(discs, *wall).min() >= s.r_robot
             assert euclidean_to_ellipse(discs, zone).min() >= s.r_robot + s.eps - 1e-9
-    assert near > 500
+    assert near > 190
 
 
 def test_the_barriers_are_those_of_the_disc():

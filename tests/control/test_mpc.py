@@ -3,7 +3,7 @@
 import inspect
 import re
 from dataclasses import fields, replace
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -217,9 +217,10 @@ def drive(controller, state, goal, people, steps=350):
     raise AssertionError(f"deadlock: from {state} the robot came to {states[-1]}, and not to {goal}")
 
 
-@pytest.mark.parametrize("side", ["right", "left"])
-@pytest.mark.parametrize("walks", [False, True])
-@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    ("solver", "walks", "side"),
+    [*product(["sqp"], [False, True], ["right", "left"]), ("ipopt", False, "left"), ("ipopt", True, "right")],
+)
 def test_a_symmetric_meeting_at_any_angle_is_passed_on_the_chosen_side(solver, side, walks):
     rng = np.random.default_rng(3)
     for _ in range(15):

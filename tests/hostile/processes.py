@@ -50,7 +50,7 @@ record.close()
 
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
-    """Kill commands, and count what is wrong afterwards; the short form kills one run of notebooks."""
+    """Kill commands, and count what is wrong afterwards; the short form kills one run of notebooks only."""
     tally = Counter({"broken: other bytes": 0, "broken: processes left": 0, "broken: files left": 0})
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)

@@ -1,4 +1,4 @@
-"""The short forms of the attacks, each in an interpreter of its own."""
+"""The short forms of the attacks, each in an interpreter of its own; `make hostile` kills processes too."""
 
 import os
 import subprocess
@@ -10,7 +10,7 @@ import pytest
 import szlib
 
 
-@pytest.mark.parametrize("attack", ["commands", "damaged_tracks", "files", "processes"])
+@pytest.mark.parametrize("attack", ["commands", "damaged_tracks", "files"])
 def test_attack_breaks_nothing(attack, tmp_path):
     done = subprocess.run(
         [sys.executable, str(Path(__file__).parent), attack],

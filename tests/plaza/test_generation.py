@@ -84,9 +84,8 @@ def raw(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pl.DataFrame]:
     return path, raw_rows(path)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_another_truth_is_found_as_well(tmp_path: Path, seed: int) -> None:
-    zone = hull_of(samples_of(tmp_path, seed, ASIDE))
+def test_another_truth_is_found_as_well(tmp_path: Path) -> None:
+    zone = hull_of(samples_of(tmp_path, 0, ASIDE))
     metres, degrees = errors(zone, ASIDE)
     assert metres < 0.05
     assert degrees < 10
