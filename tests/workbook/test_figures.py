@@ -56,7 +56,7 @@ def samples():
 
 @pytest.fixture(scope="module")
 def zone(samples):
-    return szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1))
+    return szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1), resamples=20)
 
 
 @pytest.fixture(scope="module")
@@ -269,7 +269,7 @@ def test_the_largest_sensitivity_is_on_top():
     assert [label.get_text() for label in ax.get_yticklabels()] == ["r_max\n1.5", "speed\n0.9; 1.3"]
 
 
-def test_a_map_of_manners_has_a_letter_for_each_cell():
+def test_a_map_of_strategies_has_a_letter_for_each_cell():
     cells = pd.DataFrame({"gamma": [0.1, 0.1, 0.2, 0.2], "width": [1.0, 2.0] * 2, "strategy": list("xyyz")})
     ax = figures.plot_strategies(cells, names=["x", "y", "z"], rows="gamma", columns="width")
     assert [text.get_text() for text in ax.texts] == ["B", "C", "A", "B"]  # the largest gamma on top
@@ -303,7 +303,7 @@ def test_a_crowd_is_drawn_at_the_nearest_approach(log):
     assert in_metres(ax)
 
 
-def test_promises_are_shares_of_the_steps_that_promised():
+def test_safety_violations_are_shares_of_the_steps_claimed_safe():
     table = pd.DataFrame(0, index=["orca", "ETH"], columns=[*MOTION_CHANGES, "claimed_safe_steps"])
     table["claimed_safe_steps"], table["turned"], table["came"] = [1000, 500], [3, 0], [0, 1]
     widths = [bar.get_width() for bars in figures.plot_safety_claims(table).containers for bar in bars]

@@ -69,7 +69,7 @@ def plot_speed_histogram(recorded: np.ndarray, displaced: np.ndarray, *, ax: Axe
     style = {"bins": np.linspace(0, 2.5, 101).tolist(), "histtype": "step", "linewidth": 1.6}
     ax.hist(displaced, color=BLUE, label="from displacement", **style)
     ax.hist(recorded, color=RED, linestyle="--", label="the file's column", **style)
-    ax.set(xlabel="speed [m/s]", ylabel="samples", title="The velocity column never falls to zero")
+    ax.set(xlabel="speed [m/s]", ylabel="samples", title="Recorded speed, and speed from displacement")
     add_legend_below(ax)
     return ax
 

@@ -94,8 +94,8 @@ def plot_hull(
     --------
     >>> import numpy as np, pandas as pd, szlib
     >>> from szlib.workbook import figures
-    >>> n, rng = 1200, np.random.default_rng(0)
-    >>> samples = pd.DataFrame({"encounter": np.arange(n) // 4, "los_angle": rng.uniform(-3.1, 3.1, n)})
+    >>> n, rng = 2000, np.random.default_rng(0)
+    >>> samples = pd.DataFrame({"encounter": np.arange(n), "los_angle": rng.uniform(-3.1, 3.1, n)})
     >>> samples["distance"], samples["speed"] = rng.uniform(0.9, 2.5, n), rng.uniform(0.4, 1.6, n)
     >>> zone = szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1), n_resamples=0)
     >>> ax = figures.plot_hull(zone, (0.9, 1.1))
@@ -142,8 +142,8 @@ def plot_zone(
     --------
     >>> import numpy as np, pandas as pd, szlib
     >>> from szlib.workbook import figures
-    >>> n, rng = 1200, np.random.default_rng(0)
-    >>> samples = pd.DataFrame({"encounter": np.arange(n) // 4, "los_angle": rng.uniform(-3.1, 3.1, n)})
+    >>> n, rng = 2000, np.random.default_rng(0)
+    >>> samples = pd.DataFrame({"encounter": np.arange(n), "los_angle": rng.uniform(-3.1, 3.1, n)})
     >>> samples["distance"], samples["speed"] = rng.uniform(0.9, 2.5, n), rng.uniform(0.4, 1.6, n)
     >>> zone = szlib.SocialZone.fit(samples, method="hull", speeds=(1.1,), n_resamples=0)
     >>> figures.plot_zone(zone, 1.1).get_title()
