@@ -45,9 +45,9 @@ def _draw_people_around(rng: Rng) -> tuple[Any, ...]:
     return ref, round(float(heading), 2), ref + rng.uniform(-6, 6, (60, 2)).round(2)
 
 
-def _in_space(ref: Any, heading: float, others: Any, *space: float, centred: bool = False) -> Any:
+def _in_space(ref: Any, heading: float, others: Any, space: AttentionalSpace | None = None) -> Any:
     (dx, dy), cos, sin = (others - ref).T, np.cos(heading), np.sin(heading)
-    return AttentionalSpace(*space, centred=centred).contains(dx * cos + dy * sin, dy * cos - dx * sin)
+    return (space or AttentionalSpace()).contains(dx * cos + dy * sin, dy * cos - dx * sin)
 
 
 def _draw_turn(rng: Rng) -> tuple[Any, ...]:
@@ -87,9 +87,13 @@ TASKS = (
         {
             "not_turned": lambda ref, heading, others: _in_space(ref, 0.0, others),
             "turned_back": lambda ref, heading, others: _in_space(ref, -heading, others),
-            "twice_as_wide": lambda ref, heading, others: _in_space(ref, heading, others, 5.0, 8.0),
-            "swapped": lambda ref, heading, others: _in_space(ref, heading, others, 4.0, 5.0),
-            "centred": lambda ref, heading, others: _in_space(ref, heading, others, centred=True),
+            "twice_as_wide": lambda ref, heading, others: _in_space(
+                ref, heading, others, AttentionalSpace(5, 8)
+            ),
+            "swapped": lambda ref, heading, others: _in_space(ref, heading, others, AttentionalSpace(4, 5)),
+            "centred": lambda ref, heading, others: _in_space(
+                ref, heading, others, AttentionalSpace(centred=True)
+            ),
         },
     ),
     make_task(

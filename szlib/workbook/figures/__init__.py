@@ -29,7 +29,6 @@ from .encounters import (
     plot_encounter_paths,
     plot_relative_positions,
 )
-from .movies import Movie
 from .simulation import (
     animate,
     draw_run_grid,
@@ -46,11 +45,9 @@ from .style import (
     GREY,
     ORANGE,
     RED,
-    SEQUENCE,
     add_legend_below,
     add_shared_legend,
     alt_text,
-    area_patch,
     get_axes,
     label_metres,
     pick_colours,
@@ -65,13 +62,10 @@ __all__ = [
     "GREY",
     "ORANGE",
     "RED",
-    "SEQUENCE",
-    "Movie",
     "add_legend_below",
     "add_shared_legend",
     "alt_text",
     "animate",
-    "area_patch",
     "draw_interval_grid",
     "draw_run_grid",
     "draw_step",

@@ -16,13 +16,7 @@ from shapely.plotting import patch_from_polygon
 from ...checks import Array
 from ...control.acceleration_polygon import BarrierLimit, find_admissible_controls
 from ...control.barriers import barrier, check_wall, ellipse_distance, segment_distance
-from ...control.distances import (
-    compute_distance_error,
-    euclidean_to_ellipse,
-    euclidean_to_segment,
-    find_safe_boundary,
-    required_margin,
-)
+from ...control.distances import compute_distance_error, find_safe_boundary, required_margin
 from ...control.step import Step
 from ...zones.ellipses import Ellipse
 from .style import BLACK, BLUE, GREEN, GREY, RED, add_legend_below, draw_person, get_axes, label_metres
@@ -100,12 +94,10 @@ def plot_distance_error(
     ax = get_axes(ax, size=(5.5, 4.5))
     grid = _grid(extent, 321)
     x, y = np.moveaxis(grid, -1, 0)
-    if isinstance(shape, Ellipse):
-        true = euclidean_to_ellipse(grid, shape)
-    else:
-        true = euclidean_to_segment(grid, *check_wall(shape))
-    error = np.ma.masked_where((true < 0) | (true > _MAX_DISTANCE), 100 * compute_distance_error(grid, shape))
-    image = ax.pcolormesh(x, y, error, cmap="RdBu_r", vmin=-25, vmax=25, rasterized=True)
+    error = compute_distance_error(grid, shape)
+    true = _distance(grid, shape) - error
+    shown = np.ma.masked_where((true < 0) | (true > _MAX_DISTANCE), 100 * error)
+    image = ax.pcolormesh(x, y, shown, cmap="RdBu_r", vmin=-25, vmax=25, rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.85, label="d - Euclidean [cm]; red is dangerous")
     ax.plot(*_outline(shape).T, color=BLACK, linewidth=3)
     margins = dict.fromkeys((eps, max(eps, required_margin(shape, r_robot))))
@@ -252,8 +244,5 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
     low, high = drawn.min(axis=0) - 0.2, drawn.max(axis=0) + 0.2
     ax.plot(*zip((x, y), step.target, strict=True), ":", color=BLUE, label="direction to the target")
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    handles, names = ax.get_legend_handles_labels()
-    first = dict(zip(reversed(names), reversed(handles), strict=True))
-    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
-    ax.legend(first.values(), first.keys(), **place, ncols=3, fontsize=8)
+    add_legend_below(ax, gap=0.16, ncols=3)
     return label_metres(ax, f"least h = {step.h.min(initial=np.inf):.2f} m, speed {np.hypot(vx, vy):.2f} m/s")

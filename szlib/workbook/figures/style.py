@@ -60,14 +60,7 @@ def label_metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
 
 
 def area_patch(area: Area, **style: Any) -> PathPatch:
-    """Return the borders of `area`, with its holes, as one patch; `style` as for matplotlib's PathPatch.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> patch = figures.area_patch(szlib.ATC_SQUARE, edgecolor=figures.RED)
-    """
+    """Return the borders of `area`, with its holes, as one patch; `style` as for matplotlib's PathPatch."""
     rings = [Path(ring, closed=True) for ring in area.outlines]
     return PathPatch(Path.make_compound_path(*rings), fill=False, **style)
 
@@ -85,7 +78,7 @@ def pick_colours(values: Sequence[Any]) -> list[Any]:
 
 
 def add_legend_below(ax: Axes, *, gap: float = 0.13, ncols: int = 2) -> Legend:
-    """Add a legend below `ax`, at a distance of `gap` times its height, with `ncols` columns.
+    """Add a legend below `ax`, at a distance of `gap` times its height, with `ncols` columns; each name once.
 
     Examples
     --------
@@ -94,7 +87,11 @@ def add_legend_below(ax: Axes, *, gap: float = 0.13, ncols: int = 2) -> Legend:
     >>> line = ax.plot([0, 1], [0, 1], label="robot")
     >>> legend = figures.add_legend_below(ax)
     """
-    return ax.legend(loc="upper center", bbox_to_anchor=(0.5, -gap), ncols=ncols, fontsize=8)
+    handles, names = ax.get_legend_handles_labels()
+    first = dict(zip(reversed(names), reversed(handles), strict=True))
+    unique = {name: first[name] for name in names}
+    place: Any = {"loc": "upper center", "bbox_to_anchor": (0.5, -gap)}
+    return ax.legend(unique.values(), unique.keys(), **place, ncols=ncols, fontsize=8)
 
 
 def add_shared_legend(panels: Sequence[Axes]) -> None:

@@ -187,7 +187,7 @@ def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None =
     """
     ax = get_axes(ax, size=(6, 5))
     zone = zones if isinstance(zones, SocialZone) else None
-    shown = sorted((zone.ellipses if zone else zones).items())
+    shown = sorted((zones.ellipses if isinstance(zones, SocialZone) else zones).items())
     angles = np.linspace(np.pi / 6, 11 * np.pi / 6, len(shown)).tolist()
     white = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
     for (speed, ellipse), colour, line, angle in zip(
