@@ -39,7 +39,7 @@ bench: $(INSTALLED)  ## speed and memory, as ratios within one run
 	$(BIN)/python tests/benchmarks
 
 notebooks: $(INSTALLED)  ## execute the committed copies anew, and renew the README's pictures
-	$(BIN)/python notebooks/refresh.py
+	$(BIN)/python notebooks/tools/refresh.py
 
 lock: $(INSTALLED)  ## pin every dependency with hashes, for every platform, from pyproject.toml
 	$(BIN)/uv pip compile pyproject.toml --universal --all-extras --generate-hashes --upgrade --quiet \

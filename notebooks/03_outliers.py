@@ -151,7 +151,7 @@ record.claim(
 # %%
 settings = szlib.PlazaSettings(intruders=intruders, intruder_speeds=SLOW_INTRUDERS)
 file = szlib.make_plaza(record.out / "03_intruders.csv", seed=seed, settings=settings)
-people = szlib.find_encounters(szlib.read_tracks(file), **record.cache.method.search_options())
+people = szlib.find_encounters(szlib.read_tracks(file), settings=record.cache.method.encounter_settings())
 people = people[people["distance"] <= r_max]
 intruder = accuracy.true_kinds(people, seed=seed, settings=settings) == "intruder"
 crossed = people.loc[intruder, "encounter"].nunique()

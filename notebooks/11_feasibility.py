@@ -29,7 +29,8 @@
 # **Afterwards you can** say when a step has no solution, and prove when there always is one.
 #
 # **Words.** *exact penalty*: a price on violations so high that none is paid where a solution without
-# violations exists.
+# violations exists; *fallback*: which of the controller's ways to a control was taken: hard, relaxed,
+# shifted, braking.
 
 # %%
 from dataclasses import replace

@@ -24,7 +24,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [16 - What is true?](16_claims.ipynb) · next: [18 - Eleven
-# meetings](18_meetings.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 20 min to read
+# meetings](18_meetings.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 25 min to read
 #
 # **Afterwards you can** say which promises of the controller hold among people who react.
 #

@@ -13,7 +13,7 @@ from szlib.workbook.exercises import SHEETS
 
 
 def _course():
-    spec = importlib.util.spec_from_file_location("course", folders.NOTEBOOKS / "course.py")
+    spec = importlib.util.spec_from_file_location("course", folders.NOTEBOOKS / "tools" / "course.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -41,7 +41,7 @@ def shell():
 
 def test_every_cell_is_what_the_course_makes_of_the_notebooks(shell):
     stale = [s.name for s, text in shell.items() if told(text) != told(s.read_text(encoding="utf-8"))]
-    assert stale == [], "python notebooks/course.py"
+    assert stale == [], "python notebooks/tools/course.py"
 
 
 @pytest.mark.parametrize("page", STORY, ids=lambda p: p.source.stem)
@@ -49,7 +49,7 @@ def test_a_notebook_says_how_long_it_takes_and_what_it_gives(page):
     (navigation,) = [c.source for c in page.cells if course.HEADING in c.source]
     assert page.cells[1].source == navigation
     (minutes,) = re.findall(r"(\d+)\s+min\s+to\s+read", navigation)
-    assert abs(int(minutes) - page.minutes) <= 5, "python notebooks/course.py"
+    assert abs(int(minutes) - page.minutes) <= 5, "python notebooks/tools/course.py"
     assert re.search(r"\[paper\]\(https://arxiv.org/abs/2405.15101\):\s(all|sec)", navigation)
 
 

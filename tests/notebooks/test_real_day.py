@@ -12,7 +12,7 @@ COPIES = sorted((folders.NOTEBOOKS / "real_day").glob("*.ipynb"))
 
 
 def _refresh():
-    spec = importlib.util.spec_from_file_location("refresh", folders.NOTEBOOKS / "refresh.py")
+    spec = importlib.util.spec_from_file_location("refresh", folders.NOTEBOOKS / "tools" / "refresh.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -25,8 +25,8 @@ refresh = _refresh()
 class TestCopy:
     def test_it_is_of_the_notebook_as_it_is(self, copy):
         executed = nbformat.read(copy, as_version=4)
-        now = refresh.on(folders.NOTEBOOKS / f"{copy.stem}.py", "atc-1hz")
-        again = "python notebooks/refresh.py real_day"
+        now = refresh.replace_data(folders.NOTEBOOKS / f"{copy.stem}.py", "atc-1hz")
+        again = "python notebooks/tools/refresh.py real_day"
         assert [c.source for c in executed.cells] == [c.source for c in now.cells], again
         code = [c for c in executed.cells if c.cell_type == "code"]
         assert [c.execution_count for c in code] == list(range(1, len(code) + 1))
@@ -39,7 +39,7 @@ class TestCopy:
 
 
 def test_a_copy_has_the_data_asked_for_and_links_from_its_folder():
-    notebook = refresh.on(folders.NOTEBOOKS / "01_tracks.py", "atc-1hz")
+    notebook = refresh.replace_data(folders.NOTEBOOKS / "01_tracks.py", "atc-1hz")
     (tagged,) = (c.source for c in notebook.cells if "parameters" in c.metadata.get("tags", []))
     assert tagged.startswith('data = "atc-1hz"')
     links = re.findall(r"\]\(([^)]+)\)", notebook.cells[1].source)

@@ -205,14 +205,17 @@ def test_what_the_notebooks_set_themselves_is_in_range():
         check_parameters(given, [source])
 
 
-def test_a_parameter_is_text_to_a_notebook_and_never_code(notebooks, tmp_path):
-    notebooks(_01_one='record.key["word"] = word')
+def test_in_a_kernel_a_parameter_is_text_and_never_code_and_an_error_is_reported(notebooks, tmp_path):
+    notebooks(_01_one='record.key["word"] = word', _02_crash="1 / 0")
     source = tmp_path / "notebooks" / "01_one.py"
     source.write_text(source.read_text().replace("seed = 0\n", 'seed = 0\nword = ""\n', 1))
-    evil = "\"; __import__('pathlib').Path('pwned').touch(); '\"\"\""
-    summary = runner.run("mine.csv", out="out", parameters={"word": evil})
-    assert summary["notebooks"]["01_one"]["key_figures"]["word"] == evil
-    assert not list(tmp_path.rglob("pwned"))
+    code = "\"; __import__('pathlib').Path('executed').touch(); '\"\"\""
+    summary = runner.run("mine.csv", out="out", parameters={"word": code})
+    assert summary["notebooks"]["01_one"]["key_figures"]["word"] == code
+    assert not list(tmp_path.rglob("executed"))
+    assert summary["notebooks"]["02_crash"]["status"] == "error"
+    assert summary["notebooks"]["02_crash"]["error"] == "ZeroDivisionError: division by zero"
+    assert "1 / 0" in next((tmp_path / "out").glob("mine-*/02_crash.ipynb")).read_text()
 
 
 @pytest.mark.parametrize("value", ["9" * 5000, "[" * 100_000])

@@ -24,7 +24,7 @@ SEED = 3
 
 
 def _sheets():
-    spec = importlib.util.spec_from_file_location("sheets", folders.NOTEBOOKS / "sheets.py")
+    spec = importlib.util.spec_from_file_location("sheets", folders.NOTEBOOKS / "tools" / "sheets.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -38,7 +38,8 @@ def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp
     assert "report.html" in printed and (tmp_path / "out" / "mine" / "report.html").exists()
 
 
-@pytest.mark.usefixtures("at_once")
+@pytest.mark.usefixtures("without_kernels")
+@pytest.mark.usefixtures("without_kernels")
 def test_a_changed_parameter_makes_observations_and_ends_with_0_but_a_promise_fails(
     notebooks, tmp_path, capsys
 ):
@@ -65,6 +66,7 @@ def test_a_value_that_is_one_notebooks_default_is_given_to_the_others(notebooks)
     assert check_parameters({"worlds": 4}, sources[1:]) == {}
 
 
+@pytest.mark.usefixtures("without_kernels")
 def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, tmp_path, capsys):
     notebooks(_01_bad='record.check("sum", False, 3)', _02_crash="1 / 0", _03_fine='record.check("ok", True)')
     assert run() == 1

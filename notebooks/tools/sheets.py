@@ -1,8 +1,8 @@
 """Make the exercise sheets from their solutions; for a class, make a course of nbgrader.
 
-    python notebooks/sheets.py                 exercises/, and the executed copies of solutions/
-    python notebooks/sheets.py --text          the same where only text has changed: nothing is executed
-    python notebooks/sheets.py --class FOLDER  a course of nbgrader, its sheets ready to be handed out
+    python notebooks/tools/sheets.py                 exercises/, and the executed copies of solutions/
+    python notebooks/tools/sheets.py --text          the same where only text has changed: nothing is executed
+    python notebooks/tools/sheets.py --class FOLDER  a course of nbgrader, its sheets ready to be handed out
 
 The solutions are the source.  What stands between `### BEGIN SOLUTION` and `### END SOLUTION` becomes the
 stub that nbgrader makes of it, and cells that begin with "**Solution.**" are left out.  nbgrader is not among
@@ -19,7 +19,7 @@ import jupytext
 import nbformat
 from nbclient import NotebookClient
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 SOLUTIONS, EXERCISES = HERE / "solutions", HERE / "exercises"
 SOLVED = re.compile(r"^( *)### BEGIN SOLUTION\n.*?### END SOLUTION$", re.DOTALL | re.MULTILINE)
 STUB = r"\1# YOUR CODE HERE\n\1raise NotImplementedError()"

@@ -1,4 +1,4 @@
-"""Execute the committed copies of the notebooks anew, and renew the README's pictures: `make notebooks`."""
+"""Execute the committed copies of the notebooks again, and copy the pictures of the README: `make notebooks`."""
 
 import re
 import shutil
@@ -11,7 +11,7 @@ from nbclient import NotebookClient
 
 from szlib.workbook import folders
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 LAB = HERE.parent / "results" / "lab"
 PICTURES = {
     "zone.png": "05_zones-zone.png",
@@ -21,15 +21,15 @@ PICTURES = {
     "making_room.gif": "10_making_room-run.gif",
     "laboratory.png": "20_laboratory-strip.png",
 }
-"""The README's names of what the notebooks draw."""
-
-
+"""The pictures of the README, and the figures of the notebooks that they are copies of."""
+WARNING = re.compile(r"^\S+\.py:\d+: (\w*Warning: .*\n)(  .*\n)?", re.MULTILINE)
+"""A warning with the path of a file on this machine, and the line that caused it."""
 REAL_DAY = ("01", "02", "03", "04", "05", "16")
-"""Notebooks of which a copy on the real day is kept, in the folder `real_day`: `refresh.py real_day`."""
+"""Notebooks with a copy on the real day, in the folder `real_day`: `refresh.py real_day`."""
 
 
-def on(source: Path, data: str) -> nbformat.NotebookNode:
-    """A notebook with other data than its own, its links as from the folder `real_day`."""
+def replace_data(source: Path, data: str) -> nbformat.NotebookNode:
+    """Read a notebook with other data than its own, and links as from the folder `real_day`."""
     notebook = jupytext.read(source)
     for cell in notebook.cells:
         if "parameters" in cell.metadata.get("tags", []):
@@ -40,12 +40,12 @@ def on(source: Path, data: str) -> nbformat.NotebookNode:
 
 
 def refresh(source: Path, data: str = "") -> None:
-    """Execute one notebook and store it beside its script, without times, so that copies can be compared.
+    """Execute the notebook `source`, and store the copy beside it, or with other `data` in `real_day`.
 
-    With other data than its own the copy goes into `real_day`.
+    The copy holds no times and no paths, so that two copies can be compared.
     """
-    notebook = on(source, data) if data else jupytext.read(source)
-    for number, cell in enumerate(notebook.cells):  # no other names each time
+    notebook = replace_data(source, data) if data else jupytext.read(source)
+    for number, cell in enumerate(notebook.cells):  # the same at every execution
         cell.id = f"{source.stem[:2]}-{number}"
     target = (HERE / "real_day" if data else HERE) / f"{source.stem}.ipynb"
     target.parent.mkdir(exist_ok=True)
@@ -56,6 +56,9 @@ def refresh(source: Path, data: str = "") -> None:
         resources={"metadata": {"path": str(HERE)}},
         extra_arguments=["--log-level=CRITICAL"],
     ).execute()
+    for output in (each for cell in notebook.cells for each in cell.get("outputs", ())):
+        if output.get("name") == "stderr":
+            output["text"] = WARNING.sub(r"\1", output["text"])
     jupytext.write(notebook, target, fmt="ipynb")
 
 

@@ -1,6 +1,6 @@
 """The shell of the course: the navigation cell of every notebook, and the maps of 00_start_here.
 
-    python notebooks/course.py        write them anew: titles, questions and minutes are the notebooks' own
+    python notebooks/tools/course.py        write them anew: titles, questions and minutes are the notebooks' own
 
 What a notebook gives a reader, and the glossary, stand here.  A test holds that every cell is what this makes
 of it.
@@ -15,7 +15,7 @@ from pathlib import Path
 import jupytext
 import nbformat
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 START = "00_start_here"
 PAPER = "https://arxiv.org/abs/2405.15101"
 WORDS, LINES = 120, 15
