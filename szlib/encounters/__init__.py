@@ -27,24 +27,7 @@ from .settings import EncounterSettings
 from .time_shift import time_shifted
 
 __all__ = [
-    "ATC_SQUARE",
-    "KINDS",
-    "PAPER_SPACE",
-    "SAMPLE_COLUMNS",
-    "Area",
-    "AttentionalSpace",
-    "EncounterSettings",
-    "Extraction",
-    "NullEncounters",
-    "Region",
-    "Square",
-    "as_area",
-    "encounter_kinds",
-    "extract_days",
-    "find_encounters",
-    "null_encounters",
-    "of_kind",
-    "reference_frame",
-    "time_shifted",
-    "walked_area",
-]
+    "ATC_SQUARE", "KINDS", "PAPER_SPACE", "SAMPLE_COLUMNS", "Area", "AttentionalSpace", "EncounterSettings",
+    "Extraction", "NullEncounters", "Region", "Square", "as_area", "encounter_kinds", "extract_days",
+    "find_encounters", "null_encounters", "of_kind", "reference_frame", "time_shifted", "walked_area",
+]  # fmt: skip

@@ -75,7 +75,7 @@ def find_encounters(
     rows = TrackRows.from_tracks(tracks)
     area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area)
     openings = _find_openings(rows, area, settings)
-    chosen, stage = _find_windows(rows, openings, settings)
+    chosen, reasons = _find_windows(rows, openings, settings)
     ref, other = openings.rows[chosen], openings.other[openings.rows[chosen]]
 
     samples = sample_windows(tracks, rows.order, ref, other, settings.steps)
@@ -85,7 +85,12 @@ def find_encounters(
     kind = kinds_of_pairs(number[ref], number[other], number, rows.tick, position, velocity, counts)
     samples["kind"] = kind.repeat(settings.steps + 1)
     samples.attrs["area"] = str(area)
-    return of_kind(funnels.attach(samples, [*funnels.get(tracks), openings.stage, stage]), kinds)
+    n_rows, n_openings, opening = len(rows), len(openings.rows), "encounters: ticks that open a window"
+    stages = [
+        funnels.stage(opening, n_rows, n_openings, openings.reasons),
+        funnels.stage("encounters: windows", n_openings, len(chosen), reasons),
+    ]
+    return of_kind(funnels.attach(samples, [*funnels.get(tracks), *stages]), kinds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +104,7 @@ class _Openings:
     one, several : whether one person, or more, are in the space.
     space_inside : whether the corners of the space are inside the area.
     ready : whether they are, and the reference pedestrian is fast enough.
-    stage : the funnel's stage.
+    reasons : number of rejected ticks, by reason.
     """
 
     rows: np.ndarray
@@ -108,7 +113,7 @@ class _Openings:
     several: np.ndarray
     space_inside: np.ndarray
     ready: np.ndarray
-    stage: dict[str, Any]
+    reasons: dict[str, int]
 
 
 def _find_openings(rows: TrackRows, area: Area, settings: EncounterSettings) -> _Openings:
@@ -138,14 +143,13 @@ def _find_openings(rows: TrackRows, area: Area, settings: EncounterSettings) -> 
             (f"other person nearer than {settings.min_distance} m", far),
         ],
     )
-    stage = funnels.stage("encounters: ticks that open a window", len(rows), len(found), reasons)
-    return _Openings(found, other, one, people > 1, space_inside, ready, stage)
+    return _Openings(found, other, one, people > 1, space_inside, ready, reasons)
 
 
 def _find_windows(
     rows: TrackRows, openings: _Openings, settings: EncounterSettings
-) -> tuple[np.ndarray, dict[str, Any]]:
-    """Find the openings whose window meets the conditions throughout, and count the others in a stage."""
+) -> tuple[np.ndarray, dict[str, int]]:
+    """Find the openings whose window meets the conditions throughout, and count the others by reason."""
     steps, first, partner = settings.steps, openings.rows, openings.other[openings.rows]
     last, partner_last = (np.minimum(row + steps, len(rows) - 1) for row in (first, partner))
     tracked = np.ones(len(first), bool)
@@ -163,8 +167,7 @@ def _find_windows(
         conditions.append(("the other person leaves the space", stays))
     valid = np.logical_and.reduce([condition for _, condition in conditions])
     conditions.append(("overlaps an earlier window", _drop_overlaps(first, valid, steps)))
-    chosen, reasons = _apply_conditions(np.arange(len(first)), conditions)
-    return chosen, funnels.stage("encounters: windows", len(first), len(chosen), reasons)
+    return _apply_conditions(np.arange(len(first)), conditions)
 
 
 def _holds_throughout(condition: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ file.  `szlib.find_encounters` finds the same encounters in them as in all rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -64,35 +64,37 @@ def is_near(x: np.ndarray, y: np.ndarray, person: np.ndarray, area: Area, durati
 
 
 def read_near_area(
-    path: str | Path,
+    paths: str | Path | Sequence[Path],
     *,
-    area: Area,
+    area: Area | None,
     duration: float,
     options: ReadOptions | None = None,
     content: Content | None = None,
 ) -> pd.DataFrame:
-    """Read the rows of a file that encounters in an area can depend on, as `tracks.readers.read_raw` does.
+    """Read the rows of files that encounters in an area can depend on, as `tracks.readers.read_raw` does.
 
-    Only ATC raw files are streamed; others are small, and are read whole.
+    A single ATC raw file is streamed.  Other files are small: all their rows are read.
 
     Parameters
     ----------
-    path : of the file.
-    area, duration : as in `szlib.EncounterSettings`.
-    options : how the file is read.
-    content : gives size and checksum of the file, as `szlib.files.file_content`; with it the rows are stored
-        in the user's cache, and loaded from there (`near_rows_cache`).
+    paths : one file, or several of one day.
+    area, duration : as in `szlib.EncounterSettings`; area None reads all rows.
+    options : how the files are read.
+    content : gives size and checksum of a single file, as `szlib.files.file_content`; with it the rows are
+        stored in the user's cache, and loaded from there (`near_rows_cache`).
 
     Returns
     -------
-    The rows; empty where nobody came near.  The funnel counts every row of the file.
+    The rows; empty where nobody came near.  The funnel counts every row of the files.
 
     Raises
     ------
     DataError : as `szlib.read_tracks`.
     """
-    path, options = Path(path), options or ReadOptions()
-    if path.is_file():
+    options = options or ReadOptions()
+    files = [Path(paths)] if isinstance(paths, str | Path) else list(paths)
+    path = files[0]
+    if area is not None and len(files) == 1 and path.is_file():
         with open_file(path, options) as (layout, scan, plain):
             if layout.is_streamed:
                 max_gap = options.max_gap or layout.max_gap or 0.0
@@ -100,7 +102,7 @@ def read_near_area(
                 blocks = UsableBlocks(layout.quick_scan(plain), scan, layout)
                 near, summary = _load_or_select(blocks, path, layout, cells, content)
                 return _as_table(near, summary, path, layout, options)
-    return read_raw(path, options=options)
+    return read_raw(files, options=options)
 
 
 def _load_or_select(

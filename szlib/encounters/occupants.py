@@ -58,7 +58,7 @@ class TrackRows:
 def find_occupants(
     rows: TrackRows, inside: np.ndarray, ready: np.ndarray, space: AttentionalSpace
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Count the people in the `space` of each row, and give the row of one of them (-1 if it is empty).
+    """Count the people in the `space` of each of `rows`, and give the row of one of them (-1 if it is empty).
 
     Only rows that are `ready` (booleans) have a space.  The space lies inside the area, so only the rows
     `inside` the area (their indices) can be in it.
@@ -75,7 +75,7 @@ def find_occupants(
 
 
 def occupant_changes(rows: TrackRows, other: np.ndarray, one: np.ndarray) -> np.ndarray:
-    """Whether the only occupant of a row differs from the last one in the same gap-free piece.
+    """Whether the only occupant of each of `rows` differs from the last one in the same gap-free piece.
 
     `other` is as from `find_occupants`; `one` says which rows have exactly one occupant.
     """

@@ -11,24 +11,22 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from .. import __version__
 from ..errors import DataError, DataWarning
 from ..files import file_content, load_cached, store_cached
 from ..tracks import funnels
-from ..tracks.clock import COLUMNS, to_clock
+from ..tracks.clock import to_clock
 from ..tracks.formats import find_format
 from ..tracks.options import ReadOptions
 from ..tracks.readers import read_raw
-from .areas import walked_area
+from .areas import AUTO, walked_area
 from .finding import find_encounters
 from .geometry import Area, Region, Square
-from .kinds import KINDS
 from .near_rows import read_near_area
 from .near_rows_cache import Content
-from .samples import sample_windows
+from .samples import no_samples
 from .settings import EncounterSettings
 
 _ADVICE = {
@@ -53,26 +51,18 @@ def find_encounters_in_files(
     options: ReadOptions,
     contents: Sequence[Content] = (),
 ) -> pd.DataFrame:
-    """Find the encounters of one day's files: the same as in ``szlib.read_tracks(files)``.
+    """Find the encounters of the `files` of one day: the same as in ``szlib.read_tracks(files)``.
 
     `settings` say what counts as an encounter, `options` how the files are read.  `contents` give the
     content of each file, as `file_contents`; with them, the rows near the area are cached for the next call.
     """
     area = _known_area(settings, files, options)
-    if area is None or len(files) > 1:
-        raw = read_raw(files, options=options)
-    else:
-        content = contents[0] if contents else None
-        raw = read_near_area(
-            files[0], area=area, duration=settings.duration, options=options, content=content
-        )
+    content = contents[0] if contents else None
+    raw = read_near_area(files, area=area, duration=settings.duration, options=options, content=content)
     tracks = to_clock(raw, max_gap=options.max_gap) if len(raw) else raw
     if len(tracks) == 0:
-        nothing = np.zeros(0, np.int64)
-        samples = sample_windows(tracks.reindex(columns=COLUMNS), nothing, nothing, nothing, settings.steps)
-        samples["kind"] = pd.Categorical([], categories=list(KINDS))
-        return funnels.attach(samples, funnels.get(tracks))
-    return find_encounters(tracks, settings=replace(settings, area=area or walked_area(tracks)))
+        return funnels.attach(no_samples(), funnels.get(tracks))
+    return find_encounters(tracks, settings=replace(settings, area=area or AUTO))
 
 
 def with_area(

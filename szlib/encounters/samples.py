@@ -9,6 +9,7 @@ from ..checks import check_columns
 from ..errors import DataError
 from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, nearest_tick
 from .geometry import wrap_angle
+from .kinds import KINDS
 
 SAMPLE_COLUMNS = ["encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed"]
 """Columns of a table of samples; the column kind follows them."""
@@ -35,6 +36,15 @@ def sample_windows(
             "speed": np.hypot(of_ref["vx"], of_ref["vy"]),
         }
     )
+
+
+def no_samples() -> pd.DataFrame:
+    """A table of samples, with their kind, without a row."""
+    types = dict.fromkeys(SAMPLE_COLUMNS, "float64") | dict.fromkeys(
+        ("encounter", "ref_id", "other_id"), "int64"
+    )
+    types |= {"day": "category", "kind": pd.CategoricalDtype(KINDS)}
+    return pd.DataFrame(columns=list(types)).astype(types)
 
 
 def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame:

@@ -281,9 +281,9 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same(
     assert contents(out) == reference
 
 
-def test_joblib_decides_where_no_number_of_processes_is_given(
+def test_another_backend_of_joblib_gives_the_same(
     days: list[Path], reference: dict[str, bytes], tmp_path: Path
 ) -> None:
-    with joblib.parallel_config("threading", n_jobs=2):
-        extract(days, tmp_path)
+    with joblib.parallel_config("threading"):
+        extract(days, tmp_path, n_jobs=2)
     assert contents(tmp_path) == reference
