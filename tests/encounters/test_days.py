@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import random
@@ -15,6 +16,7 @@ from pathlib import Path
 import joblib
 import pandas as pd
 import pytest
+from helpers.faulty_disk import FaultyDisk
 
 import szlib
 from szlib.encounters import days as extraction
@@ -187,15 +189,10 @@ def test_a_full_disk_is_told_and_earlier_days_stay_intact(
     assert contents(tmp_path) == reference
 
 
-def test_an_output_that_is_read_only(
-    days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(*_: object) -> None:
-        raise OSError(30, "Read-only file system")
-
+def test_an_output_that_is_read_only(days: list[Path], tmp_path: Path) -> None:
     claim_folder(tmp_path / "out", extraction.PURPOSE)
-    monkeypatch.setattr("szlib.files._fill", refuse)
-    refused = extract(days[:1], tmp_path / "out")
+    with FaultyDisk(0, errno.EROFS):
+        refused = extract(days[:1], tmp_path / "out")
     assert "Read-only file system" in refused.failed["why"].iloc[0]
     with pytest.raises(szlib.DataError, match="no day was finished"):
         refused.samples()

@@ -7,7 +7,6 @@ times of steps).
 
 from __future__ import annotations
 
-import errno
 import io
 import os
 import random
@@ -23,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from helpers.faulty_disk import FaultyDisk
 
 import szlib
 from szlib import files
@@ -35,27 +35,6 @@ from szlib.workbook.record import NotebookRecord, ZoneMethod
 
 DAMAGES = {False: 4, True: 300}
 JUMPS = {False: 2, True: 40}
-
-
-class Disk:
-    """A disk that is full at write number `full`, counted from 0; None never."""
-
-    def __init__(self, full: int | None) -> None:
-        self.full, self.writes, self.real = full, 0, files._fill
-
-    def __call__(self, unfinished: Path, content: bytes, lasting: bool) -> None:
-        self.writes += 1
-        if self.writes - 1 == self.full:
-            self.real(unfinished, content[: len(content) // 2], False)
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        self.real(unfinished, content, lasting)
-
-    def __enter__(self) -> Disk:
-        files._fill = self
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        files._fill = self.real
 
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
@@ -87,13 +66,13 @@ def fill_disks(
     full = 0
     while True:
         out = place / f"{name}-full-{full}"
-        with Disk(full) as disk:
+        with FaultyDisk(full) as disk:
             try:
                 work(place / "data", out)
                 refused = False
             except (StorageError, ZoneError):
                 refused = True
-        if disk.writes <= full:
+        if disk.n_writes <= full:
             break
         found = _contents(out)
         whole = all(reference.get(file) == content for file, content in found.items())

@@ -1,6 +1,5 @@
 """What was once lost or wrongly believed: folders, stale results, parameters, endings."""
 
-import errno
 import itertools
 import json
 import os
@@ -13,9 +12,9 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from helpers.faulty_disk import FaultyDisk
 
 import szlib
-from szlib import files
 from szlib.errors import DataError, StorageError
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
@@ -292,27 +291,20 @@ def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypa
     notebooks(_01_one="", _06_two="")
     done = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
     monkeypatch.setattr(runner, "execute_notebook", lambda script, *_: (Path(script).stem, done))
-    fill, command = files._fill, ["run", "--data", "mine.csv", "--out", "out"]
-    for full in itertools.count():
+    command = ["run", "--data", "mine.csv", "--out", "out"]
+    for failing in itertools.count():
         shutil.rmtree(tmp_path / "out", ignore_errors=True)
-        writes = itertools.count()
-
-        def disk(*write, full=full, writes=writes):
-            if next(writes) == full:
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-            fill(*write)
-
-        monkeypatch.setattr(files, "_fill", disk)
-        if main(command) == 0:
+        with FaultyDisk(failing) as disk:
+            code = main(command)
+        if code == 0:
             break
         *_, line = capsys.readouterr().err.splitlines()  # after the progress bar
         assert "No space left on device" in line
         assert not list(tmp_path.rglob("summary.json"))
-        monkeypatch.setattr(files, "_fill", fill)
         assert main(command) == 0
         assert main([*command, "--only", "06"]) == 0
         capsys.readouterr()
-    assert full == next(writes) >= 4, "the two markers, the parameters, the summary"
+    assert failing == disk.n_writes >= 4, "the two markers, the parameters, the summary"
 
 
 @pytest.mark.filterwarnings("default")
