@@ -1,27 +1,26 @@
 """The controller: model predictive control with barriers around people and walls (MPC-CBF).
 
-`problem` states the problem, `solvers` solve it, and `solvers.fallbacks` says what follows where they cannot.
+`problem` states the problem, `solvers` solve it, `solvers.fallbacks` says what follows where they fail.
 
-The terminal condition and what it is good for
-----------------------------------------------
-`terminal="rest"` (barriers on the whole horizon, v_N = 0). *Recursive feasibility*: let everybody
+The terminal condition
+----------------------
+`terminal="rest"` (barriers on the whole horizon, v_N = 0). *Recursive feasibility*: let all people
 stand, h(x_0) >= 0, and let u_0 .. u_{N-1} satisfy the problem. One step later take u_1 .. u_{N-1}, 0.
-Its states are x_1 .. x_N, x_N, for v_N = 0. Bounds, speed and the terminal condition hold, and so do
+Its states are x_1 .. x_N, x_N, because v_N = 0. Bounds, speed and the terminal condition hold, and so do
 the barrier rows of the steps that both plans share. The new row is
 h(x_N) - (1 - gamma) h(x_N) = gamma h(x_N), and the old rows give h(x_{k+1}) >= (1 - gamma) h(x_k), so
-h(x_N) >= (1 - gamma)^N h(x_0) >= 0: it holds as well. So a robot that starts in the safe set with a
-solution, at rest for instance (u = 0), has one for ever, and h >= 0 for ever.
+h(x_N) >= (1 - gamma)^N h(x_0) >= 0: the new row holds as well. So a robot that starts in the safe set with
+a solution, at rest for instance (u = 0), has one for ever, and h >= 0 for ever.
 
-*Passive safety*: if people walk as predicted, the new row may fail: they come closer while the robot
-rests. Call a plan safe to its end if h >= 0 at all its states up to the one from which on it rests.
-By the inequality above each solution is; and the shift of one that is, is one. So where the problem
-has no solution, the ladder applies the relaxed plan only if it is safe to its end, and else the
-last plan, shifted. Then at the first instant at which any h < 0 the robot is at rest: nobody is
-hit by a moving robot.
+*Passive safety*: if people walk as predicted, the new row may fail, because they come closer while the
+robot rests. Say that a plan reaches a safe end if h >= 0 at all its states up to the one from which on it
+rests. By the inequality above each solution does, and so does a shifted plan that did before. So if the
+problem has no solution, the relaxed plan is applied only if it reaches a safe end, and otherwise the last
+plan, shifted. Then at the first instant at which any h < 0 the robot is at rest: a moving robot hits nobody.
 
-`terminal="person"` (one person, walking at velocity w, |w| <= v_max, no wall; v_N = w). Seen from the
-person both arguments are the first one: appending 0 keeps the robot at their pace, so
-h(x_{N+1}, N+1) = h(x_N, N), and the problem is recursively feasible although they walk.
+`terminal="person"` (one person, walking at velocity w, |w| <= v_max, no wall; v_N = w). In the frame of the
+person both arguments are the first one: appending 0 keeps the robot at the person's velocity, so
+h(x_{N+1}, N+1) = h(x_N, N), and the problem is recursively feasible although the person walks.
 """
 
 from __future__ import annotations
@@ -45,33 +44,44 @@ from .person import Person, SpeedZone, as_ellipse, circle_around, place_zone
 from .scene import Scene
 from .settings import MPCSettings
 from .solvers.fallbacks import solve_with_fallbacks
-from .solvers.solver_pool import Sizes, slots, taken
+from .solvers.solver_pool import SolverPool, active_rows, padded_parameters
 from .step import Step
 from .tracker import People, TrackedPeople, Tracker
 
 
 class MPCCBF(Controller):
-    """Drives a double integrator to a goal, outside the social zones of people and clear of walls.
+    """Drives a double integrator to a goal, outside the social zones of people and away from walls.
 
-    A controller belongs to the thread that first asks it for a step; give each thread one of its own, for
-    instance a `copy.deepcopy`. It can be pickled.
+    A controller belongs to the thread that first calls `step`; give each thread its own, for instance a
+    `copy.deepcopy`. It can be pickled.
 
     Parameters
     ----------
-    zone : the social zone of a person, in the person's frame [m]; or anything with `.ellipse(speed)`,
-        such as a `SocialZone`, which is asked for `settings.zone_speed`.
-    walls : segments, shape (n, 2, 2): end points [m]; or polylines, Shapely's lines and polygons, or whatever
-        else `barriers.read_walls` takes; `self.walls` are their segments.
+    zone : the social zone of a person, in the person's frame [m]; or anything with `.ellipse(speed)`, such as
+        a `SocialZone`, whose zone at `settings.zone_speed` is used.
+    walls : segments, shape (n, 2, 2): end points [m]; or anything else that `read_walls` accepts. The
+        attribute `walls` holds their segments.
     settings : every other parameter.
-    max_people : how many people to be ready for; None: for 8, and in time for more, built in a thread of its
-        own from when half of the slots are taken. More people than it is ready for make the controller grow
-        at once, which no time limit covers, and is logged by "szlib" (at level INFO).
-    tracker : what is remembered of people by their ids; default: `Tracker()`.
+    max_people : number of people to prepare solvers for. None: 8, and more in the background as soon as half
+        of this number is present. For more people than are prepared the solver is built within the step,
+        which no time limit covers; the log "szlib" says so (level INFO).
+    tracker : remembers people by their ids; default: `Tracker()`.
 
     Raises
     ------
-    SolverError : a wall is not finite or has no length, or settings and walls do not go together.
+    SolverError : a wall is not finite or has no length, or settings and walls do not fit.
     ZoneError : `zone` is no zone.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> zone = szlib.Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))
+    >>> controller = szlib.MPCCBF(zone, walls=[[(-6.0, 2.3), (7.0, 2.3)]])
+    >>> person = szlib.Person(position=(0.0, 0.0), velocity=(-0.5, 0.0))
+    >>> step = controller.step(state=(-4.0, 0.0, 0.0, 0.0), goal=(4.0, 0.0), people=[person])
+    >>> step.safe
+    True
+    >>> ax, ay = step.control  # the acceleration to apply for the next 0.1 s
     """
 
     settings: MPCSettings
@@ -93,7 +103,7 @@ class MPCCBF(Controller):
             raise SolverError(f"max_people must be a whole number >= 0, or None; got {max_people!r}")
         self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
         self._take_walls(walls)
-        self._sizes = Sizes(self.settings, max_people, len(self.walls))
+        self._pool = SolverPool(self.settings, max_people, len(self.walls))
         self.reset()
 
     def _take_walls(self, walls: Any) -> None:
@@ -103,32 +113,34 @@ class MPCCBF(Controller):
         self.walls, self._wall_rows = segments, walls_with_margins(segments, self.settings)
 
     def set_walls(self, walls: Any) -> None:
-        """Know these walls from the next step on, in place of those before; given as to the controller.
+        """Replace the walls, from the next step on.
 
-        A number of walls that needs another size (1, 2, 3, 4, 6, ...) is built now: see `SolverPool`.
+        Parameters
+        ----------
+        walls : as of `MPCCBF`. A solver of another size (1, 2, 3, 4, 6, ... walls) is built now if needed.
 
         Raises
         ------
-        SolverError : as the controller, which then keeps its walls; or another thread has it.
+        SolverError : as of `MPCCBF`, which then keeps its walls; or the controller belongs to another thread.
         """
-        self._own()
+        self._check_thread()
         self._take_walls(walls)
-        self._sizes.of(self._n_people, len(self.walls))
+        self._pool.get(self._n_people, len(self.walls))
 
-    def _own(self) -> None:
+    def _check_thread(self) -> None:
         if self._thread.setdefault("first", get_ident()) != get_ident():
             raise SolverError("this controller belongs to another thread; build one in each thread")
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the thread: a copy goes on from the same plan, in whatever thread asks it first."""
+        """Everything but the thread: a copy continues from the same plan, in another thread."""
         return {**self.__dict__, "_thread": {}}
 
     def reset(self) -> None:
-        """Forget the last plan and everybody: what follows depends on nothing that went before."""
+        """Forget the last plan and all people, so that the next step depends on no earlier one."""
         self._plan, self._change, self._now = *np.zeros((2, 2 * self.settings.N)), 0.0
         self._moved, self._n_people = False, 0
         self.tracker.reset()
-        self._sizes.reset()
+        self._pool.reset()
 
     def step(
         self,
@@ -167,29 +179,29 @@ class MPCCBF(Controller):
             lies too close to a wall, or the controller belongs to another thread.
         """
         began = perf_counter()
-        self._own()
+        self._check_thread()
         x, towards = check_vector("state", state, 4), check_point("goal", goal)
         if not self._moved:
             self._check_goal(towards)
         self._now = self._clock(now, stamps)
         scene = self._scene(x, towards, self.tracker.see(people, now=self._now, ids=ids, stamps=stamps))
         first, self._moved, self._n_people = not self._moved, True, len(scene.zones)
-        solver = self._sizes.of(self._n_people, len(self.walls))
-        self._sizes.budget.begin()
+        solver = self._pool.get(self._n_people, len(self.walls))
+        self._pool.budget.begin()
         size = solver.evaluate.size
         parameters = self._parameters(x, scene, size)
-        fallback, numbers, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
-        self._change = np.zeros(numbers.inputs.size) if first else numbers.inputs - self._plan
-        self._plan, rows = numbers.inputs, taken(self._n_people, len(self.walls), size)
+        fallback, plan, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
+        self._change = np.zeros(plan.inputs.size) if first else plan.inputs - self._plan
+        self._plan, rows = plan.inputs, active_rows(self._n_people, len(self.walls), size)
         return Step(
             control=self._plan[:2].copy(),
-            predicted=numbers.states,
+            predicted=plan.states,
             fallback=fallback,
-            slack=numbers.slack,
-            residual=numbers.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h)[rows],
-            h=numbers.h[rows, 0],
+            slack=plan.slack,
+            residual=plan.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h)[rows],
+            h=plan.h[rows, 0],
             target=parameters[4:6],
-            cost=numbers.cost,
+            cost=plan.cost,
             solve_time=perf_counter() - began,
             timed_out=timed_out,
             scene=scene,
@@ -208,7 +220,9 @@ class MPCCBF(Controller):
         else:
             target = find_target((x[0], x[1]), scene.goal, scene.zones, self._wall_rows, self.settings)
         end_velocity = scene.zones[0][5:] if scene.terminal == "person" else (0.0, 0.0)
-        return np.array([*x, *target, *end_velocity, *slots(x, scene.zones, self._wall_rows, size)])
+        return np.array(
+            [*x, *target, *end_velocity, *padded_parameters(x, scene.zones, self._wall_rows, size)]
+        )
 
     def _clock(self, now: float | None, stamps: ArrayLike | None) -> float:
         """The time of this step [s]: as given, or `dt` after the last."""

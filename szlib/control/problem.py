@@ -1,4 +1,4 @@
-"""The optimal control problem of the controller, in symbols: written down once, for every solver.
+"""The optimal control problem of the controller, in symbols, for every solver.
 
     min over u_0 .. u_{N-1}
         (x_N - g)' P (x_N - g) + sum_{k=1}^{N-1} (x_k - g)' Q (x_k - g) + sum_{k=0}^{N-1} u_k' R u_k
@@ -10,11 +10,11 @@
         (vx, vy)_N = w                                                if there is a terminal condition
 
 (paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., k) takes person i at constant
-velocity, k steps ahead. `g` is the goal at rest, but for people met head-on (`head_on.find_target`); w is 0
-or the velocity of a person. The states are eliminated: 2 N unknowns remain. The *relaxed* problem
-adds a slack s >= 0 to each barrier row, and to the speed rows if the robot is already too fast, and
-penalises their sum: exactly, so wherever the hard problem has a solution near by, both have the
-same one. The terminal condition is never relaxed.
+velocity, k steps ahead. `g` is the target at rest: the goal, except where a person is met head-on
+(`head_on.find_target`); w is 0 or the velocity of a person. The states are eliminated: 2 N unknowns remain.
+The *relaxed* problem adds a slack s >= 0 to each barrier row, and to the speed rows if the robot is already
+too fast, and penalises their sum. The penalty is exact: if the hard problem has a solution near by, both have
+the same one. The terminal condition is never relaxed.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ from .settings import TOLERANCE as TOLERANCE
 from .settings import MPCSettings
 
 HARD_SHARE = 0.4
-"""Share of a step's time for the hard problem. Its second try begins within half of that, or not at all, so
-that as much again is left for the relaxed problem."""
-BUILDING = RLock()
-"""Held while anything of CasADi is written down, built or given away: its symbols count their users, and
-not safely for threads. Functions may run at the same time, each in memory of its own."""
+"""Share of a step's time for the hard problem. The second try begins within half of this share, or not at
+all, so that time is left for the relaxed problem."""
+CASADI_LOCK = RLock()
+"""Held while CasADi's symbols and functions are made or released, because their reference counts are not safe
+for threads. Functions may run at the same time, each in memory of its own."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """The problem for so many people and walls.
+    """The problem for a number of people and walls.
 
     `rows` are meant >= 0: the `n_cbf` barrier conditions, person by person, then wall by wall, and
     the N speed limits. `terminal` is meant to be 0, and empty without a terminal condition. `h` has a
@@ -67,13 +67,13 @@ class Problem:
 
     @property
     def violations(self) -> Any:
-        """By how much each row is violated, and the terminal condition missed; 0 where they hold."""
+        """Violation of each row and of the terminal condition; 0 where they hold."""
         return ca.vertcat(ca.fmax(0, -self.rows), ca.fabs(self.terminal))
 
 
 @lru_cache(maxsize=256)
 def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem:
-    """Write down the problem of this module's docstring; once for each size and settings."""
+    """Build the problem of this module's docstring for `settings`, `n_people` and `n_walls`, or reuse it."""
     s = settings
     inputs, start, target = ca.SX.sym("u", 2, s.N), ca.SX.sym("x0", 4), ca.SX.sym("target", 2)
     people, walls, w = ca.SX.sym("person", 7, n_people), ca.SX.sym("wall", 5, n_walls), ca.SX.sym("w", 2)
@@ -135,7 +135,7 @@ def _differentiated(h: Any, x: Any, y: Any, time: Any, of: Sequence[Any], dt: fl
 
 
 def remaining_distance(x: Any, y: Any, gx: Any, gy: Any) -> Any:
-    """Distance from (x, y) to the target (gx, gy) [m], and at least 1 m.
+    """Distance from (`x`, `y`) to the target (`gx`, `gy`) [m], at least 1 m.
 
     The cost of a metre of slack is `MPCSettings.slack_weight` for each of its metres.
     """
@@ -148,10 +148,15 @@ def function(name: str, arguments: Sequence[Any], outputs: Sequence[Any]) -> Any
     return ca.Function(name, list(arguments), [ca.densify(output) for output in outputs])
 
 
-class Buffered:
-    """A CasADi function between arrays that stay: fill the arguments, `call`, read `results`.
+class BufferedFunction:
+    """A CasADi function on fixed arrays: fill the arguments, `call`, read `results`.
 
-    It saves the conversions of an ordinary call, which take ten times as long as these functions.
+    This saves the conversions of an ordinary call, which take ten times as long as these functions.
+
+    Parameters
+    ----------
+    function : the CasADi function.
+    arguments : one array for each of its arguments.
     """
 
     def __init__(self, function: Any, *arguments: Array) -> None:
@@ -165,11 +170,17 @@ class Buffered:
         self._memory = buffer, arguments  # must live as long as `call`
 
 
-class Numbers(NamedTuple):
-    """A plan, its inputs, shape (2N,), in numbers.
+class PlanEvaluation(NamedTuple):
+    """The numbers of a plan.
 
-    See `Problem` for rows and h, shape (people + walls, N_h+1); states are (N+1, 4). `slack` is the largest
-    violation of a row or of the terminal condition, 0 if none.
+    Attributes
+    ----------
+    cost : of the plan, without any penalty.
+    slack : largest violation of a row or of the terminal condition, 0 if none.
+    inputs : accelerations, shape (2N,) [m/s2].
+    rows : see `Problem`.
+    states : shape (N+1, 4) [m, m/s].
+    h : barriers, shape (people + walls, N_h+1) [m].
     """
 
     cost: float
@@ -180,30 +191,32 @@ class Numbers(NamedTuple):
     h: Array
 
 
-class Evaluator:
-    """The numbers of any plan, without a solver; the first `n_cbf` of the `n_rows` rows are barriers.
+class PlanEvaluator:
+    """Evaluates any plan, without a solver.
 
-    `size` is the numbers of people and walls.
+    Parameters
+    ----------
+    settings, n_people, n_walls : of the problem; `size` holds the last two.
     """
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        with BUILDING:
+        with CASADI_LOCK:
             evaluate, self.n_cbf = _evaluation(settings, n_people, n_walls)
             self.n_rows = evaluate.nnz_out(1)
             self._inputs, self._parameters = np.zeros(evaluate.nnz_in(0)), np.zeros(evaluate.nnz_in(1))
-            self.function = Buffered(evaluate, self._inputs, self._parameters)
+            self.function = BufferedFunction(evaluate, self._inputs, self._parameters)
         self.size, self._shape = (n_people, n_walls), (n_people + n_walls, settings.N_h + 1)
         self._numbers = (self._inputs, *self.shaped(*self.function.results[1:]))
 
     def shaped(self, rows: Array, states: Array, h: Array) -> tuple[Array, Array, Array]:
-        """Views of buffers as `Numbers` has them."""
+        """Views of the buffers `rows`, `states` and `h`, shaped as in `PlanEvaluation`."""
         return rows[: self.n_rows], states.reshape(-1, 4), h.reshape(self._shape)
 
-    def __call__(self, plan: Array, parameters: Array) -> Numbers:
+    def __call__(self, plan: Array, parameters: Array) -> PlanEvaluation:
         self._inputs[:], self._parameters[:] = plan, parameters
         self.function.call()
         cost, slack = self.function.results[0].tolist()
-        return Numbers(cost, slack, *[array.copy() for array in self._numbers])
+        return PlanEvaluation(cost, slack, *[array.copy() for array in self._numbers])
 
 
 @lru_cache(maxsize=256)
@@ -213,42 +226,47 @@ def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any
     return function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
 
 
-class Budget:
-    """The computing time of one step [s]; `begin` it anew with each."""
+class TimeBudget:
+    """The computing time of one step; call `begin` at its start.
+
+    Parameters
+    ----------
+    limit : time [s], or inf.
+    """
 
     def __init__(self, limit: float) -> None:
         self._limit = limit
         self.begin()
 
     def begin(self) -> None:
-        """From now on."""
+        """Start to measure."""
         self._wall, self._thread = perf_counter(), thread_time()
 
-    def spent(self, share: float = 1.0) -> bool:
-        """True if this share is used up. To read the thread's own clock takes long: wall time goes first."""
+    def is_spent(self, share: float = 1.0) -> bool:
+        """True if this `share` of the time is used up. The thread's clock is slow, so it is read last."""
         limit = share * self._limit
         return perf_counter() - self._wall > limit and thread_time() - self._thread > limit
 
 
 class ProblemSolver(Protocol):
-    """What the solvers of this problem have in common; inputs have shape (2N,) [m/s2].
+    """What the solvers of this problem have in common.
 
-    `late` says that the last call was cut off by the `budget`, and gave what it had by then.
+    `timed_out` is True if the `budget` stopped the last call, which then returned its plan so far.
     """
 
     settings: MPCSettings
-    evaluate: Evaluator
-    budget: Budget
-    late: bool
+    evaluate: PlanEvaluator
+    budget: TimeBudget
+    timed_out: bool
 
     remembered: Array
-    """What goes from call to call: it saves time, and changes the answers by rounding."""
+    """Multipliers kept from call to call: they save time, and change the answers by rounding only."""
 
-    def hard(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
-        """The plan that obeys every row, from a guess; and whether one was found."""
+    def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
+        """The plan that obeys every row, from a `guess`, shape (2N,), and `parameters`; True if found."""
 
-    def relaxed(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
-        """The plan that violates the rows least, by the exact penalty; and whether it converged."""
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
+        """The plan of least penalty, from a `guess` and `parameters`; True if it converged."""
 
     def reset(self) -> None:
-        """Forget what is remembered."""
+        """Forget the multipliers."""

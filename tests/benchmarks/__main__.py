@@ -161,7 +161,7 @@ def bench_build() -> dict[str, float]:
         problem.build_problem.cache_clear()
         problem._evaluation.cache_clear()
         ipopt._idle.clear()
-        rebuilt._sizes._solvers[1, 0] = ipopt.Ipopt(rebuilt.settings, 1, 0)
+        rebuilt._pool._solvers[1, 0] = ipopt.Ipopt(rebuilt.settings, 1, 0)
         rebuilt.step(x, scenario.goal, people)
 
     times = race(scenario, {"once": asking(once, scenario), "anew": anew}, repeats=3)

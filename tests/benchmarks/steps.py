@@ -160,7 +160,7 @@ def jump(ahead: bool) -> tuple[float, float, float]:
         ask(n)
     for n in (4, 8, 16) if ahead else ():
         ask(n)
-        while (builder := controller._sizes._builder) is not None and builder.is_alive():
+        while (builder := controller._pool._builder) is not None and builder.is_alive():
             longest = max(longest, ask(n))
             time.sleep(0.001)
         usual = max([usual, *(ask(n) for _ in range(200))])

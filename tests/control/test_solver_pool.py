@@ -1,4 +1,4 @@
-"""Sizes: empty slots change nothing, nor does what is built ahead; walls of any shape; copies and pickles."""
+"""The solver pool: unused slots and sizes built ahead change nothing; walls of any shape; copies."""
 
 import copy
 import pickle
@@ -14,7 +14,7 @@ from helpers.random_states import ZONE, questions
 import szlib
 from szlib.control.barriers import read_walls
 from szlib.control.solvers import solver_pool
-from szlib.control.solvers.solver_pool import UNFELT, rounded
+from szlib.control.solvers.solver_pool import INACTIVE_H, round_up_size
 from szlib.simulation.closed_loop import advance
 
 GOAL = (4.0, 0.0)
@@ -50,16 +50,16 @@ def drive(controller, numbers, turn=None):
 
 
 def wait_for_the_builder(controller, _=None):
-    if controller._sizes._builder is not None:
-        controller._sizes._builder.join()
+    if controller._pool._builder is not None:
+        controller._pool._builder.join()
 
 
 # empty slots
 
 
 def test_sizes_are_powers_of_two_and_three_quarters_of_them():
-    assert sorted({rounded(n) for n in range(49)}) == [0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48]
-    assert all(n <= rounded(n) < 1.5 * n for n in range(1, 1000))
+    assert sorted({round_up_size(n) for n in range(49)}) == [0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48]
+    assert all(n <= round_up_size(n) < 1.5 * n for n in range(1, 1000))
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
@@ -68,18 +68,21 @@ def test_empty_slots_do_not_change_the_control(monkeypatch, solver, count, formu
     for question in islice(questions(seed=31), count):
         answers = []
         for size in (lambda n: n, lambda n: 4 if n <= 4 else 8):
-            monkeypatch.setattr(solver_pool, "rounded", size)
+            monkeypatch.setattr(solver_pool, "round_up_size", size)
             controller = controller_of(solver, question.walls, max_people=0, **formulation)
             steps = [controller.step(question.state, question.goal, question.people) for _ in range(2)]
             answers.append(steps)
-        assert controller._sizes.of(len(question.people), len(question.walls)).evaluate.size == (4, 4)
+        assert controller._pool.get(len(question.people), len(question.walls)).evaluate.size == (4, 4)
         for exact, padded in zip(*answers, strict=True):
             assert padded.control == pytest.approx(exact.control, abs=1e-6)
             assert padded.fallback == exact.fallback
             assert padded.slack == pytest.approx(exact.slack, abs=1e-6)
             assert padded.h == pytest.approx(exact.h) and padded.residual.shape == exact.residual.shape
             assert padded.residual == pytest.approx(exact.residual, abs=1e-5)
-            assert max(np.abs(padded.h).max(initial=0), np.abs(padded.residual).max(initial=0)) < UNFELT / 100
+            assert (
+                max(np.abs(padded.h).max(initial=0), np.abs(padded.residual).max(initial=0))
+                < INACTIVE_H / 100
+            )
 
 
 # building ahead
@@ -98,7 +101,7 @@ def test_a_run_is_the_same_whether_or_not_a_size_was_built_ahead(monkeypatch, so
 def test_a_controller_is_ready_for_eight_and_grows_ahead_from_when_half_of_them_are_there(caplog):
     caplog.set_level("INFO", logger="szlib")
     controller = controller_of()
-    built = controller._sizes._solvers
+    built = controller._pool._solvers
     assert {people for people, _ in built} == {0, 1, 2, 3, 4, 6, 8}
     drive(controller, [3])
     wait_for_the_builder(controller)
@@ -115,8 +118,8 @@ def test_a_controller_is_ready_for_eight_and_grows_ahead_from_when_half_of_them_
 def test_a_number_that_is_told_is_taken_at_its_word():
     controller = controller_of(max_people=4)
     drive(controller, [4])
-    assert controller._sizes._builder is None
-    assert {people for people, _ in controller._sizes._solvers} == {0, 1, 2, 3, 4}
+    assert controller._pool._builder is None
+    assert {people for people, _ in controller._pool._solvers} == {0, 1, 2, 3, 4}
 
 
 # walls

@@ -13,7 +13,7 @@ from helpers.random_states import ZONE, meetings, questions
 import szlib
 from szlib.control.problem import TOLERANCE, build_problem, remaining_distance
 from szlib.control.solvers import sqp
-from szlib.control.solvers.sqp_functions import build_program
+from szlib.control.solvers.sqp_functions import build_sqp_functions
 from szlib.simulation.closed_loop import advance
 
 SOLVERS = ("sqp", "ipopt")
@@ -76,7 +76,7 @@ def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
 def test_derivatives_by_structure_are_those_of_the_whole_expressions(formulation):
     settings = szlib.MPCSettings(**formulation)
-    p, derive = build_problem(settings, 2, 1), build_program(settings, 2, 1).derive
+    p, derive = build_problem(settings, 2, 1), build_sqp_functions(settings, 2, 1).derive
     values = ca.vertcat(p.rows, p.terminal)
     multipliers = ca.SX.sym("multipliers", values.numel())
     arguments = [p.inputs, p.parameters, multipliers]
@@ -118,7 +118,7 @@ def test_steps_that_raise_the_merit_for_a_while_end_in_the_same_plan(monkeypatch
 
 
 def broken(monkeypatch, controller, *names):
-    solver = controller._sizes.of(1, 0)
+    solver = controller._pool.get(1, 0)
     for name in names:
         monkeypatch.setattr(solver, name, lambda guess, numbers: (solver.evaluate(guess, numbers), False))
 

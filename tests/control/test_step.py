@@ -207,10 +207,10 @@ def test_a_controller_shared_by_threads_says_no(solver):
 def test_solvers_are_lent_and_come_back():
     settings = szlib.MPCSettings(solver="ipopt", max_iterations=98)
     one, two = (szlib.MPCCBF(ZONE, settings=settings, max_people=0) for _ in range(2))
-    first = one._sizes.of(0, 0)._hard
-    assert two._sizes.of(0, 0)._hard is not first
+    first = one._pool.get(0, 0)._hard
+    assert two._pool.get(0, 0)._hard is not first
     del one
-    assert szlib.MPCCBF(ZONE, settings=settings, max_people=0)._sizes.of(0, 0)._hard is first
+    assert szlib.MPCCBF(ZONE, settings=settings, max_people=0)._pool.get(0, 0)._hard is first
 
 
 # the time of a step
@@ -250,7 +250,7 @@ def test_a_plan_cut_short_is_taken_only_if_it_violates_no_more_than_braking(monk
             step = controller.step(question.state, question.goal, question.people)
         if step.timed_out:
             controller = szlib.MPCCBF(ZONE, walls=question.walls, max_people=3)
-            for solver in controller._sizes._solvers.values():
+            for solver in controller._pool._solvers.values():
                 answer = lambda guess, numbers, of=solver: (of.evaluate(guess, numbers), False)  # noqa: E731
                 for name in ("hard", "relaxed"):
                     monkeypatch.setattr(solver, name, answer)

@@ -1,14 +1,14 @@
-"""What is done where a solver has no answer: each step climbs down a ladder until a fallback holds.
+"""The ways to a control: each is tried until one gives a plan.
 
     warm      the problem, from the last plan, changed as it changed in the step before
     cold      the problem, from full braking
     kept      the last plan, shifted, if it still satisfies the problem        terminal condition only
     relaxed   the problem with penalised slack
-    kept      the last plan, shifted, if it is a way to a safe end             terminal condition only
+    kept      the last plan, shifted, if it reaches a safe end                 terminal condition only
     braking   to rest as soon as the bounds allow
 
-Where the time of a step is up, what is left of the ladder is skipped; a relaxed plan that was cut short is
-taken if it violates no more than braking would. For the reason of "kept" see `szlib.control.mpc`.
+When the time of a step is up, the remaining solvers are skipped. A relaxed plan that was cut short is used if
+it violates no more than braking does. For the reason of "kept" see `szlib.control.mpc`.
 """
 
 from __future__ import annotations
@@ -16,58 +16,95 @@ from __future__ import annotations
 import numpy as np
 
 from ...checks import Array
-from ..problem import HARD_SHARE, TOLERANCE, Numbers, ProblemSolver
-from ..settings import MPCSettings
+from ..problem import HARD_SHARE, PlanEvaluation, ProblemSolver
+from ..settings import TOLERANCE, MPCSettings
 from ..step import Fallback
 
 
 def solve_with_fallbacks(
     solver: ProblemSolver, last_plan: Array, change: Array, parameters: Array
-) -> tuple[Fallback, Numbers, bool]:
-    """The first fallback that holds, its plan in numbers, and whether the time was up.
+) -> tuple[Fallback, PlanEvaluation, bool]:
+    """Find a plan: the fallback that gave it, the plan, and True if time was up.
 
-    Plans are inputs, shape (2N,) [m/s2], `change` is that of the last one; `parameters` as in `Problem`.
-    A plan changes little from step to step, seen from the robot: which of its inputs a barrier holds depends
-    on how far ahead they are. So its trend is a better guess than the plan shifted, by up to a quarter of
-    the iterations.
+    Parameters
+    ----------
+    solver : of the problem of this size.
+    last_plan : inputs of the last plan, shape (2N,) [m/s2].
+    change : by which the last plan differed from the one before, shape (2N,) [m/s2].
+    parameters : of the problem: see `Problem`.
     """
-    s = solver.settings
-    ends, late, start = s.terminal != "none", False, None
-    fallback: Fallback
-    for fallback in ("warm", "cold"):
-        if fallback == "cold" and solver.budget.spent(HARD_SHARE / 2):
-            late = True
-            break
-        if fallback == "warm":
-            guess = np.minimum(np.maximum(last_plan + change, -s.a_max), s.a_max)
-        else:
-            guess = _brake(s, parameters[2:4])
-        plan, converged = solver.hard(guess, parameters)
+    attempts = _Attempts(solver, parameters)
+    braking = plan_braking(solver.settings, parameters[2:4])
+    if plan := attempts.solve_hard(_continue_trend(solver.settings, last_plan, change)):
+        return "warm", plan, attempts.timed_out
+    if plan := attempts.solve_hard_if_time(braking):
+        return "cold", plan, attempts.timed_out
+    shifted = solver.evaluate(_shift(last_plan), parameters)
+    has_end = solver.settings.terminal != "none"
+    if has_end and shifted.slack <= TOLERANCE:
+        return "kept", shifted, attempts.timed_out
+    shifted_is_safe = has_end and _reaches_safe_end(shifted, parameters)
+    relaxed, converged = attempts.solve_relaxed(shifted.inputs, solver.evaluate(braking, parameters).slack)
+    if relaxed and (not shifted_is_safe or _reaches_safe_end(relaxed, parameters)):
+        satisfied = converged and relaxed.slack <= TOLERANCE
+        return "warm" if satisfied else "relaxed", relaxed, attempts.timed_out
+    if shifted_is_safe:
+        return "kept", shifted, attempts.timed_out
+    return "braking", solver.evaluate(braking, parameters), attempts.timed_out
+
+
+class _Attempts:
+    """Calls of the solver within one step, and what they leave for the next one."""
+
+    def __init__(self, solver: ProblemSolver, parameters: Array) -> None:
+        self.solver, self.parameters = solver, parameters
+        self.timed_out = False
+        self._unfinished: Array | None = None
+
+    def solve_hard(self, guess: Array) -> PlanEvaluation | None:
+        """The plan that satisfies the problem, from a guess; None if there is none."""
+        plan, converged = self.solver.hard(guess, self.parameters)
         if converged and plan.slack <= TOLERANCE:
-            return fallback, plan, late
-        late |= solver.late
-        start = plan.inputs if solver.late and np.isfinite(plan.inputs).all() else start
-    shifted = np.zeros(last_plan.size)
-    shifted[:-2] = last_plan[2:]
-    kept = solver.evaluate(shifted, parameters)
-    if ends and kept.slack <= TOLERANCE:
-        return "kept", kept, late
-    safe_end = ends and _safe_to_its_end(kept, parameters)
-    plan, converged = solver.relaxed(shifted if start is None else start, parameters)
-    late |= solver.late
-    braking = solver.evaluate(_brake(s, parameters[2:4]), parameters)
-    if (converged or solver.late) and np.isfinite(plan.inputs).all():
-        better = converged or plan.slack <= braking.slack
-        if better and (not safe_end or _safe_to_its_end(plan, parameters)):
-            fallback = "warm" if converged and plan.slack <= TOLERANCE else "relaxed"
-            return fallback, plan, late
-    if safe_end:
-        return "kept", kept, late
-    return "braking", braking, late
+            return plan
+        self.timed_out |= self.solver.timed_out
+        if self.solver.timed_out and np.isfinite(plan.inputs).all():
+            self._unfinished = plan.inputs
+        return None
+
+    def solve_hard_if_time(self, guess: Array) -> PlanEvaluation | None:
+        """As `solve_hard`; None if too little time is left."""
+        if self.solver.budget.is_spent(HARD_SHARE / 2):
+            self.timed_out = True
+            return None
+        return self.solve_hard(guess)
+
+    def solve_relaxed(self, guess: Array, slack_limit: float) -> tuple[PlanEvaluation | None, bool]:
+        """The relaxed plan, and True if it converged; None if it was cut short above the limit, or failed."""
+        start = guess if self._unfinished is None else self._unfinished
+        plan, converged = self.solver.relaxed(start, self.parameters)
+        self.timed_out |= self.solver.timed_out
+        usable = converged or (self.solver.timed_out and plan.slack <= slack_limit)
+        return (plan if usable and np.isfinite(plan.inputs).all() else None), converged
 
 
-def _brake(s: MPCSettings, velocity: Array) -> Array:
-    """The inputs that bring the robot to rest soonest along its path, shape (2N,) [m/s2]."""
+def _continue_trend(s: MPCSettings, last_plan: Array, change: Array) -> Array:
+    """The last plan, changed as it changed before: a better guess than the plan shifted.
+
+    A plan changes little from step to step, seen from the robot: a barrier holds inputs at certain steps
+    ahead. This saves up to a quarter of the iterations.
+    """
+    return np.minimum(np.maximum(last_plan + change, -s.a_max), s.a_max)
+
+
+def _shift(plan: Array) -> Array:
+    """The rest of a plan, with zero at its end."""
+    shifted = np.zeros(plan.size)
+    shifted[:-2] = plan[2:]
+    return shifted
+
+
+def plan_braking(s: MPCSettings, velocity: Array) -> Array:
+    """Inputs that bring the robot from `velocity` to rest soonest along its path, within `s`, shape (2N,)."""
     vx, vy = velocity.tolist()
     plan: list[float] = []
     for _ in range(s.N):
@@ -77,8 +114,8 @@ def _brake(s: MPCSettings, velocity: Array) -> Array:
     return np.array(plan)
 
 
-def _safe_to_its_end(plan: Numbers, parameters: Array) -> bool:
-    """True if the plan ends as it should, with h >= 0 at every state up to the one from which on it does."""
-    off = np.abs(plan.states[:, 2:] - parameters[6:8]).max(axis=1) > TOLERANCE
-    last = int(off.nonzero()[0].max(initial=-1)) + 1
-    return last < len(off) and bool((plan.h[:, : last + 1] >= -TOLERANCE).all())
+def _reaches_safe_end(plan: PlanEvaluation, parameters: Array) -> bool:
+    """True if the plan ends at its terminal velocity, with h >= 0 at every state until it has reached it."""
+    is_off = np.abs(plan.states[:, 2:] - parameters[6:8]).max(axis=1) > TOLERANCE
+    last = int(is_off.nonzero()[0].max(initial=-1)) + 1
+    return last < len(is_off) and bool((plan.h[:, : last + 1] >= -TOLERANCE).all())

@@ -16,11 +16,11 @@ import numpy as np
 
 from ...checks import Array
 from ..problem import (
-    BUILDING,
+    CASADI_LOCK,
     HARD_SHARE,
-    Budget,
-    Evaluator,
-    Numbers,
+    PlanEvaluation,
+    PlanEvaluator,
+    TimeBudget,
     build_problem,
     remaining_distance,
 )
@@ -56,21 +56,21 @@ class Ipopt:
     """The hard and the relaxed problem, by IPOPT."""
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        self.settings, self.budget, self.late = settings, Budget(settings.time_limit), False
-        self.evaluate = Evaluator(settings, n_people, n_walls)
+        self.settings, self.budget, self.timed_out = settings, TimeBudget(settings.time_limit), False
+        self.evaluate = PlanEvaluator(settings, n_people, n_walls)
         key = (settings, n_people, n_walls)
         solvers = _borrow(key)
         weakref.finalize(self, _give_back, key, solvers).atexit = False
         self._hard, self._relaxed, self._n_terminal = solvers
         self.remembered = np.zeros(0)
 
-    def hard(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
+    def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan, and whether IPOPT says that it converged."""
         a_max, upper = self.settings.a_max, self._row_bounds()
         found = self._hard(x0=guess, p=parameters, lbx=-a_max, ubx=a_max, lbg=0, ubg=upper)
         return self.evaluate(self._inputs(found), parameters), self._succeeded(self._hard)
 
-    def relaxed(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The same for the problem with penalised slack."""
         s = self.settings
         rows = self.evaluate(guess, parameters).rows
@@ -92,7 +92,7 @@ class Ipopt:
 
     def _succeeded(self, solver: Any) -> bool:
         stats = solver.stats()
-        self.late = stats["return_status"] == _OUT_OF_TIME
+        self.timed_out = stats["return_status"] == _OUT_OF_TIME
         return bool(stats["success"])
 
     def _row_bounds(self) -> Array:
@@ -106,7 +106,7 @@ class Ipopt:
 
 def _borrow(key: _Key) -> _Solvers:
     """Solvers that nobody else has: idle ones, or else new ones."""
-    with BUILDING:
+    with CASADI_LOCK:
         for _ in range(len(_idle)):
             known, solvers = _idle.popleft()
             if known == key:
@@ -116,7 +116,7 @@ def _borrow(key: _Key) -> _Solvers:
 
 
 def _give_back(key: _Key, solvers: _Solvers) -> None:
-    with BUILDING:
+    with CASADI_LOCK:
         _idle.append((key, solvers))
 
 

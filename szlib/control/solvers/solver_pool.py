@@ -1,12 +1,13 @@
-"""Solvers for any number of people and walls: some sizes are built before they are needed, for all others.
+"""A pool of solvers for different numbers of people and walls.
 
-A slot that is not taken holds a zone, or a wall, far away, and of a size so far below zero that its h is
-`UNFELT` or more in every state: its rows never bind, and their multipliers stay zero. So the solution is that
-of the problem without the slot, and which sizes have been built so far changes nothing but the time.
+Solvers exist for some sizes only. An unused slot of a solver holds a zone or a wall far away, with a size so
+far below zero that its h is at least `INACTIVE_H` in every state. Its rows never bind, and their multipliers
+stay zero. So the solution is that of the problem without the slot, and the sizes that exist change nothing
+but the time.
 
-To build a size takes as long as a hundred steps. So a controller builds some when it is made, and the next
-one, in a thread of its own, from when half of its slots are taken. A size that is not there by the time it is
-needed is built in place.
+Building a size takes as long as a hundred steps. So a controller builds some sizes when it is made, and the
+next one in a background thread as soon as half of its slots are used. A size that is missing when it is
+needed is built at once.
 """
 
 from __future__ import annotations
@@ -20,95 +21,105 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..problem import BUILDING, Budget, ProblemSolver
+from ..problem import CASADI_LOCK, ProblemSolver, TimeBudget
 from ..settings import MPCSettings
 from .ipopt import Ipopt
 from .sqp import Sqp
 
 _log = logging.getLogger("szlib")
 
-READY = 8
-"""How many people a controller is ready for, unless it is told (assumed)."""
-UNFELT = 1e9
-"""h of an empty slot, at least [m]."""
+DEFAULT_MAX_PEOPLE = 8
+"""Number of people for whom solvers are built by default (assumed)."""
+INACTIVE_H = 1e9
+"""Smallest h of an unused slot [m]."""
 _AWAY = 1e6
-"""How far from the robot it is put [m]: a distance has a gradient there, of length 1."""
+"""Distance of an unused slot from the robot [m]: its distance has a gradient there, of length 1."""
 
 
-def rounded(n: int) -> int:
-    """The size for so many: 0, 1, 2, 3, 4, 6, 8, 12, ..., so that at most a third of the slots is empty."""
+def round_up_size(n: int) -> int:
+    """Smallest size for `n` people or walls: 0, 1, 2, 3, 4, 6, 8, 12, ...; at most a third is unused."""
     power = 1 << (n - 1).bit_length() if n else 0
     return power - power // 4 if n <= power - power // 4 else power
 
 
-def up_to(largest: int) -> Iterator[int]:
-    """Every size up to this one."""
+def list_sizes(largest: int) -> Iterator[int]:
+    """Every size up to `largest`."""
     size = 0
     while size <= largest:
         yield size
-        size = rounded(size + 1)
+        size = round_up_size(size + 1)
 
 
-class Sizes:
-    """The solvers of one controller, by how many people and walls there are.
+class SolverPool:
+    """The solvers of one controller, one for each size.
 
     Parameters
     ----------
     settings : of the controller.
-    max_people : how many people to be ready for; None: `READY`, and more of them ahead of the need.
-    n_walls : how many walls there are, at first.
+    max_people : number of people to prepare for; None: `DEFAULT_MAX_PEOPLE`, and more before they are needed.
+    n_walls : number of walls at the start.
     """
 
     def __init__(self, settings: MPCSettings, max_people: int | None, n_walls: int) -> None:
-        self.settings, self.budget = settings, Budget(settings.time_limit)
-        self.ready, self._grows = rounded(READY if max_people is None else max_people), max_people is None
+        self.settings, self.budget = settings, TimeBudget(settings.time_limit)
+        self.max_people, self._grows = (
+            round_up_size(DEFAULT_MAX_PEOPLE if max_people is None else max_people),
+            max_people is None,
+        )
         self._solvers: dict[tuple[int, int], ProblemSolver] = {}
-        self._begun = {(self.ready, rounded(n_walls))}
+        self._begun = {(self.max_people, round_up_size(n_walls))}
         self._builder: Thread | None = None
-        self._build(self.ready, rounded(n_walls))
+        self._build(self.max_people, round_up_size(n_walls))
 
-    def of(self, n_people: int, n_walls: int) -> ProblemSolver:
-        """The solver for so many people and walls; it has `Evaluator.size` slots for them."""
-        people, walls = size = rounded(n_people), rounded(n_walls)
-        if people > self.ready:
-            _log.info("the controller was built for %d people and now grows to %d", self.ready, people)
-            self.ready, self._grows = people, True
+    def get(self, n_people: int, n_walls: int) -> ProblemSolver:
+        """Get the solver for `n_people` and `n_walls`; it has `PlanEvaluator.size` slots for them."""
+        people, walls = size = round_up_size(n_people), round_up_size(n_walls)
+        if people > self.max_people:
+            _log.info("the controller was built for %d people and now grows to %d", self.max_people, people)
+            self.max_people, self._grows = people, True
         if size not in self._solvers:
             self._add(people, walls)
         if self._builder is None or not self._builder.is_alive():
-            if self._grows and 2 * n_people >= self.ready:
-                self.ready *= 2
-            if (self.ready, walls) not in self._begun:
-                self._begun.add((self.ready, walls))
-                self._builder = Thread(target=self._build, args=(self.ready, walls), name="szlib sizes")
+            if self._grows and 2 * n_people >= self.max_people:
+                self.max_people *= 2
+            if (self.max_people, walls) not in self._begun:
+                self._begun.add((self.max_people, walls))
+                self._builder = Thread(
+                    target=self._build, args=(self.max_people, walls), name="szlib solver pool"
+                )
                 self._builder.start()
         return self._solvers[size]
 
     def __getstate__(self) -> dict[str, Any]:
         remembered = {size: solver.remembered.copy() for size, solver in list(self._solvers.items())}
-        return {"settings": self.settings, "ready": self.ready, "grows": self._grows, "solvers": remembered}
+        return {
+            "settings": self.settings,
+            "max_people": self.max_people,
+            "grows": self._grows,
+            "solvers": remembered,
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Build the same sizes, which remember the same."""
+        """Build the same sizes, with the same multipliers."""
         self.__init__(state["settings"], 0, 0)  # type: ignore[misc]
-        self.ready, self._grows = state["ready"], state["grows"]
+        self.max_people, self._grows = state["max_people"], state["grows"]
         for size, remembered in state["solvers"].items():
             self._add(*size)
             self._solvers[size].remembered = remembered
 
     def reset(self) -> None:
-        """Let every solver forget what it remembers from call to call."""
+        """Let every solver forget its multipliers."""
         for solver in list(self._solvers.values()):
             solver.reset()
 
     def _build(self, largest: int, walls: int) -> None:
         """Every size up to the largest number of people."""
-        for people in up_to(largest):
+        for people in list_sizes(largest):
             self._add(people, walls)
 
     def _add(self, people: int, walls: int) -> None:
-        """One size, unless it is there already: who comes second waits for who came first."""
-        with BUILDING:
+        """Build one size unless it exists; a second thread waits for the first."""
+        with CASADI_LOCK:
             if (people, walls) not in self._solvers:
                 solver = _solver(self.settings, people, walls)
                 solver.budget = self.budget
@@ -119,30 +130,35 @@ def _solver(settings: MPCSettings, n_people: int, n_walls: int) -> ProblemSolver
     return (Sqp if settings.solver == "sqp" else Ipopt)(settings, n_people, n_walls)
 
 
-def slots(
+def padded_parameters(
     x: Sequence[float],
     zones: Sequence[Sequence[float]],
     walls: Sequence[Sequence[float]],
     size: tuple[int, int],
 ) -> list[float]:
-    """Zones (7 numbers each) and walls (5) as in `Problem.parameters`, with empty slots up to `size`.
+    """Parameters of zones and walls as in `Problem.parameters`, with unused slots up to the size.
 
-    `x` is the state of the robot, (x, y, vx, vy) [m, m/s]; the walls come one after another.
+    Parameters
+    ----------
+    x : state of the robot, (x, y, vx, vy) [m, m/s].
+    zones : 7 numbers each, as `PlacedZone`.
+    walls : 5 numbers each: end points and margin [m].
+    size : number of people and of walls of the solver.
     """
-    there, y = x[0] + _AWAY, x[1]
-    numbers: list[float] = []
+    away, y = x[0] + _AWAY, x[1]
+    parameters: list[float] = []
     for zone in zones:
-        numbers += zone
-    numbers += (size[0] - len(zones)) * (there, y, there, y, -UNFELT, 0.0, 0.0)
+        parameters += zone
+    parameters += (size[0] - len(zones)) * (away, y, away, y, -INACTIVE_H, 0.0, 0.0)
     for wall in walls:
-        numbers += wall
-    numbers += (size[1] - len(walls)) * (there, y, there, y + 1.0, -UNFELT)
-    return numbers
+        parameters += wall
+    parameters += (size[1] - len(walls)) * (away, y, away, y + 1.0, -INACTIVE_H)
+    return parameters
 
 
 @lru_cache
-def taken(n_people: int, n_walls: int, size: tuple[int, int]) -> slice | NDArray[np.intp]:
-    """Which rows of people and walls are those of slots that are taken."""
+def active_rows(n_people: int, n_walls: int, size: tuple[int, int]) -> slice | NDArray[np.intp]:
+    """Rows of `n_people` and `n_walls` among the slots of a solver of this `size`."""
     if n_people == size[0] or n_walls == 0:
         return slice(n_people + n_walls)
     return np.array([*range(n_people), *range(size[0], size[0] + n_walls)])

@@ -25,11 +25,11 @@ import daqp
 import numpy as np
 
 from ...checks import Array
-from ..problem import BUILDING, HARD_SHARE, Budget, Buffered, Evaluator, Numbers
+from ..problem import CASADI_LOCK, HARD_SHARE, BufferedFunction, PlanEvaluation, PlanEvaluator, TimeBudget
 from ..settings import MPCSettings
-from .sqp_functions import Program, build_program
+from .sqp_functions import SqpFunctions, build_sqp_functions
 
-Outcome = Literal["converged", "stalled", "late", "failed"]
+Outcome = Literal["converged", "stalled", "timed out", "failed"]
 CONVERGED = {True: 1e-2, False: 1e-5}
 """The last step of the SQP moves no input by more than this [m/s2]: with the exact Hessian, when the
 error is of the order of its square, and without."""
@@ -53,20 +53,20 @@ class Sqp:
     """The hard problem and the relaxed one, by SQP; it remembers multipliers from call to call."""
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        self.settings, self.budget, self.late = settings, Budget(settings.time_limit), False
-        self.evaluate = Evaluator(settings, n_people, n_walls)
-        with BUILDING:
-            self._allocate(build_program(settings, n_people, n_walls))
+        self.settings, self.budget, self.timed_out = settings, TimeBudget(settings.time_limit), False
+        self.evaluate = PlanEvaluator(settings, n_people, n_walls)
+        with CASADI_LOCK:
+            self._allocate(build_sqp_functions(settings, n_people, n_walls))
 
-    def _allocate(self, of: Program) -> None:
+    def _allocate(self, of: SqpFunctions) -> None:
         """Memory for the functions and for the program."""
         n, m, n_rows = of.derive.nnz_in(0), of.derive.nnz_in(2), self.evaluate.n_rows
         self._inputs, self._step, self._share = np.zeros(n), np.zeros(n), np.ones(1)
         self._parameters, self._multipliers = np.zeros(of.derive.nnz_in(1)), np.zeros(m)
         arguments = self._inputs, self._parameters, self._multipliers
-        self._derive = Buffered(of.derive, *arguments)
-        self._measure = Buffered(of.measure, *arguments, self._step, self._share)
-        self._free = None if of.free is None else Buffered(of.free, self._parameters)
+        self._derive = BufferedFunction(of.derive, *arguments)
+        self._measure = BufferedFunction(of.measure, *arguments, self._step, self._share)
+        self._free = None if of.free is None else BufferedFunction(of.free, self._parameters)
         self._before, self._lower, self._upper, gradient, jacobian, exact, gauss = self._derive.results
         self._after, self._trial, self._values, states, h = self._measure.results
         self._jacobian = jacobian.reshape(m, n)
@@ -95,12 +95,12 @@ class Sqp:
         self._multipliers[:], self._held = 0, False
         self._model.update(sense=self._sense)
 
-    def hard(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
+    def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan, and whether it converged; if rows stay violated, to that of the relaxed problem."""
         outcome = self._solve(guess, parameters, HARD_SHARE)
         return self._plan(), outcome == "converged"
 
-    def relaxed(self, guess: Array, parameters: Array) -> tuple[Numbers, bool]:
+    def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The same, where it is enough that no step lowers the merit any more."""
         outcome = self._solve(guess, parameters, 1.0)
         return self._plan(), outcome in ("converged", "stalled")
@@ -117,13 +117,13 @@ class Sqp:
                 self.reset()
             if outcome != "converged":
                 self._stay()
-        self.late = outcome == "late"
+        self.timed_out = outcome == "timed out"
         return outcome
 
-    def _plan(self) -> Numbers:
+    def _plan(self) -> PlanEvaluation:
         """What stands in the buffers."""
         cost, slack = self._after[2:4].tolist()
-        return Numbers(cost, slack, *[array.copy() for array in self._found])
+        return PlanEvaluation(cost, slack, *[array.copy() for array in self._found])
 
     def _is_free(self) -> bool:
         """True if the minimum of the cost alone satisfies everything; then it is the plan."""
@@ -141,8 +141,8 @@ class Sqp:
         """Improve `_inputs`, within this share of the budget; no price goes above the weight of slack."""
         price, rises, least, limit = 0.0, 0, (0.0, 0.0), self.settings.slack_weight
         for _ in range(self.settings.max_iterations):
-            if self.budget.spent(share):
-                return "late"
+            if self.budget.is_spent(share):
+                return "timed out"
             exact = self._linearise()
             step, _, flag, info = self._model.solve()
             if flag < 0:

@@ -24,7 +24,7 @@ from ..problem import Problem, build_problem, function, remaining_distance
 from ..settings import MPCSettings
 
 
-class Program(NamedTuple):
+class SqpFunctions(NamedTuple):
     """Three functions of CasADi; the scaled cost is that for each metre to the target, at least one.
 
     derive : (inputs, parameters, multipliers) -> (scaled cost, violation, largest multiplier of a row, of a
@@ -43,7 +43,7 @@ class Program(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def build_program(settings: MPCSettings, n_people: int, n_walls: int) -> Program:
+def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> SqpFunctions:
     """Write down the functions; once for each size and settings."""
     p, s = build_problem(settings, n_people, n_walls), settings
     u, n_rows, scale = (
@@ -81,13 +81,13 @@ def build_program(settings: MPCSettings, n_people: int, n_walls: int) -> Program
     merit = ca.vertcat(*totals, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
     measure = function("measure", [*arguments, step, share], [merit, trial, values, states, h])
     if p.terminal.numel():
-        return Program(derive, measure, None)
+        return SqpFunctions(derive, measure, None)
     given = p.parameters[:6]
     to_inputs, to_given = (ca.evalf(ca.jacobian(gradient, by)) for by in (u, given))
     least = -ca.solve(to_inputs, to_given) @ given
     beyond = ca.sum1(ca.fmax(0, ca.fabs(least) - s.a_max))
     free = function("unbound", [p.parameters], [least, beyond + there(least, p.parameters)[1]])
-    return Program(derive, measure, free)
+    return SqpFunctions(derive, measure, free)
 
 
 def _jacobian(p: Problem, s: MPCSettings, to_position: Any, to_velocity: Any) -> Any:
