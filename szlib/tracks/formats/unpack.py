@@ -29,17 +29,22 @@ def unpacked(path: Path) -> Iterator[Path]:
     if printable(path.name) != path.name:
         raise DataError(f"{printable(path)}: its name is no readable text (UTF-8); rename the file")
     try:
-        with path.open("rb") as stream:
-            packed = stream.read(2) == b"\x1f\x8b"
+        is_packed = _is_packed(path)
     except OSError as error:
         raise DataError(f"{path}: cannot be opened ({error})") from error
-    if not packed:
+    if not is_packed:
         yield path
         return
     with temporary_folder() as folder:
         unpacked = folder / "unpacked"
         _unpack(path, unpacked)
         yield unpacked
+
+
+def _is_packed(path: Path) -> bool:
+    """Whether a file is gzipped."""
+    with path.open("rb") as stream:
+        return stream.read(2) == b"\x1f\x8b"
 
 
 def _unpack(path: Path, unpacked: Path) -> None:
@@ -79,9 +84,7 @@ def require_memory(plain: Path, path: Path) -> None:
 def read_first_line(path: Path) -> bytes:
     """The first line of file `path`, plain or .gz; empty where it cannot be read."""
     try:
-        with path.open("rb") as stream:
-            packed = stream.read(2) == b"\x1f\x8b"
-        with gzip.open(path) if packed else path.open("rb") as stream:
+        with gzip.open(path) if _is_packed(path) else path.open("rb") as stream:
             return stream.readline(LONGEST_LINE)
     except (OSError, EOFError, zlib.error):
         return b""

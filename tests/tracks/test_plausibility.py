@@ -1,4 +1,4 @@
-"""What people can do says what is wrong with a table: units, times, columns, degrees."""
+"""Implausible tracks are refused with the probable reason: unit, time, columns, degrees."""
 
 from __future__ import annotations
 
@@ -45,30 +45,30 @@ SPOILED = {
 }
 
 
-@pytest.mark.parametrize("told", SPOILED)
-def test_what_is_wrong_is_told(told: str) -> None:
-    with pytest.raises(szlib.DataError, match=re.escape(told)):
-        read_raw(SPOILED[told]())
+@pytest.mark.parametrize("message", SPOILED)
+def test_the_error_suggests_what_was_misread(message: str) -> None:
+    with pytest.raises(szlib.DataError, match=re.escape(message)):
+        read_raw(SPOILED[message]())
 
 
-@pytest.mark.parametrize("told", [t for t in SPOILED if "pass unit" in t or "columns=" in t])
-def test_the_advice_helps(told: str) -> None:
+@pytest.mark.parametrize("message", [t for t in SPOILED if "pass unit" in t or "columns=" in t])
+def test_the_suggested_options_give_the_right_table(message: str) -> None:
     with pytest.raises(szlib.DataError) as error:
-        read_raw(SPOILED[told]())
+        read_raw(SPOILED[message]())
     advice = re.search(r"pass (unit|columns)=('\w+'|\{.*?\})", str(error.value))
     options = {advice[1]: eval(advice[2])}
     pd.testing.assert_frame_equal(
-        read_raw(SPOILED[told](), options=szlib.ReadOptions(**options)), read_raw(table())
+        read_raw(SPOILED[message](), options=szlib.ReadOptions(**options)), read_raw(table())
     )
 
 
-def test_the_advice_for_frames_helps() -> None:
+def test_the_suggestion_for_frames_gives_the_right_table() -> None:
     read = szlib.read_tracks(frames(), columns={"frame": "t"}, frame_rate=RATE)
     right = szlib.read_tracks(table())
     pd.testing.assert_frame_equal(read, right)
 
 
-def test_the_same_is_told_of_files(tmp_path: Path) -> None:
+def test_implausible_files_are_refused_like_tables(tmp_path: Path) -> None:
     spoiled = SPOILED["centimetres: pass unit='cm'"]()
     spoiled.to_csv(tmp_path / "hall.csv", index=False)
     with pytest.raises(szlib.DataError, match=r"hall\.csv: people move at .* m/s .* pass unit='cm'"):
@@ -79,7 +79,7 @@ def test_the_same_is_told_of_files(tmp_path: Path) -> None:
         read_raw(without)
 
 
-def test_fields_without_names_are_told_by_number(tmp_path: Path) -> None:
+def test_exchanged_columns_of_a_file_without_header_are_named_by_number(tmp_path: Path) -> None:
     wrong = table().assign(v=1.0, a=0.1)[["id", "t", "x", "y", "v", "a"]]
     wrong.to_csv(tmp_path / "a.csv", index=False, header=False)
     with pytest.raises(szlib.DataError, match="columns look exchanged") as error:
@@ -90,20 +90,20 @@ def test_fields_without_names_are_told_by_number(tmp_path: Path) -> None:
     pd.testing.assert_frame_equal(read.drop(columns="day"), read_raw(table()).drop(columns="day"))
 
 
-def test_who_insists_is_warned() -> None:
+def test_an_implausible_given_unit_warns() -> None:
     spoiled = SPOILED["centimetres: pass unit='cm'"]()
     with pytest.warns(szlib.DataWarning, match="people move at"):
         assert len(read_raw(spoiled, options=szlib.ReadOptions(unit="m"))) == len(spoiled)
 
 
-def test_people_who_stand_are_people() -> None:
+def test_a_table_of_standing_people_warns() -> None:
     crowd = make_tracks(*(make_walk((k, 0), (0.01, 0), person=k, duration=30) for k in range(9)))
     with pytest.warns(szlib.DataWarning, match="nobody walks"):
         read_raw(crowd[["t", "id", "x", "y"]])
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_good_tables_pass_in_silence(tmp_path: Path, seed: int) -> None:
+def test_plausible_tables_give_no_warning(tmp_path: Path, seed: int) -> None:
     read_raw(in_seconds(people(seed, count=30)))
     plaza = pd.read_csv(
         make_plaza(tmp_path / "plaza.csv", seed=seed, settings=PlazaSettings(n_encounters=60)), header=None
@@ -113,6 +113,6 @@ def test_good_tables_pass_in_silence(tmp_path: Path, seed: int) -> None:
     read_raw(standing)
 
 
-def test_real_data_passes_in_silence() -> None:
+def test_real_data_gives_no_warning() -> None:
     for file in sorted(real_data("atc-1hz").glob("*_test.csv")):
         read_raw(file)
