@@ -56,7 +56,7 @@ def samples():
 
 @pytest.fixture(scope="module")
 def zone(samples):
-    return szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1), resamples=20)
+    return szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1), n_resamples=20)
 
 
 @pytest.fixture(scope="module")
