@@ -107,21 +107,13 @@ class Movie(bytes):
         limits : x0, x1, y0, y1 of the scene [m].
         """
         movie = super().__new__(cls, gif)
-        rows = zip(
-            run.time.tolist(),
-            run.states,
-            run.people,
-            run.predicted,
-            run.h,
-            run.fallback.tolist(),
-            strict=True,
-        )
+        columns = run.time.tolist(), run.states, run.people, run.predicted, run.h, run.fallback.tolist()
         n = len(run.zones)
         movie.run = {
             "layout": scene_layout(run.scenario, run.settings, limits),
             "snapshots": [
                 snapshot(t, state, people, run.zones, plan, h, fallback)
-                for t, state, people, plan, h, fallback in rows
+                for t, state, people, plan, h, fallback in zip(*columns, strict=True)
             ],
             "alt": f"{run.scenario.title or run.scenario.name}: a robot and {n} "
             f"{'person' if n == 1 else 'people'}, {run.time[-1]:.1f} s",
