@@ -1,6 +1,15 @@
 """Is it true: a synthetic square whose people keep a known social zone.
 
-settings    the settings of the plaza, and the zone that its people keep: `PlazaSettings`
+settings    the settings of the plaza, and the true zone of its people: `PlazaSettings`
 generation  how its people walk, and what a sensor records of them: `make_plaza`
-accuracy    how precise a rule for outliers is, and how far a zone is from the true one
+accuracy    the precision of a rule for outliers, and the error of a zone
 """
+
+from .accuracy import largest_error, precision_and_recall, true_kinds
+from .generation import make_plaza, positions, stage_encounters
+from .settings import RUSHING_INTRUDERS, SLOW_INTRUDERS, PlazaSettings
+
+__all__ = [
+    "RUSHING_INTRUDERS", "SLOW_INTRUDERS", "PlazaSettings", "largest_error", "make_plaza", "positions",
+    "precision_and_recall", "stage_encounters", "true_kinds",
+]  # fmt: skip

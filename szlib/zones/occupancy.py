@@ -102,9 +102,9 @@ def pair_correlation(samples: pd.DataFrame, null: NullEncounters) -> PairCorrela
     Examples
     --------
     >>> import szlib
-    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=50))
+    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> tracks = szlib.read_tracks(path)
-    >>> null = szlib.null_encounters(tracks, shifts=3, progress=False)
+    >>> null = szlib.null_encounters(tracks, shifts=3, minutes=(0.5, 2.0), progress=False)
     >>> szlib.pair_correlation(szlib.find_encounters(tracks), null).g.shape
     (36, 80)
     """

@@ -173,10 +173,10 @@ def remove_outliers(
     Examples
     --------
     >>> import szlib
-    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100, intruders=0.05))
+    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> samples = szlib.find_encounters(szlib.read_tracks(path))
-    >>> inliers = szlib.remove_outliers(samples)
-    >>> inliers["distance"].min() > samples["distance"].min()
+    >>> inliers = szlib.remove_outliers(samples, fraction=0.002, r_max=2.0)
+    >>> len(inliers) < len(samples)
     True
     """
     if not 0 < r_max < np.inf:

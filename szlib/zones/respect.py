@@ -128,7 +128,7 @@ def fit_respect(
     >>> import szlib
     >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> tracks = szlib.read_tracks(path)
-    >>> null = szlib.null_encounters(tracks, shifts=3, progress=False)
+    >>> null = szlib.null_encounters(tracks, shifts=3, minutes=(0.5, 2.0), progress=False)
     >>> respect = szlib.fit_respect(szlib.find_encounters(tracks), null)
     >>> respect.radii([0.0, 3.14]).shape  # ahead and behind
     (2,)
@@ -176,7 +176,7 @@ def respect_boundary(
     >>> import szlib
     >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> tracks = szlib.read_tracks(path)
-    >>> null = szlib.null_encounters(tracks, shifts=3, progress=False)
+    >>> null = szlib.null_encounters(tracks, shifts=3, minutes=(0.5, 2.0), progress=False)
     >>> szlib.respect_boundary(szlib.find_encounters(tracks), null, [0.0, 1.57]).shape
     (2,)
     """
@@ -197,8 +197,8 @@ def respect_radius(
     >>> import szlib
     >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> tracks = szlib.read_tracks(path)
-    >>> null = szlib.null_encounters(tracks, shifts=3, progress=False)
-    >>> 0 < szlib.respect_radius(szlib.find_encounters(tracks), null) < 2
+    >>> null = szlib.null_encounters(tracks, shifts=3, minutes=(0.5, 2.0), progress=False)
+    >>> szlib.respect_radius(szlib.find_encounters(tracks), null) < null.r_max
     True
     """
     return float(fit_respect(samples, null, pool_directions=True).radii(0.0))

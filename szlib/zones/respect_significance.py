@@ -120,7 +120,7 @@ def null_test(
     >>> import szlib
     >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> tracks = szlib.read_tracks(path)
-    >>> null = szlib.null_encounters(tracks, shifts=3, progress=False)
+    >>> null = szlib.null_encounters(tracks, shifts=3, minutes=(0.5, 2.0), progress=False)
     >>> test = szlib.null_test(szlib.find_encounters(tracks), null, fit_null_radii=False)
     >>> test.p_value >= 0.25  # the smallest possible value with 3 shifts
     True

@@ -79,7 +79,7 @@ class SocialZone:
     Examples
     --------
     >>> import szlib
-    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=150))
+    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=300))
     >>> samples = szlib.find_encounters(szlib.read_tracks(path))
     >>> zone = szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=0)
     >>> 0.7 < zone.ellipse(1.1).semi_axes[1] < 1.0
@@ -167,7 +167,7 @@ class SocialZone:
         Examples
         --------
         >>> import szlib
-        >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=150))
+        >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=300))
         >>> samples = szlib.find_encounters(szlib.read_tracks(path))
         >>> zone = szlib.SocialZone.fit(samples, method="hull", fraction=0.002, speeds=[1.1], n_resamples=0)
         >>> zone.method, list(zone.ellipses)
