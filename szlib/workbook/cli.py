@@ -253,12 +253,10 @@ def _extract(options: argparse.Namespace) -> int:
 
 
 def _area_text(options: argparse.Namespace) -> str:
-    """The area of the options as text: "" for the area of the data, "auto", numbers or a polygon."""
-    if options.auto or not (options.area or options.polygon):
-        return "auto" if options.auto else ""
-    from ..encounters.areas import as_area
-
-    return str(as_area(options.area or Path(options.polygon)))
+    """The area of the options as text: "" for the default of the data, "auto", four numbers or a file."""
+    if options.auto:
+        return "auto"
+    return " ".join(map(str, options.area)) if options.area else options.polygon or ""
 
 
 def _require_workbook_packages() -> None:

@@ -90,8 +90,8 @@ def claim_results(
     purpose = f"results of {source if isinstance(source, str) else ', '.join(source)}"
     if parameters:
         purpose += f" with {json.dumps(parameters, sort_keys=True)}"
-    claim_folder(results, PURPOSE)
     folder = Path(results) / datasets.label(data)
+    claim_folder(results, PURPOSE)
     if parameters or folder_purpose(folder) not in (None, purpose):
         folder = folder.with_name(f"{folder.name}-{hashlib.sha256(purpose.encode()).hexdigest()[:8]}")
     return claim_folder(folder, purpose, inputs=inputs)

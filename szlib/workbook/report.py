@@ -109,24 +109,41 @@ class _Exporter(HTMLExporter):
 
 def make_front_page(home: Path, notebooks: Notebooks) -> Iterator[Any]:
     """Yield the cells of the front page, made from the results in `home` and the executed `notebooks`."""
+    zone, funnel = _load_results(home)
     summary, run = _read_json(home / "summary.json"), _read_json(home / "parameters.json")
     outcomes: dict[str, Any] = summary.get("notebooks", {})
-    data = "the synthetic plaza" if run.get("data") == datasets.SYNTHETIC else summary.get("data", home.name)
-    yield _markdown(f"# Results for {data}")
+    is_synthetic = run.get("data") == datasets.SYNTHETIC
+    yield _markdown(
+        f"# Results for {'the synthetic plaza' if is_synthetic else summary.get('data', home.name)}"
+    )
     yield from _describe_run(home, run, outcomes)
     yield _markdown("## The notebooks")
     yield _table(_list_notebooks(notebooks, outcomes))
     yield _markdown("## From rows to encounters")
-    yield _show_funnel(home / "encounters.parquet")
+    yield _table(funnel)
     yield _markdown("## The social zone")
-    yield from _show_zone(home / "zone.json", is_synthetic=run.get("data") == datasets.SYNTHETIC)
+    yield from _show_zone(zone, is_synthetic=is_synthetic) if zone else [_markdown(_NOT_IN_RUN)]
     yield _markdown("## Claims of the paper, measured")
-    yield _list_claims(outcomes)
+    yield _table(_list_claims(outcomes))
     yield _markdown("## The four scenarios")
     outputs = {name: list(_html_outputs(notebook)) for name, notebook in notebooks.items()}
     yield from _show_scenarios(outputs)
     yield _markdown("## Parameters and their sources")
-    yield _list_parameters(outputs)
+    yield _table(_list_parameters(outputs))
+
+
+def _load_results(home: Path) -> tuple[SocialZone | None, pd.DataFrame]:
+    """The zone if there is one, and the funnel of the encounters with each stage named once."""
+    try:
+        zone = SocialZone.load(home / "zone.json")
+    except (OSError, ZoneError):
+        zone = None
+    if not (home / "encounters.parquet").exists():
+        return zone, pd.DataFrame()
+    funnel = funnels.table(funnels.get(pd.read_parquet(home / "encounters.parquet")))
+    funnel["stage"] = funnel["stage"].where(~funnel["stage"].duplicated(), "")
+    funnel["rows"] = [f"{rows:,}" for rows in funnel["rows"]]
+    return zone, funnel
 
 
 def _describe_run(home: Path, run: Mapping[str, Any], outcomes: Mapping[str, Any]) -> Iterator[Any]:
@@ -169,21 +186,7 @@ def _list_notebooks(notebooks: Notebooks, outcomes: Mapping[str, Any]) -> pd.Dat
     return pd.DataFrame(rows, columns=["notebook", "question", "checks", "seconds", "status"])
 
 
-def _show_funnel(file: Path) -> Any:
-    if not file.exists():
-        return _markdown(_NOT_IN_RUN)
-    table = funnels.table(funnels.get(pd.read_parquet(file)))
-    table["stage"] = table["stage"].where(~table["stage"].duplicated(), "")
-    table["rows"] = [f"{rows:,}" for rows in table["rows"]]
-    return _table(table)
-
-
-def _show_zone(file: Path, *, is_synthetic: bool) -> Iterator[Any]:
-    try:
-        zone = SocialZone.load(file)
-    except (OSError, ZoneError):
-        yield _markdown(_NOT_IN_RUN)
-        return
+def _show_zone(zone: SocialZone, *, is_synthetic: bool) -> Iterator[Any]:
     speed = MPCSettings().zone_speed
     if speed in zone.ellipses:
         yield _draw_zone(zone, speed, PlazaSettings().true_zone(speed) if is_synthetic else None)
@@ -207,14 +210,14 @@ def _draw_zone(zone: SocialZone, speed: float, truth: Any) -> Any:
     return _html(f'<img src="data:image/png;base64,{b64encode(content.getvalue()).decode()}" alt="{alt}">')
 
 
-def _list_claims(outcomes: Mapping[str, Any]) -> Any:
+def _list_claims(outcomes: Mapping[str, Any]) -> pd.DataFrame:
     rows = [
         (_short_link(name), *(escape(format_value(c[key])) for key in ("name", "result", "value")))
         for name, outcome in outcomes.items()
         for c in outcome["checks"]
         if c["kind"] == "claim"
     ]
-    return _table(pd.DataFrame(rows, columns=["notebook", "claim", "verdict", "effect, or value"]))
+    return pd.DataFrame(rows, columns=["notebook", "claim", "verdict", "effect, or value"])
 
 
 def _show_scenarios(outputs: Mapping[str, list[str]]) -> Iterator[Any]:
@@ -226,7 +229,7 @@ def _show_scenarios(outputs: Mapping[str, list[str]]) -> Iterator[Any]:
             yield _html(player)
 
 
-def _list_parameters(outputs: Mapping[str, list[str]]) -> Any:
+def _list_parameters(outputs: Mapping[str, list[str]]) -> pd.DataFrame:
     """The tables of parameters (`szlib.workbook.record.parameters`) of all notebooks as one."""
     columns = ["parameter", "value", "badge", "why"]
     rows = []
@@ -237,7 +240,7 @@ def _list_parameters(outputs: Mapping[str, list[str]]) -> Any:
                 rows += [
                     (_short_link(name), *(escape(td.get_text(strip=True)) for td in row)) for row in cells
                 ]
-    return _table(pd.DataFrame(rows, columns=["notebook", *columns]).drop_duplicates(columns))
+    return pd.DataFrame(rows, columns=["notebook", *columns]).drop_duplicates(columns)
 
 
 def _short_link(name: str) -> str:

@@ -17,7 +17,6 @@ from typing import Any
 from tqdm import tqdm
 
 from .. import __version__, memory
-from ..encounters.areas import AUTO, as_area
 from ..errors import DataError
 from ..files import file_content, folder_lock, write_file
 from ..parallel import cluster, limit_jobs
@@ -69,31 +68,24 @@ def run(
     StorageError : the results cannot be written, or another run writes to the same folder.
     """
     scripts = choose_notebooks(only)
+    names = [script.stem for script in scripts]
     known = sorted({*scripts, *(s for s in folders.list_notebooks() if s.stem[:2] <= PRODUCERS[-1])})
     given = check_parameters(parameters or {}, known)
-    if given.get("area", AUTO) != AUTO:  # the same text for each way to give an area
-        given["area"] = str(as_area(given["area"]))
     data = folders.absolute_data(data)
-    results = folders.results_root(out)
+    jobs, label = max(limit_jobs(jobs, len(scripts)), 1), datasets.label(data)
     files = [] if data == datasets.SYNTHETIC else datasets.find(data)
+    results = folders.results_root(out)
     home = folders.claim_results(results, data, given, inputs=files)
     with folder_lock(home):
-        names = [script.stem for script in scripts]
-        files = files or DataCache(home, data, seed=given.get("seed", 0)).files()
-        source = {
-            "szlib": __version__,
-            "data": datasets.label(data),
-            "files": [[file.name, *file_content(file)] for file in files],
-            "parameters": dict(given),
-        }
-        earlier = _start_summary(home, source, names)
         folders.remove_outputs(home, names)
-        outcomes = _execute_all(
-            scripts, given | {"data": data, "results": str(results)}, home, jobs, scheduler
-        )
-        everything = _summarise(source, {**earlier, **outcomes})
+        files = files or DataCache(home, data, seed=given.get("seed", 0)).files()
+        contents = [[file.name, *file_content(file)] for file in files]
+        source = {"szlib": __version__, "data": label, "files": contents, "parameters": dict(given)}
+        earlier = _start_summary(home, source, names)
+        given |= {"data": data, "results": str(results)}
+        outcomes = _execute_all(scripts, given, home, jobs, scheduler)
+        summary, everything = (_summarise(source, each) for each in (outcomes, {**earlier, **outcomes}))
         write_file(home / SUMMARY, json.dumps(everything, indent=1))
-        summary = _summarise(source, outcomes)
         if any((home / f"{name}.ipynb").exists() for name in everything["notebooks"]):
             from .report import write_report  # importing it takes longer than all other imports
 
@@ -123,7 +115,6 @@ def _execute_all(
     scripts: Sequence[Path], given: Mapping[str, Any], home: Path, jobs: int, scheduler: str | None
 ) -> dict[str, dict[str, Any]]:
     """Execute the notebooks; the outcome of each by its name, in their order."""
-    jobs = max(limit_jobs(jobs, len(scripts)), 1)
     environment = {folders.RUN_VARIABLE: str(home)}
     if not scheduler:
         threads = max(1, (os.cpu_count() or 1) // jobs)
@@ -133,7 +124,7 @@ def _execute_all(
         }
     not_started = {"status": NOT_STARTED, "seconds": 0.0, **EMPTY_RECORD}
     outcomes = {script.stem: not_started for script in scripts}
-    bar = tqdm(total=len(scripts), unit="notebook", desc=datasets.label(given["data"]))
+    bar = tqdm(total=len(scripts), unit="notebook", desc=home.name)
     with bar, cluster(scheduler) as client, _open_executor(client, jobs) as executor:
         for batch in split_batches(scripts):
             if any(outcome["status"] == "refused" for outcome in outcomes.values()):

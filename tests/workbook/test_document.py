@@ -102,9 +102,9 @@ def test_the_run_is_on_the_front_page_and_in_its_notebook_with_its_data(page, mo
     script = page.select("figure.szlib-player + script")[0].text
     run = json.loads(re.search(r"const run = (.*);\n", script)[1])
     assert run == json.loads(json.dumps(movie.run))
-    assert len(run["moments"]) == 11
-    assert run["moments"][0]["robot"] == [-4, 0]
-    assert run["moments"][10]["people"] == [[3.5, 0, 3.142]]
+    assert len(run["snapshots"]) == 11
+    assert run["snapshots"][0]["robot"] == [-4, 0]
+    assert run["snapshots"][10]["people"] == [[3.5, 0, 3.142]]
 
 
 def test_code_is_there_but_folded(page):

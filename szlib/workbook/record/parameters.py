@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ...control.settings import MPCSettings
+from ...encounters.areas import AUTO, as_area
 from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
 from ...encounters.settings import EncounterSettings
 from ...errors import DataError, SolverError
@@ -99,12 +100,14 @@ def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dic
 
     Returns
     -------
-    The parameters that differ from the default of at least one of the notebooks.
+    The parameters that differ from the default of at least one of the notebooks; an area in one form of text.
 
     Raises
     ------
     DataError : a parameter is unknown to all notebooks, has another type, or is out of its range.
     """
+    if given.get("area") not in (None, "", AUTO):
+        given = {**given, "area": str(as_area(given["area"]))}
     defaults: dict[str, list[Any]] = {}
     for notebook in notebooks:
         for name, value in read_defaults(notebook).items():
