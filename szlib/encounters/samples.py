@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -40,10 +42,9 @@ def sample_windows(
 
 def no_samples() -> pd.DataFrame:
     """A table of samples, with their kind, without a row."""
-    types = dict.fromkeys(SAMPLE_COLUMNS, "float64") | dict.fromkeys(
-        ("encounter", "ref_id", "other_id"), "int64"
-    )
-    types |= {"day": "category", "kind": pd.CategoricalDtype(KINDS)}
+    types: dict[str, Any] = dict.fromkeys(SAMPLE_COLUMNS, "float64")
+    types |= dict.fromkeys(("encounter", "ref_id", "other_id"), "int64")
+    types |= {"day": "category", "kind": pd.CategoricalDtype(list(KINDS))}
     return pd.DataFrame(columns=list(types)).astype(types)
 
 
