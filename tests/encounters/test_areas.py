@@ -1,4 +1,4 @@
-"""Areas: one meaning in whatever form, wherever the world's axes are; and the area found by walkers."""
+"""Areas: all forms mean the same, the direction of the axes does not matter; and the area where people walk."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def geojson(shape: object, kind: str) -> str:
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("form", ["shapely", "wkt", "geometry", "feature", "collection", "text", "with z"])
-def test_every_form_is_the_same_area(tmp_path: Path, name: str, form: str) -> None:
+def test_all_forms_give_the_same_area(tmp_path: Path, name: str, form: str) -> None:
     shape = SHAPES[name]
     given = {
         "shapely": shape,
@@ -86,7 +86,7 @@ def test_four_numbers_are_a_square(given: object) -> None:
     assert szlib.as_area(given) == Square(x=(0, 12), y=(0, 8))
 
 
-def test_pedpys_areas_are_areas() -> None:
+def test_areas_of_pedpy_are_accepted() -> None:
     pedpy = pytest.importorskip("pedpy")
     assert szlib.as_area(pedpy.WalkableArea(HALL)) == Square(x=(0, 12), y=(0, 8))
     with_pillar = pedpy.WalkableArea(HALL.exterior.coords[:-1], obstacles=[PILLAR.interiors[0].coords[:-1]])
@@ -98,13 +98,13 @@ numbers = strategies.floats(-1e6, 1e6, allow_nan=False)
 
 
 @given(numbers, strategies.floats(1e-3, 1e6), numbers, strategies.floats(1e-3, 1e6))
-def test_the_text_of_a_square_gives_it_again(x: float, width: float, y: float, height: float) -> None:
+def test_text_of_a_square_round_trips(x: float, width: float, y: float, height: float) -> None:
     square = Square(x=(x, x + width), y=(y, y + height))
     assert szlib.as_area(str(square)) == square
 
 
 @given(strategies.floats(0, 7), numbers, numbers)
-def test_the_text_of_a_region_gives_it_again(angle: float, x: float, y: float) -> None:
+def test_text_of_a_region_round_trips(angle: float, x: float, y: float) -> None:
     area = szlib.as_area(turned(ELL, angle, (x, y)))
     assert szlib.as_area(str(area)) == area
 
@@ -125,21 +125,21 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize(("text", "told"), WRONG.items())
-def test_what_is_no_area_is_told(text: str, told: str) -> None:
-    with pytest.raises(szlib.DataError, match=told):
+@pytest.mark.parametrize(("text", "message"), WRONG.items())
+def test_invalid_text_raises(text: str, message: str) -> None:
+    with pytest.raises(szlib.DataError, match=message):
         szlib.as_area(text)
 
 
 @pytest.mark.parametrize(
     "given", [None, 3, [1, 2, 3], shapely.Point(1, 2), shapely.LineString([(0, 0), (1, 1)])]
 )
-def test_what_is_no_area_at_all_is_told(given: object) -> None:
+def test_objects_that_are_no_area_raise(given: object) -> None:
     with pytest.raises(szlib.DataError, match="area"):
         szlib.as_area(given)
 
 
-def test_a_file_that_is_no_area_is_named(tmp_path: Path) -> None:
+def test_error_names_a_file_that_is_no_area(tmp_path: Path) -> None:
     for content in (b"t,id,x,y\n1,2,3,4\n", b"", b"\xff\xfe\x00", b"POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))"):
         (tmp_path / "hall.wkt").write_bytes(content)
         with pytest.raises(szlib.DataError, match=r"hall\.wkt"):
@@ -153,7 +153,7 @@ def test_a_file_that_is_no_area_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("angle", [0.0, 0.7])
-def test_inside_is_where_matplotlib_says_so(name: str, angle: float) -> None:
+def test_contains_agrees_with_matplotlib(name: str, angle: float) -> None:
     shape = turned(SHAPES[name], angle)
     area = szlib.as_area(shape)
     x0, x1, y0, y1 = *area.box.x, *area.box.y
@@ -164,7 +164,7 @@ def test_inside_is_where_matplotlib_says_so(name: str, angle: float) -> None:
     np.testing.assert_array_equal(area.contains(x, y), crossings % 2 == 1)
 
 
-def test_the_border_is_inside_as_in_a_square() -> None:
+def test_border_is_inside() -> None:
     square, polygon = szlib.ATC_SQUARE, Region(ATC_POLYGON.wkt)
     ticks = np.r_[
         -18.5, -10, -7.5, 8, np.nextafter([-18.5, -7.5, 8, -10], 99), np.nextafter([-18.5, 8], -99), np.nan
@@ -174,7 +174,7 @@ def test_the_border_is_inside_as_in_a_square() -> None:
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_space_is_covered_where_every_point_of_it_is_inside(name: str) -> None:
+def test_covers_requires_every_point_inside(name: str) -> None:
     area = Region(SHAPES[name].wkt)
     rng = np.random.default_rng(1)
     n, unit = 400, np.linspace(0, 1, 41)
@@ -195,7 +195,7 @@ def test_a_space_is_covered_where_every_point_of_it_is_inside(name: str) -> None
 # --- encounters --------------------------------------------------------------------------------------
 
 
-def test_a_polygon_that_is_the_square_gives_the_identical_table() -> None:
+def test_square_given_as_polygon_gives_identical_encounters() -> None:
     pedpy = pytest.importorskip("pedpy")
     found = 0
     for seed in range(12):
@@ -212,7 +212,7 @@ def test_a_polygon_that_is_the_square_gives_the_identical_table() -> None:
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.0, 2.5, -2.0])
-def test_world_and_polygon_may_be_turned_by_any_angle(angle: float) -> None:
+def test_encounters_do_not_depend_on_the_direction_of_the_axes(angle: float) -> None:
     crowd = make_crowd(77, people=160, seconds=200, square=ROOM)
     for shape in (shapely.box(-20, -20, 20, 20), shapely.box(-20, -20, 20, 20) - shapely.box(-3, -3, 3, 3)):
         known = find_encounters(crowd, square=shape)
@@ -222,7 +222,7 @@ def test_world_and_polygon_may_be_turned_by_any_angle(angle: float) -> None:
         assert samples["kind"].tolist() == known["kind"].tolist()
 
 
-def test_nobody_is_watched_across_a_pillar() -> None:
+def test_no_encounter_where_the_space_holds_a_pillar() -> None:
     walks = make_walk((1, 5), (1.0, 0), duration=6), make_walk((9, 5), (-1.0, 0), person=2, duration=6)
     room, pillar = shapely.box(-5, 0, 15, 10), shapely.box(5.2, 5.5, 5.4, 5.7)
     assert find_encounters(make_tracks(*walks), square=room)["encounter"].nunique() == 2
@@ -232,7 +232,7 @@ def test_nobody_is_watched_across_a_pillar() -> None:
 @pytest.mark.parametrize(
     "shape", [ATC_POLYGON, turned(ATC_POLYGON, 0.3, (-4, 3)), ATC_POLYGON - shapely.box(-13, -1, -12, 0)]
 )
-def test_streaming_keeps_what_a_polygon_needs(tmp_path: Path, shape: object) -> None:
+def test_streaming_in_a_polygon_gives_the_encounters_of_the_whole_day(tmp_path: Path, shape: object) -> None:
     found = 0
     for seed in range(3):
         path = write_raw_day(tmp_path / "day.csv", make_raw_day(seed, wild=seed % 2 == 0))
@@ -240,7 +240,7 @@ def test_streaming_keeps_what_a_polygon_needs(tmp_path: Path, shape: object) -> 
     assert found > 0
 
 
-def test_the_null_model_takes_any_area() -> None:
+def test_null_model_accepts_any_area() -> None:
     crowd = make_crowd(7, people=60, seconds=600)
     options = {"shifts": 2, "minutes": (0.2, 2.0), "progress": False}
     expected = null_encounters(crowd, **options)
@@ -265,7 +265,7 @@ def best(walked: np.ndarray, side: int, loss: float) -> float:
 
 @pytest.mark.parametrize("loss", [math.inf, 2.0])
 @pytest.mark.parametrize("side", [1, 3])
-def test_the_largest_rectangle_is_the_best_of_all(loss: float, side: int) -> None:
+def test_largest_rectangle_is_the_best_of_all(loss: float, side: int) -> None:
     rng = np.random.default_rng(4)
     for _ in range(60):
         walked = rng.random(rng.integers(1, 9, 2)) < rng.choice([0.3, 0.7, 0.9])
@@ -276,7 +276,7 @@ def test_the_largest_rectangle_is_the_best_of_all(loss: float, side: int) -> Non
         assert worth == 0 or (share == block.mean() and min(block.shape) >= side)
 
 
-def test_a_hall_is_found_to_its_walls() -> None:
+def test_walked_area_reaches_the_walls_of_a_hall() -> None:
     found = szlib.walked_area(make_hall())
     assert shapely.box(found.x[0], found.y[0], found.x[1], found.y[1]).symmetric_difference(HALL).area < 8
     assert found == area_for(make_hall(), "auto")
@@ -284,7 +284,7 @@ def test_a_hall_is_found_to_its_walls() -> None:
     assert samples.attrs["area"] == str(found)
 
 
-def test_a_pillar_is_left_out() -> None:
+def test_walked_area_excludes_a_pillar() -> None:
     tracks = make_hall(people=2500, pillar=(14, 9, 16, 11), size=(30, 20))
     found = szlib.walked_area(tracks)
     around = shapely.box(found.x[0], found.y[0], found.x[1], found.y[1])
@@ -292,7 +292,7 @@ def test_a_pillar_is_left_out() -> None:
     assert around.area > 0.4 * 30 * 20
 
 
-def test_who_stands_who_jumps_and_what_they_are_called_changes_nothing() -> None:
+def test_walked_area_ignores_queues_jumps_and_ids() -> None:
     tracks = make_hall()
     found = szlib.walked_area(tracks)
     queue = [make_walk((-3 + 0.1 * k, 4), (0.05, 0), person=1000 + k) for k in range(20)]
@@ -305,7 +305,7 @@ def test_who_stands_who_jumps_and_what_they_are_called_changes_nothing() -> None
     )
 
 
-def test_the_area_moves_with_the_world() -> None:
+def test_walked_area_moves_and_turns_with_the_tracks() -> None:
     found = szlib.walked_area(make_hall())
     moved = szlib.walked_area(make_hall().assign(x=lambda t: t["x"] + 37.5, y=lambda t: t["y"] - 12))
     assert moved == Square(x=(found.x[0] + 37.5, found.x[1] + 37.5), y=(found.y[0] - 12, found.y[1] - 12))
@@ -313,14 +313,14 @@ def test_the_area_moves_with_the_world() -> None:
     assert turned_by_right_angle.area == pytest.approx(found.area, abs=8)
 
 
-def test_furniture_is_told() -> None:
+def test_walked_area_with_furniture_warns() -> None:
     tracks = make_hall(people=900, pillar=(5.2, 3.2, 6.8, 4.8))
     with pytest.warns(szlib.DataWarning, match="of the area found .* nobody walked"):
         found = szlib.walked_area(tracks)
     assert found.area > 60
 
 
-def test_where_there_is_no_area_it_is_told() -> None:
+def test_tracks_without_an_area_raise() -> None:
     with pytest.raises(szlib.DataError, match="nobody walks"):
         szlib.walked_area(make_tracks(make_walk((0, 0), (0.1, 0))))
     with pytest.raises(szlib.DataError, match="no area was found"):
@@ -329,7 +329,7 @@ def test_where_there_is_no_area_it_is_told() -> None:
         szlib.walked_area(make_hall(), n_people=0)
 
 
-def test_the_square_of_the_mall_is_found_again(real_tracks: pd.DataFrame) -> None:
+def test_walked_area_of_the_mall_is_its_open_square(real_tracks: pd.DataFrame) -> None:
     by_eye = Square(x=(-18.5, -7.5), y=(-11.5, 8.5))  # the largest rectangle free of pillars and walls
     found = szlib.walked_area(real_tracks)
     for ours, theirs in zip((*found.x, *found.y), (*by_eye.x, *by_eye.y), strict=True):

@@ -1,4 +1,4 @@
-"""Many days: whoever computes them, in whatever order, however often they are killed, the result is one."""
+"""Many days: the result does not depend on order, processes or interruptions."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def reference(days: list[Path], tmp_path_factory: pytest.TempPathFactory) -> dic
     return contents(out)
 
 
-def test_days_are_those_of_the_whole_table(days: list[Path], tmp_path: Path) -> None:
+def test_samples_of_days_equal_those_of_one_table(days: list[Path], tmp_path: Path) -> None:
     ours = extract(days, tmp_path / "out").samples()
     whole = szlib.find_encounters(szlib.read_tracks(days))
     pd.testing.assert_frame_equal(ours, whole, check_exact=True, check_categorical=False)
@@ -71,7 +71,7 @@ def test_days_are_those_of_the_whole_table(days: list[Path], tmp_path: Path) -> 
     assert kept == next(s["entered"] for s in funnels.get(ours) if s["stage"] == "near the area")
 
 
-def test_the_result_depends_neither_on_order_nor_on_processes_nor_on_blocks(
+def test_result_does_not_depend_on_order_processes_or_blocks(
     days: list[Path], reference: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     extract(days[::-1], tmp_path / "reversed")
@@ -88,7 +88,7 @@ def test_the_result_depends_neither_on_order_nor_on_processes_nor_on_blocks(
     assert zones[0].provenance == zones[1].provenance
 
 
-def test_what_is_there_is_kept_and_what_changed_is_done_again(days: list[Path], tmp_path: Path) -> None:
+def test_finished_days_are_kept_and_changed_days_computed_again(days: list[Path], tmp_path: Path) -> None:
     out, copies = tmp_path / "out", [tmp_path / day.name for day in days]
     for copy, day in zip(copies, days, strict=True):
         copy.write_bytes(day.read_bytes())
@@ -126,7 +126,7 @@ def test_days_that_fail_do_not_stop_the_others(days: list[Path], tmp_path: Path)
     assert list(done.samples()["day"].cat.categories) == list(DATES[:2])
 
 
-def test_pieces_of_one_day_are_one_day(days: list[Path], tmp_path: Path) -> None:
+def test_files_of_one_date_make_one_day(days: list[Path], tmp_path: Path) -> None:
     lines = days[0].read_text().splitlines(keepends=True)
     for part in range(2):  # as in the public 1 Hz day: people of one hour in several files
         (tmp_path / f"part{part}.csv").write_text("".join(lines[part::2]))
@@ -136,7 +136,7 @@ def test_pieces_of_one_day_are_one_day(days: list[Path], tmp_path: Path) -> None
     pd.testing.assert_frame_equal(pieces.samples(), whole, check_exact=True)
 
 
-def test_a_day_on_which_nobody_met(days: list[Path], tmp_path: Path) -> None:
+def test_day_without_encounters_gives_an_empty_table(days: list[Path], tmp_path: Path) -> None:
     far = extract(days[:2], tmp_path / "far", square=szlib.Square(x=(500, 520), y=(500, 520)))
     assert list(far.table["encounters"]) == [0, 0]
     samples = far.samples()
@@ -145,7 +145,7 @@ def test_a_day_on_which_nobody_met(days: list[Path], tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ({"speed": 1}, "unknown parameter"),
         ({"tz": "Mars"}, "unknown time zone 'Mars'"),
@@ -153,14 +153,14 @@ def test_a_day_on_which_nobody_met(days: list[Path], tmp_path: Path) -> None:
         ({"file_format": "csv"}, "unknown file_format 'csv'"),
     ],
 )
-def test_parameters_without_a_meaning(
-    days: list[Path], tmp_path: Path, given: dict[str, object], told: str
+def test_invalid_parameters_raise(
+    days: list[Path], tmp_path: Path, given: dict[str, object], message: str
 ) -> None:
-    with pytest.raises(szlib.DataError, match=told):
+    with pytest.raises(szlib.DataError, match=message):
         extract(days, tmp_path / "out", **given)
 
 
-def test_an_output_that_cannot_be_written(days: list[Path], tmp_path: Path) -> None:
+def test_output_or_input_that_does_not_exist_raises(days: list[Path], tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(szlib.DataError, match="cannot be made"):
         extract(days, tmp_path / "file" / "out")
@@ -168,7 +168,7 @@ def test_an_output_that_cannot_be_written(days: list[Path], tmp_path: Path) -> N
         extract(tmp_path / "nothing.csv", tmp_path / "out")
 
 
-def test_a_full_disk_is_told_and_earlier_days_stay_intact(
+def test_full_disk_is_reported_and_earlier_days_stay_intact(
     days: list[Path], reference: dict[str, bytes], tmp_path: Path
 ) -> None:
     extract(days[:2], tmp_path)
@@ -189,7 +189,7 @@ def test_a_full_disk_is_told_and_earlier_days_stay_intact(
     assert contents(tmp_path) == reference
 
 
-def test_an_output_that_is_read_only(days: list[Path], tmp_path: Path) -> None:
+def test_read_only_output_fails_each_day(days: list[Path], tmp_path: Path) -> None:
     claim_folder(tmp_path / "out", extraction.PURPOSE)
     with FaultyDisk(0, errno.EROFS):
         refused = extract(days[:1], tmp_path / "out")
@@ -225,15 +225,13 @@ def kill_and_resume(days: list[Path], out: Path, reference: dict[str, bytes], ki
     return struck
 
 
-def test_killed_at_random_moments_the_result_is_the_same(
+def test_killed_runs_resume_to_the_same_result(
     days: list[Path], reference: dict[str, bytes], tmp_path: Path
 ) -> None:
     assert kill_and_resume(days, tmp_path / "out", reference, kills=3, seed=1) > 0
 
 
-def test_a_worker_that_dies_is_told(
-    days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_killed_worker_raises(days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(extraction, "extract_day", _die)
     with pytest.raises(szlib.SzlibError, match="a worker process was killed"):
         extract(days, tmp_path / "out", n_jobs=2)
@@ -243,7 +241,7 @@ def _die(*_: object) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_dask_cluster_that_loses_a_worker_gives_the_same(
+def test_dask_cluster_that_loses_a_worker_gives_the_same_result(
     days: list[Path], reference: dict[str, bytes], tmp_path: Path
 ) -> None:
     """In a process of its own: the cluster leaves sockets and threads behind."""
@@ -278,7 +276,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same(
     assert contents(out) == reference
 
 
-def test_another_backend_of_joblib_gives_the_same(
+def test_another_backend_of_joblib_gives_the_same_result(
     days: list[Path], reference: dict[str, bytes], tmp_path: Path
 ) -> None:
     with joblib.parallel_config("threading"):

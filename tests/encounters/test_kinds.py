@@ -1,4 +1,4 @@
-"""Kinds of encounter: walks made for each, what must not matter, and people whose companions are known."""
+"""Kinds of encounter: constructed walks, invariances, and people whose companions are known."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ WALKS = {
 
 
 @pytest.mark.parametrize("name", WALKS)
-def test_walks_made_for_each_kind(name: str) -> None:
+def test_constructed_walks_have_their_kind(name: str) -> None:
     tracks, kind = WALKS[name]
     assert list(encounter_kinds(tracks, PAIR)) == [kind]
 
@@ -87,14 +87,14 @@ SAME_WORLD: dict[str, Callable[[pd.DataFrame], pd.DataFrame]] = {
 
 @pytest.mark.parametrize("change", SAME_WORLD)
 @pytest.mark.parametrize("name", WALKS)
-def test_what_must_not_matter(name: str, change: str) -> None:
+def test_kind_is_invariant(name: str, change: str) -> None:
     tracks, kind = WALKS[name]
     tracks = SAME_WORLD[change](tracks)
     both = pd.concat([PAIR, PAIR.rename(columns={"ref_id": "other_id", "other_id": "ref_id"})])
     assert list(encounter_kinds(tracks, both)) == [kind, kind], "and it is the same for both people"
 
 
-def test_a_kind_is_of_the_whole_common_track_and_of_the_pair(crowd: pd.DataFrame) -> None:
+def test_kind_belongs_to_the_pair_and_its_common_track(crowd: pd.DataFrame) -> None:
     samples = find_encounters(crowd, square=ROOM)
     kinds = samples.groupby("encounter")[["day", "ref_id", "other_id", "kind"]].first()
     assert set(kinds["kind"]) >= {"same direction", "opposite", "crossing", "standing"}
@@ -108,7 +108,7 @@ def test_a_kind_is_of_the_whole_common_track_and_of_the_pair(crowd: pd.DataFrame
     assert renamed["kind"].value_counts().to_dict() == samples["kind"].value_counts().to_dict()
 
 
-def test_plain_loops_find_the_same_kinds(crowd: pd.DataFrame) -> None:
+def test_kinds_agree_with_plain_loops(crowd: pd.DataFrame) -> None:
     samples = find_encounters(crowd, square=ROOM)
     room = szlib.Square(x=(-20 - REACH, 20 + REACH), y=(-20 - REACH, 20 + REACH))
     inside = crowd[room.contains(crowd["x"], crowd["y"])]
@@ -131,19 +131,19 @@ def test_plain_loops_find_the_same_kinds(crowd: pd.DataFrame) -> None:
         assert one["kind"] == expected
 
 
-def test_beyond_the_reach_of_the_square_nothing_counts() -> None:
+def test_rows_beyond_the_reach_do_not_count() -> None:
     tracks = two(((-17, 0), (1.2, 0)), ((-17, 1.2), (1.2, 0)))  # for 12 s, to x = -2.6
     assert list(encounter_kinds(tracks, PAIR, area=szlib.Square(x=(0, 20), y=(-5, 5)))) == ["same direction"]
     assert list(encounter_kinds(tracks, PAIR, area=szlib.Square(x=(-4, 20), y=(-5, 5)))) == [COMPANIONS]
     assert encounter_kinds(tracks, PAIR, area=szlib.Square(x=(30, 40), y=(-5, 5))).isna().all()
 
 
-def test_people_who_were_never_there_at_once_have_no_kind() -> None:
+def test_people_without_a_common_track_have_no_kind() -> None:
     tracks = make_tracks(make_walk((0, 0), (1, 0)), make_walk((0, 0), (1, 0), person=2, begin=60.0))
     assert encounter_kinds(tracks, PAIR).isna().all()
 
 
-def test_one_keyword_keeps_some_kinds_and_counts_the_others(crowd: pd.DataFrame) -> None:
+def test_of_kind_selects_kinds_and_counts_the_others(crowd: pd.DataFrame) -> None:
     everybody = find_encounters(crowd, square=ROOM)
     strangers = find_encounters(crowd, square=ROOM, kinds="strangers")
     pd.testing.assert_frame_equal(strangers, everybody[everybody["kind"] != COMPANIONS])
@@ -158,7 +158,7 @@ def test_one_keyword_keeps_some_kinds_and_counts_the_others(crowd: pd.DataFrame)
     }
 
 
-def test_what_has_no_meaning_is_refused() -> None:
+def test_invalid_kinds_and_pairs_raise() -> None:
     tracks, _ = WALKS["in line"]
     with pytest.raises(szlib.DataError, match="unknown kinds 'friends'; expected some of"):
         find_encounters(tracks, kinds="friends")
@@ -188,7 +188,7 @@ def confusion(tracks: pd.DataFrame, groups: pd.DataFrame) -> tuple[int, int, int
     return len(pairs), int(true.sum()), int(found.sum()), int((found & true).sum())
 
 
-def test_the_groups_of_the_eth_sequence() -> None:
+def test_groups_of_the_eth_sequence_are_found() -> None:
     folder = real_data("eth")
     with pytest.warns(szlib.DataWarning, match="share people"):
         groups = read_groups(folder / "seq_eth_groups.txt")
@@ -198,7 +198,7 @@ def test_the_groups_of_the_eth_sequence() -> None:
     assert right / true >= 0.65, "recall; those missed are the outer pairs of large groups"
 
 
-def test_the_groups_of_thor_magni() -> None:
+def test_groups_of_thor_magni_are_found() -> None:
     file = real_data("magni") / "A.csv"
     pairs, true, found, right = confusion(sites.read_magni(file), sites.read_magni_groups(file))
     assert (pairs, true) == (198, 24)
@@ -215,7 +215,7 @@ def test_the_kinds_of_the_real_day(real_tracks: pd.DataFrame, real_samples: pd.D
     assert reached[whole].mean() > 0.95, "whoever keeps together all the way does so around the square"
 
 
-def test_where_nobody_can_be_together_hardly_anybody_is(real_tracks: pd.DataFrame) -> None:
+def test_few_shifted_pairs_are_companions(real_tracks: pd.DataFrame) -> None:
     rng = np.random.default_rng(0)
     people, of = np.unique(real_tracks["id"], return_inverse=True)
     shift = rng.choice([-1, 1], len(people)) * rng.integers(600, 6000, len(people))

@@ -1,4 +1,4 @@
-"""Encounters: an independent search by plain loops agrees, and no frame, label or order matters."""
+"""Encounters: the search agrees with plain loops, and frame, labels and order do not matter."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def search(
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_plain_loops_find_the_same_encounters(variant: str) -> None:
+def test_encounters_agree_with_plain_loops(variant: str) -> None:
     options = {"square": szlib.ATC_SQUARE, **VARIANTS[variant]}
     found = 0
     for seed in range(16):
@@ -135,7 +135,7 @@ def test_plain_loops_find_the_same_encounters(variant: str) -> None:
     assert found >= 5  # or nothing was compared
 
 
-def test_plain_loops_agree_in_a_larger_room(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_encounters_agree_with_plain_loops_in_a_larger_room(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
     assert known["encounter"].nunique() >= 20
     assert_same_samples(known, search(crowd, square=ROOM))
 
@@ -144,7 +144,9 @@ def test_plain_loops_agree_in_a_larger_room(crowd: pd.DataFrame, known: pd.DataF
 
 
 @pytest.mark.parametrize("quarters", [1, 2, 3])
-def test_the_world_may_be_moved_and_turned(crowd: pd.DataFrame, known: pd.DataFrame, quarters: int) -> None:
+def test_encounters_move_and_turn_with_the_world(
+    crowd: pd.DataFrame, known: pd.DataFrame, quarters: int
+) -> None:
     turn = np.linalg.matrix_power([[0, -1], [1, 0]], quarters)
     moved = crowd.copy()
     moved[["x", "y"]] = crowd[["x", "y"]].to_numpy() @ turn.T + [3.0, -7.0]
@@ -152,21 +154,21 @@ def test_the_world_may_be_moved_and_turned(crowd: pd.DataFrame, known: pd.DataFr
     assert_same_samples(find_encounters(moved, square=Square(x=(-17, 23), y=(-27, 13))), known)
 
 
-def test_a_mirror_turns_left_into_right(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_mirror_reverses_the_sign_of_los_angle(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
     mirrored = crowd.assign(y=-crowd["y"], vy=-crowd["vy"])
     expected = known.assign(los_angle=-known["los_angle"])
     assert_same_samples(find_encounters(mirrored, square=ROOM), expected)
     assert (known["los_angle"] < 0).any()
 
 
-def test_row_order_changes_nothing_and_the_input_stays(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_row_order_does_not_matter_and_input_is_unchanged(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
     shuffled = crowd.sample(frac=1, random_state=5)
     before = shuffled.copy(deep=True)
     pd.testing.assert_frame_equal(find_encounters(shuffled, square=ROOM), known)
     pd.testing.assert_frame_equal(shuffled, before)
 
 
-def test_labels_are_only_labels(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_ids_and_day_names_do_not_matter(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
     names = {person: f"p{person:04d}" for person in crowd["id"].unique()}
     renamed = find_encounters(crowd.assign(id=crowd["id"].map(names)), square=ROOM)
     expected = known.assign(ref_id=known["ref_id"].map(names), other_id=known["other_id"].map(names))
@@ -180,7 +182,7 @@ def test_labels_are_only_labels(crowd: pd.DataFrame, known: pd.DataFrame) -> Non
     )
 
 
-def test_days_one_by_one_and_all_together_are_the_same() -> None:
+def test_days_separately_and_together_give_the_same() -> None:
     days = {f"2012-10-2{k}": make_crowd(k, people=20) for k in range(1, 6)}
     together = make_tracks(*(tracks.assign(day=day) for day, tracks in reversed(days.items())))
     alone = [find_encounters(tracks.assign(day=day)) for day, tracks in days.items()]
@@ -190,7 +192,7 @@ def test_days_one_by_one_and_all_together_are_the_same() -> None:
     assert_same_samples(find_encounters(together), expected)
 
 
-def test_memory_is_cut_into_blocks_that_nobody_sees(
+def test_block_size_does_not_matter(
     crowd: pd.DataFrame, known: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for pairs in (40, 3001):
@@ -198,7 +200,7 @@ def test_memory_is_cut_into_blocks_that_nobody_sees(
         pd.testing.assert_frame_equal(find_encounters(crowd, square=ROOM), known)
 
 
-def test_what_is_true_of_every_encounter(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_every_encounter_meets_the_four_conditions(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
     assert (known.groupby("encounter").size() == 31).all()
     assert known["encounter"].is_monotonic_increasing
     assert known.equals(known.sort_values(["day", "ref_id", "t"], ignore_index=True))
@@ -232,7 +234,7 @@ def reasons(samples: pd.DataFrame) -> dict[str, int]:
     return {reason: count for stage in funnels.get(samples) for reason, count in stage["rejected"].items()}
 
 
-def test_two_people_who_meet_are_seen_from_both_sides() -> None:
+def test_two_people_who_meet_are_two_encounters() -> None:
     """Both keep to their right, so each has the other on the left, and behind in the end."""
     east = make_walk((-2.0, -0.5), (1.2, 0.0), person=1, duration=3.0)
     west = make_walk((2.0, 0.5), (-1.2, 0.0), person=2, duration=3.0)
@@ -250,7 +252,7 @@ def test_two_people_who_meet_are_seen_from_both_sides() -> None:
     assert samples["los_angle"].max() > np.pi / 2
 
 
-def test_the_strict_reading_never_sees_a_pass() -> None:
+def test_throughout_excludes_people_who_pass() -> None:
     east = make_walk((-2.0, -0.5), (1.2, 0.0), person=1, duration=3.0)
     west = make_walk((2.0, 0.5), (-1.2, 0.0), person=2, duration=3.0)
     samples = find_encounters(make_tracks(east, west), square=ROOM, throughout=True)
@@ -262,7 +264,7 @@ FOLLOWED = make_walk((3.0, 0.2), (1.0, 0.0), person=2, duration=3.0)
 FOLLOWER = make_walk((0.0, 0.0), (1.0, 0.0), person=1, duration=3.0)
 
 
-def test_who_follows_sees_and_who_is_followed_does_not() -> None:
+def test_only_the_follower_has_an_encounter() -> None:
     samples = find_encounters(make_tracks(FOLLOWER, FOLLOWED), square=ROOM)
     assert set(samples["ref_id"]) == {1}
     np.testing.assert_allclose(samples["los_angle"], math.atan2(0.2, 3.0))
@@ -274,7 +276,7 @@ def test_who_follows_sees_and_who_is_followed_does_not() -> None:
     np.testing.assert_allclose(behind, wrap_angle(np.array(math.atan2(-0.2, -3.0))))
 
 
-def test_straight_behind_is_pi_and_not_minus_pi() -> None:
+def test_los_angle_straight_behind_is_plus_pi() -> None:
     behind = make_walk((-1.5, 0.0), (1.0, 0.0), person=2, duration=3.0)
     samples = find_encounters(make_tracks(FOLLOWER, behind), square=ROOM, space=AROUND)
     np.testing.assert_array_equal(samples.loc[samples["ref_id"] == 1, "los_angle"], np.pi)
@@ -300,7 +302,7 @@ SPOILED = {
 
 
 @pytest.mark.parametrize("scene", SPOILED)
-def test_what_spoils_an_encounter_is_named(scene: str) -> None:
+def test_funnel_names_the_failed_condition(scene: str) -> None:
     people, reason = SPOILED[scene]
     samples = find_encounters(make_tracks(*people), square=ROOM)
     assert len(samples[samples["ref_id"] == 1]) == 0
@@ -315,7 +317,7 @@ def test_what_spoils_an_encounter_is_named(scene: str) -> None:
         (3.05, 20.0, "not in the area"),
     ],
 )
-def test_a_corner_that_leaves_the_square(low: float, high: float, reason: str) -> None:
+def test_funnel_names_a_space_that_leaves_the_area(low: float, high: float, reason: str) -> None:
     """The far corners of the follower's space go from 5 to 8 m."""
     tracks = make_tracks(FOLLOWER, FOLLOWED)
     assert len(find_encounters(tracks, square=Square(x=(-1, 8.1), y=(-2.1, 2.1)))) == 31
@@ -325,7 +327,7 @@ def test_a_corner_that_leaves_the_square(low: float, high: float, reason: str) -
     assert len(find_encounters(tracks, square=Square(x=(-1, 8.1), y=(-1.9, 2.1)))) == 0
 
 
-def test_people_outside_the_square_are_not_in_the_space() -> None:
+def test_people_outside_the_area_are_not_in_the_space() -> None:
     """They cannot be: the space lies inside the square."""
     outside = make_walk((3.0, 2.2), (1.0, 0.0), person=3, duration=3.0)
     square = Square(x=(-1, 9), y=(-2.1, 2.1))
@@ -345,7 +347,7 @@ def test_windows_follow_each_other_without_overlap() -> None:
     assert reasons(samples)["overlaps an earlier window"] == len(follower) - 30 - 4
 
 
-def test_the_other_person_may_change_between_windows_but_not_within() -> None:
+def test_other_person_can_change_between_windows_only() -> None:
     """One leaves the space to the side after 1 s, then another comes in."""
     walks = [
         make_walk((0, 0), (1, 0), person=1, duration=3.0),
@@ -359,7 +361,7 @@ def test_the_other_person_may_change_between_windows_but_not_within() -> None:
     assert alone["ref_id"].tolist() == [1] * 31
 
 
-def test_the_same_id_on_another_day_is_not_there() -> None:
+def test_same_id_on_another_day_is_another_person() -> None:
     yesterday = FOLLOWED.assign(day="2012-10-23", id=3, y=0.0)
     for there in (yesterday, yesterday.head(1)):
         samples = find_encounters(make_tracks(there, FOLLOWER, FOLLOWED), square=ROOM)
@@ -378,7 +380,7 @@ def test_a_person_whose_id_changes_is_two_people() -> None:
 # --- nothing, and nonsense ---------------------------------------------------------------------------
 
 
-def test_no_encounter_is_an_empty_table_like_any_other() -> None:
+def test_no_encounter_gives_an_empty_table_with_all_columns() -> None:
     full = find_encounters(make_tracks(FOLLOWER, FOLLOWED), square=ROOM)
     for tracks in (make_tracks(FOLLOWER), make_tracks(FOLLOWER.assign(x=99.0))):
         empty = find_encounters(tracks, square=ROOM)
@@ -390,7 +392,7 @@ def test_no_encounter_is_an_empty_table_like_any_other() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         ({"duration": 0}, "duration"),
         ({"duration": np.nan}, "duration"),
@@ -401,26 +403,26 @@ def test_no_encounter_is_an_empty_table_like_any_other() -> None:
         ({"min_speed": np.nan}, "min_speed"),
     ],
 )
-def test_parameters_without_a_meaning(options: dict, told: str) -> None:
-    with pytest.raises(szlib.DataError, match=told):
+def test_invalid_parameters_raise(options: dict, message: str) -> None:
+    with pytest.raises(szlib.DataError, match=message):
         find_encounters(make_tracks(FOLLOWER, FOLLOWED), square=ROOM, **options)
 
 
-def test_tables_that_cannot_be_used() -> None:
+def test_invalid_tables_raise() -> None:
     tracks = make_tracks(FOLLOWER, FOLLOWED)
-    for table, told in {
+    for message, table in {
         r"columns \['vx'\] are missing": tracks.drop(columns="vx"),
         "the table is empty": tracks.iloc[:0],
         "row 3: got .*'x': nan": tracks.assign(x=tracks["x"].where(tracks.index != 3)),
         "is not a multiple of 0.1 s": tracks.assign(t=tracks["t"] + 0.05),
         "two rows at t": pd.concat([tracks, tracks.head(1)]),
     }.items():
-        with pytest.raises(szlib.DataError, match=table):
-            find_encounters(told, square=ROOM)
+        with pytest.raises(szlib.DataError, match=message):
+            find_encounters(table, square=ROOM)
 
 
 @pytest.mark.parametrize("x", [(1, 1), (2, 1), (0, np.nan), (-np.inf, 0)])
-def test_squares_without_an_inside(x: tuple[float, float]) -> None:
+def test_squares_without_an_inside_raise(x: tuple[float, float]) -> None:
     with pytest.raises(szlib.DataError, match="a square needs finite x and y"):
         Square(x=x, y=(0, 1))
     with pytest.raises(szlib.DataError, match="a square needs finite x and y"):
@@ -428,7 +430,7 @@ def test_squares_without_an_inside(x: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize("sides", [(0, 4), (5, -1), (np.nan, 4), (5, np.inf)])
-def test_spaces_without_an_inside(sides: tuple[float, float]) -> None:
+def test_spaces_without_an_inside_raise(sides: tuple[float, float]) -> None:
     with pytest.raises(szlib.DataError, match="an attentional space needs positive sides"):
         AttentionalSpace(*sides)
 
@@ -436,7 +438,7 @@ def test_spaces_without_an_inside(sides: tuple[float, float]) -> None:
 # --- shapes and angles -------------------------------------------------------------------------------
 
 
-def test_the_corners_are_those_of_the_space() -> None:
+def test_corners_lie_on_the_border_of_the_space() -> None:
     for space in (AHEAD, AROUND, AttentionalSpace(2.0, 6.0)):
         corners = space.corners
         assert np.ptp(corners, axis=0).tolist() == [space.length, space.width]
@@ -446,7 +448,7 @@ def test_the_corners_are_those_of_the_space() -> None:
     np.testing.assert_array_equal(AROUND.corners.mean(axis=0), 0)
 
 
-def test_wrapped_angles_are_the_same_directions_within_half_a_turn() -> None:
+def test_wrap_angle_keeps_the_direction() -> None:
     angles = np.concatenate([np.linspace(-20, 20, 1001), np.pi * np.arange(-6, 7)])
     wrapped = wrap_angle(angles)
     np.testing.assert_allclose(np.exp(1j * wrapped), np.exp(1j * angles), atol=1e-12)
@@ -471,14 +473,14 @@ def test_paths_in_the_reference_frame(crowd: pd.DataFrame, known: pd.DataFrame) 
     assert (ref[following, 0] > 0).all()  # x points along the motion
 
 
-def test_paths_come_in_the_order_of_the_samples(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_paths_follow_the_order_of_the_samples(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
     expected = reference_frame(crowd, known)
     shuffled = known.sample(frac=1, random_state=2)
     again = reference_frame(crowd, shuffled)
     pd.testing.assert_frame_equal(again, expected.iloc[shuffled.index].reset_index(drop=True))
 
 
-def test_paths_of_samples_from_other_tracks(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_samples_of_other_tracks_raise(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
     with pytest.raises(szlib.DataError, match=r"sample .* is not in these tracks"):
         reference_frame(crowd[crowd["id"] != known["ref_id"].iloc[40]], known)
     with pytest.raises(szlib.DataError, match="the table is empty"):

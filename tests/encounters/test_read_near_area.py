@@ -1,4 +1,4 @@
-"""Streaming changes nothing: what it keeps of a day has the very encounters of the whole day."""
+"""Streaming a raw day: the selected rows have exactly the encounters of the whole day."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SETTINGS = [
 
 @pytest.mark.parametrize("rows_at_once", [97, 1000, 1 << 17])
 @pytest.mark.parametrize(("square", "duration", "max_gap"), SETTINGS)
-def test_the_encounters_are_those_of_the_whole_day(
+def test_streamed_encounters_equal_those_of_the_whole_day(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     square: szlib.Square,
@@ -46,7 +46,7 @@ def test_the_encounters_are_those_of_the_whole_day(
     assert found > 0
 
 
-def test_rows_in_any_order_give_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_order_of_rows_does_not_matter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(blocks, "_BLOCK_ROWS", 1000)
     rows = make_raw_day(1, wild=False)
     shuffled = write_raw_day(tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0))
@@ -57,7 +57,7 @@ def test_rows_in_any_order_give_the_same(tmp_path: Path, monkeypatch: pytest.Mon
     pd.testing.assert_frame_equal(encounters(in_order, **given), encounters(any_order, **given))
 
 
-def test_slots_that_are_shared_only_keep_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shared_slots_select_more_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_raw_day(tmp_path / "day.csv", make_raw_day(3))
     apart = len(read_near_area(path, area=szlib.ATC_SQUARE, duration=1.0))
     monkeypatch.setattr(cells, "_CELLS", 64)
@@ -65,20 +65,20 @@ def test_slots_that_are_shared_only_keep_more(tmp_path: Path, monkeypatch: pytes
     assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=1.0) > 0
 
 
-def test_packed_files_and_bad_rows(tmp_path: Path) -> None:
+def test_gzip_files_and_bad_rows_are_reported_as_by_read_tracks(tmp_path: Path) -> None:
     lines = write_raw_day(tmp_path / "day.csv", make_raw_day(2)).read_text().splitlines()
     for at, bad in ((5, "1,2"), (900, "no row at all"), (901, lines[900] + ",9"), (3000, lines[0])):
         lines.insert(at, bad)
     path = tmp_path / "day.csv.gz"
     path.write_bytes(gzip.compress("\n".join(lines).encode()))
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         raw = read_near_area(path, area=szlib.ATC_SQUARE, duration=3.0)
     with warnings.catch_warnings(record=True) as expected:
         warnings.simplefilter("always")
         whole = read_raw(path)
-    assert "first at line 6: rejected rows" in str(told[0].message)
-    assert [str(each.message) for each in told] == [str(each.message) for each in expected]
+    assert "first at line 6: rejected rows" in str(caught[0].message)
+    assert [str(each.message) for each in caught] == [str(each.message) for each in expected]
     assert funnels.get(raw)[0] == funnels.get(whole)[0]
     assert sum(funnels.get(raw)[0]["rejected"].values()) == 3
 
@@ -107,7 +107,7 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("bad", DAMAGED.values(), ids=DAMAGED.keys())
-def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bad: str) -> None:
+def test_quick_scan_detects_every_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bad: str) -> None:
     monkeypatch.setattr(blocks, "_BLOCK_ROWS", 7)
     path = tmp_path / "day.csv"
     lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
@@ -125,7 +125,7 @@ def test_a_quick_scan_sees_every_damage(tmp_path: Path, monkeypatch: pytest.Monk
     np.testing.assert_array_equal(rows.y * layout.metres, whole["y"])
 
 
-def test_the_plaza_and_a_place_where_nobody_is(tmp_path: Path) -> None:
+def test_area_without_people_gives_an_empty_table(tmp_path: Path) -> None:
     path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=100))
     assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=3.0) > 0
     elsewhere = read_near_area(path, area=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0)
@@ -135,7 +135,7 @@ def test_the_plaza_and_a_place_where_nobody_is(tmp_path: Path) -> None:
     assert near["rejected"] == {"never near the area": read["kept"]}
 
 
-def test_what_cannot_be_read_is_told_as_by_read_tracks(tmp_path: Path) -> None:
+def test_unreadable_files_raise_as_in_read_tracks(tmp_path: Path) -> None:
     rows = make_raw_day(0)
     mostly_bad = tmp_path / "bad.csv"
     mostly_bad.write_text(

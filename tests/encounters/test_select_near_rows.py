@@ -1,4 +1,4 @@
-"""Rows that encounters can depend on: the same encounters in a fraction of the rows, and none lost unsaid."""
+"""Rows that encounters can depend on: the same encounters in fewer rows; the funnel counts the others."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ def crowd() -> pd.DataFrame:
 
 @pytest.mark.parametrize("asked", [{}, {"duration": 1.0}, {"kinds": "strangers"}, {"throughout": True}])
 @pytest.mark.parametrize("narrower", [0.0, 1.0])
-def test_they_are_those_of_all_rows(crowd: pd.DataFrame, asked: dict[str, object], narrower: float) -> None:
+def test_near_rows_give_the_same_encounters(
+    crowd: pd.DataFrame, asked: dict[str, object], narrower: float
+) -> None:
     near = select_near_rows(crowd, SQUARE, 3.0)
     square = SQUARE.grown(-narrower)
     found, whole = (szlib.find_encounters(rows, square=square, **asked) for rows in (near, crowd))
@@ -33,7 +35,7 @@ def test_they_are_those_of_all_rows(crowd: pd.DataFrame, asked: dict[str, object
     pd.testing.assert_frame_equal(found, whole)
 
 
-def test_those_who_never_come_and_what_is_long_after_are_elsewhere(crowd: pd.DataFrame) -> None:
+def test_people_elsewhere_and_later_rows_are_dropped(crowd: pd.DataFrame) -> None:
     through = make_walk((-20, 4), (1, 0), duration=60)  # inside from 20 to 34 s, within 5 m from 15 to 39 s
     near = select_near_rows(make_tracks(through, make_walk((-3, 26), (1, 0), person=2)), SQUARE, 3.0)
     assert near["id"].unique().tolist() == [1]

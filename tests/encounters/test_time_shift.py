@@ -1,4 +1,4 @@
-"""People moved in time alone: paths and density stay, companions part, nobody leaves the recording."""
+"""People moved in time: paths and density stay, companions are separated, the recorded hours stay."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def all_day(day: str = DAY, person: int = 999, minutes: float = 20) -> pd.DataFr
 # --- what stays --------------------------------------------------------------------------------------
 
 
-def test_it_is_a_valid_track_table_of_the_recorded_hours(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
+def test_shifted_tracks_stay_within_the_recorded_hours(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
     check_tracks(shifted)
     assert shifted["t"].between(tracks["t"].min(), tracks["t"].max()).all()
     assert list(shifted.columns) == list(tracks.columns)
 
 
-def test_every_path_stays_but_for_a_tick_on_the_seam(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
+def test_paths_stay_except_for_a_tick_on_the_seam(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
     before = {k: set(zip(p["x"], p["y"], strict=True)) for k, p in tracks.groupby("id")}
     after = {k: set(zip(p["x"], p["y"], strict=True)) for k, p in shifted.groupby("id")}
     assert before.keys() == after.keys()
@@ -58,7 +58,7 @@ def test_every_path_stays_but_for_a_tick_on_the_seam(tracks: pd.DataFrame, shift
     assert stage["rejected"] == {"on the seam of the day": sum(lost)}
 
 
-def test_each_person_moves_by_one_time_of_their_own(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
+def test_each_person_has_one_shift(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
     both = tracks.merge(shifted, on=["id", "x", "y"])
     period = np.ptp(ticks(tracks)) + 2
     moved = np.rint((both["t_y"] - both["t_x"]) * 10).astype(int) % period
@@ -69,14 +69,14 @@ def test_each_person_moves_by_one_time_of_their_own(tracks: pd.DataFrame, shifte
     assert moved["min"].nunique() > 250, "each their own"
 
 
-def test_velocities_stay_away_from_the_seam(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
+def test_velocities_stay_except_near_the_seam(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
     both = tracks.merge(shifted, on=["id", "x", "y"])
     same = np.isclose(both["vx_x"], both["vx_y"]) & np.isclose(both["vy_x"], both["vy_y"])
     across = shifted.groupby("id")["t"].agg(np.ptp) > 600
     assert same[~both["id"].isin(across.index[across])].all()
 
 
-def test_density_stays_even_at_the_ends_of_the_recording() -> None:
+def test_density_at_the_ends_of_the_recording_stays() -> None:
     """Reflected shifts would leave the first and the last minutes half empty."""
     tracks = noninteracting_crowd(seed=0, people=2000, minutes=20)
     minute = ticks(tracks) // 600
@@ -88,7 +88,7 @@ def test_density_stays_even_at_the_ends_of_the_recording() -> None:
     assert after / 4 == pytest.approx(np.full(19, before.mean()), rel=0.15)
 
 
-def test_gaps_stay_gaps_and_nobody_is_carried_across_the_seam() -> None:
+def test_gaps_and_the_seam_are_not_bridged() -> None:
     person = all_day()
     with_gap = person.drop(index=range(3000, 3010))
     tracks = make_tracks(with_gap, make_walk((-12, 0), (1, 0)))
@@ -101,7 +101,7 @@ def test_gaps_stay_gaps_and_nobody_is_carried_across_the_seam() -> None:
         assert (own["t"].diff().round(3) > 0.1).sum() == 2, "the gap, and the seam"
 
 
-def test_each_day_is_a_circle_of_its_own() -> None:
+def test_each_day_is_shifted_within_itself() -> None:
     days = ["2012-10-24", "2012-10-28"]
     walks = [
         make_walk((-12, 0), (1, 0), day=d, person=p, begin=b)
@@ -117,7 +117,7 @@ def test_each_day_is_a_circle_of_its_own() -> None:
         assert after.between(before.min(), before.max()).all()
 
 
-def test_order_and_seed(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
+def test_result_depends_on_the_seed_and_not_on_row_order(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
     untouched = tracks.copy()
     mixed = tracks.sample(frac=1, random_state=0)
     pd.testing.assert_frame_equal(szlib.time_shifted(mixed, seed=1, minutes=MINUTES), shifted)
@@ -128,7 +128,7 @@ def test_order_and_seed(tracks: pd.DataFrame, shifted: pd.DataFrame) -> None:
 # --- what is lost ------------------------------------------------------------------------------------
 
 
-def test_who_met_no_longer_meets(tracks: pd.DataFrame) -> None:
+def test_encounters_of_the_data_do_not_recur(tracks: pd.DataFrame) -> None:
     def met(samples: pd.DataFrame) -> set[tuple[int, int]]:
         return set(zip(samples["ref_id"], samples["other_id"], strict=True))
 
@@ -141,7 +141,7 @@ def test_who_met_no_longer_meets(tracks: pd.DataFrame) -> None:
     assert sum(again) <= 1
 
 
-def test_companions_are_taken_apart() -> None:
+def test_companions_are_separated() -> None:
     """Groups of three: by chance alone, some of so many shifts would agree within 10 s."""
     walks = [
         make_walk((-18, -4 + 0.7 * k), (1, 0), person=10 * g + k, begin=40 * g, duration=10)
@@ -162,7 +162,7 @@ def test_companions_are_taken_apart() -> None:
     assert (gaps < 10 * COMPANION_SEPARATION).sum() > 10
 
 
-def test_who_only_passes_is_no_companion() -> None:
+def test_passing_people_are_no_companions() -> None:
     walks = [make_walk((-18, 0), (1, 0), person=1), make_walk((-14, 0.5), (-1, 0), person=2)]
     assert len(ShiftableTracks.from_tracks(make_tracks(*walks)).companions) == 0
 
@@ -170,19 +170,19 @@ def test_who_only_passes_is_no_companion() -> None:
 # --- errors ------------------------------------------------------------------------------------------
 
 
-def test_a_short_recording_says_what_to_pass(tracks: pd.DataFrame) -> None:
+def test_short_recording_error_suggests_minutes(tracks: pd.DataFrame) -> None:
     with pytest.raises(DataError, match=r"recorded for 20.0 min.*pass shorter ones, such as minutes=\(1, 6"):
         szlib.time_shifted(tracks, minutes=(1, 25))
     check_tracks(szlib.time_shifted(tracks, minutes=(1.0, 6.7)))
 
 
 @pytest.mark.parametrize("minutes", [(0, 5), (5, 1), (-5, -1), (1, np.inf), (np.nan, 5)])
-def test_meaningless_minutes(tracks: pd.DataFrame, minutes: tuple[float, float]) -> None:
+def test_invalid_minutes_raise(tracks: pd.DataFrame, minutes: tuple[float, float]) -> None:
     with pytest.raises(DataError, match="shortest, longest"):
         szlib.time_shifted(tracks, minutes=minutes)
 
 
-def test_no_room_to_take_companions_apart() -> None:
+def test_range_too_narrow_to_separate_companions_raises() -> None:
     three = [make_walk((-18, 0.7 * k), (1, 0), person=k, duration=10) for k in range(3)]
     tracks = make_tracks(*three, all_day())
     with pytest.raises(DataError, match="wider range of minutes"):

@@ -1,4 +1,4 @@
-"""Rows near the area are kept: the same encounters without reading the day, never from a damaged entry."""
+"""The cache of rows near an area: the same encounters without reading the day; damaged entries are not used."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def entries(cache: Path) -> list[Path]:
     return sorted(cache.glob("*.parquet")) if cache.exists() else []
 
 
-def test_other_conditions_are_asked_of_what_is_kept(
+def test_other_conditions_use_the_cached_rows(
     cache: Path, day: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[dict] = [{}, {"min_speed": 0.2}, {"min_distance": 0.3}, {"space": szlib.AttentionalSpace()}]
@@ -67,7 +67,7 @@ def test_other_conditions_are_asked_of_what_is_kept(
     assert len(entries(cache)) == 1
 
 
-def test_whatever_makes_other_rows_near_is_another_entry(cache: Path, day: Path) -> None:
+def test_area_duration_gap_and_content_make_entries_of_their_own(cache: Path, day: Path) -> None:
     found(day)
     other_square = szlib.Square(x=(-17, -8), y=(-9, 8))
     for number, parameters in enumerate(({"area": other_square}, {"duration": 2.0}, {"max_gap": 0.3}), 2):
@@ -80,24 +80,24 @@ def test_whatever_makes_other_rows_near_is_another_entry(cache: Path, day: Path)
 
 
 @pytest.mark.parametrize("damage", ["one bit", "half", "nothing left", "no record", "the record of another"])
-def test_a_damaged_entry_is_made_anew(cache: Path, day: Path, damage: str) -> None:
+def test_damaged_entry_is_made_anew(cache: Path, day: Path, damage: str) -> None:
     fresh = found(day)
     (entry,) = entries(cache)
     record, content = entry.with_name(f"{entry.name}.json"), entry.read_bytes()
-    told = record.read_bytes()
+    stored = record.read_bytes()
     if damage == "no record":
         record.unlink()
     elif damage == "the record of another":
-        record.write_bytes(told.replace(b'"version": 2', b'"version": 0'))
+        record.write_bytes(stored.replace(b'"version": 2', b'"version": 0'))
     else:
         middle = len(content) // 2
         flipped = content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
         entry.write_bytes({"one bit": flipped, "half": content[:middle], "nothing left": b""}[damage])
     assert same(found(day), fresh)
-    assert (entry.read_bytes(), record.read_bytes()) == (content, told)
+    assert (entry.read_bytes(), record.read_bytes()) == (content, stored)
 
 
-def test_entries_not_used_for_longest_give_way(
+def test_entries_unused_for_longest_are_removed(
     cache: Path, day: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found(day, duration=1.0)
@@ -115,13 +115,13 @@ def test_entries_not_used_for_longest_give_way(
     assert entries(cache) == []
 
 
-def test_a_cache_that_cannot_be_written_is_told_and_stops_nobody(cache: Path, day: Path) -> None:
+def test_unwritable_cache_warns_and_the_search_goes_on(cache: Path, day: Path) -> None:
     cache.parent.write_text("a file where the folder should be")
     with pytest.warns(RuntimeWarning, match="rows near the area are not cached"):
         assert len(found(day)) > 0
 
 
-def test_numbers_come_back_to_the_last_bit(cache: Path) -> None:
+def test_numbers_round_trip_bit_for_bit(cache: Path) -> None:
     rng = np.random.default_rng(0)
     odd = np.array([-0.0, 0.1 + 0.2, 1e-300, -2.5e15, 7.0])
     for t, x in ((1351038629 + rng.integers(0, 10**7, 5) / 1000, odd), (odd, np.arange(5.0))):
@@ -134,7 +134,7 @@ def test_numbers_come_back_to_the_last_bit(cache: Path) -> None:
             assert ours.tobytes() == theirs.tobytes()
 
 
-def test_two_may_keep_the_same_at_once(cache: Path, day: Path) -> None:
+def test_two_threads_can_store_the_same_entry(cache: Path, day: Path) -> None:
     fresh = found(day)
     near_rows_cache.clear()
     with ThreadPoolExecutor(2) as two:  # each entry is written whole: tests/test_files.py has processes

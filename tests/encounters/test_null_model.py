@@ -1,4 +1,4 @@
-"""The null model: the encounters of many time-shifted days, the same as if each had been searched whole."""
+"""The null model: the encounters of time-shifted days equal those of a search of each whole day."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def null(tracks: pd.DataFrame) -> szlib.NullEncounters:
     return szlib.null_encounters(tracks, shifts=7, seed=4, progress=False, **ASKED)
 
 
-def test_a_shift_has_the_encounters_of_the_whole_shifted_day(
+def test_each_shift_equals_encounters_of_the_shifted_day(
     tracks: pd.DataFrame, null: szlib.NullEncounters
 ) -> None:
     for shift in (0, 3, 6):
@@ -42,7 +42,7 @@ def test_a_shift_has_the_encounters_of_the_whole_shifted_day(
         pd.testing.assert_frame_equal(found, expected)
 
 
-def test_numbers_are_unique_and_the_funnel_adds_up(null: szlib.NullEncounters) -> None:
+def test_encounter_numbers_are_unique_and_the_funnel_adds_up(null: szlib.NullEncounters) -> None:
     assert null.encounters["encounter"].is_unique
     assert (null.samples.groupby("encounter")["shift"].nunique() == 1).all()
     assert set(null.samples["encounter"]) <= set(null.encounters["encounter"])
@@ -54,18 +54,18 @@ def test_numbers_are_unique_and_the_funnel_adds_up(null: szlib.NullEncounters) -
     json.dumps(null.parameters)
 
 
-def test_processes_change_nothing(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
+def test_result_does_not_depend_on_processes(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
     other = szlib.null_encounters(tracks, shifts=7, seed=4, n_jobs=2, progress=False, **ASKED)
     pd.testing.assert_frame_equal(other.samples, null.samples)
     pd.testing.assert_frame_equal(other.encounters, null.encounters)
 
 
-def test_more_shifts_begin_with_the_same(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
+def test_first_shifts_do_not_depend_on_their_number(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
     fewer = szlib.null_encounters(tracks, shifts=2, seed=4, progress=False, **ASKED)
     pd.testing.assert_frame_equal(fewer.encounters, null.encounters[null.encounters["shift"] < 2])
 
 
-def test_kinds_are_chosen_as_in_the_data(null: szlib.NullEncounters) -> None:
+def test_kinds_are_selected_as_in_the_data(null: szlib.NullEncounters) -> None:
     some = null.of_kind(["opposite", "crossing"])
     assert set(some.encounters["kind"]) == set(some.samples["kind"]) == {"opposite", "crossing"}
     assert len(some.encounters) == null.encounters["kind"].isin(["opposite", "crossing"]).sum()
@@ -74,7 +74,7 @@ def test_kinds_are_chosen_as_in_the_data(null: szlib.NullEncounters) -> None:
         null.of_kind("friends")
 
 
-def test_where_nobody_meets() -> None:
+def test_null_model_without_encounters_is_empty() -> None:
     tracks = make_tracks(make_walk((-12, 0), (1, 0)), make_walk((-12, 0), (1, 0), person=2, begin=1800))
     null = szlib.null_encounters(tracks, shifts=3, progress=False)
     assert len(null.samples) == len(null.encounters) == 0
@@ -82,7 +82,7 @@ def test_where_nobody_meets() -> None:
     assert len(null.one(2)) == 0
 
 
-def test_errors(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
+def test_invalid_arguments_raise(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
     with pytest.raises(DataError, match="shifts >= 1"):
         szlib.null_encounters(tracks, shifts=0)
     with pytest.raises(DataError, match="too short"):
