@@ -1,4 +1,4 @@
-"""Areas: all forms mean the same, the direction of the axes does not matter; and the area where people walk."""
+"""Areas: all forms mean the same, the direction of the axes does not matter; the area where people walk."""
 
 from __future__ import annotations
 

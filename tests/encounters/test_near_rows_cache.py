@@ -1,4 +1,4 @@
-"""The cache of rows near an area: the same encounters without reading the day; damaged entries are not used."""
+"""The cache of rows near an area: the same encounters without reading the day, never a damaged entry."""
 
 from __future__ import annotations
 
