@@ -20,22 +20,20 @@ sensitivity           the zone with each parameter of the method varied alone
 from .costmaps import Grid, draw_costmap
 from .ellipses import BODY_RADIUS, Ellipse, circle_around
 from .enclosing_ellipse import minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
-from .hulls import HullEstimator, HullZone, Slice, hull_vertices, slice_hull
+from .hulls import HullZone, hull_vertices, slice_hull
 from .occupancy import OccupancyHistogram, PairCorrelation, pair_correlation
 from .outliers import complementary_points, is_outlier, remove_outliers
 from .polar import PolarZone
-from .quantile import QuantileEstimator
-from .respect import Respect, RespectEstimator, fit_respect, respect_boundary, respect_radius
+from .respect import Respect, fit_respect, respect_boundary, respect_radius
 from .respect_significance import NullTest, null_test
 from .sensitivity import sensitivity
 from .social_zone import SocialZone
-from .uncertainty import Uncertainty, count_by_side
+from .uncertainty import count_by_side
 
 __all__ = [
-    "BODY_RADIUS", "Ellipse", "Grid", "HullEstimator", "HullZone", "NullTest", "OccupancyHistogram",
-    "PairCorrelation", "PolarZone", "QuantileEstimator", "Respect", "RespectEstimator", "Slice",
-    "SocialZone", "Uncertainty", "circle_around", "complementary_points", "count_by_side", "draw_costmap",
-    "fit_respect", "hull_vertices", "is_outlier", "minimum_enclosing_ellipse",
+    "BODY_RADIUS", "Ellipse", "Grid", "HullZone", "NullTest", "OccupancyHistogram", "PairCorrelation",
+    "PolarZone", "Respect", "SocialZone", "circle_around", "complementary_points", "count_by_side",
+    "draw_costmap", "fit_respect", "hull_vertices", "is_outlier", "minimum_enclosing_ellipse",
     "minimum_enclosing_ellipse_of_curve", "null_test", "pair_correlation", "remove_outliers",
     "respect_boundary", "respect_radius", "sensitivity", "slice_hull",
 ]  # fmt: skip

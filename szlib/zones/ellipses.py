@@ -126,6 +126,12 @@ def circle_around(zone: Ellipse) -> Ellipse:
         b q cos t - a p sin t - (a^2 - b^2) sin t cos t,
 
     changes its sign once there, because divided by sin t cos t it falls.
+
+    Examples
+    --------
+    >>> from szlib.zones import Ellipse, circle_around
+    >>> round(circle_around(Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))).semi_axes[0], 6)
+    1.1
     """
     radius = _greatest_distance(zone.center, zone.semi_axes, zone.angle)
     return replace(zone, center=(0.0, 0.0), semi_axes=(radius, radius), angle=0.0, support=None)

@@ -185,6 +185,14 @@ class HullZone:
     Raises
     ------
     ZoneError : the vertices have no hull.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from szlib.zones import HullZone
+    >>> corners = np.array([(x, y, v) for x in (-1, 1) for y in (-1, 1) for v in (0.5, 1.5)])
+    >>> HullZone(corners, r_max=2.0).boundary(1.0, 0.0).tolist()
+    [1.0, 0.0]
     """
 
     vertices: Array

@@ -79,6 +79,13 @@ class PairCorrelation:
     ----------
     distance, direction : centres of the cells [m], (n,), and [rad], (m,).
     g : shape (m, n): 1 where people are as frequent as in the null model; NaN where the null model has none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import szlib
+    >>> szlib.PairCorrelation(np.array([0.5, 1.0]), np.array([0.0]), np.array([[0.1, 1.0]])).g.shape
+    (1, 2)
     """
 
     distance: Array

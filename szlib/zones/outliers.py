@@ -133,6 +133,15 @@ def is_outlier(
     Warns
     -----
     DataWarning : there are `N_NEIGHBOURS` encounters or fewer, so that none can be judged.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> from szlib.zones import is_outlier
+    >>> samples = pd.DataFrame({"los_angle": np.linspace(0, 6, 100), "distance": [0.1] + 99 * [1.5]})
+    >>> np.flatnonzero(is_outlier(samples, fraction=0.01)).tolist()
+    [0]
     """
     n_samples = len(complementary_points(samples, r_max=r_max))
     if fraction is None:

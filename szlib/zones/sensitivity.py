@@ -1,4 +1,4 @@
-"""What moves a zone most: each parameter of the method varied alone, the others at their defaults."""
+"""The sensitivity of a zone: each parameter of the method varied alone, the others at their defaults."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
         "kinds": ("strangers", ("opposite", "crossing")),
     }
 )
-"""Values of `szlib.find_encounters`, beside its defaults."""
+"""Values of `szlib.find_encounters`, besides its defaults."""
 FIT: Mapping[str, Sequence[Any]] = MappingProxyType(
     {"r_max": (1.5, 2.5), "fraction": (0.0, 0.002, 0.01), "n_neighbours": (10, 50)}
 )
-"""Values of `szlib.SocialZone.fit`, beside its defaults."""
+"""Values of `szlib.SocialZone.fit`, besides its defaults."""
 SPEEDS = (0.9, 1.3)
-"""Speeds, beside the one looked at [m/s]."""
+"""Speeds besides `speed` [m/s]."""
 NARROWER = 1.0
-"""By so much the square is made narrower on each side [m]."""
+"""The area is made narrower by this on each side [m]."""
 
 
 def sensitivity(
@@ -43,22 +43,32 @@ def sensitivity(
     method: str = "hull",
     fit: Mapping[str, Sequence[Any]] = FIT,
 ) -> pd.DataFrame:
-    """The zone at a speed [m/s] with each parameter varied alone.
+    """Fit the zone at one speed with each parameter varied alone.
 
     Parameters
     ----------
     tracks, square : as for `szlib.find_encounters`.
-    fit : keywords of `SocialZone.fit` to vary, and their values; those of the search are `SEARCH`.
+    speed : speed of the zone [m/s].
     method : of every fit.
+    fit : options of `SocialZone.fit` to vary, and their values. `SEARCH` are those of the search.
 
     Returns
     -------
-    One row a variation, the first with every default: parameter, value, encounters, a, b [m], area [m2]
-    (NaN where there is no zone).
+    One row for each variation, the first with all defaults: parameter, value, encounters, a, b [m], area [m2]
+    (NaN: no zone).
 
     Raises
     ------
     ZoneError : there is no zone with the defaults.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.zones import sensitivity
+    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
+    >>> table = sensitivity(szlib.read_tracks(path), square=szlib.ATC_SQUARE, fit={"r_max": [1.5]})
+    >>> "r_max" in set(table["parameter"])
+    True
     """
     rows: list[tuple[str, str, int, float, float, float]] = []
 
@@ -66,7 +76,7 @@ def sensitivity(
         """One row: the zone of these samples at this speed."""
         count, sizes = int(samples["encounter"].nunique()), (np.nan, np.nan, np.nan)
         try:
-            with warnings.catch_warnings():  # few encounters, told by their number here
+            with warnings.catch_warnings():  # the number of encounters is in the table
                 warnings.simplefilter("ignore", DataWarning)
                 zone = SocialZone.fit(samples, speeds=(at,), method=method, n_resamples=0, **keywords)
             ellipse = zone.ellipses[at]

@@ -94,6 +94,16 @@ def count_by_side(samples: pd.DataFrame, speeds: Sequence[float], *, r_max: floa
 
     The table has one row for each of the `speeds` (+-`SPEED_BAND`): speed [m/s], encounters, and one column
     for each of `SIDES`. `samples` are as from `szlib.find_encounters`.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from szlib.zones import count_by_side
+    >>> samples = pd.DataFrame(
+    ...     {"encounter": [0, 0, 1], "los_angle": [0.0, 0.1, 0.0], "distance": 1.0, "speed": 1.1}
+    ... )
+    >>> count_by_side(samples, [1.1], r_max=2.0)["ahead"].tolist()
+    [2]
     """
     close = samples[samples["distance"] <= r_max]
     number = encounter_numbers(close)[0]

@@ -23,7 +23,7 @@ def plazas() -> list[pd.DataFrame]:
 # --- the measures ------------------------------------------------------------------------------------
 
 
-def test_every_sample_knows_its_kind(plazas: list[pd.DataFrame]) -> None:
+def test_true_kinds_match_the_samples(plazas: list[pd.DataFrame]) -> None:
     nearest = plazas[0].groupby("encounter").agg(kind=("kind", "first"), distance=("distance", "min"))
     assert (nearest["distance"] < 0.45).equals(nearest["kind"] == "intruder")
     together = plazas[0].query("kind == 'together'")
@@ -51,7 +51,7 @@ def test_precision_and_recall() -> None:
         accuracy.precision_and_recall(removed, intruders[1:])
 
 
-def test_the_error_is_the_largest_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:
+def test_largest_error_is_that_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:
     zone, truth = (
         szlib.SocialZone.fit(plazas[0], method="hull", speeds=accuracy.SPEEDS, n_resamples=0),
         szlib.PlazaSettings(),
@@ -98,7 +98,7 @@ def test_the_zone_does_not_shrink_at_the_size_of_the_paper(plazas: list[pd.DataF
     assert found["recall"] == 1
 
 
-def test_the_table_of_the_notebook_shows_it_for_all_sizes() -> None:
+def test_notebook_table_shows_it_for_all_sizes() -> None:
     table = pd.read_csv(TABLE)
     assert table["encounters"].max() > 20_000
     ours = table[table["rule"] == "encounters"]

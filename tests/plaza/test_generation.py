@@ -84,7 +84,7 @@ def raw(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pl.DataFrame]:
     return path, raw_rows(path)
 
 
-def test_another_truth_is_found_as_well(tmp_path: Path) -> None:
+def test_tilted_truth_is_found(tmp_path: Path) -> None:
     zone = hull_of(samples_of(tmp_path, 0, ASIDE))
     metres, degrees = errors(zone, ASIDE)
     assert metres < 0.05
@@ -92,7 +92,7 @@ def test_another_truth_is_found_as_well(tmp_path: Path) -> None:
     assert all(zone.ellipse(v).angle > 0 and zone.ellipse(v).center[1] < -0.03 for v in SPEEDS)
 
 
-def test_without_intruders_it_is_found_too_and_without_outlier_removal(tmp_path: Path) -> None:
+def test_truth_without_intruders_is_found_with_and_without_outlier_removal(tmp_path: Path) -> None:
     polite = PlazaSettings(intruders=0.0)
     samples = samples_of(tmp_path, 2, polite)
     for fraction in (0.002, 0.0):
@@ -111,7 +111,7 @@ def test_intruders_spoil_the_zone_unless_outliers_are_removed(tmp_path: Path) ->
     assert metres > 0.15
 
 
-def test_a_reader_that_swaps_x_and_y_is_found_out(tmp_path: Path) -> None:
+def test_swapped_x_and_y_are_detected(tmp_path: Path) -> None:
     tracks = szlib.read_tracks(make_plaza(tmp_path / "plaza.csv", seed=4, settings=ASIDE))
     swapped = tracks.rename(columns={"x": "y", "y": "x", "vx": "vy", "vy": "vx"})
     assert len(szlib.find_encounters(swapped)) < len(szlib.find_encounters(tracks)) / 2
@@ -120,14 +120,14 @@ def test_a_reader_that_swaps_x_and_y_is_found_out(tmp_path: Path) -> None:
     assert errors(zone, ASIDE)[1] > 10
 
 
-def test_a_clock_that_is_late_for_some_is_found_out(tmp_path: Path) -> None:
+def test_late_clock_of_some_people_is_detected(tmp_path: Path) -> None:
     polite = PlazaSettings(intruders=0.0)
     tracks = szlib.read_tracks(make_plaza(tmp_path / "plaza.csv", seed=4, settings=polite))
     tracks.loc[tracks["id"] % 200 == 0, "t"] += 0.2
     assert errors(hull_of(szlib.find_encounters(tracks)), polite)[0] > 0.1
 
 
-def test_everybody_but_the_intruders_respects_both_zones(staged: pd.DataFrame) -> None:
+def test_only_intruders_enter_a_zone(staged: pd.DataFrame) -> None:
     some = staged.iloc[::5]
     speed, bearing, distance = in_frame(some)
     level = levels(DEFAULT, speed, bearing, distance)
@@ -138,7 +138,7 @@ def test_everybody_but_the_intruders_respects_both_zones(staged: pd.DataFrame) -
     assert (levels(DEFAULT, *in_frame(intruders))[..., 0].min(axis=1) < 0.4).all()
 
 
-def test_all_kinds_of_motion_are_there(staged: pd.DataFrame) -> None:
+def test_all_kinds_of_motion_occur(staged: pd.DataFrame) -> None:
     assert set(staged["kind"]) == set(KINDS)
     other = np.hypot(staged["other_vx"], staged["other_vy"])
     walker = np.hypot(staged["walker_vx"], staged["walker_vy"])
@@ -156,7 +156,7 @@ def test_all_kinds_of_motion_are_there(staged: pd.DataFrame) -> None:
     assert (kind.value_counts() > 100).drop("intruder").all()
 
 
-def test_shares_are_as_set() -> None:
+def test_shares_match_the_settings() -> None:
     counts = stage_encounters(
         settings=PlazaSettings(n_encounters=400, standing=0.1, together=0.2, intruders=0.05)
     )
@@ -164,7 +164,7 @@ def test_shares_are_as_set() -> None:
     assert (counts["standing"], counts["together"], counts["intruder"]) == (40, 80, 20)
 
 
-def test_intruders_have_a_pace(tmp_path: Path) -> None:
+def test_slow_intruders_leave_more_samples(tmp_path: Path) -> None:
     """Slow ones leave many samples deep within the zone, rushing ones a few; both pass as near."""
     inside, nearest = {}, {}
     for pace in (RUSHING_INTRUDERS, SLOW_INTRUDERS):
@@ -180,14 +180,14 @@ def test_intruders_have_a_pace(tmp_path: Path) -> None:
     assert nearest[SLOW_INTRUDERS] == pytest.approx(nearest[RUSHING_INTRUDERS], abs=0.05)
 
 
-def test_most_pairs_are_seen_as_the_encounter_they_are(tmp_path: Path, staged: pd.DataFrame) -> None:
+def test_most_pairs_are_detected_as_encounters(tmp_path: Path, staged: pd.DataFrame) -> None:
     samples = samples_of(tmp_path, 3, DEFAULT)
     refs = set(samples["ref_id"])
     walkers = 9_190_600 + 200 * np.arange(len(staged))
     assert np.mean([walker in refs for walker in walkers]) > 0.9
 
 
-def test_a_seed_gives_the_same_bytes_and_another_seed_others(tmp_path: Path) -> None:
+def test_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
     one, same, other = (
         make_plaza(tmp_path / f"{k}.csv", seed=seed, settings=FEW).read_bytes()
         for k, seed in enumerate((5, 5, 6))
@@ -196,7 +196,7 @@ def test_a_seed_gives_the_same_bytes_and_another_seed_others(tmp_path: Path) -> 
     assert one != other
 
 
-def test_the_file_is_as_the_sensor_writes_it(raw: tuple[Path, pl.DataFrame]) -> None:
+def test_file_has_the_format_of_the_sensor(raw: tuple[Path, pl.DataFrame]) -> None:
     path, rows = raw
     assert path.read_text().splitlines()[0].count(",") == 7
     assert (rows["time"].diff().drop_nulls() >= 0).all()
@@ -229,14 +229,14 @@ def test_tracks_have_gaps_short_and_long(tmp_path: Path) -> None:
     assert 150 < (steps > 0.5).sum() < 210  # 180
 
 
-def test_a_day_is_the_day_that_was_asked_for(tmp_path: Path) -> None:
+def test_day_matches_the_date(tmp_path: Path) -> None:
     tracks = szlib.read_tracks(
         make_plaza(tmp_path / "p.csv", settings=PlazaSettings(n_encounters=5, date="2001-05-06"))
     )
     assert list(tracks["day"].unique()) == ["2001-05-06"]
 
 
-def test_the_truth_is_linear_in_speed_and_turns_the_shorter_way() -> None:
+def test_truth_is_linear_in_speed() -> None:
     settings = PlazaSettings(
         slow_zone=szlib.Ellipse((0.0, 0.0), (0.80, 0.70), np.pi / 2 - 0.04),
         fast_zone=szlib.Ellipse((0.04, 0.02), (0.84, 0.72), 0.04 - np.pi / 2),
@@ -264,7 +264,7 @@ def test_the_truth_is_linear_in_speed_and_turns_the_shorter_way() -> None:
         {"area": szlib.Square(x=(0, 8), y=(0, 20))},
     ],
 )
-def test_settings_without_meaning_are_refused(given: dict[str, object]) -> None:
+def test_invalid_settings_are_refused(given: dict[str, object]) -> None:
     with pytest.raises(szlib.DataError, match="got"):
         PlazaSettings(**given)  # type: ignore[arg-type]
 
@@ -277,12 +277,12 @@ def test_settings_without_meaning_are_refused(given: dict[str, object]) -> None:
         (szlib.Ellipse((0.0, 0.0), (2.1, 2.0)), "contain the person"),
     ],
 )
-def test_a_truth_that_no_hull_finds_is_refused(zone: szlib.Ellipse, why: str) -> None:
+def test_truth_without_a_hull_is_refused(zone: szlib.Ellipse, why: str) -> None:
     with pytest.raises(szlib.ZoneError, match=why):
         PlazaSettings(slow_zone=zone, fast_zone=zone)
 
 
-def test_a_folder_that_is_not_there_is_told_and_nothing_is_left_behind(tmp_path: Path) -> None:
+def test_missing_folder_is_refused_and_no_file_remains(tmp_path: Path) -> None:
     with pytest.raises(szlib.SzlibError, match="cannot be written"):
         make_plaza(tmp_path / "nowhere" / "plaza.csv", settings=FEW)
     make_plaza(tmp_path / "plaza.csv", settings=FEW)

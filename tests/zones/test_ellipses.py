@@ -180,7 +180,7 @@ def test_placed_ellipse_is_the_curve_turned_and_moved(ellipse, heading):
 
 
 @pytest.mark.parametrize("angle", np.linspace(-10, 10, 41))
-def test_angle_is_kept_in_the_half_turn_that_tells_axes_apart(angle):
+def test_angle_is_normalised_to_half_a_turn(angle):
     ellipse, turned = (Ellipse((1, 2), (2, 1), angle + turn) for turn in (0, 3 * np.pi))
     assert -np.pi / 2 < ellipse.angle <= np.pi / 2
     np.testing.assert_allclose(turned.level(ellipse.curve()), 1, rtol=1e-12)
@@ -235,14 +235,14 @@ def test_no_smaller_ellipse_encloses_even_the_support(cloud, aspect):
 
 @pytest.mark.parametrize("cloud", CLOUDS)
 @pytest.mark.parametrize(("size", "offset"), [(1e-3, 0), (1, 1e4), (1e6, 0)])
-def test_size_and_place_do_not_matter(cloud, size, offset):
+def test_result_does_not_depend_on_scale_and_position(cloud, size, offset):
     points = size * CLOUDS[cloud](np.random.default_rng(2)) + [offset, -offset]
     assert_smallest(minimum_enclosing_ellipse(points), points)
 
 
 @settings(max_examples=100, derandomize=True, deadline=None)
 @given(st.lists(st.tuples(st.integers(-6, 6), st.integers(-6, 6)), min_size=3, max_size=30))
-def test_any_points_of_a_lattice_are_enclosed_or_named_collinear(points):
+def test_lattice_points_are_enclosed_or_reported_collinear(points):
     if np.linalg.matrix_rank(np.subtract(points, points[0])) < 2:
         with pytest.raises(ZoneError, match=r"distinct points"):
             minimum_enclosing_ellipse(points)
@@ -272,7 +272,7 @@ def test_order_duplicates_and_inner_points_change_nothing():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_affine_maps_carry_the_ellipse_along(seed):
+def test_affine_maps_transform_the_ellipse(seed):
     rng = np.random.default_rng([5, seed])
     points, matrix, shift = rng.normal(size=(40, 2)), rng.normal(size=(2, 2)), rng.normal(size=2)
     ellipse, mapped = minimum_enclosing_ellipse(points), minimum_enclosing_ellipse(points @ matrix.T + shift)
@@ -384,7 +384,7 @@ ZONES = {
 
 
 @pytest.mark.parametrize("name", ZONES)
-def test_the_whole_curve_is_inside_and_nothing_smaller_holds_the_support(name):
+def test_whole_curve_is_inside_the_smallest_ellipse(name):
     curve, corners = ZONES[name]
     ellipse = minimum_enclosing_ellipse_of_curve(curve, corners)
     assert np.max(ellipse.level(curve(DENSE))) <= 1 + INSIDE
@@ -419,7 +419,7 @@ def test_an_ellipse_is_recovered_from_its_curve(truth):
     np.testing.assert_allclose(ellipse.center, truth.center, atol=1e-9)
 
 
-def test_order_and_turns_of_the_breaks_do_not_matter():
+def test_order_and_full_turns_of_breaks_do_not_matter():
     curve, corners = ZONES["seven sides"]
     ellipse = minimum_enclosing_ellipse_of_curve(curve, corners)
     again = minimum_enclosing_ellipse_of_curve(curve, np.append(corners[::-1] + 4 * np.pi, corners[0]))

@@ -38,7 +38,7 @@ def within_hull(points: np.ndarray, query: np.ndarray) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_vertices_are_the_points_that_the_others_do_not_mix(seed: int) -> None:
+def test_vertices_are_the_points_outside_the_hull_of_the_others(seed: int) -> None:
     points = cloud(seed, 30)
     vertices = {tuple(v) for v in hull_vertices(points)}
     for k, point in enumerate(points):
@@ -64,7 +64,7 @@ def test_points_inside_and_copies_add_no_vertex() -> None:
         (np.vstack([[0, 0, np.inf], CUBE]), "point 0 of the hull is not finite"),
     ],
 )
-def test_points_without_a_hull(points: np.ndarray, message: str) -> None:
+def test_points_without_a_hull_are_refused(points: np.ndarray, message: str) -> None:
     with pytest.raises(szlib.ZoneError, match=message):
         hull_vertices(points)
     with pytest.raises(szlib.ZoneError, match=message):
@@ -87,14 +87,14 @@ def test_a_point_is_in_the_slice_where_it_is_in_the_hull(seed: int, speed: float
     assert 0 < inside < 40
 
 
-def test_the_slice_at_the_speed_of_a_vertex() -> None:
+def test_slice_exists_at_the_speed_of_a_vertex() -> None:
     pyramid = np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0), (0, 0, 2), (1.5, 0, 1)], float)
     section = Polygon(slice_hull(pyramid, 1.0, r_max=R_MAX).polygon)
     expected = MultiPoint([(x / 2, y / 2) for x, y, _ in pyramid[:4]] + [(1.5, 0)]).convex_hull
     assert section.symmetric_difference(expected).area < 1e-12
 
 
-def test_a_slice_in_the_plane_of_many_vertices() -> None:
+def test_slice_exists_in_the_plane_of_many_vertices() -> None:
     """Two boxes on top of each other: every vertex of the middle lies in the slice."""
     stack = np.vstack([CUBE, CUBE + np.array([0, 0, 2])])
     assert Polygon(slice_hull(stack, 2.0, r_max=R_MAX).polygon).area == pytest.approx(4)
@@ -137,7 +137,7 @@ def test_a_slice_at_the_very_edge_is_whole_or_undefined(speed: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_boundary_is_what_a_ray_leaves(seed: int) -> None:
+def test_boundary_is_the_rest_of_a_ray_through_the_slice(seed: int) -> None:
     section = slice_hull(cloud(seed), 1.0, r_max=R_MAX)
     rim = Polygon(section.polygon).exterior
     theta = np.random.default_rng(seed).uniform(-np.pi, np.pi, 200)
@@ -171,7 +171,7 @@ def test_between_corner_angles_the_boundary_is_that_of_one_edge() -> None:
 
 
 @pytest.mark.parametrize("r_max", [2.0, 3.0])
-def test_nobody_in_the_data_is_within_the_zone(r_max: float) -> None:
+def test_no_sample_is_within_the_zone(r_max: float) -> None:
     points = cloud(3)
     section = slice_hull(points, 1.0, r_max=r_max)
     same = np.array([p for p in points if within_hull(points, np.array([p[0], p[1], 1.0]))])
@@ -215,7 +215,7 @@ def test_the_missing_directions_are_those_that_miss_the_slice(towards: int) -> N
         ([(-1, -0.5), (-0.2, 0), (-1, 0.5)], -153, 153),
     ],
 )
-def test_the_origin_on_the_rim_or_behind(corners: list, low: int, high: int) -> None:
+def test_origin_on_or_outside_the_rim_is_undefined(corners: list, low: int, high: int) -> None:
     with pytest.raises(szlib.ZoneError) as error:
         Slice(np.array(corners, float), 1.1, R_MAX)
     assert missing_directions(str(error.value)) == (low, high)

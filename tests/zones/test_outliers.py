@@ -45,7 +45,7 @@ def close(samples: pd.DataFrame) -> pd.DataFrame:
 
 
 def with_intruders(samples: pd.DataFrame, count: int = 5) -> pd.DataFrame:
-    """A few who come far too close."""
+    """Add a few people who come far too close."""
     rng = np.random.default_rng(9)
     intruders = pd.DataFrame(
         {"los_angle": np.linspace(-3, 2.5, count), "distance": rng.uniform(0.05, 0.2, count), "speed": 1.0}
@@ -80,7 +80,7 @@ def make_encounters(
 
 
 @pytest.mark.parametrize("r_max", [2.0, 3.5])
-def test_the_complementary_plane_is_the_plane_inside_out(r_max: float) -> None:
+def test_complementary_plane_is_the_plane_inside_out(r_max: float) -> None:
     samples = close(make_samples())
     points = complementary_points(samples, r_max=r_max)
     np.testing.assert_allclose(np.hypot(*points.T), r_max - samples["distance"], atol=1e-12)
@@ -89,7 +89,7 @@ def test_the_complementary_plane_is_the_plane_inside_out(r_max: float) -> None:
     )
 
 
-def test_who_is_at_r_max_is_at_the_origin_and_who_touches_is_on_the_rim() -> None:
+def test_r_max_maps_to_the_origin_and_contact_to_the_rim() -> None:
     samples = pd.DataFrame({"los_angle": [1.0, np.pi / 2, np.pi], "distance": [2.0, 0.0, 0.5]})
     points = complementary_points(samples)
     np.testing.assert_allclose(points, [[0, 0], [0, 2], [-1.5, 0]], atol=1e-12)
@@ -105,7 +105,7 @@ def test_who_is_at_r_max_is_at_the_origin_and_who_touches_is_on_the_rim() -> Non
         {"los_angle": np.inf},
     ],
 )
-def test_samples_that_have_no_complement(change: dict[str, float]) -> None:
+def test_samples_without_a_complement_are_refused(change: dict[str, float]) -> None:
     samples = close(make_samples()).assign()
     row = samples.index[7]
     for name, value in change.items():
@@ -138,12 +138,12 @@ def brute_force_factors(points: np.ndarray, k: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("k", [5, 20, 60])
-def test_the_factor_is_that_of_its_definition(k: int) -> None:
+def test_factor_equals_its_definition(k: int) -> None:
     points = complementary_points(nearest_approaches(close(make_encounters(300, intruders=5))))
     np.testing.assert_allclose(local_outlier_factors(points, k), brute_force_factors(points, k), rtol=1e-6)
 
 
-def test_an_encounter_stands_for_its_nearest_sample() -> None:
+def test_nearest_approach_is_the_nearest_sample_of_an_encounter() -> None:
     samples = close(make_encounters()).sample(frac=1, random_state=0)
     nearest = nearest_approaches(samples)
     expected = samples.loc[samples.groupby("encounter")["distance"].idxmin()]
@@ -154,12 +154,12 @@ def test_an_encounter_stands_for_its_nearest_sample() -> None:
 @pytest.mark.parametrize("intruders", [0, 1, 6, 12, 30])
 @pytest.mark.parametrize("seed", range(3))
 def test_intruders_are_found_whatever_their_number_and_pace(seed: int, intruders: int, pace: float) -> None:
-    """Up to 5 % of the encounters; and nobody else, who keep to the edge that the quota eats."""
+    """Up to 5 % of the encounters; no other encounter is removed."""
     samples = make_encounters(seed=seed, intruders=intruders, pace=pace)
     assert removed_encounters(samples) == set(range(intruders))
 
 
-def test_a_slow_intruder_hides_from_the_quota_among_their_own_samples() -> None:
+def test_fixed_share_misses_slow_intruders() -> None:
     samples = make_encounters(intruders=6, pace=0.2)
     near = close(samples)
     by_quota = is_outlier(near, fraction=6 * 31 / len(near))  # the very number, were they known
@@ -167,7 +167,7 @@ def test_a_slow_intruder_hides_from_the_quota_among_their_own_samples() -> None:
     assert is_outlier(near)[near["encounter"] < 6].all()
 
 
-def test_the_middle_of_a_crowd_is_found_in_a_later_round() -> None:
+def test_middle_of_a_crowd_is_found_in_a_later_round() -> None:
     """A hundred who rest upon each other in two places, of 2,000: one round alone sees their fringe."""
     samples = make_encounters(2000, intruders=100)
     samples.loc[samples["encounter"] < 100, "los_angle"] *= 0.25
@@ -177,7 +177,7 @@ def test_the_middle_of_a_crowd_is_found_in_a_later_round() -> None:
     assert set(range(100)) <= removed_encounters(samples)
 
 
-def test_who_keeps_away_more_than_most_is_no_outlier() -> None:
+def test_distant_encounters_are_no_outliers() -> None:
     ring = make_samples(300, nearest=0.9, farthest=1.1)
     two = pd.DataFrame({"los_angle": [1.0, 1.0], "distance": [0.2, 1.95], "speed": 1.0})
     samples = pd.concat([ring, two], ignore_index=True).assign(encounter=range(302))
@@ -186,7 +186,7 @@ def test_who_keeps_away_more_than_most_is_no_outlier() -> None:
     assert removed_encounters(samples) == {300}
 
 
-def test_the_neighbours_are_a_share_of_the_encounters() -> None:
+def test_number_of_neighbours_is_a_share_of_the_encounters() -> None:
     samples = make_encounters(2000, intruders=40)
     expected = math.ceil(NEIGHBOUR_SHARE * samples["encounter"].nunique())
     assert expected > N_NEIGHBOURS
@@ -212,7 +212,7 @@ def test_numbers_order_and_direction_of_encounters_change_nothing() -> None:
     assert mirrored.index.equals(kept.index)
 
 
-def test_a_speed_that_nobody_else_walks_at_sets_apart_where_speed_counts() -> None:
+def test_unique_speed_is_an_outlier_if_speed_counts() -> None:
     samples = make_encounters()
     near = samples["encounter"] == samples["encounter"][samples["distance"].idxmin()]
     samples.loc[near, "speed"] = 6.0
@@ -229,7 +229,7 @@ def test_the_funnel_counts_the_samples_of_outlying_encounters() -> None:
     pd.testing.assert_frame_equal(kept, samples.loc[kept.index])
 
 
-def test_a_few_encounters_are_told_and_kept() -> None:
+def test_few_encounters_warn_and_stay() -> None:
     few = make_encounters(N_NEIGHBOURS, intruders=1)
     with pytest.warns(szlib.DataWarning, match=r"20 encounters are too few to find outliers .* add data"):
         kept = remove_outliers(few)
@@ -245,8 +245,8 @@ def test_copies_of_an_encounter_count_once() -> None:
     assert removed_encounters(both) == removed_encounters(samples) >= set(range(5))
 
 
-def test_encounters_of_several_days_are_kept_apart_by_day() -> None:
-    """Or an intruder would take along the one who has the same number on another day."""
+def test_encounters_of_different_days_are_separate() -> None:
+    """Otherwise, an intruder would remove the encounter with the same number on another day."""
     days = [make_encounters(seed=k, intruders=6 * k).assign(day=f"2012-11-0{k + 1}") for k in range(2)]
     both = pd.concat(days, ignore_index=True)
     near = close(both)
@@ -255,21 +255,21 @@ def test_encounters_of_several_days_are_kept_apart_by_day() -> None:
     assert set(found["encounter"]) == set(range(6))
 
 
-def test_samples_that_tell_no_encounter_count_as_one_each() -> None:
+def test_samples_without_encounter_count_individually() -> None:
     samples = with_intruders(close(make_samples(2500)))
     found = is_outlier(samples)
     assert np.flatnonzero(found).tolist() == list(range(len(samples) - 5, len(samples)))
     np.testing.assert_array_equal(found, is_outlier(samples.assign(encounter=range(len(samples)))))
 
 
-def test_more_neighbours_than_encounters() -> None:
+def test_too_many_neighbours_are_refused() -> None:
     with pytest.raises(
         szlib.DataError, match=r"smaller than the number of samples \(or encounters\) .* got 600 neigh"
     ):
         remove_outliers(make_encounters(), n_neighbours=600)
 
 
-def test_nobody_is_taken_from_the_real_day(real_samples: pd.DataFrame) -> None:
+def test_real_day_has_no_outliers(real_samples: pd.DataFrame) -> None:
     """169 encounters within 2 m say too little: even the nearest, at 0.48 m, has company."""
     assert len(remove_outliers(real_samples)) == (real_samples["distance"] <= 2).sum()
 
@@ -280,7 +280,7 @@ def test_nobody_is_taken_from_the_real_day(real_samples: pd.DataFrame) -> None:
 @pytest.mark.parametrize("speed_scale", [None, 0.5])
 @pytest.mark.parametrize("neighbours", [5, 20])
 @pytest.mark.parametrize("fraction", [0.002, 0.05])
-def test_it_is_the_local_outlier_factor(fraction: float, neighbours: int, speed_scale: float | None) -> None:
+def test_outliers_equal_scikit_learn(fraction: float, neighbours: int, speed_scale: float | None) -> None:
     samples = close(make_samples())
     radius, angle = 2 - samples["distance"], samples["los_angle"]
     features = [radius * np.cos(angle), radius * np.sin(angle)]
@@ -293,7 +293,7 @@ def test_it_is_the_local_outlier_factor(fraction: float, neighbours: int, speed_
 
 
 @pytest.mark.parametrize("fraction", [0.0, 0.002, 0.01, 0.1, 0.5])
-def test_the_quota_is_kept(fraction: float) -> None:
+def test_fixed_share_is_removed(fraction: float) -> None:
     samples = make_samples()
     n = len(close(samples))
     kept = remove_outliers(samples, fraction=fraction)
@@ -309,7 +309,7 @@ def test_planted_intruders_are_found(seed: int) -> None:
     assert np.flatnonzero(found).tolist() == list(range(len(people), len(samples)))
 
 
-def test_row_order_and_turning_the_world_change_nothing() -> None:
+def test_row_order_and_rotation_change_nothing() -> None:
     samples = with_intruders(make_samples())
     kept = remove_outliers(samples, fraction=0.01)
     shuffled = remove_outliers(samples.sample(frac=1, random_state=1), fraction=0.01)
@@ -318,7 +318,7 @@ def test_row_order_and_turning_the_world_change_nothing() -> None:
     assert turned.index.equals(kept.index)
 
 
-def test_rows_come_as_they_are_and_the_input_stays() -> None:
+def test_rows_and_input_do_not_change() -> None:
     samples = make_samples().assign(note="x")
     funnels.attach(samples, [funnels.stage("before", 1000, 1000, {})])
     before = samples.copy(deep=True)
@@ -333,7 +333,7 @@ def test_rows_come_as_they_are_and_the_input_stays() -> None:
     assert len(funnels.get(samples)) == 1
 
 
-def test_identical_samples_are_told_and_parted() -> None:
+def test_identical_samples_warn_and_are_separated() -> None:
     samples = pd.concat(
         [close(make_samples(600)), close(make_samples(30))] + [close(make_samples(30)).head(1)] * 40
     )
@@ -373,12 +373,12 @@ def test_a_few_identical_samples_need_no_noise() -> None:
         ({"speed_scale": np.nan}, "speed_scale must be a positive number"),
     ],
 )
-def test_parameters_without_a_meaning(options: dict, message: str) -> None:
+def test_invalid_parameters_are_refused(options: dict, message: str) -> None:
     with pytest.raises(szlib.DataError, match=message):
         remove_outliers(make_samples(), **{"fraction": FRACTION, **options})
 
 
-def test_samples_that_cannot_be_used() -> None:
+def test_invalid_samples_are_refused() -> None:
     samples = make_samples()
     with pytest.raises(szlib.DataError, match=r"columns \['distance'\] are missing"):
         remove_outliers(samples.drop(columns="distance"))
@@ -392,7 +392,7 @@ def test_samples_that_cannot_be_used() -> None:
         remove_outliers(samples.drop(columns="speed"), fraction=FRACTION, speed_scale=1.0)
 
 
-def test_the_real_day_keeps_its_quota(real_samples: pd.DataFrame) -> None:
+def test_fixed_share_is_removed_from_the_real_day(real_samples: pd.DataFrame) -> None:
     kept = remove_outliers(real_samples, fraction=FRACTION)
     *_, near, inliers = funnels.get(kept)
     assert inliers["rejected"]["outlier (LOF)"] == math.ceil(0.002 * (near["kept"] - 1))

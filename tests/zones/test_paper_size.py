@@ -22,9 +22,9 @@ MANY = 40_000
 def test_outliers_are_those_of_scikit_learn() -> None:
     samples = paper_samples(MANY)
     points = outliers.complementary_points(samples)
-    theirs = LocalOutlierFactor(n_neighbors=20, contamination=0.002).fit_predict(points) == -1
-    assert (outliers.is_outlier(samples, fraction=outliers.FRACTION) == theirs).all()
-    assert theirs.sum() == 0.002 * MANY
+    expected = LocalOutlierFactor(n_neighbors=20, contamination=0.002).fit_predict(points) == -1
+    assert (outliers.is_outlier(samples, fraction=outliers.FRACTION) == expected).all()
+    assert expected.sum() == 0.002 * MANY
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])

@@ -34,7 +34,7 @@ def test_the_reach_of_an_ellipse_ends_on_it() -> None:
     assert np.isnan(ellipse_reach(np.array([2.0, 0.0, 1.0, 0.5, 0.0]))).all()  # the person is outside
 
 
-def test_radii_of_an_ellipse_give_it_back() -> None:
+def test_fit_recovers_an_ellipse_from_its_radii() -> None:
     same(fit_ellipses(ellipse_reach(KNOWN)), KNOWN, 1e-8)
 
 
@@ -61,7 +61,7 @@ def test_turned_mirrored_and_scaled_radii_give_turned_mirrored_and_scaled_ellips
     same(fit_ellipses(3 * radii), np.array([[3 * m, 3 * n, 3 * a, 3 * b, angle]]), 1e-7)
 
 
-def test_gaps_are_closed_up_to_half_of_all_directions() -> None:
+def test_gaps_below_half_a_turn_are_filled() -> None:
     radii = ellipse_reach(KNOWN[:1])
     radii[0, 3:9] = np.nan
     radii[0, -1] = np.nan  # across the seam
@@ -74,7 +74,7 @@ def test_gaps_are_closed_up_to_half_of_all_directions() -> None:
     assert np.isnan(fill_gaps(radii)).all()
 
 
-def test_a_half_circle_is_no_zone_and_the_error_names_it() -> None:
+def test_gap_of_half_a_turn_is_undefined_and_named() -> None:
     radii = ellipse_reach(KNOWN[:1])
     radii[0, 10:50] = np.nan
     zone = PolarZone(np.array([1.1]), DIRECTIONS, radii)
@@ -110,6 +110,6 @@ def test_between_speeds_radii_are_linear() -> None:
         ([1.0], [0.0], [[-1.0]], "must not be negative; got -1"),
     ],
 )
-def test_radii_without_meaning(speeds: list, directions: list, radii: list, message: str) -> None:
+def test_invalid_radii_are_refused(speeds: list, directions: list, radii: list, message: str) -> None:
     with pytest.raises(szlib.ZoneError, match=message):
         PolarZone(np.array(speeds), np.array(directions), np.array(radii))

@@ -30,12 +30,12 @@ def test_the_known_zone_is_recovered_whatever_the_number_of_people(seed: int) ->
     np.testing.assert_allclose(many[:4], TRUTH[:4], atol=0.02)
 
 
-def test_noise_does_not_bring_people_nearer() -> None:
+def test_noise_does_not_shrink_the_zone() -> None:
     still, noisy = ellipse(passers(2500)), ellipse(passers(2500, noise=0.05))
     np.testing.assert_allclose(noisy[:4], still[:4], atol=0.02)
 
 
-def test_a_few_who_walk_right_through_change_little(samples: pd.DataFrame) -> None:
+def test_few_intruders_change_little(samples: pd.DataFrame) -> None:
     through = samples["encounter"] % 50 == 0  # 2 %
     intruders = samples.assign(distance=np.where(through, samples["distance"] / 3, samples["distance"]))
     np.testing.assert_allclose(ellipse(intruders)[:4], ellipse(samples)[:4], atol=0.03)
@@ -43,8 +43,8 @@ def test_a_few_who_walk_right_through_change_little(samples: pd.DataFrame) -> No
 
 def test_at_most_a_share_q_of_encounters_is_nearer(samples: pd.DataFrame) -> None:
     known = Approaches.from_samples(samples, r_max=2.0)
-    who, nearest = known.nearest(1.1)
-    assert (np.abs(samples.groupby("encounter")["speed"].mean()[who] - 1.1) <= SPEED_BAND).all()
+    encounters, nearest = known.nearest(1.1)
+    assert (np.abs(samples.groupby("encounter")["speed"].mean()[encounters] - 1.1) <= SPEED_BAND).all()
     for q in (0.01, 0.05, 0.3):
         radii = quantile_radii(known, 1.1, q)[0]
         seen = np.isfinite(nearest).sum(axis=0)
@@ -61,7 +61,7 @@ def test_more_may_enter_a_larger_zone(samples: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize("turn", [np.pi / 2, np.radians(35), 1.0])
-def test_turned_people_turn_the_zone(samples: pd.DataFrame, turn: float) -> None:
+def test_rotated_samples_rotate_the_quantile_zone(samples: pd.DataFrame, turn: float) -> None:
     """Exactly by multiples of 5 deg, which the directions are apart; else nearly."""
     m, n, a, b, angle = ellipse(samples)
     cos, sin = np.cos(turn), np.sin(turn)
@@ -90,7 +90,7 @@ def test_neither_order_nor_numbers_of_encounters_matter(samples: pd.DataFrame) -
     np.testing.assert_allclose(ellipse(days), expected, atol=1e-9)
 
 
-def test_weights_are_copies(samples: pd.DataFrame) -> None:
+def test_weights_equal_copies(samples: pd.DataFrame) -> None:
     known = Approaches.from_samples(samples, r_max=2.0)
     weights = np.random.default_rng(0).integers(0, 4, (3, len(known.encounters))).astype(float)
     lines = quantile_radii(known, 1.1, 0.05, weights)
@@ -112,7 +112,7 @@ def test_weights_are_copies(samples: pd.DataFrame) -> None:
 # --- smoothing ---------------------------------------------------------------------------------------
 
 
-def test_straight_and_evenly_bent_paths_stay_as_they_are() -> None:
+def test_smoothing_keeps_straight_and_evenly_curved_paths() -> None:
     t = np.arange(31) / 10
     x, y = 3 - 1.5 * t + 0.2 * t**2, 0.7 + 0.1 * t - 0.05 * t**2
     path = pd.DataFrame({"encounter": 0, "t": t, "los_angle": np.arctan2(y, x), "distance": np.hypot(x, y)})
@@ -135,7 +135,7 @@ def test_smoothing_stops_at_gaps_and_at_other_encounters(samples: pd.DataFrame) 
     np.testing.assert_array_equal(untimed[1], some["distance"])
 
 
-def test_smoothing_takes_noise_away() -> None:
+def test_smoothing_reduces_noise() -> None:
     still, noisy = passers(200), passers(200, noise=0.05)
     error = smooth_paths(noisy)[1] - still["distance"]
     assert error.std() < 0.6 * (noisy["distance"] - still["distance"]).std()
@@ -157,7 +157,7 @@ def test_smoothing_takes_noise_away() -> None:
         ({"los_angle": 0.3}, szlib.ZoneError, r"from 35 counter-clockwise to 360 deg|no speed has a zone"),
     ],
 )
-def test_samples_without_a_quantile(
+def test_samples_without_a_quantile_zone_are_refused(
     samples: pd.DataFrame, change: dict, error: type[Exception], message: str
 ) -> None:
     with pytest.raises(error, match=message):

@@ -1,4 +1,4 @@
-"""The respect zone: known contours come back, flat in the number of samples, nothing where nobody minds."""
+"""The respect zone: known contours are recovered, whatever the number of samples; null data has no zone."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ZONE = szlib.Ellipse((0.1, 0.05), (1.1, 0.7), 0.3)
 
 
 def scattered(seed: int, n: int) -> pd.DataFrame:
-    """Samples of people who mind nobody: even over a disc, more of them ahead."""
+    """Samples of people who ignore others: uniform over a disc, more of them ahead."""
     rng = np.random.default_rng(seed)
     ahead = rng.normal(0, 1.2, n)
     angle = np.where(rng.random(n) < 0.5, ahead, rng.uniform(-np.pi, np.pi, n))
@@ -80,7 +80,7 @@ def test_a_known_circle_comes_back_from_all_bearings(null: szlib.NullEncounters,
     assert respect_boundary(data, null, THETA) == pytest.approx(radius, abs=0.04)
 
 
-def test_it_is_flat_in_the_number_of_samples(null: szlib.NullEncounters) -> None:
+def test_radius_does_not_depend_on_the_number_of_samples(null: szlib.NullEncounters) -> None:
     """With an edge as soft as at real sites; what a hull finds shrinks by half a metre meanwhile."""
     nearest = []
     for n in (100, 1_000, 10_000, 100_000):
@@ -95,20 +95,20 @@ def test_it_is_flat_in_the_number_of_samples(null: szlib.NullEncounters) -> None
 
 
 @pytest.mark.parametrize("ignoring", [0.05, 0.2, 0.4])
-def test_some_who_do_not_care_change_little(null: szlib.NullEncounters, ignoring: float) -> None:
+def test_people_who_ignore_others_change_little(null: szlib.NullEncounters, ignoring: float) -> None:
     data = kept_out(scattered(3, 50_000), ZONE, ignoring)
     fit = fit_respect(data, null)
     assert fit.ignoring_share == pytest.approx(ignoring, abs=0.03)
     assert fit.radii(THETA) == pytest.approx(reach(ZONE, THETA), abs=0.06)
 
 
-def test_half_who_do_not_care_leave_no_zone(null: szlib.NullEncounters) -> None:
+def test_most_people_ignoring_others_leave_no_zone(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(4, 50_000), ZONE, 0.7)
     assert respect_radius(data, null) == 0
     assert (respect_boundary(data, null, THETA) == 0).all()
 
 
-def test_where_nobody_minds_there_is_no_zone(null: szlib.NullEncounters) -> None:
+def test_null_data_has_no_zone(null: szlib.NullEncounters) -> None:
     radii = [respect_radius(scattered(seed, 1_000), null) for seed in range(5, 25)]
     assert np.median(radii) < 0.05
     assert max(radii) < 0.3
@@ -124,7 +124,7 @@ def test_the_contour_is_where_counts_are_half(null: szlib.NullEncounters) -> Non
     assert fit_respect(data, null).softness == pytest.approx(0.1, abs=0.01)
 
 
-def test_zones_by_speed(null: szlib.NullEncounters) -> None:
+def test_radius_follows_the_speed(null: szlib.NullEncounters) -> None:
     data = scattered(7, 60_000)
     data = data[data["distance"] > 0.4 + 0.4 * data["speed"]]
     for speed in (0.7, 1.0, 1.3):
@@ -135,7 +135,7 @@ def test_zones_by_speed(null: szlib.NullEncounters) -> None:
 # --- invariances -------------------------------------------------------------------------------------
 
 
-def test_the_mix_of_directions_and_the_numbers_do_not_matter(null: szlib.NullEncounters) -> None:
+def test_mix_of_directions_does_not_matter(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(8, 40_000), ZONE)
     ahead = np.abs(data["los_angle"]) < np.pi / 2
     fewer = pd.concat([data[ahead], data[~ahead].iloc[::4]])
@@ -144,14 +144,14 @@ def test_the_mix_of_directions_and_the_numbers_do_not_matter(null: szlib.NullEnc
     )
 
 
-def test_a_mirrored_world_has_a_mirrored_zone(null: szlib.NullEncounters) -> None:
+def test_mirrored_samples_mirror_the_respect_zone(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(9, 20_000), ZONE)
     other = null_of(null.samples.assign(los_angle=-null.samples["los_angle"]))
     found = respect_boundary(data.assign(los_angle=-data["los_angle"]), other, -THETA)
     assert found == pytest.approx(respect_boundary(data, null, THETA), abs=1e-3)
 
 
-def test_weights_are_copies(null: szlib.NullEncounters) -> None:
+def test_weights_equal_copies(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(10, 2_000), ZONE)
     weights = np.random.default_rng(0).integers(0, 4, len(data))
     weighed = OccupancyHistogram.from_samples(data, r_max=R_MAX, weights=weights)
@@ -161,15 +161,17 @@ def test_weights_are_copies(null: szlib.NullEncounters) -> None:
     assert respect_radius(weighed, against) == respect_radius(data.loc[data.index.repeat(weights)], null)
 
 
-def test_what_is_far_does_not_matter(null: szlib.NullEncounters) -> None:
+def test_far_samples_do_not_matter(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(11, 2_000), ZONE)
     far = data.assign(distance=data["distance"] + 2.0)
     found = respect_boundary(pd.concat([data, far]), null, THETA)
     np.testing.assert_array_equal(found, respect_boundary(data, null, THETA))
 
 
-def test_a_null_of_few_shifts_is_drawn_anew_as_well(null: szlib.NullEncounters) -> None:
-    few = szlib.NullEncounters(null.samples[:2000], null.encounters[:2000], 11, R_MAX)  # nobody in the last
+def test_shifts_of_the_null_are_resampled(null: szlib.NullEncounters) -> None:
+    few = szlib.NullEncounters(
+        null.samples[:2000], null.encounters[:2000], 11, R_MAX
+    )  # no sample in the last
     data = kept_out(scattered(1, 2000), szlib.Ellipse((0, 0), (0.9, 0.7)))
     zones = RespectEstimator.from_samples(data, r_max=R_MAX, null=few)
     alike = np.ones((5, len(zones.encounters)))
@@ -180,14 +182,14 @@ def test_a_null_of_few_shifts_is_drawn_anew_as_well(null: szlib.NullEncounters) 
     np.testing.assert_allclose(zones.counts_by_shift.sum(axis=0), zones.null.counts)
 
 
-def test_shapes(null: szlib.NullEncounters) -> None:
+def test_radii_have_the_shape_of_theta(null: szlib.NullEncounters) -> None:
     fit = fit_respect(kept_out(scattered(12, 2_000), ZONE), null)
     assert fit.radii(0.0).shape == ()
     assert fit.radii(np.zeros((2, 3))).shape == (2, 3)
     assert fit.radii(np.pi) == pytest.approx(fit.radii(-np.pi))
 
 
-def test_nothing_to_compare(null: szlib.NullEncounters) -> None:
+def test_respect_without_samples_is_refused(null: szlib.NullEncounters) -> None:
     data = scattered(13, 100)
     with pytest.raises(ZoneError, match=r"0 samples of the data.*nothing to compare"):
         respect_radius(data.assign(distance=3.0), null)
@@ -200,19 +202,17 @@ def test_nothing_to_compare(null: szlib.NullEncounters) -> None:
 # --- the map -----------------------------------------------------------------------------------------
 
 
-def test_the_map_of_g(null: szlib.NullEncounters) -> None:
+def test_pair_correlation_is_low_within_the_zone(null: szlib.NullEncounters) -> None:
     same = pair_correlation(null.samples, null)
     assert same.g == pytest.approx(1.0)
     data = kept_out(scattered(14, 100_000), szlib.Ellipse((0, 0), (1, 1)))
     g = pair_correlation(data, null).g
     assert g.shape == (len(same.direction), len(same.distance))
     assert g[:, same.distance < 0.7].max() < 0.05
-    assert g[:, same.distance > 1.3].min() > 1.0, (
-        "who is not inside is outside: more than with nobody minding"
-    )
+    assert g[:, same.distance > 1.3].min() > 1.0, "people outside the zone are more frequent than in the null"
 
 
-def test_the_map_needs_a_null(null: szlib.NullEncounters) -> None:
+def test_pair_correlation_needs_a_null(null: szlib.NullEncounters) -> None:
     with pytest.raises(ZoneError, match="no encounter"):
         pair_correlation(scattered(0, 10), null_of(scattered(0, 0)))
 

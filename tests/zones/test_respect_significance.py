@@ -1,4 +1,4 @@
-"""Is it respect at all: valid p-values where nobody minds, small ones where people do."""
+"""Is it respect at all: valid p-values under the null, small ones with respect."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ def null_of(seed: int, shifts: int = SHIFTS) -> szlib.NullEncounters:
     return szlib.NullEncounters(rows[rows["distance"] <= 2], found, shifts, 2.0)
 
 
-# --- nobody minds ------------------------------------------------------------------------------------
+# --- under the null ------------------------------------------------------------------------------------
 
 
-def test_p_values_are_even_where_nobody_minds() -> None:
+def test_p_values_are_uniform_under_the_null() -> None:
     tests = [null_test(encounters(seed, SHIFTS), null_of(seed), fit_null_radii=False) for seed in range(100)]
     p = np.array([test.p_value for test in tests])
     assert (p <= 0.05).mean() <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / len(p))
@@ -43,8 +43,8 @@ def test_p_values_are_even_where_nobody_minds() -> None:
     assert share == pytest.approx([0.25, 0.5, 0.75], abs=0.1)
 
 
-def test_a_crowd_that_minds_nobody_is_found_out() -> None:
-    """100 seeds stand in notebooks/tables/15_nobody.csv."""
+def test_noninteracting_crowd_shows_no_respect() -> None:
+    """notebooks/tables/15_nobody.csv has 100 seeds."""
     p = []
     for seed in range(6):
         tracks = noninteracting_crowd(seed=seed, people=600, minutes=40)
@@ -54,7 +54,7 @@ def test_a_crowd_that_minds_nobody_is_found_out() -> None:
     assert np.median(p) > 0.15
 
 
-def test_another_mix_of_kinds_is_no_respect() -> None:
+def test_different_mix_of_kinds_is_no_respect() -> None:
     """In a bunch most walk the same way, and farther apart by condition 3; shifted, most of them cross."""
 
     def mixed(seed: int, shift: int, crossing: float) -> pd.DataFrame:
@@ -79,7 +79,7 @@ def test_another_mix_of_kinds_is_no_respect() -> None:
     assert np.median(by_kind) > 0.3
 
 
-def test_people_drawn_to_each_other_show_no_respect(tmp_path: Path) -> None:
+def test_attraction_is_no_respect(tmp_path: Path) -> None:
     """A plaza without clearance whose zones are tiny: everybody walks right at everybody."""
     tiny = szlib.Ellipse((0, 0), (0.15, 0.15))
     settings = szlib.PlazaSettings(
@@ -96,7 +96,7 @@ def test_people_drawn_to_each_other_show_no_respect(tmp_path: Path) -> None:
 # --- people mind -------------------------------------------------------------------------------------
 
 
-def test_who_keeps_away_is_seen_to() -> None:
+def test_people_who_keep_away_show_respect() -> None:
     null = null_of(0)
     test = null_test(encounters(1, SHIFTS, away=0.5), null)
     assert test.p_value == 1 / (1 + SHIFTS)
@@ -107,13 +107,13 @@ def test_who_keeps_away_is_seen_to() -> None:
     assert "respect: p = 0.025 (39 shifts" in str(test)
 
 
-def test_who_comes_near_is_no_respect() -> None:
+def test_people_who_come_near_show_no_respect() -> None:
     near = encounters(1, SHIFTS)
     near["distance"] /= 3
     assert null_test(near, null_of(0)).p_value == 1
 
 
-def test_more_than_bodies() -> None:
+def test_excluded_encounters_do_not_count() -> None:
     """0.5 m that no two bodies can be within: no respect in that alone."""
     null = null_of(0)
     assert null_test(encounters(1, SHIFTS, n=200, away=0.5), null).is_significant
@@ -121,7 +121,7 @@ def test_more_than_bodies() -> None:
     assert null_test(encounters(1, SHIFTS, n=200, away=1.0), null, excluded_below=0.55).is_significant
 
 
-def test_the_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.DataFrame) -> None:
+def test_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.DataFrame) -> None:
     null = szlib.null_encounters(real_tracks, shifts=20, progress=False)
     for kinds in ("strangers", KINDS):
         test = null_test(szlib.of_kind(real_samples, kinds), null.of_kind(kinds), excluded_below=0.5)
@@ -133,14 +133,14 @@ def test_the_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.
 # --- the object, and errors --------------------------------------------------------------------------
 
 
-def test_it_survives_json() -> None:
+def test_null_test_survives_json() -> None:
     test = null_test(encounters(1, SHIFTS), null_of(0))
     assert NullTest.from_record(json.loads(json.dumps(test.record()))) == test
     with pytest.raises(ZoneError, match="test it again"):
         NullTest.from_record({"p_value": 0.1})
 
 
-def test_kinds_on_one_side_only() -> None:
+def test_kind_on_one_side_only_warns() -> None:
     null, data = null_of(0), encounters(1, SHIFTS, n=100)
     kind = np.where(np.arange(len(null.encounters)) % 2, "crossing", "opposite")
     null = szlib.NullEncounters(null.samples, null.encounters.assign(kind=kind), SHIFTS, 2.0)
@@ -151,7 +151,7 @@ def test_kinds_on_one_side_only() -> None:
         null_test(data.assign(kind=mixed), null)
 
 
-def test_errors() -> None:
+def test_null_test_without_encounters_is_refused() -> None:
     data, null = encounters(1, SHIFTS), null_of(0)
     with pytest.raises(ZoneError, match="nothing to test"):
         null_test(data.assign(distance=2.5), null)

@@ -125,14 +125,14 @@ def test_the_ellipse_contains_the_whole_boundary(zone: SocialZone, speed: float)
 
 
 @pytest.mark.parametrize("turn", [0.3, -2.0, np.pi / 2])
-def test_turning_the_people_turns_the_zone(samples: pd.DataFrame, zone: SocialZone, turn: float) -> None:
+def test_rotated_samples_rotate_the_zone(samples: pd.DataFrame, zone: SocialZone, turn: float) -> None:
     turned = fit(samples.assign(los_angle=samples["los_angle"] + turn))
     for speed in (0.9, 1.1, 1.3):
         expected = zone.ellipse(speed).placed((0, 0), turn)
         assert_same_ellipse(turned.ellipse(speed), expected, 1e-5)
 
 
-def test_a_mirror_mirrors_the_zone(samples: pd.DataFrame, zone: SocialZone) -> None:
+def test_mirrored_samples_mirror_the_zone(samples: pd.DataFrame, zone: SocialZone) -> None:
     mirrored = fit(samples.assign(los_angle=-samples["los_angle"])).ellipse(1.1)
     known = zone.ellipse(1.1)
     x, y = known.center
@@ -164,7 +164,7 @@ def test_a_fitted_speed_is_the_one_in_the_table(zone: SocialZone) -> None:
         assert row.area == pytest.approx(np.pi * row.a * row.b)
 
 
-def test_a_speed_between_is_fitted_when_asked(samples: pd.DataFrame, zone: SocialZone) -> None:
+def test_speed_between_fitted_speeds_is_fitted_on_demand(samples: pd.DataFrame, zone: SocialZone) -> None:
     fitted = fit(samples, speeds=[1.05]).ellipses[1.05]
     assert zone.ellipse(1.05) == fitted
     assert 1.05 not in zone.ellipses
@@ -178,7 +178,7 @@ def test_a_speed_outside_the_data_names_the_range(zone: SocialZone) -> None:
                 ask(speed)
 
 
-def test_undefined_speeds_are_told_and_kept(samples: pd.DataFrame, tmp_path: Path) -> None:
+def test_undefined_speeds_warn_and_are_saved(samples: pd.DataFrame, tmp_path: Path) -> None:
     with pytest.warns(szlib.DataWarning, match=r"at 0\.1 m/s is undefined.*; .*at 9 m/s is undefined"):
         zone = fit(samples, speeds=(0.1, 1.1, 9))
     assert list(zone.ellipses) == [1.1]
@@ -231,7 +231,7 @@ def test_a_stage_that_does_not_add_up_is_refused() -> None:
         (lambda d: d.assign(speed=np.nan), szlib.ZoneError, "is not finite"),
     ],
 )
-def test_samples_without_a_zone(
+def test_samples_without_a_zone_are_refused(
     samples: pd.DataFrame, change: Callable, error: type[Exception], message: str
 ) -> None:
     with pytest.raises(error, match=message):
@@ -244,7 +244,7 @@ def test_three_points_have_no_hull(samples: pd.DataFrame) -> None:
         fit(few, fraction=0)
 
 
-def test_no_speed_asked_for(samples: pd.DataFrame) -> None:
+def test_empty_speeds_are_refused(samples: pd.DataFrame) -> None:
     with pytest.raises(szlib.ZoneError, match="no speed has a zone: `speeds` is empty"):
         fit(samples, speeds=())
 
@@ -252,7 +252,7 @@ def test_no_speed_asked_for(samples: pd.DataFrame) -> None:
 # --- files -------------------------------------------------------------------------------------------
 
 
-def test_a_saved_zone_comes_back_bit_by_bit(samples: pd.DataFrame, zone: SocialZone, tmp_path: Path) -> None:
+def test_saved_zone_loads_bit_by_bit(samples: pd.DataFrame, zone: SocialZone, tmp_path: Path) -> None:
     zone.save(tmp_path / "zone.json")
     loaded = SocialZone.load(tmp_path / "zone.json")
     np.testing.assert_array_equal(loaded.shape.vertices, zone.shape.vertices)
@@ -272,7 +272,7 @@ def test_a_saved_zone_comes_back_bit_by_bit(samples: pd.DataFrame, zone: SocialZ
     numpy_options.save(tmp_path / "numpy.json")
 
 
-def test_the_file_says_what_it_is(zone: SocialZone, tmp_path: Path) -> None:
+def test_file_states_format_version_and_units(zone: SocialZone, tmp_path: Path) -> None:
     zone.save(str(tmp_path / "zone.json"))
     content = json.loads((tmp_path / "zone.json").read_text(encoding="utf-8"))
     assert (content["format"], content["version"]) == ("szlib.SocialZone", 2)
@@ -292,7 +292,7 @@ def test_saving_replaces_a_file_as_a_whole(zone: SocialZone, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("place", ["missing/zone.json", "file/zone.json", "folder"])
-def test_a_place_where_nothing_can_be_written_is_named(zone: SocialZone, tmp_path: Path, place: str) -> None:
+def test_unwritable_path_is_named(zone: SocialZone, tmp_path: Path, place: str) -> None:
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").touch()
     with pytest.raises(szlib.ZoneError, match=f"{place}: cannot write the zone"):
@@ -348,7 +348,7 @@ BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
 
 
 @pytest.mark.parametrize(("change", "message"), BROKEN.values(), ids=BROKEN)
-def test_a_file_that_is_no_zone_is_told_by_name(
+def test_damaged_file_is_refused_by_name(
     zone: SocialZone, tmp_path: Path, change: Callable[[str], str | bytes], message: str
 ) -> None:
     path = tmp_path / "zone.json"
@@ -359,14 +359,14 @@ def test_a_file_that_is_no_zone_is_told_by_name(
         SocialZone.load(path)
 
 
-def test_no_file(tmp_path: Path) -> None:
+def test_missing_file_is_refused(tmp_path: Path) -> None:
     for path in (tmp_path / "missing.json", tmp_path):
         with pytest.raises(szlib.ZoneError, match=f"{path.name}: cannot be read as a zone"):
             SocialZone.load(path)
 
 
 @pytest.mark.parametrize("r_max", [0, -1, np.nan, np.inf])
-def test_a_zone_needs_a_distance(zone: SocialZone, r_max: float) -> None:
+def test_invalid_r_max_is_refused(zone: SocialZone, r_max: float) -> None:
     with pytest.raises(szlib.ZoneError, match="r_max must be a positive distance"):
         replace(zone, r_max=r_max)
 
@@ -390,7 +390,7 @@ def test_every_method_finds_the_known_zone(samples: pd.DataFrame, method: str) -
 
 
 @pytest.mark.parametrize("method", ["hull", "quantile"])
-def test_every_method_drives_the_robot_and_keeps_its_file(
+def test_zone_of_every_method_drives_the_robot_and_reloads(
     samples: pd.DataFrame, method: str, tmp_path: Path
 ) -> None:
     zone = SocialZone.fit(samples, method=method, n_resamples=20)
@@ -407,7 +407,7 @@ def test_every_method_drives_the_robot_and_keeps_its_file(
     assert (tmp_path / "again.json").read_bytes() == (tmp_path / "zone.json").read_bytes()
 
 
-def test_intervals_and_counts_do_not_touch_the_zone(samples: pd.DataFrame, zone: SocialZone) -> None:
+def test_intervals_do_not_change_the_zone(samples: pd.DataFrame, zone: SocialZone) -> None:
     plain = fit(samples)
     assert plain.ellipses == zone.ellipses
     np.testing.assert_array_equal(plain.shape.vertices, zone.shape.vertices)
@@ -426,12 +426,12 @@ def test_intervals_and_counts_do_not_touch_the_zone(samples: pd.DataFrame, zone:
         ({"n_resamples": 1}, "resamples must be a whole number, 0 .no intervals. or at least 2; got 1"),
     ],
 )  # fmt: skip
-def test_options_without_meaning(samples: pd.DataFrame, options: dict, message: str) -> None:
+def test_invalid_options_are_refused(samples: pd.DataFrame, options: dict, message: str) -> None:
     with pytest.raises(szlib.SzlibError, match=message):
         fit(samples, **options)
 
 
-def test_a_quantile_has_no_hull_and_ends_at_its_speeds(samples: pd.DataFrame) -> None:
+def test_quantile_zone_is_undefined_outside_its_speeds(samples: pd.DataFrame) -> None:
     zone = fit(samples, method="quantile", speeds=(0.9, 1.1))
     assert zone.speed_range == (0.9, 1.1)
     with pytest.raises(
@@ -448,7 +448,7 @@ def made_null(n: int = 3000, *, r_max: float = 2.0) -> szlib.NullEncounters:
     return szlib.NullEncounters(close, encounters.reset_index().assign(kind="crossing"), 20, r_max)
 
 
-def test_respect_is_found_against_a_null_and_kept_with_its_test(tmp_path: Path) -> None:
+def test_respect_zone_is_found_and_saved_with_its_test(tmp_path: Path) -> None:
     people = passers(600)
     zone = SocialZone.fit(people, method="respect", null=made_null(), speeds=(1.1,), n_resamples=4)
     assert_same_ellipse(zone.ellipse(1.1), szlib.Ellipse(TRUTH[:2], TRUTH[2:4], TRUTH[4]), 0.12)
@@ -478,7 +478,7 @@ def test_any_zone_can_be_tested_against_a_null(samples: pd.DataFrame) -> None:
         ({"null": made_null(20), "speed_width": 0.0}, "speed_width must be positive, inf for equal"),
     ],
 )
-def test_respect_without_what_it_needs(options: dict, message: str) -> None:
+def test_respect_without_valid_null_is_refused(options: dict, message: str) -> None:
     with pytest.raises(szlib.ZoneError, match=message):
         fit(passers(50), method="respect", **options)
 
@@ -487,7 +487,7 @@ def test_respect_without_what_it_needs(options: dict, message: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:6 encounters are too few to find outliers")
-def test_six_encounters_are_no_zone_to_rely_on(samples: pd.DataFrame, tmp_path: Path) -> None:
+def test_low_sample_zone_warns(samples: pd.DataFrame, tmp_path: Path) -> None:
     six = samples[samples["encounter"] < 6]
     for method in ("hull", "quantile"):
         with pytest.warns(
@@ -502,14 +502,14 @@ def test_six_encounters_are_no_zone_to_rely_on(samples: pd.DataFrame, tmp_path: 
                 szlib.MPCCBF(again)
 
 
-def test_a_side_that_few_were_seen_on_is_named(samples: pd.DataFrame) -> None:
+def test_side_with_few_encounters_is_named(samples: pd.DataFrame) -> None:
     left = np.abs(samples["los_angle"] - np.pi / 2) < np.pi / 8
     with pytest.warns(szlib.DataWarning, match=r"fewer than 20 encounters were seen left \([0-9]\)$"):
         zone = fit(samples[~left | (samples["encounter"] < 10)], speeds=(1.1,))
     assert zone.missing_data(1.1).endswith("seen left (9)") or "left (" in zone.missing_data(1.1)
 
 
-def test_speeds_that_nobody_counted_are_not_relied_on(zone: SocialZone) -> None:
+def test_speed_without_encounters_is_not_adequate(zone: SocialZone) -> None:
     assert zone.adequate(1.0)  # between 0.9 and 1.1
     with pytest.warns(
         szlib.DataWarning, match=r"at 1\.6 m/s no encounters were counted \(only at 0\.5 to 1\.5 m/s\)"
@@ -517,7 +517,7 @@ def test_speeds_that_nobody_counted_are_not_relied_on(zone: SocialZone) -> None:
         zone.ellipse(1.6)
 
 
-def test_an_older_file_loads_and_says_that_it_does_not_know(zone: SocialZone, tmp_path: Path) -> None:
+def test_version_1_file_loads_without_quality(zone: SocialZone, tmp_path: Path) -> None:
     zone.save(tmp_path / "zone.json")
     content = json.loads((tmp_path / "zone.json").read_text(encoding="utf-8"))
     old = {key: content[key] for key in ("format", "units", "r_max", "ellipses", "undefined", "provenance")}
@@ -533,7 +533,7 @@ def test_an_older_file_loads_and_says_that_it_does_not_know(zone: SocialZone, tm
     assert loaded.table()["a_low"].isna().all()
 
 
-def test_an_older_file_whose_ellipse_is_no_zone_is_refused(zone: SocialZone, tmp_path: Path) -> None:
+def test_version_1_file_with_damaged_ellipse_is_refused(zone: SocialZone, tmp_path: Path) -> None:
     zone.save(tmp_path / "zone.json")
     content = json.loads((tmp_path / "zone.json").read_text(encoding="utf-8"))
     old = {key: content[key] for key in ("format", "units", "r_max", "ellipses", "undefined", "provenance")}
@@ -548,7 +548,7 @@ def test_an_older_file_whose_ellipse_is_no_zone_is_refused(zone: SocialZone, tmp
             SocialZone.load(tmp_path / "old.json")
 
 
-def test_samples_that_do_not_tell_encounters_apart(samples: pd.DataFrame) -> None:
+def test_samples_without_encounter_give_a_zone_of_unknown_quality(samples: pd.DataFrame) -> None:
     with pytest.warns(
         szlib.DataWarning, match="^the quality of the zone is unknown.*samples without `encounter`.*again$"
     ):
@@ -559,7 +559,7 @@ def test_samples_that_do_not_tell_encounters_apart(samples: pd.DataFrame) -> Non
 # --- the real day ------------------------------------------------------------------------------------
 
 
-def test_the_real_day_has_zones_at_walking_speeds(real_samples: pd.DataFrame, tmp_path: Path) -> None:
+def test_real_day_has_zones_at_walking_speeds(real_samples: pd.DataFrame, tmp_path: Path) -> None:
     with pytest.warns(szlib.DataWarning, match=r"at 1\.1 m/s fewer than 20 encounters were seen .*behind \("):
         zone = fit(real_samples)
     assert sorted(zone.ellipses) == list(SPEEDS)

@@ -1,4 +1,4 @@
-"""How sure: counts by side, who is drawn, intervals that hold what they should, what one encounter moves."""
+"""Uncertainty: counts by side, resampling units, coverage of intervals, influence of one encounter."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_each_side_counts_encounters_not_samples() -> None:
     assert seen.loc[1, list(SIDES)].sum() == seen.loc[1, "ahead left"] == 1
 
 
-def test_what_is_missing_is_named_side_by_side() -> None:
+def test_missing_sides_are_named() -> None:
     seen = pd.DataFrame(
         [[1.0, 99, *[MIN_ENCOUNTERS] * 8], [1.2, 99, *[MIN_ENCOUNTERS] * 7, MIN_ENCOUNTERS - 1]]
     )
@@ -59,7 +59,7 @@ def test_what_is_missing_is_named_side_by_side() -> None:
     assert describe_missing_sides(seen, 1.3) == "at 1.3 m/s no encounters were counted (only at 1 to 1.2 m/s)"
 
 
-def test_pairs_of_people_are_drawn_and_days_where_there_are_many() -> None:
+def test_pairs_are_resampled_or_days_if_there_are_many() -> None:
     table = pd.DataFrame({"day": ["a", "a", "a", "b"], "ref_id": [1, 2, 1, 1], "other_id": [2, 1, 3, 2]})
     unit, member = resampling_units(table)
     assert unit == "pairs"
@@ -89,7 +89,7 @@ def test_more_people_make_narrower_intervals() -> None:
 
 
 @pytest.mark.parametrize("method", ["quantile", "hull"])
-def test_a_pair_seen_twice_is_no_new_evidence(samples: pd.DataFrame, method: str) -> None:
+def test_second_view_of_a_pair_does_not_narrow_the_interval(samples: pd.DataFrame, method: str) -> None:
     """The other person's view of the same encounter makes the interval no narrower."""
     twice = pd.concat([samples, samples.assign(encounter=samples["encounter"] + 1000, t=samples["t"] + 0.01)])
     options = {"method": method, "n_resamples": 60}
@@ -101,7 +101,7 @@ def test_a_pair_seen_twice_is_no_new_evidence(samples: pd.DataFrame, method: str
     np.testing.assert_allclose(one.intervals[["low", "high"]], two.intervals[["low", "high"]], atol=1e-9)
 
 
-def test_the_hull_is_taken_back_behind_its_nearest_people() -> None:
+def test_hull_interval_lies_inside_the_hull() -> None:
     """People keep out of a zone that no sample shows whole: the interval reaches farther in than the hull."""
     samples = passers(300)
     zone = fit(samples, method="hull", fraction=0.0, n_resamples=60)
@@ -112,7 +112,7 @@ def test_the_hull_is_taken_back_behind_its_nearest_people() -> None:
     assert area["area_low"] < truth < area["area"]
 
 
-def test_intervals_hold_the_limit() -> None:
+def test_intervals_contain_the_limit() -> None:
     """In short: 25 data sets of 200 pairs; 200 plazas are in notebooks/tables/16_coverage.csv."""
     limit = fit(passers(20_000, seed=99), n_resamples=0).table().iloc[0]
     held = []
@@ -122,7 +122,7 @@ def test_intervals_hold_the_limit() -> None:
     assert np.mean(held) >= 0.85  # 95 %, less four standard errors of 25 x 6 that are not independent
 
 
-def test_influence_is_what_leaving_one_out_does(samples: pd.DataFrame) -> None:
+def test_influence_equals_the_change_without_one_encounter(samples: pd.DataFrame) -> None:
     for method, options in (("quantile", {}), ("hull", {"fraction": 0.0})):
         zone = fit(samples, method=method, n_resamples=2, **options)
         influence = zone.uncertainty.influence.iloc[0]
@@ -149,7 +149,7 @@ def test_resamples_without_a_zone_leave_no_interval() -> None:
 
 
 @pytest.mark.parametrize("resamples", [1, -3, 2.5])
-def test_resamples_without_meaning(samples: pd.DataFrame, resamples: float) -> None:
+def test_invalid_n_resamples_is_refused(samples: pd.DataFrame, resamples: float) -> None:
     with pytest.raises(szlib.DataError, match="resamples must be a whole number"):
         estimate_uncertainty(
             QuantileEstimator.from_samples(samples, r_max=2.0), SPEEDS, n_resamples=resamples, seed=0
