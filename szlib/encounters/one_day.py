@@ -17,10 +17,9 @@ from .. import __version__
 from ..errors import DataError, DataWarning
 from ..files import file_content, load_cached, store_cached
 from ..tracks import funnels
-from ..tracks.clock import to_clock
+from ..tracks.clock import read_tracks, to_clock
 from ..tracks.formats import find_format
 from ..tracks.options import ReadOptions
-from ..tracks.readers import read_raw
 from .areas import AUTO, walked_area
 from .finding import find_encounters
 from .geometry import Area, Region, Square
@@ -80,7 +79,7 @@ def with_area(
         if tracks is None:
             with warnings.catch_warnings():  # reading the day itself warns of rejected rows
                 warnings.simplefilter("ignore", DataWarning)
-                tracks = to_clock(read_raw(files, options=options), max_gap=options.max_gap)
+                tracks = read_tracks(files, options=options)
         area = walked_area(tracks)
     return replace(settings, area=area)
 
