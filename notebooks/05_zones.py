@@ -177,7 +177,7 @@ seen.round(2)
 
 # %%
 few = int(seen["encounters"].iloc[[0, -1]].sum())
-ahead = claims.larger_ahead(zone, speed=zone_speed)
+ahead = claims.measure_reach_ahead(zone, speed=zone_speed)
 value = f"{ahead}; {few} encounters were in view behind"
 claim = f"the zone at {zone_speed:g} m/s reaches farther ahead than behind"
 record.claim(claim, ahead.verdict == "supported", value)

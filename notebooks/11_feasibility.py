@@ -41,8 +41,9 @@ import numpy as np
 import pandas as pd
 
 import szlib
-from szlib.simulation.closed_loop import advance, drive
-from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds, make_world
+from szlib.control.controller import advance
+from szlib.simulation.closed_loop import drive
+from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
@@ -227,7 +228,7 @@ meeting = replace(ONE_PERSON, standing=0.0)
 start_only = True
 for each in range(seed, seed + 4 * worlds):
     controller = szlib.MPCCBF(zone, settings=szlib.MPCSettings(terminal="person"))
-    log = drive(make_world(each, meeting), controller, until_arrival=False)
+    log = drive(meeting(each), controller, until_arrival=False)
     feasible = log.slack <= 1e-6
     start_only &= bool(feasible[feasible.argmax() :].all())
 record.check("once there is a solution there always is one", start_only, 4 * worlds, always=True)

@@ -87,14 +87,14 @@ with warnings.catch_warnings():
     zones = {"hull": fit(method="hull"), "quantile": fit(method="quantile", q=record.cache.method.q)}
 
 # %%
-found, methods = [claims.passes_on_the_right(samples)], ["-"]
+found, methods = [claims.measure_passing_side(samples)], ["-"]
 if data == "atc-1hz":
-    found.append(claims.as_many_a_day(samples["encounter"].nunique(), samples["day"].nunique()))
+    found.append(claims.measure_encounter_rate(samples["encounter"].nunique(), samples["day"].nunique()))
     methods.append("-")
 for method, zone in zones.items():
-    found += [claims.larger_ahead(zone, speed=zone_speed), claims.grows_with_speed(zone)]
+    found += [claims.measure_reach_ahead(zone, speed=zone_speed), claims.measure_growth_with_speed(zone)]
     methods += [method, method]
-table = claims.findings_table(found, data=record.out.name).assign(method=methods)
+table = claims.tabulate_findings(found, data=record.out.name).assign(method=methods)
 record.table(table, "16_claims")
 for each, method in zip(found, methods, strict=True):
     record.claim(f"{each.claim} ({method})", each.verdict == "supported", str(each))
@@ -105,7 +105,7 @@ if record.cache.is_synthetic:
     close = samples[samples["distance"] <= r_max]
     intruder = true_kinds(close, seed=seed) == "intruder"
     removed = is_outlier(close, fraction=fraction, n_neighbours=20, r_max=r_max)
-    lof = claims.outliers_are_intruders(int((removed & intruder).sum()), int(removed.sum()))
+    lof = claims.measure_intruders_removed(int((removed & intruder).sum()), int(removed.sum()))
     record.claim(f"{lof.claim} (20 neighbours, {fraction:.1%})", lof.low > 0, str(lof))
 
 # %%
@@ -122,7 +122,7 @@ record.figure(ax.figure, "claims")
 
 # %%
 everywhere = pd.read_csv("tables/16_claims.csv")
-wide = everywhere.assign(cell=everywhere.agg(claims.as_cell, axis=1)).pivot(
+wide = everywhere.assign(cell=everywhere.agg(claims.format_finding, axis=1)).pivot(
     index=["claim", "method"], columns="data", values="cell"
 )
 record.key["claims decided"] = int((~everywhere["verdict"].str.startswith("not")).sum())
@@ -251,7 +251,7 @@ size = {"low": (line["a_low"] / line["a"]), "middle": 1.0, "high": (line["a_high
 rows = []
 for name in szlib.SCENARIOS:
     for end, scale in size.items():
-        metrics = claims.run_with(name, zone.ellipses[zone_speed].scaled(scale))
+        metrics = claims.run_scenario(name, zone.ellipses[zone_speed].scaled(scale))
         rows.append(
             (
                 name,
@@ -268,7 +268,7 @@ driven = pd.DataFrame(
 driven.pivot(index="scenario", columns="zone", values=["time to goal [s]", "yields [s]"]).round(1)
 
 # %%
-trade = claims.size_trades_efficiency(zone.ellipses[zone_speed])
+trade = claims.measure_delay_by_size(zone.ellipses[zone_speed])
 record.claim(trade.claim, trade.low > 0, str(trade))
 fig, ax = plt.subplots(figsize=(7, 3.5), layout="constrained")
 for (name, part), (shade, line) in zip(

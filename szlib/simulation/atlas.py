@@ -1,6 +1,6 @@
-"""A sensitivity atlas: the paper's scenarios with other widths, paces, zones and gamma, and what comes of it.
+"""A sensitivity atlas: the paper's scenarios with other widths, paces, zones and gamma.
 
-One cell of the atlas is one run.  All that is changed stands in `AtlasCell`; the rest is as in `paper`.
+One cell of the atlas is one run.  `AtlasCell` names all that changes; the rest is as in the paper's scenario.
 """
 
 from __future__ import annotations
@@ -25,26 +25,28 @@ from .scenarios.paper import SCENARIOS
 from .strategies import classify_strategy
 
 SCENES = {"corridor": 4.6, "waiting": 2.0, "making_room": 2.0}
-"""Scenarios with walls, by name, and the width that is theirs [m]."""
+"""Scenarios with walls, by name, and the width between the walls in the paper's scenario [m]."""
 REFERENCE = Ellipse((0.03, 0.0), (0.97, 0.75))
-"""The zone of the saved atlas: that of the synthetic plaza at 1.1 m/s, rounded to a centimetre."""
+"""Zone of the saved atlas: that of the synthetic plaza at 1.1 m/s, rounded to a centimetre."""
+CANNOT_START = "cannot start"
+"""Strategy of a cell whose start violates a barrier: the space is too narrow for the robot alone."""
 
 
 @dataclass(frozen=True)
 class AtlasCell:
-    """One cell: a scene of `SCENES`, with what is changed in it.
+    """One cell: a scenario of `SCENES` with these changes.
 
     Parameters
     ----------
     scene : "corridor", "waiting" or "making_room".
     gamma : as in `MPCSettings`.
-    width : of the corridor or the pathway, between its walls [m].
-    pace : the person's speed [m/s].
-    size : the zone's centre and semi-axes are so many times as far and as long.
+    width : width of the corridor or the pathway, between its walls [m].
+    pace : speed of the person [m/s].
+    size : factor of the zone's centre and semi-axes.
 
     Raises
     ------
-    SolverError : the scene is none of these, or a width, pace or size is not positive.
+    SolverError : the scene is unknown, or a width, pace or size is not positive.
     """
 
     scene: str
@@ -61,45 +63,54 @@ class AtlasCell:
                 raise SolverError(f"{name} must be a positive number; got {getattr(self, name)!r}")
 
     def scenario(self) -> Scenario:
-        """The scene with this width and pace; the side walls of a pathway end where they did."""
-        scene, half = SCENARIOS[self.scene], SCENES[self.scene] / 2
+        """The scenario with this width and pace; the side walls of a pathway keep their outer ends."""
+        scene, half_width = SCENARIOS[self.scene], SCENES[self.scene] / 2
         walls = scene.walls.copy()
-        near = np.isclose(np.abs(walls[..., 1]), half)
-        walls[..., 1] = np.where(near, np.sign(walls[..., 1]) * self.width / 2, walls[..., 1])
+        is_inner = np.isclose(np.abs(walls[..., 1]), half_width)
+        walls[..., 1] = np.where(is_inner, np.sign(walls[..., 1]) * self.width / 2, walls[..., 1])
         people = tuple(replace(person, velocity=(-self.pace, 0.0)) for person in scene.people)
         return replace(scene, walls=walls, people=people)
 
     def controller(self, zone: Ellipse) -> MPCCBF:
-        """The controller of this cell, for a zone of size 1."""
-        # A time limit would make what happens depend on how busy the machine is.
+        """The controller of this cell; `zone` is the zone of size 1."""
+        # With a time limit the result would depend on the load of the machine.
         settings = MPCSettings(gamma=self.gamma, time_limit=np.inf)
         return MPCCBF(zone.scaled(self.size), walls=self.scenario().walls, settings=settings)
 
     def run(self, zone: Ellipse) -> SimulationLog:
-        """The run of this cell, for a zone of size 1; SolverError where it starts in violation."""
+        """The run of this cell; `zone` is the zone of size 1.
+
+        Raises
+        ------
+        SolverError : the start violates a barrier.
+        """
         return simulate(self.scenario(), self.controller(zone))
 
 
-NO_START = "cannot start"
-"""The outcome of a cell that starts in violation: the place is too narrow for the robot alone."""
-
-
 def run_atlas(cells: Sequence[AtlasCell], zone: Ellipse, *, n_jobs: int = 1) -> pd.DataFrame:
-    """What the robot does in each cell: a row each, in their order.
+    """Run each cell of an atlas.
 
-    Columns: those of `AtlasCell`; strategy, as of `classify_strategy`, or `NO_START`; time_to_goal,
-    time_yielding [s], min_h [m], min_speed [m/s], infeasible_steps.
+    Parameters
+    ----------
+    cells : the cells.
+    zone : the zone of size 1.
+    n_jobs : runs at a time; -1: one for each core.
+
+    Returns
+    -------
+    One row for each cell, in their order: its parameters; strategy (see `classify_strategy`, or
+    `CANNOT_START`); time_to_goal, time_yielding [s], min_h [m], min_speed [m/s], infeasible_steps.
     """
-    tasks = [joblib.delayed(_row)(i, cell, zone) for i, cell in enumerate(cells)]
+    tasks = [joblib.delayed(_run_cell)(i, cell, zone) for i, cell in enumerate(cells)]
     rows = sorted(run_tasks(tasks, n_jobs=n_jobs), key=lambda row: row[0])
     return pd.DataFrame([row for _, row in rows])
 
 
-def _row(i: int, cell: AtlasCell, zone: Ellipse) -> tuple[int, dict[str, Any]]:
+def _run_cell(i: int, cell: AtlasCell, zone: Ellipse) -> tuple[int, dict[str, Any]]:
     shown = ("time_to_goal", "time_yielding", "min_h", "min_speed", "infeasible_steps")
     scenario = cell.scenario()
     if cell.controller(zone).barriers(scenario.start[:2], scenario.people).min() < 0:
-        return i, asdict(cell) | {"strategy": NO_START} | dict.fromkeys(shown, np.nan)
+        return i, asdict(cell) | {"strategy": CANNOT_START} | dict.fromkeys(shown, np.nan)
     log = cell.run(zone)
-    found = log.metrics()
-    return i, asdict(cell) | {"strategy": classify_strategy(log)} | {name: found[name] for name in shown}
+    metrics = log.metrics()
+    return i, asdict(cell) | {"strategy": classify_strategy(log)} | {name: metrics[name] for name in shown}

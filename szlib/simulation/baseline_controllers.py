@@ -1,12 +1,12 @@
-"""What people would otherwise use, each in a few lines: none promises anything, none knows of zones.
+"""Baseline controllers to compare with: none claims that its steps are safe, none knows zones.
 
-    straight      ahead to the goal, and stop for what is in the way
-    social force  Helbing and Molnar (1995), with the interaction measured by Moussaid et al. (2009)
-    dwa           the dynamic window: of all velocities within reach, the best that can still be stopped
+    straight        straight to the goal; stops for what is in the way
+    social force    Helbing and Molnar (1995), with the interaction measured by Moussaid et al. (2009)
+    dynamic window  the best velocity within reach from which the robot can still stop
 
-All keep the limits of `MPCSettings` (a_max, v_max), and a gap of eps to bodies and walls.  No package on PyPI
-was found that is kept and light: dynamic-window-approach has had no release since 2020, pytorch-mppi brings
-PyTorch.
+All keep the limits of `MPCSettings` (a_max, v_max), and a gap of eps to bodies and walls.  PyPI has no
+package that is both maintained and light: dynamic-window-approach has had no release since 2020,
+pytorch-mppi needs PyTorch.
 
 Sources: D. Helbing, P. Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51, 1995;
 M. Moussaid et al., "Experimental study of the behavioural mechanisms underlying self-organization in human
@@ -25,42 +25,63 @@ import numpy as np
 from ..checks import Array
 from ..control.barriers import euclidean_segment_formula
 from ..control.controller import Controller
-from ..control.person import BODY_RADIUS, Person
+from ..control.person import Person
 from ..control.settings import MPCSettings
+from ..zones.ellipses import BODY_RADIUS
 from .scenario import Scenario
 
 
 class Command(NamedTuple):
-    """What a baseline decided: (ax, ay) [m/s2], and nothing else."""
+    """The decision of a baseline: `control`, (ax, ay) [m/s2]."""
 
     control: Array
 
 
 @dataclass(frozen=True)
-class Baseline(Controller):
-    """What the baselines share: `settings` for their limits, the walls, and a velocity that each wants."""
+class BaselineController(Controller):
+    """Base of the baselines: `settings` with the limits, `walls`, and a desired velocity."""
 
     settings: MPCSettings = field()
     walls: Array = field()
 
     def step(self, state: Array, goal: Array, people: Sequence[Person]) -> Command:
-        """The acceleration that brings the robot nearest to the velocity that it wants."""
+        """The acceleration towards the desired velocity; see `Controller.step` for `state`, `goal`,
+        `people`.
+        """
         s, velocity = self.settings, state[2:]
-        wanted = self.wanted(state[:2], velocity, goal, people)
-        change = (wanted / max(1.0, np.hypot(*wanted) / s.v_max) - velocity) / s.dt
+        desired = self.desired_velocity(state[:2], velocity, goal, people)
+        change = (desired / max(1.0, np.hypot(*desired) / s.v_max) - velocity) / s.dt
         return Command(change / max(1.0, np.abs(change).max() / s.a_max))
 
-    def wanted(self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]) -> Array:
-        """The velocity wanted now [m/s]."""
-        return self.towards(goal - position)
+    def desired_velocity(
+        self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
+    ) -> Array:
+        """The velocity that the robot desires now [m/s].
 
-    def towards(self, offset: Array) -> Array:
-        """A velocity to the goal: full speed, but so that the robot can stop there [m/s]."""
+        Parameters
+        ----------
+        position, velocity : of the robot, shape (2,) [m, m/s].
+        goal : (x, y) [m].
+        people : the people whom the robot sees.
+        """
+        return self.velocity_to_goal(goal - position)
+
+    def velocity_to_goal(self, offset: Array) -> Array:
+        """A velocity along the `offset` to the goal [m]: full speed, or slower so that the robot can stop
+        [m/s].
+        """
         distance = float(np.hypot(*offset))
         return offset / max(distance, 1e-9) * min(self.settings.v_max, distance)
 
     def gap(self, at: Array, people: Sequence[Person], time: Any = 0.0) -> Array:
-        """Euclidean gap from the robot's disc to the nearest body or wall, then; at (..., 2), time (...)."""
+        """Euclidean gap from the robot's disc to the nearest body or wall [m].
+
+        Parameters
+        ----------
+        at : positions of the robot, shape (..., 2) [m].
+        people : the people, who walk at constant velocity.
+        time : time of each position, shape (...) [s].
+        """
         x, y = at[..., 0], at[..., 1]
         nearest = np.full(x.shape, np.inf)
         for (px, py), (vx, vy) in ((p.position, p.velocity) for p in people):
@@ -71,27 +92,33 @@ class Baseline(Controller):
 
 
 @dataclass(frozen=True)
-class Straight(Baseline):
-    """Straight ahead; stops for who is in its lane, no farther than it needs to stop, and `margin` [m]."""
+class StraightController(BaselineController):
+    """Drives straight to the goal; stops if something is within its braking distance and `margin` [m].
+
+    `settings`, `walls` : as of `BaselineController`.
+    """
 
     margin: float = 0.5
 
-    def wanted(self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]) -> Array:
-        """To the goal at full speed, or nowhere."""
-        s, ahead = self.settings, self.towards(goal - position)
+    def desired_velocity(
+        self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
+    ) -> Array:
+        s, ahead = self.settings, self.velocity_to_goal(goal - position)
         reach = float(velocity @ velocity) / (2 * s.a_max) + s.v_max * s.dt + self.margin
         lane = position + np.linspace(0.0, 1.0, 9)[:, None] * reach * ahead / max(np.hypot(*ahead), 1e-9)
         return ahead if self.gap(lane, people).min() > 0 else np.zeros(2)
 
 
 @dataclass(frozen=True)
-class SocialForce(Baseline):
-    """Drawn to the goal within `tau` [s], pushed by people and walls; numbers of Moussaid et al. (2009).
+class SocialForceController(BaselineController):
+    """Attracted to the goal within `tau` [s], pushed by people and walls; numbers of Moussaid et al. (2009).
+
+    `settings`, `walls` : as of `BaselineController`.
 
     The interaction is along D = e + `relative` (v - v'), e the direction to the person: with B = `reach` |D|
     and theta the angle from D to e, `strength` exp(-d/B) [m/s2], slowing by exp(-(2 B theta)^2), turning by
     exp(-(3 B theta)^2); walls push with `wall` exp(-d/`wall_reach`).  d is the distance of two people with
-    the same gap, for the robot is larger than one.  A bias of theta, 0.005 B, is the choice of the right.
+    the same gap, because the robot is larger than a person.  A bias of theta, 0.005 B, prefers the right.
     """
 
     tau: float = 0.54
@@ -101,9 +128,10 @@ class SocialForce(Baseline):
     wall: float = 3.0
     wall_reach: float = 0.1
 
-    def wanted(self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]) -> Array:
-        """What the forces make of the velocity in one step."""
-        force = (self.towards(goal - position) - velocity) / self.tau
+    def desired_velocity(
+        self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
+    ) -> Array:
+        force = (self.velocity_to_goal(goal - position) - velocity) / self.tau
         for person in people:
             force = force + self._push(position, velocity, person)
         for xa, ya, xb, yb in self.walls.reshape(-1, 4).tolist():
@@ -129,21 +157,24 @@ class SocialForce(Baseline):
 
 
 @dataclass(frozen=True)
-class DynamicWindow(Baseline):
-    """The dynamic window, for a robot that accelerates in any direction; weights and sizes are assumed.
+class DynamicWindowController(BaselineController):
+    """The dynamic window for a robot that accelerates in any direction; weights and sizes are assumed.
 
-    Of `samples` squared velocities that can be had one step from now, those are admissible with which the
-    robot, held at them, could still brake before it touches a wall, or people at constant velocity; the best
-    is nearest to the goal after `horizon` [s], less `clearance` times the least gap on the way, of which more
-    than 1 m is worth nothing.  Where none is admissible the robot brakes.
+    `settings`, `walls` : as of `BaselineController`.
+
+    The window has `samples` squared velocities that the robot can reach in one step.  A velocity is
+    admissible if the robot, held at it, can brake before it touches a wall, or a person at constant
+    velocity.  The best one has the smallest distance to the goal after `horizon` [s], less `clearance`
+    times the smallest gap on the path, up to 1 m.  Without an admissible velocity the robot brakes.
     """
 
     horizon: float = 2.0
     clearance: float = 0.5
     samples: int = 9
 
-    def wanted(self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]) -> Array:
-        """The best velocity of the window."""
+    def desired_velocity(
+        self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
+    ) -> Array:
         s = self.settings
         change = np.linspace(-1, 1, self.samples) * s.a_max * s.dt
         window = velocity + np.stack(np.meshgrid(change, change), axis=-1).reshape(-1, 2)
@@ -155,21 +186,21 @@ class DynamicWindow(Baseline):
         admissible = free > np.hypot(*window.T) / s.a_max + s.dt
         if not admissible.any():
             return np.zeros(2)
-        away = np.hypot(*(at[:, -1] - goal).T)
-        worth = self.clearance * np.minimum(gap.min(axis=1), 1.0) - away
-        return np.asarray(window[np.where(admissible, worth, -np.inf).argmax()])
+        to_goal = np.hypot(*(at[:, -1] - goal).T)
+        value = self.clearance * np.minimum(gap.min(axis=1), 1.0) - to_goal
+        return np.asarray(window[np.where(admissible, value, -np.inf).argmax()])
 
 
-def straight(scenario: Scenario, settings: MPCSettings) -> Straight:
-    """Straight ahead, with stop; a `ControllerFactory`."""
-    return Straight(settings, scenario.walls)
+def make_straight(scenario: Scenario, settings: MPCSettings) -> StraightController:
+    """Make a `StraightController` for a `scenario` with `settings`."""
+    return StraightController(settings, scenario.walls)
 
 
-def social_force(scenario: Scenario, settings: MPCSettings) -> SocialForce:
-    """Social forces; a `ControllerFactory`."""
-    return SocialForce(settings, scenario.walls)
+def make_social_force(scenario: Scenario, settings: MPCSettings) -> SocialForceController:
+    """Make a `SocialForceController` for a `scenario` with `settings`."""
+    return SocialForceController(settings, scenario.walls)
 
 
-def dynamic_window(scenario: Scenario, settings: MPCSettings) -> DynamicWindow:
-    """The dynamic window; a `ControllerFactory`."""
-    return DynamicWindow(settings, scenario.walls)
+def make_dynamic_window(scenario: Scenario, settings: MPCSettings) -> DynamicWindowController:
+    """Make a `DynamicWindowController` for a `scenario` with `settings`."""
+    return DynamicWindowController(settings, scenario.walls)

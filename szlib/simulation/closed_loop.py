@@ -1,14 +1,14 @@
-"""The closed loop: a robot, whatever controls it, and people who walk on, deviate, react, come and go.
+"""The closed loop: a robot with any controller, among people who walk on, change their velocity, or react.
 
-The robot is the double integrator of the paper's eq. 8, unless the controller has one of its own; people go
-on at constant velocity, unaffected by the robot (paper, sec. 4), unless a `Behaviour` or a `Crowd` says
-otherwise.  World frame, metres and seconds.
+The robot is the double integrator of the paper (eq. 8), unless the controller has another one.  People
+walk at constant velocity, unaffected by the robot (paper, sec. 4), unless a `CrowdModel` or a `Crowd`
+moves them.  World frame, metres and seconds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from math import hypot, isfinite
 from time import perf_counter
 from typing import Any
@@ -17,21 +17,19 @@ import numpy as np
 import pandas as pd
 
 from ..checks import Array
-from ..control.controller import Controller, Robot, advance, as_controller
-from ..control.person import BODY_RADIUS, Person, SpeedZone, as_ellipse, circle_around
+from ..control.controller import Controller, as_controller
+from ..control.person import Person, SpeedZone, as_ellipse
 from ..control.settings import MPCSettings
 from ..errors import SolverError
-from ..zones.ellipses import Ellipse
+from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .log import SimulationLog
 from .scenario import GOAL_RADIUS, STOPPED_SPEED, UNAFFECTED, Crowd, CrowdModel, Scenario
 
-__all__ = ["BODY", "Zones", "advance", "drive", "simulate"]
+ZoneTransform = Callable[[Ellipse], Ellipse]
+"""Makes the zone that the robot keeps out of from a person's own zone."""
 
-Zones = Callable[[Ellipse], Ellipse]
-"""What is kept in place of a person's own zone, made from it."""
-
-BODY = Ellipse((0.0, 0.0), (BODY_RADIUS, BODY_RADIUS))
-"""The zone of people for whom neither they nor the controller have one: their body alone."""
+BODY_ZONE = Ellipse((0.0, 0.0), (BODY_RADIUS, BODY_RADIUS))
+"""Zone of people if neither they nor the controller have one: their body."""
 _ABSENT = (np.nan,) * 5
 _NO_PLAN = np.zeros((0, 4))
 
@@ -43,31 +41,42 @@ def simulate(
     crowd: Crowd | None = None,
     max_time: float | None = None,
 ) -> SimulationLog:
-    """Run a scenario until the robot rests at the goal, or to `max_time` [s] (default: its duration).
+    """Run a scenario until the robot rests at the goal, or until the time limit.
 
-    The controller is reset first, so the same scenario gives the same run. Every row of the table,
-    the last one included, has the control decided in its state.
+    The loop resets the controller first, so that the same scenario gives the same run.  Each row of the log,
+    also the last one, has the control that is decided in its state.
 
     Parameters
     ----------
     scenario : the scene.
-    controller : an `MPCCBF`, or anything else with `reset` and `step`: see `robots`.
-    crowd : everybody's true motion; see `scenario.Crowd`. Default: the scenario's people walk on.
+    controller : an `MPCCBF`, or any other `szlib.control.Controller`.
+    crowd : the true people as a function of time and the robot's state (`szlib.simulation.Crowd`);
+        default: the scenario's people, who walk on.
+    max_time : time limit [s]; default: the scenario's duration.
 
     Raises
     ------
-    SolverError : the controller has other walls, or gives a control that is not finite; for an `MPCCBF` also:
-        the start violates a barrier or the speed limit, or the goal cannot be reached: it lies too close to
-        a wall, or in the zone of somebody who stands.
+    SolverError : the controller has other walls, or gives a control that is not finite. For an `MPCCBF` also:
+        the start violates a barrier or the speed limit, or the goal cannot be reached, because it lies too
+        close to a wall or in the zone of a person who stands.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> scenario = szlib.SCENARIOS["corridor"]
+    >>> zone = szlib.Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))
+    >>> log = szlib.simulate(scenario, szlib.MPCCBF(zone, walls=scenario.walls))
+    >>> log.success, log.metrics()["passing_side"]
+    (True, 'right')
     """
-    known = as_controller(controller)
-    if known.walls is not None and not np.array_equal(known.walls, scenario.walls):
+    controller = as_controller(controller)
+    if controller.walls is not None and not np.array_equal(controller.walls, scenario.walls):
         raise SolverError(
-            f"the controller knows {len(known.walls)} walls, and not the {len(scenario.walls)} of "
+            f"the controller knows {len(controller.walls)} walls, and not the {len(scenario.walls)} of "
             f"{scenario.name!r}; build it with walls=scenario.walls"
         )
     try:
-        known.check_start(scenario.start, scenario.goal, scenario.people if crowd is None else ())
+        controller.check_start(scenario.start, scenario.goal, scenario.people if crowd is None else ())
     except SolverError as error:
         raise SolverError(f"{scenario.name!r}: {error}") from error
     return drive(scenario, controller, crowd=crowd, max_time=max_time)
@@ -80,194 +89,213 @@ def drive(
     behaviour: CrowdModel = UNAFFECTED,
     crowd: Crowd | None = None,
     seed: int = 0,
-    zones: Zones | None = None,
+    zone_transform: ZoneTransform | None = None,
     settings: MPCSettings | None = None,
     max_time: float | None = None,
     until_arrival: bool = True,
 ) -> SimulationLog:
-    """The loop itself, from wherever the robot starts: what `simulate` and `rollouts` run.
+    """Run the loop from any start, without the checks of `simulate`, and with any behaviour of people.
 
     Parameters
     ----------
-    behaviour, seed : what people do and how they are seen, and the seed of it.
-    crowd : what people do, in place of the behaviour's. If the scenario has people, the crowd is as many, and
-        theirs are the zones; else everybody has the zone with which they first come.
-    zones : makes what is kept from each person's own zone, or else the controller's, or else `BODY`; of who
-        comes without a heading, from the smallest circle around it.
-    settings : what is measured by (dt, r_robot, eps, zone_speed); default: the controller's, if it has any.
-    max_time : end of the run [s]; default: the scenario's duration.
-    until_arrival : False drives on to the end of time, so that a robot that rests at its goal may still
-        have to make room.
+    scenario : the scene.
+    controller : an `MPCCBF`, or any other `szlib.control.Controller`.
+    behaviour : how people move and how the controller sees them.
+    crowd : the true people, in place of those of `behaviour`. If the scenario has people, the crowd must have
+        as many, and their zones apply; else each person has the zone with which they first appear.
+    seed : seed of the behaviour.
+    zone_transform : makes the zone that the robot keeps out of from each person's own zone, or the
+        controller's, or `BODY_ZONE`; from the smallest circle around it for a person without a heading.
+    settings : settings of the measurements (dt, r_robot, eps, zone_speed); default: the controller's.
+    max_time : time limit [s]; default: the scenario's duration.
+    until_arrival : False: run to the time limit, so that a robot at its goal may still have to make room.
 
     Raises
     ------
-    SolverError : a control is not finite, the crowd changes its size, the controller's dt is not that of
-        `settings`; of an `MPCCBF`: the goal lies too close to a wall.
+    SolverError : a control is not finite, the crowd changes its size, or the controller's dt is not that of
+        `settings`. For an `MPCCBF` also: the goal lies too close to a wall.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> turning = szlib.simulation.Behaviour(turn=1.5)
+    >>> zone = szlib.Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))
+    >>> scenario = szlib.MEETINGS["frontal approach"]
+    >>> log = szlib.simulation.drive(scenario, szlib.MPCCBF(zone), behaviour=turning, seed=1)
+    >>> log.metrics()["unflagged_overlaps"]
+    0
     """
     controller = as_controller(controller)
-    s = _settings(controller, settings)
-    robot = controller.robot
-    end = scenario.duration if max_time is None else max_time
-    cast = _Cast(BODY if controller.zone is None else controller.zone, zones, s.zone_speed)
-    people = tuple(replace(p, zone=cast.zone(i, p)) for i, p in enumerate(scenario.people))
+    s, robot = _choose_settings(controller, settings), controller.robot
+    default_zone = BODY_ZONE if controller.zone is None else controller.zone
+    zones = ZoneAssignment(default_zone, zone_transform, s.zone_speed)
+    people = tuple(replace(p, zone=zones.zone_of(i, p)) for i, p in enumerate(scenario.people))
     if crowd is None:
-        crowd = behaviour.crowd(replace(scenario, people=people), seed)
+        crowd = behaviour.start(replace(scenario, people=people), seed)
+    end = scenario.duration if max_time is None else max_time
     goal, dt, rng = scenario.goal, s.dt, np.random.default_rng([seed, 2])
     gx, gy = goal.tolist()
     controller.reset()
     own, numbers = robot.start(scenario.start), list[float | None]()
-    rows: list[tuple[Any, ...]] = []
+    states, steps, seen_by_step = list[Array](), list[StepRecord](), list[list[int]]()
     for k in range(round(end / dt) + 1):
         state = robot.body(own)
-        everybody = cast.zoned(crowd(k * dt, state))
+        everybody = zones.assign(crowd(k * dt, state))
         for p in everybody:
             numbers += _ABSENT if p is None else (*p.position, p.heading, *p.velocity)
-        there = [i for i, p in enumerate(everybody) if p is not None]
-        seen = behaviour.seen(tuple([p for p in everybody if p is not None]), rng)
-        given = [i for i, p in zip(there, seen, strict=True) if p is not None]
-        known = tuple([p for p in seen if p is not None])
-        began = perf_counter()
-        step = controller.step(own, goal, known)
-        told = _told(step, perf_counter() - began)
-        rows.append((state, given, *told))
+        present = [i for i, p in enumerate(everybody) if p is not None]
+        observed = behaviour.observe(tuple([p for p in everybody if p is not None]), rng)
+        seen_by_step.append([i for i, p in zip(present, observed, strict=True) if p is not None])
+        seen = tuple([p for p in observed if p is not None])
+        begin = perf_counter()
+        decision = controller.step(own, goal, seen)
+        step = StepRecord.of(decision, perf_counter() - begin)
+        states.append(state)
+        steps.append(step)
         x, y, vx, vy = state.tolist()
         if until_arrival and hypot(vx, vy) <= STOPPED_SPEED and hypot(x - gx, y - gy) <= GOAL_RADIUS:
             break
-        control = told[0]
-        if not all(map(isfinite, control.tolist())):
-            raise SolverError(f"{scenario.name!r}: the controller gave {control.tolist()} at {k * dt:g} s")
-        own = robot.advance(own, control, dt)
-    true = _facing(np.reshape(np.array(numbers, float), (len(rows), len(everybody), 5)))
-    return _log(scenario, s, cast.kept(len(everybody)), rows, true, robot)
+        if not all(map(isfinite, step.control.tolist())):
+            given = step.control.tolist()
+            raise SolverError(f"{scenario.name!r}: the controller gave {given} at {k * dt:g} s")
+        own = robot.advance(own, step.control, dt)
+    n, n_people = len(steps), len(everybody)
+    residuals = [step.residual for step in steps]
+    return SimulationLog(
+        scenario=scenario,
+        settings=s,
+        zones=zones.all_zones(n_people),
+        states=np.array(states),
+        controls=np.array([step.control for step in steps]),
+        people=_fill_headings(np.reshape(np.array(numbers, float), (n, n_people, 5))),
+        predicted=_stack_plans([step.predicted for step in steps]),
+        residual=_align_residuals(residuals, seen_by_step, n_people, len(scenario.walls)),
+        fallback=np.array([step.fallback for step in steps]),
+        safe=np.array([step.safe for step in steps], bool),
+        slack=np.array([step.slack for step in steps]),
+        solve_time=np.array([step.solve_time for step in steps]),
+        arrival=_find_arrival(np.array(states), goal),
+        has_safety_claims=steps[0].safe is not None,
+        inputs=tuple(robot.inputs),
+    )
 
 
-def _facing(people: Array) -> Array:
-    """The same, with the last heading known of those who are there without one; 0 if there never was one."""
-    headings, there = people[:, :, 2], ~np.isnan(people[:, :, 0])
-    if np.isnan(headings[there]).any():
+def _choose_settings(controller: Controller, settings: MPCSettings | None) -> MPCSettings:
+    own = controller.settings
+    if settings and own and settings.dt != own.dt:
+        raise SolverError(f"the controller steps every {own.dt} s, the loop every {settings.dt} s; give one")
+    return settings or own or MPCSettings()
+
+
+class ZoneAssignment:
+    """The zone that the robot keeps out of for each person, from when they first appear.
+
+    Parameters
+    ----------
+    default : zone of people who have none.
+    transform : makes the zone from each person's own; None: it is their own.
+    speed : walking speed for zones that depend on it [m/s].
+    """
+
+    def __init__(self, default: Ellipse | SpeedZone, transform: ZoneTransform | None, speed: float) -> None:
+        self._default, self._transform, self._speed = default, transform, speed
+        self._zones: dict[int, Ellipse] = {}
+        self._n_people: int | None = None
+
+    def zone_of(self, i: int, person: Person | None) -> Ellipse:
+        """The zone of person `i`, made from the `person` at the first call; None: they never appear."""
+        if i not in self._zones:
+            own = self._default if person is None or person.zone is None else person.zone
+            zone = as_ellipse(own, self._speed)
+            if person is not None and person.heading is None:
+                zone = circle_around(zone)
+            self._zones[i] = self._transform(zone) if self._transform else zone
+        return self._zones[i]
+
+    def assign(self, people: Sequence[Person | None]) -> Sequence[Person | None]:
+        """The `people` with their zones; SolverError if their number changes."""
+        if self._n_people is None:
+            self._n_people = len(self._zones) or len(people)
+        if len(people) != self._n_people:
+            raise SolverError(
+                "the number of people in a crowd must not change, use None for people who are absent; it was "
+                f"{self._n_people}, and now is {len(people)}"
+            )
+        return [
+            p if p is None or p.zone is self._zones.get(i, self) else replace(p, zone=self.zone_of(i, p))
+            for i, p in enumerate(people)
+        ]
+
+    def all_zones(self, n_people: int) -> tuple[Ellipse, ...]:
+        """The zone of each of `n_people`."""
+        return tuple(self.zone_of(i, None) for i in range(n_people))
+
+
+@dataclass(slots=True)
+class StepRecord:
+    """What the log keeps of a step: `control`, `predicted`, `residual`, `fallback`, `safe`, `slack`,
+    `solve_time`.
+
+    The meanings are those of `szlib.Step`; the defaults stand for what a controller does not report.  The
+    step itself is not kept: a thousand of them cost a garbage collection.
+    """
+
+    control: Array
+    predicted: Array = field(default_factory=lambda: _NO_PLAN)
+    residual: Array | None = None
+    fallback: str = ""
+    safe: bool | None = None
+    slack: float = np.nan
+    solve_time: float = np.nan
+
+    @classmethod
+    def of(cls, step: Any, duration: float) -> StepRecord:
+        """The record of a `step` whose call takes `duration` [s]: its attributes that have these names."""
+        reported = {name: getattr(step, name) for name in cls.__slots__ if hasattr(step, name)}
+        reported["control"] = np.asarray(step.control, float)
+        return cls(**{"solve_time": duration, **reported})
+
+
+def _find_arrival(states: Array, goal: Array) -> int | None:
+    """Index of the first state at rest at the goal."""
+    offset = states - np.r_[goal, 0.0, 0.0]
+    is_there = (np.hypot(*offset[:, :2].T) <= GOAL_RADIUS) & (np.hypot(*offset[:, 2:].T) <= STOPPED_SPEED)
+    return int(is_there.argmax()) if is_there.any() else None
+
+
+def _fill_headings(people: Array) -> Array:
+    """Replace missing headings of people who are present by their last known heading, or 0."""
+    headings, is_present = people[:, :, 2], ~np.isnan(people[:, :, 0])
+    if np.isnan(headings[is_present]).any():
         known = pd.DataFrame(headings).ffill().fillna(0.0).to_numpy()
-        people[:, :, 2] = np.where(there, known, np.nan)
+        people[:, :, 2] = np.where(is_present, known, np.nan)
     return people
 
 
-def _settings(controller: Controller, given: MPCSettings | None) -> MPCSettings:
-    """What a run is measured by."""
-    own = controller.settings
-    if given and own and given.dt != own.dt:
-        raise SolverError(f"the controller steps every {own.dt} s, the loop every {given.dt} s; give one")
-    return given or own or MPCSettings()
-
-
-class _Cast:
-    """Everybody in their order, and the zone that is kept for each from when they first come."""
-
-    def __init__(self, default: Ellipse | SpeedZone, change: Zones | None, speed: float) -> None:
-        self._default, self._change, self._speed = default, change, speed
-        self._zones: dict[int, Ellipse] = {}
-        self._size: int | None = None
-
-    def zone(self, i: int, person: Person | None) -> Ellipse:
-        """What is kept for person i."""
-        if i not in self._zones:
-            own = self._default if person is None or person.zone is None else person.zone
-            ellipse = as_ellipse(own, self._speed)
-            if person is not None and person.heading is None:
-                ellipse = circle_around(ellipse)
-            self._zones[i] = self._change(ellipse) if self._change else ellipse
-        return self._zones[i]
-
-    def zoned(self, everybody: Sequence[Person | None]) -> Sequence[Person | None]:
-        """The same people, with the zones that are kept."""
-        if self._size is None:
-            self._size = len(self._zones) or len(everybody)
-        if len(everybody) != self._size:
-            raise SolverError(
-                f"a crowd is always as many, with None for who is not there; it was {self._size}, and now is "
-                f"{len(everybody)}"
-            )
-        return [
-            p if p is None or p.zone is self._zones.get(i, self) else replace(p, zone=self.zone(i, p))
-            for i, p in enumerate(everybody)
-        ]
-
-    def kept(self, size: int) -> tuple[Ellipse, ...]:
-        """The zone of each; for those who never came, of those without a zone of their own."""
-        return tuple(self.zone(i, None) for i in range(size))
-
-
-def _told(step: Any, took: float) -> tuple[Any, ...]:
-    """What is logged of a step, empty where it does not tell it: control, plan, conditions, fallback, if it
-    is safe, slack, time. The step itself is let go: a thousand objects that stay cost a garbage collection.
-    """
-    return (
-        np.asarray(step.control, float),
-        np.asarray(getattr(step, "predicted", _NO_PLAN), float),
-        getattr(step, "residual", None),
-        getattr(step, "fallback", ""),
-        getattr(step, "safe", None),
-        getattr(step, "slack", np.nan),
-        getattr(step, "solve_time", took),
-    )
-
-
-def _log(
-    scenario: Scenario,
-    settings: MPCSettings,
-    kept: tuple[Ellipse, ...],
-    rows: list[tuple[Any, ...]],
-    people: Array,
-    robot: Robot,
-) -> SimulationLog:
-    """What the run was: a row is a state, who was given to the controller, and what the step told."""
-    way, given, *told = zip(*rows, strict=True)
-    controls, plans, residual, fallback, safe, slack, solve_time = told
-    states = np.array(way)
-    away = states - np.r_[scenario.goal, 0.0, 0.0]
-    there = (np.hypot(*away[:, :2].T) <= GOAL_RADIUS) & (np.hypot(*away[:, 2:].T) <= STOPPED_SPEED)
-    inputs = getattr(robot, "inputs", None) or [f"control_{i}" for i in range(len(controls[0]))]
-    return SimulationLog(
-        scenario=scenario,
-        settings=settings,
-        zones=kept,
-        states=states,
-        controls=np.array(controls),
-        people=people,
-        predicted=_plans(plans),
-        residual=_residuals(residual, given, people.shape[1], len(scenario.walls)),
-        fallback=np.array(fallback),
-        safe=np.array(safe, bool),
-        slack=np.array(slack),
-        solve_time=np.array(solve_time),
-        arrival=int(there.argmax()) if there.any() else None,
-        has_safety_claims=safe[0] is not None,
-        inputs=tuple(inputs),
-    )
-
-
-def _plans(plans: Sequence[Array]) -> Array:
-    """The plan of each step, shape (n, N+1, 4); (n, 0, 4) if there is none, NaN after the shorter ones."""
+def _stack_plans(plans: Sequence[Array]) -> Array:
+    """The plan of each step, shape (n, N+1, 4); (n, 0, 4) if there are none, NaN after shorter ones."""
     longest = max(map(len, plans))
     if all(len(plan) == longest for plan in plans):
         return np.array(plans)
     return np.array([np.pad(p, ((0, longest - len(p)), (0, 0)), constant_values=np.nan) for p in plans])
 
 
-def _residuals(rows: Sequence[Any], given: Sequence[list[int]], people: int, walls: int) -> Array:
-    """The conditions of each step, shape (n, P+W, N_h), NaN for whom it was not given; else (n, P+W, 0).
+def _align_residuals(rows: Sequence[Any], seen: Sequence[list[int]], n_people: int, n_walls: int) -> Array:
+    """The conditions of each step, shape (n, P+W, N_h), NaN for people who were not seen; else (n, P+W, 0).
 
-    A step has a row for everybody it was given, then for whoever it remembers besides, then for each wall.
+    A step has a row for each person whom it sees, then for people whom it remembers, then for each wall.
     """
     if any(row is None for row in rows):
-        return np.zeros((len(rows), people + walls, 0))
-    if all(len(row) == len(of) + walls == people + walls for row, of in zip(rows, given, strict=True)):
+        return np.zeros((len(rows), n_people + n_walls, 0))
+    if all(len(row) == len(i) + n_walls == n_people + n_walls for row, i in zip(rows, seen, strict=True)):
         return np.array(rows)
-    full = np.full((len(rows), people + walls, rows[0].shape[1]), np.nan)
-    for each, row, of in zip(full, rows, given, strict=True):
-        if len(row) < len(of) + walls:
+    residuals = np.full((len(rows), n_people + n_walls, rows[0].shape[1]), np.nan)
+    for residual, row, i in zip(residuals, rows, seen, strict=True):
+        if len(row) < len(i) + n_walls:
             raise SolverError(
-                "the residual of a step has a row for everybody whom it is given, and then for each wall; "
-                f"got {len(row)} rows, expected {len(of) + walls}"
+                "the residual of a step must have a row for each person it sees, and then for each wall; "
+                f"got {len(row)} rows, expected {len(i) + n_walls}"
             )
-        each[of] = row[: len(of)]
-        each[people:] = row[len(row) - walls :]
-    return full
+        residual[i] = row[: len(i)]
+        residual[n_people:] = row[len(row) - n_walls :]
+    return residuals

@@ -1,7 +1,8 @@
-"""The fitted zone against what people would otherwise use, on identical worlds.
+"""Comparisons on identical worlds: controllers, zones, formulations and behaviours of people.
 
-Each zone from the literature is an `Ellipse` in the person's frame, made from the fitted one where it
-depends on it; each formulation is a set of settings; each behaviour is a way to be wrong about people.
+Each zone of the literature is an `Ellipse` in the person's frame, made from the fitted one where it
+depends on it.  Each formulation is a set of settings.  Each behaviour violates one expectation of the
+controller.
 
 Sources: E. T. Hall, "The Hidden Dimension", 1966 (personal distance up to 1.2 m); R. Kirby, R. Simmons,
 J. Forlizzi, "COMPANION: A constraint-optimizing method for person-acceptable navigation", RO-MAN 2009
@@ -24,74 +25,80 @@ import pandas as pd
 
 from ..checks import Array
 from ..control.distances import euclidean_to_ellipse
-from ..control.person import BODY_RADIUS, as_ellipse
+from ..control.person import as_ellipse
 from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from ..zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
-from .baseline_controllers import dynamic_window, social_force, straight
-from .closed_loop import Zones
-from .log import SimulationLog
-from .monte_carlo import Scenes, mpc_cbf, rollouts
-from .robots import ControllerFactory
+from .baseline_controllers import make_dynamic_window, make_social_force, make_straight
+from .closed_loop import BODY_ZONE, ZoneTransform
+from .monte_carlo import ControllerFactory, ScenarioSource, make_mpc_cbf, rollouts
+from .run import Run
 from .scenario import Behaviour, CrowdModel
 from .scenarios.random_worlds import Worlds
 
 HALL_PERSONAL = 1.2
-"""Far end of the personal distance [m] (Hall 1966)."""
-KIRBY_PACE = 0.5
-"""Walking speed for which Kirby's zone is taken [m/s]: that of the people (paper, sec. 4)."""
+"""Largest personal distance [m] (Hall 1966)."""
+KIRBY_SPEED = 0.5
+"""Walking speed of Kirby's zone [m/s]: that of the people (paper, sec. 4)."""
 
 
-def own_zone(fitted: Ellipse) -> Ellipse:
-    """The fitted ellipse itself."""
+def keep_zone(fitted: Ellipse) -> Ellipse:
+    """The `fitted` ellipse itself."""
     return fitted
 
 
-def no_zone(fitted: Ellipse) -> Ellipse:
-    """A person's body alone: a distance constraint (`BODY_RADIUS`)."""
-    return Ellipse((0.0, 0.0), (BODY_RADIUS, BODY_RADIUS))
+def use_body(fitted: Ellipse) -> Ellipse:
+    """A person's body (`BODY_ZONE`) in place of the `fitted` ellipse: a distance constraint."""
+    return BODY_ZONE
 
 
-def equal_circle(fitted: Ellipse) -> Ellipse:
-    """A circle around the person with the fitted ellipse's area."""
+def use_equal_circle(fitted: Ellipse) -> Ellipse:
+    """A circle around the person with the area of the `fitted` ellipse."""
     radius = sqrt(fitted.area / pi)
     return Ellipse((0.0, 0.0), (radius, radius))
 
 
-def hall_circle(fitted: Ellipse) -> Ellipse:
-    """Hall's personal distance."""
+def use_hall_circle(fitted: Ellipse) -> Ellipse:
+    """Hall's personal distance in place of the `fitted` ellipse."""
     return Ellipse((0.0, 0.0), (HALL_PERSONAL, HALL_PERSONAL))
 
 
-def kirby_ellipse(fitted: Ellipse) -> Ellipse:
-    """The smallest ellipse around the one-sigma line of Kirby's asymmetric Gaussian at `KIRBY_PACE`."""
-    return _kirby(KIRBY_PACE)
+def use_kirby_ellipse(fitted: Ellipse) -> Ellipse:
+    """The smallest ellipse around `kirby_curve` at `KIRBY_SPEED`, in place of the `fitted` ellipse."""
+    return _fit_kirby_ellipse(KIRBY_SPEED)
 
 
-def kirby_curve(angles: Array, pace: float) -> Array:
-    """Kirby's one-sigma line, shape (n, 2) [m]: sigma 2 v ahead, at least 1/2; to the sides 2/3 of it,
-    and 1/2 of it behind."""
-    ahead = max(2 * pace, 0.5)
+def kirby_curve(angles: Array, speed: float) -> Array:
+    """The one-sigma line of Kirby's asymmetric Gaussian, shape (n, 2) [m].
+
+    Sigma is 2 v ahead, at least 1/2; 2/3 of this to the sides, and 1/2 of it behind.
+
+    Parameters
+    ----------
+    angles : directions, shape (n,) [rad].
+    speed : walking speed v [m/s].
+    """
+    ahead = max(2 * speed, 0.5)
     x, y = np.cos(angles), np.sin(angles)
     return np.column_stack([ahead * np.where(x > 0, x, x / 2), ahead * 2 / 3 * y])
 
 
 @lru_cache
-def _kirby(pace: float) -> Ellipse:
-    return minimum_enclosing_ellipse_of_curve(lambda angles: kirby_curve(angles, pace), [-pi / 2, pi / 2])
+def _fit_kirby_ellipse(speed: float) -> Ellipse:
+    return minimum_enclosing_ellipse_of_curve(lambda angles: kirby_curve(angles, speed), [-pi / 2, pi / 2])
 
 
-ZONES: Mapping[str, Zones] = MappingProxyType(
+ZONES: Mapping[str, ZoneTransform] = MappingProxyType(
     {
-        "none": no_zone,
-        "equal circle": equal_circle,
-        "Hall": hall_circle,
-        "Kirby": kirby_ellipse,
-        "fitted": own_zone,
+        "none": use_body,
+        "equal circle": use_equal_circle,
+        "Hall": use_hall_circle,
+        "Kirby": use_kirby_ellipse,
+        "fitted": keep_zone,
     }
 )
-"""What a controller may keep out of, by name."""
+"""Zones that the robot keeps out of, by name."""
 
 FORMULATIONS: Mapping[str, MPCSettings] = MappingProxyType(
     {
@@ -100,7 +107,7 @@ FORMULATIONS: Mapping[str, MPCSettings] = MappingProxyType(
         "rest": MPCSettings(terminal="rest"),
     }
 )
-"""How long the barriers hold in the plan, and what it ends in, by name."""
+"""Settings of barrier horizon and terminal condition, by name."""
 
 BEHAVIOURS: Mapping[str, Behaviour] = MappingProxyType(
     {
@@ -111,23 +118,23 @@ BEHAVIOURS: Mapping[str, Behaviour] = MappingProxyType(
         "seen 10 cm off": Behaviour(noise=0.1),
     }
 )
-"""What people do, or how they are seen, by name."""
+"""How people move, or how the controller sees them, by name."""
 
 CONTROLLERS: Mapping[str, ControllerFactory] = MappingProxyType(
     {
-        "MPC-CBF": mpc_cbf,
-        "straight": straight,
-        "social force": social_force,
-        "dynamic window": dynamic_window,
+        "MPC-CBF": make_mpc_cbf,
+        "straight": make_straight,
+        "social force": make_social_force,
+        "dynamic window": make_dynamic_window,
     }
 )
-"""What drives the robot, by name."""
+"""Controllers, by name."""
 
 METHOD = ("controller", "zone", "formulation", "behaviour")
 """Columns of `compare` that name a method."""
 
 WORLDS = Worlds(people=(3, 5), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=1.0)
-"""Room enough at the start and at the goal for every one of the zones: nobody begins inside one."""
+"""Worlds with space for each of the zones at the start and at the goal: the robot starts outside all."""
 
 METRICS = (
     "success",
@@ -143,25 +150,25 @@ METRICS = (
 """Columns that are compared; seconds, metres, m2/s6, steps."""
 
 
-def measure_time_inside(log: SimulationLog) -> dict[str, float]:
-    """Seconds for which the robot's disc overlapped anybody's zone of each kind, Euclidean.
+def measure_time_inside(run: Run) -> dict[str, float]:
+    """Time for which the robot's disc of a `run` overlaps a zone of each kind, by Euclidean distance [s].
 
-    The fitted zones are those of the world, whatever the controller kept; those that were kept for people
-    of whom the world says nothing.
+    The fitted zones are those of the scenario's people, whatever zones the robot keeps out of.  People
+    without a zone in the scenario have the one that the robot keeps out of.
     """
-    own = [person.zone for person in log.scenario.people] or [None] * len(log.zones)
+    own = [person.zone for person in run.scenario.people] or [None] * len(run.zones)
     fitted = [
-        as_ellipse(each or zone, log.settings.zone_speed) for each, zone in zip(own, log.zones, strict=True)
+        as_ellipse(each or zone, run.settings.zone_speed) for each, zone in zip(own, run.zones, strict=True)
     ]
     inside = {}
     for name, zone in ZONES.items():
         gaps = [
-            log.distance_to_person(i, partial(euclidean_to_ellipse, ellipse=zone(each)))
-            - log.settings.r_robot
+            run.distance_to_person(i, partial(euclidean_to_ellipse, ellipse=zone(each)))
+            - run.settings.r_robot
             for i, each in enumerate(fitted)
         ]
-        overlaps = np.fmin.reduce(np.reshape(gaps, (-1, len(log.states))), initial=np.inf) < 0
-        inside[f"inside {name}"] = log.settings.dt * float(overlaps.sum())
+        overlaps = np.fmin.reduce(np.reshape(gaps, (-1, len(run.states))), initial=np.inf) < 0
+        inside[f"inside {name}"] = run.settings.dt * float(overlaps.sum())
     return inside
 
 
@@ -170,29 +177,45 @@ def compare(
     *,
     seed: int = 0,
     controllers: Sequence[str] | Mapping[str, ControllerFactory] = ("MPC-CBF",),
-    zones: Sequence[str] | Mapping[str, Zones] = tuple(ZONES),
+    zones: Sequence[str] | Mapping[str, ZoneTransform] = tuple(ZONES),
     formulations: Sequence[str] | Mapping[str, MPCSettings] = tuple(FORMULATIONS),
     behaviours: Sequence[str] | Mapping[str, CrowdModel] = ("as expected",),
-    worlds: Scenes = WORLDS,
+    worlds: ScenarioSource = WORLDS,
     out: str | Path | None = None,
-    n_jobs: int = -1,
+    n_jobs: int = 1,
     progress: bool = True,
 ) -> pd.DataFrame:
-    """Drive through the same n worlds in every combination; rows of `rollouts`, each with its names.
+    """Drive through the same n worlds with each combination of methods.
 
     Parameters
     ----------
-    controllers, zones, formulations, behaviours : names in `CONTROLLERS`, `ZONES`, `FORMULATIONS`,
-        `BEHAVIOURS`, or a mapping from names of your own to factories, zones, settings, crowd models.
     n, seed, worlds, out, n_jobs, progress : as of `rollouts`.
+    controllers : names in `CONTROLLERS`, or a mapping from names of your own to controller factories.
+    zones : names in `ZONES`, or a mapping to zone transforms.
+    formulations : names in `FORMULATIONS`, or a mapping to settings.
+    behaviours : names in `BEHAVIOURS`, or a mapping to crowd models.
+
+    Returns
+    -------
+    The rows of `rollouts`, with the columns `METHOD` and the time in each of `ZONES`.
 
     Raises
     ------
-    SolverError : an unknown name.
+    SolverError : a name is unknown.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> worlds = szlib.Worlds(duration=1.0)
+    >>> table = szlib.simulation.compare(
+    ...     1, zones=["none", "fitted"], formulations=["paper"], worlds=worlds, progress=False
+    ... )
+    >>> table[["zone", "formulation", "seed"]].to_numpy().tolist()
+    [['none', 'paper', 0], ['fitted', 'paper', 0]]
     """
-    given = (controllers, zones, formulations, behaviours)
+    methods = (controllers, zones, formulations, behaviours)
     tables = []
-    for names in product(*map(_by_name, given, (CONTROLLERS, ZONES, FORMULATIONS, BEHAVIOURS))):
+    for names in product(*map(_resolve_names, methods, (CONTROLLERS, ZONES, FORMULATIONS, BEHAVIOURS))):
         (_, controller), (_, zone), (_, settings), (_, behaviour) = names
         table = rollouts(
             n,
@@ -201,7 +224,7 @@ def compare(
             worlds=worlds,
             behaviour=behaviour,
             controller=controller,
-            zones=zone,
+            zone_transform=zone,
             measure=measure_time_inside,
             out=out,
             n_jobs=n_jobs,
@@ -211,14 +234,14 @@ def compare(
     return pd.concat(tables, ignore_index=True)
 
 
-def _by_name(given: Sequence[str] | Mapping[str, Any], known: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Names and what they stand for."""
+def _resolve_names(
+    given: Sequence[str] | Mapping[str, Any], known: Mapping[str, Any]
+) -> list[tuple[str, Any]]:
+    """Names and the objects that they stand for."""
     if isinstance(given, Mapping):
         return list(given.items())
     if unknown := sorted(set(given) - set(known)):
-        raise SolverError(
-            f"unknown: {', '.join(unknown)}; there are {', '.join(known)}; for your own give a mapping"
-        )
+        raise SolverError(f"unknown names: {', '.join(unknown)}; expected {', '.join(known)}, or a mapping")
     return [(name, known[name]) for name in given]
 
 
@@ -232,20 +255,29 @@ def summarise(
     resamples: int = 2000,
     seed: int = 0,
 ) -> pd.DataFrame:
-    """Means over worlds with percentile bootstrap intervals; worlds are drawn, and with them all methods.
+    """Means over worlds, with percentile bootstrap intervals.
+
+    A bootstrap sample draws worlds, each with the runs of all methods: comparisons are paired.
 
     Parameters
     ----------
-    rows : as from `compare`.
+    rows : rows of `compare`.
     by : columns that name a method.
-    metrics : columns to average; a world that lacks one (no time to a goal never reached) is left out.
-    against : the method, such as {"zone": "fitted"}, that is subtracted world by world first; columns
-        not named keep their own value.
-    level, resamples, seed : of the intervals.
+    metrics : columns to average; worlds without a value (no time to a goal that is not reached) are left out.
+    against : the method, such as {"zone": "fitted"}, that is subtracted from all others in each world;
+        columns that are not named keep their own value.
+    level : level of the intervals.
+    resamples : number of bootstrap samples.
+    seed : seed of the bootstrap.
 
     Returns
     -------
-    One row each method and metric: `by`, metric, mean, low, high, n (worlds that count); NaN if none does.
+    One row for each method and metric: `by`, metric, mean, low, high, n (number of worlds with a value); NaN
+    without a value.
+
+    Raises
+    ------
+    SolverError : the level is not in (0, 1), or the number of samples is not positive.
     """
     if not 0 < level < 1 or resamples < 1:
         raise SolverError(f"level must be in (0, 1) and resamples positive; got {level}, {resamples}")
@@ -258,13 +290,13 @@ def summarise(
     wide = values.unstack(list(by))
     drawn = np.random.default_rng(seed).integers(len(wide), size=(resamples, len(wide)))
     counts = np.stack([np.bincount(row, minlength=len(wide)) for row in drawn])
-    data, there = wide.fillna(0.0).to_numpy(), wide.notna().to_numpy()
-    weight = counts @ there
+    data, has_value = wide.fillna(0.0).to_numpy(), wide.notna().to_numpy()
+    weight = counts @ has_value
     means = np.divide(counts @ data, weight, out=np.full(weight.shape, np.nan), where=weight > 0)
-    some = np.asarray(there.any(axis=0))
+    some = np.asarray(has_value.any(axis=0))
     low, high = bounds = np.full((2, len(some)), np.nan)
     bounds[:, some] = np.nanquantile(means[:, some], [(1 - level) / 2, (1 + level) / 2], axis=0)
     table = pd.DataFrame(wide.columns.tolist(), columns=["metric", *by])
-    mean = np.where(some, data.sum(axis=0) / np.maximum(there.sum(axis=0), 1), np.nan)
-    table = table.assign(mean=mean, low=low, high=high, n=there.sum(axis=0))
+    mean = np.where(some, data.sum(axis=0) / np.maximum(has_value.sum(axis=0), 1), np.nan)
+    table = table.assign(mean=mean, low=low, high=high, n=has_value.sum(axis=0))
     return table[[*by, "metric", "mean", "low", "high", "n"]]

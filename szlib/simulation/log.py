@@ -34,7 +34,11 @@ _SHOWN = ("success", "outcome", "time_to_goal", "min_h", "min_clearance", "infea
 
 
 class SimulationLog(Run):
-    """The log of one run: see `Run` for its arrays.
+    """The log of one run, with a table, metrics, pictures and files.
+
+    `szlib.simulate` returns it.  Its arrays are those of `szlib.simulation.Run`: `scenario`, `settings`,
+    `zones`, `states`, `controls`, `people`, `predicted`, `residual`, `fallback`, `safe`, `slack`,
+    `solve_time`, `arrival`, `has_safety_claims`, `inputs`.
 
     Examples
     --------

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Array
-from ..control.problem import TOLERANCE
+from ..control.settings import TOLERANCE
 from ..control.step import FALLBACKS
 from .outcomes import classify_outcome
 from .run import Run, nanmin

@@ -1,10 +1,10 @@
-"""Monte Carlo: thousands of random worlds, each driven through, measured, and classified if it failed.
+"""Monte Carlo: the robot drives through thousands of random worlds; each run is measured and classified.
 
     table = szlib.rollouts(10_000, settings=szlib.MPCSettings(), out="results/rollouts")
-    log = rerun_world(4711)                     # the world of a row, once more, with every state
+    log = szlib.simulation.rerun_world(4711)     # the world of one row again, with every state
 
-Worlds run in parallel; each chunk of them is a Parquet file, written as a whole or not at all, in a
-folder named after the parameters: an interrupted call goes on where it stopped, a larger `n` adds.
+Worlds run in parallel.  Each chunk of worlds is one Parquet file, written atomically, in a folder named after
+the parameters: an interrupted call continues where it stopped, and a larger `n` adds chunks.
 """
 
 from __future__ import annotations
@@ -25,34 +25,37 @@ from joblib import delayed
 from tqdm import tqdm
 
 from .. import __version__
+from ..control.controller import Controller
 from ..control.mpc import MPCCBF
-from ..control.problem import TOLERANCE
-from ..control.settings import MPCSettings
+from ..control.settings import TOLERANCE, MPCSettings
 from ..errors import SolverError, SzlibError
 from ..files import claim_folder, load_cached, store_cached, write_file
 from ..parallel import run_tasks
 from ..zones.ellipses import Ellipse
-from .closed_loop import Zones, drive
+from .closed_loop import ZoneTransform, drive
 from .log import SimulationLog
 from .outcomes import Outcome
-from .robots import ControllerFactory
-from .scenario import Behaviour, CrowdModel, Scenario
+from .run import Run
+from .scenario import UNAFFECTED, Behaviour, CrowdModel, Scenario
 from .scenarios.random_worlds import Worlds
 
 PURPOSE = "rollouts"
-"""What the folder of finished chunks is marked as."""
+"""Purpose with which the folder of finished chunks is marked."""
 
-CHUNK = 50
+CHUNK_SIZE = 50
 """Worlds in one file and in one task: half a second of work."""
 
 DEFAULT_ZONE = Ellipse((0.0, 0.0), (1.0, 1.0))
-"""The zone of people without one [m] (assumed); in random worlds everybody has one of their own."""
+"""Zone of people who have none [m] (assumed); in random worlds all people have one."""
 
-Scenes = Callable[[int], Scenario]
-"""A scene of each seed: `Worlds`, or anything else that makes the same one every time."""
+ControllerFactory = Callable[[Scenario, MPCSettings], Controller]
+"""Makes a controller for a scenario.  A function of a module, so that other processes find it."""
 
-Measure = Callable[[SimulationLog], dict[str, float]]
-"""Further columns of a row; must be a function of a module."""
+ScenarioSource = Callable[[int], Scenario]
+"""Makes the scenario of a seed, the same one each time: `Worlds` or another function."""
+
+Measure = Callable[[Run], dict[str, float]]
+"""Further columns of a row.  A function of a module."""
 
 
 def rollouts(
@@ -60,39 +63,48 @@ def rollouts(
     *,
     seed: int = 0,
     settings: MPCSettings | None = None,
-    worlds: Scenes | None = None,
+    worlds: ScenarioSource | None = None,
     behaviour: CrowdModel | None = None,
     controller: ControllerFactory | None = None,
-    zones: Zones | None = None,
+    zone_transform: ZoneTransform | None = None,
     measure: Measure | None = None,
     out: str | Path | None = None,
-    n_jobs: int = -1,
+    n_jobs: int = 1,
     progress: bool = True,
 ) -> pd.DataFrame:
-    """Drive through the worlds of seeds `seed` to `seed + n - 1`; one row of metrics each.
+    """Drive through the worlds of seeds `seed` to `seed + n - 1`; one row of metrics for each.
 
     Parameters
     ----------
-    n, seed : how many worlds, and the first one's seed.
-    settings, worlds, behaviour : of the controller, of the worlds, and of the people in them: a `Worlds` or
-        another function of the seed, a `Behaviour` or another `CrowdModel`.
-    controller : makes the controller for a world, from its scenario and the settings; default: `mpc_cbf`,
-        of which worlds with as many people and walls take one in turn.
-    zones : what is kept in place of a person's own zone, made from it.
+    n : number of worlds.
+    seed : seed of the first world.
+    settings : settings of the controller and the loop; default: `MPCSettings()`.
+    worlds : `Worlds`, or another function of the seed that makes scenarios; default: `Worlds()`.
+    behaviour : what people do: `Behaviour`, or another `CrowdModel`; default: they walk on.
+    controller : makes the controller for a scenario with these settings; default: `make_mpc_cbf`, where
+        worlds with the same numbers of people and walls share one controller.
+    zone_transform : makes the zone that the robot keeps out of from each person's own zone.
     measure : further columns from each run.
-    out : folder for finished chunks, to go on from; default: none is kept. Parameters and szlib's
-        version name the folder inside it; after a change of the code choose another.
-    n_jobs : worlds at a time, as joblib counts: -1 for every core.
-    progress : show a bar.
+    out : folder for finished chunks; a later call continues from them. Default: no files. The parameters and
+        szlib's version name a folder inside it. After a change of your own code choose another folder.
+    n_jobs : worlds at a time; -1: one for each core.
+    progress : show a progress bar.
 
     Returns
     -------
-    The columns of `metrics.metrics`, sorted by seed.
+    seed, and the columns of `szlib.simulation.compute_metrics`, sorted by seed.
 
     Raises
     ------
-    SolverError : `n` is not positive, a world broke the controller (it names the seed), or chunks are to be
-        kept of a function that is defined inside another: nothing names it.
+    SolverError : `n` is not positive, the controller fails in a world (the error names the seed), or `out` is
+        given with a function that is defined inside another: it has no name that other processes know.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> table = szlib.rollouts(2, worlds=szlib.Worlds(duration=2.0), progress=False)
+    >>> table["seed"].tolist(), (table["unflagged_violations"] == 0).all()
+    ([0, 1], np.True_)
     """
     if n < 1:
         raise SolverError(f"n must be at least 1; got {n}")
@@ -101,7 +113,7 @@ def rollouts(
         worlds=worlds,
         behaviour=behaviour,
         controller=controller,
-        zones=zones,
+        zone_transform=zone_transform,
         measure=measure,
     )
     folder = None if out is None else Path(out) / setup.key()
@@ -109,8 +121,8 @@ def rollouts(
         claim_folder(folder.parent, PURPOSE)
         claim_folder(folder, f"{PURPOSE} {setup.key()}")
         write_file(folder / "parameters.txt", setup.describe() + "\n")
-    chunks = [range(first, min(first + CHUNK, seed + n)) for first in range(seed, seed + n, CHUNK)]
-    tasks = [delayed(_chunk)(setup, chunk, folder) for chunk in chunks]
+    chunks = [range(first, min(first + CHUNK_SIZE, seed + n)) for first in range(seed, seed + n, CHUNK_SIZE)]
+    tasks = [delayed(run_chunk)(setup, chunk, folder) for chunk in chunks]
     tables: list[pd.DataFrame] = []
     with tqdm(total=n, unit="world", disable=not progress) as bar:
         for table in run_tasks(tasks, n_jobs=n_jobs):
@@ -119,55 +131,61 @@ def rollouts(
     return pd.concat(tables).sort_values("seed", ignore_index=True)
 
 
-def mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = DEFAULT_ZONE) -> MPCCBF:
-    """The controller of the paper; `zone` is that of people without one of their own."""
+def make_mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = DEFAULT_ZONE) -> MPCCBF:
+    """The controller of the paper for a `scenario` with `settings`; `zone` is that of people who have
+    none.
+    """
     return MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
 
 
-class OneOfEachSize:
-    """As `mpc_cbf`, but worlds with as many people and walls take one controller in turn: to build one takes
-    as long as ten steps. The loop resets it before each, so that nothing is left of the world before.
+class ControllerPool:
+    """A `ControllerFactory` like `make_mpc_cbf` that reuses controllers.
+
+    Scenarios with the same numbers of people and walls share one controller: to build one takes as long as
+    ten steps.  The loop resets it before each run, so that it remembers nothing of the last world.
     """
 
     def __init__(self) -> None:
-        self._made: dict[tuple[int, int], MPCCBF] = {}
+        self._controllers: dict[tuple[int, int], MPCCBF] = {}
 
     def __call__(self, scenario: Scenario, settings: MPCSettings) -> MPCCBF:
         size = len(scenario.people), len(scenario.walls)
-        if size not in self._made:
-            self._made[size] = mpc_cbf(scenario, settings)
-        self._made[size].set_walls(scenario.walls)
-        return self._made[size]
+        if size not in self._controllers:
+            self._controllers[size] = make_mpc_cbf(scenario, settings)
+        self._controllers[size].set_walls(scenario.walls)
+        return self._controllers[size]
 
 
 @lru_cache(maxsize=1)
-def _in_turn(settings: MPCSettings, thread: int) -> OneOfEachSize:
-    """The controllers of a worker, from chunk to chunk: of these settings, and its own thread's."""
-    return OneOfEachSize()
+def _worker_pool(settings: MPCSettings, thread: int) -> ControllerPool:
+    """The controllers of one worker thread for these settings, kept from chunk to chunk."""
+    return ControllerPool()
 
 
 @dataclass(frozen=True)
-class Setup:
-    """Everything but the seed that decides what a row says; parameters as of `rollouts`."""
+class RolloutSetup:
+    """Everything except the seed that decides a row: `settings`, `worlds`, `behaviour`, `controller`,
+    `zone_transform`, `measure`, as of `rollouts`.
+    """
 
     settings: MPCSettings
-    worlds: Scenes
+    worlds: ScenarioSource
     behaviour: CrowdModel
     controller: ControllerFactory
-    zones: Zones | None
+    zone_transform: ZoneTransform | None
     measure: Measure | None
 
     def describe(self) -> str:
         """Every parameter, as text."""
-        named = {field.name: identify(getattr(self, field.name)) for field in fields(self)}
-        return repr((__version__, named))
+        parts = {field.name: identify(getattr(self, field.name)) for field in fields(self)}
+        return repr((__version__, parts))
 
     def key(self) -> str:
         """A short name for these parameters."""
         return hashlib.sha256(self.describe().encode()).hexdigest()[:12]
 
     def run(self, seed: int) -> SimulationLog:
-        """Drive through one world."""
+        """Drive through the world of a `seed`."""
         scenario = self.worlds(seed)
         try:
             return drive(
@@ -175,42 +193,53 @@ class Setup:
                 self.controller(scenario, self.settings),
                 behaviour=self.behaviour,
                 seed=seed,
-                zones=self.zones,
+                zone_transform=self.zone_transform,
                 settings=self.settings,
                 until_arrival=False,
             )
         except SzlibError as error:
-            raise SolverError(f"world {seed} broke the controller: {error}; see worlds({seed})") from error
+            raise SolverError(
+                f"the controller failed in world {seed}: {error}; see worlds({seed})"
+            ) from error
         except Exception as error:
             error.add_note(f"in world {seed}")
             raise
 
 
-def make_setup(**given: Any) -> Setup:
-    """A `Setup` of what is given, and of the defaults where that is None or missing."""
-    setup: dict[str, Any] = {"settings": MPCSettings(), "worlds": Worlds(), "behaviour": Behaviour()}
-    setup |= {"controller": mpc_cbf, "zones": None, "measure": None}
-    return Setup(**(setup | {name: value for name, value in given.items() if value is not None}))
+def make_setup(**parameters: Any) -> RolloutSetup:
+    """A `RolloutSetup` of these `parameters`; defaults replace those that are None or missing."""
+    setup: dict[str, Any] = {"settings": MPCSettings(), "worlds": Worlds(), "behaviour": UNAFFECTED}
+    setup |= {"controller": make_mpc_cbf, "zone_transform": None, "measure": None}
+    return RolloutSetup(**(setup | {name: part for name, part in parameters.items() if part is not None}))
 
 
 def identify(part: Any) -> str:
-    """What tells a part of a `Setup` from any other, in every process: its name if it is a function of a
-    module, its text if it is one of szlib's own settings, and else its type with a hash of what it holds.
+    """Text that identifies a `part` of a `RolloutSetup` in every process.
 
-    Raises SolverError for a function that is defined inside another.
+    A function of a module: its name.  Settings of szlib: their text.  Other objects: their type and a hash of
+    their content.
+
+    Raises
+    ------
+    SolverError : the part is a function that is defined inside another.
     """
     if part is None or type(part) in (MPCSettings, Worlds, Behaviour):
         return repr(part)
     kind = part if isinstance(part, FunctionType | type) else type(part)
     name = f"{kind.__module__}.{kind.__qualname__}"
     if "<" in name:
-        raise SolverError(f"{name} cannot be told from others of that name; define it in a module")
+        raise SolverError(f"{name} has no name that other processes know; define it in a module")
     return name if kind is part else f"{name} {joblib.hash(part)}"
 
 
 def summarise_rollouts(rows: pd.DataFrame) -> pd.Series[Any]:
-    """Rows of `rollouts` in one: worlds, steps by what they say, shares of worlds with h < 0, with Euclidean
-    overlaps, and of each outcome, least h and clearance [m]."""
+    """Summarise `rows` of `rollouts`.
+
+    Returns
+    -------
+    Number of worlds and of steps by what they report, fractions of worlds with h < 0, with Euclidean overlaps
+    and with each outcome, smallest h and clearance [m].
+    """
     numbers: dict[str, Any] = {"worlds": len(rows)}
     numbers |= {
         name: int(rows[name].sum())
@@ -223,23 +252,25 @@ def summarise_rollouts(rows: pd.DataFrame) -> pd.Series[Any]:
         "share overlap person": float((rows["min_clearance_people"] < -TOLERANCE).mean()),
         "min_clearance": float(rows["min_clearance"].min()),
     }
-    numbers |= {ending: float((rows["outcome"] == ending).mean()) for ending in get_args(Outcome)}
+    numbers |= {outcome: float((rows["outcome"] == outcome).mean()) for outcome in get_args(Outcome)}
     return pd.Series(numbers)
 
 
 def rerun_world(seed: int, **parameters: Any) -> SimulationLog:
-    """One world again, with every state; parameters as of `rollouts` (settings, worlds, ...)."""
+    """Drive through the world of a `seed` again, for its log; `parameters` as of `rollouts`."""
     return make_setup(**parameters).run(seed)
 
 
-def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
-    """The rows of these seeds: read where they are finished, else driven, and kept."""
+def run_chunk(setup: RolloutSetup, seeds: range, folder: Path | None = None) -> pd.DataFrame:
+    """The rows of the worlds of `seeds` with a `setup`: read from `folder` if finished, else driven and
+    stored.
+    """
     file = None if folder is None else folder / f"seeds-{seeds.start:07d}-{seeds.stop - 1:07d}.parquet"
-    made = {"rollouts": file and setup.describe(), "seeds": [seeds.start, seeds.stop]}
-    if file is not None and (content := load_cached(file, made)) is not None:
+    key = {"rollouts": file and setup.describe(), "seeds": [seeds.start, seeds.stop]}
+    if file is not None and (content := load_cached(file, key)) is not None:
         return pd.read_parquet(io.BytesIO(content))
-    if setup.controller is mpc_cbf:
-        setup = replace(setup, controller=_in_turn(setup.settings, get_ident()))
+    if setup.controller is make_mpc_cbf:
+        setup = replace(setup, controller=_worker_pool(setup.settings, get_ident()))
     rows = []
     for seed in seeds:
         log = setup.run(seed)
@@ -249,5 +280,5 @@ def _chunk(setup: Setup, seeds: range, folder: Path | None) -> pd.DataFrame:
     if file is not None:
         buffer = io.BytesIO()
         table.to_parquet(buffer)
-        store_cached(file, buffer.getvalue(), made)
+        store_cached(file, buffer.getvalue(), key)
     return table

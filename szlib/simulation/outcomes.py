@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 from scipy.ndimage import label
 
-from ..control.barriers import barrier, ellipse_distance, segment_distance
-from ..control.distances import wall_margin
-from ..control.problem import TOLERANCE
+from ..control.barriers import compute_h
+from ..control.distances import walls_with_margins
+from ..control.settings import TOLERANCE
 from .run import Run, nanmin
 from .scenario import STOPPED_SPEED
 
@@ -76,12 +76,12 @@ def _has_free_path(run: Run) -> bool:
     low, high = everything.min(axis=0) - _MARGIN, everything.max(axis=0) + _MARGIN
     axes = [np.arange(low[i], high[i], _CELL) for i in range(2)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    s, free = run.settings, np.ones(grid.shape[:2], bool)
-    for zone, (x, y, heading, *_) in people:
-        free &= barrier(ellipse_distance(grid, zone.placed((x, y), heading)), s.r_robot, s.eps) >= 0
-    for wall in run.scenario.walls:
-        free &= barrier(segment_distance(grid, *wall), s.r_robot, wall_margin(wall, s)) >= 0
-    regions = label(free, structure=np.ones((3, 3)))[0]
+    s = run.settings
+    zones = [(*zone.placed((x, y), heading).foci_and_axis, 0.0, 0.0) for zone, (x, y, heading, *_) in people]
+    walls = walls_with_margins(run.scenario.walls, s)
+    h = compute_h(grid[..., 0], grid[..., 1], zones, walls, r_robot=s.r_robot, eps=s.eps)
+    is_free = nanmin(np.array([np.ones(grid.shape[:2]), *h]), axis=0) >= 0
+    regions = label(is_free, structure=np.ones((3, 3)))[0]
     cells = np.round((ends - low) / _CELL).astype(int)
     robot, goal = (regions[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] for i, j in cells)
     return bool(set(np.unique(robot)) & set(np.unique(goal)) - {0})

@@ -1,6 +1,6 @@
-"""What data says of the paper's claims: each an effect with its 95 % interval, and a verdict.
+"""The claims of the paper, tested on data: each is an effect with its 95 % interval, and a verdict.
 
-An effect is written so that above 0 it is as the paper says.  Nothing is decided where the interval holds 0.
+An effect above 0 supports the claim.  Where the interval contains 0, the data decide nothing.
 """
 
 from __future__ import annotations
@@ -22,29 +22,36 @@ from ..zones.social_zone import SocialZone
 from .closed_loop import simulate
 from .scenarios.paper import SCENARIOS
 
-PAPERS_RATE = 16_181 / 92
+PAPER_RATE = 16_181 / 92
 """Encounters a day in the paper (sec. 2)."""
 LEVEL = 0.95
-"""Of every interval here."""
+"""Level of all intervals here."""
 LARGER_AHEAD = "the zone reaches farther ahead than behind"
-GROWS = "the zone grows with walking speed"
-AS_MANY = "as many encounters a day as in the paper, within a factor of two"
-LATER = "a larger zone makes the robot later"
+GROWS_WITH_SPEED = "the zone grows with walking speed"
+ENCOUNTER_RATE = "as many encounters a day as in the paper, within a factor of two"
+DELAYED_BY_SIZE = "a larger zone makes the robot later"
 OPPOSITE = "opposite"
 """The kind of encounter in which people pass each other."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One claim on one data set.
+    """The result for one claim on one data set.
 
     Parameters
     ----------
-    claim : the paper's sentence.
-    effect, low, high : what was measured and its interval, in `unit`; above 0: as the paper says.
-    unit : of the effect.
-    n : encounters, pairs, days or runs it rests on.
-    adequate : whether enough people were seen on every side; if not, nothing is decided.
+    claim : the claim of the paper.
+    effect, low, high : measured effect and its interval, in `unit`; above 0 supports the claim.
+    unit : unit of the effect.
+    n : number of encounters, pairs, days or runs.
+    adequate : False if there are too few people on some side; then nothing is decided.
+
+    Examples
+    --------
+    >>> from szlib.simulation import paper_claims
+    >>> finding = paper_claims.measure_encounter_rate(encounters=16_181, days=92)
+    >>> finding.verdict
+    'supported'
     """
 
     claim: str
@@ -57,7 +64,7 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """ "supported", "contradicted", or "not decidable" with the n it rests on."""
+        """ "supported", "contradicted", or "not decidable" with n."""
         if self.adequate and self.low > 0:
             return "supported"
         if self.adequate and self.high < 0:
@@ -68,116 +75,126 @@ class Finding:
         return f"{self.effect:+.2f} [{self.low:+.2f}, {self.high:+.2f}] {self.unit}: {self.verdict}"
 
 
-def findings_table(findings: Iterable[Finding], *, data: str) -> pd.DataFrame:
-    """One row a finding: data, claim, effect, low, high, unit, n, verdict."""
+def tabulate_findings(findings: Iterable[Finding], *, data: str) -> pd.DataFrame:
+    """One row for each of `findings` on `data`: data, claim, effect, low, high, unit, n, verdict."""
     rows = [(data, f.claim, f.effect, f.low, f.high, f.unit, f.n, f.verdict) for f in findings]
     return pd.DataFrame(rows, columns=["data", "claim", "effect", "low", "high", "unit", "n", "verdict"])
 
 
-def as_cell(row: pd.Series[Any]) -> str:
-    """A row of the table in few words: effect [low, high] unit, verdict."""
+def format_finding(row: pd.Series[Any]) -> str:
+    """A `row` of `tabulate_findings` in few words: effect [low, high] unit: verdict."""
     return f"{row['effect']:+.2f} [{row['low']:+.2f}, {row['high']:+.2f}] {row['unit']}: {row['verdict']}"
 
 
-def larger_ahead(zone: SocialZone, *, speed: float = 1.1) -> Finding:
-    """The zone reaches farther ahead than behind, by twice the offset of its centre (sec. 1 and 4)."""
-    center, low, high = _interval(zone, speed, "center_x")
-    n, adequate = _encounters(zone, speed), zone.adequate(speed)
+def measure_reach_ahead(zone: SocialZone, *, speed: float = 1.1) -> Finding:
+    """The `zone` at a `speed` [m/s] reaches farther ahead than behind: twice its offset (sec. 1 and 4)."""
+    center, low, high = _read_interval(zone, speed, "center_x")
+    n, adequate = _count_encounters(zone, speed), zone.adequate(speed)
     return Finding(LARGER_AHEAD, 2 * center, 2 * low, 2 * high, "m", n, adequate)
 
 
-def grows_with_speed(zone: SocialZone, *, slow: float = 0.7, fast: float = 1.3) -> Finding:
-    """The zone's area grows with walking speed (fig. 5).
+def measure_growth_with_speed(zone: SocialZone, *, slow: float = 0.7, fast: float = 1.3) -> Finding:
+    """The area of a `zone` grows from a `slow` to a `fast` walking speed [m/s] (fig. 5).
 
-    The interval of the difference is recovered from those of both areas as if they were independent
-    (MOVER; Zou and Donner, Statist. Med. 27, 2008): too wide rather than too narrow, for both rest on the
-    same people.
+    Notes
+    -----
+    The interval of the difference follows from those of both areas as if they were independent (MOVER; Zou
+    and Donner, Statist. Med. 27, 2008).  Both depend on the same people: the interval is rather too wide.
     """
-    area, low, high = _interval(zone, fast, "area")
-    other, other_low, other_high = _interval(zone, slow, "area")
+    area, low, high = _read_interval(zone, fast, "area")
+    other, other_low, other_high = _read_interval(zone, slow, "area")
     effect = area - other
     down = sqrt((area - low) ** 2 + (other_high - other) ** 2)
     up = sqrt((high - area) ** 2 + (other - other_low) ** 2)
-    n, adequate = min(_encounters(zone, v) for v in (slow, fast)), all(map(zone.adequate, (slow, fast)))
-    return Finding(GROWS, effect, effect - down, effect + up, "m2", n, adequate)
+    n, adequate = min(_count_encounters(zone, v) for v in (slow, fast)), all(map(zone.adequate, (slow, fast)))
+    return Finding(GROWS_WITH_SPEED, effect, effect - down, effect + up, "m2", n, adequate)
 
 
-def passes_on_the_right(samples: pd.DataFrame) -> Finding:
-    """People who walk towards each other pass on the right: share of pairs, less one half (abstract).
+def measure_passing_side(samples: pd.DataFrame) -> Finding:
+    """People who walk towards each other pass on the right: fraction of pairs in `samples` - 1/2 (abstract).
 
     A pair passes on the right if each has the other to the left where they are closest.
     """
     check_columns(samples, ["day", "encounter", "ref_id", "other_id", "los_angle", "distance", "kind"])
-    met = samples[samples["kind"] == OPPOSITE]
-    closest = met.loc[met.groupby("encounter")["distance"].idxmin()] if len(met) else met
+    opposite = samples[samples["kind"] == OPPOSITE]
+    rows = opposite.groupby("encounter")["distance"].idxmin()
+    closest = opposite.loc[rows] if len(opposite) else opposite
     people = np.sort(closest[["ref_id", "other_id"]].to_numpy(), axis=1).reshape(-1, 2)
     pairs = closest.assign(one=people[:, 0], two=people[:, 1]).drop_duplicates(["day", "one", "two"])
-    return _share("people pass each other on the right", int((pairs["los_angle"] > 0).sum()), len(pairs))
+    return _measure_share(
+        "people pass each other on the right", int((pairs["los_angle"] > 0).sum()), len(pairs)
+    )
 
 
-def outliers_are_intruders(intruders: int, removed: int) -> Finding:
-    """LOF finds the outliers: share of known intruders' samples among those removed, less one half."""
-    return _share("what LOF removes are outliers", intruders, removed)
+def measure_intruders_removed(intruders: int, removed: int) -> Finding:
+    """LOF removes outliers: fraction of `intruders` among the `removed` samples - 1/2."""
+    return _measure_share("what LOF removes are outliers", intruders, removed)
 
 
-def as_many_a_day(encounters: int, days: float) -> Finding:
-    """As many encounters a day as in the paper, within a factor of two: one less the doublings between."""
+def measure_encounter_rate(encounters: int, days: float) -> Finding:
+    """As many `encounters` in these `days` as in the paper, within a factor of two: 1 - number of
+    doublings.
+    """
     if not (encounters >= 0 and days > 0):
         raise DataError(f"expected encounters >= 0 in days > 0; got {encounters} in {days}")
     low = chi2.ppf((1 - LEVEL) / 2, 2 * encounters) / 2 if encounters else 0.0
     high = chi2.ppf((1 + LEVEL) / 2, 2 * encounters + 2) / 2
 
-    def within(count: float) -> float:
-        """One less the doublings between so many and the paper's."""
-        return 1 - abs(log2(max(count, 1e-9) / days / PAPERS_RATE))
+    def effect(count: float) -> float:
+        """1 - number of doublings between this `count` and the paper's."""
+        return 1 - abs(log2(max(count, 1e-9) / days / PAPER_RATE))
 
-    ends = sorted(map(within, (low, high)))
-    top = 1.0 if low / days <= PAPERS_RATE <= high / days else ends[1]
-    return Finding(AS_MANY, within(encounters), ends[0], top, "doublings", encounters)
+    ends = sorted(map(effect, (low, high)))
+    top = 1.0 if low / days <= PAPER_RATE <= high / days else ends[1]
+    return Finding(ENCOUNTER_RATE, effect(encounters), ends[0], top, "doublings", encounters)
 
 
-def size_trades_efficiency(
+def measure_delay_by_size(
     zone: Ellipse, *, scales: Sequence[float] = (0.8, 1.2), names: Iterable[str] = tuple(SCENARIOS)
 ) -> Finding:
-    """A larger zone makes the robot later at its goal (sec. 4): least and greatest over the scenarios."""
-    late = []
+    """A larger zone makes the robot later at its goal (sec. 4): mean and range over scenarios of the paper.
+
+    Parameters
+    ----------
+    zone : the zone.
+    scales : factors of its size; the first and the last are compared.
+    names : names of the scenarios.
+    """
+    delays = []
     for name in names:
-        times = [run_with(name, zone.scaled(scale))["time_to_goal"] for scale in scales]
-        late.append(times[-1] - times[0])
+        times = [run_scenario(name, zone.scaled(scale))["time_to_goal"] for scale in scales]
+        delays.append(times[-1] - times[0])
     claim = f"a zone {scales[-1] / scales[0]:.1f} times as large makes the robot later"
-    return Finding(claim, float(np.mean(late)), float(np.min(late)), float(np.max(late)), "s", len(late))
+    return Finding(
+        claim, float(np.mean(delays)), float(np.min(delays)), float(np.max(delays)), "s", len(delays)
+    )
 
 
-def run_with(name: str, zone: Ellipse) -> dict[str, float]:
-    """Metrics of a scenario of the paper with a zone."""
+def run_scenario(name: str, zone: Ellipse) -> dict[str, float]:
+    """Metrics of the paper's scenario of this `name` with a `zone`."""
     scenario = replace(SCENARIOS[name], claims=())
     return simulate(scenario, MPCCBF(zone, walls=scenario.walls)).metrics()
 
 
-def _interval(zone: SocialZone, speed: float, quantity: str) -> tuple[float, float, float]:
-    """Value, low, high of a quantity at a speed, NaN where there is no zone; ZoneError if not asked for."""
+def _read_interval(zone: SocialZone, speed: float, quantity: str) -> tuple[float, float, float]:
+    """Value, low, high of a quantity at a speed; NaN where there is no zone; ZoneError if not fitted."""
     if speed in zone.undefined:
         return np.nan, np.nan, np.nan
     table = zone.table().set_index("speed")
     if speed not in table.index or zone.uncertainty is None:
-        raise ZoneError(
-            f"no interval at {speed:g} m/s; fit with speeds that hold it, and with n_resamples > 0"
-        )
+        raise ZoneError(f"no interval at {speed:g} m/s; fit with this speed, and n_resamples > 0")
     value, low, high = (table[f"{quantity}{end}"].to_dict()[speed] for end in ("", "_low", "_high"))
     return float(value), float(low), float(high)
 
 
-def _encounters(zone: SocialZone, speed: float) -> int:
-    return (
-        0
-        if zone.side_counts is None
-        else int(zone.side_counts.set_index("speed")["encounters"].to_dict()[speed])
-    )
+def _count_encounters(zone: SocialZone, speed: float) -> int:
+    counts = zone.side_counts
+    return 0 if counts is None else int(counts.set_index("speed")["encounters"].to_dict()[speed])
 
 
-def _share(claim: str, hits: int, of: int) -> Finding:
-    """A share less one half, with Wilson's interval; nothing is known of no trials."""
-    if of == 0:
+def _measure_share(claim: str, hits: int, trials: int) -> Finding:
+    """A fraction - 1/2 with Wilson's interval; undecided without trials."""
+    if trials == 0:
         return Finding(claim, np.nan, -0.5, 0.5, "share", 0)
-    ends = binomtest(hits, of).proportion_ci(LEVEL, method="wilson")
-    return Finding(claim, hits / of - 0.5, ends.low - 0.5, ends.high - 0.5, "share", of)
+    ends = binomtest(hits, trials).proportion_ci(LEVEL, method="wilson")
+    return Finding(claim, hits / trials - 0.5, ends.low - 0.5, ends.high - 0.5, "share", trials)

@@ -1,23 +1,23 @@
-"""The robot in the place of somebody who was recorded, among all others as they walked that day.
+"""Replay: the robot takes the place of a recorded walker, among all other people as they walked that day.
 
-They do not see it: what they would have done for a robot nobody recorded.  Tracks are on the house's clock
+The people do not see the robot: nobody recorded what they would do.  Tracks are on szlib's clock
 (`szlib.tracks.clock`): between two samples people walk straight on, and their velocity is their displacement
-over +-0.5 s, half of which has not happened yet.  World frame, metres and seconds; time 0 is when the walker
-who is replaced was first seen.
+over +-0.5 s, half of which lies in the future.  World frame, metres and seconds; time 0 is the first
+sample of the walker who is replaced.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import atan2, hypot
-from math import floor as whole
+from math import atan2, floor, hypot
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ..checks import Array
+from ..control.controller import Controller
 from ..control.person import Person
 from ..control.settings import MPCSettings
 from ..encounters.areas import area_for
@@ -29,23 +29,23 @@ from .crowds.reacting import MIN_HEADING_SPEED
 from .scenario import Crowd, Scenario
 
 TIME_FACTOR = 2.0
-"""The robot has so many times as long as the walker took, or as it needs itself at full speed (assumed)."""
+"""Time limit of the robot, as a multiple of the walker's time, or of its own time at full speed (assumed)."""
 SENSING_RANGE = 6.0
-"""The controller is given who is within this distance of the robot [m] (assumed)."""
+"""The controller sees people within this distance of the robot [m] (assumed)."""
 MIN_START_DISTANCE = 2.0
-"""Nobody is within this distance when the robot is put in [m] (assumed): it has no companions."""
+"""Nobody is within this distance of the robot's start [m] (assumed): the robot has no companions."""
 MIN_TRAVEL = 5.0
-"""Walkers who came no farther than this are not replaced [m] (assumed)."""
+"""Walkers who cover a smaller distance are not replaced [m] (assumed)."""
 _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
 class RecordedPerson:
-    """A person from one tick to another without a gap.
+    """A recorded person, from one tick to another without a gap.
 
     Attributes
     ----------
-    id : of the track table.
+    id : id in the track table.
     first : tick of the first row, from time 0 of the replay.
     states : x, y, vx, vy, heading, shape (n, 5) [m, m/s, rad].
     """
@@ -55,11 +55,11 @@ class RecordedPerson:
     states: Array
 
     def at(self, t: float, zone: Ellipse | None = None) -> Person | None:
-        """The person, with this zone, at a time [s]; None where they were not there."""
+        """The person at a time `t` [s], with this `zone`; None if they are absent."""
         tick = t * TICKS_PER_SECOND - self.first
         if not -_ROUNDING <= tick <= len(self.states) - 1 + _ROUNDING:
             return None
-        row = min(max(whole(tick + _ROUNDING), 0), len(self.states) - 1)
+        row = min(max(floor(tick + _ROUNDING), 0), len(self.states) - 1)
         now, after = self.states[row], self.states[min(row + 1, len(self.states) - 1)]
         x, y, vx, vy = (now[:4] + max(tick - row, 0.0) * (after[:4] - now[:4])).tolist()
         return Person((x, y), (vx, vy), float(now[4]), zone)
@@ -67,101 +67,90 @@ class RecordedPerson:
 
 @dataclass(frozen=True)
 class Replay:
-    """A recorded scene without one of its people: a behaviour, with the scenario that it belongs to.
+    """A recorded scene without one of its people: a `CrowdModel`, with its scenario.
 
     Attributes
     ----------
-    scenario : the robot from the walker's first to their last point, at first with their velocity, or as
-        much of it as it may; people come and go, so that it names none.
-    walker : who is replaced.
-    others : everybody else who was there meanwhile; who was lost and found again counts twice.
-    zone : of everybody; None: that of the controller.
-    sight : how far the controller is given people [m].
+    scenario : from the walker's first to their last point. The robot starts with their velocity, up to its
+        own limit. It has no people: people come and go.
+    walker : the person who is replaced.
+    others : all other people; a person who was lost and found again counts twice.
+    zone : zone of all people; None: that of the controller.
+    sensing_range : distance at which the controller sees people [m].
     """
 
     scenario: Scenario
     walker: RecordedPerson
     others: tuple[RecordedPerson, ...] = field(repr=False)
     zone: Ellipse | None = None
-    sight: float = SENSING_RANGE
+    sensing_range: float = SENSING_RANGE
 
-    def crowd(self, scenario: Scenario, seed: int) -> Crowd:
-        """Everybody within sight of the robot as they were; the same whatever the seed."""
-        return self._at
+    def start(self, scenario: Scenario, seed: int) -> Crowd:
+        """The recorded people within range of the robot, whatever the `scenario` and the `seed`."""
+        return self._people_in_range
 
-    def _at(self, t: float, robot: Array) -> tuple[Person | None, ...]:
-        return tuple(self._within_sight(other.at(t, self.zone), robot) for other in self.others)
+    def _people_in_range(self, t: float, robot: Array) -> tuple[Person | None, ...]:
+        x, y = robot[:2].tolist()
+        people = (other.at(t, self.zone) for other in self.others)
+        return tuple(
+            p if p and hypot(p.position[0] - x, p.position[1] - y) <= self.sensing_range else None
+            for p in people
+        )
 
-    def _within_sight(self, person: Person | None, robot: Array) -> Person | None:
-        if person is None:
-            return None
-        (x, y), (rx, ry) = person.position, robot[:2].tolist()
-        return person if hypot(x - rx, y - ry) <= self.sight else None
-
-    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
-        """Everybody as the controller is given them: as they are."""
+    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
+        """The `people` themselves; nothing is drawn from `rng`."""
         return people
 
 
 class Replays(tuple[Replay, ...]):
-    """Several of them, each by its seed, as `rollouts` wants them.
+    """Several replays, each with its seed: worlds and behaviour of `rollouts`.
 
-    ``szlib.rollouts(len(made), worlds=made, behaviour=made)``: seed 0 is the first, and after the last comes
-    the first again.
+    ``szlib.rollouts(len(replays), worlds=replays, behaviour=replays)``: seed 0 is the first replay; after the
+    last the first follows again.
     """
 
     def __call__(self, seed: int) -> Scenario:
-        """The scenario of a seed."""
+        """The scenario of a `seed`."""
         return self[seed % len(self)].scenario
 
-    def crowd(self, scenario: Scenario, seed: int) -> Crowd:
-        """The crowd of a seed."""
-        return self[seed % len(self)].crowd(scenario, seed)
+    def start(self, scenario: Scenario, seed: int) -> Crowd:
+        """The people of the replay of a `seed`, whatever the `scenario`."""
+        return self[seed % len(self)].start(scenario, seed)
 
-    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
-        """Everybody as the controller is given them: as they are."""
+    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
+        """The `people` themselves; nothing is drawn from `rng`."""
         return people
 
 
-class ReplacedWalker:
-    """The walker who was replaced, as a controller and its robot: drives their own path, whatever is ahead.
+class ReplacedWalker(Controller):
+    """The walker of a `replay`, as a controller and its own robot: follows the recorded path, whatever is
+    ahead.
 
-    With it the person replaced is measured like any controller.
+    With it a person is measured like any robot, with the same `settings` (default: `MPCSettings()`).
     """
 
     inputs = ()
+    control = np.zeros(0)
 
     def __init__(self, replay: Replay, settings: MPCSettings | None = None) -> None:
-        self.settings, self._path = settings or MPCSettings(), replay.walker.states[:, :4]
-
-    @property
-    def robot(self) -> ReplacedWalker:
-        """Itself; its own state is the time since the start, shape (1,) [s]."""
-        return self
-
-    def reset(self) -> None:
-        """Nothing to forget."""
+        self.settings, self.robot = settings or MPCSettings(), self
+        self._path = replay.walker.states[:, :4]
 
     def step(self, state: Array, goal: Array, people: Sequence[Person]) -> ReplacedWalker:
-        """On along the path."""
+        """No control is needed, whatever the `state`, `goal` and `people`."""
         return self
 
-    @property
-    def control(self) -> Array:
-        """None is needed, shape (0,)."""
-        return np.zeros(0)
-
     def start(self, state: Array) -> Array:
-        """Time 0."""
+        """The own state is the time since the start, shape (1,) [s], whatever the `state`."""
         return np.zeros(1)
 
     def body(self, own: Array) -> Array:
-        """(x, y, vx, vy) then; who has come to the end stays there."""
+        """(x, y, vx, vy) at the time `own`; at the end of the path the walker stays there."""
         tick = min(float(own[0]) * TICKS_PER_SECOND, len(self._path) - 1.0)
         return np.array([np.interp(tick, np.arange(len(self._path)), column) for column in self._path.T])
 
     def advance(self, own: Array, control: Array, dt: float) -> Array:
-        """`dt` later."""
+        """The time `own`, `dt` later; there is no `control`."""
         return own + dt
 
 
@@ -174,22 +163,24 @@ def find_replays(
     zone: Ellipse | None = None,
     settings: MPCSettings | None = None,
 ) -> Replays:
-    """At most n recorded walkers, drawn by the seed, each to be replaced by the robot.
+    """Draw recorded walkers whom the robot can replace.
 
-    A walker's way is a gap-free piece of their track within the area, at least `MIN_TRAVEL` from its first
-    to its last point, with nobody within `MIN_START_DISTANCE` at the first.
+    The robot takes a piece of a walker's track without gaps, within the area, of at least `MIN_TRAVEL`
+    from its first to its last point, with nobody within `MIN_START_DISTANCE` of the first.
 
     Parameters
     ----------
-    tracks : a track table; of several days, each is a scene of its own.
-    area : open floor, where the robot may drive: whatever `szlib.as_area` takes, or "auto"; None: everywhere,
-        though tracks say nothing of walls.
-    zone : of everybody; None: that of the controller.
-    settings : of the robot: its greatest speed.
+    tracks : a track table; each day is a scene of its own.
+    n : largest number of walkers.
+    seed : seed of the draw.
+    area : open floor, where the robot may drive: as for `szlib.as_area`, or "auto"; None: everywhere,
+        although tracks say nothing of walls.
+    zone : zone of all people; None: that of the controller.
+    settings : settings of the robot, for its speed limit.
 
     Raises
     ------
-    DataError : nobody walked so.
+    DataError : there is no such walker.
     """
     s = settings or MPCSettings()
     order, tick, piece = clock_index(tracks)
@@ -198,76 +189,77 @@ def find_replays(
     days, ids = pd.factorize(table["day"])[0], table["id"].to_numpy()
     starts = np.flatnonzero(np.r_[True, np.diff(piece) > 0])
     ends = np.r_[starts[1:], len(piece)]
-    known = ends - starts > 1
-    pieces = pd.DataFrame({"begin": starts[known], "end": ends[known]})
+    is_long = ends - starts > 1
+    pieces = pd.DataFrame({"begin": starts[is_long], "end": ends[is_long]})
     pieces["day"], pieces["id"] = days[pieces["begin"]], ids[pieces["begin"]]
     pieces["first"], pieces["last"] = tick[pieces["begin"]], tick[pieces["end"] - 1]
-    floor = None if area is None else area_for(tracks, area)
-    ways = _ways(states, pieces, floor)
-    made: list[Replay] = []
-    for i in np.random.default_rng(seed).permutation(len(ways)):
-        number, begin, end = ways[i]
-        t0, straight = int(tick[begin]), hypot(*(states[end - 1, :2] - states[begin, :2]))
-        time = round(TIME_FACTOR * max((end - 1 - begin) / TICKS_PER_SECOND, straight / s.v_max), 1)
-        until = t0 + round(time * TICKS_PER_SECOND)
-        there = (pieces["day"] == pieces["day"].iloc[number]) & (pieces["id"] != ids[begin])
-        there &= (pieces["last"] >= t0) & (pieces["first"] <= until)
-        others = [_cut(states, each, t0, until) for each in pieces[there].itertuples()]
-        walker = RecordedPerson(int(ids[begin]), 0, _with_heading(states[begin:end]))
-        if _has_room(walker, others):
-            made.append(Replay(_scenario(walker, time, s), walker, tuple(others), zone))
-        if len(made) == n:
+    floor_area = None if area is None else area_for(tracks, area)
+    paths = _find_paths(states, pieces, floor_area)
+    replays: list[Replay] = []
+    for i in np.random.default_rng(seed).permutation(len(paths)):
+        number, begin, end = paths[i]
+        t0, distance = int(tick[begin]), hypot(*(states[end - 1, :2] - states[begin, :2]))
+        duration = round(TIME_FACTOR * max((end - 1 - begin) / TICKS_PER_SECOND, distance / s.v_max), 1)
+        t1 = t0 + round(duration * TICKS_PER_SECOND)
+        is_other = (pieces["day"] == pieces["day"].iloc[number]) & (pieces["id"] != ids[begin])
+        is_other &= (pieces["last"] >= t0) & (pieces["first"] <= t1)
+        others = tuple(_cut(states, each, t0, t1) for each in pieces[is_other].itertuples())
+        walker = RecordedPerson(int(ids[begin]), 0, _add_heading(states[begin:end]))
+        if _has_free_start(walker, others):
+            replays.append(Replay(_make_scenario(walker, duration, s), walker, others, zone))
+        if len(replays) == n:
             break
-    if not made:
+    if not replays:
         raise DataError(
-            f"no walker came {MIN_TRAVEL} m far within {floor or 'the tracks'} from a point with nobody "
-            f"within {MIN_START_DISTANCE} m ({len(ways)} came so far); give a larger area or other tracks"
+            f"no walker covers {MIN_TRAVEL} m within {floor_area or 'the tracks'} from a point with nobody "
+            f"within {MIN_START_DISTANCE} m ({len(paths)} cover this distance); give a larger area or other "
+            "tracks"
         )
-    return Replays(made)
+    return Replays(replays)
 
 
-def _cut(states: Array, piece: Any, t0: int, until: int) -> RecordedPerson:
-    """What a piece has of the ticks from `t0` to `until`, from when they first came."""
-    rows = slice(max(t0 - piece.first, 0), until + 1 - piece.first)
-    whole_way = _with_heading(states[piece.begin : piece.end])
-    return RecordedPerson(int(piece.id), int(max(piece.first - t0, 0)), whole_way[rows])
+def _cut(states: Array, piece: Any, t0: int, t1: int) -> RecordedPerson:
+    """A piece of a track from tick `t0` to tick `t1`."""
+    rows = slice(max(t0 - piece.first, 0), t1 + 1 - piece.first)
+    whole = _add_heading(states[piece.begin : piece.end])
+    return RecordedPerson(int(piece.id), int(max(piece.first - t0, 0)), whole[rows])
 
 
-def _ways(states: Array, pieces: pd.DataFrame, area: Area | None) -> list[tuple[int, int, int]]:
-    """Number of the piece, first row and end of every way that is long enough."""
+def _find_paths(states: Array, pieces: pd.DataFrame, area: Area | None) -> list[tuple[int, int, int]]:
+    """Number of the piece, first row and end of each path that is long enough."""
     inside = np.ones(len(states), bool)
     if area is not None:
         inside = np.asarray(area.contains(states[:, 0], states[:, 1]))
-    ways = []
+    paths = []
     for number, (a, b) in enumerate(pieces[["begin", "end"]].itertuples(index=False)):
         edges = np.flatnonzero(np.diff(np.r_[False, inside[a:b], False])).reshape(-1, 2) + a
         for begin, end in edges.tolist():
             if hypot(*(states[end - 1, :2] - states[begin, :2])) >= MIN_TRAVEL:
-                ways.append((number, begin, end))
-    return ways
+                paths.append((number, begin, end))
+    return paths
 
 
-def _has_room(walker: RecordedPerson, others: list[RecordedPerson]) -> bool:
-    """True if nobody is within `MIN_START_DISTANCE` where the walker began."""
-    near = [person for other in others if (person := other.at(0.0)) is not None]
-    return all(np.hypot(*(walker.states[0, :2] - person.position)) > MIN_START_DISTANCE for person in near)
+def _has_free_start(walker: RecordedPerson, others: Sequence[RecordedPerson]) -> bool:
+    """True if nobody is within `MIN_START_DISTANCE` of the walker's start."""
+    present = [person for other in others if (person := other.at(0.0)) is not None]
+    return all(np.hypot(*(walker.states[0, :2] - p.position)) > MIN_START_DISTANCE for p in present)
 
 
-def _scenario(walker: RecordedPerson, time: float, s: MPCSettings) -> Scenario:
-    """The robot from the walker's first to their last point, as fast as they were or as it may be."""
+def _make_scenario(walker: RecordedPerson, duration: float, s: MPCSettings) -> Scenario:
+    """From the walker's first to their last point, with their velocity up to the robot's limit."""
     x, y, vx, vy, _ = walker.states[0].tolist()
-    share = min(1.0, 0.99 * s.v_max / max(hypot(vx, vy), _ROUNDING))
+    factor = min(1.0, 0.99 * s.v_max / max(hypot(vx, vy), _ROUNDING))
     return Scenario(
         name=f"replay of {walker.id}",
         title=f"In the place of person {walker.id}",
-        start=np.array([x, y, share * vx, share * vy]),
+        start=np.array([x, y, factor * vx, factor * vy]),
         goal=walker.states[-1, :2],
-        duration=time,
+        duration=duration,
     )
 
 
-def _with_heading(states: Array) -> Array:
-    """x, y, vx, vy and heading: where they walk, or last walked at `MIN_HEADING_SPEED`, or first walk."""
+def _add_heading(states: Array) -> Array:
+    """x, y, vx, vy, heading: the direction of the last motion at `MIN_HEADING_SPEED`, or of the first."""
     vx, vy = states[:, 2:].T
     walking = np.hypot(vx, vy) >= MIN_HEADING_SPEED
     if walking.any():

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Array
-from ..control.barriers import barrier, ellipse_formula, euclidean_segment_formula, segment_formula
-from ..control.distances import wall_margin
-from ..control.person import BODY_RADIUS, Person
+from ..control.barriers import compute_h, euclidean_segment_formula
+from ..control.distances import walls_with_margins
+from ..control.person import Person
 from ..control.settings import MPCSettings
 from ..errors import DataError
-from ..zones.ellipses import Ellipse
+from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .scenario import Scenario
 
 
@@ -119,23 +119,22 @@ class Run:
     @cached_property
     def h(self) -> Array:
         """Barriers with the true positions of people, shape (n, P+W) [m]."""
-        s, walls = self.settings, self.scenario.walls
-        zones = np.reshape([(*zone.foci.flat, zone.semi_axes[0]) for zone in self.zones], (-1, 5))
-        to_people = ellipse_formula(self.relative[..., 0], self.relative[..., 1], *zones.T)
-        margins = [s.eps] * len(zones) + [wall_margin(wall, s) for wall in walls]
-        distances = np.hstack([to_people, self._distance_to_walls(segment_formula)])
-        return np.asarray(barrier(distances, s.r_robot, np.array(margins)))
+        s, h = self.settings, list[Array]()
+        for (x, y), zone in zip(self.relative.T.swapaxes(0, 1), self.zones, strict=True):
+            at_rest = [(*zone.foci_and_axis, 0.0, 0.0)]  # in the person's frame
+            h += compute_h(x, y, at_rest, (), r_robot=s.r_robot, eps=s.eps)
+        x, y = self.states[:, 0], self.states[:, 1]
+        walls = walls_with_margins(self.scenario.walls, s)
+        h += compute_h(x, y, (), walls, r_robot=s.r_robot, eps=s.eps)
+        return np.reshape(h, (-1, len(self.states))).T
 
     @cached_property
     def clearance(self) -> Array:
         """Euclidean gaps from the robot's disc to bodies (of `BODY_RADIUS`) and walls, shape (n, P+W) [m]."""
         to_people = np.hypot(self.relative[..., 0], self.relative[..., 1]) - BODY_RADIUS
-        to_walls = self._distance_to_walls(euclidean_segment_formula)
-        return np.hstack([to_people, to_walls]) - self.settings.r_robot
-
-    def _distance_to_walls(self, distance: Callable[..., Array]) -> Array:
         x, y = self.states[:, :1], self.states[:, 1:2]
-        return distance(x, y, *self.scenario.walls.reshape(-1, 4).T)
+        to_walls = euclidean_segment_formula(x, y, *self.scenario.walls.reshape(-1, 4).T)
+        return np.hstack([to_people, to_walls]) - self.settings.r_robot
 
     @cached_property
     def cbf_people(self) -> Array:

@@ -1,4 +1,4 @@
-"""What a closed loop needs: a scene with its people and walls, what is claimed of it, and what people do.
+"""Scenarios: where the robot, people and walls are, what the paper claims, and how people move.
 
 World frame, metres and seconds.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import atan2, cos, hypot, pi, sin
-from typing import TYPE_CHECKING, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,50 +17,59 @@ from ..control.barriers import check_wall
 from ..control.person import Person
 from ..errors import SolverError
 
-if TYPE_CHECKING:
-    from .log import SimulationLog
-
 GOAL_RADIUS = 0.1
 """The robot has arrived within this distance of the goal [m], when it has stopped (assumed)."""
 STOPPED_SPEED = 0.05
-"""Below this speed the robot stands, and below this progress to the goal it yields [m/s] (assumed)."""
+"""Below this speed the robot stands; below this progress to the goal it yields [m/s] (assumed)."""
 
 Crowd = Callable[[float, Array], Sequence[Person | None]]
-"""Everybody as they truly are, from the time [s] and the robot's state (x, y, vx, vy) then.
+"""The true people at a time [s], given the robot's state (x, y, vx, vy) at that time.
 
-Always as many, in the same order; None for who is not there at that time. The loop asks once a step, at 0,
-dt, 2 dt, ..., so that a crowd may move on with each call.
+The number and the order of people never change; None stands for a person who is absent.  The loop calls it
+once a step, at 0, dt, 2 dt, ..., so that a crowd may advance with each call.
 """
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence that the paper claims of a scenario, and the check of a run against it.
+    """A claim of the paper about a scenario, and its check.
 
-    `check(log)` returns whether it holds, and the figure that decides.
+    Parameters
+    ----------
+    text : the claim.
+    check : function of a `Run` of the scenario; returns whether the claim holds, and the number that decides.
     """
 
     text: str
-    check: Callable[[SimulationLog], tuple[bool, float]]
+    check: Callable[[Any], tuple[bool, float]]
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A scene: who is where, and what should happen.
+    """A scene: the robot's start and goal, people and walls.
 
     Parameters
     ----------
-    name, title : short name, and the line above a figure.
+    name : short name.
     start : (x, y, vx, vy) of the robot [m, m/s].
     goal : (x, y) [m].
-    people : everybody, at time 0.
+    people : all people, at time 0.
     walls : segments, shape (n, 2, 2) [m].
-    claims : what the paper says of it.
-    duration : time after which a run that has not arrived is given up [s].
+    claims : what the paper claims of it.
+    title : title of its figures.
+    duration : time limit of a run [s].
 
     Raises
     ------
     SolverError : a number is not finite, a shape is wrong, or a wall has no length.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> walls = [((-5.0, 2.0), (5.0, 2.0))]
+    >>> person = szlib.Person((3.0, 0.0), velocity=(-0.5, 0.0))
+    >>> szlib.Scenario("hall", (-4, 0, 0, 0), (4, 0), (person,), walls).walls.shape
+    (1, 2, 2)
     """
 
     name: str
@@ -73,51 +82,53 @@ class Scenario:
     duration: float = 60.0
 
     def __post_init__(self) -> None:
-        walls = np.array([check_wall(wall) for wall in self.walls]).reshape(-1, 2, 2)
-        given = {
+        arrays = {
             "start": check_array("start", self.start, (4,)),
             "goal": check_array("goal", self.goal, (2,)),
-            "walls": walls,
+            "walls": np.array([check_wall(wall) for wall in self.walls]).reshape(-1, 2, 2),
         }
-        for name, value in given.items():
-            frozen = value.copy()
-            frozen.setflags(write=False)
-            object.__setattr__(self, name, frozen)
+        for name, array in arrays.items():
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
         object.__setattr__(self, "people", tuple(self.people))
         if not 0 < self.duration < np.inf:
             raise SolverError(f"duration must be a positive number of seconds; got {self.duration}")
 
     def turn_people(self) -> Scenario:
-        """The same place with everybody facing the other way; who walks, walks on backwards."""
+        """The same scene with all people facing the other way; people who walk then walk backwards."""
         people = tuple(p if p.heading is None else replace(p, heading=p.heading + pi) for p in self.people)
         return replace(self, people=people)
 
 
 class CrowdModel(Protocol):
-    """What people do, and how the controller is given them: a `Behaviour`, or anything else with these two.
+    """How people move, and how the controller sees them: `Behaviour`, or another class with these two
+    methods.
 
-    The people of the scenario have the zones that are kept for them.
+    The robot keeps out of the zones of the scenario's people.
     """
 
-    def crowd(self, scenario: Scenario, seed: int) -> Crowd:
-        """Everybody of a scenario, from its start on."""
+    def start(self, scenario: Scenario, seed: int) -> Crowd:
+        """The people of a `scenario` from its start on, with a `seed` for what is random."""
 
-    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> Sequence[Person | None]:
-        """What the controller gets of those who are there, in their order; None for who is not seen."""
+    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> Sequence[Person | None]:
+        """What the controller sees of the `people` who are present, in their order; None: not seen.
+
+        `rng` is for noise.
+        """
 
 
 @dataclass(frozen=True)
 class Behaviour:
-    """What people do: walk on, unaffected by the robot (paper, sec. 4), or deviate from what is expected.
+    """People who walk on, unaffected by the robot (paper, sec. 4), or who change their velocity once.
 
     Parameters
     ----------
-    pace : factor of a walker's speed once they change their mind; 0 stops them.
-    turn : by how much they turn then, to either side [rad].
-    noise : standard deviation of the position that the controller is given, each coordinate [m].
-    between : first and last time at which a walker changes their mind [s].
+    pace : factor of a walker's speed after the change; 0 stops them.
+    turn : angle by which they turn then, to a random side [rad].
+    noise : standard deviation of the position that the controller sees, for each coordinate [m].
+    between : first and last time of the change [s].
 
-    All of them are assumed.
+    All defaults are assumed.
 
     Raises
     ------
@@ -135,34 +146,34 @@ class Behaviour:
             if not (np.isfinite(value) & (value >= 0)).all():
                 raise SolverError(f"{each.name} must be finite and >= 0; got {getattr(self, each.name)}")
 
-    def crowd(self, scenario: Scenario, seed: int) -> Crowd:
-        """Everybody's true motion from time 0 on; these people do not look at the robot."""
+    def start(self, scenario: Scenario, seed: int) -> Crowd:
+        """The true motion of the people of a `scenario`, with times and sides of changes from the `seed`."""
         people = scenario.people
         if self.pace == 1.0 and self.turn == 0.0:
             return lambda t, _: [person.after(t) for person in people]
         rng = np.random.default_rng([seed, 1])
         plans = [(p, rng.uniform(*self.between), self.turn * rng.choice([-1, 1])) for p in people]
-        return lambda t, _: [self._at(t, *plan) for plan in plans]
+        return lambda t, _: [self._locate(t, *plan) for plan in plans]
 
-    def _at(self, t: float, person: Person, when: float, turn: float) -> Person:
-        if t <= when or person.stands:
+    def _locate(self, t: float, person: Person, change_time: float, turn: float) -> Person:
+        if t <= change_time or person.stands:
             return person.after(t)
         vx, vy = person.velocity
         heading = (atan2(vy, vx) if person.heading is None else person.heading) + turn
         speed = self.pace * hypot(vx, vy)
-        changed = (speed * cos(heading), speed * sin(heading))
-        here = person.after(when).position
-        return Person(here, changed, heading, person.zone, person.id).after(t - when)
+        velocity = (speed * cos(heading), speed * sin(heading))
+        position = person.after(change_time).position
+        return Person(position, velocity, heading, person.zone, person.id).after(t - change_time)
 
-    def seen(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
-        """Everybody as the controller is given them."""
+    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
+        """The `people` at positions with noise from `rng`."""
         if self.noise == 0:
             return people
-        off = rng.normal(0.0, self.noise, (len(people), 2)).tolist()
+        noise = rng.normal(0.0, self.noise, (len(people), 2)).tolist()
         return tuple(
-            p.at((p.position[0] + dx, p.position[1] + dy)) for p, (dx, dy) in zip(people, off, strict=True)
+            p.at((p.position[0] + dx, p.position[1] + dy)) for p, (dx, dy) in zip(people, noise, strict=True)
         )
 
 
 UNAFFECTED = Behaviour()
-"""People who walk on at constant velocity, exactly seen (paper, sec. 4)."""
+"""People who walk on at constant velocity and are seen without noise (paper, sec. 4)."""

@@ -14,8 +14,7 @@ import numpy as np
 from ..checks import Array
 from ..control.barriers import ellipse_distance
 from ..control.distances import euclidean_to_segment
-from ..control.person import BODY_RADIUS
-from ..zones.ellipses import Ellipse
+from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .run import Run, nanmin
 from .scenario import STOPPED_SPEED
 

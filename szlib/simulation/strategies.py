@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ..control.problem import TOLERANCE
+from ..control.settings import TOLERANCE
 from .metrics import compute_metrics, find_passing_side
 from .run import Run, nanmin
 

@@ -21,12 +21,12 @@ import traitlets
 from ..checks import Array, check_array
 from ..control.acceleration_polygon import find_admissible_controls
 from ..control.barriers import check_wall
+from ..control.controller import advance
 from ..control.mpc import MPCCBF
 from ..control.person import Person
 from ..control.settings import MPCSettings
 from ..control.step import Step
 from ..errors import SolverError, SzlibError
-from ..simulation.closed_loop import advance
 from ..simulation.scenario import Scenario
 from ..zones.ellipses import Ellipse
 from . import folders

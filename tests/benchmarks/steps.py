@@ -23,7 +23,7 @@ from helpers.random_states import ZONE
 
 import szlib
 from szlib.checks import Array
-from szlib.simulation.closed_loop import advance
+from szlib.control.controller import advance
 
 BEFORE_VARIABLE = "SZLIB_BEFORE"
 GOAL = (8.0, 0.5)
@@ -226,7 +226,7 @@ def ten_worlds(rival: str, first: int) -> tuple[float, list[dict[str, Any]]]:
     module = importlib.import_module(f"{of.__name__}.simulation.monte_carlo")
     setup = module.make_setup(settings=of.MPCSettings(time_limit=np.inf))
     begun = time.process_time()
-    table = module._chunk(setup, range(first, first + 10), None)
+    table = module.run_chunk(setup, range(first, first + 10), None)
     return time.process_time() - begun, table.to_dict("records")
 
 

@@ -15,7 +15,7 @@ from szlib.control.differential_drive import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
 from szlib.control.person import BODY_RADIUS
 from szlib.control.problem import TOLERANCE
-from szlib.simulation.scenarios.random_worlds import Worlds, draw_zone, make_world
+from szlib.simulation.scenarios.random_worlds import Worlds, draw_zone
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 OPEN = (6.0, 1.0)
@@ -197,7 +197,7 @@ def test_among_people_who_stand_a_plan_that_ends_at_rest_is_never_without_a_next
     """Recursive feasibility, proved of the double integrator in `szlib.control.mpc`, holds of the wheels."""
     settings, quiet = szlib.MPCSettings(terminal="rest"), Worlds(standing=1.0, start_speed=0.0, min_h=0.6)
     for seed in range(10):
-        scene = make_world(seed, quiet)
+        scene = quiet(seed)
         drive = szlib.DifferentialDrive(
             ZONE, walls=scene.walls, settings=settings, max_people=len(scene.people)
         )

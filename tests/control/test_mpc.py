@@ -10,11 +10,11 @@ import pytest
 from scipy.optimize import minimize
 
 import szlib
+from szlib.control.controller import advance
 from szlib.control.person import place_zone
 from szlib.control.problem import TOLERANCE, build_problem
 from szlib.control.solvers.ipopt import Ipopt
 from szlib.control.solvers.sqp import Sqp
-from szlib.simulation.closed_loop import advance
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 GOAL = (4.0, 0.0)

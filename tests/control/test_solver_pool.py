@@ -13,9 +13,9 @@ from helpers.random_states import ZONE, questions
 
 import szlib
 from szlib.control.barriers import read_walls
+from szlib.control.controller import advance
 from szlib.control.solvers import solver_pool
 from szlib.control.solvers.solver_pool import INACTIVE_H, round_up_size
-from szlib.simulation.closed_loop import advance
 
 GOAL = (4.0, 0.0)
 SOLVERS = ("sqp", "ipopt")

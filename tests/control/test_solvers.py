@@ -11,10 +11,10 @@ import pytest
 from helpers.random_states import ZONE, meetings, questions
 
 import szlib
+from szlib.control.controller import advance
 from szlib.control.problem import TOLERANCE, build_problem, remaining_distance
 from szlib.control.solvers import sqp
 from szlib.control.solvers.sqp_functions import build_sqp_functions
-from szlib.simulation.closed_loop import advance
 
 SOLVERS = ("sqp", "ipopt")
 GOAL = (4.0, 0.0)

@@ -13,9 +13,10 @@ from helpers.random_states import ZONE, questions
 
 import szlib
 from szlib.control import problem
+from szlib.control.controller import advance
 from szlib.control.distances import required_margin, wall_margin
 from szlib.control.person import BODY_RADIUS
-from szlib.simulation.closed_loop import advance, drive
+from szlib.simulation.closed_loop import drive
 
 SOLVERS = ("sqp", "ipopt")
 GOAL = (4.0, 0.0)

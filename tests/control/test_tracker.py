@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import szlib
+from szlib.control.controller import advance
 from szlib.control.person import circle_around
-from szlib.simulation.closed_loop import advance
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 GOAL = (4.0, 0.0)

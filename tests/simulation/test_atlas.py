@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.simulation.atlas import NO_START, REFERENCE, SCENES, AtlasCell, run_atlas
+from szlib.simulation.atlas import CANNOT_START, REFERENCE, SCENES, AtlasCell, run_atlas
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.strategies import MIN_RETREAT, STRATEGIES, classify_strategy, compute_retreat
 
@@ -98,7 +98,7 @@ def test_the_chart_has_a_row_for_each_cell_in_their_order() -> None:
     ]
     table = run_atlas(cells, REFERENCE)
     assert table["width"].tolist() == [6.4, 1.0, 4.6]
-    assert table["strategy"].iloc[:2].tolist() == ["goes ahead", NO_START]
+    assert table["strategy"].iloc[:2].tolist() == ["goes ahead", CANNOT_START]
     assert table["strategy"].iloc[2] != "goes ahead"  # the corridor of the paper with a larger zone
     assert table["min_h"].iloc[[0, 2]].min() >= 0
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.simulation.baseline_controllers import dynamic_window, social_force, straight
+from szlib.simulation.baseline_controllers import make_dynamic_window, make_social_force, make_straight
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS
 from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.scenarios.random_worlds import Worlds
 
 SETTINGS = szlib.MPCSettings()
-BASELINES = [straight, social_force, dynamic_window]
+BASELINES = [make_straight, make_social_force, make_dynamic_window]
 START, GOAL = (-4.0, 0.0, 0.0, 0.0), (4.0, 0.0)
 LANE = [((-6.0, y), (6.0, y)) for y in (1.2, -1.2)]
 
@@ -40,7 +40,7 @@ def test_the_goal_is_reached_where_nothing_is_in_the_way(factory, walls):
 
 
 def test_straight_stops_for_who_stands_in_the_way_and_waits():
-    log = run(straight, (person(0.0, 0.0),))
+    log = run(make_straight, (person(0.0, 0.0),))
     assert not log.success and log.metrics()["overlaps"] == 0
     assert np.abs(log.states[:, 1]).max() == 0
     assert log.speed[-1] < 0.05 and 0.05 < log.clearance[-1, 0] < 1.0
@@ -52,7 +52,7 @@ def test_they_let_somebody_cross(factory):
     assert metrics["success"] and metrics["overlaps"] == 0
 
 
-@pytest.mark.parametrize("factory", [social_force, dynamic_window])
+@pytest.mark.parametrize("factory", [make_social_force, make_dynamic_window])
 def test_the_others_go_around_who_stands(factory):
     metrics = run(factory, (person(0.0, 0.05),)).metrics()
     assert metrics["success"] and metrics["overlaps"] == 0
@@ -60,16 +60,17 @@ def test_the_others_go_around_who_stands(factory):
 
 
 def test_social_force_goes_to_the_right_of_who_is_straight_ahead():
-    assert run(social_force, (person(0.0, 0.0),)).metrics()["passing_side"] == "right"
+    assert run(make_social_force, (person(0.0, 0.0),)).metrics()["passing_side"] == "right"
 
 
-@pytest.mark.parametrize("factory", [straight, dynamic_window])
+@pytest.mark.parametrize("factory", [make_straight, make_dynamic_window])
 def test_a_wall_across_the_way_stops_them(factory):
     log = run(factory, walls=[((0.0, -8.0), (0.0, 8.0))])
     assert not log.success and log.metrics()["overlaps"] == 0
 
 
-@pytest.mark.parametrize("factory", [straight, social_force])  # of equal velocities a window takes the first
+@pytest.mark.parametrize("factory", [make_straight, make_social_force])
+# Of equal velocities the dynamic window takes the first one, so that it has no such symmetry.
 def test_turning_the_world_turns_the_way(factory):
     turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # by a right angle: the box of accelerations stays a box
     people = (person(0.0, 0.4, (-0.3, 0.1)),)
@@ -93,7 +94,7 @@ def largest(log):
 STILL = Worlds(standing=1.0, walls=1.0, start_speed=0.0)
 
 
-@pytest.mark.parametrize("factory", [straight, dynamic_window])
+@pytest.mark.parametrize("factory", [make_straight, make_dynamic_window])
 def test_where_nobody_moves_nothing_is_touched(factory):
     rows = rollouts(15, worlds=STILL, controller=factory, n_jobs=1, progress=False)
     assert rows["overlaps"].sum() == 0
@@ -114,7 +115,7 @@ def test_the_social_force_between_two_people_is_that_of_its_source():
     slow = -4.5 * np.exp(-d / b - (2 * b * theta) ** 2)
     turn = -4.5 * np.sign(theta) * np.exp(-d / b - (3 * b * theta) ** 2)
     equal = szlib.MPCSettings(r_robot=0.25)  # a robot as large as a person
-    model = social_force(szlib.Scenario("two", START, GOAL), equal)
+    model = make_social_force(szlib.Scenario("two", START, GOAL), equal)
     # the source has no bias of the angle here; it turns theta by 0.005 B
     found = model._push(np.zeros(2), np.array([v, 0.0]), person(*offset))
     assert found == pytest.approx(slow * t + turn * n, abs=0.05)

@@ -9,7 +9,7 @@ import pytest
 
 import szlib
 from szlib.control.person import circle_around
-from szlib.simulation.closed_loop import BODY, drive
+from szlib.simulation.closed_loop import BODY_ZONE, drive
 from szlib.simulation.comparisons import compare, summarise
 from szlib.simulation.monte_carlo import identify, rerun_world, rollouts, summarise_rollouts
 from szlib.simulation.scenario import Behaviour
@@ -90,7 +90,7 @@ def test_a_controller_that_promises_is_held_to_it():
 
 def test_people_without_a_zone_have_the_controllers_or_their_body():
     scenario = szlib.Scenario("met", WALK.start, WALK.goal, (person(0.0, 3.0), person(1.0, 3.0, zone=ZONE)))
-    assert szlib.simulate(scenario, Straight()).zones == (BODY, ZONE)
+    assert szlib.simulate(scenario, Straight()).zones == (BODY_ZONE, ZONE)
     other = szlib.Ellipse((0.0, 0.0), (0.5, 0.5))
     log = szlib.simulate(scenario, szlib.MPCCBF(other))
     assert log.zones == (other, ZONE)
@@ -181,7 +181,7 @@ def test_the_controller_gets_those_who_are_there_with_the_zones_that_are_kept():
     log = szlib.simulate(WALK, controller, crowd=visitor)
     there = (log.time >= 2) & (log.time < 4)
     assert [len(seen) for seen in controller.seen] == there.astype(int).tolist()
-    assert {p.zone for seen in controller.seen for p in seen} == {BODY}
+    assert {p.zone for seen in controller.seen for p in seen} == {BODY_ZONE}
 
 
 def test_residuals_belong_to_who_was_there():
@@ -249,13 +249,13 @@ def test_a_log_of_visitors_comes_back_from_its_files(tmp_path):
 
 def test_a_crowd_model_needs_only_two_methods():
     class Circling:
-        def crowd(self, scenario, seed):
+        def start(self, scenario, seed):
             center = (
                 np.mean([p.position for p in scenario.people], axis=0) if scenario.people else np.zeros(2)
             )
             return lambda t, _: [person(center[0] + np.cos(t), center[1] + 3 + np.sin(t), (0.1, 0), ZONE)]
 
-        def seen(self, people, rng):
+        def observe(self, people, rng):
             return people
 
     log = drive(WALK, Straight(), behaviour=Circling(), seed=3)
@@ -371,5 +371,5 @@ def test_compare_takes_names_and_objects():
     named = rows[["controller", "zone", "formulation", "behaviour"]]
     assert named.to_numpy().tolist() == [["blind", "half", "mine", "slower"]]
     assert summarise(rows)["controller"].unique().tolist() == ["blind"]
-    with pytest.raises(szlib.SolverError, match="unknown: PID; there are MPC-CBF"):
+    with pytest.raises(szlib.SolverError, match="unknown names: PID; expected MPC-CBF"):
         compare(1, controllers=["PID"])

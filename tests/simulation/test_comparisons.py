@@ -17,7 +17,6 @@ from szlib.simulation.comparisons import (
     summarise,
 )
 from szlib.simulation.monte_carlo import rerun_world
-from szlib.simulation.scenarios.random_worlds import make_world
 
 FITTED = szlib.Ellipse((0.1, -0.02), (1.0, 0.7), 0.3)
 
@@ -43,7 +42,7 @@ def test_kirbys_zone_is_enclosed_by_its_ellipse_and_not_by_a_smaller_one():
 
 @pytest.mark.parametrize("seed", range(20))
 def test_nobody_begins_inside_any_zone(seed):
-    scenario = make_world(seed, WORLDS)
+    scenario = WORLDS(seed)
     for zone in ZONES.values():
         controller = szlib.MPCCBF(zone(scenario.people[0].zone), walls=scenario.walls)
         people = [szlib.Person(p.position, p.velocity, p.heading) for p in scenario.people]
@@ -51,7 +50,7 @@ def test_nobody_begins_inside_any_zone(seed):
 
 
 def test_time_inside_counts_the_worlds_own_zone_whatever_is_kept():
-    log = rerun_world(0, worlds=WORLDS, zones=ZONES["none"])
+    log = rerun_world(0, worlds=WORLDS, zone_transform=ZONES["none"])
     inside = measure_time_inside(log)
     bodies = log.clearance[:, : len(log.scenario.people)]
     assert inside["inside none"] == pytest.approx(0.1 * (bodies.min(axis=1) < 0).sum())
@@ -65,7 +64,7 @@ def test_compare_is_paired():
     assert rows["people"].tolist()[:2] == rows["people"].tolist()[2:]
     found = summarise(rows, against={"zone": "fitted"}).set_index(["zone", "metric"])
     assert (found.loc["fitted"][["mean", "low", "high"]] == 0).all(axis=None)
-    with pytest.raises(szlib.SolverError, match="unknown: Hull; there are none, equal circle"):
+    with pytest.raises(szlib.SolverError, match="unknown names: Hull; expected none, equal circle"):
         compare(1, zones=("Hull",))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.simulation.baseline_controllers import straight
+from szlib.simulation.baseline_controllers import make_straight
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.monte_carlo import identify, rollouts
 from szlib.simulation.scenarios.meetings import MEETINGS, Variations, VisiblePeople, is_visible
@@ -29,7 +29,7 @@ def test_all_eleven_are_there_and_the_papers_four_keep_their_names():
 @pytest.mark.parametrize("name", MEETINGS)
 def test_alone_the_robot_drives_straight_to_the_goal(name):
     alone = replace(MEETINGS[name], people=())
-    log = drive(alone, straight(alone, SETTINGS))
+    log = drive(alone, make_straight(alone, SETTINGS))
     assert log.success and log.metrics()["overlaps"] == 0
     assert np.abs(log.states[:, 1]).max() < 1e-9
 
@@ -88,7 +88,7 @@ def test_variations_are_worlds_for_rollouts(tmp_path):
             2,
             worlds=worlds,
             behaviour=VisiblePeople(),
-            controller=straight,
+            controller=make_straight,
             out=tmp_path,
             n_jobs=1,
             progress=False,
@@ -130,6 +130,6 @@ def test_who_is_hidden_is_there_but_not_given_to_the_controller():
 
 def test_what_was_seen_is_no_part_of_what_a_model_is():
     model, used = VisiblePeople(), VisiblePeople()
-    used.crowd(MEETINGS["blind corner"], 0)(0.0, np.zeros(4))
+    used.start(MEETINGS["blind corner"], 0)(0.0, np.zeros(4))
     assert identify(model) == identify(used)
     assert vars(pickle.loads(pickle.dumps(used))) == {}

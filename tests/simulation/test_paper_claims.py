@@ -19,9 +19,9 @@ def test_a_verdict_is_where_the_interval_lies() -> None:
     assert finding(0.1, 0.2).verdict == "supported"
     assert finding(-0.2, -0.1).verdict == "contradicted"
     assert finding(-0.1, 0.2).verdict == "not decidable with n = 12"
-    table = claims.findings_table([finding(0.1, 0.3)], data="here")
+    table = claims.tabulate_findings([finding(0.1, 0.3)], data="here")
     assert table.loc[0, ["data", "n", "verdict"]].tolist() == ["here", 12, "supported"]
-    assert claims.as_cell(table.iloc[0]) == "+0.20 [+0.10, +0.30] m: supported"
+    assert claims.format_finding(table.iloc[0]) == "+0.20 [+0.10, +0.30] m: supported"
 
 
 def meetings(on_the_left: int, on_the_right: int) -> pd.DataFrame:
@@ -38,18 +38,18 @@ def meetings(on_the_left: int, on_the_right: int) -> pd.DataFrame:
 
 
 def test_who_has_the_other_to_the_left_passes_on_the_right() -> None:
-    assert claims.passes_on_the_right(meetings(60, 20)).verdict == "supported"
-    assert claims.passes_on_the_right(meetings(20, 60)).verdict == "contradicted"
-    even = claims.passes_on_the_right(meetings(10, 10))
+    assert claims.measure_passing_side(meetings(60, 20)).verdict == "supported"
+    assert claims.measure_passing_side(meetings(20, 60)).verdict == "contradicted"
+    even = claims.measure_passing_side(meetings(10, 10))
     assert even.effect == 0 and even.low == pytest.approx(-even.high)
-    assert claims.passes_on_the_right(meetings(3, 3).assign(kind="crossing")).n == 0
+    assert claims.measure_passing_side(meetings(3, 3).assign(kind="crossing")).n == 0
 
 
 def test_both_people_of_a_pair_are_one_piece_of_evidence() -> None:
     once = meetings(30, 10)
     both = pd.concat([once, once.rename(columns={"ref_id": "other_id", "other_id": "ref_id"}).assign(
         encounter=once["encounter"] + 1000)])  # fmt: skip
-    assert claims.passes_on_the_right(both).n == claims.passes_on_the_right(once).n == 40
+    assert claims.measure_passing_side(both).n == claims.measure_passing_side(once).n == 40
 
 
 @pytest.mark.parametrize(
@@ -60,21 +60,21 @@ def test_both_people_of_a_pair_are_one_piece_of_evidence() -> None:
 def test_the_papers_own_rate_is_supported_and_a_fifth_of_it_is_not(
     count: int, days: float, verdict: str
 ) -> None:
-    assert claims.as_many_a_day(count, days).verdict.startswith(verdict)
+    assert claims.measure_encounter_rate(count, days).verdict.startswith(verdict)
 
 
 def test_an_interval_of_a_rate_covers_it() -> None:
     rng, inside = np.random.default_rng(0), 0
-    truth = claims.as_many_a_day(300, 2.0).effect
+    truth = claims.measure_encounter_rate(300, 2.0).effect
     for count in rng.poisson(300, 400):
-        found = claims.as_many_a_day(int(count), 2.0)
+        found = claims.measure_encounter_rate(int(count), 2.0)
         inside += found.low <= truth <= found.high
     assert 0.92 <= inside / 400 <= 0.99
 
 
 def test_wilsons_interval_holds_half_where_half_is_true() -> None:
     rng = np.random.default_rng(1)
-    undecided = [claims.outliers_are_intruders(int(k), 80) for k in rng.binomial(80, 0.5, 400)]
+    undecided = [claims.measure_intruders_removed(int(k), 80) for k in rng.binomial(80, 0.5, 400)]
     assert 0.92 <= np.mean([f.low <= 0 <= f.high for f in undecided]) <= 0.98
 
 
@@ -85,20 +85,20 @@ def zone_of(people: pd.DataFrame, **options: object) -> szlib.SocialZone:
 def test_the_plaza_is_larger_ahead_and_grows_as_it_was_made_to(tmp_path) -> None:
     tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=3))
     zone = zone_of(szlib.find_encounters(tracks), n_resamples=60)
-    ahead, growth = claims.larger_ahead(zone), claims.grows_with_speed(zone)
+    ahead, growth = claims.measure_reach_ahead(zone), claims.measure_growth_with_speed(zone)
     assert ahead.verdict == growth.verdict == "supported"
     true = szlib.PlazaSettings().true_zone
     assert growth.low <= true(1.3).area - true(0.7).area <= growth.high
     assert 0 < ahead.effect < 2 * true(1.1).center[0] + 0.05
     row = zone.table().set_index("speed").loc[0.7]
     assert growth.high - growth.low >= row["area_high"] - row["area_low"]
-    with pytest.raises(szlib.ZoneError, match=r"no interval at 1\.2 m/s; fit with speeds"):
-        claims.larger_ahead(zone, speed=1.2)
+    with pytest.raises(szlib.ZoneError, match=r"no interval at 1\.2 m/s; fit with this speed"):
+        claims.measure_reach_ahead(zone, speed=1.2)
 
 
 def test_a_larger_zone_makes_the_robot_later() -> None:
     zone = szlib.Ellipse((0.05, 0.0), (0.9, 0.7))
-    found = claims.size_trades_efficiency(zone, names=("passing", "corridor"))
+    found = claims.measure_delay_by_size(zone, names=("passing", "corridor"))
     assert found.low > 0 and found.n == 2
     assert zone.scaled(2.0) == szlib.Ellipse((0.1, 0.0), (1.8, 1.4))
 
@@ -125,5 +125,5 @@ def test_where_there_is_no_zone_nothing_is_decided() -> None:
     )
     with pytest.warns(szlib.DataWarning):
         zone = szlib.SocialZone.fit(fast, method="hull", speeds=(0.7, 1.5), n_resamples=5)
-    found = claims.grows_with_speed(zone, slow=0.7, fast=1.5)
+    found = claims.measure_growth_with_speed(zone, slow=0.7, fast=1.5)
     assert np.isnan(found.effect) and found.verdict.startswith("not decidable")

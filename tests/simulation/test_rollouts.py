@@ -46,7 +46,7 @@ def test_what_goes_on_after_the_arrival_changes_nothing_before_it():
 
 
 def test_jobs_and_interruptions_change_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(MODULE, "CHUNK", 2)
+    monkeypatch.setattr(MODULE, "CHUNK_SIZE", 2)
     alone = rollouts(5, worlds=SHORT, n_jobs=1, progress=False)
     kept = rollouts(3, worlds=SHORT, n_jobs=1, progress=False, out=tmp_path)
     more = rollouts(5, worlds=SHORT, n_jobs=1, progress=False, out=tmp_path)
@@ -140,8 +140,8 @@ def test_bad_input():
 
 
 def test_a_world_that_breaks_the_controller_is_named():
-    with pytest.raises(szlib.SolverError, match="world 5 broke the controller: a zone must lie within"):
-        rerun_world(5, worlds=Worlds(standing=1.0), zones=huge)
+    with pytest.raises(szlib.SolverError, match="the controller failed in world 5: a zone must lie within"):
+        rerun_world(5, worlds=Worlds(standing=1.0), zone_transform=huge)
 
 
 def huge(zone):

@@ -8,14 +8,14 @@ from hypothesis import strategies as st
 import szlib
 from szlib.control.distances import euclidean_to_segment
 from szlib.simulation.scenario import Behaviour
-from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds, make_world
+from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
 seeds = st.integers(0, 2**32)
 
 
 @given(seeds)
 def test_a_seed_is_a_world(seed):
-    one, two = make_world(seed), make_world(seed)
+    one, two = Worlds()(seed), Worlds()(seed)
     assert np.array_equal(one.start, two.start)
     assert np.array_equal(one.walls, two.walls)
     assert one.people == two.people
@@ -23,7 +23,7 @@ def test_a_seed_is_a_world(seed):
 
 @given(seeds)
 def test_start_is_safe_and_goal_can_be_asked_for(seed):
-    scenario = make_world(seed)
+    scenario = Worlds()(seed)
     controller = szlib.MPCCBF(scenario.people[0].zone, walls=scenario.walls)
     assert controller.barriers(scenario.start[:2], scenario.people).min() >= 0
     assert controller.barriers(scenario.goal, [p for p in scenario.people if p.stands]).min(initial=1) >= 0
@@ -38,7 +38,7 @@ def test_start_is_safe_and_goal_can_be_asked_for(seed):
 @pytest.mark.parametrize("seed", range(5))
 def test_a_zone_that_was_learned_is_everybodys_and_the_start_lies_outside_of_it(seed):
     learned = szlib.Ellipse((0.3, 0.0), (1.5, 0.6))
-    scenario = make_world(seed, Worlds(zone=learned))
+    scenario = Worlds(zone=learned)(seed)
     assert all(person.zone == learned for person in scenario.people)
     controller = szlib.MPCCBF(learned, walls=scenario.walls)
     assert controller.barriers(scenario.start[:2], scenario.people).min() >= 0
@@ -46,7 +46,7 @@ def test_a_zone_that_was_learned_is_everybodys_and_the_start_lies_outside_of_it(
 
 @given(seeds)
 def test_one_person_in_open_space(seed):
-    scenario = make_world(seed, ONE_PERSON)
+    scenario = ONE_PERSON(seed)
     (person,) = scenario.people
     controller = szlib.MPCCBF(person.zone)
     assert controller.barriers(scenario.start[:2], scenario.people).min() >= 0.3
@@ -56,17 +56,17 @@ def test_one_person_in_open_space(seed):
 
 
 def test_half_have_walls_and_half_of_the_people_stand():
-    worlds = [make_world(seed) for seed in range(1000)]
+    worlds = [Worlds()(seed) for seed in range(1000)]
     assert np.mean([len(w.walls) > 0 for w in worlds]) == pytest.approx(0.5, abs=0.1)
     assert np.mean([p.stands for w in worlds for p in w.people]) == pytest.approx(0.5, abs=0.1)
 
 
 def test_what_cannot_be():
     with pytest.raises(szlib.SolverError, match="no world of seed 3"):
-        make_world(3, Worlds(people=(1, 1), size=0.5, travel=(0.1, 0.2), walls=0.0))
+        Worlds(people=(1, 1), size=0.5, travel=(0.1, 0.2), walls=0.0)(3)
     with pytest.raises(szlib.SolverError, match="travel must be a range"):
         Worlds(travel=(3.0, 2.0))
-    with pytest.raises(szlib.SolverError, match="standing must be a share"):
+    with pytest.raises(szlib.SolverError, match="standing must be a fraction"):
         Worlds(standing=1.5)
     with pytest.raises(szlib.SolverError, match="noise must be finite and >= 0"):
         Behaviour(noise=-0.1)
@@ -87,7 +87,7 @@ MEETING = szlib.Scenario("meeting", np.zeros(4), np.ones(2), people=(WALKER, STA
     ],
 )
 def test_walkers_change_their_mind_and_never_jump(behaviour, pace, turn):
-    crowd = behaviour.crowd(MEETING, seed=1)
+    crowd = behaviour.start(MEETING, seed=1)
     paths = [crowd(t, np.zeros(4)) for t in np.linspace(0, 10, 101).tolist()]
     walker, standing = zip(*paths, strict=True)
     assert set(standing) == {STANDING}
@@ -100,6 +100,6 @@ def test_walkers_change_their_mind_and_never_jump(behaviour, pace, turn):
 
 def test_noise_is_what_it_says_and_moves_nobody():
     rng = np.random.default_rng(0)
-    seen = [Behaviour(noise=0.1).seen((WALKER,), rng)[0].position for _ in range(2000)]
+    seen = [Behaviour(noise=0.1).observe((WALKER,), rng)[0].position for _ in range(2000)]
     assert np.std(seen, axis=0) == pytest.approx([0.1, 0.1], rel=0.1)
-    assert Behaviour(noise=0.1).crowd(MEETING, 0)(2.0, np.zeros(4)) == [WALKER.after(2.0), STANDING]
+    assert Behaviour(noise=0.1).start(MEETING, 0)(2.0, np.zeros(4)) == [WALKER.after(2.0), STANDING]

@@ -63,44 +63,44 @@ def of_site(name: str) -> Iterator[pd.DataFrame]:
     load, square = SITES[name]
     tracks = load()
     samples = szlib.find_encounters(tracks, square=square)
-    plain = [claims.passes_on_the_right(samples), lof(name, samples), as_many(name, samples, tracks)]
-    yield claims.findings_table(plain, data=name).assign(method="-")
+    plain = [claims.measure_passing_side(samples), lof(name, samples), as_many(name, samples, tracks)]
+    yield claims.tabulate_findings(plain, data=name).assign(method="-")
     for method in ("hull", "quantile"):
         for who, people in (("everybody", samples), ("strangers", szlib.of_kind(samples, "strangers"))):
             found = list(of_zone(people, method))
-            yield claims.findings_table(found, data=name).assign(method=f"{method}, {who}")
+            yield claims.tabulate_findings(found, data=name).assign(method=f"{method}, {who}")
 
 
 def lof(name: str, samples: pd.DataFrame) -> claims.Finding:
     """Whether LOF removes intruders; undecided where nobody knows who is one."""
     if name != "plaza":
-        return claims.outliers_are_intruders(0, 0)
+        return claims.measure_intruders_removed(0, 0)
     close = samples[samples["distance"] <= 2.0]
     removed = is_outlier(close, fraction=0.002, n_neighbours=20)
     intruder = true_kinds(close) == "intruder"
-    return claims.outliers_are_intruders(int((removed & intruder).sum()), int(removed.sum()))
+    return claims.measure_intruders_removed(int((removed & intruder).sum()), int(removed.sum()))
 
 
 def as_many(name: str, samples: pd.DataFrame, tracks: pd.DataFrame) -> claims.Finding:
     """Whether there are as many encounters a day as in the paper; undecided anywhere but in its mall."""
     if name != "ATC day":
-        return claims.Finding(claims.AS_MANY, np.nan, np.nan, np.nan, "doublings", 0)
+        return claims.Finding(claims.ENCOUNTER_RATE, np.nan, np.nan, np.nan, "doublings", 0)
     days = (tracks["t"].max() - tracks["t"].min()) / 3600 / HOURS_A_DAY
-    return claims.as_many_a_day(samples["encounter"].nunique(), days)
+    return claims.measure_encounter_rate(samples["encounter"].nunique(), days)
 
 
 def later(zone: szlib.SocialZone) -> claims.Finding:
     """What a larger zone costs the robot, with the zone of this site."""
-    found = claims.size_trades_efficiency(zone.ellipses[1.1])
-    return replace(found, claim=claims.LATER, adequate=zone.adequate(1.1))
+    found = claims.measure_delay_by_size(zone.ellipses[1.1])
+    return replace(found, claim=claims.DELAYED_BY_SIZE, adequate=zone.adequate(1.1))
 
 
 def of_zone(people: pd.DataFrame, method: str) -> Iterator[claims.Finding]:
     """The claims about a zone; undecided where there is no zone, or too few people on some side."""
     for claim, text, speeds in (
-        (claims.larger_ahead, claims.LARGER_AHEAD, (1.1,)),
-        (claims.grows_with_speed, claims.GROWS, (0.7, 1.3)),
-        (later, claims.LATER, (1.1,)),
+        (claims.measure_reach_ahead, claims.LARGER_AHEAD, (1.1,)),
+        (claims.measure_growth_with_speed, claims.GROWS_WITH_SPEED, (0.7, 1.3)),
+        (later, claims.DELAYED_BY_SIZE, (1.1,)),
     ):
         try:
             zone = szlib.SocialZone.fit(people, method=method, speeds=speeds, n_resamples=RESAMPLES)

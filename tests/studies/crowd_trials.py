@@ -24,12 +24,13 @@ import numpy as np
 import pandas as pd
 
 import szlib
+from szlib.control.controller import Controller
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS, summarise
 from szlib.simulation.crowds.reacting import ReactingPeople
 from szlib.simulation.log import SimulationLog
+from szlib.simulation.monte_carlo import ControllerFactory
 from szlib.simulation.replay import ReplacedWalker, Replays, find_replays
-from szlib.simulation.robots import Controller, ControllerFactory
 from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
 from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds

@@ -24,7 +24,7 @@ from szlib.control.differential_drive import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
 from szlib.control.person import BODY_RADIUS
 from szlib.control.problem import TOLERANCE
-from szlib.simulation.monte_carlo import DEFAULT_ZONE, mpc_cbf
+from szlib.simulation.monte_carlo import DEFAULT_ZONE, make_mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
@@ -69,7 +69,7 @@ def slow(scenario: szlib.Scenario, settings: szlib.MPCSettings) -> Any:
     return two_wheels(scenario, settings, 2.0)
 
 
-ROBOTS = {"double integrator": mpc_cbf, "8 rad/s": nimble, "4 rad/s": common, "2 rad/s": slow}
+ROBOTS = {"double integrator": make_mpc_cbf, "8 rad/s": nimble, "4 rad/s": common, "2 rad/s": slow}
 TOLD = ["double integrator", "4 rad/s"]
 """Those of the table; the others are there to ask for."""
 SETS = {"all": Worlds(), "one person": ONE_PERSON}
@@ -175,7 +175,7 @@ def main() -> None:
     lines = []
     for name in given.sets:
         tables = {robot: drive(worlds=SETS[name], controller=ROBOTS[robot]) for robot in given.robots}
-        against = drive(worlds=SETS[name], controller=mpc_cbf)
+        against = drive(worlds=SETS[name], controller=make_mpc_cbf)
         lines += [{"set": name, "robot": robot, **line(rows, against)} for robot, rows in tables.items()]
         pd.DataFrame(lines).round(6).to_csv(TABLE, index=False)
 

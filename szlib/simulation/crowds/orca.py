@@ -1,8 +1,8 @@
 """Optimal reciprocal collision avoidance (ORCA), by pyrvo, which wraps the authors' RVO2 library.
 
-J. van den Berg, S. Guy, M. Lin, D. Manocha, "Reciprocal n-body collision avoidance", ISRR 2009.  Everybody
-takes half of what is needed to stay apart for `HORIZON`, and expects the robot to take the other half.  Who
-stands steps aside and comes back.
+J. van den Berg, S. Guy, M. Lin, D. Manocha, "Reciprocal n-body collision avoidance", ISRR 2009.  Each
+person takes half of the motion that keeps them apart for `HORIZON`, and expects the robot to take the other
+half.  People who stand step aside and come back.
 """
 
 from __future__ import annotations
@@ -12,29 +12,29 @@ from typing import Any
 import numpy as np
 
 from ...checks import Array
-from ...control.person import BODY_RADIUS
-from .walking_model import CROWDS, FASTER, Walkers, package
+from ...zones.ellipses import BODY_RADIUS
+from .walking_model import INSTALL_CROWDS, MAX_SPEED_FACTOR, Walkers, import_package
 
 HORIZON, WALL_HORIZON = 3.0, 1.0
-"""How far ahead people keep apart from others and from walls [s] (assumed)."""
-SENSING_RANGE, NEIGHBOURS = 10.0, 10
+"""Time for which people keep apart from others and from walls [s] (assumed)."""
+SENSING_RANGE, MAX_NEIGHBOURS = 10.0, 10
 """How far they see [m], and to how many at once they react (as in RVO2's examples)."""
-STEP_ASIDE = 0.5
-"""Greatest speed of who stands [m/s] (assumed)."""
+STEP_ASIDE_SPEED = 0.5
+"""Largest speed of people who stand [m/s] (assumed)."""
 
 
-class Orca:
-    """People who avoid each other, the robot and walls by ORCA; parameters as of `Model`."""
+class OrcaModel:
+    """`walkers` who avoid each other, the robot and walls by ORCA: a `WalkingModel`."""
 
     def __init__(self, walkers: Walkers) -> None:
         self._walkers, self._sim = walkers, self._simulator(walkers)
 
     @staticmethod
     def _simulator(walkers: Walkers) -> Any:
-        rvo = package("pyrvo", CROWDS)
-        near = (SENSING_RANGE, NEIGHBOURS, HORIZON, WALL_HORIZON)
+        rvo = import_package("pyrvo", INSTALL_CROWDS)
+        near = (SENSING_RANGE, MAX_NEIGHBOURS, HORIZON, WALL_HORIZON)
         sim = rvo.RVOSimulator(0.1, *near, BODY_RADIUS, 1.0)
-        fastest = np.where(walkers.paces > 0, FASTER * walkers.paces, STEP_ASIDE).tolist()
+        fastest = np.where(walkers.speeds > 0, MAX_SPEED_FACTOR * walkers.speeds, STEP_ASIDE_SPEED).tolist()
         for position, velocity, speed in zip(walkers.positions, walkers.velocities, fastest, strict=True):
             sim.add_agent(position.tolist(), *near, BODY_RADIUS, speed, velocity.tolist())
         if walkers.r_robot is not None:
@@ -45,12 +45,12 @@ class Orca:
         return sim
 
     def velocities(self, positions: Array, robot: Array, dt: float) -> Array:
-        """Everybody's velocity for the next `dt`, shape (n, 2) [m/s]; see `Model`."""
+        """See `WalkingModel.velocities` for `positions`, `robot` and `dt`."""
         w, sim, n = self._walkers, self._sim, len(positions)
-        way = w.goals - positions
-        left = np.hypot(*way.T)
-        pace = np.minimum(np.where(w.paces > 0, w.paces, STEP_ASIDE), left / dt)
-        preferred = way * np.divide(pace, left, out=np.zeros(n), where=left > 0)[:, None]
+        offset = w.goals - positions
+        distance = np.hypot(*offset.T)
+        speed = np.minimum(np.where(w.speeds > 0, w.speeds, STEP_ASIDE_SPEED), distance / dt)
+        preferred = offset * np.divide(speed, distance, out=np.zeros(n), where=distance > 0)[:, None]
         for i in range(n):
             sim.set_agent_position(i, positions[i].tolist())
             sim.set_agent_pref_velocity(i, preferred[i].tolist())

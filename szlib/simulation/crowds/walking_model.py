@@ -1,4 +1,4 @@
-"""Everybody in numbers, and what a model of walking must do.  World frame, metres and seconds."""
+"""What a model of walking is given, and what it must do.  World frame, metres and seconds."""
 
 from __future__ import annotations
 
@@ -11,53 +11,54 @@ from typing import Protocol
 from ...checks import Array
 from ...errors import SolverError
 
-FASTER = 1.3
-"""How much faster than at their own pace people walk to avoid others (Helbing and Molnar 1995)."""
+MAX_SPEED_FACTOR = 1.3
+"""Largest speed of people who avoid others, as a multiple of their own (Helbing and Molnar 1995)."""
+INSTALL_CROWDS = "pip install -e '.[crowds]'"
+"""Command that installs pyrvo and PySocialForce."""
 
 
 @dataclass(frozen=True)
 class Walkers:
-    """Everybody at the beginning, and where they want to go.
+    """All people at the start, and their goals.
 
     Attributes
     ----------
     positions, velocities, goals : shape (n, 2) [m, m/s, m].
-    paces : speed at which each walks to their goal, shape (n,) [m/s]; 0 for who stands.
+    speeds : speed at which each walks to their goal, shape (n,) [m/s]; 0 for people who stand.
     walls : segments, shape (m, 2, 2) [m].
-    r_robot : radius of the disc for which they take the robot [m]; None: they do not see it.
+    r_robot : radius of the disc for which people take the robot [m]; None: they do not see it.
     """
 
     positions: Array
     velocities: Array
     goals: Array
-    paces: Array
+    speeds: Array
     walls: Array
     r_robot: float | None
 
 
-class Model(Protocol):
+class WalkingModel(Protocol):
     """A model of walking, built for some `Walkers`."""
 
     def velocities(self, positions: Array, robot: Array, dt: float) -> Array:
-        """Everybody's velocity for the next `dt` [s], shape (n, 2) [m/s].
+        """Velocity of each person for the next time step, shape (n, 2) [m/s].
 
-        They are at `positions`, and see the robot at (x, y, vx, vy), unless they are blind to it.
+        Parameters
+        ----------
+        positions : where people are, shape (n, 2) [m].
+        robot : (x, y, vx, vy) of the robot [m, m/s], unless they do not see it.
+        dt : time step [s].
         """
-        ...
 
 
-Build = Callable[[Walkers], Model]
+ModelFactory = Callable[[Walkers], WalkingModel]
 
 
-def package(name: str, install: str) -> ModuleType:
-    """An optional package; SolverError says how to install it where it is missing."""
+def import_package(name: str, install: str) -> ModuleType:
+    """Import the optional package `name`; SolverError gives the command `install` where it is missing."""
     try:
         return import_module(name)
     except ImportError as error:
         raise SolverError(
             f"these people need the package {name} ({error}); install it with: {install}"
         ) from error
-
-
-CROWDS = "pip install -e '.[crowds]'"
-"""Installs pyrvo and PySocialForce."""

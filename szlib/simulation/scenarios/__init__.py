@@ -2,7 +2,7 @@
 
 from .meetings import MEETINGS, Variations, VisiblePeople
 from .paper import SCENARIOS
-from .random_worlds import ONE_PERSON, Worlds, draw_zone, make_world
+from .random_worlds import ONE_PERSON, Worlds, draw_zone
 
 __all__ = [
     "MEETINGS",
@@ -12,5 +12,4 @@ __all__ = [
     "VisiblePeople",
     "Worlds",
     "draw_zone",
-    "make_world",
 ]

@@ -1,7 +1,11 @@
-"""The four scenarios of the paper (fig. 6) as data, with what the paper claims of each as a check.
+"""The four scenarios of the paper (fig. 6), each with checks of what the paper claims of it.
 
-The paper gives no coordinates. They are assumed, so as to show a person who stands or walks at
-0.5 m/s (sec. 4) in the way of a robot that starts at rest. World frame, metres and seconds.
+The paper gives no coordinates.  They are assumed: a person stands, or walks at 0.5 m/s (sec. 4), in the
+way of a robot that starts at rest.  World frame, metres and seconds.
+
+>>> import szlib
+>>> list(szlib.SCENARIOS)
+['passing', 'corridor', 'waiting', 'making_room']
 """
 
 from __future__ import annotations
@@ -13,17 +17,17 @@ import numpy as np
 from ...control.mpc import MPCCBF
 from ...control.person import Person
 from ..closed_loop import simulate
-from ..log import SimulationLog
-from ..metrics import find_avoidance_start, find_passing_side, locate_along_course
+from ..metrics import compute_metrics, find_avoidance_start, find_passing_side, locate_along_course
+from ..run import Run
 from ..scenario import GOAL_RADIUS, Claim, Scenario
 from ..strategies import MIN_RETREAT, MIN_WAIT
 
-WELL_BEFORE = 0.5
-"""Avoidance that starts at this h starts well before the zone [m] (assumed)."""
-BESIDE = 1.0
-"""A person no farther ahead or behind than this is being passed [m] (assumed)."""
-SLOWED = 0.8
-"""Below this share of its greatest speed the robot has slowed down (assumed)."""
+EARLY_H = 0.5
+"""Avoidance that starts above this h starts well before the zone [m] (assumed)."""
+PASSING_DISTANCE = 1.0
+"""The robot passes a person who is within this distance ahead or behind [m] (assumed)."""
+SLOW_FRACTION = 0.8
+"""Below this fraction of its greatest speed the robot has slowed down (assumed)."""
 MOUTH = 0.0
 """x of the near end of the restricted pathway [m]."""
 
@@ -34,70 +38,69 @@ _PATHWAY = np.array(
 )
 
 
-def _avoids_earlier_head_on(log: SimulationLog) -> tuple[bool, float]:
-    """How much farther away [m]."""
-    head_on = find_avoidance_start(log)[0]
-    controller = MPCCBF(log.zones[0], walls=log.scenario.walls, settings=log.settings)
-    from_behind = find_avoidance_start(simulate(log.scenario.turn_people(), controller))[0]
+def _avoids_earlier_head_on(run: Run) -> tuple[bool, float]:
+    """Difference of the two distances [m]."""
+    head_on = find_avoidance_start(run)[0]
+    controller = MPCCBF(run.zones[0], walls=run.scenario.walls, settings=run.settings)
+    from_behind = find_avoidance_start(simulate(run.scenario.turn_people(), controller))[0]
     return head_on > from_behind, head_on - from_behind
 
 
-def _avoids_well_before(log: SimulationLog) -> tuple[bool, float]:
+def _avoids_well_before(run: Run) -> tuple[bool, float]:
     """h where avoidance starts [m]."""
-    h = find_avoidance_start(log)[1]
-    return h > WELL_BEFORE, h
+    h = find_avoidance_start(run)[1]
+    return h > EARLY_H, h
 
 
-def _passes_on_chosen_side(log: SimulationLog) -> tuple[bool, float]:
-    """How far to the robot's left the person is when abeam [m]."""
-    ahead, left = locate_along_course(log, 0)
-    return find_passing_side(log) == log.settings.pass_side, float(left[np.abs(ahead).argmin()])
+def _passes_on_chosen_side(run: Run) -> tuple[bool, float]:
+    """Distance of the person to the robot's left when abeam [m]."""
+    ahead, left = locate_along_course(run, 0)
+    return find_passing_side(run) == run.settings.pass_side, float(left[np.abs(ahead).argmin()])
 
 
-def _slows_while_passing(log: SimulationLog) -> tuple[bool, float]:
-    """Least speed beside the person, as a share of the greatest speed."""
-    speed = log.table["speed"].to_numpy()
-    beside = np.abs(locate_along_course(log, 0)[0]) <= BESIDE
-    share = float(speed[beside].min() / speed.max()) if beside.any() else np.nan
-    return share < SLOWED, share
+def _slows_while_passing(run: Run) -> tuple[bool, float]:
+    """Smallest speed beside the person, as a fraction of the greatest speed."""
+    beside = np.abs(locate_along_course(run, 0)[0]) <= PASSING_DISTANCE
+    fraction = float(run.speed[beside].min() / run.speed.max()) if beside.any() else np.nan
+    return fraction < SLOW_FRACTION, fraction
 
 
-def _waits(log: SimulationLog) -> tuple[bool, float]:
-    """How long the robot yields [s], without having to go back."""
-    waited = float(log.metrics()["time_yielding"])
-    return waited >= MIN_WAIT and _retreat(log) < GOAL_RADIUS, waited
+def _waits(run: Run) -> tuple[bool, float]:
+    """Time for which the robot yields [s], without going back."""
+    waited = float(compute_metrics(run)["time_yielding"])
+    return waited >= MIN_WAIT and _retreat_from_start(run) < GOAL_RADIUS, waited
 
 
-def _makes_room(log: SimulationLog) -> tuple[bool, float]:
-    """How far the robot goes back behind its start [m]."""
-    return _retreat(log) >= MIN_RETREAT, _retreat(log)
+def _makes_room(run: Run) -> tuple[bool, float]:
+    """Distance by which the robot goes back behind its start [m]."""
+    retreat = _retreat_from_start(run)
+    return retreat >= MIN_RETREAT, retreat
 
 
-def _retreat(log: SimulationLog) -> float:
-    return float(log.scenario.start[0] - log.table["x"].min())
+def _retreat_from_start(run: Run) -> float:
+    return float(run.scenario.start[0] - run.states[:, 0].min())
 
 
-def _lets_person_out_first(log: SimulationLog) -> tuple[bool, float]:
-    """Time from the person's leaving the pathway to the robot's entering it for good [s]."""
-    table = log.table
-    person_out = table["t"][table["person_0_x"] <= MOUTH]
-    robot_out = table["t"][table["x"] < MOUTH]
-    if person_out.empty or robot_out.empty or not log.success:
+def _lets_person_out_first(run: Run) -> tuple[bool, float]:
+    """Time from the person's leaving of the pathway to the robot's last entering [s]."""
+    person_outside = run.time[run.people[:, 0, 0] <= MOUTH]
+    robot_outside = run.time[run.states[:, 0] < MOUTH]
+    if not (len(person_outside) and len(robot_outside) and run.success):
         return False, np.nan
-    between = float(robot_out.iloc[-1] - person_out.iloc[0])
+    between = float(robot_outside[-1] - person_outside[0])
     return between > 0, between
 
 
-def _goes_on(log: SimulationLog) -> tuple[bool, float]:
+def _goes_on(run: Run) -> tuple[bool, float]:
     """Time to the goal [s]."""
-    return log.success, float(log.metrics()["time_to_goal"])
+    return run.success, float(compute_metrics(run)["time_to_goal"])
 
 
 _CHOSEN_SIDE = Claim("The robot passes the person on the chosen side.", _passes_on_chosen_side)
 _OUT_FIRST = Claim("It enters the pathway after the person has left it.", _lets_person_out_first)
 _GOES_ON = Claim("Then it goes on to its goal.", _goes_on)
 
-_ALL = (
+_SCENARIOS = (
     Scenario(
         name="passing",
         title="Passing a stationary person",
@@ -143,5 +146,5 @@ _ALL = (
     ),
 )
 
-SCENARIOS: dict[str, Scenario] = {scenario.name: scenario for scenario in _ALL}
+SCENARIOS: dict[str, Scenario] = {scenario.name: scenario for scenario in _SCENARIOS}
 """The four scenarios of the paper, by name: passing, corridor, waiting, making_room."""

@@ -1,6 +1,6 @@
-"""Random worlds: people who stand or walk, walls, a robot with somewhere to go - each from its seed.
+"""Random worlds: scenarios with people who stand or walk, and walls, each drawn from a seed.
 
-A world is a `Scenario` like the paper's four. World frame, metres and seconds.
+World frame, metres and seconds.
 """
 
 from __future__ import annotations
@@ -11,44 +11,54 @@ from math import cos, dist, pi, sin
 import numpy as np
 
 from ...checks import Array
-from ...control.barriers import barrier, euclidean_segment_formula, segment_formula
+from ...control.barriers import compute_h, euclidean_segment_formula
 from ...control.distances import required_margin
-from ...control.person import BODY_RADIUS, Person, PlacedZone, place_zone
+from ...control.person import Person, PlacedZone, place_zone
 from ...control.settings import MPCSettings
 from ...errors import SolverError
-from ...zones.ellipses import Ellipse
+from ...zones.ellipses import BODY_RADIUS, Ellipse
 from ..scenario import Scenario
 
-_DRIVER = MPCSettings()
-"""Of the robot for which there has to be room."""
+_ROBOT = MPCSettings()
+"""Settings of the robot that must have space."""
 _TRIES = 5_000
-"""Draws after which a world is given up as impossible; a usual one takes fewer than a hundred."""
-_ALONG = np.linspace(0, 1, 31)[:, None]
-"""Where a person's path is held clear of walls, from its start to its end."""
+"""Draws after which the search for a world ends; a usual world takes fewer than a hundred."""
+_FRACTIONS = np.linspace(0, 1, 31)[:, None]
+"""Fractions of a person's path at which it is checked against walls."""
 
 
 @dataclass(frozen=True)
 class Worlds:
-    """What a random world may hold; every range is drawn from uniformly (all of them assumed).
+    """What random worlds contain.  Called with a seed, it draws a world: `worlds(seed)`.
+
+    Values are drawn uniformly from their ranges.  All defaults are assumed.
 
     Parameters
     ----------
-    people : least and greatest number of people.
-    standing : share of people who stand.
-    pace : slowest and fastest walk [m/s]; the paper's people walk at 0.5 m/s.
-    walls : share of worlds that have walls.
-    max_walls : greatest number of walls in such a world.
-    wall_length : shortest and longest wall [m].
-    size : start, goal, people and walls' midpoints lie in a square of this side [m].
-    travel : nearest and farthest goal [m].
-    start_speed : fastest start, in any direction [m/s].
-    min_h : least h of every person and wall at the start, and where full braking would end [m].
-    duration : time that the robot has [s].
-    zone : everybody's, such as one that was learned; None draws one for each world (`draw_zone`).
+    people : smallest and largest number of people.
+    standing : fraction of people who stand.
+    pace : smallest and largest walking speed [m/s]; the paper's people walk at 0.5 m/s.
+    walls : fraction of worlds with walls.
+    max_walls : largest number of walls in a world with walls.
+    wall_length : smallest and largest length of a wall [m].
+    size : side of the square in which start, goal, people and midpoints of walls lie [m].
+    travel : smallest and largest distance to the goal [m].
+    start_speed : largest speed at the start, in any direction [m/s].
+    min_h : smallest h of every person and wall at the start, and where full braking ends [m].
+    duration : time limit of the robot [s].
+    zone : zone of all people, for instance a fitted one; None: one drawn for each world (`draw_zone`).
 
     Raises
     ------
-    SolverError : a range is empty or a share is not in [0, 1].
+    SolverError : a range is empty or a fraction is not in [0, 1].
+
+    Examples
+    --------
+    >>> import szlib
+    >>> worlds = szlib.Worlds(people=(2, 2), walls=0.0)
+    >>> scenario = worlds(seed=0)
+    >>> len(scenario.people), len(scenario.walls)
+    (2, 0)
     """
 
     people: tuple[int, int] = (1, 5)
@@ -71,69 +81,64 @@ class Worlds:
                 raise SolverError(f"{name} must be a range 0 <= low <= high; got {(low, high)}")
         for name in ("standing", "walls"):
             if not 0 <= getattr(self, name) <= 1:
-                raise SolverError(f"{name} must be a share in [0, 1]; got {getattr(self, name)}")
+                raise SolverError(f"{name} must be a fraction in [0, 1]; got {getattr(self, name)}")
         for name in ("max_walls", "size", "duration"):
             if not 0 < getattr(self, name) < np.inf:
                 raise SolverError(f"{name} must be positive; got {getattr(self, name)}")
 
     def __call__(self, seed: int) -> Scenario:
-        """The world of this seed; see `world`."""
-        return make_world(seed, self)
+        """The world of a `seed`: the same one each time, whatever controller drives in it.
+
+        Start and goal are clear of walls, by the distance that a robot of the default radius needs.  The goal
+        is clear of people who stand.  People keep clear of walls and, at the start, of each other's bodies;
+        walkers never cross a wall.  All people have one zone: `zone`, or one drawn by `draw_zone`.
+
+        Raises
+        ------
+        SolverError : no world fits in many draws; ask for fewer people or more space.
+        """
+        rng = np.random.default_rng(seed)
+        for _ in range(_TRIES):
+            drawn = draw_zone(rng)  # in any case: the rest of the world does not depend on it
+            zone, walls = self.zone or drawn, _draw_walls(rng, self)
+            people = _draw_people(rng, self, walls, zone)
+            x, goal = rng.uniform(-self.size / 2, self.size / 2, (2, 2))
+            speed, heading = self.start_speed * rng.uniform(), rng.uniform(-pi, pi)
+            velocity = speed * np.array([cos(heading), sin(heading)])
+            if not self.travel[0] <= np.hypot(*(goal - x)) <= self.travel[1]:
+                continue
+            eps = max([_ROBOT.eps, *(required_margin(wall, _ROBOT.r_robot) for wall in walls)])
+            placed = [place_zone(person, zone) for person in people]
+            standing = [each for each, person in zip(placed, people, strict=True) if person.stands]
+            stop = x + velocity * speed / (2 * _ROBOT.a_max)
+            points = ((x, placed), (stop, placed), (goal, standing))
+            if all(_min_h(point, zones, walls, eps) >= self.min_h for point, zones in points):
+                return Scenario(
+                    name=f"world {seed}",
+                    title=f"World {seed}",
+                    start=np.concatenate([x, velocity]),
+                    goal=goal,
+                    people=tuple(people),
+                    walls=walls,
+                    duration=self.duration,
+                )
+        raise SolverError(
+            f"no world of seed {seed} fits {self} in {_TRIES} draws; ask for fewer people or a larger size"
+        )
 
 
 ONE_PERSON = Worlds(people=(1, 1), walls=0.0, start_speed=0.0, min_h=0.3)
-"""One person in open space, a robot that starts at rest: here a controller has no excuse."""
-
-
-def make_world(seed: int, worlds: Worlds | None = None) -> Scenario:
-    """The world of this seed: the same one every time, whatever controller is to drive in it.
-
-    Start and goal are clear of walls by what a robot of the default radius requires, the goal also
-    of people who stand. People keep off walls and off each other's bodies at the start, and walkers
-    never cross a wall. Each person has the zone of the world: `worlds.zone`, or one by `draw_zone`.
-
-    Raises
-    ------
-    SolverError : nothing that fits was found in many tries; ask for fewer people or more space.
-    """
-    w, rng = worlds or Worlds(), np.random.default_rng(seed)
-    for _ in range(_TRIES):
-        drawn = draw_zone(rng)  # drawn in any case: the rest of the world does not depend on it
-        zone, walls = w.zone or drawn, _walls(rng, w)
-        people = _people(rng, w, walls, zone)
-        x, goal = rng.uniform(-w.size / 2, w.size / 2, (2, 2))
-        speed, heading = w.start_speed * rng.uniform(), rng.uniform(-pi, pi)
-        velocity = speed * np.array([cos(heading), sin(heading)])
-        if not w.travel[0] <= np.hypot(*(goal - x)) <= w.travel[1]:
-            continue
-        eps = max([_DRIVER.eps, *(required_margin(wall, _DRIVER.r_robot) for wall in walls)])
-        everybody = [place_zone(person, zone) for person in people]
-        standing = [where for where, person in zip(everybody, people, strict=True) if person.stands]
-        stop = x + velocity * speed / (2 * _DRIVER.a_max)
-        held = ((x, everybody), (stop, everybody), (goal, standing))
-        if all(_h(point, zones, walls, eps) >= w.min_h for point, zones in held):
-            return Scenario(
-                name=f"world {seed}",
-                title=f"World {seed}",
-                start=np.concatenate([x, velocity]),
-                goal=goal,
-                people=tuple(people),
-                walls=walls,
-                duration=w.duration,
-            )
-    raise SolverError(
-        f"no world of seed {seed} fits {w} in {_TRIES} tries; ask for fewer people or a larger size"
-    )
+"""One person in open space and a robot that starts at rest: the simplest worlds."""
 
 
 def draw_zone(rng: np.random.Generator) -> Ellipse:
-    """A zone of the fitted family: like those learned (1.0 m x 0.75 m), of any tilt, off centre."""
+    """A random zone from `rng`, similar to fitted ones (1.0 m x 0.75 m), with any tilt, off centre."""
     a = rng.uniform(0.7, 1.2)
     center = (rng.uniform(-0.1, 0.2), rng.uniform(-0.1, 0.1))
     return Ellipse(center, (a, a * rng.uniform(0.6, 1.0)), rng.uniform(-pi / 2, pi / 2))
 
 
-def _walls(rng: np.random.Generator, w: Worlds) -> Array:
+def _draw_walls(rng: np.random.Generator, w: Worlds) -> Array:
     count = int(rng.integers(1, w.max_walls, endpoint=True)) if rng.uniform() < w.walls else 0
     middle = rng.uniform(-w.size / 2, w.size / 2, (count, 2))
     angle, half = rng.uniform(0, pi, count), rng.uniform(*w.wall_length, count) / 2
@@ -141,10 +146,10 @@ def _walls(rng: np.random.Generator, w: Worlds) -> Array:
     return np.stack([middle - along, middle + along], axis=1)
 
 
-def _people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellipse) -> list[Person]:
-    """People one by one, each off the walls and off those before; fewer where there is no room."""
+def _draw_people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellipse) -> list[Person]:
+    """People one by one, clear of the walls and of each other; fewer where there is no space."""
     people: list[Person] = []
-    times, ends = w.duration * _ALONG, walls.reshape(-1, 4).T
+    times, ends = w.duration * _FRACTIONS, walls.reshape(-1, 4).T
     for _ in range(int(rng.integers(*w.people, endpoint=True))):
         for _ in range(100):
             x, y = rng.uniform(-w.size / 2, w.size / 2, 2).tolist()
@@ -160,9 +165,7 @@ def _people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellipse) ->
     return people
 
 
-def _h(point: Array, zones: list[PlacedZone], walls: Array, eps: float) -> float:
-    """Smallest h of anybody or any wall [m]."""
-    x, y = point.tolist()
-    distances = [zone.distance(x, y) for zone in zones]
-    distances += [segment_formula(x, y, *ends) for ends in walls.reshape(-1, 4).tolist()]
-    return float(barrier(min(distances, default=np.inf), _DRIVER.r_robot, eps))
+def _min_h(point: Array, zones: list[PlacedZone], walls: Array, eps: float) -> float:
+    """Smallest h of the people and walls at a point [m]."""
+    (x, y), rows = point.tolist(), [(*ends, eps) for ends in walls.reshape(-1, 4).tolist()]
+    return float(min(compute_h(x, y, zones, rows, r_robot=_ROBOT.r_robot, eps=eps), default=np.inf))
