@@ -26,7 +26,7 @@ _PRELOADED = [
 
 
 class ForkedKernelManager(AsyncKernelManager):
-    """Jupyter's manager of kernels, which forks them on Linux."""
+    """Jupyter's manager of kernels, which forks them on Linux; `options` are those of Jupyter."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)

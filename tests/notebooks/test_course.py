@@ -1,4 +1,4 @@
-"""The shell of the course: links lead somewhere, minutes are near, words are explained where first used."""
+"""Navigation and maps of the course: links, reading times, and words explained at their first use."""
 
 import importlib.util
 import re
@@ -26,8 +26,8 @@ FOLDERS = (folders.NOTEBOOKS, folders.NOTEBOOKS / "exercises", folders.NOTEBOOKS
 TIME = re.compile(r"(\d+ h )?\d+\s(#\s)?min\b")
 
 
-def told(text: str) -> str:
-    """A text with its times left out, on one line: they may be a little off."""
+def without_times(text: str) -> str:
+    """The text on one line without reading times, which may differ a little."""
     return " ".join(TIME.sub("T min", text).replace("\n#", " ").split())
 
 
@@ -39,13 +39,17 @@ def shell():
 # --- navigation and maps -----------------------------------------------------------------------------
 
 
-def test_every_cell_is_what_the_course_makes_of_the_notebooks(shell):
-    stale = [s.name for s, text in shell.items() if told(text) != told(s.read_text(encoding="utf-8"))]
+def test_navigation_and_maps_are_up_to_date(shell):
+    stale = [
+        s.name
+        for s, text in shell.items()
+        if without_times(text) != without_times(s.read_text(encoding="utf-8"))
+    ]
     assert stale == [], "python notebooks/tools/course.py"
 
 
 @pytest.mark.parametrize("page", STORY, ids=lambda p: p.source.stem)
-def test_a_notebook_says_how_long_it_takes_and_what_it_gives(page):
+def test_navigation_states_reading_time_and_aim(page):
     (navigation,) = [c.source for c in page.cells if course.HEADING in c.source]
     assert page.cells[1].source == navigation
     (minutes,) = re.findall(r"(\d+)\s+min\s+to\s+read", navigation)
@@ -54,7 +58,7 @@ def test_a_notebook_says_how_long_it_takes_and_what_it_gives(page):
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda f: f.name)
-def test_every_link_leads_somewhere(folder):
+def test_every_link_has_a_target(folder):
     for source in folder.glob("*[0-9]*_*.py"):
         prose = [c.source for c in jupytext.read(source).cells if c.cell_type == "markdown"]
         links = re.findall(r"\]\(([^)#]+)\)", "\n".join(prose))
@@ -77,7 +81,7 @@ def test_the_course_reads_every_notebook_and_does_every_sheet_once():
 
 
 @pytest.mark.parametrize("word", ["class K", "SQP", "exact penalty", "EWAP", "tidy"])
-def test_a_word_is_explained_where_it_comes_first(word):
+def test_word_is_explained_at_its_first_use(word):
     first = course.first_uses(STORY)[word]
     (page,) = [page for page in STORY if page.number == first]
     assert f"*{word}*: {course.GLOSSARY[word].means}" in " ".join(page.cells[1].source.split())
@@ -104,7 +108,7 @@ def test_every_reference_has_a_doi_or_says_that_there_is_none():
             assert shown == link
 
 
-def test_only_the_navigation_is_written_anew():
+def test_only_the_navigation_is_replaced():
     script = "# ---\n# ---\n\n# %% [markdown]\n# # 1 - A\n\n# %%\nx = 1\n"
     navigation = f"5 min\n\n{course.HEADING}x"
     once = course.renewed(script, {}, navigation)

@@ -1,4 +1,4 @@
-"""The notebooks: each pair holds together, each was executed, and all of them prove their results."""
+"""The notebooks: script and copy agree, every cell was executed, and all checks hold."""
 
 import json
 import os
@@ -24,7 +24,7 @@ def code_lines(cell: nbformat.NotebookNode) -> int:
     return sum(1 for line in cell.source.splitlines() if line.strip() and not line.strip().startswith("#"))
 
 
-def test_none_is_missing_and_no_copy_is_stray():
+def test_each_notebook_has_a_copy_and_no_number_is_missing():
     numbers = [s.stem.split("_")[0] for s in SOURCES]
     assert len(set(numbers)) == len(numbers)
     assert {f"{n:02d}" for n in range(1, 19)} <= set(numbers)
@@ -33,7 +33,7 @@ def test_none_is_missing_and_no_copy_is_stray():
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.stem)
 class TestEach:
-    def test_the_pair_holds_together(self, source):
+    def test_script_and_copy_agree(self, source):
         executed = nbformat.read(source.with_suffix(".ipynb"), as_version=4)
         found = [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in executed.cells]
         assert found == [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in cells(source)]
@@ -52,7 +52,7 @@ class TestEach:
         assert len(text) < 1_048_576
         assert not re.search(r"/(home|root|work|Users)/|[A-Z]:\\\\Users", text)
 
-    def test_rhythm(self, source):
+    def test_notebook_has_question_expectation_and_meaning(self, source):
         all_cells = cells(source)
         assert all_cells[0].cell_type == "markdown"
         assert "**Question.**" in all_cells[0].source
@@ -62,14 +62,14 @@ class TestEach:
         assert sum("parameters" in c.metadata.get("tags", []) for c in all_cells) == 1
         assert max(code_lines(c) for c in all_cells if c.cell_type == "code") <= MAX_LINES
 
-    def test_knows_the_common_parameters(self, source):
+    def test_notebook_has_the_common_parameters(self, source):
         (tagged,) = [c for c in cells(source) if "parameters" in c.metadata.get("tags", [])]
         assert {"data", "seed", "results"} <= {
             line.split("=")[0].strip() for line in tagged.source.splitlines()
         }
 
 
-def test_each_knob_of_the_method_is_a_parameter_where_it_acts_with_the_default_that_it_has_elsewhere():
+def test_method_parameters_have_the_same_default_everywhere():
     found = [(n, v) for s in SOURCES for n, v in read_defaults(s).items() if n in METHOD_DEFAULTS]
     assert {name for name, _ in found} == set(METHOD_DEFAULTS)
     assert all(value == METHOD_DEFAULTS[name] for name, value in found)
@@ -83,7 +83,7 @@ def test_read_defaults_finds_what_the_cell_sets():
         assert variables == read_defaults(source) | {"__builtins__": variables["__builtins__"]}
 
 
-def test_a_parameter_has_one_type_wherever_it_stands():
+def test_parameter_has_the_same_type_in_all_notebooks():
     types: dict[str, set[type]] = {}
     for source in SOURCES:
         for name, value in read_defaults(source).items():
@@ -91,11 +91,11 @@ def test_a_parameter_has_one_type_wherever_it_stands():
     assert all(len(found) == 1 for found in types.values()), types
 
 
-OF_DATA = ("01", "02", "03", "04", "05", "14")
+REAL_DAY = ("01", "02", "03", "04", "05", "14")
 """Notebooks that read the data; the others only use the encounters and the zone."""
 
 
-def proven(summary: dict, home: Path, only: tuple[str, ...] = ("",)) -> None:
+def check_run(summary: dict, home: Path, only: tuple[str, ...] = ("",)) -> None:
     assert summary["passed"], runner.format_summary(summary)
     assert json.loads((home / "summary.json").read_text(encoding="utf-8"))["passed"]
     assert list(summary["notebooks"]) == [s.stem for s in SOURCES if s.stem.startswith(only)]
@@ -108,9 +108,9 @@ def proven(summary: dict, home: Path, only: tuple[str, ...] = ("",)) -> None:
         assert (home / artefact).exists()
 
 
-def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
+def test_all_checks_hold_on_the_plaza(tmp_path):
     summary = runner.run(out=tmp_path, jobs=2)
-    proven(summary, tmp_path / "synthetic")
+    check_run(summary, tmp_path / "synthetic")
     claims = [c for record in summary["notebooks"].values() for c in record["checks"] if c["kind"] == "claim"]
     assert sum(c["passed"] for c in claims) > len(claims) / 2
     assert any("true zone found" in c["name"] for c in summary["notebooks"]["05_zones"]["checks"])
@@ -119,9 +119,9 @@ def test_the_workbook_proves_itself_on_the_plaza(tmp_path):
 @pytest.mark.skipif(
     not os.environ.get("SZLIB_DATA_DIR"), reason="SZLIB_DATA_DIR names no folder with real data"
 )
-def test_the_workbook_completes_on_the_real_day(tmp_path):
-    summary = runner.run("atc-1hz", out=tmp_path, jobs=2, only=OF_DATA)
-    proven(summary, tmp_path / "atc-1hz", only=OF_DATA)
+def test_notebooks_complete_on_the_real_day(tmp_path):
+    summary = runner.run("atc-1hz", out=tmp_path, jobs=2, only=REAL_DAY)
+    check_run(summary, tmp_path / "atc-1hz", only=REAL_DAY)
     assert summary["notebooks"]["01_tracks"]["key_figures"]["rows"] == 624_951
     results = {c["name"]: c["result"] for record in summary["notebooks"].values() for c in record["checks"]}
     assert results["the zone at 1.1 m/s reaches farther ahead than behind"] == "not supported here"

@@ -1,4 +1,4 @@
-"""The copies on the real day: of the notebooks as they are, executed, small, and of no machine."""
+"""The copies on the real day: up to date, executed, small, and without paths of a machine."""
 
 import importlib.util
 import re
@@ -23,7 +23,7 @@ refresh = _refresh()
 
 @pytest.mark.parametrize("copy", COPIES, ids=lambda c: c.stem)
 class TestCopy:
-    def test_it_is_of_the_notebook_as_it_is(self, copy):
+    def test_copy_has_the_cells_of_the_notebook(self, copy):
         executed = nbformat.read(copy, as_version=4)
         now = refresh.replace_data(folders.NOTEBOOKS / f"{copy.stem}.py", "atc-1hz")
         again = "python notebooks/tools/refresh.py real_day"
@@ -32,13 +32,13 @@ class TestCopy:
         assert [c.execution_count for c in code] == list(range(1, len(code) + 1))
         assert all(out.output_type != "error" for c in code for out in c.outputs)
 
-    def test_it_is_small_and_names_no_machine(self, copy):
+    def test_copy_is_small_and_names_no_machine(self, copy):
         text = copy.read_text(encoding="utf-8")
         assert len(text) < 1_500_000
         assert not re.search(r"/(home|root|work|tmp|Users)/|at 0x", text)
 
 
-def test_a_copy_has_the_data_asked_for_and_links_from_its_folder():
+def test_copy_has_other_data_and_links_from_its_folder():
     notebook = refresh.replace_data(folders.NOTEBOOKS / "01_tracks.py", "atc-1hz")
     (tagged,) = (c.source for c in notebook.cells if "parameters" in c.metadata.get("tags", []))
     assert tagged.startswith('data = "atc-1hz"')

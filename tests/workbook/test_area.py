@@ -1,4 +1,4 @@
-"""The area of a run: asked for in any form, found where none is, recorded; and where nobody met."""
+"""The area of a run: given in any form or found from the tracks; errors where there is no encounter."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def record_of(tmp_path, file, **variables):
     return NotebookRecord("99_test", given)
 
 
-# --- asked for ---------------------------------------------------------------------------------------
+# --- given by options ---------------------------------------------------------------------------------------
 
 
-def test_inspect_takes_an_area_in_every_form(hall, tmp_path, capsys):
+def test_inspect_accepts_numbers_and_polygons_as_area(hall, tmp_path, capsys):
     (tmp_path / "hall.wkt").write_text(HALL.wkt)
     told = []
     for options in (["--square", "0", "12", "0", "8"], ["--polygon", str(tmp_path / "hall.wkt")]):
@@ -44,21 +44,21 @@ def test_inspect_takes_an_area_in_every_form(hall, tmp_path, capsys):
     assert capsys.readouterr().out.startswith("area -5.5 6.0 -1.0 8.0\n")
 
 
-def test_what_is_nobodys_is_found(hall, capsys):
+def test_area_of_other_data_is_the_walked_area(hall, capsys):
     for options in ([], ["--auto"]):
         assert main(["inspect", *options, str(hall)]) == 0
         found = szlib.as_area(capsys.readouterr().out.splitlines()[0].removeprefix("area "))
         assert found == szlib.walked_area(szlib.read_tracks(hall))
 
 
-def test_extract_takes_an_area_and_tells_it(hall, tmp_path, capsys):
+def test_extract_records_the_area(hall, tmp_path, capsys):
     assert main(["extract", str(hall), "--out", str(tmp_path / "days"), "--square", "0", "12", "0", "8"]) == 0
     assert "area: 0.0 12.0 0.0 8.0" in capsys.readouterr().out
     record = json.loads((tmp_path / "days" / "hall.parquet.json").read_text())
     assert record["made_of"]["parameters"]["area"] == "0.0 12.0 0.0 8.0"
 
 
-def test_one_area_only(hall, capsys):
+def test_two_areas_are_refused(hall, capsys):
     with pytest.raises(SystemExit):
         main(["inspect", str(hall), "--auto", "--square", "0", "12", "0", "8"])
     assert "not allowed with" in capsys.readouterr().err
@@ -67,7 +67,7 @@ def test_one_area_only(hall, capsys):
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_a_run_records_the_area_whatever_it_was_given_as(notebooks, tmp_path, capsys):
+def test_every_form_of_an_area_gives_the_same_run(notebooks, tmp_path, capsys):
     folder = notebooks(_01_a='record.key["area"] = record.cache.area')
     script = folder / "01_a.py"
     script.write_text(script.read_text().replace("seed = 0\n", 'seed = 0\narea = ""\n'))
@@ -83,14 +83,14 @@ def test_a_run_records_the_area_whatever_it_was_given_as(notebooks, tmp_path, ca
     assert main(["run", "--data", "mine.csv", "--out", "out", "-p", "area=1 2"]) == 2
 
 
-# --- of a notebook -----------------------------------------------------------------------------------
+# --- in a notebook -----------------------------------------------------------------------------------
 
 
-def test_the_plaza_has_the_malls_square(tmp_path):
+def test_plaza_has_the_square_of_the_mall(tmp_path):
     assert record_of(tmp_path, "", data="synthetic").cache.find_area() == szlib.ATC_SQUARE
 
 
-def test_an_area_is_found_once_and_kept(hall, tmp_path, monkeypatch):
+def test_area_is_found_once_and_cached(hall, tmp_path, monkeypatch):
     record = record_of(tmp_path, hall)
     found = record.cache.find_area(record.cache.tracks())
     assert str(found) == (record.out / "area.txt").read_text()
@@ -99,7 +99,7 @@ def test_an_area_is_found_once_and_kept(hall, tmp_path, monkeypatch):
     assert record.cache.encounters().attrs["area"] == str(found)
 
 
-def test_an_area_that_is_given_is_taken(hall, tmp_path):
+def test_given_area_is_used(hall, tmp_path):
     assert record_of(tmp_path, hall, area="0 6 0 8").cache.find_area() == szlib.Square(x=(0, 6), y=(0, 8))
     assert record_of(tmp_path, hall, area=HALL.buffer(1).wkt).cache.find_area() == szlib.as_area(
         HALL.buffer(1)
@@ -128,7 +128,7 @@ EMPTIED = {
 
 
 @pytest.mark.parametrize("told", EMPTIED)
-def test_the_condition_that_emptied_it_is_told_with_its_funnel(told):
+def test_error_names_the_condition_that_rejected_the_last_rows(told):
     tracks, square = EMPTIED[told]
     samples = szlib.find_encounters(tracks, square=square)
     with pytest.raises(szlib.DataError) as error:
@@ -137,13 +137,13 @@ def test_the_condition_that_emptied_it_is_told_with_its_funnel(told):
     assert str(square) in str(error.value)
 
 
-def test_where_people_met_nothing_is_said():
+def test_samples_with_encounters_pass_unchanged():
     samples = szlib.find_encounters(make_crowd(77, people=160, seconds=200, square=ROOM), square=ROOM)
     assert require_encounters(samples) is samples
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_a_run_stops_at_the_first_empty_stage(notebooks, tmp_path, capsys):
+def test_run_stops_when_no_encounters_are_left(notebooks, tmp_path, capsys):
     look = "import szlib\nrecord.cache.store_encounters(szlib.find_encounters(record.cache.tracks()))"
     notebooks(_01_fine='record.check("ok", True)', _02_nobody=look, _03_never="1 / 0", _07_never="1 / 0")
     straight = [(k / 2, person, 30 + k / 2, person) for person in (1, 9) for k in range(40)]

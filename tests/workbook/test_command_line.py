@@ -1,4 +1,4 @@
-"""What the commands print, and how they end."""
+"""`szlib inspect` and `szlib extract`: their output and exit codes."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ def test_extract_prints_the_table(day: Path, tmp_path: Path, capsys: pytest.Capt
     assert "1 failed, 1 kept" in capsys.readouterr().out
 
 
-def test_a_missing_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_error_names_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["inspect", str(tmp_path / "missing.csv")]) == 2
     assert "no such file" in capsys.readouterr().err
 
 
-def test_nobody_answers_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_names_an_address_without_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
     distributed = pytest.importorskip("distributed")
 
     def refuse(*_: object, **__: object) -> None:

@@ -1,4 +1,4 @@
-"""Records: what a notebook records, and the artefacts it leaves for the next."""
+"""What a notebook records, and the data that it stores for later notebooks."""
 
 import json
 from dataclasses import replace
@@ -20,7 +20,7 @@ def record(tmp_path):
     return NotebookRecord("01_test", given)
 
 
-def test_checks_and_claims_are_written_down(record, capsys):
+def test_checks_and_claims_are_recorded(record, capsys):
     record.check("holds", np.True_, np.float64(0.5))
     record.check("breaks", np.bool_(False), np.array([1, 2]))
     record.claim("claimed", False, {"n": np.int64(3)})
@@ -34,7 +34,7 @@ def test_checks_and_claims_are_written_down(record, capsys):
     assert "FAILED" in capsys.readouterr().out
 
 
-def test_a_check_of_the_defaults_is_an_observation_elsewhere_and_a_promise_stays_one(record, capsys):
+def test_check_with_changed_parameters_is_an_observation(record, capsys):
     given = {"data": record.cache.data, "results": record.out.parents[1], "r_max": 1.5}
     other = NotebookRecord("01_test", given)
     other.check("few infeasible steps", False, 4)
@@ -50,7 +50,7 @@ def test_a_check_of_the_defaults_is_an_observation_elsewhere_and_a_promise_stays
     assert not NotebookRecord("01_test", given | {"r_max": 2.0, "n_jobs": 7, "area": "auto"}).changed
 
 
-def test_knobs_of_the_method_reach_encounters_and_zone_and_their_names(record, monkeypatch):
+def test_method_parameters_change_encounters_and_zone(record, monkeypatch):
     searched, fitted = [], []
     found = pd.DataFrame({"encounter": [0], "distance": [1.0]})
     shape = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
@@ -71,7 +71,7 @@ def test_knobs_of_the_method_reach_encounters_and_zone_and_their_names(record, m
     assert NotebookRecord("02_test", given | {"zone_speed": 1.3}).cache.method.zone_speed == 1.3
 
 
-def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monkeypatch):
+def test_encounters_are_cached_for_the_same_data_only(record, monkeypatch):
     made = []
 
     def fake(tracks, settings):
@@ -96,7 +96,7 @@ def test_encounters_are_kept_for_this_data_and_found_anew_for_other(record, monk
     assert len(made) == 3
 
 
-def test_an_unreadable_zone_is_fitted_again_and_said_so(record, monkeypatch, capsys):
+def test_damaged_zone_is_fitted_again(record, monkeypatch, capsys):
     (record.out / "zone.json").write_text("{")
     monkeypatch.setattr(DataCache, "encounters", lambda self: None)
     monkeypatch.setattr(data_cache.SocialZone, "fit", lambda samples, **_: "zone")
@@ -105,7 +105,7 @@ def test_an_unreadable_zone_is_fitted_again_and_said_so(record, monkeypatch, cap
     assert "zone is fitted again" in capsys.readouterr().out
 
 
-def test_badges():
+def test_unknown_badge_is_refused():
     table = parameters([("gamma", 0.05, "measured", "why")])
     assert table.data.set_index("parameter").loc["gamma", "badge"] == "measured"
     assert "gamma" in repr(table) and " at 0x" not in repr(table)
@@ -113,7 +113,7 @@ def test_badges():
         parameters([("gamma", 0.05, "guessed", "")])
 
 
-def test_every_setting_of_the_controller_is_explained_and_has_a_badge():
+def test_every_controller_setting_has_description_and_badge():
     table = settings_table(szlib.MPCSettings()).data
     assert set(table["parameter"]) == set(szlib.MPCSettings.__dataclass_fields__)
     assert table["why"].str.len().min() > 5

@@ -1,4 +1,4 @@
-"""The command line: what it runs, what it tells, and with which exit code."""
+"""`szlib run`: the notebooks that it executes, its output, and its exit codes."""
 
 import json
 import os
@@ -22,7 +22,7 @@ def summary(tmp_path, folder="mine"):
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp_path, capsys):
+def test_run_records_checks_claims_and_key_figures(notebooks, tmp_path, capsys):
     notebooks(_01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)')
     assert run() == 0
     record = summary(tmp_path)["notebooks"]["01_good"]
@@ -40,9 +40,7 @@ def test_a_check_that_holds_a_claim_that_does_not_and_a_parameter(notebooks, tmp
 
 @pytest.mark.usefixtures("without_kernels")
 @pytest.mark.usefixtures("without_kernels")
-def test_a_changed_parameter_makes_observations_and_ends_with_0_but_a_promise_fails(
-    notebooks, tmp_path, capsys
-):
+def test_with_changed_parameters_only_checks_that_always_hold_fail_the_run(notebooks, tmp_path, capsys):
     notebooks(_01_good='record.check("no infeasible step", seed == 0, 4)')
     assert run("-p", "seed=3") == 0
     (folder,) = (path.name for path in (tmp_path / "out").glob("mine-*"))
@@ -56,7 +54,7 @@ def test_a_changed_parameter_makes_observations_and_ends_with_0_but_a_promise_fa
     assert run("-p", "seed=3") == 1
 
 
-def test_a_value_that_is_one_notebooks_default_is_given_to_the_others(notebooks):
+def test_default_of_one_notebook_is_passed_to_the_others(notebooks):
     folder = notebooks(_01_few="", _07_many="")
     for name, worlds in (("01_few", 2), ("07_many", 4)):
         script = folder / f"{name}.py"
@@ -67,7 +65,7 @@ def test_a_value_that_is_one_notebooks_default_is_given_to_the_others(notebooks)
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, tmp_path, capsys):
+def test_failed_check_and_error_fail_the_run_but_not_other_notebooks(notebooks, tmp_path, capsys):
     notebooks(_01_bad='record.check("sum", False, 3)', _02_crash="1 / 0", _03_fine='record.check("ok", True)')
     assert run() == 1
     found = summary(tmp_path)
@@ -82,13 +80,13 @@ def test_a_failed_check_and_a_crash_fail_the_run_but_not_the_others(notebooks, t
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_only_runs_what_is_asked_for(notebooks, tmp_path):
+def test_only_selects_notebooks(notebooks, tmp_path):
     notebooks(_01_one='record.check("ok", True)', _07_two='record.check("ok", True)')
     assert run("--only", "07") == 0
     assert list(summary(tmp_path)["notebooks"]) == ["07_two"]
 
 
-def test_06_is_not_06b_and_00_comes_first(notebooks):
+def test_notebooks_are_ordered_and_chosen_by_full_number(notebooks):
     names = ["00_start", "06_barriers", "06b_build", "07_passing", "10_room"]
     notebooks(**{f"_{name}": "" for name in reversed(names)})
     chosen = [
@@ -99,7 +97,7 @@ def test_06_is_not_06b_and_00_comes_first(notebooks):
         runner.choose_notebooks(["0"])
 
 
-def test_notebooks_wait_for_the_encounters_and_the_zone_and_for_nothing_else(notebooks):
+def test_notebooks_wait_only_for_encounters_and_zone(notebooks):
     names = ["00_start", "01_tracks", "02_met", "03_far", "05_zone", "06_robot", "06b_build", "15_respect"]
     notebooks(**{f"_{name}": "" for name in names})
     stems = [[s.stem for s in batch] for batch in runner.split_batches(runner.choose_notebooks([]))]
@@ -133,14 +131,14 @@ def test_notebooks_that_run_at_the_same_time_share_the_cores(notebooks, monkeypa
         (["--data", "nowhere.csv"], "nowhere.csv: no such file"),
     ],
 )
-def test_what_cannot_be_run_exits_with_2_and_says_why(notebooks, capsys, arguments, message):
+def test_invalid_options_exit_with_2_and_one_reason(notebooks, capsys, arguments, message):
     notebooks(_01_one="")
     assert run(*arguments) == 2
     assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("place", ["taken", "taken/inside"])
-def test_results_that_cannot_be_written_exit_with_2(notebooks, tmp_path, capsys, place):
+def test_unwritable_results_exit_with_2(notebooks, tmp_path, capsys, place):
     notebooks(_01_one="")
     (tmp_path / "taken").write_text("a file")
     assert run("--out", str(tmp_path / place)) == 2
@@ -148,20 +146,20 @@ def test_results_that_cannot_be_written_exit_with_2(notebooks, tmp_path, capsys,
 
 
 @pytest.mark.parametrize("jobs", ["0", "-1", "two", "1.5", "²"])
-def test_a_number_of_jobs_that_is_none_is_refused_at_once(jobs, capsys):
+def test_invalid_number_of_jobs_is_refused(jobs, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["run", "--jobs", jobs])
     assert stop.value.code == 2
     assert "expected a whole number >= 1" in capsys.readouterr().err
 
 
-def test_without_the_workbooks_packages_it_says_what_to_install(monkeypatch, capsys):
+def test_missing_packages_are_named(monkeypatch, capsys):
     monkeypatch.setattr(cli, "_WORKBOOK_PACKAGES", ("nbclient", "no_such_package"))
     assert main(["run"]) == 2
     assert "need no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
 
 
-def test_without_notebooks_it_says_where_to_find_them(notebooks):
+def test_missing_notebooks_are_explained(notebooks):
     with pytest.raises(DataError, match="they come with the repository"):
         runner.run()
 

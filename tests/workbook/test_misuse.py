@@ -1,4 +1,4 @@
-"""What was once lost or wrongly believed: folders, stale results, parameters, endings."""
+"""Misuse of the commands: foreign folders, stale results, bad parameters, full disks, signals."""
 
 import itertools
 import json
@@ -32,13 +32,13 @@ def interrupt(*_):
 
 
 def refused(arguments, capsys, message):
-    """It ends with 2, and one line says why."""
+    """The command exits with 2, and one line contains `message`."""
     assert main(arguments) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert message in line
 
 
-def test_tracks_are_never_overwritten_by_encounters(tmp_path, monkeypatch, capsys):
+def test_extract_never_writes_into_a_folder_of_tracks(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "tracks").mkdir()
     day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=5))
@@ -49,13 +49,13 @@ def test_tracks_are_never_overwritten_by_encounters(tmp_path, monkeypatch, capsy
     assert (tmp_path / "tracks" / "day.parquet").read_bytes() == before
 
 
-def test_results_go_nowhere_but_into_folders_of_our_own(notebooks, tmp_path, capsys):
+def test_run_refuses_a_folder_with_other_files(notebooks, tmp_path, capsys):
     notebooks(_01_one="")
     refused(["run", "--data", "mine.csv", "--out", "."], capsys, "holds files that szlib did not write")
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_one_data_set_has_one_folder_by_whatever_name(notebooks, tmp_path):
+def test_folder_name_of_links_globs_and_folders(notebooks, tmp_path):
     notebooks(_01_one='record.table(__import__("pandas").DataFrame({"a": [1]}), "table")')
     (tmp_path / "dir").mkdir()
     (tmp_path / "dir" / "b.csv").write_bytes((tmp_path / "mine.csv").read_bytes())
@@ -77,7 +77,7 @@ def test_data_sets_of_one_name_do_not_share_results(tmp_path):
     assert datasets.label("a/dir/.") == "dir"
 
 
-def test_encounters_and_zone_of_another_day_of_the_same_name_and_size_are_not_served(tmp_path, monkeypatch):
+def test_cache_is_not_used_for_other_data_of_the_same_name_and_size(tmp_path, monkeypatch):
     file = tmp_path / "day.csv"
     make_plaza(file, settings=PlazaSettings(n_encounters=60))
     samples = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"}).cache.encounters()
@@ -95,7 +95,7 @@ def test_encounters_and_zone_of_another_day_of_the_same_name_and_size_are_not_se
     assert len(pd.read_parquet(artefact)) > 0
 
 
-def test_a_foreign_plaza_is_not_taken_for_ours(tmp_path, monkeypatch):
+def test_foreign_file_with_the_name_of_the_plaza_is_replaced(tmp_path, monkeypatch):
     (tmp_path / "plaza-0.csv").write_text("1,2,3,4,5,6,7,8\n")
     small = PlazaSettings(n_encounters=3)
     monkeypatch.setattr(
@@ -108,7 +108,7 @@ def test_a_foreign_plaza_is_not_taken_for_ours(tmp_path, monkeypatch):
     assert cache.files() == [file], "ours is not made again"
 
 
-def test_an_extraction_gives_its_own_samples_or_none(tmp_path):
+def test_extraction_refuses_samples_that_another_one_replaced(tmp_path):
     day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=30))
     first = szlib.extract_days(day, out=tmp_path / "out", progress=False)
     assert len(first.samples()) > 0
@@ -117,7 +117,7 @@ def test_an_extraction_gives_its_own_samples_or_none(tmp_path):
         first.samples()
 
 
-def test_a_poisoned_day_is_a_line_and_the_others_are_done(tmp_path, monkeypatch):
+def test_failed_day_does_not_stop_the_others(tmp_path, monkeypatch):
     day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=5))
     (tmp_path / os.fsdecode(b"latin\xe4.csv")).write_bytes(day.read_bytes())
     (tmp_path / "other.csv").write_bytes(day.read_bytes())
@@ -139,7 +139,7 @@ def test_a_poisoned_day_is_a_line_and_the_others_are_done(tmp_path, monkeypatch)
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_a_run_that_fails_leaves_no_summary_that_passed(notebooks, tmp_path, monkeypatch):
+def test_interrupted_run_leaves_no_summary_that_passed(notebooks, tmp_path, monkeypatch):
     notebooks(_01_one='record.check("ok", True)')
     arguments = ["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]
     assert main(arguments) == 0
@@ -150,7 +150,7 @@ def test_a_run_that_fails_leaves_no_summary_that_passed(notebooks, tmp_path, mon
 
 
 @pytest.mark.parametrize("garbage", ["summary.json", "records"])
-def test_results_with_garbage_in_them(notebooks, tmp_path, capsys, garbage):
+def test_entry_that_blocks_results_is_named(notebooks, tmp_path, capsys, garbage):
     notebooks(_01_one="")
     home = folders.claim_results(tmp_path / "out", str(tmp_path / "mine.csv"))
     (home / garbage).write_text("") if garbage == "records" else (home / garbage).mkdir()
@@ -158,7 +158,7 @@ def test_results_with_garbage_in_them(notebooks, tmp_path, capsys, garbage):
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_no_room_for_results_ends_with_2_and_no_room_in_a_notebook_too(notebooks, tmp_path, capsys):
+def test_notebook_without_disk_space_is_refused_with_exit_code_2(notebooks, tmp_path, capsys):
     full = 'from szlib.errors import StorageError\nraise StorageError("no room")'
     notebooks(_00_fine='record.check("ok", True)', _01_full=full, _06_later="")
     assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
@@ -196,7 +196,7 @@ def test_parameters_are_checked_before_any_notebook_starts(given, message):
         check_parameters(given, folders.list_notebooks())
 
 
-def test_what_the_notebooks_set_themselves_is_in_range():
+def test_defaults_of_the_notebooks_are_in_range():
     from szlib.workbook.record.parameters import read_defaults
 
     for source in folders.list_notebooks():
@@ -204,7 +204,7 @@ def test_what_the_notebooks_set_themselves_is_in_range():
         check_parameters(given, [source])
 
 
-def test_in_a_kernel_a_parameter_is_text_and_never_code_and_an_error_is_reported(notebooks, tmp_path):
+def test_kernel_gets_parameters_as_text_and_reports_errors(notebooks, tmp_path):
     notebooks(_01_one='record.key["word"] = word', _02_crash="1 / 0")
     source = tmp_path / "notebooks" / "01_one.py"
     source.write_text(source.read_text().replace("seed = 0\n", 'seed = 0\nword = ""\n', 1))
@@ -218,7 +218,7 @@ def test_in_a_kernel_a_parameter_is_text_and_never_code_and_an_error_is_reported
 
 
 @pytest.mark.parametrize("value", ["9" * 5000, "[" * 100_000])
-def test_values_that_cannot_even_be_read(value, capsys):
+def test_unreadable_parameter_values_are_refused(value, capsys):
     refused(["run", "-p", f"seed={value}"], capsys, "seed")
 
 
@@ -230,7 +230,7 @@ def command(*arguments, **options):
     )  # fmt: skip
 
 
-def test_standard_output_that_is_full_or_knows_ascii_only(tmp_path):
+def test_full_or_ascii_standard_output_gives_one_line(tmp_path):
     make_plaza(tmp_path / "plätze.csv", settings=PlazaSettings(n_encounters=3))
     with Path("/dev/full").open("w") as full:
         done = command("inspect", str(tmp_path / "plätze.csv"), stdout=full)
@@ -243,7 +243,7 @@ def test_standard_output_that_is_full_or_knows_ascii_only(tmp_path):
     assert done.returncode == 0
 
 
-def test_sigterm_ends_a_command_as_ctrl_c_does(tmp_path):
+def test_sigterm_stops_extract_with_exit_code_143(tmp_path):
     days = [make_plaza(tmp_path / f"d{k}.csv", settings=PlazaSettings(n_encounters=300, date=f"2000-01-0{k}"))
             for k in range(1, 6)]  # fmt: skip
     done = command("extract", *map(str, days), "--out", str(tmp_path / "out"))
@@ -256,7 +256,7 @@ def test_sigterm_ends_a_command_as_ctrl_c_does(tmp_path):
     assert not list(tmp_path.rglob(".szlib-part-*"))
 
 
-def test_sigterm_ends_a_run_and_its_kernels(notebooks, tmp_path):
+def test_sigterm_stops_a_run_and_its_kernels(notebooks, tmp_path):
     sleeper = """
 import os, time
 record.table(__import__("pandas").DataFrame({"pid": [os.getpid()]}), "kernel")
@@ -287,7 +287,7 @@ time.sleep(120)"""
     assert not (tmp_path / "out" / "mine" / "summary.json").exists()
 
 
-def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypatch, capsys):
+def test_run_recovers_from_a_full_disk_at_any_write(notebooks, tmp_path, monkeypatch, capsys):
     notebooks(_01_one="", _06_two="")
     done = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
     monkeypatch.setattr(runner, "execute_notebook", lambda script, *_: (Path(script).stem, done))
@@ -308,13 +308,13 @@ def test_a_disk_that_is_full_at_any_write_of_a_run(notebooks, tmp_path, monkeypa
 
 
 @pytest.mark.filterwarnings("default")
-def test_jobs_are_capped_and_that_is_said(tmp_path, capsys):
+def test_too_many_jobs_are_reduced_with_a_warning(tmp_path, capsys):
     day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=3))
     assert main(["extract", str(day), "--out", str(tmp_path / "out"), "--jobs", "100000"]) == 0
     assert "n_jobs=100000 is reduced to 1" in capsys.readouterr().err
 
 
-def test_memory_is_granted_by_the_command_line(tmp_path, capsys):
+def test_memory_option_refuses_larger_data(tmp_path, capsys):
     file = tmp_path / "day.csv"
     file.write_text("t,id,x,y\n" + "0,1,0,0\n" * 20_000)
     refused(
@@ -322,6 +322,6 @@ def test_memory_is_granted_by_the_command_line(tmp_path, capsys):
     )
 
 
-def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+def test_error_names_a_folder_that_cannot_be_made(tmp_path):
     with pytest.raises(StorageError, match="cannot be made or read"):
         folders.claim_results("/proc/nowhere", "synthetic")

@@ -1,4 +1,4 @@
-"""Kernels of a run: forked where they can be, and like any other kernel all the same."""
+"""Forked kernels behave as any other kernel."""
 
 import io
 import os
@@ -31,7 +31,7 @@ def execute(folder, *codes):
     return [o["text"].strip() for o in outputs if "text" in o], [o["data"] for o in outputs if "data" in o]
 
 
-def test_a_kernel_has_the_folder_environment_and_memory_that_it_was_asked_for(tmp_path):
+def test_kernel_has_its_own_folder_environment_and_memory(tmp_path):
     look = "import os, szlib\n"
     look += (
         "where = os.getcwd()\nprint(where, os.environ['WORD'], os.getsid(0) - os.getpid(), szlib.__name__)"
@@ -42,7 +42,7 @@ def test_a_kernel_has_the_folder_environment_and_memory_that_it_was_asked_for(tm
     assert Path.cwd() != tmp_path and "WORD" not in os.environ
 
 
-def test_figures_are_shown_and_nothing_is_imported_twice(tmp_path):
+def test_kernel_shows_figures_and_has_imported_szlib(tmp_path):
     loaded = "import sys\nprint('casadi' in sys.modules, 'szlib.zones.social_zone' in sys.modules)"
     draw = "import matplotlib.pyplot as plt\nplt.plot([1, 2]); plt.show()"
     printed, shown = execute(tmp_path, loaded, draw)
@@ -50,7 +50,7 @@ def test_figures_are_shown_and_nothing_is_imported_twice(tmp_path):
     assert "image/png" in shown[-1]
 
 
-def test_a_figure_that_is_recorded_is_shown_once_as_it_was_drawn(tmp_path):
+def test_recorded_figure_is_shown_smaller_and_once(tmp_path):
     record = "from szlib.workbook.record import NotebookRecord\n"
     record += (
         f"record = NotebookRecord('99_test', {{'data': 'synthetic', 'results': {str(tmp_path / 'out')!r}}})"
@@ -64,7 +64,7 @@ def test_a_figure_that_is_recorded_is_shown_once_as_it_was_drawn(tmp_path):
     assert np.abs(small - large).mean() < 2
 
 
-def test_an_interrupt_is_one_and_who_is_killed_is_dead(tmp_path):
+def test_kernel_can_be_interrupted_and_killed(tmp_path):
     stop = "import os, signal, time\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(60)\n"
     printed, _ = execute(tmp_path, stop + "except KeyboardInterrupt:\n    print('stopped')")
     assert printed == ["stopped"]

@@ -1,4 +1,4 @@
-"""A record that holds: where results go, and that nobody else touches them."""
+"""Folders of results: one for each data set and choice of parameters, and locked while a run writes."""
 
 import json
 import os
@@ -38,7 +38,7 @@ def contents(folder):
     }
 
 
-def test_other_parameters_have_a_folder_of_their_own(workbook, tmp_path):
+def test_other_parameters_have_another_folder(workbook, tmp_path):
     run()
     before = contents(tmp_path / "out")
     run("--only", "08", "-p", "gamma=0.1")
@@ -53,7 +53,7 @@ def test_other_parameters_have_a_folder_of_their_own(workbook, tmp_path):
     assert len(list((tmp_path / "out").glob("mine-*"))) == 1, "a default is no other parameter"
 
 
-def test_a_notebook_executed_anew_leaves_the_others_in_the_summary(workbook, tmp_path):
+def test_summary_keeps_the_other_notebooks_of_the_same_data(workbook, tmp_path):
     run()
     folder = tmp_path / "out" / "mine"
     first = json.loads((folder / "summary.json").read_text())["notebooks"]
@@ -66,7 +66,7 @@ def test_a_notebook_executed_anew_leaves_the_others_in_the_summary(workbook, tmp
     assert list(json.loads((folder / "summary.json").read_text())["notebooks"]) == ["08_two"], "other data"
 
 
-def test_while_it_runs_no_summary_has_passed(workbook, tmp_path, monkeypatch):
+def test_summary_has_not_passed_before_the_run_ends(workbook, tmp_path, monkeypatch):
     run()
     monkeypatch.setattr(runner, "as_completed", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
     assert main(["run", "--data", "mine.csv", "--out", "out", "--only", "08"]) == 130
@@ -75,7 +75,7 @@ def test_while_it_runs_no_summary_has_passed(workbook, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("gamma", [0.05, 0.8])
-def test_what_is_executed_by_hand_touches_no_run(workbook, tmp_path, monkeypatch, gamma):
+def test_notebook_executed_by_hand_changes_no_run(workbook, tmp_path, monkeypatch, gamma):
     run()
     before = contents(tmp_path / "out")
     script = workbook / "08_two.py"
@@ -93,7 +93,7 @@ def test_what_is_executed_by_hand_touches_no_run(workbook, tmp_path, monkeypatch
     assert json.loads(left.read_text())["key_figures"] == {"gamma": gamma}
 
 
-def test_relative_results_start_at_the_notebooks(workbook, tmp_path, monkeypatch):
+def test_relative_results_folder_is_beside_the_notebooks(workbook, tmp_path, monkeypatch):
     monkeypatch.chdir("/")
     assert folders.results_root(folders.RESULTS) == tmp_path / "results"
 

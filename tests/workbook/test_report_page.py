@@ -1,4 +1,4 @@
-"""The report: one file that needs nothing else, and says what the run said."""
+"""The report: one file with everything that the run found."""
 
 import json
 import re
@@ -61,7 +61,7 @@ def page(tmp_path_factory, movie):
     return BeautifulSoup(write_report(home).read_text(encoding="utf-8"), "html.parser")
 
 
-def test_it_needs_no_other_file_and_no_network(page):
+def test_report_needs_no_other_file_and_no_network(page):
     asked = [tag.get(name) for tag in page.find_all(True) for name in ("src", "href") if tag.get(name)]
     assert asked
     assert all(address.startswith(("data:", "#")) for address in asked)
@@ -70,13 +70,13 @@ def test_it_needs_no_other_file_and_no_network(page):
     )
 
 
-def test_every_link_leads_somewhere(page):
+def test_every_link_has_a_target(page):
     places = {tag["id"] for tag in page.select("[id]")} | {"top"}
     assert {link["href"][1:] for link in page.select("td a[href], p a[href]")} <= places
     assert "next" in page.text and not [link for link in page.select("a") if link.text == "next"]
 
 
-def test_every_picture_says_what_it_shows(page):
+def test_every_picture_has_an_alt_text(page):
     alts = [image.get("alt") for image in page.select("img")]
     assert 'h "over" time' in alts
     assert all(alts)
@@ -87,7 +87,7 @@ def test_formulas_are_drawn_by_the_browser(page):
     assert page.select("math[display=block] mfrac")
 
 
-def test_the_front_page_says_what_came_out(page):
+def test_front_page_lists_checks_claims_and_parameters(page):
     assert "0 of 1 checks hold" in page.text
     assert "h >= 0 (-0.25)" in page.text
     rows = [[cell.text for cell in row.select("td")] for row in page.select("table.front tr")]
@@ -97,7 +97,7 @@ def test_the_front_page_says_what_came_out(page):
     assert page.text.count("Not part of this run") == 5  # funnel, zone, three scenarios
 
 
-def test_the_run_is_on_the_front_page_and_in_its_notebook_with_its_data(page, movie):
+def test_movie_is_on_the_front_page_and_in_its_notebook(page, movie):
     assert len(page.select("figure.szlib-player")) == 2
     script = page.select("figure.szlib-player + script")[0].text
     run = json.loads(re.search(r"const run = (.*);\n", script)[1])
@@ -107,12 +107,12 @@ def test_the_run_is_on_the_front_page_and_in_its_notebook_with_its_data(page, mo
     assert run["snapshots"][10]["people"] == [[3.5, 0, 3.142]]
 
 
-def test_code_is_there_but_folded(page):
+def test_code_is_folded(page):
     (code,) = page.select("details.code")
     assert "x < 1" in code.text and not code.has_attr("open")
 
 
-def test_where_nothing_was_executed_it_says_what_to_do(tmp_path, capsys):
+def test_report_without_notebooks_is_refused(tmp_path, capsys):
     with pytest.raises(DataError, match="holds no executed notebooks; `szlib run` makes them"):
         write_report(tmp_path)
     assert main(["report", str(tmp_path)]) == 2
@@ -121,7 +121,7 @@ def test_where_nothing_was_executed_it_says_what_to_do(tmp_path, capsys):
     assert "01_one.ipynb: cannot be read as a notebook" in capsys.readouterr().err
 
 
-def test_pictures_beside_the_notebooks_are_taken_along(tmp_path):
+def test_pictures_of_the_notebooks_are_embedded(tmp_path):
     text = '![a zone](figures/zone.png)\n\n<img src="figures/making_room.gif" alt="a robot">'
     cells = [nbformat.v4.new_markdown_cell(f"# 0 - Pictures\n\n{text}")]
     nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "00_pictures.ipynb")
