@@ -1,11 +1,11 @@
-"""The admissible-control polygon: what a step could have chosen, and what forbids the rest.
+"""The polygon of admissible controls: what a step could have chosen, and what forbids the rest.
 
 With a in place of the first acceleration and the rest of the plan as it is, the states are
 
     x_k(a) = x_k + dt^2 (k - 1/2) (a - u_0),   v_k(a) = v_k + dt (a - u_0),   k >= 1
 
-so each row of the problem is a condition on a alone.  A speed row leaves a disc; a barrier row leaves one
-side of a curve that is nearly straight, for in one step the robot moves by millimetres.
+so each row of the problem is a condition on a alone. A speed row allows a disc. A barrier row allows one side
+of a curve that is nearly straight, because the robot moves by millimetres in one step.
 """
 
 from __future__ import annotations
@@ -20,17 +20,22 @@ from .barriers import cbf_residual, compute_h
 from .step import Step
 
 _REACH = 3
-"""The box of accelerations ends within so many times its half-width of any point in it."""
+"""Reach of the curves, in half-widths of the box of accelerations: enough to cross the whole box."""
 _POINTS = 49
 """Points of each curve: between two of them it is straight to 1e-3 m/s2."""
 _BISECTIONS = 20
-"""Halvings after which nothing is left of the width of the box that could be seen."""
+"""Halvings after which the rest of the box is too narrow to be seen."""
 
 
 class BarrierLimit(NamedTuple):
-    """The edge of what one barrier row allows: of which person or wall, from k to k+1, shape (n, 2) [m/s2].
+    """The edge of what one barrier row allows.
 
-    The curve passes what is allowed on its left.
+    Attributes
+    ----------
+    kind : "person" or "wall".
+    number : of the person or wall.
+    k : the row links steps k and k + 1 of the plan.
+    curve : points with the allowed side on the left, shape (n, 2) [m/s2].
     """
 
     kind: Literal["person", "wall"]
@@ -40,10 +45,12 @@ class BarrierLimit(NamedTuple):
 
 
 class AdmissibleControls(NamedTuple):
-    """All accelerations that obey every row, with the rest of the plan kept [m/s2, world frame].
+    """All first accelerations that obey every row, with the rest of the plan unchanged [m/s2, world frame].
 
-    `polygon` is a Shapely polygon, of several parts or empty where the rows leave it so; `limits` are the
-    barrier rows that take something away from the box and the speed limit.
+    Attributes
+    ----------
+    polygon : a Shapely polygon, which may be empty or have several parts.
+    limits : the barrier rows that forbid something that the bounds and the speed limit allow.
     """
 
     polygon: Any
@@ -51,10 +58,25 @@ class AdmissibleControls(NamedTuple):
 
 
 def find_admissible_controls(step: Step) -> AdmissibleControls:
-    """The accelerations among which a step could choose: bounds, speed limit, and every barrier row.
+    """Find the accelerations that a step could have chosen: bounds, speed limit, and every barrier row.
 
-    A terminal condition is left out: with the rest of the plan kept it leaves the chosen one alone.  Of a
-    step whose plan is not feasible the polygon is empty, or does not hold the control.
+    A terminal condition is ignored, because with the rest of the plan unchanged it allows only the chosen
+    acceleration. If the plan is not feasible, the polygon is empty or does not contain the control.
+
+    Parameters
+    ----------
+    step : of an `MPCCBF`.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> import szlib
+    >>> from szlib.control import find_admissible_controls
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> step = controller.step((-2.5, 0.0, 0.2, 0.0), (4.0, 0.0), [szlib.Person((0.0, 0.0))])
+    >>> found = find_admissible_controls(step)
+    >>> found.polygon.distance(shapely.Point(step.control)) < 1e-3
+    True
     """
     s, u0, x = step.scene.settings, step.control, step.predicted
     free = shapely.box(-s.a_max, -s.a_max, s.a_max, s.a_max)
@@ -75,7 +97,7 @@ def find_admissible_controls(step: Step) -> AdmissibleControls:
 
 
 def _edges(step: Step) -> list[tuple[Array, Array]]:
-    """Of each barrier row, obstacle by obstacle, its edge as seen along the way in, and that way."""
+    """The edge of each barrier row, obstacle by obstacle, and the direction to its allowed side."""
     s, u0 = step.scene.settings, step.control
     reach, rows = _REACH * s.a_max, (len(step.h), s.N_h)
     nudges = 1e-3 * s.a_max * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
@@ -96,13 +118,13 @@ def _edges(step: Step) -> list[tuple[Array, Array]]:
 
 
 def _residuals(step: Step, first: Array) -> Array:
-    """What each barrier row leaves over with other first accelerations, (obstacles, N_h, n, 2) to (.., n)."""
+    """Residual of each barrier row for other first accelerations, (obstacles, N_h, n, 2) to (.., n)."""
     s, k = step.scene.settings, np.arange(step.scene.settings.N_h + 1)[:, None]
     moved = s.dt**2 * np.maximum(k - 0.5, 0)[..., None]
     left = []
-    for i, of_one in enumerate(first - step.control):
+    for i, change in enumerate(first - step.control):
         now, after = (
-            _barrier(step, i, step.predicted[rows, None, :2] + moved[rows] * of_one, s.dt * k[rows])
+            _barrier(step, i, step.predicted[rows, None, :2] + moved[rows] * change, s.dt * k[rows])
             for rows in (slice(s.N_h), slice(1, s.N_h + 1))
         )
         left.append(cbf_residual(after, now, s.gamma))

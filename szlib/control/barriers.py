@@ -6,8 +6,8 @@
     barrier   h = d - r_robot - eps, safe where h >= 0                      (paper, sec. 4)
     CBF       h(x_{k+1}) - h(x_k) >= -gamma h(x_k)                          (paper, eq. 1)
 
-`|t| - t` stands for the paper's norm of a scalar. Each formula is written once, in operators only,
-so that the same lines run on floats, on NumPy arrays and on the symbols of CasADi.
+`|t| - t` stands for the paper's norm of a scalar. Each formula is written once, with operators only, so that
+the same lines run on floats, on NumPy arrays and on the symbols of CasADi.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 
 SHORTEST_WALL = 1e-3
-"""Length below which the direction of a wall is not usable [m]; a pillar may be a wall of a millimetre."""
+"""Below this length the direction of a wall cannot be used [m]; a pillar may be a wall of a millimetre."""
 
 
 def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
-    """Approximate distance of (x, y) to the segment from (xa, ya) to (xb, yb) [m] (paper, eq. 3-5)."""
+    """Approximate distance of (`x`, `y`) to the segment (`xa`, `ya`) to (`xb`, `yb`) [m] (paper, eq. 3-5)."""
     length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
     g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
     t = ((length / 2) ** 2 - (x - (xa + xb) / 2) ** 2 - (y - (ya + yb) / 2) ** 2) / length
@@ -36,7 +36,7 @@ def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
 
 
 def euclidean_segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
-    """Euclidean distance of (x, y) to the segment from (xa, ya) to (xb, yb) [m]: what a disc feels."""
+    """Euclidean distance of (`x`, `y`) to the segment from (`xa`, `ya`) to (`xb`, `yb`) [m]."""
     length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
     g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
     along = ((x - (xa + xb) / 2) * (xb - xa) + (y - (ya + yb) / 2) * (yb - ya)) / length
@@ -45,12 +45,28 @@ def euclidean_segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any
 
 
 def ellipse_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any, a: Any) -> Any:
-    """Approximate distance of (x, y) to the ellipse of these foci and semi-major axis [m] (paper, eq. 7)."""
+    """Approximate distance of (`x`, `y`) to an ellipse [m] (paper, eq. 7).
+
+    The foci are (`xa`, `ya`) and (`xb`, `yb`), the semi-major axis is `a`.
+    """
     return (((x - xa) ** 2 + (y - ya) ** 2) ** 0.5 + ((x - xb) ** 2 + (y - yb) ** 2) ** 0.5) / 2 - a
 
 
 def barrier(distance: Any, radius: float, margin: Any) -> Any:
-    """h = d - r_robot - eps [m]: safe where it is not negative (paper, sec. 4)."""
+    """Barrier h = d - r_robot - eps [m]: safe where it is not negative (paper, sec. 4).
+
+    Parameters
+    ----------
+    distance : d, to a wall or a zone [m].
+    radius : of the robot [m].
+    margin : eps [m].
+
+    Examples
+    --------
+    >>> from szlib.control import barrier
+    >>> barrier(2.0, radius=0.5, margin=0.25)
+    1.25
+    """
     return distance - (radius + margin)
 
 
@@ -95,15 +111,28 @@ def compute_h(
 
 
 def cbf_residual(h_next: Any, h: Any, gamma: float) -> Any:
-    """What the discrete CBF condition leaves over [m]: satisfied where it is not negative (paper, eq. 1)."""
+    """Residual of the discrete CBF condition [m]: satisfied where it is not negative (paper, eq. 1).
+
+    Parameters
+    ----------
+    h_next : h one step later [m].
+    h : now [m].
+    gamma : fraction of h that a step may use up.
+
+    Examples
+    --------
+    >>> from szlib.control import cbf_residual
+    >>> cbf_residual(h_next=0.5, h=1.0, gamma=0.5)
+    0.0
+    """
     return h_next - (1 - gamma) * h
 
 
 def segment_distance(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
     """Approximate distance of points to the segment from a to b (paper, eq. 3-5).
 
-    Zero exactly on the segment and positive elsewhere. Euclidean for points in the disc that has the
-    segment as its diameter; beyond, an approximation that is exact to first order at the ends.
+    It is zero exactly on the segment and positive elsewhere. It is Euclidean for points in the disc that has
+    the segment as its diameter; beyond, it is an approximation that is exact to first order at the ends.
 
     Parameters
     ----------
@@ -116,7 +145,13 @@ def segment_distance(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
 
     Raises
     ------
-    SolverError : the segment has no length, or a shape or a number is not usable.
+    SolverError : the segment has no length, or a shape or a number cannot be used.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> szlib.segment_distance([(0.0, 0.5), (0.0, -0.5)], (-1.0, 0.0), (1.0, 0.0)).tolist()
+    [0.5, 0.5]
     """
     xy = check_array("points", points, (..., 2))
     (xa, ya), (xb, yb) = check_wall([np.asarray(a), np.asarray(b)])
@@ -126,7 +161,8 @@ def segment_distance(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
 def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
     """Approximate signed distance of points to an ellipse, from the sum of focal distances (paper, eq. 7).
 
-    Zero on the ellipse, negative inside (at least -(a - c)), positive outside; Euclidean for a circle.
+    It is zero on the ellipse, negative inside (at least -(a - c)), and positive outside. For a circle it is
+    Euclidean.
 
     Parameters
     ----------
@@ -136,13 +172,20 @@ def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
     Returns
     -------
     Distances, shape (...) [m].
+
+    Examples
+    --------
+    >>> import szlib
+    >>> circle = szlib.Ellipse(center=(0.0, 0.0), semi_axes=(1.0, 1.0))
+    >>> szlib.ellipse_distance([(2.0, 0.0), (0.0, 0.0)], circle).tolist()
+    [1.0, -1.0]
     """
     xy = check_array("points", points, (..., 2))
     return np.asarray(ellipse_formula(xy[..., 0], xy[..., 1], *ellipse.foci_and_axis))
 
 
 def check_wall(wall: ArrayLike) -> Array:
-    """A wall's end points, shape (2, 2) [m]; SolverError unless usable and not below `SHORTEST_WALL`."""
+    """End points of a `wall`, shape (2, 2) [m]; SolverError if it is shorter than `SHORTEST_WALL`."""
     ends = check_array("wall", wall, (2, 2))
     length = np.hypot(*(ends[1] - ends[0]))
     if length == 0:
@@ -156,18 +199,24 @@ def check_wall(wall: ArrayLike) -> Array:
 
 
 def read_walls(walls: Any) -> Array:
-    """Walls as segments, shape (n, 2, 2) [m], in the order in which they are given.
+    """Read walls as segments, shape (n, 2, 2) [m], in the order in which they are given.
 
     Parameters
     ----------
     walls : segments, shape (2, 2) each; polylines, shape (m, 2); Shapely's lines, rings, polygons and
-        collections, or whatever has `.coords`, `.exterior` and `.interiors`, or `.geoms` as they do; one or
-        many, nested in any way. Of a polygon its outline and the edges of its holes count. Corners of a line
-        that are not `SHORTEST_WALL` apart count as one.
+        collections, or objects with `.coords`, `.exterior` and `.interiors`, or `.geoms` like them; one or
+        many, nested in any way. The outline of a polygon and the edges of its holes are walls. Corners of a
+        line that are closer than `SHORTEST_WALL` count as one.
 
     Raises
     ------
-    SolverError : something is no wall, or a number is not usable.
+    SolverError : something is no wall, or a number cannot be used.
+
+    Examples
+    --------
+    >>> from szlib.control import read_walls
+    >>> read_walls([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]).shape  # a polyline of two segments
+    (2, 2, 2)
     """
     found = [check_wall(piece) for line in _lines(walls) for piece in _pieces(line)]
     return np.reshape(np.array(found, float), (-1, 2, 2))

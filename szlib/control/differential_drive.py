@@ -1,11 +1,12 @@
 """A differential drive: a point ahead of the axle is driven, and the wheels follow it exactly.
 
-The robot is a disc of radius r about the middle c of its axle, heading theta. It is told a speed v and a
-turning rate omega, and holds them for dt. `MPCCBF` drives the point
+The robot is a disc of radius r about the middle c of its axle, heading theta. It holds a commanded speed v
+and turning rate omega for dt. `MPCCBF` drives the point
 
     p = c + L e(theta),     e = (cos theta, sin theta),     L = `ahead`
 
-as a double integrator, which it can be: p moves sideways as the robot turns. The disc lies within r + L of p.
+as a double integrator. This is possible because p moves sideways as the robot turns. The disc lies within
+r + L of p.
 
 *At the samples p is where the plan says.* Let the plan move p by xi ahead and eta to the left within dt, and
 let the robot turn by 2 beta = omega dt. Seen at the heading theta + beta, half way, c moves straight ahead by
@@ -26,9 +27,9 @@ By both lines (v dt)^2 = (D^2 - 4 L^2 sin^2 beta) beta^2 / sin^2 beta <= D^2, fo
 
 *Between samples* p runs along an arc that turns by 2 beta, and leaves its chord by at most
 
-    bow = V dt / 2 * tan(beta_max / 2),     sin(beta_max) = V dt / 2 L                   (5 mm by default)
+    chord_error = V dt / 2 * tan(beta_max / 2),     sin(beta_max) = V dt / 2 L           (5 mm by default)
 
-*From p to the disc.* The point keeps r' = r + eps + L + bow, and no margin besides. People: the focal
+*From p to the disc.* The point keeps r' = r + eps + L + chord_error, and no other margin. People: the focal
 distance changes by no more than the way, so h >= 0 at p is h >= 0 at c. A wall of length l: write its
 distance as d = s + s^2 / l. With t its trimming term, 0 <= t <= d, |grad d|^2 = 1 + 4 t / l, and ds/dd is
 (1 + 4 d / l)^(-1/2): s changes by no more than the way either. h >= 0 at p says s >= r' there, so
@@ -69,27 +70,37 @@ OMEGA_MAX = 4.0
 
 @dataclass(frozen=True)
 class Unicycle:
-    """How a differential drive moves: state (x, y, theta, v, omega) [m, rad, m/s, rad/s], told (v, omega).
+    """How a differential drive moves: state (x, y, theta, v, omega), driven by (v, omega).
 
-    `heading` [rad] is that of a robot that starts at rest; one that moves, heads where it goes.
+    Parameters
+    ----------
+    heading : of a robot that starts at rest [rad]; a moving robot heads in its direction of motion.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from szlib.control import Unicycle
+    >>> own = Unicycle().start((0.0, 0.0, 1.0, 0.0))
+    >>> Unicycle().advance(own, np.array([1.0, 0.0]), dt=0.1)[:2].round(3).tolist()
+    [0.1, 0.0]
     """
 
     heading: float = 0.0
     inputs = ("v", "omega")
 
     def start(self, state: ArrayLike) -> Array:
-        """The robot's own state, shape (5,), from (x, y, vx, vy) of its centre."""
+        """The robot's own state, shape (5,), from `state`, (x, y, vx, vy) of its centre."""
         x, y, vx, vy = check_vector("state", state, 4)
         heading = atan2(vy, vx) if vx or vy else self.heading
         return np.array([x, y, heading, hypot(vx, vy), 0.0])
 
     def body(self, own: Array) -> Array:
-        """(x, y, vx, vy) of the disc's centre."""
+        """(x, y, vx, vy) of the disc's centre, from the robot's state `own`."""
         x, y, theta, v, _ = own.tolist()
         return np.array([x, y, v * cos(theta), v * sin(theta)])
 
     def advance(self, own: Array, control: Array, dt: float) -> Array:
-        """The state after (v, omega) was held for dt: exact, along an arc."""
+        """The state after `own` when `control`, (v, omega), was held for `dt` [s]: exact, along an arc."""
         (x, y, theta, _, _), (v, omega) = own.tolist(), control.tolist()
         half = omega * dt / 2
         chord = v * dt * float(np.sinc(half / pi))
@@ -99,16 +110,17 @@ class Unicycle:
 
 @dataclass(frozen=True)
 class DriveStep:
-    """What a differential drive is told, and how far that can be relied upon.
+    """What a differential drive does next, and how far it can be relied upon.
 
     Attributes
     ----------
     control : (v, omega) to hold for the next dt, within their limits, shape (2,) [m/s, rad/s].
     predicted : (x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s].
     h : barriers of the disc now, people before walls, shape (people + walls,) [m].
-    safe : as `Step.safe`, of the disc: nobody is lost, the plan satisfies the hard problem, and the disc has
-        h >= 0 and overlaps no body and no wall, neither now nor dt later, if people keep their velocity.
-    point : the step of the point ahead of the axle: its plan, and all else that `Step` tells.
+    safe : as `Step.safe`, for the disc: no person is unknown, the plan satisfies the hard problem, and the
+        disc has h >= 0 and overlaps no body and no wall, neither now nor dt later, if people keep their
+        velocity.
+    point : the step of the point ahead of the axle, a `Step`.
     solve_time : wall-clock time of the whole step [s].
     """
 
@@ -121,12 +133,12 @@ class DriveStep:
 
     @property
     def fallback(self) -> Fallback:
-        """The fallback of the ladder that gave the plan: see `Step.fallback`."""
+        """The way in which the plan was found: see `Step.fallback`."""
         return self.point.fallback
 
     @property
     def slack(self) -> float:
-        """Largest violation of a hard row by the point's plan: see `Step.slack`."""
+        """Largest violation of a hard row by the plan of the point: see `Step.slack`."""
         return self.point.slack
 
     @property
@@ -136,14 +148,14 @@ class DriveStep:
 
 
 class _Point(MPCCBF):
-    """The point ahead of the axle; whether a goal can be reached, the disc decides."""
+    """The controller of the point ahead of the axle. The goal is checked for the disc instead."""
 
     def _check_goal(self, goal: tuple[float, float]) -> None:
         pass
 
 
 class DifferentialDrive(Controller):
-    """Drives a robot with two wheels to a goal, outside the social zones of people and clear of walls.
+    """Drives a robot with two wheels to a goal, outside the social zones of people and away from walls.
 
     Parameters
     ----------
@@ -151,21 +163,32 @@ class DifferentialDrive(Controller):
     settings : of the robot: `r_robot` its radius about the middle of the axle, `v_max` the limit of |v|;
         `a_max` bounds the acceleration of the point ahead of the axle.
     omega_max : limit of |omega| [rad/s].
-    ahead : distance of the point from the axle [m]; default: the least one at which `settings.v_max` is
-        reached, about v_max / omega_max. With less the robot is slower, with more it needs more room: it
-        passes through what is passable for a double integrator of the radius r_robot + ahead.
+    ahead : distance of the point from the axle [m]; default: the smallest one with which `settings.v_max` can
+        be reached, about v_max / omega_max. With less the robot is slower, with more it needs more space: it
+        fits where a double integrator of the radius r_robot + ahead fits.
 
     Attributes
     ----------
-    robot : how it moves: `Unicycle`.
-    v_max : speed that it really reaches [m/s]; see `ahead`.
-    bow : how far the point leaves the straight line between two samples at most [m].
-    room : how far off walls and zones of people who stand a goal must be to be reached from any side [m]; the
-        disc's centre comes to rest there, at any heading. Nearer goals may be missed by up to 2 `ahead`.
+    robot : how it moves: a `Unicycle`.
+    v_max : speed that it can reach [m/s]; see `ahead`.
+    chord_error : largest distance of the point from the straight line between two samples [m].
+    goal_clearance : distance of a goal from walls, and from zones of people who stand, at which it can be
+        reached from any side [m]; the disc's centre comes to rest there, at any heading. A closer goal may be
+        missed by up to 2 `ahead`.
 
     Raises
     ------
-    SolverError : a limit is not usable, or as of `MPCCBF`.
+    SolverError : a limit cannot be used, or as of `MPCCBF`.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> zone = szlib.Ellipse(center=(0.1, 0.0), semi_axes=(1.0, 0.7))
+    >>> drive = szlib.DifferentialDrive(zone, settings=szlib.MPCSettings(r_robot=0.3), omega_max=4.0)
+    >>> step = drive.step((-4.0, 0.0, 0.0), goal=(4.0, 0.0), people=[szlib.Person((0.0, 0.2), (-0.5, 0.0))])
+    >>> v, omega = step.control  # [m/s, rad/s]
+    >>> step.safe
+    True
     """
 
     settings: MPCSettings
@@ -194,17 +217,17 @@ class DifferentialDrive(Controller):
         if not self.ahead > 0:
             raise SolverError(f"ahead must be positive: the axle itself cannot move sideways; got {ahead}")
         self.v_max = min(s.v_max, self.ahead * turn)
-        self.bow = self.v_max * s.dt / 2 * tan(asin(self.v_max * s.dt / 2 / self.ahead) / 2)
-        radius = s.r_robot + s.eps + self.ahead + self.bow
+        self.chord_error = self.v_max * s.dt / 2 * tan(asin(self.v_max * s.dt / 2 / self.ahead) / 2)
+        radius = s.r_robot + s.eps + self.ahead + self.chord_error
         grown = replace(s, r_robot=radius, eps=0.0, margin="euclidean", v_max=self.v_max)
-        self.room = radius + self.ahead
+        self.goal_clearance = radius + self.ahead
         self._point = _Point(zone, walls=walls, settings=grown, max_people=max_people, tracker=tracker)
         self.zone = self._point.zone
         self._take_walls()
         self.reset()
 
     def set_walls(self, walls: Any) -> None:
-        """Know these walls from the next step on: as of `MPCCBF.set_walls`."""
+        """Replace the `walls`, from the next step on: see `MPCCBF.set_walls`."""
         self._point.set_walls(walls)
         self._take_walls()
 
@@ -213,10 +236,10 @@ class DifferentialDrive(Controller):
         self._wall_rows = walls_with_margins(self.walls, self.settings)
 
     def reset(self) -> None:
-        """Forget the last plan, command and goal."""
+        """Forget the last plan and command, and all people."""
         self._point.reset()
-        self._told: list[float] = []
-        self._planned = [0.0, 0.0]
+        self._command: list[float] = []
+        self._planned_velocity = [0.0, 0.0]
 
     def step(
         self,
@@ -228,29 +251,33 @@ class DifferentialDrive(Controller):
         stamps: ArrayLike | None = None,
         now: float | None = None,
     ) -> DriveStep:
-        """The (v, omega) to hold for the next `dt`.
+        """Decide the (v, omega) to hold for the next `dt`.
 
         Parameters
         ----------
-        state : (x, y, theta) of the axle's middle [m, rad], or with (v, omega) as well [m/s, rad/s]. The plan
-            begins at the velocity that was planned for the point; at what (v, omega) say where that is
-            farther from the last command than a_max dt: the robot was held back, or pushed.
+        state : (x, y, theta) of the axle's middle [m, rad], or (x, y, theta, v, omega) [m, rad, m/s, rad/s].
+            The plan begins at the planned velocity of the point. If the robot was stopped or pushed,
+            and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega).
         goal : (x, y) of the disc's centre [m].
-        people, ids, stamps, now : as of `MPCCBF.step`, and so is what is raised.
+        people, ids, stamps, now : as of `MPCCBF.step`.
+
+        Raises
+        ------
+        SolverError : as of `MPCCBF.step`.
         """
         began = perf_counter()
         own = check_array("state", state, (5,) if np.size(state) == 5 else (3,)).tolist()
         x, y, theta = own[:3]
-        there, lever = check_array("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
-        if not self._told and min(self.barriers(there), default=0.0) < 0:
+        centre, lever = check_array("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
+        if not self._command and min(self.barriers(centre), default=0.0) < 0:
             raise SolverError(
-                f"the goal {there.tolist()} cannot be reached: it lies too close to a wall; choose one "
-                f"{self.room:.2f} m off all walls"
+                f"the goal {centre.tolist()} cannot be reached: it lies too close to a wall; choose one at "
+                f"least {self.goal_clearance:.2f} m away from all walls"
             )
         start = (*(own[:2] + lever).tolist(), *self._velocity(theta, own[3:]))
-        point = self._point.step(start, there + lever, people, ids=ids, stamps=stamps, now=now)
+        point = self._point.step(start, centre + lever, people, ids=ids, stamps=stamps, now=now)
         states, controls = self._follow(own, point.predicted[1:, :2])
-        self._told, self._planned = controls[0].tolist(), point.predicted[1, 2:].tolist()
+        self._command, self._planned_velocity = controls[0].tolist(), point.predicted[1, 2:].tolist()
         scene, dt = point.scene._replace(settings=self.settings, walls=self._wall_rows), self.settings.dt
         h, (x1, y1) = scene.h(x, y), states[1][:2].tolist()
         smallest = min(h + scene.h(x1, y1, dt) + scene.gaps(x, y) + scene.gaps(x1, y1, dt), default=0.0)
@@ -264,24 +291,24 @@ class DifferentialDrive(Controller):
         )
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
-        """h of every person and then of every wall, for the disc there, shape (people + walls,) [m]."""
+        """h of all `people` and then of all walls, for the disc at `position`, shape (n,) [m]."""
         (x, y), s = check_point("position", position), self.settings
         zones = [place_zone(person, self._point.zone_of(person)) for person in people]
         return np.array(compute_h(x, y, zones, self._wall_rows, r_robot=s.r_robot, eps=s.eps))
 
     def _velocity(self, theta: float, given: list[float]) -> list[float]:
-        """Velocity of the point: planned, unless the robot moves otherwise than it was told."""
-        told = self._told or [0.0, 0.0]
-        v, omega = given or told
-        off = hypot(v - told[0], self.ahead * (omega - told[1]))
-        if self._told and off <= self.settings.a_max * self.settings.dt:
-            return self._planned
+        """Velocity of the point: as planned, unless the robot does not follow its command."""
+        command = self._command or [0.0, 0.0]
+        v, omega = given or command
+        deviation = hypot(v - command[0], self.ahead * (omega - command[1]))
+        if self._command and deviation <= self.settings.a_max * self.settings.dt:
+            return self._planned_velocity
         c, s, sideways = cos(theta), sin(theta), self.ahead * omega
         return [v * c - sideways * s, v * s + sideways * c]
 
     def _follow(self, own: list[float], points: Array) -> tuple[list[Array], list[Array]]:
-        """The disc's states, now and after each of the commands that bring the point to points (N, 2)."""
-        dt, at = self.settings.dt, np.array([*own[:3], *(own[3:] or self._told or [0.0, 0.0])])
+        """States of the disc, and the commands that bring the point to `points`, shape (N, 2)."""
+        dt, at = self.settings.dt, np.array([*own[:3], *(own[3:] or self._command or [0.0, 0.0])])
         states, controls = [self.robot.body(at)], []
         for px, py in points.tolist():
             x, y, theta = at[:3].tolist()

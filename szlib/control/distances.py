@@ -1,4 +1,4 @@
-"""The paper's distances against the Euclidean ones, and the margin that makes them safe.
+"""The paper's distances compared with Euclidean ones, and the margin that makes them safe.
 
 A robot of radius r must stay r away from a wall or a zone, in Euclidean distance e. The barrier keeps
 d >= r + eps instead, so eps is large enough where {e < r} lies inside {d < r + eps}:
@@ -14,9 +14,9 @@ line. Its trimming term is r cos phi + r^2/L, so d^2 = r^2 + 2 (r^3/L) cos phi +
 greatest straight ahead of the end: d = r + r^2/L. A point beside the wall, u <= L/2 from the end, has
 the term (r^2 - u (L-u))/L at most, and is exact where that is negative.
 
-So the controller gives each wall the margin it requires (`wall_margin`). That costs
-0.42 r of room at most, beside a wall of L = 2 r; around a pillar, L -> 0, {d < r + r^2/L} becomes the
-disc of radius r, and nothing is lost.
+So the controller gives each wall the margin it requires (`wall_margin`). This costs at most 0.42 r of space,
+beside a wall of L = 2 r. Around a pillar, L -> 0, {d < r + r^2/L} becomes the disc of radius r, and it costs
+nothing.
 """
 
 from __future__ import annotations
@@ -32,25 +32,47 @@ from .barriers import check_wall, ellipse_distance, euclidean_segment_formula, s
 from .settings import MPCSettings
 
 _BISECTIONS = 60
-"""Halvings of a quarter turn until nothing is left of it in double precision."""
+"""Halvings of a quarter turn that reach double precision."""
 
 
 def euclidean_to_segment(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
-    """Euclidean distance of points (..., 2) to the segment from a to b, shape (...) [m]."""
+    """Euclidean distance of `points`, shape (..., 2), to the segment from `a` to `b`, shape (...) [m].
+
+    Examples
+    --------
+    >>> from szlib.control import euclidean_to_segment
+    >>> euclidean_to_segment([(0.0, 0.5), (2.0, 0.0)], (-1.0, 0.0), (1.0, 0.0)).tolist()
+    [0.5, 1.0]
+    """
     xy = check_array("points", points, (..., 2))
     (xa, ya), (xb, yb) = check_wall([np.asarray(a), np.asarray(b)])
     return np.asarray(euclidean_segment_formula(xy[..., 0], xy[..., 1], xa, ya, xb, yb))
 
 
 def euclidean_to_ellipse(points: ArrayLike, ellipse: Ellipse) -> Array:
-    """Euclidean signed distance of points (..., 2) to an ellipse, negative inside, shape (...) [m].
+    """Euclidean signed distance of points to an ellipse, negative inside, shape (...) [m].
 
-    Of (p, q) in the first quadrant of the ellipse's frame, the nearest point (a cos t, b sin t) is where
-    half the derivative of the squared distance by t,
+    Parameters
+    ----------
+    points : positions, shape (..., 2) [m].
+    ellipse : the zone.
 
-        a p sin t - b q cos t - (a^2 - b^2) sin t cos t,
+    Notes
+    -----
+    For (p, q) in the first quadrant of the ellipse's frame the nearest point is (a cos t, b sin t), with t
+    the root of half the derivative of the squared distance,
 
-    which is negative below the one root inside the quadrant and positive above it, changes its sign.
+        a p sin t - b q cos t - (a^2 - b^2) sin t cos t.
+
+    It is negative below this one root in the quadrant and positive above, so bisection finds it.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.control import euclidean_to_ellipse
+    >>> ellipse = szlib.Ellipse((0.0, 0.0), (2.0, 1.0))
+    >>> euclidean_to_ellipse([(3.0, 0.0), (0.0, 2.0)], ellipse).round(6).tolist()
+    [1.0, 1.0]
     """
     offset = check_array("points", points, (..., 2)) - ellipse.center
     (a, b), cos, sin = ellipse.semi_axes, np.cos(ellipse.angle), np.sin(ellipse.angle)
@@ -66,10 +88,20 @@ def euclidean_to_ellipse(points: ArrayLike, ellipse: Ellipse) -> Array:
 
 
 def required_margin(of: Ellipse | ArrayLike, r_robot: float) -> float:
-    """The least eps that keeps a robot of this radius out of a zone or off a wall, exactly [m].
+    """The smallest eps with which a robot never touches a zone or a wall [m].
 
-    0 for an ellipse, r_robot^2 / L for a wall of length L given by its ends, shape (2, 2) [m]; see the
-    proof at the top of this module.
+    It is 0 for an ellipse, and r_robot^2 / L for a wall of length L; see the proof at the top of this module.
+
+    Parameters
+    ----------
+    of : an ellipse, or the end points of a wall, shape (2, 2) [m].
+    r_robot : radius of the robot [m].
+
+    Examples
+    --------
+    >>> from szlib.control import required_margin
+    >>> required_margin([(0.0, 0.0), (1.0, 0.0)], r_robot=0.5)
+    0.25
     """
     if isinstance(of, Ellipse):
         return 0.0
@@ -78,7 +110,14 @@ def required_margin(of: Ellipse | ArrayLike, r_robot: float) -> float:
 
 
 def wall_margin(wall: ArrayLike, settings: MPCSettings) -> float:
-    """The margin that the controller keeps around a wall [m]: what it requires and at least eps, or eps."""
+    """Margin that the controller keeps around a `wall` by its `settings` [m]: see `MPCSettings.margin`.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> szlib.control.wall_margin([(0.0, 0.0), (1.0, 0.0)], szlib.MPCSettings(r_robot=0.5))
+    0.25
+    """
     needed = required_margin(wall, settings.r_robot) if settings.margin == "euclidean" else 0.0
     return max(settings.eps, needed)
 
@@ -96,13 +135,13 @@ def walls_with_margins(walls: Array, settings: MPCSettings) -> list[list[float]]
 
 @dataclass(frozen=True)
 class DistanceComparison:
-    """What the approximate distance does on the line h = 0, where it decides.
+    """The error of the approximate distance on the line h = 0.
 
     Attributes
     ----------
-    nearest, farthest : Euclidean gap left between the robot's disc and the zone or wall [m]; `nearest`
-        below 0 is a collision that the barrier calls safe, `farthest` beyond eps is room given away.
-    required : the margin that makes `nearest` 0 [m]; see `required_margin`.
+    nearest, farthest : smallest and largest Euclidean gap between the robot's disc and the zone or wall [m].
+        `nearest` below 0 is a collision that the barrier calls safe; `farthest` above eps is wasted space.
+    required : the margin with which `nearest` is 0 [m]; see `required_margin`.
     """
 
     nearest: float
@@ -113,7 +152,21 @@ class DistanceComparison:
 def compare_distances(
     of: Ellipse | ArrayLike, *, r_robot: float, eps: float, n: int = 2001
 ) -> DistanceComparison:
-    """Compare the distances on n points of each arc of h = 0 around a zone, or a wall given by its ends."""
+    """Compare the approximate with the Euclidean distance on the line h = 0.
+
+    Parameters
+    ----------
+    of : an ellipse, or the end points of a wall, shape (2, 2) [m].
+    r_robot : radius of the robot [m].
+    eps : margin [m].
+    n : number of points on each arc.
+
+    Examples
+    --------
+    >>> from szlib.control import compare_distances
+    >>> round(compare_distances([(0.0, 0.0), (1.0, 0.0)], r_robot=0.5, eps=0.05).nearest, 2)  # they overlap
+    -0.11
+    """
     points = find_safe_boundary(of, r_robot + eps, n)
     if isinstance(of, Ellipse):
         gap = euclidean_to_ellipse(points, of) - r_robot
@@ -123,9 +176,17 @@ def compare_distances(
 
 
 def find_safe_boundary(of: Ellipse | ArrayLike, distance: float, n: int = 2001) -> Array:
-    """Points where the approximate distance is `distance` > 0, shape (m, 2) [m].
+    """Find points where the approximate distance is `distance` > 0, shape (m, 2) [m].
 
-    Around a zone the confocal ellipse of semi-major axis a + distance. Around a wall, in its own frame,
+    Parameters
+    ----------
+    of : an ellipse, or the end points of a wall, shape (2, 2) [m].
+    distance : approximate distance of the points [m].
+    n : number of points on each arc.
+
+    Notes
+    -----
+    Around a zone it is the confocal ellipse of semi-major axis a + distance. Around a wall, in its own frame,
     y = distance sin psi and x^2 = L^2/4 + L distance cos psi - y^2, for each end and side.
     """
     if isinstance(of, Ellipse):
@@ -143,7 +204,7 @@ def find_safe_boundary(of: Ellipse | ArrayLike, distance: float, n: int = 2001) 
 
 
 def compute_distance_error(points: ArrayLike, of: Ellipse | ArrayLike) -> Array:
-    """Approximate less Euclidean distance at points (..., 2), shape (...) [m]: dangerous where positive."""
+    """Approximate minus Euclidean distance of `points` (..., 2) to `of` [m]: dangerous if positive."""
     if isinstance(of, Ellipse):
         return ellipse_distance(points, of) - euclidean_to_ellipse(points, of)
     ends = check_wall(of)

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from threading import RLock
 from time import perf_counter, thread_time
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -46,12 +46,19 @@ for threads. Functions may run at the same time, each in memory of its own."""
 class Problem:
     """The problem for a number of people and walls.
 
-    `rows` are meant >= 0: the `n_cbf` barrier conditions, person by person, then wall by wall, and
-    the N speed limits. `terminal` is meant to be 0, and empty without a terminal condition. `h` has a
-    row for each person and wall, a column for each of the states x_0 .. x_{N_h}; so have its derivatives
-    by the position in that state, `slope` (h_x, h_y) and `bend` (h_xx, h_xy, h_yy). `parameters` stacks the
-    state (4), the target (2), the terminal velocity w (2), then for each person the foci and a of the
-    zone and the velocity (7), then for each wall its end points and its margin (5).
+    Attributes
+    ----------
+    inputs : u_0 .. u_{N-1}, shape (2N,).
+    parameters : the state (4), the target (2), the terminal velocity w (2), then for each person the foci and
+        a of the zone and the velocity (7), then for each wall its end points and its margin (5).
+    states : x_0 .. x_N, shape (4, N+1).
+    cost : of the plan.
+    rows : required to be >= 0: the `n_cbf` barrier conditions, person by person, then wall by wall, and the N
+        speed limits.
+    terminal : required to be 0; empty without a terminal condition.
+    h : a row for each person and wall, a column for each of the states x_0 .. x_{N_h}.
+    slope, bend : derivatives of h by the position in that state, (h_x, h_y) and (h_xx, h_xy, h_yy).
+    n_cbf : number of barrier conditions.
     """
 
     inputs: Any
@@ -143,8 +150,8 @@ def remaining_distance(x: Any, y: Any, gx: Any, gy: Any) -> Any:
     return (distance + 1 + abs(distance - 1)) / 2
 
 
-def function(name: str, arguments: Sequence[Any], outputs: Sequence[Any]) -> Any:
-    """A CasADi function of expressions, all dense."""
+def dense_function(name: str, arguments: Sequence[Any], outputs: Sequence[Any]) -> Any:
+    """A CasADi function `name` from `arguments` to dense `outputs`."""
     return ca.Function(name, list(arguments), [ca.densify(output) for output in outputs])
 
 
@@ -223,7 +230,7 @@ class PlanEvaluator:
 def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, int]:
     p = build_problem(settings, n_people, n_walls)
     outputs = [ca.vertcat(p.cost, ca.mmax(p.violations)), p.rows, p.states, p.h.T]
-    return function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
+    return dense_function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
 
 
 class TimeBudget:
@@ -248,25 +255,34 @@ class TimeBudget:
         return perf_counter() - self._wall > limit and thread_time() - self._thread > limit
 
 
-class ProblemSolver(Protocol):
-    """What the solvers of this problem have in common.
+class ProblemSolver:
+    """Base class of the solvers of this problem.
 
-    `timed_out` is True if the `budget` stopped the last call, which then returned its plan so far.
+    Parameters
+    ----------
+    settings, n_people, n_walls : of the problem.
+
+    Attributes
+    ----------
+    evaluate : evaluates any plan.
+    budget : the computing time of a step.
+    timed_out : True if the budget stopped the last call, which then returned its plan so far.
     """
 
-    settings: MPCSettings
-    evaluate: PlanEvaluator
-    budget: TimeBudget
-    timed_out: bool
+    def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
+        self.settings, self.budget, self.timed_out = settings, TimeBudget(settings.time_limit), False
+        self.evaluate = PlanEvaluator(settings, n_people, n_walls)
 
     remembered: Array
     """Multipliers kept from call to call: they save time, and change the answers by rounding only."""
 
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan that obeys every row, from a `guess`, shape (2N,), and `parameters`; True if found."""
+        raise NotImplementedError
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan of least penalty, from a `guess` and `parameters`; True if it converged."""
+        raise NotImplementedError
 
     def reset(self) -> None:
         """Forget the multipliers."""

@@ -1,4 +1,4 @@
-"""The parameters of the controller, and where each one comes from."""
+"""The parameters of the controller, and the source of each default."""
 
 from __future__ import annotations
 
@@ -18,69 +18,78 @@ Solver = Literal["sqp", "ipopt"]
 Terminal = Literal["none", "rest", "person"]
 
 
-def _from(badge: str, default: Any) -> Any:
+def _setting(badge: str, default: Any) -> Any:
     return field(default=default, metadata={"badge": badge})
 
 
 @dataclass(frozen=True)
 class MPCSettings:
-    """Every parameter of the controller; `MPCSettings.badges()` says where each default comes from.
+    """Every parameter of the controller; `MPCSettings.badges()` gives the source of each default.
 
     Parameters
     ----------
     dt : time step [s].
     N : steps of the prediction horizon.
-    N_h : steps under barrier conditions, 1 <= N_h <= N; all N of them if there is a terminal condition.
-    gamma : share of h that a step may use up, 0 < gamma <= 1.
+    N_h : steps with barrier conditions, 1 <= N_h <= N; all N steps if there is a terminal condition.
+    gamma : fraction of h that a step may use up, 0 < gamma <= 1.
     Q, P : weights of the state (x, y, vx, vy) against the goal, on the way and at the end, >= 0.
     R : weights of the accelerations (ax, ay), > 0.
     a_max : largest |ax| and |ay| [m/s2].
     v_max : largest Euclidean speed [m/s].
     r_robot : radius of the robot [m].
     eps : margin for the error of the approximate distances [m].
-    margin : around walls: "euclidean", what each requires to stay clear of the robot's disc, and at least
-        eps (`distances.wall_margin`); "paper", eps, which overlooks overlaps with the ends of walls shorter
+    margin : around walls. "euclidean": what each wall requires so that the robot does not touch it, and at
+        least eps (see `wall_margin`). "paper": eps, which allows overlaps with the ends of walls shorter
         than r_robot^2 / eps.
-    zone_speed : walking speed whose social zone is kept, where a zone depends on speed [m/s].
-    pass_side : the robot's own hand on which it passes a person whom it meets head-on.
-    tie : a meeting is head-on while the goal lies within this share of the half-angle under which the
+    zone_speed : walking speed whose social zone is used, if a zone depends on speed [m/s].
+    pass_side : the side on which the robot passes a person whom it meets head-on: "right" or "left".
+    tie : a meeting is head-on while the goal lies within this fraction of the half-angle under which the
         robot sees the person's zone; see `head_on.find_target`. At most 0.5.
-    terminal : what the plan ends in: "none", as in the paper; "rest", zero velocity; "person", the
-        velocity of the one person there is, in open space ("rest" while there is not exactly one; see
-        `terminal_for`). See the proof in `szlib.control.mpc`.
+    terminal : what the plan ends in. "none": nothing, as in the paper. "rest": zero velocity. "person": the
+        velocity of the only person, in open space; "rest" unless there is one person. See the proof in
+        `szlib.control.mpc`.
     solver : "sqp", the condensed SQP of `szlib.control.solvers.sqp`, or "ipopt", as in the paper.
-    slack_weight : penalty of slack [cost per m, and per m of distance to the goal (at least 1 m)],
-        to which the multipliers of the barriers are in proportion.
-    max_iterations : iterations that a solver may take before the next fallback of the ladder.
+    slack_weight : penalty of slack [cost per m, and per m of distance to the goal (at least 1 m)]. The
+        multipliers of the barriers grow with that distance as well.
+    max_iterations : iterations of a solver before the next fallback is tried.
     time_limit : computing time of the step's thread after which the best plan so far, or full braking, is
-        taken; see `Step.timed_out` [s]. `inf` for none. What other processes take does not count, so that
-        runs stay the same on a busy machine.
+        used [s]; see `Step.timed_out`. `inf` for none. Time of other processes does not count, so that runs
+        are the same on a busy machine.
 
     Raises
     ------
-    SolverError : a value out of its range.
+    SolverError : a value is out of its range.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> settings = szlib.MPCSettings(gamma=0.1, terminal="rest")
+    >>> settings.N_h == settings.N  # a terminal condition needs barriers on the whole horizon
+    True
+    >>> szlib.MPCSettings.badges()["dt"]
+    'paper'
     """
 
-    dt: float = _from("paper", 0.1)
-    N: int = _from("paper", 8)
-    N_h: int = _from("paper", 2)
-    gamma: float = _from("measured", 0.05)
-    Q: tuple[float, float, float, float] = _from("assumed", (10.0, 10.0, 1.0, 1.0))
-    R: tuple[float, float] = _from("assumed", (1.0, 1.0))
-    P: tuple[float, float, float, float] = _from("assumed", (100.0, 100.0, 10.0, 10.0))
-    a_max: float = _from("assumed", 1.0)
-    v_max: float = _from("paper", 1.0)
-    r_robot: float = _from("paper", 0.5)
-    eps: float = _from("paper", 0.05)
-    margin: Margin = _from("measured", "euclidean")  # noqa: RUF009
-    zone_speed: float = _from("paper", 1.1)
-    pass_side: Side = _from("assumed", "right")  # noqa: RUF009
-    tie: float = _from("assumed", 0.25)
-    terminal: Terminal = _from("paper", "none")  # noqa: RUF009
-    solver: Solver = _from("measured", "sqp")  # noqa: RUF009
-    slack_weight: float = _from("measured", 1e5)
-    max_iterations: int = _from("assumed", 100)
-    time_limit: float = _from("assumed", 0.05)
+    dt: float = _setting("paper", 0.1)
+    N: int = _setting("paper", 8)
+    N_h: int = _setting("paper", 2)
+    gamma: float = _setting("measured", 0.05)
+    Q: tuple[float, float, float, float] = _setting("assumed", (10.0, 10.0, 1.0, 1.0))
+    R: tuple[float, float] = _setting("assumed", (1.0, 1.0))
+    P: tuple[float, float, float, float] = _setting("assumed", (100.0, 100.0, 10.0, 10.0))
+    a_max: float = _setting("assumed", 1.0)
+    v_max: float = _setting("paper", 1.0)
+    r_robot: float = _setting("paper", 0.5)
+    eps: float = _setting("paper", 0.05)
+    margin: Margin = _setting("measured", "euclidean")  # noqa: RUF009
+    zone_speed: float = _setting("paper", 1.1)
+    pass_side: Side = _setting("assumed", "right")  # noqa: RUF009
+    tie: float = _setting("assumed", 0.25)
+    terminal: Terminal = _setting("paper", "none")  # noqa: RUF009
+    solver: Solver = _setting("measured", "sqp")  # noqa: RUF009
+    slack_weight: float = _setting("measured", 1e5)
+    max_iterations: int = _setting("assumed", 100)
+    time_limit: float = _setting("assumed", 0.05)
 
     def __post_init__(self) -> None:
         for name, length in (("Q", 4), ("R", 2), ("P", 4)):
@@ -119,7 +128,7 @@ class MPCSettings:
 
     @classmethod
     def badges(cls) -> dict[str, str]:
-        """Where each default comes from: 'paper', 'assumed' or 'measured'."""
+        """Source of each default: 'paper', 'assumed' or 'measured'."""
         return {setting.name: setting.metadata["badge"] for setting in fields(cls)}
 
 

@@ -82,7 +82,7 @@ def test_the_point_lands_where_the_plan_says_near_its_chord_and_within_the_limit
         assert drive.robot.advance(own, control, s.dt)[:2] == pytest.approx(poses[-1, :2], abs=1e-9)
         assert reached[:2] == pytest.approx(poses[-1, :2], abs=1e-9)
         across = np.array([-np.sin(angle), np.cos(angle)])
-        assert np.abs((points - start) @ across).max() <= drive.bow + 1e-12
+        assert np.abs((points - start) @ across).max() <= drive.chord_error + 1e-12
         assert np.hypot(*(poses[:, :2] - points).T) == pytest.approx(drive.ahead)
 
 
@@ -95,7 +95,9 @@ def test_the_bow_and_the_limits_are_attained():
             _, (control,) = drive._follow([0.0, 0.0, 0.0], np.array([end]))
             assert control[1] == pytest.approx(drive.omega_max)
             points = point_of(integrate(np.zeros(3), control, dt, [0, dt / 2, dt]), drive.ahead)
-            assert np.hypot(*(points[1] - points[[0, 2]].mean(axis=0))) == pytest.approx(drive.bow, rel=1e-6)
+            assert np.hypot(*(points[1] - points[[0, 2]].mean(axis=0))) == pytest.approx(
+                drive.chord_error, rel=1e-6
+            )
 
 
 def test_where_the_point_is_safe_the_disc_is_whatever_its_heading():
@@ -188,7 +190,7 @@ def test_the_disc_keeps_out_on_a_fine_grid_after_every_step_that_said_it_was_saf
                 at = [person.after(0.1 * k + t).position for t in times]
                 gap = euclidean_to_ellipse(discs - at, zone.placed((0, 0), person.heading)) - 0.5
                 assert gap[[0, -1]].min() >= 0.05 - 2 * TOLERANCE  # eps, at the samples
-                assert gap.min() >= 0.05 - (1.5 * 0.1) ** 2 / 8 / 0.8 - drive.bow
+                assert gap.min() >= 0.05 - (1.5 * 0.1) ** 2 / 8 / 0.8 - drive.chord_error
                 assert (np.hypot(*(discs - at).T) - 0.5 - BODY_RADIUS).min() >= 0
     assert checked > 1000
 
@@ -276,7 +278,7 @@ def test_with_less_ahead_it_is_slower_and_by_default_it_is_not():
     near = szlib.DifferentialDrive(ZONE, settings=settings, ahead=0.1, omega_max=2.0)
     assert near.v_max == pytest.approx(0.2, rel=0.01)
     assert near.v_max < 0.2
-    assert near._point.settings.r_robot == pytest.approx(0.5 + 0.05 + 0.1 + near.bow)
+    assert near._point.settings.r_robot == pytest.approx(0.5 + 0.05 + 0.1 + near.chord_error)
 
 
 def test_people_come_as_an_array_with_ids_and_whoever_is_lost_makes_the_step_unsafe():

@@ -1,8 +1,8 @@
-"""How the problem is solved, and what is done where it is not.
+"""The solvers of the control problem, and the fallbacks if they find no plan.
 
-ipopt     by IPOPT, as in the paper
-program   what the SQP works with: derivatives by the structure of the problem
-sqp       by a condensed SQP
-sizes     a solver for any number of people and walls, built ahead of the need
-ladder    what is tried one after another, down to full braking
+fallbacks      what is tried one after another, down to full braking
+solver_pool    solvers for different numbers of people and walls, built before they are needed
+sqp            a condensed SQP: `Sqp`
+sqp_functions  the CasADi functions that the SQP evaluates
+ipopt          IPOPT, as in the paper: `Ipopt`
 """

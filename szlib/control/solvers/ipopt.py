@@ -1,7 +1,7 @@
-"""IPOPT behind the problem of `szlib.control.problem`, as in the paper.
+"""The problem of `szlib.control.problem`, solved by IPOPT as in the paper.
 
-A compiled solver keeps its iterations in memory of its own and belongs to one controller at a time; it is
-lent, and comes back when the controller is gone, since building one takes as long as many steps.
+A built solver keeps its iterations in memory of its own, so it belongs to one controller at a time. When the
+controller is gone, the solver is used again, because building one takes as long as many steps.
 """
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ from ..problem import (
     CASADI_LOCK,
     HARD_SHARE,
     PlanEvaluation,
-    PlanEvaluator,
-    TimeBudget,
+    ProblemSolver,
     build_problem,
     remaining_distance,
 )
@@ -45,19 +44,18 @@ _OPTIONS = {
 """Measured on the approach to a person: 7 iterations instead of 9.4, in 0.65 of the time."""
 _OUT_OF_TIME = "Maximum_CpuTime_Exceeded"
 _MOST_IDLE = 64
-"""Pairs of solvers that wait for another controller; beyond, the oldest are dropped."""
+"""Pairs of solvers that wait for another controller; if there are more, the oldest are dropped."""
 
 _Key = tuple[MPCSettings, int, int]
 _Solvers = tuple[Any, Any, int]
 _idle: deque[tuple[_Key, _Solvers]] = deque(maxlen=_MOST_IDLE)
 
 
-class Ipopt:
+class Ipopt(ProblemSolver):
     """The hard and the relaxed problem, by IPOPT."""
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        self.settings, self.budget, self.timed_out = settings, TimeBudget(settings.time_limit), False
-        self.evaluate = PlanEvaluator(settings, n_people, n_walls)
+        super().__init__(settings, n_people, n_walls)
         key = (settings, n_people, n_walls)
         solvers = _borrow(key)
         weakref.finalize(self, _give_back, key, solvers).atexit = False
@@ -65,13 +63,11 @@ class Ipopt:
         self.remembered = np.zeros(0)
 
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
-        """The plan, and whether IPOPT says that it converged."""
         a_max, upper = self.settings.a_max, self._row_bounds()
         found = self._hard(x0=guess, p=parameters, lbx=-a_max, ubx=a_max, lbg=0, ubg=upper)
         return self.evaluate(self._inputs(found), parameters), self._succeeded(self._hard)
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
-        """The same for the problem with penalised slack."""
         s = self.settings
         rows = self.evaluate(guess, parameters).rows
         free = np.ones(rows.size)
@@ -105,7 +101,7 @@ class Ipopt:
 
 
 def _borrow(key: _Key) -> _Solvers:
-    """Solvers that nobody else has: idle ones, or else new ones."""
+    """Solvers that no controller uses: idle ones, or else new ones."""
     with CASADI_LOCK:
         for _ in range(len(_idle)):
             known, solvers = _idle.popleft()

@@ -25,7 +25,7 @@ import daqp
 import numpy as np
 
 from ...checks import Array
-from ..problem import CASADI_LOCK, HARD_SHARE, BufferedFunction, PlanEvaluation, PlanEvaluator, TimeBudget
+from ..problem import CASADI_LOCK, HARD_SHARE, BufferedFunction, PlanEvaluation, ProblemSolver
 from ..settings import MPCSettings
 from .sqp_functions import SqpFunctions, build_sqp_functions
 
@@ -39,7 +39,7 @@ violates a row by so much is 2 / dt^2 times as much off, 2e-6 m/s2."""
 PRICE = 1.1
 """Price of violation in the merit, as a multiple of the largest multiplier: exact above 1."""
 SHORTEST = 1e-3
-"""A step that must be cut to less than this share of its length leads nowhere."""
+"""Smallest share of a step that is still tried."""
 ROUNDING = 1e-12
 """Share by which the merit may rise from rounding alone."""
 RISES = 2
@@ -49,12 +49,11 @@ _DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3}
 """Convex programs as they stand; next to the exact penalty, a quadratic one too small to matter."""
 
 
-class Sqp:
-    """The hard problem and the relaxed one, by SQP; it remembers multipliers from call to call."""
+class Sqp(ProblemSolver):
+    """The hard and the relaxed problem, by SQP; it keeps multipliers from call to call."""
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        self.settings, self.budget, self.timed_out = settings, TimeBudget(settings.time_limit), False
-        self.evaluate = PlanEvaluator(settings, n_people, n_walls)
+        super().__init__(settings, n_people, n_walls)
         with CASADI_LOCK:
             self._allocate(build_sqp_functions(settings, n_people, n_walls))
 
@@ -73,8 +72,8 @@ class Sqp:
         self._program = (exact.reshape(n, n), gradient, self._jacobian, self._upper, self._lower)
         self._gauss_newton = (gauss.reshape(n, n), *self._program[1:])
         self._sense = np.repeat(np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows])
-        self._found = (self._trial, *self.evaluate.shaped(self._values, states, h))
-        self._held, self._model = False, daqp.Model()
+        self._measured = (self._trial, *self.evaluate.shaped(self._values, states, h))
+        self._is_held, self._model = False, daqp.Model()
         self._model.settings = _DAQP
         self._model.setup(np.eye(n), *self._program[1:], self._sense)
         weights = np.full(n + m, self.settings.slack_weight)
@@ -88,20 +87,20 @@ class Sqp:
     @remembered.setter
     def remembered(self, multipliers: Array) -> None:
         """Go on from these."""
-        self._multipliers[:], self._held = multipliers, bool(multipliers.any())
+        self._multipliers[:], self._is_held = multipliers, bool(multipliers.any())
 
     def reset(self) -> None:
         """Forget every multiplier and active row."""
-        self._multipliers[:], self._held = 0, False
+        self._multipliers[:], self._is_held = 0, False
         self._model.update(sense=self._sense)
 
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
-        """The plan, and whether it converged; if rows stay violated, to that of the relaxed problem."""
+        # If rows stay violated, this converges to the plan of the relaxed problem.
         outcome = self._solve(guess, parameters, HARD_SHARE)
         return self._plan(), outcome == "converged"
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
-        """The same, where it is enough that no step lowers the merit any more."""
+        # Here it is enough that no step lowers the merit any more.
         outcome = self._solve(guess, parameters, 1.0)
         return self._plan(), outcome in ("converged", "stalled")
 
@@ -109,21 +108,21 @@ class Sqp:
         """Leave the plan in `_trial`, and what was measured of it in the buffers beside that."""
         self._parameters[:] = parameters
         outcome: Outcome = "converged"
-        # Who was held by a row is held still, nearly always: then the program finds it out by itself.
-        if self._held or not self._is_free():
+        # A robot that was held by a row nearly always still is; then the quadratic program finds out.
+        if self._is_held or not self._is_free():
             self._inputs[:] = guess
             outcome = self._iterate(share)
             if outcome == "failed":
                 self.reset()
             if outcome != "converged":
-                self._stay()
+                self._measure_inputs()
         self.timed_out = outcome == "timed out"
         return outcome
 
     def _plan(self) -> PlanEvaluation:
-        """What stands in the buffers."""
+        """The plan in the buffers."""
         cost, slack = self._after[2:4].tolist()
-        return PlanEvaluation(cost, slack, *[array.copy() for array in self._found])
+        return PlanEvaluation(cost, slack, *[array.copy() for array in self._measured])
 
     def _is_free(self) -> bool:
         """True if the minimum of the cost alone satisfies everything; then it is the plan."""
@@ -134,7 +133,7 @@ class Sqp:
         if violation[0] != 0:
             return False
         self._inputs[:] = least
-        self._stay()
+        self._measure_inputs()
         return True
 
     def _iterate(self, share: float) -> Outcome:
@@ -151,7 +150,7 @@ class Sqp:
             self._share[0] = 1.0
             self._measure.call()
             cost, violation, _, _, size, steepest, on_rows = self._after.tolist()
-            self._held = steepest > 0
+            self._is_held = steepest > 0
             price = max(price, min(PRICE * steepest, limit))
             cost_before, violation_before, on_rows_before, on_speed = self._before.tolist()
             curved = on_rows_before if exact else on_speed
@@ -175,20 +174,20 @@ class Sqp:
             elif self._lower_merit(price, before):
                 rises = 0
             else:
-                self._stay()
+                self._measure_inputs()
                 return "converged" if size <= CONVERGED[False] else "stalled"
             if solved:
                 return "converged"
             self._inputs[:] = self._trial
         return "failed"
 
-    def _stay(self) -> None:
-        """Leave the plan as it is in `_inputs`, and measure it."""
+    def _measure_inputs(self) -> None:
+        """Measure the plan in `_inputs`, unchanged."""
         self._step[:] = 0
         self._measure.call()
 
     def _linearise(self) -> bool:
-        """Hand over the program at `_inputs`; True if with the exact Hessian."""
+        """Give the quadratic program at `_inputs` to DAQP; True if with the exact Hessian."""
         self._derive.call()
         exact = bool(self._model.update(*self._program) >= 0)
         if not exact:

@@ -1,4 +1,4 @@
-"""What the SQP works with, in CasADi: the program at a plan, the merit of a step, and the unconstrained plan.
+"""The CasADi functions of the SQP: the quadratic program, the merit of a step, the unconstrained plan.
 
 The derivatives follow from the structure of the problem. Positions and velocities are constant linear maps
 of the inputs, p = P u + ... and v = V u + ...; a barrier row depends on two positions, a speed row on one
@@ -20,13 +20,15 @@ import casadi as ca
 import numpy as np
 
 from ..barriers import cbf_residual
-from ..problem import Problem, build_problem, function, remaining_distance
+from ..problem import Problem, build_problem, dense_function, remaining_distance
 from ..settings import MPCSettings
 
 
 class SqpFunctions(NamedTuple):
     """Three functions of CasADi; the scaled cost is that for each metre to the target, at least one.
 
+    Attributes
+    ----------
     derive : (inputs, parameters, multipliers) -> (scaled cost, violation, largest multiplier of a row, of a
         speed row), lower and upper bounds, gradient, Jacobian, Hessian of the Lagrangian, and the same
         without the curvature of the barriers.
@@ -44,7 +46,7 @@ class SqpFunctions(NamedTuple):
 
 @lru_cache(maxsize=256)
 def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> SqpFunctions:
-    """Write down the functions; once for each size and settings."""
+    """Build the functions for `settings`, `n_people` and `n_walls`, or reuse them."""
     p, s = build_problem(settings, n_people, n_walls), settings
     u, n_rows, scale = (
         p.inputs,
@@ -71,7 +73,7 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
     jacobian = _jacobian(p, s, to_position, to_velocity)
     hessians = ca.tril2symm(exact), ca.tril2symm(gauss)
     outputs = [merit, lower, upper, scale * gradient, jacobian.T, *hessians]
-    derive = function("derive", arguments, outputs)
+    derive = dense_function("derive", arguments, outputs)
 
     step, share = ca.SX.sym("d", u.numel()), ca.SX.sym("s")
     trial = ca.fmax(-s.a_max, ca.fmin(u + share * step, s.a_max))
@@ -79,14 +81,14 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
     there = ca.Function("there", [u, p.parameters], found)
     *totals, values, states, h = there(trial, p.parameters)
     merit = ca.vertcat(*totals, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
-    measure = function("measure", [*arguments, step, share], [merit, trial, values, states, h])
+    measure = dense_function("measure", [*arguments, step, share], [merit, trial, values, states, h])
     if p.terminal.numel():
         return SqpFunctions(derive, measure, None)
     given = p.parameters[:6]
     to_inputs, to_given = (ca.evalf(ca.jacobian(gradient, by)) for by in (u, given))
     least = -ca.solve(to_inputs, to_given) @ given
     beyond = ca.sum1(ca.fmax(0, ca.fabs(least) - s.a_max))
-    free = function("unbound", [p.parameters], [least, beyond + there(least, p.parameters)[1]])
+    free = dense_function("unbound", [p.parameters], [least, beyond + there(least, p.parameters)[1]])
     return SqpFunctions(derive, measure, free)
 
 
