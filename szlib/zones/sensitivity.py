@@ -38,7 +38,7 @@ NARROWER = 1.0
 def sensitivity(
     tracks: pd.DataFrame,
     *,
-    square: Area,
+    area: Area,
     speed: float = 1.1,
     method: str = "hull",
     fit: Mapping[str, Sequence[Any]] = FIT,
@@ -47,7 +47,7 @@ def sensitivity(
 
     Parameters
     ----------
-    tracks, square : as for `szlib.find_encounters`.
+    tracks, area : as for `szlib.find_encounters`.
     speed : speed of the zone [m/s].
     method : of every fit.
     fit : options of `SocialZone.fit` to vary, and their values. `SEARCH` are those of the search.
@@ -60,15 +60,6 @@ def sensitivity(
     Raises
     ------
     ZoneError : there is no zone with the defaults.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.zones import sensitivity
-    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
-    >>> table = sensitivity(szlib.read_tracks(path), square=szlib.ATC_SQUARE, fit={"r_max": [1.5]})
-    >>> "r_max" in set(table["parameter"])
-    True
     """
     rows: list[tuple[str, str, int, float, float, float]] = []
 
@@ -87,14 +78,14 @@ def sensitivity(
         text = ", ".join(value) if isinstance(value, tuple) else str(value)
         rows.append((parameter, text, count, *sizes))
 
-    tracks = select_near_rows(tracks, square, max(SEARCH["duration"]))  # searched many times
-    usual = find_encounters(tracks, square=square)
+    tracks = select_near_rows(tracks, area, max(SEARCH["duration"]))  # searched many times
+    usual = find_encounters(tracks, area=area)
     add("default", "", usual)
     for name, values in SEARCH.items():
         for value in values:
-            add(name, value, find_encounters(tracks, square=square, **{name: value}))
-    smaller = square.grown(-NARROWER)
-    add("square", f"{NARROWER:g} m narrower", find_encounters(tracks, square=smaller))
+            add(name, value, find_encounters(tracks, area=area, **{name: value}))
+    smaller = area.grown(-NARROWER)
+    add("area", f"{NARROWER:g} m narrower", find_encounters(tracks, area=smaller))
     for name, values in fit.items():
         for value in values:
             add(name, value, usual, **{name: value})

@@ -106,9 +106,9 @@ def test_a_larger_zone_makes_the_robot_later() -> None:
 def test_sensitivity_varies_one_parameter_at_a_time(tmp_path) -> None:
     settings = szlib.PlazaSettings(n_encounters=400)
     tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=0, settings=settings))
-    table = sensitivity(tracks, square=szlib.ATC_SQUARE)
+    table = sensitivity(tracks, area=szlib.ATC_SQUARE)
     assert table.loc[0, "parameter"] == "default" and np.isfinite(table.loc[0, "area"])
-    assert {"min_distance", "duration", "kinds", "square", "r_max", "speed"} <= set(table["parameter"])
+    assert {"min_distance", "duration", "kinds", "area", "r_max", "speed"} <= set(table["parameter"])
     assert (table.loc[table["parameter"] == "r_max", "encounters"] == table.loc[0, "encounters"]).all()
     assert table.loc[table["parameter"] == "min_distance", "encounters"].is_monotonic_decreasing
 

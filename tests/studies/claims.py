@@ -124,7 +124,7 @@ def main() -> None:
         else:
             tracks, square = SITES["ATC day"][0](), szlib.ATC_SQUARE
             hull, quantile = (
-                sensitivity(tracks, square=square, method=method, fit=fit).assign(method=method)
+                sensitivity(tracks, area=square, method=method, fit=fit).assign(method=method)
                 for method, fit in (("hull", FIT), ("quantile", {"r_max": (1.5, 2.5), "q": (0.02, 0.1)}))
             )
             table = pd.concat([hull, quantile])

@@ -249,6 +249,17 @@ def test_empty_speeds_are_refused(samples: pd.DataFrame) -> None:
         fit(samples, speeds=())
 
 
+def test_repr_has_five_lines(zone: SocialZone) -> None:
+    assert len(repr(zone).splitlines()) == 5
+    assert "method 'hull'" in repr(zone)
+
+
+def test_plot_shows_one_speed_or_all(zone: SocialZone) -> None:
+    assert "1.1 m/s" in zone.plot(1.1).get_title()
+    labels = [text.get_text() for text in zone.plot().get_legend().get_texts()]
+    assert len(labels) == len(zone.ellipses)
+
+
 # --- files -------------------------------------------------------------------------------------------
 
 
@@ -422,6 +433,7 @@ def test_intervals_do_not_change_the_zone(samples: pd.DataFrame, zone: SocialZon
         ({"method": "guess"}, "method must be one of quantile, hull, respect; got 'guess'"),
         ({"q": 0.05}, 'q belongs to method="quantile"; got method="hull"'),
         ({"method": "quantile", "n_neighbours": 200}, 'neighbours belongs to method="hull"; got'),
+        ({"outlier_share": 0.1}, "unknown option 'outlier_share'; method 'hull' has fraction, n_neighbours"),
         ({"method": "quantile", "q": 0.0}, "q must be a share of encounters, 0 < q < 1; got 0"),
         ({"n_resamples": 1}, "resamples must be a whole number, 0 .no intervals. or at least 2; got 1"),
     ],
