@@ -124,7 +124,7 @@ class Region:
         if not (np.isfinite(polygon.bounds).all() and polygon.is_valid):
             raise DataError(
                 f"{self.wkt[:80]!r}: is no valid polygon ({shapely.is_valid_reason(polygon)}); its border "
-                "must not cross itself (shapely.make_valid can mend it)"
+                "must not cross itself (shapely.make_valid can repair it)"
             )
         shapely.prepare(polygon)
         return polygon

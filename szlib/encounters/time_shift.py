@@ -1,7 +1,7 @@
 """The same people on the same paths, each moved in time by an amount of their own: `time_shifted`.
 
-Every path and speed stays, and so does the density of the crowd over the day.  Interaction is removed: it is
-chance who meets whom.
+Every path and speed stays, and so does the density of the crowd over the day.  Interaction is removed:
+people meet by chance only.
 
 The recording is closed to a circle: a person who is moved past its end appears at its beginning.  So nobody
 leaves the recorded hours, and every moment remains equally likely.  (Reversing the sign of such a shift
@@ -155,8 +155,8 @@ class ShiftableTracks:
         """The track table with each person moved by `shift` [ticks] around the circle."""
         first, period = (each[self.day[self.person]] for each in (self.first, self.period))
         turns, since = np.divmod(self.tick - first + shift[self.person], period)
-        kept = np.flatnonzero(since < period - 1)
-        order = kept[np.lexsort((since[kept], self.person[kept]))]
+        rows = np.flatnonzero(since < period - 1)
+        order = rows[np.lexsort((since[rows], self.person[rows]))]
         table = self.table.iloc[order].reset_index(drop=True)
         table["t"] = (first + since)[order] / TICKS_PER_SECOND
         across = (self.person[1:] == self.person[:-1]) & (turns[1:] != turns[:-1])
@@ -167,8 +167,8 @@ class ShiftableTracks:
             table.loc[cut, ["vx", "vy"]] = to_clock(raw, max_gap=1.5 / TICKS_PER_SECOND)[
                 ["vx", "vy"]
             ].to_numpy()
-        rejected = {"on the seam of the day": len(since) - len(kept)}
-        stage = funnels.stage("time shifted: ticks", len(since), len(kept), rejected)
+        rejected = {"on the seam of the day": len(since) - len(rows)}
+        stage = funnels.stage("time shifted: ticks", len(since), len(rows), rejected)
         return funnels.attach(table, [*funnels.get(self.table), stage])
 
 
