@@ -1,4 +1,4 @@
-"""Build sdist and wheel into dist/, with the README's relative links made absolute: `make dist HOME_URL=...`.
+"""Build sdist and wheel into dist/, with absolute links in the README: `make dist HOME_URL=...`.
 
 HOME_URL is where the repository's files are served, such as https://github.com/OWNER/szlib/raw/main: the page
 of a package index shows pictures by absolute links only.
@@ -18,7 +18,7 @@ LEFT_OUT = shutil.ignore_patterns(".git", ".venv", "results", "dist", "__pycache
 
 
 def absolute(text: str, home: str) -> str:
-    """The text with its relative Markdown links led to `home`."""
+    """Make the relative Markdown links of `text` absolute: they then start with `home`."""
     return re.sub(r"\]\((?!https?://|#)([^)]+)\)", rf"]({home.rstrip('/')}/\1)", text)
 
 

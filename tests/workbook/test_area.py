@@ -34,12 +34,12 @@ def record_of(tmp_path, file, **variables):
 
 def test_inspect_accepts_numbers_and_polygons_as_area(hall, tmp_path, capsys):
     (tmp_path / "hall.wkt").write_text(HALL.wkt)
-    told = []
+    printed = []
     for options in (["--square", "0", "12", "0", "8"], ["--polygon", str(tmp_path / "hall.wkt")]):
         assert main(["inspect", *options, str(hall)]) == 0
-        told.append(capsys.readouterr().out)
-    assert told[0] == told[1]
-    assert told[0].startswith("area 0.0 12.0 0.0 8.0\n")
+        printed.append(capsys.readouterr().out)
+    assert printed[0] == printed[1]
+    assert printed[0].startswith("area 0.0 12.0 0.0 8.0\n")
     assert main(["inspect", str(hall), "--square", "-5.5", "6", "-1", "8"]) == 0
     assert capsys.readouterr().out.startswith("area -5.5 6.0 -1.0 8.0\n")
 
@@ -127,13 +127,13 @@ EMPTIED = {
 }
 
 
-@pytest.mark.parametrize("told", EMPTIED)
-def test_error_names_the_condition_that_rejected_the_last_rows(told):
-    tracks, square = EMPTIED[told]
+@pytest.mark.parametrize("reason", EMPTIED)
+def test_error_names_the_condition_that_rejected_the_last_rows(reason):
+    tracks, square = EMPTIED[reason]
     samples = szlib.find_encounters(tracks, square=square)
     with pytest.raises(szlib.DataError) as error:
         require_encounters(samples)
-    assert f"The last condition: {told}" in str(error.value).replace("a corner", "corner")
+    assert f"The last condition: {reason}" in str(error.value).replace("a corner", "corner")
     assert str(square) in str(error.value)
 
 
