@@ -98,14 +98,14 @@ def race(
 
 def ratios(times: dict[str, Array], rival: str) -> dict[str, float]:
     """Median, p95 and maximum over the steps: of `sqp` in ms, and of the rival as multiples."""
-    ours, theirs = times["sqp"], times[rival]
+    sqp_times, rival_times = times["sqp"], times[rival]
     return {
-        "sqp ms": 1e3 * float(np.median(ours)),
-        "sqp p99 ms": 1e3 * float(np.quantile(ours, 0.99)),
-        "sqp p99.9 ms": 1e3 * float(np.quantile(ours, 0.999)),
-        f"{rival} / sqp median": float(np.median(theirs) / np.median(ours)),
-        f"{rival} / sqp p95": float(np.quantile(theirs, 0.95) / np.quantile(ours, 0.95)),
-        f"{rival} / sqp max": float(theirs.max() / ours.max()),
+        "sqp ms": 1e3 * float(np.median(sqp_times)),
+        "sqp p99 ms": 1e3 * float(np.quantile(sqp_times, 0.99)),
+        "sqp p99.9 ms": 1e3 * float(np.quantile(sqp_times, 0.999)),
+        f"{rival} / sqp median": float(np.median(rival_times) / np.median(sqp_times)),
+        f"{rival} / sqp p95": float(np.quantile(rival_times, 0.95) / np.quantile(sqp_times, 0.95)),
+        f"{rival} / sqp max": float(rival_times.max() / sqp_times.max()),
     }
 
 
@@ -134,11 +134,11 @@ def bench_rival() -> dict[str, float]:
     scenario = szlib.SCENARIOS["passing"]
     step, rival = asking(controller_of(scenario), scenario), do_mpc_step(szlib.MPCSettings(), ZONE)
 
-    def theirs(x: Array, people: Sequence[szlib.Person], target: Array) -> Array:
+    def rival_control(x: Array, people: Sequence[szlib.Person], target: Array) -> Array:
         return rival(x, target, people[0])
 
-    apart = [np.abs(step(*each).control - theirs(*each)).max() for each in way(scenario)]
-    found = ratios(race(scenario, {"sqp": step, "do-mpc": theirs}, repeats=3), "do-mpc")
+    apart = [np.abs(step(*each).control - rival_control(*each)).max() for each in way(scenario)]
+    found = ratios(race(scenario, {"sqp": step, "do-mpc": rival_control}, repeats=3), "do-mpc")
     return found | {"largest difference of controls": max(apart)}
 
 
@@ -204,12 +204,12 @@ def check_meetings(count: int, solver: str) -> dict[str, float]:
 def bench_day() -> dict[str, float]:
     """The real 1 Hz day, files to zone, against reading the same files with pandas alone."""
     files = datasets.find("atc-1hz", cache=tempfile.gettempdir())
-    ours, pandas = in_turn(
+    whole, pandas = in_turn(
         lambda: szlib.SocialZone.fit(szlib.find_encounters(szlib.read_tracks(files))),
         lambda: pd.concat([pd.read_csv(file, header=None) for file in files]),
         repeats=3,
     )
-    return {"s": ours, "ours / pandas read_csv": ours / pandas}
+    return {"s": whole, "ours / pandas read_csv": whole / pandas}
 
 
 def bench_plaza() -> dict[str, float]:
@@ -225,12 +225,12 @@ def bench_plaza() -> dict[str, float]:
 
 def bench_import() -> dict[str, float]:
     """`import szlib` against an interpreter that imports nothing, as whole processes."""
-    ours, bare = in_turn(
+    imported, bare = in_turn(
         lambda: subprocess.run([sys.executable, "-c", "import szlib"], check=True),
         lambda: subprocess.run([sys.executable, "-c", "pass"], check=True),
         repeats=5,
     )
-    return {"s more than bare Python": ours - bare, "szlib / bare Python": ours / bare}
+    return {"s more than bare Python": imported - bare, "szlib / bare Python": imported / bare}
 
 
 BARS: dict[str, measuring.Bars] = {
@@ -272,7 +272,7 @@ def main() -> None:
         for name in wanted:
             bench = cases[name]
             found[name] = {key: float(f"{value:.4g}") for key, value in bench().items()}
-            print(measuring.told(name, found[name], bars.get(name)), flush=True)
+            print(measuring.report(name, found[name], bars.get(name)), flush=True)
     Path("results").mkdir(exist_ok=True)
     Path("results/bench.json").write_text(json.dumps(found, indent=1))
     if "--save" in sys.argv:

@@ -41,7 +41,7 @@ def longer(tracks: pd.DataFrame, times: int) -> pd.DataFrame:
     return joined
 
 
-def told(rows: Mapping[int, int], seconds: Mapping[float, float]) -> dict[str, float]:
+def summarise(rows: Mapping[int, int], seconds: Mapping[float, float]) -> dict[str, float]:
     """Rows and seconds of the smallest and the largest, and the exponent over all."""
     most = max(rows)
     return {
@@ -55,7 +55,7 @@ def told(rows: Mapping[int, int], seconds: Mapping[float, float]) -> dict[str, f
 def over(tables: Mapping[int, pd.DataFrame], work: Callable[[pd.DataFrame], object]) -> dict[str, float]:
     """How a function's time grows with its table."""
     seconds = measuring.grow({n: lambda table=table: work(table) for n, table in tables.items()})
-    return told({n: len(table) for n, table in tables.items()}, seconds)
+    return summarise({n: len(table) for n, table in tables.items()}, seconds)
 
 
 def bench_clock() -> dict[str, float]:
@@ -98,7 +98,7 @@ def bench_respect() -> dict[str, float]:
         rows = longer(tracks, n)
         of[n] = szlib.find_encounters(rows), shifted(rows, 5)
     seconds = measuring.grow({n: lambda pair=pair: szlib.fit_respect(*pair) for n, pair in of.items()})
-    return told({n: len(samples) for n, (samples, _) in of.items()}, seconds)
+    return summarise({n: len(samples) for n, (samples, _) in of.items()}, seconds)
 
 
 def bench_lof() -> dict[str, float]:

@@ -169,7 +169,7 @@ def bench_lof() -> dict[str, float]:
     samples = paper_samples()
     points = outliers.complementary_points(samples)
     begun = time.perf_counter()
-    theirs = LocalOutlierFactor(contamination=outliers.FRACTION).fit_predict(points) == -1
+    sklearn_labels = LocalOutlierFactor(contamination=outliers.FRACTION).fit_predict(points) == -1
     between = time.perf_counter()
     ours = outliers.is_outlier(samples, fraction=outliers.FRACTION)
     ended = time.perf_counter()
@@ -178,7 +178,7 @@ def bench_lof() -> dict[str, float]:
         "s": ended - between,
         "whole encounters s": time.perf_counter() - ended,
         "ours / scikit-learn": (ended - between) / (between - begun),
-        "labels that differ": float((ours != theirs).sum()),
+        "labels that differ": float((ours != sklearn_labels).sum()),
     }
 
 

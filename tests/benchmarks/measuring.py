@@ -1,7 +1,7 @@
 """Measure how time grows with size, print numbers beside their bars, and save ratios (for `make bench`).
 
 A case of the bench is a dictionary of numbers.  Those whose name holds " / " or "exponent" do not depend on
-the machine: `save` appends them to ratios.csv, and `told` prints beside each what it was there last.
+the machine: `save` appends them to ratios.csv, and `report` prints the last saved value beside each.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def grow(work: Mapping[float, Callable[[], object]], repeats: int = 3) -> dict[f
     return {size: median(lap[size] for lap in laps[1:]) for size in work}
 
 
-def told(case: str, found: Mapping[str, float], bars: Bars | None = None) -> str:
-    """A line for each number: its bar, met or not met, and what it was when it was saved last."""
+def report(case: str, found: Mapping[str, float], bars: Bars | None = None) -> str:
+    """A line for each number: its bar, met or not met, and its last saved value."""
     before, lines = _saved(), []
     for what, value in found.items():
         line = f"  {what:<44} {value:>10.4g}"

@@ -1,4 +1,4 @@
-"""A plaza on which nobody minds anybody: every meeting is chance, and so no zone is true there.
+"""A crowd of people who do not avoid each other: every encounter is chance, and no zone is true.
 
 The counterpart of `szlib.make_plaza`: whatever claims to find respect must find none here.
 """
@@ -27,13 +27,13 @@ def noninteracting_crowd(
     bunch: int = 1,
     square: Square = ATC_SQUARE,
 ) -> pd.DataFrame:
-    """People who cross the square straight on, each at a moment, on a path and at a speed of their own.
+    """People who cross the square on straight paths, with random times, paths and speeds.
 
     Parameters
     ----------
     seed : the same seed gives the same crowd.
     people : how many come; moments are even over the recording, entrances and exits along its edges.
-    minutes : that are recorded; who is still on the way then is cut off.
+    minutes : length of the recording [min]; later samples are cut off.
     bunch : so many come by one side and leave by one other, all within 20 s, as from a train; they mind each
         other no more than anybody else.
     square : that they cross; they come into view 6 m outside of it.

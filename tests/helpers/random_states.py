@@ -1,4 +1,4 @@
-"""Seeded questions to the controller, for the tests and, in larger numbers, for the benchmark."""
+"""Random states and meetings for the controller, from a seed, for tests and benchmarks."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ class Question:
     walls: Array
 
     def ask(self, settings: szlib.MPCSettings) -> szlib.Step:
-        """The answer of a controller that knows nothing of before."""
+        """The step of a new controller."""
         controller = szlib.MPCCBF(ZONE, walls=self.walls, settings=settings, max_people=len(self.people))
         return controller.step(self.state, self.goal, self.people)
 
 
 def questions(seed: int) -> Iterator[Question]:
-    """Safe states at any speed, among up to three people who walk and up to two walls, without end."""
+    """Safe states at any speed, among up to three people who walk and up to two walls; endless."""
     rng = np.random.default_rng(seed)
     while True:
         people = tuple(
@@ -45,10 +45,10 @@ def questions(seed: int) -> Iterator[Question]:
 
 
 def meetings(seed: int) -> Iterator[tuple[szlib.Scenario, str]]:
-    """Exactly symmetric meetings where a way through exists, and the place: open, corridor or wall.
+    """Exactly symmetric meetings with a free way, and the place: open, corridor or wall; endless.
 
-    At any angle, with a person who stands or walks, faces the robot or not; the corridor is as wide
-    on both sides, the wall stands on the robot's right and leaves room on the left only.
+    At any angle, with a person who stands or walks, faces the robot or not; a corridor
+    is symmetric; a wall is on the right of the robot, so that only the left is free.
     """
     rng = np.random.default_rng(seed)
     while True:

@@ -17,7 +17,7 @@ SPACE = szlib.AttentionalSpace(length=2.5, width=2.0)
 
 
 def make_raw_day(seed: int, *, people: int = 60, wild: bool = True) -> pd.DataFrame:
-    """Rows of a raw file: people cross the square, some get lost, some jump across it in one frame."""
+    """Rows of a raw file: people cross the square; some are not seen for a while, some jump in one frame."""
     rng = np.random.default_rng(seed)
     walks = []
     for person in range(people):
@@ -56,12 +56,12 @@ def assert_streamed_as_whole(
     given = {"square": square, "duration": duration, "max_gap": max_gap, "space": SPACE}
     streamed, whole = encounters(near, **given), encounters(read_raw(path), **given)
     pd.testing.assert_frame_equal(streamed, whole, check_exact=True)
-    ours, theirs = funnels.get(streamed), funnels.get(whole)
-    assert ours[-1] == theirs[-1], "windows are turned away for the same reasons"
-    assert {k: v for k, v in ours[-2]["rejected"].items() if k != "not in the area"} == {
-        k: v for k, v in theirs[-2]["rejected"].items() if k != "not in the area"
+    of_near, of_whole = funnels.get(streamed), funnels.get(whole)
+    assert of_near[-1] == of_whole[-1], "windows are rejected for the same reasons"
+    assert {k: v for k, v in of_near[-2]["rejected"].items() if k != "not in the area"} == {
+        k: v for k, v in of_whole[-2]["rejected"].items() if k != "not in the area"
     }
-    assert ours[0] == theirs[0], "every row of the file is counted"
-    for before, after in zip(ours[:3], ours[1:4], strict=True):
+    assert of_near[0] == of_whole[0], "every row of the file is counted"
+    for before, after in zip(of_near[:3], of_near[1:4], strict=True):
         assert before["kept"] == after["entered"]
     return len(streamed)

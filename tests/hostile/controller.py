@@ -73,15 +73,16 @@ class Judge:
 
     def h(self, p: Any, seconds: float = 0.0) -> Any:
         found = []
-        for who in self.people:
-            center = np.array(who.position) + seconds * np.array(who.velocity)
-            found.append(to_zone(p, center, who.heading, who.zone) - self.s.r_robot - self.s.eps)
+        for person in self.people:
+            center = np.array(person.position) + seconds * np.array(person.velocity)
+            found.append(to_zone(p, center, person.heading, person.zone) - self.s.r_robot - self.s.eps)
         found += [paper_to_segment(p, wall) - self.s.r_robot - self.margin(wall) for wall in self.walls]
         return np.array(found)
 
     def gaps(self, p: Any, seconds: float = 0.0) -> Any:
         found = [
-            np.linalg.norm(p - who.position - seconds * np.array(who.velocity)) - BODY for who in self.people
+            np.linalg.norm(p - person.position - seconds * np.array(person.velocity)) - BODY
+            for person in self.people
         ]
         found += [to_segment(p, wall) for wall in self.walls]
         return np.array(found) - self.s.r_robot
@@ -120,7 +121,9 @@ class Judge:
             if least < -TOLERANCE - NEAR or worst < -2 * TOLERANCE - NEAR or not step.feasible:
                 yield "safe"
         on_goal = self.h(np.asarray(goal))[: len(self.people)]
-        standing = [h < -NEAR for h, who in zip(on_goal, self.people, strict=True) if not any(who.velocity)]
+        standing = [
+            h < -NEAR for h, person in zip(on_goal, self.people, strict=True) if not any(person.velocity)
+        ]
         if any(standing) and not step.goal_blocked:
             yield "goal_blocked"
 
@@ -201,7 +204,7 @@ def attack_steps(count: int, tally: Counter[str], seed: int = 0, solver: str = "
                     tqdm.write(f"{fault}: seed [{seed}, {k}], step {i}, {s}")
                 u = step.control
                 state = np.r_[state[:2] + s.dt * state[2:] + s.dt**2 / 2 * u, state[2:] + s.dt * u]
-                people = [who.after(s.dt) for who in people]
+                people = [person.after(s.dt) for person in people]
             bar.update(A_SETTING)
 
 

@@ -66,13 +66,13 @@ def of_site(name: str) -> Iterator[pd.DataFrame]:
     plain = [claims.measure_passing_side(samples), lof(name, samples), as_many(name, samples, tracks)]
     yield claims.tabulate_findings(plain, data=name).assign(method="-")
     for method in ("hull", "quantile"):
-        for who, people in (("everybody", samples), ("strangers", szlib.of_kind(samples, "strangers"))):
+        for group, people in (("everybody", samples), ("strangers", szlib.of_kind(samples, "strangers"))):
             found = list(of_zone(people, method))
-            yield claims.tabulate_findings(found, data=name).assign(method=f"{method}, {who}")
+            yield claims.tabulate_findings(found, data=name).assign(method=f"{method}, {group}")
 
 
 def lof(name: str, samples: pd.DataFrame) -> claims.Finding:
-    """Whether LOF removes intruders; undecided where nobody knows who is one."""
+    """Whether LOF removes intruders; undecided where intruders are not known."""
     if name != "plaza":
         return claims.measure_intruders_removed(0, 0)
     close = samples[samples["distance"] <= 2.0]

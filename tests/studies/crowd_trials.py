@@ -4,7 +4,7 @@ python tests/studies/crowd_trials.py           both tables, as they are saved: s
 python tests/studies/crowd_trials.py --n 10    at most 10 trials of each kind
 
 17_crowds.csv     means with 95 % intervals: crowd by what people see by controller
-17_safety_claims.csv   steps that said they were safe, how many led to h < 0, and what people did meanwhile
+17_safety_claims.csv   steps that said they were safe, how many led to h < 0, and what the people did
 
 They go to notebooks/tables, or to --out.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/,
 eth/); JuPedSim is left out where it is not installed.  An exception in any trial ends the run.
@@ -176,7 +176,7 @@ def zone_of(site: str) -> szlib.Ellipse:
 
 def promises(rows: pd.DataFrame) -> pd.DataFrame:
     """One row each crowd and controller: trials, steps, and what became of the promises."""
-    told = rows[rows["controller"].str.startswith("MPC")]
+    of_mpc = rows[rows["controller"].str.startswith("MPC")]
     sums = [
         "steps",
         "claimed_safe_steps",
@@ -186,7 +186,7 @@ def promises(rows: pd.DataFrame) -> pd.DataFrame:
         "to_who_kept",
         "flagged_steps",
     ]
-    table = told.groupby(list(BY), sort=False).agg(
+    table = of_mpc.groupby(list(BY), sort=False).agg(
         trials=("seed", "size"), **{name: (name, "sum") for name in sums}, worst=("worst", "min")
     )
     return table.astype(dict.fromkeys(sums, int)).reset_index()

@@ -37,7 +37,7 @@ FIRST = 1_000_000
 """Seed of the first world: that of the first block of rollout_table."""
 SUBSTEPS = 10
 NEAR = 0.6
-"""Who ends so close to the goal, but not at it, was kept from it by what is beside it [m]."""
+"""A robot that ends this close to the goal, but not at it, was blocked by an obstacle beside it [m]."""
 
 
 def two_wheels(scenario: szlib.Scenario, settings: szlib.MPCSettings, omega_max: float) -> Any:

@@ -1,6 +1,6 @@
 """Respect or emptiness: the tables of notebook 15.
 
-python tests/studies/respect.py nobody      15_nobody.csv     the test where nobody minds anybody, 100 seeds
+python tests/studies/respect.py nobody      15_nobody.csv     the test without interaction, 100 seeds
 python tests/studies/respect.py sites       15_sites.csv      radii, intervals and p-values on the real data
 python tests/studies/respect.py n-curve     15_n_curve.csv    hull and respect zone by number of encounters
 python tests/studies/respect.py changes     15_changes.csv    the radius at Grand Central, one thing changed
@@ -42,7 +42,7 @@ SETS = {
     "same direction": "same direction",
 }
 SPEED = 1.1
-"""At which the hull's zone is told [m/s]."""
+"""Speed of the hull's zone [m/s]."""
 RESAMPLES, DRAWS = 100, 30
 HULLS = 100_000
 """Samples of the null model whose hulls are found, at most: LOF is slow."""
@@ -64,7 +64,7 @@ def main() -> None:
     print(table.to_string())
 
 
-# --- nobody minds anybody ----------------------------------------------------------------------------
+# --- a crowd without interaction ---------------------------------------------------------------------
 
 
 def nobody(asked: argparse.Namespace) -> list[dict[str, object]]:
@@ -82,8 +82,8 @@ def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
     for name in ("all", "opposite, crossing"):
         data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
         test = szlib.null_test(data, against, fit_null_radii=False)
-        told = {"p_value": test.p_value, "encounters": test.n_encounters, "radius": test.radius}
-        rows.append({"bunch": bunch, "kinds": name, "seed": seed, "shifts": null.shifts} | told)
+        result = {"p_value": test.p_value, "encounters": test.n_encounters, "radius": test.radius}
+        rows.append({"bunch": bunch, "kinds": name, "seed": seed, "shifts": null.shifts} | result)
     return rows
 
 
@@ -217,7 +217,7 @@ def draws(
 
 # --- what the radius at Grand Central depends on -----------------------------------------------------
 
-WHO = {
+KINDS_OF = {
     "all": None,
     "strangers": "strangers",
     "not in the same direction": ("opposite", "crossing", "standing"),
@@ -239,7 +239,7 @@ def changes(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
     """One row a change, a set of kinds: the fitted radius, its interval, and where bins of g cross 1/2."""
     for change, how in CHANGES.items():
         found = changed(asked, **how) if how else data_and_null("grand-central", 1.0, asked)
-        for name, kinds in WHO.items():
+        for name, kinds in KINDS_OF.items():
             data, null = szlib.of_kind(found[0], kinds), found[1].of_kind(kinds)
             data = data[data["distance"] < null.r_max]
             against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
@@ -259,10 +259,12 @@ def changes(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
                 "shifts": null.shifts,
                 "encounters": data["encounter"].nunique(),
             }
-            for how_told, radius in (("fitted", szlib.respect_radius), ("binned", half_in_bins)):
-                told = [radius(each, against) for each in weighted]
-                row[how_told] = told[0]
-                row[f"{how_told}_low"], row[f"{how_told}_high"] = np.percentile(told[1:], [2.5, 97.5])
+            for how_measured, radius in (("fitted", szlib.respect_radius), ("binned", half_in_bins)):
+                found_radii = [radius(each, against) for each in weighted]
+                row[how_measured] = found_radii[0]
+                row[f"{how_measured}_low"], row[f"{how_measured}_high"] = np.percentile(
+                    found_radii[1:], [2.5, 97.5]
+                )
             print(row, file=sys.stderr, flush=True)
             yield row
 

@@ -228,7 +228,7 @@ def _both_sides(samples: pd.DataFrame, tracks: pd.DataFrame) -> tuple[np.ndarray
     you = where.add_suffix("_you").rename(columns={"day_you": "day", "id_you": "other_id", "t_you": "t"})
     both = samples.merge(me, on=["day", "ref_id", "t"]).merge(you, on=["day", "other_id", "t"])
     bearing = np.arctan2(both["y_me"] - both["y_you"], both["x_me"] - both["x_you"])
-    theirs = both.assign(
+    mirrored = both.assign(
         los_angle=bearing - np.arctan2(both["vy_you"], both["vx_you"]),
         speed=np.hypot(both["vx_you"], both["vy_you"]),
     )
@@ -236,7 +236,7 @@ def _both_sides(samples: pd.DataFrame, tracks: pd.DataFrame) -> tuple[np.ndarray
         [both[["ref_id", "other_id"]].min(axis=1), both[["ref_id", "other_id"]].max(axis=1)]
     ).ngroup()
     sides = []
-    for side in (both, theirs):
+    for side in (both, mirrored):
         angle, distance = smooth_paths(side)
         use = (distance <= 2.0) & (side["speed"].to_numpy() >= 0.4)
         points = [distance * np.cos(angle), distance * np.sin(angle), side["speed"], pair]
