@@ -1,8 +1,5 @@
 """Distances against an independent geometry, and one formula for numbers and symbols alike."""
 
-import subprocess
-import sys
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -125,10 +122,3 @@ def test_the_condition_lets_h_fall_by_the_share_gamma_and_no_more():
 def test_what_has_no_distance_is_refused(arguments, message):
     with pytest.raises(szlib.SolverError, match=message):
         szlib.segment_distance(*arguments)
-
-
-def test_distances_do_without_casadi():
-    code = "import sys, szlib; szlib.segment_distance((0, 0), (1, 0), (2, 0)); print('casadi' in sys.modules)"
-    assert (
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "False"
-    )

@@ -52,7 +52,12 @@ _idle: deque[tuple[_Key, _Solvers]] = deque(maxlen=_MOST_IDLE)
 
 
 class Ipopt(ProblemSolver):
-    """The hard and the relaxed problem, by IPOPT."""
+    """The hard and the relaxed problem, by IPOPT.
+
+    Parameters
+    ----------
+    settings, n_people, n_walls : of the problem.
+    """
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
         super().__init__(settings, n_people, n_walls)
@@ -63,11 +68,13 @@ class Ipopt(ProblemSolver):
         self.remembered = np.zeros(0)
 
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
+        """The plan from a `guess` and `parameters`; True if IPOPT converged."""
         a_max, upper = self.settings.a_max, self._row_bounds()
         found = self._hard(x0=guess, p=parameters, lbx=-a_max, ubx=a_max, lbg=0, ubg=upper)
         return self.evaluate(self._inputs(found), parameters), self._succeeded(self._hard)
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
+        """The plan of the relaxed problem from a `guess` and `parameters`; True if IPOPT converged."""
         s = self.settings
         rows = self.evaluate(guess, parameters).rows
         free = np.ones(rows.size)

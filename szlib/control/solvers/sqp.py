@@ -50,7 +50,12 @@ _DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3}
 
 
 class Sqp(ProblemSolver):
-    """The hard and the relaxed problem, by SQP; it keeps multipliers from call to call."""
+    """The hard and the relaxed problem, by SQP; it keeps multipliers from call to call.
+
+    Parameters
+    ----------
+    settings, n_people, n_walls : of the problem.
+    """
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
         super().__init__(settings, n_people, n_walls)
@@ -95,12 +100,12 @@ class Sqp(ProblemSolver):
         self._model.update(sense=self._sense)
 
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
-        # If rows stay violated, this converges to the plan of the relaxed problem.
+        """The plan from a `guess` and `parameters`, relaxed if rows stay violated; True if it converged."""
         outcome = self._solve(guess, parameters, HARD_SHARE)
         return self._plan(), outcome == "converged"
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
-        # Here it is enough that no step lowers the merit any more.
+        """The same; True as well if no step lowers the merit any more, from a `guess` and `parameters`."""
         outcome = self._solve(guess, parameters, 1.0)
         return self._plan(), outcome in ("converged", "stalled")
 
