@@ -28,7 +28,7 @@ from .. import __version__, memory
 from ..errors import DataError, DataWarning, SzlibError
 from ..files import printable
 
-_WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbclient", "nbconvert")
+_WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbconvert", "papermill")
 """Packages of the extra `workbook`, which the commands `run` and `report` need."""
 _BROKEN_STREAM = (OSError, ValueError, AttributeError)
 """Errors of standard output or standard error that is full, closed or missing."""

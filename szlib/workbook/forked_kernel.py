@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from multiprocessing import get_context, parent_process
+from multiprocessing import current_process, get_context, parent_process
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +40,10 @@ class ForkingProvisioner(LocalProvisioner):
     async def launch_kernel(self, cmd: list[str], **options: Any) -> Any:
         """Fork a kernel with the arguments of the command `cmd`, and return how to connect to it.
 
-        `options` hold its environment, env, and its folder, cwd. If the command is not this Python's, the
-        kernel is started as usual.
+        `options` hold its environment, env, and its folder, cwd. If the command is not this Python's, or
+        this process may have no children (a worker of Dask), the kernel is started as usual.
         """
-        if cmd[:3] != [sys.executable, "-m", "ipykernel_launcher"]:
+        if cmd[:3] != [sys.executable, "-m", "ipykernel_launcher"] or current_process().daemon:
             return await super().launch_kernel(cmd, **options)
         context = get_context("forkserver")
         context.set_forkserver_preload(_PRELOADED)
