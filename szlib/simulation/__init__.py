@@ -1,1 +1,84 @@
-"""What happens then: the robot among people, in the paper's scenarios and in random worlds."""
+"""What happens then: the robot among people, in the paper's scenarios and in random worlds.
+
+scenario              the scene of a run, the paper's claims of it, and how people move: `Scenario`
+scenarios             the paper's four scenarios, eleven meetings, random worlds
+crowds                people who react, by three models of walking: `ReactingPeople`
+run                   the arrays of a run, and the quantities that follow from them: `Run`
+metrics               the motion of a run in numbers: `compute_metrics`
+outcomes              how a run ends: `classify_outcome`
+strategies            what the robot does: goes ahead, waits, backs out: `classify_strategy`
+social_metrics        what people notice, and a robot beside the person whom it replaces
+safety_claims         safe steps that lead to h < 0: `safety_violations`
+log                   a run with its table, metrics, pictures and files: `SimulationLog`
+closed_loop           the robot among people, step by step: `simulate`, `drive`
+baseline_controllers  controllers to compare with
+monte_carlo           thousands of random worlds, in parallel: `rollouts`
+comparisons           controllers, zones, formulations and behaviours on identical worlds: `compare`
+atlas                 the paper's scenarios with other widths, paces, zones and gamma: `run_atlas`
+replay                the robot in the place of a recorded walker: `find_replays`
+paper_claims          the paper's claims, tested on data: `Finding`
+"""
+
+from .atlas import AtlasCell, run_atlas
+from .closed_loop import drive, simulate
+from .comparisons import BEHAVIOURS, CONTROLLERS, FORMULATIONS, ZONES, compare, measure_time_inside, summarise
+from .crowds import ReactingPeople
+from .log import SimulationLog
+from .metrics import compute_metrics, find_avoidance_start, find_passing_side, find_yielding_steps
+from .monte_carlo import rerun_world, rollouts, summarise_rollouts
+from .outcomes import classify_outcome
+from .paper_claims import Finding
+from .replay import ReplacedWalker, Replay, Replays, find_replays
+from .run import Run
+from .safety_claims import safety_violations
+from .scenario import Behaviour, Claim, Crowd, CrowdModel, Scenario
+from .scenarios import MEETINGS, ONE_PERSON, SCENARIOS, Variations, VisiblePeople, Worlds
+from .social_metrics import compute_replay_metrics, compute_social_metrics
+from .strategies import STRATEGIES, classify_strategy, compute_retreat
+
+__all__ = [
+    "BEHAVIOURS",
+    "CONTROLLERS",
+    "FORMULATIONS",
+    "MEETINGS",
+    "ONE_PERSON",
+    "SCENARIOS",
+    "STRATEGIES",
+    "ZONES",
+    "AtlasCell",
+    "Behaviour",
+    "Claim",
+    "Crowd",
+    "CrowdModel",
+    "Finding",
+    "ReactingPeople",
+    "ReplacedWalker",
+    "Replay",
+    "Replays",
+    "Run",
+    "Scenario",
+    "SimulationLog",
+    "Variations",
+    "VisiblePeople",
+    "Worlds",
+    "classify_outcome",
+    "classify_strategy",
+    "compare",
+    "compute_metrics",
+    "compute_replay_metrics",
+    "compute_retreat",
+    "compute_social_metrics",
+    "drive",
+    "find_avoidance_start",
+    "find_passing_side",
+    "find_replays",
+    "find_yielding_steps",
+    "measure_time_inside",
+    "rerun_world",
+    "rollouts",
+    "run_atlas",
+    "safety_violations",
+    "simulate",
+    "summarise",
+    "summarise_rollouts",
+]

@@ -103,6 +103,7 @@ class StraightController(BaselineController):
     def desired_velocity(
         self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
     ) -> Array:
+        """See `BaselineController.desired_velocity` for `position`, `velocity`, `goal`, `people`."""
         s, ahead = self.settings, self.velocity_to_goal(goal - position)
         reach = float(velocity @ velocity) / (2 * s.a_max) + s.v_max * s.dt + self.margin
         lane = position + np.linspace(0.0, 1.0, 9)[:, None] * reach * ahead / max(np.hypot(*ahead), 1e-9)
@@ -131,6 +132,7 @@ class SocialForceController(BaselineController):
     def desired_velocity(
         self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
     ) -> Array:
+        """See `BaselineController.desired_velocity` for `position`, `velocity`, `goal`, `people`."""
         force = (self.velocity_to_goal(goal - position) - velocity) / self.tau
         for person in people:
             force = force + self._push(position, velocity, person)
@@ -175,6 +177,7 @@ class DynamicWindowController(BaselineController):
     def desired_velocity(
         self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
     ) -> Array:
+        """See `BaselineController.desired_velocity` for `position`, `velocity`, `goal`, `people`."""
         s = self.settings
         change = np.linspace(-1, 1, self.samples) * s.a_max * s.dt
         window = velocity + np.stack(np.meshgrid(change, change), axis=-1).reshape(-1, 2)

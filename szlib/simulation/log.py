@@ -48,7 +48,7 @@ class SimulationLog(Run):
     >>> log.metrics()["outcome"]
     'arrived'
     >>> log.table[["t", "x", "y", "h_person_0"]].round(2).iloc[0].tolist()
-    [0.0, -4.0, 0.0, 2.51]
+    [0.0, -4.0, 0.0, 2.35]
     >>> log.save("run")
     >>> szlib.SimulationLog.load("run").success
     True

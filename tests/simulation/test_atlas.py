@@ -51,21 +51,21 @@ RUNS = {
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_a_manner_is_what_was_done(name: str) -> None:
+def test_each_run_has_its_strategy(name: str) -> None:
     assert classify_strategy(RUNS[name]) == name
 
 
-def test_there_is_a_run_for_every_manner() -> None:
+def test_every_strategy_has_a_run() -> None:
     assert set(RUNS) == set(STRATEGIES)
 
 
-def test_what_is_worse_comes_first() -> None:
+def test_the_worst_strategy_has_precedence() -> None:
     both = replace(RUNS["infeasible"], arrival=None)
     assert classify_strategy(both) == "infeasible"
     assert classify_strategy(replace(RUNS["backs out"], arrival=None)) == "deadlock"
 
 
-def test_standing_while_nobody_holds_the_robot_back_is_not_waiting() -> None:
+def test_standing_without_an_active_barrier_is_not_waiting() -> None:
     assert classify_strategy(made(STANDS, held=False)) == "goes ahead"
 
 
@@ -90,7 +90,7 @@ def test_a_width_moves_the_walls_of_a_pathway_and_keeps_its_mouth_closed() -> No
     assert np.array_equal(np.sort(np.abs(walls[2:, :, 1]), axis=1), [[1.5, 4.0]] * 2)
 
 
-def test_the_chart_has_a_row_for_each_cell_in_their_order() -> None:
+def test_the_atlas_has_one_row_per_cell_in_order() -> None:
     cells = [
         AtlasCell("corridor", width=6.4, size=0.5),
         AtlasCell("corridor", width=1.0),
@@ -104,7 +104,7 @@ def test_the_chart_has_a_row_for_each_cell_in_their_order() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"scene": "hall"}, {"scene": "corridor", "width": 0}])
-def test_a_cell_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
+def test_invalid_cells_are_rejected(wrong: dict[str, object]) -> None:
     with pytest.raises(szlib.SolverError, match="must be"):
         AtlasCell(**wrong)  # type: ignore[arg-type]
 

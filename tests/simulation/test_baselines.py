@@ -39,7 +39,7 @@ def test_the_goal_is_reached_where_nothing_is_in_the_way(factory, walls):
     assert metrics["time_to_goal"] < 14
 
 
-def test_straight_stops_for_who_stands_in_the_way_and_waits():
+def test_straight_stops_and_waits_for_a_standing_person():
     log = run(make_straight, (person(0.0, 0.0),))
     assert not log.success and log.metrics()["overlaps"] == 0
     assert np.abs(log.states[:, 1]).max() == 0
@@ -47,13 +47,13 @@ def test_straight_stops_for_who_stands_in_the_way_and_waits():
 
 
 @pytest.mark.parametrize("factory", BASELINES)
-def test_they_let_somebody_cross(factory):
+def test_baselines_let_a_person_cross(factory):
     metrics = run(factory, (person(0.0, -2.0, (0.0, 0.5)),)).metrics()
     assert metrics["success"] and metrics["overlaps"] == 0
 
 
 @pytest.mark.parametrize("factory", [make_social_force, make_dynamic_window])
-def test_the_others_go_around_who_stands(factory):
+def test_other_baselines_go_around_a_standing_person(factory):
     metrics = run(factory, (person(0.0, 0.05),)).metrics()
     assert metrics["success"] and metrics["overlaps"] == 0
     assert metrics["passing_side"] == "right"  # the person is a little to the left

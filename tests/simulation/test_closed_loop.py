@@ -46,14 +46,14 @@ def person(x, y, velocity=(0.0, 0.0), zone=None):
 
 
 def visitor(t, _):
-    """Somebody who stands beside the way, from 2 s to 4 s only, and somebody who never comes."""
+    """A person who stands beside the way, from 2 s to 4 s only, and somebody who never comes."""
     return (person(-1.0, 1.6) if 2 <= t < 4 else None, None)
 
 
 # --- any controller ----------------------------------------------------------------------------------
 
 
-def test_a_strangers_controller_drives_and_what_it_does_not_tell_is_empty(tmp_path):
+def test_a_foreign_controller_drives_and_missing_reports_are_empty(tmp_path):
     log = szlib.simulate(WALK, Straight())
     metrics = log.metrics()
     assert log.success and metrics["outcome"] == "arrived"
@@ -79,7 +79,7 @@ def test_a_controller_that_promises_nothing_breaks_no_promise_and_its_violations
     assert np.isnan(metrics["time_yielding"])
 
 
-def test_a_controller_that_promises_is_held_to_it():
+def test_every_step_of_mpc_cbf_is_claimed_safe_or_flagged():
     log = szlib.simulate(
         szlib.SCENARIOS["corridor"], szlib.MPCCBF(ZONE, walls=szlib.SCENARIOS["corridor"].walls)
     )
@@ -184,7 +184,7 @@ def test_the_controller_gets_those_who_are_there_with_the_zones_that_are_kept():
     assert {p.zone for seen in controller.seen for p in seen} == {BODY_ZONE}
 
 
-def test_residuals_belong_to_who_was_there():
+def test_residuals_belong_to_people_who_are_present():
     log = szlib.simulate(WALK, szlib.MPCCBF(ZONE, max_people=2), crowd=visitor)
     there = (log.time >= 2) & (log.time < 4)
     assert np.array_equal(~np.isnan(log.residual[:, 0, 0]), there)
@@ -192,7 +192,7 @@ def test_residuals_belong_to_who_was_there():
     assert log.metrics()["time_yielding"] == 0
 
 
-def test_who_never_comes_changes_nothing():
+def test_an_absent_person_changes_nothing():
     alone = szlib.simulate(WALK, szlib.MPCCBF(ZONE))
     awaited = szlib.simulate(WALK, szlib.MPCCBF(ZONE), crowd=lambda t, _: [None])
     assert np.array_equal(alone.states, awaited.states)
@@ -287,7 +287,7 @@ class Broken(Straight):
         (Straight(), lambda t, _: [None] * (1 + (t > 1)), "was 1, and now is 2"),
     ],
 )
-def test_what_does_not_fit_is_named(controller, crowd, message):
+def test_invalid_controllers_and_crowds_are_rejected(controller, crowd, message):
     with pytest.raises(szlib.SolverError, match=message):
         szlib.simulate(WALK, controller, crowd=crowd, max_time=2.0)
 
@@ -332,7 +332,7 @@ def test_the_controller_is_part_of_what_chunks_are_of(tmp_path):
         run(lambda scenario, settings: Straight())
 
 
-def test_parts_are_told_apart_by_what_they_hold():
+def test_parts_are_identified_by_their_content():
     parts = [None, straight, Straight, szlib.MPCSettings(), szlib.MPCSettings(gamma=0.1), Behaviour(), ALONE]
     parts += [partial(straight, pace=0.5), partial(straight, pace=0.4), Worlds().__call__, ALONE.__call__]
     assert len({identify(part) for part in parts}) == len(parts)
@@ -348,7 +348,7 @@ def failing(scenario, settings):
     return Failing()
 
 
-def test_the_world_in_which_a_stranger_fails_is_named():
+def test_a_failing_controller_is_reported_with_its_world():
     with pytest.raises(KeyError, match="mine") as error:
         rollouts(1, seed=4, worlds=ALONE, controller=failing, n_jobs=1, progress=False)
     assert error.value.__notes__ == ["in world 4"]

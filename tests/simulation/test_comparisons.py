@@ -88,7 +88,7 @@ def test_intervals_cover_the_mean_and_pairs_sharpen_them():
     assert paired.loc["b", ["low", "high"]].tolist() == [0, 0]
 
 
-def test_what_a_world_lacks_is_left_out():
+def test_missing_values_are_left_out():
     rows = table(x=np.where(np.arange(400) % 2, np.nan, 3.0))
     found = summarise(rows, ["zone"], ["x"])
     assert found[["mean", "low", "high"]].to_numpy() == pytest.approx(3.0)

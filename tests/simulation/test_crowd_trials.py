@@ -42,7 +42,7 @@ def straight(*people: Person, y: float = 0.0) -> Scenario:
 
 
 @pytest.mark.parametrize("sees", ["robot", "nothing"])
-def test_who_keeps_their_velocity_is_promised_nothing_that_is_not_kept(model: str, sees: str) -> None:
+def test_claims_hold_for_people_who_keep_their_velocity(model: str, sees: str) -> None:
     rows = szlib.rollouts(
         6,
         worlds=CROWDED,
@@ -96,7 +96,7 @@ def test_recorded_people_who_do_not_see_the_robot_are_no_exception_either() -> N
     assert (table[["unexplained", "to_who_kept", "kept their velocity", "wall"]] == 0).all(axis=None)
 
 
-def test_a_controller_that_lies_is_found_out() -> None:
+def test_false_safety_claims_are_found() -> None:
     log = drive(straight(Person((0.0, 0.2), (-0.3, 0.0))), Careless())
     broken = safety_violations(log)
     assert set(broken["change"]) == {"kept their velocity"}
@@ -121,7 +121,7 @@ def test_a_controller_that_lies_is_found_out() -> None:
         ((np.nan, np.nan), (0.5, 0.0), 0.0, "came"),
     ],
 )
-def test_what_people_did_is_told(given: tuple, walked: tuple, turned: float, did: str) -> None:
+def test_the_change_of_motion_is_classified(given: tuple, walked: tuple, turned: float, did: str) -> None:
     log = drive(straight(Person((0.0, 0.0), heading=0.0)), Careless(), max_time=0.1)
     at = log.states[1, :2] + (0.5, 0.0)
     before = np.array([*(at - 0.1 * np.array(walked)), 0.0, *given])

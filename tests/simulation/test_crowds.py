@@ -126,7 +126,7 @@ def test_a_missing_package_is_named_with_what_installs_it(
         ReactingPeople(model).start(scene(*TWO), 0)
 
 
-def test_what_makes_no_sense_is_refused() -> None:
+def test_invalid_parameters_are_rejected() -> None:
     with pytest.raises(szlib.SolverError, match="orca, social force, speed model; got 'boids'"):
         ReactingPeople("boids")
     with pytest.raises(szlib.SolverError, match="robot, person, nothing"):

@@ -114,7 +114,7 @@ def test_walls_hide_who_is_behind_them():
     assert is_visible(here, (1.0, 0.5), np.zeros((0, 2, 2)))
 
 
-def test_who_is_hidden_is_there_but_not_given_to_the_controller():
+def test_hidden_people_are_present_but_not_seen():
     scenario = Variations(MEETINGS["blind corner"], ZONE, shift=0.0, pace=(1.0, 1.0))(0)
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
     log = drive(scenario, controller, behaviour=VisiblePeople())

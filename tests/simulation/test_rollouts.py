@@ -33,7 +33,7 @@ def whole(world):
     return drive(world, szlib.MPCCBF(ZONE, walls=world.walls, settings=SETTINGS), until_arrival=False)
 
 
-def test_what_goes_on_after_the_arrival_changes_nothing_before_it():
+def test_driving_on_after_the_arrival_changes_nothing_before_it():
     world = scenario(people=(person((1.0, 0.3)),), walls=[[(-3, 2.5), (5, 2.5)]])
     log, longer = szlib.simulate(world, szlib.MPCCBF(ZONE, walls=world.walls)), whole(world)
     n = len(log.states)
@@ -94,7 +94,7 @@ ENDINGS = {
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_how_it_ended(ending):
+def test_each_outcome_is_classified(ending):
     assert whole(ENDINGS[ending]).metrics()["outcome"] == ending
 
 

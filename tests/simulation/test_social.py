@@ -76,7 +76,7 @@ def test_where_nobody_is_there_is_nothing_to_intrude_upon():
         (-0.2, -1.0, (0, 1)),  # it backs away and is caught
     ],
 )
-def test_who_ran_into_whom(robot, person, expected):
+def test_a_collision_is_assigned_to_the_faster_one(robot, person, expected):
     t = 0.1 * np.arange(60)
     xs, at = robot * t, 2.0 + person * t
     people = np.column_stack([at, 0 * t, 0 * t, 0 * t + person, 0 * t])

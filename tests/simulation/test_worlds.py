@@ -61,7 +61,7 @@ def test_half_have_walls_and_half_of_the_people_stand():
     assert np.mean([p.stands for w in worlds for p in w.people]) == pytest.approx(0.5, abs=0.1)
 
 
-def test_what_cannot_be():
+def test_invalid_worlds_are_rejected():
     with pytest.raises(szlib.SolverError, match="no world of seed 3"):
         Worlds(people=(1, 1), size=0.5, travel=(0.1, 0.2), walls=0.0)(3)
     with pytest.raises(szlib.SolverError, match="travel must be a range"):
