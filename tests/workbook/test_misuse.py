@@ -214,7 +214,7 @@ def test_kernel_gets_parameters_as_text_and_reports_errors(notebooks, tmp_path):
     assert not list(tmp_path.rglob("executed"))
     assert summary["notebooks"]["02_crash"]["status"] == "error"
     assert summary["notebooks"]["02_crash"]["error"] == "ZeroDivisionError: division by zero"
-    assert "1 / 0" in next((tmp_path / "out").glob("mine-*/02_crash.ipynb")).read_text()
+    assert "1 / 0" in Path(summary["report"]).with_name("02_crash.ipynb").read_text()
 
 
 @pytest.mark.parametrize("value", ["9" * 5000, "[" * 100_000])
