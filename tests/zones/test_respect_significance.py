@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from helpers.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.errors import DataError, DataWarning, ZoneError
-from szlib.zones.respect_significance import NullTest, null_test
+from szlib.zones.respect_significance import null_test
 
 KINDS = ("opposite", "crossing")
 SHIFTS = 39
@@ -131,13 +130,6 @@ def test_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.Data
 
 
 # --- the object, and errors --------------------------------------------------------------------------
-
-
-def test_null_test_survives_json() -> None:
-    test = null_test(encounters(1, SHIFTS), null_of(0))
-    assert NullTest.from_record(json.loads(json.dumps(test.record()))) == test
-    with pytest.raises(ZoneError, match="test it again"):
-        NullTest.from_record({"p_value": 0.1})
 
 
 def test_kind_on_one_side_only_warns() -> None:
