@@ -22,8 +22,6 @@ import pytest
 import szlib
 
 PACKAGE = Path(szlib.__file__).parent
-UNFINISHED = {"encounters", "plaza", "workbook", "zones"}
-"""Rooms whose documentation is not complete yet: their failures are expected. The aim is none."""
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
 ENTRY = re.compile(r"^(\*{0,2}\w+(?:, \*{0,2}\w+)*) :(?: |$)", re.MULTILINE)
 QUOTED = re.compile(r"(`+)(.+?)\1", re.DOTALL)
@@ -39,14 +37,7 @@ def module_names() -> Iterator[str]:
 MODULES = list(module_names())
 
 
-def room(module: str) -> str:
-    return module.split(".")[1] if "." in module else "szlib"
-
-
-def check_finished(module: str, problems: list[str]) -> None:
-    """Fail with a list of problems, as expected where the room is not finished."""
-    if problems and room(module) in UNFINISHED:
-        pytest.xfail("\n".join(problems))
+def fail_with(module: str, problems: list[str]) -> None:
     if problems:
         pytest.fail("\n".join([f"{module}:", *problems]), pytrace=False)
 
@@ -123,7 +114,7 @@ def test_every_parameter_is_described(module: str) -> None:
         stray = entries(docstring, "Parameters", "Other Parameters") - given - fields
         stray |= entries(docstring, "Attributes") - given - fields
         problems += [f"{name}: {each} is described, but there is no such parameter" for each in sorted(stray)]
-    check_finished(module, problems)
+    fail_with(module, problems)
 
 
 @pytest.mark.parametrize("module", MODULES)
@@ -167,8 +158,8 @@ def test_every_exported_name_has_an_example(name: str) -> None:
         return
     if inspect.isclass(found) or inspect.isfunction(found):
         missing = ">>>" not in sections(inspect.getdoc(found) or "").get("Examples", "")
-        check_finished(found.__module__, [f"{name} has no Examples"] if missing else [])
+        fail_with(found.__module__, [f"{name} has no Examples"] if missing else [])
     else:
         used = re.compile(rf"^\s*(?:>>>|\.\.\.) .*\bszlib\.{name}\b", re.MULTILINE)
         shown = any(used.search(path.read_text(encoding="utf-8")) for path in PACKAGE.rglob("*.py"))
-        check_finished("szlib.zones", [] if shown else [f"szlib.{name} is used in no example"])
+        fail_with("szlib.zones", [] if shown else [f"szlib.{name} is used in no example"])
