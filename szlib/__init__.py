@@ -1,67 +1,10 @@
-"""szlib: social zones from pedestrian tracks, and a robot that keeps out of them."""
+"""szlib: social zones from pedestrian tracks, and a robot that keeps out of them.
+
+`__init__.pyi` beside this file lists the names. Each is imported when it is first used (SPEC 1).
+"""
 
 import lazy_loader as lazy
 
 __version__ = "0.1.0"
 
-__getattr__, __dir__, __all__ = lazy.attach(
-    __name__,
-    submodules=[
-        "control",
-        "encounters",
-        "errors",
-        "files",
-        "memory",
-        "parallel",
-        "plaza",
-        "simulation",
-        "tracks",
-        "workbook",
-        "zones",
-    ],
-    submod_attrs={
-        "control.barriers": ["ellipse_distance", "segment_distance"],
-        "control.differential_drive": ["DifferentialDrive"],
-        "control.mpc": ["MPCCBF", "Step"],
-        "control.person": ["Person"],
-        "control.tracker": ["Tracker"],
-        "control.settings": ["MPCSettings"],
-        "encounters.days": ["Extraction", "extract_days"],
-        "encounters.areas": ["as_area", "walked_area"],
-        "encounters.geometry": ["ATC_SQUARE", "AttentionalSpace", "Region", "Square"],
-        "encounters.settings": ["EncounterSettings"],
-        "encounters.kinds": ["encounter_kinds", "of_kind"],
-        "encounters.null_model": ["NullEncounters", "null_encounters"],
-        "encounters.finding": ["find_encounters"],
-        "encounters.time_shift": ["time_shifted"],
-        "errors": [
-            "DataError",
-            "DataWarning",
-            "MemoryLimitError",
-            "SolverError",
-            "StorageError",
-            "SzlibError",
-            "ZoneError",
-        ],
-        "plaza.generation": ["make_plaza"],
-        "plaza.settings": ["PlazaSettings"],
-        "simulation.closed_loop": ["drive", "simulate"],
-        "simulation.comparisons": ["compare"],
-        "simulation.log": ["SimulationLog"],
-        "simulation.monte_carlo": ["rollouts"],
-        "simulation.scenario": ["Scenario"],
-        "simulation.scenarios.meetings": ["MEETINGS"],
-        "simulation.scenarios.paper": ["SCENARIOS"],
-        "simulation.scenarios.random_worlds": ["Worlds"],
-        "tracks.clock": ["read_tracks"],
-        "tracks.options": ["ReadOptions"],
-        "zones.costmaps": ["Grid", "draw_costmap"],
-        "zones.ellipses": ["Ellipse"],
-        "zones.enclosing_ellipse": ["minimum_enclosing_ellipse"],
-        "zones.outliers": ["remove_outliers"],
-        "zones.respect": ["Respect", "fit_respect", "respect_boundary", "respect_radius"],
-        "zones.occupancy": ["PairCorrelation", "OccupancyHistogram", "pair_correlation"],
-        "zones.respect_significance": ["NullTest", "null_test"],
-        "zones.social_zone": ["SocialZone"],
-    },
-)
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)
