@@ -35,37 +35,3 @@ from .settings import MPCSettings
 from .step import FALLBACKS, Step
 from .step_report import StepReport
 from .tracker import TrackedPeople, Tracker
-
-__all__ = [
-    "FALLBACKS",
-    "MPCCBF",
-    "AdmissibleControls",
-    "BarrierLimit",
-    "Controller",
-    "DifferentialDrive",
-    "DoubleIntegrator",
-    "DriveStep",
-    "MPCSettings",
-    "Person",
-    "Robot",
-    "Scene",
-    "Step",
-    "StepReport",
-    "TrackedPeople",
-    "Tracker",
-    "Unicycle",
-    "advance",
-    "as_controller",
-    "barrier",
-    "cbf_residual",
-    "compare_distances",
-    "compute_h",
-    "ellipse_distance",
-    "euclidean_to_ellipse",
-    "euclidean_to_segment",
-    "find_admissible_controls",
-    "read_walls",
-    "required_margin",
-    "segment_distance",
-    "wall_margin",
-]

@@ -20,24 +20,3 @@ from .options import ReadOptions
 from .quality import count_visits_by_hour, measure_frame_intervals, summarise_people, summarise_seconds
 from .readers import read_raw
 from .sites import read_edinburgh, read_grand_central, read_magni, read_magni_groups
-
-__all__ = [
-    "ReadOptions",
-    "check_tracks",
-    "clock_index",
-    "count_visits_by_hour",
-    "datasets",
-    "funnels",
-    "measure_frame_intervals",
-    "read_edinburgh",
-    "read_grand_central",
-    "read_groups",
-    "read_magni",
-    "read_magni_groups",
-    "read_raw",
-    "read_tracks",
-    "summarise_people",
-    "summarise_seconds",
-    "to_clock",
-    "to_pedpy",
-]

@@ -3,13 +3,3 @@
 from .meetings import MEETINGS, Variations, VisiblePeople
 from .paper import SCENARIOS
 from .random_worlds import ONE_PERSON, Worlds, draw_zone
-
-__all__ = [
-    "MEETINGS",
-    "ONE_PERSON",
-    "SCENARIOS",
-    "Variations",
-    "VisiblePeople",
-    "Worlds",
-    "draw_zone",
-]

@@ -25,8 +25,6 @@ from .pedpy import PEDPY_FORMATS
 from .tidy import PARQUET, TIDY
 from .unpack import LONGEST_LINE, read_first_line, require_memory, unpacked
 
-__all__ = ["FORMATS", "TrackFormat", "find_format", "open_file"]
-
 FORMATS: dict[str, TrackFormat] = {each.name: each for each in (*PEDPY_FORMATS, ATC_RAW, ATC_1HZ, EWAP, TIDY)}
 """Formats by name, in the order of recognition."""
 

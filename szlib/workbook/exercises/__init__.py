@@ -13,5 +13,3 @@ sheets            `check` and `hint`, over all sheets
 
 from .sheets import SHEETS, check, hint
 from .task import Task, Verdict
-
-__all__ = ["SHEETS", "Task", "Verdict", "check", "hint"]

@@ -10,14 +10,3 @@ from .data_cache import DataCache
 from .display import ASSUMED, MEASURED, PAPER, parameters, settings_table
 from .notebook_record import NotebookRecord
 from .parameters import ZoneMethod
-
-__all__ = [
-    "ASSUMED",
-    "MEASURED",
-    "PAPER",
-    "DataCache",
-    "NotebookRecord",
-    "ZoneMethod",
-    "parameters",
-    "settings_table",
-]
