@@ -7,6 +7,7 @@ import logging
 import os
 import time
 from collections.abc import Mapping
+from contextlib import closing
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -74,6 +75,7 @@ def run_cells(
     import jupytext
     import nbformat
     import papermill
+    from jupyter_core.utils import ensure_event_loop
     from papermill.clientwrap import PapermillNotebookClient
     from papermill.engines import Engine, papermill_engines
 
@@ -94,7 +96,8 @@ def run_cells(
             )
             _CLIENTS.add(client)
             try:
-                client.execute(env={**os.environ, **environment})
+                with closing(ensure_event_loop()):  # the loop of this thread, which Jupyter leaves open
+                    client.execute(env={**os.environ, **environment})
             finally:
                 _CLIENTS.discard(client)
                 copy = deepcopy(nb_man.nb)

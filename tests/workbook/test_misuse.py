@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import pytest
 from helpers.faulty_disk import FaultyDisk
 
 import szlib
+from szlib.encounters import days
 from szlib.errors import DataError, StorageError
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
@@ -118,24 +120,25 @@ def test_extraction_refuses_samples_that_another_one_replaced(tmp_path):
 
 
 def test_failed_day_does_not_stop_the_others(tmp_path, monkeypatch):
-    day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=5))
-    (tmp_path / os.fsdecode(b"latin\xe4.csv")).write_bytes(day.read_bytes())
-    (tmp_path / "other.csv").write_bytes(day.read_bytes())
-    import szlib.encounters.days as days
+    names = ("day.csv", os.fsdecode(b"latin\xe4.csv"), "unforeseen.csv")
+    for k, name in enumerate(names, 1):
+        make_plaza(tmp_path / name, settings=PlazaSettings(n_encounters=5, date=f"2000-01-0{k}"))
+    (tmp_path / "rubbish.csv").write_text("rubbish\n")
+    find = days.find_encounters_in_files
 
-    real = days.describe_source
-
-    def poisoned(files, *arguments):
-        if files[0].endswith("other.csv"):
+    def find_or_fail(files, *arguments):
+        if files[0].name == "unforeseen.csv":
             raise KeyError("foreign")
-        return real(files, *arguments)
+        return find(files, *arguments)
 
-    monkeypatch.setattr(days, "describe_source", poisoned)
-    monkeypatch.setattr(days, "_calendar_day", lambda file, options: None)
-    done = szlib.extract_days(tmp_path, out=tmp_path / "out", progress=False).table.set_index("day")
-    assert done["status"].to_dict() == {"day": "done", r"latin\xe4": "failed", "other": "failed"}
-    assert done["why"]["other"] == "KeyError: 'foreign'"
-    assert "rename the file" in done["why"][r"latin\xe4"]
+    monkeypatch.setattr(days, "find_encounters_in_files", find_or_fail)
+    table = szlib.extract_days(tmp_path, out=tmp_path / "out", progress=False).table.set_index("day")
+    assert table["status"].to_dict() == {
+        "2000-01-01": "done", "2000-01-02": "failed", "2000-01-03": "failed", "rubbish": "failed",
+    }  # fmt: skip
+    assert "rename the file" in table["why"]["2000-01-02"]
+    assert table["why"]["2000-01-03"] == "KeyError: 'foreign'"
+    assert "'rubbish' has no column" in table["why"]["rubbish"]
 
 
 @pytest.mark.usefixtures("without_kernels")
@@ -204,7 +207,9 @@ def test_defaults_of_the_notebooks_are_in_range():
         check_parameters(given, [source])
 
 
-def test_kernel_gets_parameters_as_text_and_reports_errors(notebooks, tmp_path):
+def test_kernel_gets_parameters_as_text_and_reports_errors(notebooks, tmp_path, monkeypatch):
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     notebooks(_01_one='record.key["word"] = word', _02_crash="1 / 0")
     source = tmp_path / "notebooks" / "01_one.py"
     source.write_text(source.read_text().replace("seed = 0\n", 'seed = 0\nword = ""\n', 1))
@@ -212,6 +217,7 @@ def test_kernel_gets_parameters_as_text_and_reports_errors(notebooks, tmp_path):
     summary = runner.run("mine.csv", out="out", parameters={"word": code})
     assert summary["notebooks"]["01_one"]["key_figures"]["word"] == code
     assert not list(tmp_path.rglob("executed"))
+    assert not list(tmp_path.glob("temporary/*.json")), "connection files of the kernels"
     assert summary["notebooks"]["02_crash"]["status"] == "error"
     assert summary["notebooks"]["02_crash"]["error"] == "ZeroDivisionError: division by zero"
     assert "1 / 0" in Path(summary["report"]).with_name("02_crash.ipynb").read_text()
@@ -270,7 +276,7 @@ time.sleep(120)"""
     )
     run = subprocess.Popen(
         [sys.executable, str(program), "run", "--data", "mine.csv", "--out", "out"],
-        env=HERE, text=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE,
+        env=HERE | {"TMPDIR": str(tmp_path)}, text=True, stderr=subprocess.PIPE, stdout=subprocess.PIPE,
     )  # fmt: skip
     table = tmp_path / "out" / "mine" / "kernel.csv"
     while not table.exists() and run.poll() is None:
@@ -284,6 +290,7 @@ time.sleep(120)"""
     while Path(f"/proc/{kernel}").exists() and time.monotonic() < end:
         time.sleep(0.1)
     assert not Path(f"/proc/{kernel}").exists()
+    assert not list(tmp_path.glob("*.json")), "the kernel's connection file"
     assert not (tmp_path / "out" / "mine" / "summary.json").exists()
 
 
