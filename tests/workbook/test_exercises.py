@@ -14,13 +14,61 @@ import pytest
 
 import szlib
 from szlib.workbook import folders
-from szlib.workbook.exercises import SHEETS, Task, check, hint
+from szlib.workbook.exercises import SHEETS, Task, check, hint, sheet6_robot
 from szlib.workbook.exercises.task import load_texts
 
 TASKS = {
     task.name: (sheet, number, task) for sheet, tasks in SHEETS.items() for number, task in enumerate(tasks)
 }
 SEED = 3
+
+
+def far_corner(cloud):
+    return cloud.max(axis=0) + 1.0
+
+
+def quantile_ellipse(samples, q, *, complement=False):
+    """An ellipse along the axes, from the quantile q of the nearest approaches on four sides."""
+    close = samples[(samples["distance"] <= 2.0) & (samples["speed"] - 1.1).abs().le(0.2)]
+    turn = np.radians([0, 90, 180, -90])
+    off = np.angle(np.exp(1j * (close["los_angle"].to_numpy()[:, None] - turn)))
+    radii = []
+    for side in (np.abs(off) < np.radians(15)).T:
+        approach = close[side].groupby("encounter")["distance"].min()
+        radii.append(float(np.quantile(approach, q)))
+    ahead, left, behind, right = (2.0 - r if complement else r for r in radii)
+    a, b = sorted([(ahead + behind) / 2, (left + right) / 2], reverse=True)
+    center = (ahead - behind) / 2, (left - right) / 2
+    return szlib.Ellipse(center, (a, b), np.pi / 2 if complement else 0.0)
+
+
+def predict(**wrong):
+    """The correct answers, except those in `wrong` (q0, q1, q2)."""
+    questions = enumerate(sheet6_robot.QUESTIONS.items())
+    return {question: wrong.get(f"q{i}", answers[0]) for i, (question, answers) in questions}
+
+
+WRONG_ANSWERS = {
+    "blind_spot": {
+        "an encounter has 31 samples": lambda cloud: far_corner(cloud)[None],
+        "this is not an intruder": lambda cloud: cloud[:31] + 0.01,
+        "the same point": lambda cloud: np.tile(far_corner(cloud), (31, 1)),
+        "LOF removes": lambda cloud: far_corner(cloud) + 0.02 * np.arange(31)[:, None] ** 2,
+    },
+    "my_zone": {
+        "expected a szlib.Ellipse": lambda samples: 1.0,
+        "too small; a few people walk through": lambda samples: quantile_ellipse(samples, 0.0),
+        "too large; most people keep farther away": lambda samples: quantile_ellipse(samples, 0.4),
+        "this is an ellipse around the slice": lambda s: quantile_ellipse(s, 0.05, complement=True),
+    },
+    "prediction": {
+        "'larger'; the runs give 'smaller'": lambda: predict(q0="larger"),
+        "'more'; the runs give 'fewer'": lambda: predict(q1="more"),
+        "'farther away'; the runs give 'nearer'": lambda: predict(q2="farther away"),
+        "expected a dict with an answer": lambda: "smaller",
+    },
+}
+"""Message -> answer that gets it, for each task with a judge."""
 
 
 def _sheets():
@@ -73,7 +121,7 @@ class TestEach:
             verdict.require()
 
     def test_each_typical_mistake_gets_its_message(self, name):
-        mistakes = TASKS[name][2].mistakes
+        mistakes = {**TASKS[name][2].mistakes, **WRONG_ANSWERS.get(name, {})}
         assert len(mistakes) >= 3
         for message, wrong in mistakes.items():
             verdict = check(name, wrong, seed=SEED)

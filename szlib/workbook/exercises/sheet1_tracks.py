@@ -63,47 +63,35 @@ TASKS = (
     make_task(
         "velocity",
         formula(_draw_path, _velocity),
-        {
-            "displacement": lambda path, k, half: path[k + half] - path[k - half],
-            "ticks": lambda path, k, half: (path[k + half] - path[k - half]) / (2 * half),
-            "half_time": lambda path, k, half: (path[k + half] - path[k - half]) / (half * _TICK),
-            "one_tick": lambda path, k, half: (path[k + 1] - path[k]) / _TICK,
-        },
+        displacement=lambda path, k, half: path[k + half] - path[k - half],
+        ticks=lambda path, k, half: (path[k + half] - path[k - half]) / (2 * half),
+        half_time=lambda path, k, half: (path[k + half] - path[k - half]) / (half * _TICK),
+        one_tick=lambda path, k, half: (path[k + 1] - path[k]) / _TICK,
     ),
     make_task(
         "line_of_sight",
         formula(_draw_two_people, _line_of_sight),
-        {
-            "degrees": lambda ref, heading, other: np.degrees(_line_of_sight(ref, heading, other)),
-            "world": lambda ref, heading, other: _line_of_sight(ref, 0.0, other),
-            "swapped": lambda ref, heading, other: _line_of_sight(other, heading, ref),
-            "not_wrapped": _bearing,
-            "arctan_order": lambda ref, heading, other: wrap_angle(np.arctan2(*(other - ref)) - heading),
-        },
+        degrees=lambda ref, heading, other: np.degrees(_line_of_sight(ref, heading, other)),
+        world=lambda ref, heading, other: _line_of_sight(ref, 0.0, other),
+        swapped=lambda ref, heading, other: _line_of_sight(other, heading, ref),
+        not_wrapped=_bearing,
+        arctan_order=lambda ref, heading, other: wrap_angle(np.arctan2(*(other - ref)) - heading),
     ),
     make_task(
         "in_space",
         formula(_draw_people_around, _in_space),
-        {
-            "not_turned": lambda ref, heading, others: _in_space(ref, 0.0, others),
-            "turned_back": lambda ref, heading, others: _in_space(ref, -heading, others),
-            "twice_as_wide": lambda ref, heading, others: _in_space(
-                ref, heading, others, AttentionalSpace(5, 8)
-            ),
-            "swapped": lambda ref, heading, others: _in_space(ref, heading, others, AttentionalSpace(4, 5)),
-            "centred": lambda ref, heading, others: _in_space(
-                ref, heading, others, AttentionalSpace(centred=True)
-            ),
-        },
+        not_turned=lambda ref, heading, others: _in_space(ref, 0.0, others),
+        turned_back=lambda ref, heading, others: _in_space(ref, -heading, others),
+        twice_as_wide=lambda ref, heading, others: _in_space(ref, heading, others, AttentionalSpace(5, 8)),
+        swapped=lambda ref, heading, others: _in_space(ref, heading, others, AttentionalSpace(4, 5)),
+        centred=lambda ref, heading, others: _in_space(ref, heading, others, AttentionalSpace(centred=True)),
     ),
     make_task(
         "one_hertz",
         formula(_draw_turn, _chord_error),
-        {
-            "whole_angle": lambda radius, speed, interval: radius * (1 - np.cos(speed * interval / radius)),
-            "small_angle": lambda radius, speed, interval: (speed * interval) ** 2 / (8 * radius),
-            "one_second": lambda radius, speed, interval: _chord_error(radius, speed, 1.0),
-            "from_centre": lambda radius, speed, interval: radius * np.cos(speed * interval / radius / 2),
-        },
+        whole_angle=lambda radius, speed, interval: radius * (1 - np.cos(speed * interval / radius)),
+        small_angle=lambda radius, speed, interval: (speed * interval) ** 2 / (8 * radius),
+        one_second=lambda radius, speed, interval: _chord_error(radius, speed, 1.0),
+        from_centre=lambda radius, speed, interval: radius * np.cos(speed * interval / radius / 2),
     ),
 )

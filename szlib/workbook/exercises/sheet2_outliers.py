@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ...plaza.accuracy import precision_and_recall
-from ...zones.outliers import N_NEIGHBOURS, complementary_points, local_outlier_factors, nearest_approaches
+from ...zones.outliers import N_NEIGHBOURS, complementary_points, local_outlier_factors
 from .task import Case, Rng, formula, make_task
 
 _WINDOW = 31
@@ -36,10 +36,6 @@ def _draw_encounters(rng: Rng) -> tuple[Any, ...]:
     nearest = rng.uniform(0.6, 1.4, 4)
     distance = nearest[number] + rng.uniform(0, 1, len(number))
     return (pd.DataFrame({"encounter": number, "los_angle": 0.0, "distance": distance.round(3)}),)
-
-
-def _nearest(samples: pd.DataFrame) -> Any:
-    return nearest_approaches(samples).sort_values("encounter")["distance"].to_numpy()
 
 
 def _by_encounter(samples: pd.DataFrame, statistic: str) -> Any:
@@ -76,50 +72,34 @@ def _judge_intruder(args: tuple[Any, ...], _: Any, got: Any) -> str:
     )
 
 
-def _far_corner(cloud: Any) -> Any:
-    return cloud.max(axis=0) + 1.0
-
-
 TASKS = (
     make_task(
         "complementary",
         formula(_draw_close_samples, _complementary),
-        {
-            "plain": lambda angle, distance, r_max: _positions(angle, distance),
-            "radians": lambda angle, distance, r_max: _positions(np.radians(angle), r_max - distance),
-            "swapped": lambda angle, distance, r_max: _positions(angle, r_max - distance)[:, ::-1],
-            "sign": lambda angle, distance, r_max: _positions(angle, distance - r_max),
-        },
+        plain=lambda angle, distance, r_max: _positions(angle, distance),
+        radians=lambda angle, distance, r_max: _positions(np.radians(angle), r_max - distance),
+        swapped=lambda angle, distance, r_max: _positions(angle, r_max - distance)[:, ::-1],
+        sign=lambda angle, distance, r_max: _positions(angle, distance - r_max),
     ),
     make_task(
         "nearest",
-        formula(_draw_encounters, _nearest),
-        {
-            "overall": lambda samples: np.full(samples["encounter"].nunique(), samples["distance"].min()),
-            "mean": lambda samples: _by_encounter(samples, "mean"),
-            "first": lambda samples: _by_encounter(samples, "first"),
-            "largest": lambda samples: _by_encounter(samples, "max"),
-        },
+        formula(_draw_encounters, lambda samples: _by_encounter(samples, "min")),
+        overall=lambda samples: np.full(samples["encounter"].nunique(), samples["distance"].min()),
+        mean=lambda samples: _by_encounter(samples, "mean"),
+        first=lambda samples: _by_encounter(samples, "first"),
+        largest=lambda samples: _by_encounter(samples, "max"),
     ),
     make_task(
         "found",
         formula(_draw_removed, precision_and_recall),
-        {
-            "swapped": lambda removed, intruder: precision_and_recall(removed, intruder)[::-1],
-            "of_all": lambda removed, intruder: ((removed & intruder).mean(),) * 2,
-            "not_removed": lambda removed, intruder: precision_and_recall(~removed, intruder),
-            "not_intruders": lambda removed, intruder: precision_and_recall(removed, ~intruder),
-        },
+        swapped=lambda removed, intruder: precision_and_recall(removed, intruder)[::-1],
+        of_all=lambda removed, intruder: ((removed & intruder).mean(),) * 2,
+        not_removed=lambda removed, intruder: precision_and_recall(~removed, intruder),
+        not_intruders=lambda removed, intruder: precision_and_recall(removed, ~intruder),
     ),
     make_task(
         "blind_spot",
         _draw_cloud,
-        {
-            f"an encounter has {_WINDOW} samples": lambda cloud: _far_corner(cloud)[None],
-            "this is not an intruder": lambda cloud: cloud[:_WINDOW] + 0.01,
-            "the same point": lambda cloud: np.tile(_far_corner(cloud), (_WINDOW, 1)),
-            "LOF removes": lambda cloud: _far_corner(cloud) + 0.02 * np.arange(_WINDOW)[:, None] ** 2,
-        },
         judge=_judge_intruder,
         n_cases=2,
     ),

@@ -116,61 +116,33 @@ def _judge_zone(_: tuple[Any, ...], truth: Ellipse, got: Any) -> str:
     return f"{found}, centre off by {off[0]:+.2f} and {off[1]:+.2f} m; at most {_TOLERANCE} m is allowed"
 
 
-def _quantile_ellipse(samples: pd.DataFrame, q: float, *, complement: bool = False) -> Ellipse:
-    """An ellipse along the axes, from the quantile q of the nearest approaches on four sides."""
-    close = samples[(samples["distance"] <= _R_MAX) & (samples["speed"] - _SPEED).abs().le(0.2)]
-    turn = np.radians([0, 90, 180, -90])
-    off = np.angle(np.exp(1j * (close["los_angle"].to_numpy()[:, None] - turn)))
-    radii = []
-    for side in (np.abs(off) < np.radians(15)).T:
-        approach = close[side].groupby("encounter")["distance"].min()
-        radii.append(float(np.quantile(approach, q)))
-    ahead, left, behind, right = (_R_MAX - r if complement else r for r in radii)
-    a, b = sorted([(ahead + behind) / 2, (left + right) / 2], reverse=True)
-    return Ellipse(((ahead - behind) / 2, (left - right) / 2), (a, b), np.pi / 2 if complement else 0.0)
-
-
 TASKS = (
     make_task(
         "crossing",
         formula(_draw_edge, _crossing),
-        {
-            "middle": lambda a, b, speed: (a + b)[:2] / 2,
-            "wrong_end": lambda a, b, speed: _crossing(b, a, a[2] + b[2] - speed),
-            "nearest_end": lambda a, b, speed: min(a, b, key=lambda end: abs(speed - end[2]))[:2],
-        },
+        middle=lambda a, b, speed: (a + b)[:2] / 2,
+        wrong_end=lambda a, b, speed: _crossing(b, a, a[2] + b[2] - speed),
+        nearest_end=lambda a, b, speed: min(a, b, key=lambda end: abs(speed - end[2]))[:2],
     ),
     make_task(
         "zone_radius",
         formula(_draw_polygon, lambda polygon, theta, r_max: r_max - _reach(polygon, theta)),
-        {
-            "reach": lambda polygon, theta, r_max: _reach(polygon, theta),
-            "corner": lambda polygon, theta, r_max: r_max - _nearest_corner(polygon, theta),
-            "any_direction": lambda polygon, theta, r_max: r_max - _nearest_edge(polygon),
-            "degrees": lambda polygon, theta, r_max: r_max - _reach(polygon, np.radians(theta)),
-        },
+        reach=lambda polygon, theta, r_max: _reach(polygon, theta),
+        corner=lambda polygon, theta, r_max: r_max - _nearest_corner(polygon, theta),
+        any_direction=lambda polygon, theta, r_max: r_max - _nearest_edge(polygon),
+        degrees=lambda polygon, theta, r_max: r_max - _reach(polygon, np.radians(theta)),
     ),
     make_task(
         "triangle_ellipse",
         formula(_draw_triangle, _smallest),
-        {
-            "circle": _circumscribed,
-            "triangle": _area,
-            "inside": lambda triangle: _smallest(triangle) / 4,
-            "box": lambda triangle: np.pi / 4 * float(np.prod(np.ptp(triangle, axis=0))),
-        },
+        circle=_circumscribed,
+        triangle=_area,
+        inside=lambda triangle: _smallest(triangle) / 4,
+        box=lambda triangle: np.pi / 4 * float(np.prod(np.ptp(triangle, axis=0))),
     ),
     make_task(
         "my_zone",
         _draw_plaza,
-        {
-            "expected a szlib.Ellipse": lambda samples: 1.0,
-            "too small; a few people walk through": lambda samples: _quantile_ellipse(samples, 0.0),
-            "too large; most people keep farther away": lambda samples: _quantile_ellipse(samples, 0.4),
-            "this is an ellipse around the slice": lambda samples: _quantile_ellipse(
-                samples, 0.05, complement=True
-            ),
-        },
         judge=_judge_zone,
         n_cases=1,
     ),

@@ -23,10 +23,6 @@ def _focal(points: Any, center: Any, axes: Any, angle: float) -> Any:
     return ellipse_distance(points, Ellipse(center, axes, angle))
 
 
-def _focal_sum(points: Any, center: Any, axes: Any, angle: float) -> Any:
-    return 2 * (_focal(points, center, axes, angle) + axes[0])
-
-
 def _draw_wall(rng: Rng) -> tuple[Any, ...]:
     a = rng.uniform(-2, 0, 2).round(2)
     b = (a + rng.uniform(0.8, 2.0, 2)).round(2)
@@ -63,47 +59,37 @@ TASKS = (
     make_task(
         "focal_distance",
         formula(_draw_zone, _focal),
-        {
-            "not_halved": lambda points, center, axes, angle: (
-                _focal_sum(points, center, axes, angle) - axes[0]
-            ),
-            "shorter_axis": lambda points, center, axes, angle: (
-                _focal_sum(points, center, axes, angle) / 2 - axes[1]
-            ),
-            "not_turned": lambda points, center, axes, angle: _focal(points, center, axes, 0.0),
-            "level": lambda points, center, axes, angle: Ellipse(center, axes, angle).level(points) - 1,
-            "centre": lambda points, center, axes, angle: np.hypot(*(points - center).T) - axes[0],
-        },
+        not_halved=lambda points, center, axes, angle: 2 * _focal(points, center, axes, angle) + axes[0],
+        shorter_axis=lambda points, center, axes, angle: (
+            _focal(points, center, axes, angle) + axes[0] - axes[1]
+        ),
+        not_turned=lambda points, center, axes, angle: _focal(points, center, axes, 0.0),
+        level=lambda points, center, axes, angle: Ellipse(center, axes, angle).level(points) - 1,
+        centre=lambda points, center, axes, angle: np.hypot(*(points - center).T) - axes[0],
     ),
     make_task(
         "wall_distance",
         formula(_draw_wall, segment_distance),
-        {
-            "line": lambda points, a, b: np.abs(_g_and_t(points, a, b)[0]),
-            "sign": _wrong_sign,
-            "euclidean": euclidean_to_segment,
-            "squared": lambda points, a, b: segment_distance(points, a, b) ** 2,
-        },
+        line=lambda points, a, b: np.abs(_g_and_t(points, a, b)[0]),
+        sign=_wrong_sign,
+        euclidean=euclidean_to_segment,
+        squared=lambda points, a, b: segment_distance(points, a, b) ** 2,
     ),
     make_task(
         "barrier_row",
         formula(_draw_distances, _row),
-        {
-            "no_radius": lambda now, after, gamma, radius, eps: _row(now, after, gamma, 0.0, 0.0),
-            "no_margin": lambda now, after, gamma, radius, eps: _row(now, after, gamma, radius, 0.0),
-            "swapped": lambda now, after, gamma, radius, eps: _row(now, after, 1 - gamma, radius, eps),
-            "sign": lambda now, after, gamma, radius, eps: -_row(now, after, gamma, radius, eps),
-            "only_next": lambda now, after, gamma, radius, eps: barrier(after, radius, eps),
-        },
+        no_radius=lambda now, after, gamma, radius, eps: _row(now, after, gamma, 0.0, 0.0),
+        no_margin=lambda now, after, gamma, radius, eps: _row(now, after, gamma, radius, 0.0),
+        swapped=lambda now, after, gamma, radius, eps: _row(now, after, 1 - gamma, radius, eps),
+        sign=lambda now, after, gamma, radius, eps: -_row(now, after, gamma, radius, eps),
+        only_next=lambda now, after, gamma, radius, eps: barrier(after, radius, eps),
     ),
     make_task(
         "end_margin",
         formula(_draw_robot_and_wall, lambda radius, length: required_margin([(0, 0), (length, 0)], radius)),
-        {
-            "distance": lambda radius, length: radius + radius**2 / length,
-            "no_unit": lambda radius, length: radius / length,
-            "halved": lambda radius, length: radius**2 / (2 * length),
-            "paper": lambda radius, length: 0.05,
-        },
+        distance=lambda radius, length: radius + radius**2 / length,
+        no_unit=lambda radius, length: radius / length,
+        halved=lambda radius, length: radius**2 / (2 * length),
+        paper=lambda radius, length: 0.05,
     ),
 )

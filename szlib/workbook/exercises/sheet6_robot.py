@@ -67,7 +67,7 @@ def _next_plan(plan: Any) -> Any:
     return np.vstack([plan[1:], np.zeros((1, 2))])
 
 
-_QUESTIONS = {
+QUESTIONS = {
     "passing, gamma from 0.05 to 0.1: the least h is": ("smaller", "larger"),
     "waiting at gamma 0.2, N_h from 2 to 8: the infeasible steps are": ("fewer", "more"),
     "passing, from the front to from behind: avoidance starts": ("nearer", "farther away"),
@@ -83,7 +83,7 @@ def _draw_runs(rng: Rng) -> Case:
     behind = _run("passing", zone, calm, turned=True)
     pairs = [("min_h", first, sooner), ("infeasible_steps", short, long), ("start", first, behind)]
     truth = {}
-    for (question, (falls, rises)), (name, one, other) in zip(_QUESTIONS.items(), pairs, strict=True):
+    for (question, (falls, rises)), (name, one, other) in zip(QUESTIONS.items(), pairs, strict=True):
         answer = falls if other[name] < one[name] else rises if other[name] > one[name] else "the same"
         truth[question] = (answer, f"{one[name]:.3g}, then {other[name]:.3g}")
     return (), truth
@@ -94,59 +94,42 @@ def _judge_prediction(_: tuple[Any, ...], truth: dict[str, tuple[str, str]], got
     if not isinstance(got, dict) or set(got) != set(truth):
         return f"expected a dict with an answer to each of {list(truth)}; got {got!r}"
     for question, (answer, numbers) in truth.items():
-        if got[question] not in (*_QUESTIONS[question], "the same"):
-            return f"{question!r}: expected one of {_QUESTIONS[question]}; got {got[question]!r}"
+        if got[question] not in (*QUESTIONS[question], "the same"):
+            return f"{question!r}: expected one of {QUESTIONS[question]}; got {got[question]!r}"
         if got[question] != answer:
             return f"you predicted: {question} {got[question]!r}; the runs give {answer!r} ({numbers})"
     return ""
-
-
-def _prediction(**wrong: str) -> dict[str, str]:
-    """The correct answers, except those in `wrong` (q0, q1, q2)."""
-    return {q: wrong.get(f"q{i}", answers[0]) for i, (q, answers) in enumerate(_QUESTIONS.items())}
 
 
 TASKS = (
     make_task(
         "speed_limit",
         formula(_draw_approach, _speed_limit),
-        {
-            "no_dt": lambda h, gamma, dt, person_speed: gamma * h - person_speed,
-            "no_person": lambda h, gamma, dt, person_speed: gamma * h / dt,
-            "sign": lambda h, gamma, dt, person_speed: gamma * h / dt + person_speed,
-            "multiplied": lambda h, gamma, dt, person_speed: gamma * h * dt - person_speed,
-        },
+        no_dt=lambda h, gamma, dt, person_speed: gamma * h - person_speed,
+        no_person=lambda h, gamma, dt, person_speed: gamma * h / dt,
+        sign=lambda h, gamma, dt, person_speed: gamma * h / dt + person_speed,
+        multiplied=lambda h, gamma, dt, person_speed: gamma * h * dt - person_speed,
     ),
     make_task(
         "largest_gamma",
         formula(_draw_weak_robot, _largest),
-        {
-            "next": _next_larger,
-            "smallest": lambda zone, a_max, gammas: gammas[0],
-            "largest": lambda zone, a_max, gammas: gammas[-1],
-            "default_brake": lambda zone, a_max, gammas: _largest(zone, 1.0, gammas),
-        },
+        next=_next_larger,
+        smallest=lambda zone, a_max, gammas: gammas[0],
+        largest=lambda zone, a_max, gammas: gammas[-1],
+        default_brake=lambda zone, a_max, gammas: _largest(zone, 1.0, gammas),
         n_cases=1,
     ),
     make_task(
         "next_plan",
         formula(_draw_plan, _next_plan),
-        {
-            "repeated": lambda plan: np.vstack([plan[1:], plan[-1:]]),
-            "unchanged": lambda plan: plan,
-            "wrong_way": lambda plan: np.vstack([np.zeros((1, 2)), plan[:-1]]),
-            "shorter": lambda plan: plan[1:],
-        },
+        repeated=lambda plan: np.vstack([plan[1:], plan[-1:]]),
+        unchanged=lambda plan: plan,
+        wrong_way=lambda plan: np.vstack([np.zeros((1, 2)), plan[:-1]]),
+        shorter=lambda plan: plan[1:],
     ),
     make_task(
         "prediction",
         _draw_runs,
-        {
-            "'larger'; the runs give 'smaller'": lambda: _prediction(q0="larger"),
-            "'more'; the runs give 'fewer'": lambda: _prediction(q1="more"),
-            "'farther away'; the runs give 'nearer'": lambda: _prediction(q2="farther away"),
-            "expected a dict with an answer": lambda: "smaller",
-        },
         judge=_judge_prediction,
         n_cases=1,
     ),

@@ -22,6 +22,8 @@ from ...errors import SzlibError
 Answer = Callable[..., Any]
 Case = tuple[tuple[Any, ...], Any]
 """The arguments for the learner's function, and the correct answer."""
+Judge = Callable[[tuple[Any, ...], Any, Any], str]
+"""Function of the arguments, the correct answer and the learner's answer; "" accepts the answer."""
 Rng = np.random.Generator
 
 _TEXTS = Path(__file__).with_name("texts.toml")
@@ -91,7 +93,7 @@ class Task:
     hints: tuple[str, ...]
     case: Callable[[Rng], Case]
     mistakes: Mapping[str, Answer]
-    judge: Callable[[tuple[Any, ...], Any, Any], str] | None = None
+    judge: Judge | None = None
     tolerance: float = 1e-6
     unit: str = ""
     n_cases: int = 5
@@ -113,7 +115,7 @@ class Task:
             tried.append((args, expected, got))
         for args, expected, got in tried:
             if fault := self._fault(args, expected, got):
-                mistake = "" if self.judge else self._mistake([(args, got) for args, _, got in tried])
+                mistake = self._mistake(tried)
                 return Verdict(self.name, False, f"{mistake}: {fault}" if mistake else fault)
         return Verdict(self.name, True, f"correct in {self.n_cases} fresh case{'s' * (self.n_cases > 1)}")
 
@@ -144,34 +146,39 @@ class Task:
             f"{_shown(want[first])}{unit}, got {_shown(have[first])}"
         )
 
-    def _mistake(self, tried: list[tuple[tuple[Any, ...], Any]]) -> str:
+    def _mistake(self, tried: list[tuple[tuple[Any, ...], Any, Any]]) -> str:
         """Message of the typical mistake that gives the same answers in every case; "" if there is none."""
         for message, mistake in self.mistakes.items():
-            if not any(self._difference(mistake(*deepcopy(args)), got) for args, got in tried):
+            if not any(self._difference(mistake(*deepcopy(args)), got) for args, _, got in tried):
                 return message
         return ""
 
 
-def make_task(name: str, case: Callable[[Rng], Case], mistakes: Mapping[str, Answer], **options: Any) -> Task:
+def make_task(
+    name: str,
+    case: Callable[[Rng], Case],
+    *,
+    judge: Judge | None = None,
+    tolerance: float = 1e-6,
+    n_cases: int = 5,
+    **mistakes: Answer,
+) -> Task:
     """Build a task with the texts of `texts.toml`.
 
     Parameters
     ----------
     name : name of the task, and of its section in `texts.toml`.
-    case : as for `Task`.
-    mistakes : key -> function that makes the mistake. `texts.toml` holds the message of each key; with a
-        `judge` the keys are the messages.
-    options : other fields of `Task`: `judge`, `tolerance`, `n_cases`.
+    case, judge, tolerance, n_cases : as for `Task`.
+    mistakes : key -> function that makes the mistake. `texts.toml` holds the message of each key.
 
     Raises
     ------
     KeyError : a task or a mistake has no text.
     """
     texts = load_texts()[name]
-    if "judge" not in options:
-        mistakes = {texts["mistakes"][key]: answer for key, answer in mistakes.items()}
-    unit = texts.get("unit", "")
-    return Task(name, texts["minutes"], tuple(texts["hints"]), case, mistakes, unit=unit, **options)
+    hints, unit = tuple(texts["hints"]), texts.get("unit", "")
+    messages = {texts["mistakes"][key]: answer for key, answer in mistakes.items()}
+    return Task(name, texts["minutes"], hints, case, messages, judge, tolerance, unit, n_cases)
 
 
 @cache
