@@ -32,6 +32,22 @@ def check_columns(table: pd.DataFrame, needed: Sequence[str]) -> None:
         raise DataError(f"the table is empty; expected rows of {list(needed)}")
 
 
+def check_rows(table: pd.DataFrame, is_valid: ArrayLike, columns: Sequence[str], expected: str) -> None:
+    """Raise DataError with the first row of a table that is not valid.
+
+    Parameters
+    ----------
+    table : any table.
+    is_valid : whether each row is valid, shape (n,).
+    columns : columns of the row that the message shows.
+    expected : the rest of the message: what was expected, and what to do.
+    """
+    invalid = np.flatnonzero(~np.asarray(is_valid, bool))
+    if len(invalid):
+        row = table[list(columns)].iloc[invalid[0]].to_dict()
+        raise DataError(f"row {table.index[invalid[0]]}: got {row}; {expected}")
+
+
 def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     """A copy of `value` as an array of floats.
 

@@ -27,7 +27,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from ..checks import check_columns
+from ..checks import check_columns, check_rows
 from ..errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, clock_index
@@ -89,9 +89,8 @@ def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, area: object =
         known.get_indexer(pd.MultiIndex.from_arrays([pairs["day"].astype(str), pairs[column]]))
         for column in ("ref_id", "other_id")
     )
-    if (unknown := (ref < 0) | (other < 0)).any():
-        found = pairs[["day", "ref_id", "other_id"]].iloc[int(np.flatnonzero(unknown)[0])].to_dict()
-        raise DataError(f"{found}: not in these tracks; pass the tracks in which the pairs were found")
+    expected = "not in these tracks; pass the tracks in which the pairs were found"
+    check_rows(pairs, (ref >= 0) & (other >= 0), ["day", "ref_id", "other_id"], expected)
     counts = np.ones(len(x), bool) if area is None else as_area(area).grown(REACH).contains(x, y)
     return kinds_of_pairs(ref, other, person, tick, (x, y), (vx, vy), counts)
 

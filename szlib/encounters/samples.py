@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..checks import check_columns
-from ..errors import DataError
+from ..checks import check_columns, check_rows
 from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, nearest_tick
 from .geometry import wrap_angle
 from .kinds import KINDS
@@ -89,10 +88,9 @@ def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame
         keys.merge(people, how="left", left_on=["day", column, "tick"], right_on=["day", "id", "tick"])
         for column in ("ref_id", "other_id")
     )
-    missing = ref["x"].isna() | oth["x"].isna()
-    if missing.any():
-        found = samples[SAMPLE_COLUMNS[:5]].iloc[int(np.flatnonzero(missing)[0])].to_dict()
-        raise DataError(f"sample {found} is not in these tracks; pass the tracks it was found in")
+    is_known = ref["x"].notna() & oth["x"].notna()
+    expected = "this sample is not in these tracks; pass the tracks it was found in"
+    check_rows(samples, is_known, SAMPLE_COLUMNS[:5], expected)
     opening = ref.groupby("encounter")["tick"].transform("idxmin").to_numpy()
     x, y, vx, vy = (ref[name].to_numpy()[opening] for name in ("x", "y", "vx", "vy"))
     cos, sin = np.cos(np.arctan2(vy, vx)), np.sin(np.arctan2(vy, vx))

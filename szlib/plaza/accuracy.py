@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import check_columns
+from ..checks import check_columns, check_rows
 from ..errors import DataError
 from ..zones.social_zone import SocialZone
 from .generation import FIRST_ID, ID_STEP, stage_encounters
@@ -50,13 +50,8 @@ def true_kinds(
     people = (samples[["ref_id", "other_id"]].to_numpy() - FIRST_ID) // ID_STEP
     pair = people.min(axis=1) // 2
     is_pair = (people.sum(axis=1) == 4 * pair + 1) & (pair >= 0) & (pair < len(kinds))
-    if not is_pair.all():
-        row = int(np.flatnonzero(~is_pair)[0])
-        two = samples[["ref_id", "other_id"]].iloc[row].tolist()
-        raise DataError(
-            f"row {samples.index[row]}: {two} are no pair of a plaza of {len(kinds)} encounters; "
-            "pass the settings of the plaza"
-        )
+    expected = f"they are no pair of a plaza of {len(kinds)} encounters; pass the settings of the plaza"
+    check_rows(samples, is_pair, ["ref_id", "other_id"], expected)
     return np.asarray(kinds[pair])
 
 

@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 from .. import memory
-from ..checks import check_columns
+from ..checks import check_columns, check_rows
 from ..errors import DataError
 from . import funnels
 from .options import SHORTEST_GAP, Columns, ReadOptions
@@ -246,13 +246,8 @@ def _check_values(frame: pd.DataFrame) -> None:
     good &= (t > -_LAST_SECOND) & (t < _LAST_SECOND)
     for name in ("x", "y"):
         good &= np.isfinite(frame[name].to_numpy(float))
-    if not good.all():
-        row = int(np.flatnonzero(~good)[0])
-        found = frame[["day", "id", "t", "x", "y"]].iloc[row].to_dict()
-        raise DataError(
-            f"row {frame.index[row]}: got {found}; expected a day, an id, t in seconds and finite x, y; "
-            "drop the row"
-        )
+    expected = "expected a day, an id, t in seconds and finite x, y; drop the row"
+    check_rows(frame, good, ["day", "id", "t", "x", "y"], expected)
 
 
 def _usual_gap(intervals: np.ndarray, of_format: float | None) -> float:

@@ -131,12 +131,9 @@ def draw_costmap(
     if not (np.isfinite([fade, body_radius]).all() and min(fade, body_radius) >= 0):
         raise ZoneError(f"fade and body_radius must be finite and >= 0 [m]; got {fade}, {body_radius}")
     costs = np.zeros(grid.shape, np.int8)
-    common: Ellipse | None = None
+    common = _as_ellipse(zone, speed)
     for (x, y), heading, own_zone in _read_people(people):
-        if own_zone is not None:
-            ellipse = _as_ellipse(own_zone, speed)
-        else:
-            ellipse = common = common or _as_ellipse(zone, speed)
+        ellipse = common if own_zone is None else _as_ellipse(own_zone, speed)
         placed = (circle_around(ellipse) if heading is None else ellipse).placed((x, y), heading or 0.0)
         offset = hypot(placed.center[0] - x, placed.center[1] - y)
         window = grid.window(placed.center, max(offset + body_radius, placed.semi_axes[0] + fade))

@@ -63,7 +63,7 @@ def minimum_enclosing_ellipse(points: ArrayLike, *, start: Sequence[int] = ()) -
     >>> [round(axis, 6) for axis in ellipse.semi_axes]  # the circle through the corners
     [1.414214, 1.414214]
     """
-    return _enclose(_check_points(points), list(start))[0]
+    return _enclose(check_points(points, "x, y", 3), list(start))[0]
 
 
 def minimum_enclosing_ellipse_of_curve(curve: Curve, breaks: ArrayLike = ()) -> Ellipse:
@@ -120,14 +120,25 @@ def minimum_enclosing_ellipse_of_curve(curve: Curve, breaks: ArrayLike = ()) -> 
     )
 
 
-def _check_points(points: ArrayLike) -> Array:
-    """Points as an array (n, 2) of finite numbers, n >= 3."""
+def check_points(points: ArrayLike, columns: str, min_points: int) -> Array:
+    """Convert points to an array of finite numbers, or raise ZoneError.
+
+    Parameters
+    ----------
+    points : one row for each point.
+    columns : names of the coordinates, with a comma between them.
+    min_points : smallest number of points.
+    """
+    size = len(columns.split(","))
     try:
         array = np.asarray(points, float)
     except (TypeError, ValueError) as error:
-        raise ZoneError(f"points must be numbers, one row (x, y) for each point: {error}") from error
-    if array.ndim != 2 or array.shape[1] != 2 or len(array) < 3:
-        raise ZoneError(f"points must have shape (n, 2), n >= 3, one row (x, y) each; got {array.shape}")
+        raise ZoneError(f"points must be numbers, one row ({columns}) for each point: {error}") from error
+    if array.ndim != 2 or array.shape[1] != size or len(array) < min_points:
+        raise ZoneError(
+            f"points must have shape (n, {size}), n >= {min_points}, one row ({columns}) each; "
+            f"got {array.shape}; add data"
+        )
     for i in np.flatnonzero(~np.all(np.isfinite(array), axis=1))[:1]:
         raise ZoneError(f"points must be finite; point {i} is {array[i].tolist()}: drop or repair it")
     return array
@@ -209,9 +220,7 @@ def _maximise_determinant(q: Array, weights: Array) -> tuple[NDArray[np.intp], A
         if not is_complete:
             rows, weights = np.delete(rows, dropped), np.delete(weights, dropped)
         weights /= np.sum(weights)
-        if is_complete and (
-            decrement < _CONVERGED or last <= decrement < _FULL_STEP
-        ):  # converged, or rounding
+        if is_complete and (decrement < _CONVERGED or last <= decrement < _FULL_STEP):  # or rounding
             return rows, weights
         last = decrement if is_complete else float("inf")
 

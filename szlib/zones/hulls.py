@@ -25,10 +25,10 @@ from ..checks import Array
 from ..errors import ZoneError
 from ..tracks import funnels
 from .ellipses import Ellipse
-from .enclosing_ellipse import minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
+from .enclosing_ellipse import check_points, minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
 from .estimators import Estimator
 from .outliers import complementary_points, encounter_numbers, remove_outliers
-from .polar import DIRECTIONS
+from .polar import DIRECTIONS, missing_directions_error
 
 
 def hull_vertices(points: ArrayLike) -> Array:
@@ -48,14 +48,7 @@ def hull_vertices(points: ArrayLike) -> Array:
 
 
 def _convex_hull(points: ArrayLike) -> ConvexHull:
-    points = np.asarray(points, float)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise ZoneError(f"a hull needs points of shape (n, 3): x', y', speed; got shape {points.shape}")
-    if not np.isfinite(points).all():
-        row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise ZoneError(f"point {row} of the hull is not finite: {points[row].tolist()}; drop it first")
-    if len(points) < 4:
-        raise ZoneError(f"a hull in three dimensions needs at least 4 points; got {len(points)}; add data")
+    points = check_points(points, "x', y', speed", 4)
     try:
         return ConvexHull(points)
     except QhullError as error:
@@ -87,13 +80,9 @@ class Slice:
     r_max: float
 
     def __post_init__(self) -> None:
-        if (self._edges()[1] <= 0).any():
-            low, high = np.degrees(self._missing_directions())
-            raise ZoneError(
-                f"the zone at {self.speed:g} m/s is undefined: no person was seen in the directions from "
-                f"{low:.0f} counter-clockwise to {high:.0f} deg (the origin is outside the slice); "
-                "add data, or choose another speed"
-            )
+        if (self._edges()[1] <= 0).any():  # the origin is outside the polygon
+            away = self.polygon[np.hypot(*self.polygon.T) > 0]
+            raise missing_directions_error(self.speed, np.sort(np.arctan2(away[:, 1], away[:, 0])))
 
     @property
     def corner_angles(self) -> Array:
@@ -120,13 +109,6 @@ class Slice:
         along = np.roll(self.polygon, -1, axis=0) - self.polygon
         normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
         return normals, np.einsum("ij,ij->i", normals, self.polygon)
-
-    def _missing_directions(self) -> tuple[float, float]:
-        """The range of directions in which a ray from the origin misses the polygon, in (-pi, pi] [rad]."""
-        away = self.polygon[np.hypot(*self.polygon.T) > 0]
-        angles = np.sort(np.arctan2(away[:, 1], away[:, 0]))
-        widest = int(np.argmax(np.diff(np.r_[angles, angles[0] + 2 * np.pi])))
-        return float(angles[widest]), float(angles[(widest + 1) % len(angles)])
 
 
 def slice_hull(points: ArrayLike, speed: float, *, r_max: float) -> Slice:

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import Array, check_columns
+from ..checks import Array, check_columns, check_rows
 from ..errors import DataError, DataWarning
 from ..tracks import funnels
 
@@ -53,14 +53,21 @@ def complementary_points(samples: pd.DataFrame, *, r_max: float = R_MAX) -> Arra
     """
     check_columns(samples, ["los_angle", "distance"])
     angle, distance = samples["los_angle"].to_numpy(float), samples["distance"].to_numpy(float)
-    is_bad = ~(np.isfinite(angle) & (distance >= 0) & (distance <= r_max))
-    if is_bad.any():
-        row = int(np.flatnonzero(is_bad)[0])
-        raise DataError(
-            f"row {samples.index[row]}: expected 0 <= distance <= r_max = {r_max} m and a finite los_angle; "
-            f"got {distance[row]} m, {angle[row]} rad"
-        )
+    is_valid = np.isfinite(angle) & (distance >= 0) & (distance <= r_max)
+    expected = f"expected 0 <= distance <= r_max = {r_max} m and a finite los_angle"
+    check_rows(samples, is_valid, ["los_angle", "distance"], expected)
     return np.asarray((r_max - distance)[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+def is_close(distance: Array, r_max: float) -> NDArray[np.bool_]:
+    """Whether each `distance` (n,) is at most `r_max` [m]; raises DataError if none is."""
+    close: NDArray[np.bool_] = distance <= r_max
+    if not close.any():
+        raise DataError(
+            f"none of {len(distance)} samples is within r_max = {r_max} m (nearest: "
+            f"{distance.min():.2f} m); are distances in metres?"
+        )
+    return close
 
 
 def encounter_numbers(samples: pd.DataFrame) -> tuple[NDArray[np.intp], pd.DataFrame]:
@@ -191,14 +198,8 @@ def remove_outliers(
     if not 0 < r_max < np.inf:
         raise DataError(f"r_max must be a positive distance in metres; got {r_max}")
     check_columns(samples, ["los_angle", "distance"])
-    if samples["distance"].isna().any():
-        raise DataError(f"row {samples.index[samples['distance'].isna()][0]}: distance is NaN; drop it first")
-    close = samples[samples["distance"] <= r_max]
-    if len(close) == 0:
-        raise DataError(
-            f"none of {len(samples)} samples is within r_max = {r_max} m (nearest: "
-            f"{samples['distance'].min():.2f} m); are distances in metres?"
-        )
+    check_rows(samples, samples["distance"].notna(), ["distance"], "expected a distance; drop the row")
+    close = samples[is_close(samples["distance"].to_numpy(float), r_max)]
     outlier = is_outlier(
         close, fraction=fraction, r_max=r_max, n_neighbours=n_neighbours, speed_scale=speed_scale
     )
@@ -291,7 +292,5 @@ def _features(samples: pd.DataFrame, r_max: float, speed_scale: float | None) ->
     speed = samples["speed"].to_numpy(float)
     if not 0 < speed_scale < np.inf:
         raise DataError(f"speed_scale must be a positive number of m per m/s, or None; got {speed_scale}")
-    if not np.isfinite(speed).all():
-        row = int(np.flatnonzero(~np.isfinite(speed))[0])
-        raise DataError(f"row {samples.index[row]}: speed is {speed[row]}, expected a finite number; drop it")
+    check_rows(samples, np.isfinite(speed), ["speed"], "expected a finite speed; drop the row")
     return np.column_stack([points, speed_scale * speed])

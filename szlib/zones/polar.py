@@ -99,11 +99,7 @@ class PolarZone:
         radii = self.radii_at(speed)
         complete = fill_gaps(radii[None], self.directions)
         if np.isnan(complete).any():
-            low, high = np.degrees(_find_widest_gap(radii, self.directions))
-            raise ZoneError(
-                f"the zone at {speed:g} m/s is undefined: no person was seen in the directions from "
-                f"{low:.0f} counter-clockwise to {high:.0f} deg; add data, or choose another speed"
-            )
+            raise missing_directions_error(speed, self.directions[np.isfinite(radii)])
         m, n, a, b, angle = fit_ellipses(complete, self.directions)[0]
         if not b > 0:
             raise ZoneError(
@@ -121,7 +117,7 @@ def fill_gaps(radii: Array, directions: Array = DIRECTIONS) -> Array:
     out = radii.copy()
     for row in np.flatnonzero(np.isnan(radii).any(axis=1)):
         has_data = np.isfinite(radii[row])
-        low, high = _find_widest_gap(radii[row], directions) if has_data.any() else (0.0, np.inf)
+        low, high = _find_widest_gap(directions[has_data])
         if high - low >= WIDEST_GAP:
             out[row] = np.nan
         else:
@@ -216,9 +212,17 @@ def _parametric_reach(p: Array, unit: Array) -> tuple[Array, Array]:
     return t, slope / (w * along).sum(-1)[..., None]
 
 
-def _find_widest_gap(radii: Array, directions: Array) -> tuple[float, float]:
-    """The two known directions around the widest gap, counter-clockwise [rad]."""
-    known = directions[np.isfinite(radii)]
+def missing_directions_error(speed: float, known: Array) -> ZoneError:
+    """The error at a `speed` [m/s] if people were seen only in the directions `known`, ascending [rad]."""
+    low, high = np.degrees(_find_widest_gap(known))
+    return ZoneError(
+        f"the zone at {speed:g} m/s is undefined: no person was seen in the directions from {low:.0f} "
+        f"counter-clockwise to {180 - (180 - high) % 360:.0f} deg; add data, or choose another speed"
+    )
+
+
+def _find_widest_gap(known: Array) -> tuple[float, float]:
+    """The two of the `known` directions around the widest gap, counter-clockwise [rad]."""
     if not len(known):
         return -np.pi, np.pi
     widths = np.diff(np.append(known, known[0] + 2 * np.pi))

@@ -15,11 +15,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import Array, check_columns
-from ..errors import DataError, ZoneError
+from ..checks import Array, check_columns, check_rows
+from ..errors import ZoneError
 from ..tracks import funnels
 from .estimators import Estimator
-from .outliers import encounter_numbers
+from .outliers import encounter_numbers, is_close
 from .polar import DIRECTIONS, PolarZone, fill_gaps, fit_ellipses
 
 QUANTILE = 0.05
@@ -64,23 +64,14 @@ class Approaches:
         """
         check_columns(samples, ["los_angle", "distance", "speed"])
         values = samples[["los_angle", "distance", "speed"]].to_numpy(float)
-        if not np.isfinite(values).all():
-            row = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
-            raise DataError(
-                f"row {samples.index[row]}: los_angle, distance, speed must be finite; "
-                f"got {values[row].tolist()}"
-            )
+        is_finite = np.isfinite(values).all(axis=1)
+        check_rows(samples, is_finite, ["los_angle", "distance", "speed"], "expected finite numbers")
         angle, distance = smooth_paths(samples)
-        is_close = distance <= r_max
-        if not is_close.any():
-            raise DataError(
-                f"none of {len(samples)} samples is within r_max = {r_max} m "
-                f"(nearest: {distance.min():.2f} m); are distances in metres?"
-            )
+        close = is_close(distance, r_max)
         step = 2 * np.pi / len(DIRECTIONS)
-        direction = np.rint((angle[is_close] - DIRECTIONS[0]) / step).astype(int) % len(DIRECTIONS)
-        number, encounters = encounter_numbers(samples[is_close])
-        return cls(number, direction, distance[is_close], values[is_close, 2], encounters)
+        direction = np.rint((angle[close] - DIRECTIONS[0]) / step).astype(int) % len(DIRECTIONS)
+        number, encounters = encounter_numbers(samples[close])
+        return cls(number, direction, distance[close], values[close, 2], encounters)
 
     def nearest(self, speed: float) -> tuple[NDArray[np.intp], Array]:
         """The encounters (k,) at a `speed` [m/s] (+-`SPEED_BAND`), and their nearest approaches (k, 72) [m].

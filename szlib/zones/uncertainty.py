@@ -57,9 +57,7 @@ SUBSAMPLE, RATE = 0.25, 0.5
 """Share of the pairs in a subsample, and rate at which a hull in d = 3 dimensions approaches a smooth body,
 n^-(2 / (d + 1)) (Barany, Math. Ann. 285, 1989); measured on plazas: 0.49."""
 
-_MAX_BIAS = (
-    1.0  # that is corrected [standard deviations]; a larger one, as for few people, leaves no interval
-)
+_MAX_BIAS = 1.0  # largest bias that is corrected [standard deviations]
 _MAX_FAILED = 0.1  # share of resamples without a zone beyond which there is no interval
 
 

@@ -481,7 +481,7 @@ def test_paths_follow_the_order_of_the_samples(crowd: pd.DataFrame, known: pd.Da
 
 
 def test_samples_of_other_tracks_raise(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
-    with pytest.raises(szlib.DataError, match=r"sample .* is not in these tracks"):
+    with pytest.raises(szlib.DataError, match=r"row .*got .*; this sample is not in these tracks"):
         reference_frame(crowd[crowd["id"] != known["ref_id"].iloc[40]], known)
     with pytest.raises(szlib.DataError, match="the table is empty"):
         reference_frame(crowd, known.iloc[:0])

@@ -453,7 +453,7 @@ def growing():
         (circle, [0, np.nan], "breaks must be finite"),
         (circle, [[0, 1]], r"shape \(k,\)"),
         (lambda angles: circle(angles) * [1, 0], [], "lie on a line"),
-        (growing(), [], "still leaves its ellipse.*name every corner"),
+        (growing(), [], "still leaves its ellipse.*list every corner"),
     ],
 )
 def test_curves_without_an_ellipse_are_refused(curve, breaks, words):

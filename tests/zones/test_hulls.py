@@ -54,14 +54,14 @@ def test_points_inside_and_copies_add_no_vertex() -> None:
 @pytest.mark.parametrize(
     ("points", "message"),
     [
-        (CUBE[:3], "needs at least 4 points; got 3"),
-        (CUBE[:0], "needs at least 4 points; got 0"),
-        (CUBE[:, :2], r"shape \(n, 3\): x', y', speed; got shape \(8, 2\)"),
+        (CUBE[:3], r"n >= 4, .*got \(3, 3\)"),
+        (CUBE[:0], r"n >= 4, .*got \(0, 3\)"),
+        (CUBE[:, :2], r"shape \(n, 3\), .*x', y', speed.*got \(8, 2\)"),
         (CUBE * [1, 1, 0], r"all 8 points lie in one plane .* 2 m, 2 m, 0 m/s"),
         (CUBE * [1, 0, 0], "lie in one plane"),
         (np.ones((9, 3)), "lie in one plane"),
-        (np.vstack([CUBE, [0, np.nan, 1]]), "point 8 of the hull is not finite"),
-        (np.vstack([[0, 0, np.inf], CUBE]), "point 0 of the hull is not finite"),
+        (np.vstack([CUBE, [0, np.nan, 1]]), "must be finite; point 8 is"),
+        (np.vstack([[0, 0, np.inf], CUBE]), "must be finite; point 0 is"),
     ],
 )
 def test_points_without_a_hull_are_refused(points: np.ndarray, message: str) -> None:

@@ -228,7 +228,7 @@ def test_a_stage_that_does_not_add_up_is_refused() -> None:
         (lambda d: d.iloc[:0], szlib.DataError, "the table is empty"),
         (lambda d: d.assign(distance=5.0), szlib.DataError, "none of 4000 samples is within r_max = 2.0 m"),
         (lambda d: d.assign(speed=1.0), szlib.ZoneError, "points lie in one plane"),
-        (lambda d: d.assign(speed=np.nan), szlib.ZoneError, "is not finite"),
+        (lambda d: d.assign(speed=np.nan), szlib.ZoneError, "must be finite"),
     ],
 )
 def test_samples_without_a_zone_are_refused(
@@ -240,7 +240,7 @@ def test_samples_without_a_zone_are_refused(
 
 def test_three_points_have_no_hull(samples: pd.DataFrame) -> None:
     few = samples[samples["distance"] <= 2].head(3)
-    with pytest.raises(szlib.ZoneError, match="needs at least 4 points; got 3"):
+    with pytest.raises(szlib.ZoneError, match=r"n >= 4, .*got \(3, 3\)"):
         fit(few, fraction=0)
 
 
