@@ -35,12 +35,12 @@ from numpy.typing import ArrayLike
 
 from ..checks import Array, check_point, check_vector
 from ..errors import SolverError
-from ..zones.ellipses import Ellipse
+from ..zones.ellipses import Ellipse, circle_around
 from .barriers import compute_h, read_walls
 from .controller import Controller
 from .distances import walls_with_margins
 from .head_on import find_target
-from .person import Person, SpeedZone, as_ellipse, circle_around, place_zone
+from .person import Person, SpeedZone, as_ellipse, place_zone
 from .scene import Scene
 from .settings import MPCSettings
 from .solvers.fallbacks import solve_with_fallbacks

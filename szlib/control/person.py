@@ -9,9 +9,7 @@ from typing import NamedTuple, Protocol
 
 from ..checks import LARGEST, check_number, check_point
 from ..errors import SolverError, ZoneError
-from ..zones.ellipses import BODY_RADIUS as BODY_RADIUS
-from ..zones.ellipses import Ellipse
-from ..zones.ellipses import circle_around as circle_around
+from ..zones.ellipses import Ellipse, circle_around
 from .barriers import barrier, ellipse_formula
 from .settings import MPCSettings
 

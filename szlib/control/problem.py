@@ -31,7 +31,6 @@ import numpy as np
 
 from ..checks import Array
 from .barriers import barrier, cbf_residual, ellipse_formula, segment_formula
-from .settings import TOLERANCE as TOLERANCE
 from .settings import MPCSettings
 
 HARD_SHARE = 0.4

@@ -13,9 +13,9 @@ import szlib
 from szlib.control.barriers import ellipse_distance, segment_distance
 from szlib.control.differential_drive import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
-from szlib.control.person import BODY_RADIUS
-from szlib.control.problem import TOLERANCE
+from szlib.control.settings import TOLERANCE
 from szlib.simulation.scenarios.random_worlds import Worlds, draw_zone
+from szlib.zones.ellipses import BODY_RADIUS
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 OPEN = (6.0, 1.0)

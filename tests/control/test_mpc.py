@@ -12,7 +12,8 @@ from scipy.optimize import minimize
 import szlib
 from szlib.control.controller import advance
 from szlib.control.person import place_zone
-from szlib.control.problem import TOLERANCE, build_problem
+from szlib.control.problem import build_problem
+from szlib.control.settings import TOLERANCE
 from szlib.control.solvers.ipopt import Ipopt
 from szlib.control.solvers.sqp import Sqp
 

@@ -12,7 +12,8 @@ from helpers.random_states import ZONE, meetings, questions
 
 import szlib
 from szlib.control.controller import advance
-from szlib.control.problem import TOLERANCE, build_problem, remaining_distance
+from szlib.control.problem import build_problem, remaining_distance
+from szlib.control.settings import TOLERANCE
 from szlib.control.solvers import sqp
 from szlib.control.solvers.sqp_functions import build_sqp_functions
 

@@ -15,8 +15,8 @@ import szlib
 from szlib.control import problem
 from szlib.control.controller import advance
 from szlib.control.distances import required_margin, wall_margin
-from szlib.control.person import BODY_RADIUS
 from szlib.simulation.closed_loop import drive
+from szlib.zones.ellipses import BODY_RADIUS
 
 SOLVERS = ("sqp", "ipopt")
 GOAL = (4.0, 0.0)

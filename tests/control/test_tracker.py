@@ -5,7 +5,7 @@ import pytest
 
 import szlib
 from szlib.control.controller import advance
-from szlib.control.person import circle_around
+from szlib.zones.ellipses import circle_around
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 GOAL = (4.0, 0.0)

@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.control.person import circle_around
 from szlib.simulation.closed_loop import BODY_ZONE, drive
 from szlib.simulation.comparisons import compare, summarise
 from szlib.simulation.monte_carlo import identify, rerun_world, rollouts, summarise_rollouts
 from szlib.simulation.scenario import Behaviour
 from szlib.simulation.scenarios.random_worlds import Worlds
+from szlib.zones.ellipses import circle_around
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 WALK = szlib.Scenario("walk", (-4.0, 0.0, 0.0, 0.0), (4.0, 0.0), duration=20.0)

@@ -16,10 +16,11 @@ from helpers.crowd_models import PACKAGES, scene
 from helpers.track_tables import make_tracks, make_walk
 
 import szlib
-from szlib.control.person import BODY_RADIUS, Person
+from szlib.control.person import Person
 from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
 from szlib.simulation.replay import MIN_START_DISTANCE, SENSING_RANGE, ReplacedWalker, Replay, find_replays
 from szlib.simulation.scenario import Crowd
+from szlib.zones.ellipses import BODY_RADIUS
 
 FAR = np.array([50.0, 50.0, 0.0, 0.0])
 TWO = (Person((-4.0, 0.0), (0.5, 0.0)), Person((4.0, 0.1), (-0.5, 0.0)))

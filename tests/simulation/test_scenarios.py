@@ -8,9 +8,9 @@ import pytest
 import shapely
 
 import szlib
-from szlib.control.person import BODY_RADIUS
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.metrics import find_avoidance_start, find_passing_side
+from szlib.zones.ellipses import BODY_RADIUS
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7), 0.0)
 KEYS = {

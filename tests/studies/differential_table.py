@@ -22,11 +22,11 @@ from szlib.checks import Array
 from szlib.control.barriers import ellipse_distance
 from szlib.control.differential_drive import Unicycle
 from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
-from szlib.control.person import BODY_RADIUS
-from szlib.control.problem import TOLERANCE
+from szlib.control.settings import TOLERANCE
 from szlib.simulation.monte_carlo import DEFAULT_ZONE, make_mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
+from szlib.zones.ellipses import BODY_RADIUS
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
 

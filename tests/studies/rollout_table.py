@@ -15,7 +15,7 @@ import pandas as pd
 from scipy.stats import beta
 
 import szlib
-from szlib.control.problem import TOLERANCE
+from szlib.control.settings import TOLERANCE
 from szlib.simulation.monte_carlo import rollouts, summarise_rollouts
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 

@@ -42,13 +42,11 @@ _OPTIONS = {
     "min_refinement_steps": 0,
 }
 """Measured on the approach to a person: 7 iterations instead of 9.4, in 0.65 of the time."""
-_OUT_OF_TIME = "Maximum_CpuTime_Exceeded"
-_MOST_IDLE = 64
-"""Pairs of solvers that wait for another controller; if there are more, the oldest are dropped."""
 
 _Key = tuple[MPCSettings, int, int]
-_Solvers = tuple[Any, Any, int]
-_idle: deque[tuple[_Key, _Solvers]] = deque(maxlen=_MOST_IDLE)
+_Solvers = tuple[Any, Any]
+_idle: deque[tuple[_Key, _Solvers]] = deque(maxlen=64)
+"""Pairs of solvers that wait for another controller; if there are more, the oldest are dropped."""
 
 
 class Ipopt(ProblemSolver):
@@ -64,14 +62,16 @@ class Ipopt(ProblemSolver):
         key = (settings, n_people, n_walls)
         solvers = _borrow(key)
         weakref.finalize(self, _give_back, key, solvers).atexit = False
-        self._hard, self._relaxed, self._n_terminal = solvers
+        self._hard, self._relaxed = solvers
+        self._upper = np.zeros(self._hard.numel_out("g"))  # 0 for the terminal condition
+        self._upper[: self.evaluate.n_rows] = inf
         self.remembered = np.zeros(0)
 
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan from a `guess` and `parameters`; True if IPOPT converged."""
-        a_max, upper = self.settings.a_max, self._row_bounds()
-        found = self._hard(x0=guess, p=parameters, lbx=-a_max, ubx=a_max, lbg=0, ubg=upper)
-        return self.evaluate(self._inputs(found), parameters), self._succeeded(self._hard)
+        a_max = self.settings.a_max
+        found = self._hard(x0=guess, p=parameters, lbx=-a_max, ubx=a_max, lbg=0, ubg=self._upper)
+        return self._plan(self._hard, found, parameters)
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan of the relaxed problem from a `guess` and `parameters`; True if IPOPT converged."""
@@ -86,25 +86,16 @@ class Ipopt(ProblemSolver):
             lbx=np.r_[np.full(guess.size, -s.a_max), np.zeros(rows.size)],
             ubx=np.r_[np.full(guess.size, s.a_max), np.where(free > 0, np.inf, 0.0)],
             lbg=0,
-            ubg=self._row_bounds(),
+            ubg=self._upper,
         )
-        return self.evaluate(self._inputs(found), parameters), self._succeeded(self._relaxed)
+        return self._plan(self._relaxed, found, parameters)
 
-    def reset(self) -> None:
-        """Nothing is remembered from one call to the next."""
-
-    def _succeeded(self, solver: Any) -> bool:
-        stats = solver.stats()
-        self.timed_out = stats["return_status"] == _OUT_OF_TIME
-        return bool(stats["success"])
-
-    def _row_bounds(self) -> Array:
-        rows = self._hard.numel_out("g")
-        return np.where(np.arange(rows) < rows - self._n_terminal, np.inf, 0.0)
-
-    def _inputs(self, found: dict[str, Any]) -> Array:
-        inputs = np.asarray(found["x"]).ravel()[: 2 * self.settings.N]
-        return np.asarray(np.clip(inputs, -self.settings.a_max, self.settings.a_max))
+    def _plan(self, solver: Any, found: dict[str, Any], parameters: Array) -> tuple[PlanEvaluation, bool]:
+        """The plan that `solver` has found, and True if it converged."""
+        s, stats = self.settings, solver.stats()
+        self.timed_out = stats["return_status"] == "Maximum_CpuTime_Exceeded"
+        inputs = np.clip(np.asarray(found["x"]).ravel()[: 2 * s.N], -s.a_max, s.a_max)
+        return self.evaluate(inputs, parameters), bool(stats["success"])
 
 
 def _borrow(key: _Key) -> _Solvers:
@@ -115,7 +106,7 @@ def _borrow(key: _Key) -> _Solvers:
             if known == key:
                 return solvers
             _idle.append((known, solvers))
-        return _solvers(*key)
+        return _build(*key)
 
 
 def _give_back(key: _Key, solvers: _Solvers) -> None:
@@ -123,12 +114,14 @@ def _give_back(key: _Key, solvers: _Solvers) -> None:
         _idle.append((key, solvers))
 
 
-def _solvers(settings: MPCSettings, n_people: int, n_walls: int) -> _Solvers:
+def _build(settings: MPCSettings, n_people: int, n_walls: int) -> _Solvers:
     p = build_problem(settings, n_people, n_walls)
     options: dict[str, Any] = {"expand": True, "print_time": False, "calc_lam_p": False}
     options["show_eval_warnings"] = False  # a failure shows in `Step.status`
     options |= {f"ipopt.{name}": value for name, value in _OPTIONS.items()}
     options["ipopt.max_iter"] = settings.max_iterations
+    if settings.time_limit < inf:
+        options["ipopt.max_cpu_time"] = HARD_SHARE * settings.time_limit
     # Slack counted by its penalty, in the unit of the cost: IPOPT would scale the rest away.
     penalty, weight = ca.SX.sym("penalty", p.rows.numel()), ca.SX.sym("weight")
     hard = {"x": p.inputs, "p": p.parameters, "f": p.cost, "g": ca.vertcat(p.rows, p.terminal)}
@@ -138,8 +131,4 @@ def _solvers(settings: MPCSettings, n_people: int, n_walls: int) -> _Solvers:
         "f": p.cost + ca.sum1(penalty),
         "g": ca.vertcat(p.rows + penalty / weight, p.terminal),
     }
-    solvers = []
-    limit = {"ipopt.max_cpu_time": HARD_SHARE * settings.time_limit} if settings.time_limit < inf else {}
-    for name, nlp in (("hard", hard), ("relaxed", relaxed)):
-        solvers.append(ca.nlpsol(name, "ipopt", nlp, options | limit))
-    return solvers[0], solvers[1], p.terminal.numel()
+    return ca.nlpsol("hard", "ipopt", hard, options), ca.nlpsol("relaxed", "ipopt", relaxed, options)

@@ -13,8 +13,9 @@ needed is built at once.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
+from itertools import chain
 from threading import Thread
 from typing import Any
 
@@ -25,8 +26,6 @@ from ..problem import CASADI_LOCK, ProblemSolver, TimeBudget
 from ..settings import MPCSettings
 from .ipopt import Ipopt
 from .sqp import Sqp
-
-_log = logging.getLogger("szlib")
 
 DEFAULT_MAX_PEOPLE = 8
 """Number of people for whom solvers are built by default (assumed)."""
@@ -42,14 +41,6 @@ def round_up_size(n: int) -> int:
     return power - power // 4 if n <= power - power // 4 else power
 
 
-def list_sizes(largest: int) -> Iterator[int]:
-    """Every size up to `largest`."""
-    size = 0
-    while size <= largest:
-        yield size
-        size = round_up_size(size + 1)
-
-
 class SolverPool:
     """The solvers of one controller, one for each size.
 
@@ -62,10 +53,8 @@ class SolverPool:
 
     def __init__(self, settings: MPCSettings, max_people: int | None, n_walls: int) -> None:
         self.settings, self.budget = settings, TimeBudget(settings.time_limit)
-        self.max_people, self._grows = (
-            round_up_size(DEFAULT_MAX_PEOPLE if max_people is None else max_people),
-            max_people is None,
-        )
+        self._grows = max_people is None
+        self.max_people = round_up_size(DEFAULT_MAX_PEOPLE if max_people is None else max_people)
         self._solvers: dict[tuple[int, int], ProblemSolver] = {}
         self._begun = {(self.max_people, round_up_size(n_walls))}
         self._builder: Thread | None = None
@@ -75,7 +64,9 @@ class SolverPool:
         """Get the solver for `n_people` and `n_walls`; it has `PlanEvaluator.size` slots for them."""
         people, walls = size = round_up_size(n_people), round_up_size(n_walls)
         if people > self.max_people:
-            _log.info("the controller was built for %d people and now grows to %d", self.max_people, people)
+            logging.getLogger("szlib").info(
+                "the controller was built for %d people and now grows to %d", self.max_people, people
+            )
             self.max_people, self._grows = people, True
         if size not in self._solvers:
             self._add(people, walls)
@@ -92,12 +83,8 @@ class SolverPool:
 
     def __getstate__(self) -> dict[str, Any]:
         remembered = {size: solver.remembered.copy() for size, solver in list(self._solvers.items())}
-        return {
-            "settings": self.settings,
-            "max_people": self.max_people,
-            "grows": self._grows,
-            "solvers": remembered,
-        }
+        settings, max_people, grows = self.settings, self.max_people, self._grows
+        return {"settings": settings, "max_people": max_people, "grows": grows, "solvers": remembered}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Build the same sizes, with the same multipliers."""
@@ -113,21 +100,18 @@ class SolverPool:
             solver.reset()
 
     def _build(self, largest: int, walls: int) -> None:
-        """Every size up to the largest number of people."""
-        for people in list_sizes(largest):
+        """Build every size up to the largest number of people."""
+        for people in sorted({round_up_size(n) for n in range(largest + 1)}):
             self._add(people, walls)
 
     def _add(self, people: int, walls: int) -> None:
         """Build one size unless it exists; a second thread waits for the first."""
         with CASADI_LOCK:
             if (people, walls) not in self._solvers:
-                solver = _solver(self.settings, people, walls)
+                kind = Sqp if self.settings.solver == "sqp" else Ipopt
+                solver: ProblemSolver = kind(self.settings, people, walls)
                 solver.budget = self.budget
                 self._solvers[people, walls] = solver
-
-
-def _solver(settings: MPCSettings, n_people: int, n_walls: int) -> ProblemSolver:
-    return (Sqp if settings.solver == "sqp" else Ipopt)(settings, n_people, n_walls)
 
 
 def padded_parameters(
@@ -146,14 +130,10 @@ def padded_parameters(
     size : number of people and of walls of the solver.
     """
     away, y = x[0] + _AWAY, x[1]
-    parameters: list[float] = []
-    for zone in zones:
-        parameters += zone
-    parameters += (size[0] - len(zones)) * (away, y, away, y, -INACTIVE_H, 0.0, 0.0)
-    for wall in walls:
-        parameters += wall
-    parameters += (size[1] - len(walls)) * (away, y, away, y + 1.0, -INACTIVE_H)
-    return parameters
+    no_person = (away, y, away, y, -INACTIVE_H, 0.0, 0.0)
+    no_wall = (away, y, away, y + 1.0, -INACTIVE_H)
+    slots = [*zones, *[no_person] * (size[0] - len(zones)), *walls, *[no_wall] * (size[1] - len(walls))]
+    return list(chain.from_iterable(slots))
 
 
 @lru_cache
