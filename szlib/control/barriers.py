@@ -218,12 +218,12 @@ def read_walls(walls: Any) -> Array:
     >>> read_walls([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]).shape  # a polyline of two segments
     (2, 2, 2)
     """
-    found = [check_wall(piece) for line in _lines(walls) for piece in _pieces(line)]
-    return np.reshape(np.array(found, float), (-1, 2, 2))
+    segments = [check_wall(segment) for line in _find_lines(walls) for segment in _split_line(line)]
+    return np.reshape(np.array(segments, float), (-1, 2, 2))
 
 
-def _lines(walls: Any) -> Iterator[Any]:
-    """The corners of each line."""
+def _find_lines(walls: Any) -> Iterator[Any]:
+    """Find each line among nested `walls`, as a list of its corners."""
     if hasattr(walls, "geoms"):
         parts = list(walls.geoms)
     elif hasattr(walls, "exterior"):
@@ -238,22 +238,20 @@ def _lines(walls: Any) -> Iterator[Any]:
         yield parts
     else:
         for part in parts:
-            yield from _lines(part)
+            yield from _find_lines(part)
 
 
 def _is_corner(part: Any) -> bool:
     return isinstance(part, Sequence | np.ndarray) and all(np.isscalar(number) for number in part)
 
 
-def _pieces(line: Any) -> list[Array]:
-    """The segments of a line."""
+def _split_line(line: Any) -> list[Array]:
+    """Split a line into its segments."""
     corners = check_array("a wall", line, (..., 2))
     if len(corners) < 2:
         raise SolverError(f"a wall needs two end points; got {corners.tolist()}")
-    if len(corners) == 2:
-        return [corners]
-    kept = [corners[0]]
+    separate = [corners[0]]
     for corner in corners[1:]:
-        if np.hypot(*(corner - kept[-1])) >= SHORTEST_WALL:
-            kept.append(corner)
-    return [np.array(ends) for ends in pairwise(kept)] or [corners[[0, -1]]]
+        if np.hypot(*(corner - separate[-1])) >= SHORTEST_WALL:
+            separate.append(corner)
+    return [np.array(ends) for ends in pairwise(separate)] or [corners[[0, -1]]]

@@ -64,9 +64,6 @@ from .settings import TOLERANCE, MPCSettings
 from .step import Fallback, Step
 from .tracker import People, Tracker
 
-OMEGA_MAX = 4.0
-"""Turning rate of a common indoor robot whose wheels reach 1 m/s [rad/s] (assumed)."""
-
 
 @dataclass(frozen=True)
 class Unicycle:
@@ -162,7 +159,8 @@ class DifferentialDrive(Controller):
     zone, walls, max_people, tracker : as of `MPCCBF`.
     settings : of the robot: `r_robot` its radius about the middle of the axle, `v_max` the limit of |v|;
         `a_max` bounds the acceleration of the point ahead of the axle.
-    omega_max : limit of |omega| [rad/s].
+    omega_max : limit of |omega| [rad/s]; default: that of a common indoor robot whose wheels reach 1 m/s
+        (assumed).
     ahead : distance of the point from the axle [m]; default: the smallest one with which `settings.v_max` can
         be reached, about v_max / omega_max. With less the robot is slower, with more it needs more space: it
         fits where a double integrator of the radius r_robot + ahead fits.
@@ -202,7 +200,7 @@ class DifferentialDrive(Controller):
         *,
         walls: Any = (),
         settings: MPCSettings | None = None,
-        omega_max: float = OMEGA_MAX,
+        omega_max: float = 4.0,
         ahead: float | None = None,
         max_people: int | None = None,
         tracker: Tracker | None = None,

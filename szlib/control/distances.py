@@ -168,10 +168,7 @@ def compare_distances(
     -0.11
     """
     points = find_safe_boundary(of, r_robot + eps, n)
-    if isinstance(of, Ellipse):
-        gap = euclidean_to_ellipse(points, of) - r_robot
-    else:
-        gap = euclidean_to_segment(points, *check_wall(of)) - r_robot
+    gap = eps - compute_distance_error(points, of)  # the approximate distance is r_robot + eps
     return DistanceComparison(float(gap.min()), float(gap.max()), required_margin(of, r_robot))
 
 
@@ -193,8 +190,8 @@ def find_safe_boundary(of: Ellipse | ArrayLike, distance: float, n: int = 2001) 
         (a, b), reach = of.semi_axes, of.semi_axes[0] + distance
         return replace(of, semi_axes=(reach, float(np.sqrt(reach**2 - a**2 + b**2))), support=None).curve(n)
     start, end = check_wall(of)
-    along = (end - start) / np.hypot(*(end - start))
     length, psi = float(np.hypot(*(end - start))), np.linspace(0, np.pi / 2, n)
+    along = (end - start) / length
     y = distance * np.sin(psi)
     squared = length**2 / 4 + length * distance * np.cos(psi) - y**2
     x, y = np.sqrt(squared[squared >= 0]), y[squared >= 0]

@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike
 from ..checks import Array, check_point, check_vector
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse, circle_around
-from .barriers import compute_h, read_walls
+from .barriers import read_walls
 from .controller import Controller
 from .distances import walls_with_margins
 from .head_on import find_target
@@ -184,7 +184,8 @@ class MPCCBF(Controller):
         if not self._moved:
             self._check_goal(towards)
         self._now = self._clock(now, stamps)
-        scene = self._scene(x, towards, self.tracker.see(people, now=self._now, ids=ids, stamps=stamps))
+        tracked = self.tracker.see(people, now=self._now, ids=ids, stamps=stamps)
+        scene = self._scene(x, towards, tracked)
         first, self._moved, self._n_people = not self._moved, True, len(scene.zones)
         solver = self._pool.get(self._n_people, len(self.walls))
         self._pool.budget.begin()
@@ -207,16 +208,17 @@ class MPCCBF(Controller):
             scene=scene,
         )
 
-    def _scene(self, x: list[float], goal: tuple[float, float], tracked: TrackedPeople) -> Scene:
-        """What the step is asked, with the zone of everybody."""
+    def _scene(self, state: Sequence[float], goal: tuple[float, float], tracked: TrackedPeople) -> Scene:
+        """What the step is asked, with the zone of every person."""
         zones = [self.zone_of(person) for person in tracked.people]
         placed = [place_zone(person, zone) for person, zone in zip(tracked.people, zones, strict=True)]
-        return Scene(tuple(x), goal, tracked, zones, placed, self._wall_rows, self.settings)
+        return Scene(tuple(state), goal, tracked, zones, placed, self._wall_rows, self.settings)
 
     def _parameters(self, x: list[float], scene: Scene, size: tuple[int, int]) -> Array:
         """Parameters of the problem of this size: state, target, terminal velocity, people and walls."""
         if scene.tracked.unknown:
-            target = self._stopping_point(x)
+            time = max(abs(x[2]), abs(x[3])) / self.settings.a_max
+            target = x[0] + x[2] * time / 2, x[1] + x[3] * time / 2  # where full braking ends
         else:
             target = find_target((x[0], x[1]), scene.goal, scene.zones, self._wall_rows, self.settings)
         end_velocity = scene.zones[0][5:] if scene.terminal == "person" else (0.0, 0.0)
@@ -236,12 +238,6 @@ class MPCCBF(Controller):
             raise SolverError(f"now must be a finite time [s]; got {now!r}")
         return float(now)
 
-    def _stopping_point(self, x: list[float]) -> tuple[float, float]:
-        """Where full braking along the path ends [m]."""
-        px, py, vx, vy = x
-        time = max(abs(vx), abs(vy)) / self.settings.a_max
-        return px + vx * time / 2, py + vy * time / 2
-
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.
 
@@ -254,16 +250,14 @@ class MPCCBF(Controller):
 
     def barriers(self, position: ArrayLike, people: Sequence[Person] = ()) -> Array:
         """h of all `people` and then of all walls at a `position`, shape (people + walls,) [m]."""
-        (x, y), s = check_point("position", position), self.settings
-        zones = [place_zone(person, self.zone_of(person)) for person in people]
-        return np.array(compute_h(x, y, zones, self._wall_rows, r_robot=s.r_robot, eps=s.eps), float)
+        x, y = point = check_point("position", position)
+        scene = self._scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people)))
+        return np.array(scene.h(x, y), float)
 
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
         """True if h < 0 at the `goal`, because of a wall or of one of `people` who stands."""
-        point = check_point("goal", goal)
-        zones = [place_zone(person, self.zone_of(person)) for person in people]
-        blocked = any(zone.blocks(point, self.settings) for zone in zones)
-        return blocked or bool((self.barriers(goal) < 0).any())
+        x, y = point = check_point("goal", goal)
+        return self._scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people))).goal_blocked
 
     def check_start(self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()) -> None:
         """Raise SolverError if no run can start in this state.

@@ -42,8 +42,9 @@ class Scene(NamedTuple):
 
     @property
     def terminal(self) -> Terminal:
-        """What the plan ends in: see `MPCSettings.terminal_for`."""
-        return self.settings.terminal_for(len(self.people))
+        """What the plan ends in: `MPCSettings.terminal`; "rest" in place of "person" without one person."""
+        terminal = self.settings.terminal
+        return "rest" if terminal == "person" and len(self.people) != 1 else terminal
 
     @property
     def goal_blocked(self) -> bool:

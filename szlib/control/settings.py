@@ -109,22 +109,15 @@ class MPCSettings:
         _require(min(self.Q) >= 0, "Q", self.Q, "weights >= 0")
         _require(min(self.P) >= 0, "P", self.P, "weights >= 0")
         _require(min(self.R) > 0, "R", self.R, "weights > 0")
-        self._check_choices()
+        choices = {"margin": Margin, "pass_side": Side, "terminal": Terminal, "solver": Solver}
+        for name, literal in choices.items():
+            given, allowed = getattr(self, name), get_args(literal)
+            _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
         positive = isinstance(self.time_limit, int | float | np.number) and self.time_limit > 0
         _require(positive, "time_limit", self.time_limit, "a positive number of seconds, or inf")
         if self.terminal != "none":
             object.__setattr__(self, "N_h", self.N)
         _require(0 <= self.tie <= 0.5, "tie", self.tie, "in [0, 0.5]")
-
-    def _check_choices(self) -> None:
-        choices = {"margin": Margin, "pass_side": Side, "terminal": Terminal, "solver": Solver}
-        for name, literal in choices.items():
-            given, allowed = getattr(self, name), get_args(literal)
-            _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
-
-    def terminal_for(self, n_people: int) -> Terminal:
-        """What a plan among `n_people` ends in: "rest" in place of "person", unless there is one person."""
-        return "rest" if self.terminal == "person" and n_people != 1 else self.terminal
 
     @classmethod
     def badges(cls) -> dict[str, str]:

@@ -102,7 +102,7 @@ class Step:
 
     @property
     def terminal(self) -> Terminal:
-        """What the plan ends in: see `MPCSettings.terminal_for`."""
+        """What the plan ends in: see `Scene.terminal`."""
         return self.scene.terminal
 
     @property

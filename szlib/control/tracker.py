@@ -135,22 +135,15 @@ class Tracker:
         x, y, vx, vy = (*row.position, *row.velocity) if isinstance(row, Person) else row
         if not _are_usable(x, y, now - time):
             return last, False
-        if _are_usable(vx, vy):
-            return (self._with_heading(row, name, last), time), True
-        if last is None:
-            return (Person((x, y), id=name), now), False
-        return (last[0].at((x, y)), time), False
-
-    def _with_heading(self, row: Person | list[float], name: Hashable, last: _LastSeen | None) -> Person:
-        """A person with usable numbers, and the heading that is known."""
-        x, y, vx, vy = (*row.position, *row.velocity) if isinstance(row, Person) else row
+        if not _are_usable(vx, vy):
+            return (Person((x, y), id=name), now) if last is None else (last[0].at((x, y)), time), False
         heading, zone = (row.heading, row.zone) if isinstance(row, Person) else (None, None)
         is_given = heading is not None and (vx == vy == 0 or name is None or heading != atan2(vy, vx))
         if not is_given and hypot(vx, vy) >= self.walking_speed:
             heading = atan2(vy, vx)
         elif not is_given:
             heading = None if last is None else last[0].heading
-        return Person((x, y), (vx, vy), heading, zone, name, heading is None)
+        return (Person((x, y), (vx, vy), heading, zone, name, heading is None), time), True
 
 
 def _move_forward(person: Person, time: float, now: float) -> Person | None:

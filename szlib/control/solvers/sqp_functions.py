@@ -48,11 +48,8 @@ class SqpFunctions(NamedTuple):
 def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> SqpFunctions:
     """Build the functions for `settings`, `n_people` and `n_walls`, or reuse them."""
     p, s = build_problem(settings, n_people, n_walls), settings
-    u, n_rows, scale = (
-        p.inputs,
-        p.rows.numel(),
-        1 / remaining_distance(*(p.parameters[i] for i in (0, 1, 4, 5))),
-    )
+    u, n_rows = p.inputs, p.rows.numel()
+    scale = 1 / remaining_distance(*(p.parameters[i] for i in (0, 1, 4, 5)))
     cost, gradient = scale * p.cost, ca.gradient(p.cost, u)
     values = ca.vertcat(p.rows, p.terminal)
     violations = p.violations
