@@ -17,6 +17,7 @@ import os
 import signal
 import sys
 import threading
+import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -41,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     options = build_parser().parse_args(arguments)
     try:
-        with _stop_on_signals(), memory.granted(options.memory), warnings.catch_warnings():
+        size = None if options.memory is None else memory.parse_size(options.memory)
+        with _stop_on_signals(), memory.granted(size), warnings.catch_warnings():
             warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
             code = int(options.command(options))
             if sys.stdout is not None:
@@ -52,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(stop.args[0]) if stop.args else 130
     except Exception as error:
         if os.environ.get("SZLIB_TRACEBACK"):
-            raise
+            traceback.print_exc()
         is_expected = isinstance(error, SzlibError | OSError) and str(error)
         _print_error(str(error) if is_expected else f"{type(error).__name__}: {error}")
         return 2
@@ -74,12 +76,15 @@ def build_parser() -> argparse.ArgumentParser:
         help="the rectangle in which encounters are found [m] (default: the open square for ATC files, "
         "else as with --auto)",
     )  # fmt: skip
-    area.add_argument("--polygon", metavar="FILE", help="the area as a polygon in a WKT or GeoJSON file [m]")
     area.add_argument(
-        "--auto", action="store_true", help="use the largest rectangle in which people walked everywhere"
+        "--polygon", dest="area", metavar="FILE", help="the area as a polygon in a WKT or GeoJSON file [m]"
     )
+    area.add_argument(
+        "--auto", dest="area", action="store_const", const="auto",
+        help="use the largest rectangle in which people walked everywhere",
+    )  # fmt: skip
     data.add_argument(
-        "--memory", type=_memory, metavar="SIZE",
+        "--memory", metavar="SIZE",
         help="refuse data that needs more memory, such as 4GB (default: 80 %% of the free memory)",
     )  # fmt: skip
     cluster = argparse.ArgumentParser(add_help=False)
@@ -135,13 +140,9 @@ def build_parser() -> argparse.ArgumentParser:
         help="the folder for one Parquet file a day (default: %(default)s)",
     )  # fmt: skip
     extract.add_argument(
-        "-j",
-        "--jobs",
-        type=_job_count,
-        default=1,
-        metavar="N",
+        "-j", "--jobs", type=_job_count, default=1, metavar="N",
         help="days that run at the same time (default: %(default)s)",
-    )
+    )  # fmt: skip
     extract.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help="days to leave out")
     extract.set_defaults(command=_extract)
     return parser
@@ -173,8 +174,8 @@ def _run(options: argparse.Namespace) -> int:
       szlib run --only 07 -p gamma=0.1
     """
     parameters = dict(_parse_parameter(text) for text in options.parameter)
-    if area := _area_text(options):
-        parameters["area"] = area
+    if options.area:
+        parameters["area"] = options.area
     _require_workbook_packages()
     from . import folders
     from .runner import format_summary, run
@@ -227,8 +228,7 @@ def _inspect(options: argparse.Namespace) -> int:
         )
     with warnings.catch_warnings():  # the table shows the same counts
         warnings.simplefilter("ignore", DataWarning)
-        settings = EncounterSettings(area=_area_text(options) or None)
-        samples = find_encounters_in_files(files, settings, ReadOptions())
+        samples = find_encounters_in_files(files, EncounterSettings(area=options.area), ReadOptions())
     if "area" in samples.attrs:
         print(f"area {samples.attrs['area']}")
     print(funnels.text(funnels.get(samples)))
@@ -246,17 +246,10 @@ def _extract(options: argparse.Namespace) -> int:
             out=options.out,
             n_jobs=options.jobs,
             exclude=options.exclude,
-            area=_area_text(options) or None,
+            area=options.area,
         )
     print(extraction)
     return 1 if len(extraction.failed) else 0
-
-
-def _area_text(options: argparse.Namespace) -> str:
-    """The area of the options as text: "" for the default of the data, "auto", four numbers or a file."""
-    if options.auto:
-        return "auto"
-    return " ".join(map(str, options.area)) if options.area else options.polygon or ""
 
 
 def _require_workbook_packages() -> None:
@@ -286,14 +279,6 @@ def _job_count(text: str) -> int:
     if not text.isascii() or not text.isdigit() or len(text) > 9 or int(text) < 1:
         raise argparse.ArgumentTypeError(f"expected a whole number >= 1; got {text[:40]!a}")
     return int(text)
-
-
-def _memory(text: str) -> int:
-    """An amount of memory in bytes."""
-    try:
-        return memory.parse_size(text)
-    except SzlibError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 @contextmanager

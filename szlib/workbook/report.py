@@ -39,8 +39,6 @@ TEMPLATE = Path(__file__).parent / "static" / "report.html.j2"
 """Extends the template `lab` of nbconvert."""
 _FILE_LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:|#|mailto:|data:)([^)\s]+)\)")
 _NOT_IN_RUN = "*Not part of this run.*"
-Notebooks = Mapping[str, Any]
-"""Executed notebooks by name, in order."""
 
 
 def write_report(home: Path) -> Path:
@@ -51,7 +49,14 @@ def write_report(home: Path) -> Path:
     notebooks = {file.stem: _read_notebook(file) for file in sorted(home.glob("[0-9][0-9]*_*.ipynb"))}
     if not notebooks:
         raise DataError(f"{home}: holds no executed notebooks; `szlib run` makes them")
-    page = nbformat.v4.new_notebook(cells=list(make_front_page(home, notebooks)))
+    try:
+        front_page = list(make_front_page(home, notebooks))
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise DataError(
+            f"{home}: the results are damaged or of another version of szlib ({error!r}); `szlib run` writes "
+            "them again"
+        ) from error
+    page = nbformat.v4.new_notebook(cells=front_page)
     page.metadata["title"] = f"szlib: {home.name}"
     page.metadata["language_info"] = {"name": "python", "pygments_lexer": "ipython3"}
     for name, notebook in notebooks.items():
@@ -77,7 +82,7 @@ def _read_notebook(file: Path) -> nbformat.NotebookNode:
         raise DataError(f"{file}: cannot be read as a notebook ({error}); run it again") from error
 
 
-def _local_link(link: re.Match[str], notebooks: Notebooks) -> str:
+def _local_link(link: re.Match[str], notebooks: Mapping[str, Any]) -> str:
     """A link to a notebook inside the report; the text alone if the report does not hold that notebook."""
     name = Path(link[2]).stem
     return f"[{link[1]}](#{name})" if name in notebooks else link[1]
@@ -107,7 +112,7 @@ class _Exporter(HTMLExporter):
         return MarkdownWithMath(renderer=renderer).render(source)
 
 
-def make_front_page(home: Path, notebooks: Notebooks) -> Iterator[Any]:
+def make_front_page(home: Path, notebooks: Mapping[str, Any]) -> Iterator[Any]:
     """Yield the cells of the front page, made from the results in `home` and the executed `notebooks`."""
     zone, funnel = _load_results(home)
     summary, run = _read_json(home / "summary.json"), _read_json(home / "parameters.json")
@@ -173,7 +178,7 @@ def _describe_run(home: Path, run: Mapping[str, Any], outcomes: Mapping[str, Any
     yield _table(pd.DataFrame([(k, escape(str(v))) for k, v in rows.items() if v], columns=["", " "]))
 
 
-def _list_notebooks(notebooks: Notebooks, outcomes: Mapping[str, Any]) -> pd.DataFrame:
+def _list_notebooks(notebooks: Mapping[str, Any], outcomes: Mapping[str, Any]) -> pd.DataFrame:
     rows = []
     for name, notebook in notebooks.items():
         outcome = outcomes.get(name, {"checks": [], "status": "", "seconds": None})
@@ -252,8 +257,7 @@ def _html_outputs(notebook: Any) -> Iterator[str]:
     """The HTML of every output of a notebook."""
     for cell in notebook.cells:
         for output in cell.get("outputs", ()):
-            html = output.get("data", {}).get("text/html", "")
-            yield html if isinstance(html, str) else "".join(html)
+            yield output.get("data", {}).get("text/html", "")
 
 
 def _read_json(file: Path) -> dict[str, Any]:

@@ -176,14 +176,8 @@ def _start_summary(home: Path, source: Mapping[str, Any], names: Sequence[str]) 
 
 
 def _summarise(source: Mapping[str, Any], notebooks: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "szlib": source["szlib"],
-        "data": source["data"],
-        "seed": source["parameters"].get("seed", 0),
-        "parameters": source["parameters"],
-        "passed": all(has_passed(outcome) for outcome in notebooks.values()),
-        "notebooks": dict(sorted(notebooks.items())),
-    }
+    passed = all(has_passed(outcome) for outcome in notebooks.values())
+    return {**source, "passed": passed, "notebooks": dict(sorted(notebooks.items()))}
 
 
 def has_passed(outcome: Mapping[str, Any]) -> bool:

@@ -42,9 +42,22 @@ def test_extract_prints_the_table(day: Path, tmp_path: Path, capsys: pytest.Capt
     assert "1 failed, 1 kept" in capsys.readouterr().out
 
 
-def test_error_names_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_error_is_one_line_and_a_traceback_if_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("SZLIB_TRACEBACK", raising=False)
     assert main(["inspect", str(tmp_path / "missing.csv")]) == 2
-    assert "no such file" in capsys.readouterr().err
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "no such file" in line
+    monkeypatch.setenv("SZLIB_TRACEBACK", "1")
+    assert main(["inspect", str(tmp_path / "missing.csv")]) == 2
+    first, *_, last = capsys.readouterr().err.splitlines()
+    assert (first, last) == ("Traceback (most recent call last):", line)
+
+
+def test_memory_that_is_no_amount_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(tmp_path), "--memory", "much"]) == 2
+    assert "memory 'much': expected an amount such as 4GB" in capsys.readouterr().err
 
 
 def test_error_names_an_address_without_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -178,7 +178,6 @@ def test_notebook_without_disk_space_is_refused_with_exit_code_2(notebooks, tmp_
     [
         ({"seed": -1}, "seed: expected 0 to"),
         ({"seed": float("inf")}, "seed: expected int"),
-        ({"seed": 10**5000}, "a number too long to print"),
         ({"seed": None}, "seed: expected int"),
         ({"gamma": 2.0}, r"gamma must be in \(0, 1\]"),
         ({"gamma": 0}, r"gamma must be in \(0, 1\]"),

@@ -4,6 +4,7 @@ import json
 import re
 
 import nbformat
+import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
 
@@ -119,6 +120,18 @@ def test_report_without_notebooks_is_refused(tmp_path, capsys):
     (tmp_path / "01_one.ipynb").write_text("{")
     assert main(["report", str(tmp_path)]) == 2
     assert "01_one.ipynb: cannot be read as a notebook" in capsys.readouterr().err
+
+
+def test_results_of_another_version_are_refused_in_one_line(tmp_path, capsys):
+    nbformat.write(
+        nbformat.v4.new_notebook(cells=[nbformat.v4.new_markdown_cell("# 1")]), tmp_path / "01_a.ipynb"
+    )
+    samples = pd.DataFrame({"encounter": [0]})
+    samples.attrs["funnel"] = [{"stage": "read", "entered": 1, "kept": 1, "set_aside": {}}]
+    samples.to_parquet(tmp_path / "encounters.parquet")
+    assert main(["report", str(tmp_path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "damaged or of another version of szlib (KeyError('rejected')); `szlib run` writes" in line
 
 
 def test_pictures_of_the_notebooks_are_embedded(tmp_path):

@@ -17,7 +17,6 @@ from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
 from ...encounters.one_day import require_encounters, with_area
 from ...encounters.settings import EncounterSettings
-from ...errors import DataError, ZoneError
 from ...files import file_content, load_cached, store_cached, write_checksum
 from ...plaza.generation import make_plaza
 from ...plaza.settings import PlazaSettings
@@ -62,9 +61,6 @@ class DataCache:
     seed: int = 0
     method: ZoneMethod = field(default_factory=ZoneMethod)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "folder", Path(self.folder))
-
     @property
     def is_synthetic(self) -> bool:
         """Whether the data is the synthetic plaza, whose true zone is known."""
@@ -77,13 +73,8 @@ class DataCache:
         file = self._path(f"plaza-{self.seed}.csv")
         source = {"plaza": repr(PlazaSettings()), "seed": self.seed, "szlib": __version__}
         if load_cached(file, source) is None:
-            try:
-                make_plaza(file, seed=self.seed)
-                write_checksum(file, file.read_bytes(), source)
-            except OSError as error:
-                raise DataError(
-                    f"{file}: the plaza cannot be written ({error}); choose another folder"
-                ) from error
+            make_plaza(file, seed=self.seed)
+            write_checksum(file, file.read_bytes(), source)
         return [file]
 
     def tracks(self) -> pd.DataFrame:
@@ -124,13 +115,10 @@ class DataCache:
     def zone(self) -> SocialZone:
         """The zone that notebook 05 stored, or the same fitted now."""
         file = self._path("zone.json")
-        try:
-            if load_cached(file, self._zone_source()) is not None:
-                return SocialZone.load(file)
-            if file.exists():
-                print("The zone is fitted again: zone.json was made from other data, or is damaged.")
-        except ZoneError as error:
-            print(f"The zone is fitted again: {error}")
+        if load_cached(file, self._zone_source()) is not None:
+            return SocialZone.load(file)
+        if file.exists():
+            print("The zone is fitted again: zone.json was made from other data, or is damaged.")
         return self.store_zone(SocialZone.fit(self.encounters(), **self.method.fit_options()))
 
     def ellipse(self) -> Ellipse:

@@ -147,7 +147,7 @@ def _check_type(name: str, value: Any, default: Any) -> None:
     is_whole = isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool)
     if not is_whole and type(value) is not type(default):
         raise DataError(
-            f"parameter {name}: expected {type(default).__name__}, such as {default!r}; got {_short(value)}"
+            f"parameter {name}: expected {type(default).__name__}, such as {default!r}; got {value!a:.80}"
         )
 
 
@@ -155,10 +155,10 @@ def _check_range(name: str, value: Any) -> None:
     if isinstance(value, float) and not math.isfinite(value):
         raise DataError(f"parameter {name}: expected a finite number; got {value!r}")
     if isinstance(value, str) and printable(value) != value:
-        raise DataError(f"parameter {name}: expected readable text; got {_short(value)}")
+        raise DataError(f"parameter {name}: expected readable text; got {value!a:.80}")
     low, high = RANGES.get(name, (-math.inf, math.inf))
     if not isinstance(value, str) and not low <= value <= high:
-        raise DataError(f"parameter {name}: expected {low:g} to {high:g}; got {_short(value)}")
+        raise DataError(f"parameter {name}: expected {low:g} to {high:g}; got {value!a:.80}")
     if name == "n_jobs" and value == 0:
         raise DataError("parameter n_jobs: expected a number of processes, or -1 for every core; got 0")
     setting = SETTINGS.get(name, name)
@@ -167,12 +167,3 @@ def _check_range(name: str, value: Any) -> None:
             MPCSettings(**{"N": max(value, 1), "N_h": value} if setting == "N_h" else {setting: value})
         except (SolverError, TypeError, OverflowError) as error:
             raise DataError(f"parameter {name}: {error}") from error
-
-
-def _short(value: Any) -> str:
-    """The value as text of at most 80 characters."""
-    try:
-        text = ascii(value)
-    except ValueError:  # Python refuses to print an integer of more than 4,300 digits
-        return "a number too long to print"
-    return text if len(text) <= 80 else f"{text[:77]}..."
