@@ -16,11 +16,11 @@ from typing import Any
 
 import anywidget
 import numpy as np
+import shapely
 import traitlets
 
 from ..checks import Array, check_array
 from ..control.acceleration_polygon import find_admissible_controls
-from ..control.barriers import check_wall
 from ..control.controller import advance
 from ..control.mpc import MPCCBF
 from ..control.person import Person
@@ -108,6 +108,10 @@ class Experiment:
     zones : estimator -> zone in the person's frame.
     robots : options of each robot.
 
+    Attributes
+    ----------
+    dt : time step [s].
+
     Raises
     ------
     SolverError : an option is out of range.
@@ -129,6 +133,7 @@ class Experiment:
         self.scenario, self.zones = scenario, dict(zones)
         self.robots = list(robots)
         self._controllers = [self._make_controller(options) for options in robots]
+        self.dt = self._controllers[0].settings.dt
         self.restart()
 
     def _make_controller(self, options: RobotOptions) -> MPCCBF:
@@ -141,11 +146,6 @@ class Experiment:
         self.states: list[Array] = [self.scenario.start.copy() for _ in self.robots]
         for controller in self._controllers:
             controller.reset()
-
-    @property
-    def dt(self) -> float:
-        """Time step [s]."""
-        return self._controllers[0].settings.dt
 
     @property
     def t(self) -> float:
@@ -191,11 +191,10 @@ class Experiment:
         start = moved if self._n_steps == 0 else list(self.scenario.people)
         if speed is not None:
             moved, start = ([_with_speed(person, speed) for person in group] for group in (moved, start))
-        segments = [np.reshape(wall, (2, 2)) for wall in (self.scenario.walls if walls is None else walls)]
         changed = replace(
             self.scenario,
-            goal=self.scenario.goal if goal is None else check_array("goal", goal, (2,)),
-            walls=np.reshape([check_wall(wall) for wall in segments], (-1, 2, 2)),
+            goal=self.scenario.goal if goal is None else np.asarray(goal),
+            walls=self.scenario.walls if walls is None else np.reshape(walls, (-1, 2, 2)),
             people=tuple(start),
         )
         if walls is not None:
@@ -396,14 +395,12 @@ def _robot_snapshot(
 ) -> dict[str, Any]:
     """One time of one robot, for `static/laboratory.js`."""
     placed = np.array([(*p.position, p.heading or 0.0) for p in people]).reshape(-1, 3)
-    allowed = find_admissible_controls(step).polygon.simplify(_POLYGON_TOLERANCE)
-    parts = [part for part in getattr(allowed, "geoms", [allowed]) if part.geom_type == "Polygon"]
     zones = [zone] * len(people)
+    parts = shapely.get_parts(find_admissible_controls(step).polygon.simplify(_POLYGON_TOLERANCE))
+    allowed = [part.exterior.coords for part in parts if part.geom_type == "Polygon" and not part.is_empty]
     return snapshot(t, state, placed, zones, step.predicted, step.h, step.fallback) | {
         "control": step.control.round(3).tolist(),
         "a_max": step.scene.settings.a_max,
-        "allowed": [
-            np.asarray(part.exterior.coords).round(3).tolist() for part in parts if not part.is_empty
-        ],
+        "allowed": [np.round(corners, 3).tolist() for corners in allowed],
         "safe": step.safe,
     }

@@ -174,10 +174,8 @@ def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
 
 def _strictest_limits(limits: tuple[BarrierLimit, ...], reach: float) -> list[tuple[BarrierLimit, Any]]:
     """The limit of each person and wall that forbids most of the figure, and the part that it forbids."""
-    box, strictest = (
-        shapely.box(-reach, -reach, reach, reach),
-        dict[tuple[str, int], tuple[BarrierLimit, Any]](),
-    )
+    box = shapely.box(-reach, -reach, reach, reach)
+    strictest: dict[tuple[str, int], tuple[BarrierLimit, Any]] = {}
     for limit in limits:
         (x0, y0), (x1, y1) = limit.curve[0], limit.curve[-1]
         right = np.array([y1 - y0, x0 - x1]) / np.hypot(x1 - x0, y1 - y0)

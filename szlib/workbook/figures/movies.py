@@ -7,7 +7,7 @@ from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from hashlib import sha256
 from html import escape
-from math import isfinite, isnan
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -59,22 +59,24 @@ def snapshot(
     h : barrier of each person and wall [m].
     fallback : `Step.fallback`, or "".
     """
-    present = [
-        (x, y, heading, zone.placed((x, y), heading))
-        for (x, y, heading), zone in zip(people[:, :3].tolist(), zones, strict=True)
-        if not isnan(x)
-    ]
-    known = h[np.isfinite(h)]
+    present, known = ~np.isnan(people[:, 0]), h[np.isfinite(h)]
+    placed = place_zones(zones, people)
     return {
         "t": round(t, 3),
-        "robot": _rounded(state[:2]),
+        "robot": state[:2].round(3).tolist(),
         "speed": round(float(np.hypot(state[2], state[3])), 3),
-        "people": [_rounded((x, y, heading)) for x, y, heading, _ in present],
-        "zones": [_rounded((*zone.center, *zone.semi_axes, zone.angle)) for *_, zone in present],
-        "plan": [_rounded(point) for point in plan[:, :2].tolist() if isfinite(point[0])],
+        "people": people[present, :3].round(3).tolist(),
+        "zones": [np.round((*z.center, *z.semi_axes, z.angle), 3).tolist() for z in placed],
+        "plan": plan[np.isfinite(plan[:, 0]), :2].round(3).tolist(),
         "h": round(float(known.min()), 3) if known.size else None,
         "fallback": fallback,
     }
+
+
+def place_zones(zones: Iterable[Ellipse], people: Array) -> list[Ellipse]:
+    """The zone of each person who is present, in the world frame; `zones` and `people` as of `snapshot`."""
+    poses = people[:, :3].tolist()
+    return [z.placed((x, y), angle) for z, (x, y, angle) in zip(zones, poses, strict=True) if not isnan(x)]
 
 
 class Movie(bytes):
@@ -139,8 +141,3 @@ class Movie(bytes):
 def read_scripts(*names: str) -> str:
     """The text of the scripts `names`, one after the other."""
     return "\n".join((_SCRIPTS / f"{name}.js").read_text(encoding="utf-8") for name in names)
-
-
-def _rounded(numbers: Iterable[float]) -> list[float]:
-    """Round to a millimetre, or a thousandth of a radian."""
-    return [round(float(number), 3) for number in numbers]

@@ -21,10 +21,10 @@ from PIL import Image
 
 from ...checks import Array
 from ...simulation.replay import Replay
-from ...simulation.run import Run
+from ...simulation.run import Run, nanmin
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
-from .movies import Movie
+from .movies import Movie, place_zones
 from .style import (
     BLACK,
     BLUE,
@@ -167,7 +167,7 @@ def plot_robot_paths(runs: Mapping[str, Run], *, ax: Axes | None = None) -> Axes
     ax = get_axes(ax, size=(9, 4))
     first = next(iter(runs.values()))
     _draw_scenery(ax, first.scenario)
-    for zone in _zones_in_world(first, 0):
+    for zone in place_zones(first.zones, first.people[0]):
         _draw_zone(ax, zone, _ZONE_COLOURS(0.5))
     styles = zip((BLUE, ORANGE, GREEN, BLACK), ("-", "--", "-.", ":"), strict=True)
     for (name, run), (colour, line) in zip(runs.items(), styles, strict=False):
@@ -199,7 +199,7 @@ def plot_crowd(run: Run, *, replay: Replay | None = None, ax: Axes | None = None
     ax = get_axes(ax, size=(6, 5))
     second = max(1, round(1 / run.settings.dt))
     distance = np.hypot(run.relative[..., 0], run.relative[..., 1])
-    row = int(np.nanargmin(np.where(np.isnan(distance), np.inf, distance).min(axis=1, initial=np.inf)))
+    row = int(nanmin(distance, axis=1).argmin())
     for i, (x, y) in enumerate(np.moveaxis(run.people[:, :, :2], 0, -1)):
         ax.plot(x, y, color=RED, linewidth=1, alpha=0.5, label="people" if i == 0 else None)
         ax.plot(x[::second], y[::second], ".", color=RED, markersize=3, alpha=0.5)
@@ -316,18 +316,12 @@ def _draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
 
 def _draw_moving(ax: Axes, run: Run, row: int, *, robot: Any, zone: Any) -> list[Artist]:
     """Draw robot, zones and people at one time."""
-    drawn = [_draw_zone(ax, ellipse, zone) for ellipse in _zones_in_world(run, row)]
+    drawn = [_draw_zone(ax, ellipse, zone) for ellipse in place_zones(run.zones, run.people[row])]
     position = run.states[row, :2].tolist()
     drawn.append(ax.add_patch(Circle(position, run.settings.r_robot, color=robot, alpha=0.6, lw=0)))
     for x, y, heading in run.people[row, :, :3].tolist():
         drawn += draw_person(ax, x, y, heading, color=RED, markersize=6)
     return drawn
-
-
-def _zones_in_world(run: Run, row: int) -> list[Ellipse]:
-    """The zone of each person who is present at one time, in the world frame."""
-    people = zip(run.zones, run.people[row, :, :3].tolist(), strict=True)
-    return [zone.placed((x, y), heading) for zone, (x, y, heading) in people if not isnan(x)]
 
 
 def _write_times(ax: Axes, time: Array, positions: Array, *, colour: str, above: float) -> None:
@@ -338,10 +332,8 @@ def _write_times(ax: Axes, time: Array, positions: Array, *, colour: str, above:
         if row < len(time) and np.hypot(*(positions[row] - positions[first])) < _SAME_PLACE:
             continue
         if not isnan(positions[first, 0]):
-            here, until = (
-                positions[first:row].mean(axis=0),
-                f"-{time[row - 1]:.3g}" if row - 1 > first else "",
-            )
+            here = positions[first:row].mean(axis=0)
+            until = f"-{time[row - 1]:.3g}" if row - 1 > first else ""
             near = [texts for place, texts in labels if np.hypot(*(here - place)) < _SAME_PLACE]
             if not near:
                 labels.append((here, []))
@@ -364,7 +356,8 @@ def _set_limits(ax: Axes, shown: Sequence[tuple[Run, Any]]) -> None:
     points = [first.scenario.goal + radius, first.scenario.goal - radius]
     for run, rows in shown:
         points += [run.states[:, :2] + radius, run.states[:, :2] - radius]
-        points += [zone.curve(25) for row in rows.tolist() for zone in _zones_in_world(run, row)]
+        for people in run.people[rows]:
+            points += [zone.curve(25) for zone in place_zones(run.zones, people)]
     drawn = np.vstack(points)
     low, high = drawn.min(axis=0) - _PADDING, drawn.max(axis=0) + _PADDING
     ends = first.scenario.walls.reshape(-1, 2)

@@ -150,14 +150,15 @@ def plot_zone(
     'Minimum social zone at 1.1 m/s'
     """
     ax = get_axes(ax, size=(5, 4.5))
-    ellipse, is_hull = _ellipse(zone, speed), zone.method == "hull"
-    boundary = zone.boundary(speed)
+    with warnings.catch_warnings(action="ignore", category=DataWarning):  # dashed, and said in the title
+        ellipse = zone.ellipse(speed)
+    boundary, adequate, is_hull = zone.boundary(speed), zone.adequate(speed), zone.method == "hull"
     if is_hull:
         ax.fill(*boundary.T, facecolor=GREY, alpha=0.4, label="zone: r_max - R'")
     else:
         ax.plot(*boundary.T, color=GREY, linewidth=1.5, label=f"radius by direction ({zone.method})")
     name = "smallest enclosing ellipse" if is_hull else "fitted ellipse"
-    ax.plot(*ellipse.curve().T, color=BLUE, linewidth=2, linestyle=_line(zone, speed), label=name)
+    ax.plot(*ellipse.curve().T, color=BLUE, linewidth=2, linestyle="-" if adequate else "--", label=name)
     _draw_interval(ax, zone, speed, color=ORANGE, alpha=0.35, label="its 95 % interval")
     if ellipse.support is not None:
         ax.plot(*ellipse.support.T, "o", color=BLUE, label=f"its {len(ellipse.support)} support points")
@@ -165,7 +166,7 @@ def plot_zone(
         ax.plot(*truth.curve().T, ":", color=RED, linewidth=2, label="truth")
     draw_person(ax, 0, 0, 0, color=BLACK, markersize=10)
     add_legend_below(ax, gap=0.15)
-    warning = "" if zone.adequate(speed) else "\nnot adequate: too few people on some side"
+    warning = "" if adequate else "\nnot adequate: too few people on some side"
     return label_metres(ax, f"Minimum social zone at {speed:g} m/s{warning}", person=True)
 
 
@@ -195,8 +196,10 @@ def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None =
     ):
         label, curve = f"{speed:g} m/s", ellipse.curve()
         if zone:
-            line = _line(zone, speed)
-            label += "" if zone.adequate(speed) else " (not adequate)"
+            if zone.adequate(speed):
+                line = "-"
+            else:
+                line, label = "--", f"{label} (not adequate)"
             _draw_interval(ax, zone, speed, color=colour, alpha=0.15)
         ax.plot(*curve.T, color=colour, linestyle=line, linewidth=2, label=label)
         at = curve[round(angle / (2 * np.pi) * (len(curve) - 1))]
@@ -241,17 +244,6 @@ def plot_pair_correlation(
     draw_person(ax, 0, 0, 0, color=RED, markersize=10)
     add_legend_below(ax)
     return label_metres(ax, person=True)
-
-
-def _ellipse(zone: SocialZone, speed: float) -> Ellipse:
-    """The zone's ellipse without a warning: the figure itself shows what is not adequate."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DataWarning)
-        return zone.ellipse(speed)
-
-
-def _line(zone: SocialZone, speed: float) -> str:
-    return "-" if zone.adequate(speed) else "--"
 
 
 def _draw_interval(ax: Axes, zone: SocialZone, speed: float, **style: Any) -> None:
