@@ -25,7 +25,7 @@ from .comparisons import BEHAVIOURS, CONTROLLERS, FORMULATIONS, ZONES, compare, 
 from .crowds import ReactingPeople
 from .log import SimulationLog
 from .metrics import compute_metrics, find_avoidance_start, find_passing_side, find_yielding_steps
-from .monte_carlo import rerun_world, rollouts, summarise_rollouts
+from .monte_carlo import rerun_world, rollouts
 from .outcomes import classify_outcome
 from .paper_claims import Finding
 from .replay import ReplacedWalker, Replay, Replays, find_replays

@@ -102,8 +102,8 @@ def run_atlas(cells: Sequence[AtlasCell], zone: Ellipse, *, n_jobs: int = 1) -> 
     `CANNOT_START`); time_to_goal, time_yielding [s], min_h [m], min_speed [m/s], infeasible_steps.
     """
     tasks = [joblib.delayed(_run_cell)(i, cell, zone) for i, cell in enumerate(cells)]
-    rows = sorted(run_tasks(tasks, n_jobs=n_jobs), key=lambda row: row[0])
-    return pd.DataFrame([row for _, row in rows])
+    rows = dict(run_tasks(tasks, n_jobs=n_jobs))
+    return pd.DataFrame([rows[i] for i in range(len(rows))])
 
 
 def _run_cell(i: int, cell: AtlasCell, zone: Ellipse) -> tuple[int, dict[str, Any]]:

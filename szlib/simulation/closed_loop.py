@@ -135,16 +135,17 @@ def drive(
     end = scenario.duration if max_time is None else max_time
     goal, dt, rng = scenario.goal, s.dt, np.random.default_rng([seed, 2])
     gx, gy = goal.tolist()
+    arrival: int | None = None
     controller.reset()
     own, numbers = robot.start(scenario.start), list[float | None]()
     states, steps, seen_by_step = list[Array](), list[StepRecord](), list[list[int]]()
     for k in range(round(end / dt) + 1):
         state = robot.body(own)
-        everybody = zones.assign(crowd(k * dt, state))
-        for p in everybody:
+        everyone = zones.assign(crowd(k * dt, state))
+        for p in everyone:
             numbers += _ABSENT if p is None else (*p.position, p.heading, *p.velocity)
-        present = [i for i, p in enumerate(everybody) if p is not None]
-        observed = behaviour.observe(tuple([p for p in everybody if p is not None]), rng)
+        present = [i for i, p in enumerate(everyone) if p is not None]
+        observed = behaviour.observe(tuple([p for p in everyone if p is not None]), rng)
         seen_by_step.append([i for i, p in zip(present, observed, strict=True) if p is not None])
         seen = tuple([p for p in observed if p is not None])
         begin = perf_counter()
@@ -153,18 +154,20 @@ def drive(
         states.append(state)
         steps.append(step)
         x, y, vx, vy = state.tolist()
-        if until_arrival and hypot(vx, vy) <= STOPPED_SPEED and hypot(x - gx, y - gy) <= GOAL_RADIUS:
-            break
+        if arrival is None and hypot(vx, vy) <= STOPPED_SPEED and hypot(x - gx, y - gy) <= GOAL_RADIUS:
+            arrival = k
+            if until_arrival:
+                break
         if not all(map(isfinite, step.control.tolist())):
             given = step.control.tolist()
             raise SolverError(f"{scenario.name!r}: the controller gave {given} at {k * dt:g} s")
         own = robot.advance(own, step.control, dt)
-    n, n_people = len(steps), len(everybody)
+    n, n_people = len(steps), len(everyone)
     residuals = [step.residual for step in steps]
     return SimulationLog(
         scenario=scenario,
         settings=s,
-        zones=zones.all_zones(n_people),
+        zones=tuple(zones.zone_of(i, None) for i in range(n_people)),
         states=np.array(states),
         controls=np.array([step.control for step in steps]),
         people=_fill_headings(np.reshape(np.array(numbers, float), (n, n_people, 5))),
@@ -174,7 +177,7 @@ def drive(
         safe=np.array([step.safe for step in steps], bool),
         slack=np.array([step.slack for step in steps]),
         solve_time=np.array([step.solve_time for step in steps]),
-        arrival=_find_arrival(np.array(states), goal),
+        arrival=arrival,
         has_safety_claims=steps[0].safe is not None,
         inputs=tuple(robot.inputs),
     )
@@ -226,10 +229,6 @@ class ZoneAssignment:
             for i, p in enumerate(people)
         ]
 
-    def all_zones(self, n_people: int) -> tuple[Ellipse, ...]:
-        """The zone of each of `n_people`."""
-        return tuple(self.zone_of(i, None) for i in range(n_people))
-
 
 @dataclass(slots=True)
 class StepRecord:
@@ -254,13 +253,6 @@ class StepRecord:
         reported = {name: getattr(step, name) for name in cls.__slots__ if hasattr(step, name)}
         reported["control"] = np.asarray(step.control, float)
         return cls(**{"solve_time": duration, **reported})
-
-
-def _find_arrival(states: Array, goal: Array) -> int | None:
-    """Index of the first state at rest at the goal."""
-    offset = states - np.r_[goal, 0.0, 0.0]
-    is_there = (np.hypot(*offset[:, :2].T) <= GOAL_RADIUS) & (np.hypot(*offset[:, 2:].T) <= STOPPED_SPEED)
-    return int(is_there.argmax()) if is_there.any() else None
 
 
 def _fill_headings(people: Array) -> Array:

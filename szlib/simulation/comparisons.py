@@ -13,7 +13,7 @@ robot navigation algorithms", 2023.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from itertools import product
 from math import pi, sqrt
 from pathlib import Path
@@ -162,12 +162,8 @@ def measure_time_inside(run: Run) -> dict[str, float]:
     ]
     inside = {}
     for name, zone in ZONES.items():
-        gaps = [
-            run.distance_to_person(i, partial(euclidean_to_ellipse, ellipse=zone(each)))
-            - run.settings.r_robot
-            for i, each in enumerate(fitted)
-        ]
-        overlaps = np.fmin.reduce(np.reshape(gaps, (-1, len(run.states))), initial=np.inf) < 0
+        gaps = run.distances_to_zones([zone(each) for each in fitted], euclidean_to_ellipse)
+        overlaps = (gaps < run.settings.r_robot).any(axis=1)  # NaN, of absent people, is no overlap
         inside[f"inside {name}"] = run.settings.dt * float(overlaps.sum())
     return inside
 

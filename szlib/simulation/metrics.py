@@ -83,7 +83,7 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "success": run.success,
         "outcome": classify_outcome(run),
         "time_to_goal": np.nan if run.arrival is None else round(dt * run.arrival, 9),
-        "path_length": float(np.hypot(*np.diff(run.states[way, :2], axis=0).T).sum()),
+        "path_length": measure_path_length(run.states[way, :2]),
         "min_h": _min_or_nan(run.h),
         "min_h_people": _min_or_nan(run.h[:, :n_people]),
         "min_h_walls": _min_or_nan(run.h[:, n_people:]),
@@ -110,6 +110,11 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "max_slack": float(run.slack[applied].max(initial=0.0)),
         **dict(zip(SOLVE_TIMES, solve_times, strict=True)),
     }
+
+
+def measure_path_length(points: Array) -> float:
+    """Length of the polygon through `points`, shape (n, 2) [m]."""
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def _min_or_nan(values: Array) -> float:
@@ -151,8 +156,8 @@ def find_passing_side(run: Run) -> str:
     """
     if not run.zones or np.array_equal(run.scenario.goal, run.scenario.start[:2]):
         return "none"
-    offset = np.moveaxis(run.people[:, :, :2] - run.states[:, None, :2], -1, 0)
-    ahead, left = locate_along_course(run, int(nanmin(np.hypot(*offset), axis=0).argmin()))
+    closest = int(nanmin(run.clearance[:, : len(run.zones)], axis=0).argmin())
+    ahead, left = locate_along_course(run, closest)
     abeam = np.flatnonzero((ahead[:-1] > 0) & (ahead[1:] <= 0))
     if not len(abeam):
         return "none"

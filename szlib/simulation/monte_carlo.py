@@ -12,12 +12,12 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from pathlib import Path
 from threading import get_ident
 from types import FunctionType
-from typing import Any, get_args
+from typing import Any
 
 import joblib
 import pandas as pd
@@ -27,14 +27,13 @@ from tqdm import tqdm
 from .. import __version__
 from ..control.controller import Controller
 from ..control.mpc import MPCCBF
-from ..control.settings import TOLERANCE, MPCSettings
+from ..control.settings import MPCSettings
 from ..errors import SolverError, SzlibError
 from ..files import claim_folder, load_cached, store_cached, write_file
 from ..parallel import run_tasks
 from ..zones.ellipses import Ellipse
 from .closed_loop import ZoneTransform, drive
 from .log import SimulationLog
-from .outcomes import Outcome
 from .run import Run
 from .scenario import UNAFFECTED, Behaviour, CrowdModel, Scenario
 from .scenarios.random_worlds import Worlds
@@ -108,13 +107,13 @@ def rollouts(
     """
     if n < 1:
         raise SolverError(f"n must be at least 1; got {n}")
-    setup = make_setup(
-        settings=settings,
-        worlds=worlds,
-        behaviour=behaviour,
-        controller=controller,
-        zone_transform=zone_transform,
-        measure=measure,
+    setup = RolloutSetup(
+        settings or MPCSettings(),
+        worlds or Worlds(),
+        behaviour or UNAFFECTED,
+        controller or make_mpc_cbf,
+        zone_transform,
+        measure,
     )
     folder = None if out is None else Path(out) / setup.key()
     if folder is not None:
@@ -168,16 +167,16 @@ class RolloutSetup:
     `zone_transform`, `measure`, as of `rollouts`.
     """
 
-    settings: MPCSettings
-    worlds: ScenarioSource
-    behaviour: CrowdModel
-    controller: ControllerFactory
-    zone_transform: ZoneTransform | None
-    measure: Measure | None
+    settings: MPCSettings = field(default_factory=MPCSettings)
+    worlds: ScenarioSource = field(default_factory=Worlds)
+    behaviour: CrowdModel = UNAFFECTED
+    controller: ControllerFactory = make_mpc_cbf
+    zone_transform: ZoneTransform | None = None
+    measure: Measure | None = None
 
     def describe(self) -> str:
         """Every parameter, as text."""
-        parts = {field.name: identify(getattr(self, field.name)) for field in fields(self)}
+        parts = {each.name: identify(getattr(self, each.name)) for each in fields(self)}
         return repr((__version__, parts))
 
     def key(self) -> str:
@@ -206,13 +205,6 @@ class RolloutSetup:
             raise
 
 
-def make_setup(**parameters: Any) -> RolloutSetup:
-    """A `RolloutSetup` of these `parameters`; defaults replace those that are None or missing."""
-    setup: dict[str, Any] = {"settings": MPCSettings(), "worlds": Worlds(), "behaviour": UNAFFECTED}
-    setup |= {"controller": make_mpc_cbf, "zone_transform": None, "measure": None}
-    return RolloutSetup(**(setup | {name: part for name, part in parameters.items() if part is not None}))
-
-
 def identify(part: Any) -> str:
     """Text that identifies a `part` of a `RolloutSetup` in every process.
 
@@ -232,33 +224,9 @@ def identify(part: Any) -> str:
     return name if kind is part else f"{name} {joblib.hash(part)}"
 
 
-def summarise_rollouts(rows: pd.DataFrame) -> pd.Series[Any]:
-    """Summarise `rows` of `rollouts`.
-
-    Returns
-    -------
-    Number of worlds and of steps by what they report, fractions of worlds with h < 0, with Euclidean overlaps
-    and with each outcome, smallest h and clearance [m].
-    """
-    numbers: dict[str, Any] = {"worlds": len(rows)}
-    numbers |= {
-        name: int(rows[name].sum())
-        for name in ("infeasible_steps", "flagged_steps", "unflagged_violations", "unflagged_overlaps")
-    }
-    numbers |= {
-        "share h < 0": float((rows["min_h"] < -TOLERANCE).mean()),
-        "min_h": float(rows["min_h"].min()),
-        "share overlap wall": float((rows["min_clearance_walls"] < -TOLERANCE).mean()),
-        "share overlap person": float((rows["min_clearance_people"] < -TOLERANCE).mean()),
-        "min_clearance": float(rows["min_clearance"].min()),
-    }
-    numbers |= {outcome: float((rows["outcome"] == outcome).mean()) for outcome in get_args(Outcome)}
-    return pd.Series(numbers)
-
-
 def rerun_world(seed: int, **parameters: Any) -> SimulationLog:
     """Drive through the world of a `seed` again, for its log; `parameters` as of `rollouts`."""
-    return make_setup(**parameters).run(seed)
+    return RolloutSetup(**parameters).run(seed)
 
 
 def run_chunk(setup: RolloutSetup, seeds: range, folder: Path | None = None) -> pd.DataFrame:

@@ -16,6 +16,7 @@ from scipy.stats import binomtest, chi2
 
 from ..checks import check_columns
 from ..control.mpc import MPCCBF
+from ..encounters.kinds import OPPOSITE
 from ..errors import DataError, ZoneError
 from ..zones.ellipses import Ellipse
 from ..zones.social_zone import SocialZone
@@ -29,9 +30,6 @@ LEVEL = 0.95
 LARGER_AHEAD = "the zone reaches farther ahead than behind"
 GROWS_WITH_SPEED = "the zone grows with walking speed"
 ENCOUNTER_RATE = "as many encounters a day as in the paper, within a factor of two"
-DELAYED_BY_SIZE = "a larger zone makes the robot later"
-OPPOSITE = "opposite"
-"""The kind of encounter in which people pass each other."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Replay: the robot takes the place of a recorded walker, among all other people as they walked that day.
 
-The people do not see the robot: nobody recorded what they would do.  Tracks are on szlib's clock
+The people do not see the robot: their reaction to it was not recorded.  Tracks are on szlib's clock
 (`szlib.tracks.clock`): between two samples people walk straight on, and their velocity is their displacement
 over +-0.5 s, half of which lies in the future.  World frame, metres and seconds; time 0 is the first
 sample of the walker who is replaced.
@@ -26,14 +26,14 @@ from ..errors import DataError
 from ..tracks.clock import TICKS_PER_SECOND, clock_index
 from ..zones.ellipses import Ellipse
 from .crowds.reacting import MIN_HEADING_SPEED
-from .scenario import Crowd, Scenario
+from .scenario import Crowd, CrowdModel, Scenario
 
 TIME_FACTOR = 2.0
 """Time limit of the robot, as a multiple of the walker's time, or of its own time at full speed (assumed)."""
 SENSING_RANGE = 6.0
 """The controller sees people within this distance of the robot [m] (assumed)."""
 MIN_START_DISTANCE = 2.0
-"""Nobody is within this distance of the robot's start [m] (assumed): the robot has no companions."""
+"""No person is within this distance of the robot's start [m] (assumed): the robot has no companions."""
 MIN_TRAVEL = 5.0
 """Walkers who cover a smaller distance are not replaced [m] (assumed)."""
 _ROUNDING = 1e-6
@@ -66,7 +66,7 @@ class RecordedPerson:
 
 
 @dataclass(frozen=True)
-class Replay:
+class Replay(CrowdModel):
     """A recorded scene without one of its people: a `CrowdModel`, with its scenario.
 
     Attributes
@@ -96,10 +96,6 @@ class Replay:
             p if p and hypot(p.position[0] - x, p.position[1] - y) <= self.sensing_range else None
             for p in people
         )
-
-    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
-        """The `people` themselves; nothing is drawn from `rng`."""
-        return people
 
 
 class Replays(tuple[Replay, ...]):
@@ -166,7 +162,8 @@ def find_replays(
     """Draw recorded walkers whom the robot can replace.
 
     The robot takes a piece of a walker's track without gaps, within the area, of at least `MIN_TRAVEL`
-    from its first to its last point, with nobody within `MIN_START_DISTANCE` of the first.
+    from its first to its last point, with no other person within `MIN_START_DISTANCE` of
+    the first.
 
     Parameters
     ----------
@@ -211,9 +208,9 @@ def find_replays(
             break
     if not replays:
         raise DataError(
-            f"no walker covers {MIN_TRAVEL} m within {floor_area or 'the tracks'} from a point with nobody "
-            f"within {MIN_START_DISTANCE} m ({len(paths)} cover this distance); give a larger area or other "
-            "tracks"
+            f"no walker covers {MIN_TRAVEL} m within {floor_area or 'the tracks'} from a point with no "
+            f"person within {MIN_START_DISTANCE} m ({len(paths)} cover this distance); give a larger area "
+            "or other tracks"
         )
     return Replays(replays)
 
@@ -240,7 +237,7 @@ def _find_paths(states: Array, pieces: pd.DataFrame, area: Area | None) -> list[
 
 
 def _has_free_start(walker: RecordedPerson, others: Sequence[RecordedPerson]) -> bool:
-    """True if nobody is within `MIN_START_DISTANCE` of the walker's start."""
+    """True if no person is within `MIN_START_DISTANCE` of the walker's start."""
     present = [person for other in others if (person := other.at(0.0)) is not None]
     return all(np.hypot(*(walker.states[0, :2] - p.position)) > MIN_START_DISTANCE for p in present)
 

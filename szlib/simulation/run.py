@@ -6,7 +6,7 @@ with a table, pictures and files.  World frame, metres and seconds.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -110,10 +110,16 @@ class Run:
         """True where a person is present, shape (n, P)."""
         return ~np.isnan(self.people[:, :, 0])
 
-    def distance_to_person(self, i: int, distance: Callable[[Array], Array]) -> Array:
-        """Apply a `distance` of points to the robot in the frame of person `i`, shape (n,) [m]."""
-        values = np.full(len(self.states), np.nan)
-        values[self.is_present[:, i]] = distance(self.relative[self.is_present[:, i], i])
+    def distances_to_zones(
+        self, zones: Sequence[Ellipse], distance: Callable[[Array, Ellipse], Array]
+    ) -> Array:
+        """Distance of the robot's centre to one of `zones` for each person, shape (n, P) [m].
+
+        `distance` computes it from points, shape (m, 2), and a zone, both in the person's frame.
+        """
+        values = np.full(self.is_present.shape, np.nan)
+        for i, (zone, rows) in enumerate(zip(zones, self.is_present.T, strict=True)):
+            values[rows, i] = distance(self.relative[rows, i], zone)
         return values
 
     @cached_property

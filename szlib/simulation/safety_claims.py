@@ -15,6 +15,7 @@ import pandas as pd
 from ..checks import Array
 from ..control.barriers import compute_h
 from ..control.settings import TOLERANCE
+from ..encounters.geometry import wrap_angle
 from .run import Run
 
 SAME_MOTION = 1e-6
@@ -68,7 +69,7 @@ def _find_violations(run: Run) -> Iterator[tuple[Any, ...]]:
 def _classify_change(before: Array, after: Array, deviation: float, dt: float) -> str:
     """What a person does between two states (x, y, heading, vx, vy), `deviation` [m] from the expected."""
     if deviation <= SAME_MOTION:
-        angle = abs((after[2] - before[2] + np.pi) % (2 * np.pi) - np.pi)
+        angle = abs(wrap_angle(after[2] - before[2]))
         return "kept their velocity" if angle <= SAME_MOTION else "faced elsewhere"
     velocity, new_velocity = before[3:], (after[:2] - before[:2]) / dt
     speed, increase = np.hypot(*velocity), np.hypot(*new_velocity) - np.hypot(*velocity)

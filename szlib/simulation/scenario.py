@@ -101,10 +101,9 @@ class Scenario:
 
 
 class CrowdModel(Protocol):
-    """How people move, and how the controller sees them: `Behaviour`, or another class with these two
-    methods.
+    """How people move, and how the controller sees them: `Behaviour`, or another class with these methods.
 
-    The robot keeps out of the zones of the scenario's people.
+    A subclass needs only `start`.  The robot keeps out of the zones of the scenario's people.
     """
 
     def start(self, scenario: Scenario, seed: int) -> Crowd:
@@ -113,8 +112,9 @@ class CrowdModel(Protocol):
     def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> Sequence[Person | None]:
         """What the controller sees of the `people` who are present, in their order; None: not seen.
 
-        `rng` is for noise.
+        `rng` is for noise.  By default the controller sees all people as they are.
         """
+        return people
 
 
 @dataclass(frozen=True)

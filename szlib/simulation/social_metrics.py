@@ -7,14 +7,15 @@ E. T. Hall, "The Hidden Dimension", 1966; path efficiency as in N. Tsoi et al., 
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
+from numpy.typing import NDArray
 
 from ..checks import Array
 from ..control.barriers import ellipse_distance
 from ..control.distances import euclidean_to_segment
+from ..encounters.geometry import wrap_angle
 from ..zones.ellipses import BODY_RADIUS, Ellipse
+from .metrics import measure_path_length
 from .run import Run, nanmin
 from .scenario import STOPPED_SPEED
 
@@ -70,7 +71,7 @@ def compute_social_metrics(run: Run) -> dict[str, float]:
 def _sum_heading_changes(states: Array) -> float:
     moving = states[np.hypot(states[:, 2], states[:, 3]) > STOPPED_SPEED]
     turns = np.diff(np.arctan2(moving[:, 3], moving[:, 2]))
-    return float(np.abs((turns + np.pi) % (2 * np.pi) - np.pi).sum())
+    return float(np.abs(wrap_angle(turns)).sum())
 
 
 def _compute_path_efficiency(run: Run, states: Array) -> float:
@@ -79,18 +80,18 @@ def _compute_path_efficiency(run: Run, states: Array) -> float:
     radius = run.settings.r_robot
     if not run.success or any(euclidean_to_segment(straight, *w).min() < radius for w in run.scenario.walls):
         return np.nan
-    driven, rest = _path_length(states[:, :2]), float(np.hypot(*(goal - states[-1, :2])))
+    driven, rest = measure_path_length(states[:, :2]), float(np.hypot(*(goal - states[-1, :2])))
     return float(np.hypot(*(goal - start))) / (driven + rest) if driven else np.nan
 
 
-def _path_length(path: Array) -> float:
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+def _find_onsets(states: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """True where a column of `states` becomes True."""
+    return np.diff(states, axis=0, prepend=False) & states
 
 
 def _count_collisions(run: Run, way: slice, gap: Array) -> tuple[int, int]:
     """Number of times the robot runs into a person, and a person into the robot."""
-    touching = gap < 0
-    begins = touching & ~np.vstack([np.zeros((1, gap.shape[1]), bool), touching[:-1]])
+    begins = _find_onsets(gap < 0)
     offset = run.states[way, None, :2] - run.people[way, :, :2]
     robot = -(run.states[way, None, 2:] * offset).sum(axis=2)
     person = (run.people[way, :, 3:] * offset).sum(axis=2)
@@ -118,21 +119,16 @@ def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, f
     rows = np.flatnonzero(np.hypot(*(run.states[:, :2] - run.scenario.goal).T) <= REACHED)
     way = slice(None, int(rows[0]) + 1 if len(rows) else None)
     path, n_people = run.states[way, :2], len(run.zones)
-    length, straight = _path_length(path), float(np.hypot(*(path[-1] - path[0])))
+    length, straight = measure_path_length(path), float(np.hypot(*(path[-1] - path[0])))
     zones = run.zones if zone is None else (zone,) * n_people
-    gaps = [
-        run.distance_to_person(i, partial(ellipse_distance, ellipse=each))[way]
-        for i, each in enumerate(zones)
-    ]
-    inside = np.reshape(gaps, (n_people, len(path))).T < 0  # NaN, of absent people, is not inside
-    entered = inside & ~np.vstack([np.zeros((1, n_people), bool), inside[:-1]])
+    inside = run.distances_to_zones(zones, ellipse_distance)[way] < 0  # NaN, of absent people, is not inside
     distance = np.hypot(run.relative[way, :, 0], run.relative[way, :, 1])
     reached = len(rows) > 0
     return {
         "reached": float(reached),
         "time_to_goal": float(run.time[rows[0]]) if reached else np.nan,
         "path_efficiency": straight / length if reached and length > 0 else np.nan,
-        "intrusions": float(entered.sum()),
+        "intrusions": float(_find_onsets(inside).sum()),
         "time_intruding": run.settings.dt * float(inside.any(axis=1).sum()),
         "nearest": float(np.nanmin(distance)) if np.isfinite(distance).any() else np.nan,
     }

@@ -9,14 +9,15 @@ worlds are kept in results/rollouts, so that a run that was stopped goes on.
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pandas as pd
 from scipy.stats import beta
 
 import szlib
 from szlib.control.settings import TOLERANCE
-from szlib.simulation.monte_carlo import rollouts, summarise_rollouts
+from szlib.simulation.monte_carlo import rollouts
+from szlib.simulation.outcomes import Outcome
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
 TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "11_rollouts.csv"
@@ -49,10 +50,32 @@ def interval(count: int, n: int, level: float = 0.95) -> tuple[float, float]:
     return low, float(beta.ppf(1 - tail, count + 1, n - count)) if count < n else 1.0
 
 
+def summarise_rollouts(rows: pd.DataFrame) -> dict[str, Any]:
+    """Summarise `rows` of `szlib.rollouts`.
+
+    Number of worlds and of steps by what they report, fractions of worlds with h < 0, with Euclidean overlaps
+    and with each outcome, smallest h and clearance [m].
+    """
+    numbers: dict[str, Any] = {"worlds": len(rows)}
+    numbers |= {
+        name: int(rows[name].sum())
+        for name in ("infeasible_steps", "flagged_steps", "unflagged_violations", "unflagged_overlaps")
+    }
+    numbers |= {
+        "share h < 0": float((rows["min_h"] < -TOLERANCE).mean()),
+        "min_h": float(rows["min_h"].min()),
+        "share overlap wall": float((rows["min_clearance_walls"] < -TOLERANCE).mean()),
+        "share overlap person": float((rows["min_clearance_people"] < -TOLERANCE).mean()),
+        "min_clearance": float(rows["min_clearance"].min()),
+    }
+    numbers |= {outcome: float((rows["outcome"] == outcome).mean()) for outcome in get_args(Outcome)}
+    return numbers
+
+
 def row(blocks: list[pd.DataFrame]) -> dict[str, Any]:
     """All blocks in one line."""
     rows = pd.concat(blocks, ignore_index=True)
-    line = summarise_rollouts(rows).to_dict()
+    line = summarise_rollouts(rows)
     line["worlds of blocks"] = " ".join(str(len(block)) for block in blocks)
     for event, column in EVENTS.items():
         happened = [int((block[column] < -TOLERANCE).sum()) for block in blocks]

@@ -27,13 +27,9 @@ class OrcaModel:
     """`walkers` who avoid each other, the robot and walls by ORCA: a `WalkingModel`."""
 
     def __init__(self, walkers: Walkers) -> None:
-        self._walkers, self._sim = walkers, self._simulator(walkers)
-
-    @staticmethod
-    def _simulator(walkers: Walkers) -> Any:
         rvo = import_package("pyrvo", INSTALL_CROWDS)
         near = (SENSING_RANGE, MAX_NEIGHBOURS, HORIZON, WALL_HORIZON)
-        sim = rvo.RVOSimulator(0.1, *near, BODY_RADIUS, 1.0)
+        sim: Any = rvo.RVOSimulator(0.1, *near, BODY_RADIUS, 1.0)
         fastest = np.where(walkers.speeds > 0, MAX_SPEED_FACTOR * walkers.speeds, STEP_ASIDE_SPEED).tolist()
         for position, velocity, speed in zip(walkers.positions, walkers.velocities, fastest, strict=True):
             sim.add_agent(position.tolist(), *near, BODY_RADIUS, speed, velocity.tolist())
@@ -42,7 +38,7 @@ class OrcaModel:
         for wall in walkers.walls:
             sim.add_obstacle(wall.tolist())
         sim.process_obstacles()
-        return sim
+        self._walkers, self._sim = walkers, sim
 
     def velocities(self, positions: Array, robot: Array, dt: float) -> Array:
         """See `WalkingModel.velocities` for `positions`, `robot` and `dt`."""

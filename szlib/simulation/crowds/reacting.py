@@ -15,7 +15,7 @@ from ...control.person import Person
 from ...control.settings import MPCSettings
 from ...errors import SolverError
 from ...zones.ellipses import BODY_RADIUS
-from ..scenario import Crowd, Scenario
+from ..scenario import Crowd, CrowdModel, Scenario
 from .orca import OrcaModel
 from .social_force import SocialForceModel
 from .speed_model import SpeedModel
@@ -31,7 +31,7 @@ MIN_HEADING_SPEED = 0.2
 
 
 @dataclass(frozen=True)
-class ReactingPeople:
+class ReactingPeople(CrowdModel):
     """People who walk by a model, each to their own goal: a `CrowdModel` for `drive` and `rollouts`.
 
     Parameters
@@ -85,10 +85,6 @@ class ReactingPeople:
         positions = np.array([p.position for p in people]).reshape(-1, 2)
         walkers = Walkers(positions, velocities, goals, speeds, scenario.walls, r_robot)
         return _ReactingCrowd(people, walkers, MODELS[self.model](walkers))
-
-    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
-        """The `people` themselves; nothing is drawn from `rng`."""
-        return people
 
     def _shifted_goals(self, scenario: Scenario, rng: np.random.Generator) -> Array:
         people = scenario.people

@@ -12,12 +12,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import shapely
 
 from ...checks import Array
 from ...errors import SolverError
 from .walking_model import Walkers, import_package
 
-INSTALL_JUPEDSIM = "pip install --no-deps jupedsim deprecated wrapt shapely"
+INSTALL_JUPEDSIM = "pip install --no-deps jupedsim deprecated wrapt"
 TICK = 0.01
 """JuPedSim's own time step [s]; it advises against any other."""
 RADIUS = 0.2
@@ -47,8 +48,8 @@ class SpeedModel:
             ]
         except RuntimeError as error:
             raise SolverError(
-                f"JuPedSim does not accept these people: {error}; nobody may start within {RADIUS} m of a "
-                f"wall or {2 * RADIUS} m of another, and every goal must be clear of walls"
+                f"JuPedSim does not accept these people: {error}; people must start more than "
+                f"{RADIUS} m from walls and {2 * RADIUS} m from each other, with goals clear of walls"
             ) from error
         self._steered = self._make_journey(self._sim.add_direct_steering_stage())
         self._robot: int | None = None
@@ -71,9 +72,8 @@ class SpeedModel:
         return (self._positions() - before) / dt
 
     def _add_robot(self, at: list[float], radius: float) -> int | None:
-        """Add the robot as a point, then enlarge it: JuPedSim adds nobody who touches another agent."""
+        """Add the robot as a point, then enlarge it: JuPedSim adds no agent that touches another."""
         gap = np.hypot(*(self._positions() - at).T).min(initial=np.inf) - RADIUS
-        shapely = import_package("shapely", INSTALL_JUPEDSIM)
         if gap <= 2 * _POINT_RADIUS or not self._floor.buffer(-2 * _POINT_RADIUS).contains(shapely.Point(at)):
             return None
         robot = self._add_agent(at, _POINT_RADIUS, 0.0, *self._steered)
@@ -97,7 +97,6 @@ class SpeedModel:
 
 def _make_floor(walkers: Walkers) -> Any:
     """Everything but the walls, as a Shapely polygon; SolverError where walls separate people or goals."""
-    shapely = import_package("shapely", INSTALL_JUPEDSIM)
     points = np.vstack([walkers.positions, walkers.goals, walkers.walls.reshape(-1, 2), np.zeros((1, 2))])
     box = shapely.box(*(points.min(axis=0) - _MARGIN), *(points.max(axis=0) + _MARGIN))
     walls = [shapely.LineString(wall).buffer(_HALF_THICKNESS, cap_style="flat") for wall in walkers.walls]

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from math import cos, pi, sin
 
 import numpy as np
+import shapely
 
 from ...checks import Array
 from ...control.person import Person
@@ -196,13 +197,5 @@ class VisiblePeople:
 
 def is_visible(a: Array, b: Place, walls: Array) -> bool:
     """True if the line from `a` to `b` crosses no wall of `walls`, shape (n, 2, 2)."""
-    if not len(walls):
-        return True
-    along, wall = np.subtract(b, a), walls[:, 1] - walls[:, 0]
-    sides = _cross(along, walls - a)
-    ends = np.stack([_cross(wall, a - walls[:, 0]), _cross(wall, b - walls[:, 0])])
-    return not ((sides[:, 0] * sides[:, 1] < 0) & (ends[0] * ends[1] < 0)).any()
-
-
-def _cross(u: Array, v: Array) -> Array:
-    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
+    sight = shapely.LineString([a, b])
+    return not shapely.crosses(sight, shapely.linestrings(walls)).any()
