@@ -44,8 +44,6 @@ _SLIDERS = [
 _SPEED_SLIDER = {"label": "speed of the person [m/s]", "low": 0.0, "high": 2.0, "step": 0.05}
 _MARGIN = 0.7
 """Margin around everything that can be dragged [m]."""
-_POLYGON_TOLERANCE = 0.01
-"""Tolerance of the polygon of accelerations on the page [m/s2]."""
 
 
 @dataclass(frozen=True)
@@ -396,7 +394,7 @@ def _robot_snapshot(
     """One time of one robot, for `static/laboratory.js`."""
     placed = np.array([(*p.position, p.heading or 0.0) for p in people]).reshape(-1, 3)
     zones = [zone] * len(people)
-    parts = shapely.get_parts(find_admissible_controls(step).polygon.simplify(_POLYGON_TOLERANCE))
+    parts = shapely.get_parts(find_admissible_controls(step).polygon.simplify(0.01))  # 0.01 m/s2 off
     allowed = [part.exterior.coords for part in parts if part.geom_type == "Polygon" and not part.is_empty]
     return snapshot(t, state, placed, zones, step.predicted, step.h, step.fallback) | {
         "control": step.control.round(3).tolist(),

@@ -19,10 +19,6 @@ def _draw_path(rng: Rng) -> tuple[Any, ...]:
     return np.cumsum(steps, axis=0).round(3), int(rng.integers(half, 31 - half)), half
 
 
-def _velocity(path: Any, k: int, half: int) -> Any:
-    return (path[k + half] - path[k - half]) / (2 * half * _TICK)
-
-
 def _draw_two_people(rng: Rng) -> tuple[Any, ...]:
     """A person who walks nearly backwards, and another one beyond the jump of the angle at 180 degrees."""
     ref, side = rng.uniform(-5, 5, 2).round(2), float(rng.choice([-1, 1]))
@@ -62,7 +58,7 @@ def _chord_error(radius: float, speed: float, interval: float) -> Any:
 TASKS = (
     make_task(
         "velocity",
-        formula(_draw_path, _velocity),
+        formula(_draw_path, lambda path, k, half: (path[k + half] - path[k - half]) / (2 * half * _TICK)),
         displacement=lambda path, k, half: path[k + half] - path[k - half],
         ticks=lambda path, k, half: (path[k + half] - path[k - half]) / (2 * half),
         half_time=lambda path, k, half: (path[k + half] - path[k - half]) / (half * _TICK),

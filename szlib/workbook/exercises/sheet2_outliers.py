@@ -15,8 +15,6 @@ _WINDOW = 31
 """Samples of one encounter: 3 s at 10 Hz."""
 _MIN_GAP = 0.3
 """Least distance of an intruder's samples to all other samples [m]."""
-_REMOVED_SHARE = 0.01
-"""Share of the samples that LOF removes."""
 
 
 def _draw_close_samples(rng: Rng) -> tuple[Any, ...]:
@@ -63,7 +61,8 @@ def _judge_intruder(args: tuple[Any, ...], _: Any, got: Any) -> str:
     if len(np.unique(points, axis=0)) < _WINDOW:
         return "some of your samples are the same point, where LOF has no density; a person moves"
     factors = local_outlier_factors(np.vstack([cloud, points]), N_NEIGHBOURS)
-    found = int((factors[len(cloud) :] > np.quantile(factors, 1 - _REMOVED_SHARE)).sum())
+    removed = factors > np.quantile(factors, 0.99)  # LOF removes one sample in a hundred
+    found = int(removed[len(cloud) :].sum())
     if not found:
         return ""
     return (

@@ -24,7 +24,6 @@ _TOLERANCE = 0.08
 _SPEED = 1.1
 """Walking speed of the zone [m/s] (paper, sec. 4)."""
 _R_MAX = 2.0  # paper, sec. 2 [m]
-_PAIRS = 800  # of people on the plaza: the check takes a few seconds
 
 
 def _draw_edge(rng: Rng) -> tuple[Any, ...]:
@@ -85,7 +84,7 @@ def _plaza(seed: int, a: float, b: float) -> tuple[pd.DataFrame, Ellipse]:
     """Samples from a plaza with a random zone, and that zone."""
     slow, fast = (Ellipse((0.05, 0.0), (a + grow, b + grow)) for grow in (-0.04, 0.04))
     settings = PlazaSettings(
-        n_encounters=_PAIRS, slow_zone=slow, fast_zone=fast, intruders=0.01, intruder_speeds=SLOW_INTRUDERS
+        n_encounters=800, slow_zone=slow, fast_zone=fast, intruders=0.01, intruder_speeds=SLOW_INTRUDERS
     )
     with tempfile.TemporaryDirectory() as folder:
         file = make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings)

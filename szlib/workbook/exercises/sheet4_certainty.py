@@ -37,10 +37,6 @@ def _draw_recording(rng: Rng) -> tuple[Any, ...]:
     return t.round(1), person, rng.uniform(100, 500, 4).round(1) * [1, -1, 1, -1], 600.0
 
 
-def _shifted(t: Any, person: Any, shift: Any, period: float) -> Any:
-    return (t + shift[person]) % period
-
-
 TASKS = (
     make_task(
         "quantile_radius",
@@ -68,7 +64,7 @@ TASKS = (
     ),
     make_task(
         "shifted",
-        formula(_draw_recording, _shifted),
+        formula(_draw_recording, lambda t, person, shift, period: (t + shift[person]) % period),
         same_shift=lambda t, person, shift, period: (t + shift[0]) % period,
         outside=lambda t, person, shift, period: t + shift[person],
         torn=lambda t, person, shift, period: (t + np.resize(shift, len(t))) % period,

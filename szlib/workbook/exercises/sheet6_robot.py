@@ -23,10 +23,6 @@ def _draw_approach(rng: Rng) -> tuple[Any, ...]:
     return round(rng.uniform(1, 3), 2), round(rng.uniform(0.06, 0.2), 3), 0.2, round(rng.uniform(0.1, 0.4), 2)
 
 
-def _speed_limit(h: float, gamma: float, dt: float, person_speed: float) -> float:
-    return gamma * h / dt - person_speed
-
-
 def _draw_zone(rng: Rng) -> Ellipse:
     b = round(rng.uniform(0.65, 0.75), 2)
     return Ellipse((round(rng.uniform(0.05, 0.12), 2), 0.0), (round(b + rng.uniform(0.2, 0.3), 2), b))
@@ -61,10 +57,6 @@ def _next_larger(zone: Ellipse, a_max: float, gammas: tuple[float, ...]) -> floa
 def _draw_plan(rng: Rng) -> tuple[Any, ...]:
     plan = rng.uniform(-1, 1, (8, 2)).round(2)
     return (np.vstack([plan[:-1], plan[-1:] + 0.1]),)
-
-
-def _next_plan(plan: Any) -> Any:
-    return np.vstack([plan[1:], np.zeros((1, 2))])
 
 
 QUESTIONS = {
@@ -104,7 +96,7 @@ def _judge_prediction(_: tuple[Any, ...], truth: dict[str, tuple[str, str]], got
 TASKS = (
     make_task(
         "speed_limit",
-        formula(_draw_approach, _speed_limit),
+        formula(_draw_approach, lambda h, gamma, dt, person_speed: gamma * h / dt - person_speed),
         no_dt=lambda h, gamma, dt, person_speed: gamma * h - person_speed,
         no_person=lambda h, gamma, dt, person_speed: gamma * h / dt,
         sign=lambda h, gamma, dt, person_speed: gamma * h / dt + person_speed,
@@ -121,7 +113,7 @@ TASKS = (
     ),
     make_task(
         "next_plan",
-        formula(_draw_plan, _next_plan),
+        formula(_draw_plan, lambda plan: np.vstack([plan[1:], np.zeros((1, 2))])),
         repeated=lambda plan: np.vstack([plan[1:], plan[-1:]]),
         unchanged=lambda plan: plan,
         wrong_way=lambda plan: np.vstack([np.zeros((1, 2)), plan[:-1]]),

@@ -26,8 +26,7 @@ Judge = Callable[[tuple[Any, ...], Any, Any], str]
 """Function of the arguments, the correct answer and the learner's answer; "" accepts the answer."""
 Rng = np.random.Generator
 
-_TEXTS = Path(__file__).with_name("texts.toml")
-_MAX_SHOWN, _DIGITS = 6, 4  # of an array in a message
+_MAX_SHOWN = 6  # numbers of an array in a message
 
 
 @dataclass(frozen=True)
@@ -184,7 +183,7 @@ def make_task(
 @cache
 def load_texts() -> dict[str, Any]:
     """Texts of all tasks, by the name of the task."""
-    return tomllib.loads(_TEXTS.read_text(encoding="utf-8"))
+    return tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 
 
 def formula(draw: Callable[[Rng], tuple[Any, ...]], solution: Answer) -> Callable[[Rng], Case]:
@@ -213,5 +212,5 @@ def _shown(value: Any) -> str:
     if isinstance(value, np.ndarray | list | tuple) and np.size(value) > _MAX_SHOWN:
         return _kind(np.asarray(value))
     if isinstance(value, np.ndarray | list | tuple | float | int | np.number):
-        return str(np.round(np.asarray(value), _DIGITS).tolist())
+        return str(np.round(np.asarray(value), 4).tolist())
     return str(value)

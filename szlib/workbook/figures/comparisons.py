@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -287,8 +286,7 @@ def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
         share = 1000 * table[kind].to_numpy(float) / table["claimed_safe_steps"].to_numpy(float)
         if kind in _BARS or share.any():
             colour, hatch = _BARS.get(kind, ("magenta", "ooo"))
-            style: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": "white"}
-            ax.barh(table.index, share, left=left, label=kind, **style)
+            ax.barh(table.index, share, left=left, label=kind, color=colour, hatch=hatch, edgecolor="white")
         left += share
     ax.set_xlim(0, 1.08 * max(float(left.max(initial=0)), 1e-9))
     ax.set(xlabel="steps that led to h < 0, per 1,000 steps claimed safe")

@@ -23,8 +23,6 @@ from .style import BLACK, BLUE, GREEN, GREY, RED, add_legend_below, draw_person,
 
 _WALL_LINES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 """Line styles of walls 0, 1, 2, 3; then again from the first."""
-_MAX_DISTANCE = 0.9
-"""Largest distance at which the error of a distance matters [m]."""
 
 
 def plot_distance(
@@ -96,7 +94,7 @@ def plot_distance_error(
     x, y = np.moveaxis(grid, -1, 0)
     error = compute_distance_error(grid, shape)
     true = _distance(grid, shape) - error
-    shown = np.ma.masked_where((true < 0) | (true > _MAX_DISTANCE), 100 * error)
+    shown = np.ma.masked_where((true < 0) | (true > 0.9), 100 * error)  # no error matters farther away
     image = ax.pcolormesh(x, y, shown, cmap="RdBu_r", vmin=-25, vmax=25, rasterized=True)
     ax.figure.colorbar(image, ax=ax, shrink=0.85, label="d - Euclidean [cm]; red is dangerous")
     ax.plot(*_outline(shape).T, color=BLACK, linewidth=3)

@@ -22,7 +22,6 @@ from .style import BLUE, GREEN, RED
 
 _SCRIPTS = Path(__file__).parents[1] / "static"
 """Folder of the scripts that draw in a browser."""
-_COLOURS = {"robot": BLUE, "person": RED, "plan": GREEN}
 
 
 def scene_layout(scenario: Scenario, settings: MPCSettings, limits: Sequence[float]) -> dict[str, Any]:
@@ -40,7 +39,7 @@ def scene_layout(scenario: Scenario, settings: MPCSettings, limits: Sequence[flo
         "limits": [round(float(limit), 2) for limit in limits],
         "radius": settings.r_robot,
         "dt": settings.dt,
-        "colours": _COLOURS,
+        "colours": {"robot": BLUE, "person": RED, "plan": GREEN},
     }
 
 

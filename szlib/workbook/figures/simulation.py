@@ -40,8 +40,6 @@ from .style import (
 
 _ROBOT_COLOURS = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
 _ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
-_DARK_RED = "#7A2E00"
-"""Colour of letters; `RED` is too pale for them."""
 _PADDING = 0.2
 """Margin around everything that is drawn [m]."""
 _SAME_PLACE = 0.35
@@ -82,7 +80,7 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
         _draw_moving(ax, run, row, robot=_ROBOT_COLOURS(depth), zone=_ZONE_COLOURS(depth))
     _write_times(ax, run.time[shown], run.states[shown, :2], colour=BLACK, above=0)
     for i in range(len(run.zones)):
-        _write_times(ax, run.time[shown], run.people[shown, i, :2], colour=_DARK_RED, above=8)
+        _write_times(ax, run.time[shown], run.people[shown, i, :2], colour="#7A2E00", above=8)  # dark red
     ax.plot([], [], "o", color=BLUE, label="robot")
     ax.plot([], [], color=RED, label="zone")
     ax.plot([], [], marker=(3, 0, 0), color=RED, linestyle="", label="person")

@@ -9,11 +9,6 @@ from matplotlib.axes import Axes
 from ...encounters.geometry import Area
 from .style import BLUE, GREY, RED, SEQUENCE, add_legend_below, area_patch, get_axes, label_metres
 
-_MAX_CELLS = 2000
-"""Most cells of a map along each axis; the cells of a larger site are larger."""
-_MARGIN = 0.02
-"""Margin around a map, as a share of its size."""
-
 
 def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes | None = None) -> Axes:
     """Plot where people walked: person-seconds per square metre on a log scale (paper, fig. 1).
@@ -35,7 +30,7 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     """
     ax = get_axes(ax, size=(9, 5))
     x, y = tracks["x"].to_numpy(), tracks["y"].to_numpy()
-    while max(np.ptp(x), np.ptp(y)) / cell > _MAX_CELLS:
+    while max(np.ptp(x), np.ptp(y)) / cell > 2000:  # cells along an axis; those of a larger site are larger
         cell *= 2
     edges = [np.arange(np.floor(v.min()), np.ceil(v.max()) + cell, cell) for v in (x, y)]
     seconds = np.histogram2d(x, y, bins=edges)[0] / 10 / cell**2
@@ -46,7 +41,8 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     add_legend_below(ax)
     for axis, edge, ends in zip("xy", edges, (area.box.x, area.box.y), strict=True):
         low, high = min(edge[0], ends[0]), max(edge[-1], ends[1])
-        ax.set(**{f"{axis}lim": (low - _MARGIN * (high - low), high + _MARGIN * (high - low))})
+        margin = 0.02 * (high - low)
+        ax.set(**{f"{axis}lim": (low - margin, high + margin)})
     return label_metres(ax, "Where people walked, and the area")
 
 

@@ -36,8 +36,6 @@ from .style import (
 )
 
 _LINES = ("-", "--", ":", "-.")
-_MAX_DOTS = 4000
-"""Largest number of samples drawn around a hull."""
 
 
 def plot_outliers(
@@ -107,7 +105,7 @@ def plot_hull(
     faces = zone.shape.vertices[ConvexHull(zone.shape.vertices).simplices]
     ax.add_collection3d(Poly3DCollection(faces, facecolor=GREY, edgecolor=GREY, alpha=0.12, linewidth=0.3))
     if points is not None:
-        shown = points[:: max(1, len(points) // _MAX_DOTS)]
+        shown = points[:: max(1, len(points) // 4000)]  # more dots hide the hull
         ax.plot(*shown.T, ".", color=BLUE, markersize=1.5, alpha=0.35, label=f"{len(shown):,} of the samples")
     for speed, colour, line in zip(speeds, pick_colours(speeds), cycle(_LINES), strict=False):
         corners = zone.shape.slice(speed).polygon
