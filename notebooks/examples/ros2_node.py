@@ -1,17 +1,17 @@
-"""A ROS 2 node around szlib's robot with two wheels: glue to copy, in one file.
+"""A ROS 2 node for szlib's robot with two wheels, in one file to copy.
 
     python ros2_node.py --ros-args -p zone:=results/atc-1hz/zone.json -p walls:="4 -3 4 3; 0 2 6 2"
 
 subscribes  odom                 nav_msgs/Odometry            where the robot is, and its (v, omega)
             people               people_msgs/People           tracked people: name, position, velocity
-            goal_pose            geometry_msgs/PoseStamped    where to; its orientation is not used
+            goal_pose            geometry_msgs/PoseStamped    the goal; its orientation is not used
 publishes   cmd_vel              geometry_msgs/Twist          (v, omega), every dt
             social_costmap       nav_msgs/OccupancyGrid       the zones around people, 0 to 100
 
 Parameters: `zone`, a file that `SocialZone.save` wrote; `walls`, "x1 y1 x2 y2; ..." [m]; `frame`, the one
-frame of all messages and of the walls: what comes in another is not used, and said; of the robot `r_robot`
-[m], `v_max` [m/s], `omega_max` [rad/s], `ahead` [m] (0: what `DifferentialDrive` takes); `max_people` to
-build for at the start; `timeout` [s]; `costmap_size` and `costmap_resolution` [m].
+frame of all messages and of the walls (messages in another frame are ignored with a warning); of the robot
+`r_robot` [m], `v_max` [m/s], `omega_max` [rad/s], `ahead` [m] (0: the default of `DifferentialDrive`);
+`max_people`, the number to prepare for; `timeout` [s]; `costmap_size` and `costmap_resolution` [m].
 
 Watchdog: the node commands zero velocity, every dt, unless it has a goal, and odometry and people no older
 than `timeout` by their own stamps. Silence about people does not mean that nobody is there: a tracker that
@@ -49,7 +49,7 @@ DEFAULTS = {
 
 
 class SocialDrive(Node):
-    """Drives to the last goal it was given, out of people's zones; see the top of this file."""
+    """Drives to the last goal received, outside people's zones; see the top of this file."""
 
     def __init__(self):
         super().__init__("social_drive")
@@ -76,77 +76,78 @@ class SocialDrive(Node):
         self.create_timer(self.drive.settings.dt, self.on_timer)
 
     def on_odometry(self, message):
-        """Keep where the robot was, and when; numbers that are not finite are no odometry."""
+        """Store the odometry, unless a number is not finite."""
         own = pose_and_speeds(message)
         if not np.isfinite(own).all():
-            self.say(f"odom is not finite: {own.tolist()}: not used")
-        elif self.usable(message, "odom"):
+            self.warn(f"odom is not finite: {own.tolist()}; it is ignored")
+        elif self.is_in_frame(message, "odom"):
             self.odometry, self.own = message, own
 
     def on_people(self, message):
-        """Keep who was seen, and when."""
-        if self.usable(message, "people"):
+        """Store the people who were seen."""
+        if self.is_in_frame(message, "people"):
             self.people = message
 
     def on_goal(self, message):
-        """From now on, there."""
-        if self.usable(message, "goal_pose"):
+        """Replace the goal."""
+        if self.is_in_frame(message, "goal_pose"):
             self.goal = (message.pose.position.x, message.pose.position.y)
 
-    def usable(self, message, topic):
-        """True if the message is in the frame that everything is in."""
+    def is_in_frame(self, message, topic):
+        """True if the message is in the frame of all messages; else warn."""
         if message.header.frame_id != self.frame:
-            self.say(f"{topic} is in the frame {message.header.frame_id!r}, not in {self.frame!r}: not used")
+            frame = message.header.frame_id
+            self.warn(f"{topic} is in the frame {frame!r}, not in {self.frame!r}; it is ignored")
         return message.header.frame_id == self.frame
 
-    def say(self, text):
-        """A warning, at most one a second."""
+    def warn(self, text):
+        """Log a warning, at most one a second."""
         self.get_logger().warning(text, throttle_duration_sec=1.0)
 
     def on_timer(self):
-        """Command (v, omega), or zero."""
+        """Publish (v, omega), or zero, and the costmap."""
         now = self.get_clock().now().nanoseconds * 1e-9
-        missing = [topic for topic in ("odometry", "people") if not self.recent(getattr(self, topic), now)]
+        missing = [topic for topic in ("odometry", "people") if not self.is_recent(getattr(self, topic), now)]
         if missing:
-            self.say(f"no recent {' and '.join(missing)}: the robot stops")
+            self.warn(f"no recent {' and '.join(missing)}: the robot stops")
         if missing or self.goal is None:
             self.command.publish(Twist())
             return
         try:
-            people, how = self.seen(now)
-            step = self.drive.step(self.state(now), self.goal, people, **how)
+            people, options = self.read_people(now)
+            step = self.drive.step(self.predict_state(now), self.goal, people, **options)
         except szlib.SolverError as error:
-            self.get_logger().error(f"the goal is given up: {error}")
+            self.get_logger().error(f"the goal is dropped: {error}")
             self.goal = None
             self.command.publish(Twist())
             return
         if not step.safe:
-            least = min(step.h, default=np.inf)
-            self.say(f"not safe: {step.fallback}, h = {least:.2f} m, {step.point.unknown} lost")
+            min_h = min(step.h, default=np.inf)
+            self.warn(f"not safe: {step.fallback}, h = {min_h:.2f} m, {step.point.unknown} unknown")
         twist = Twist()
         twist.linear.x, twist.angular.z = step.control.tolist()
         self.command.publish(twist)
-        self.costmap.publish(self.layer(step.point.scene.people))
+        self.costmap.publish(self.draw_costmap(step.point.scene.people))
 
-    def recent(self, message, now):
-        """True if there is a message, no older than the timeout."""
-        return message is not None and abs(now - seconds(message.header.stamp)) <= self.timeout
+    def is_recent(self, message, now):
+        """True if there is a message no older than the timeout."""
+        return message is not None and abs(now - to_seconds(message.header.stamp)) <= self.timeout
 
-    def state(self, now):
-        """(x, y, theta, v, omega) by now, from the last odometry."""
-        return self.drive.robot.advance(self.own, self.own[3:], now - seconds(self.odometry.header.stamp))
+    def predict_state(self, now):
+        """(x, y, theta, v, omega) now, predicted from the last odometry."""
+        return self.drive.robot.advance(self.own, self.own[3:], now - to_seconds(self.odometry.header.stamp))
 
-    def seen(self, now):
-        """People as an array (n, 4), and as keywords of `step` their names and when they were seen."""
+    def read_people(self, now):
+        """People as an array, shape (n, 4), and the other arguments of `step`: ids, stamps and time."""
         rows = [(p.position.x, p.position.y, p.velocity.x, p.velocity.y) for p in self.people.people]
         return np.reshape(np.array(rows, float), (-1, 4)), {
             "ids": [p.name or None for p in self.people.people],
-            "stamps": seconds(self.people.header.stamp),
+            "stamps": to_seconds(self.people.header.stamp),
             "now": now,
         }
 
-    def layer(self, people):
-        """The zones around people, in a square around the robot."""
+    def draw_costmap(self, people):
+        """The costmap of people's zones, in a square around the robot."""
         side, cells = self.costmap_resolution, round(self.costmap_size / self.costmap_resolution)
         corner = [side * round(c / side) - side * (cells // 2) for c in self.own[:2].tolist()]
         costs = szlib.draw_costmap(self.zone_around, people, szlib.Grid(corner, side, (cells, cells)))
@@ -166,8 +167,8 @@ def pose_and_speeds(odometry):
     return np.array([at.x, at.y, theta, odometry.twist.twist.linear.x, odometry.twist.twist.angular.z])
 
 
-def seconds(stamp):
-    """A builtin_interfaces/Time in seconds."""
+def to_seconds(stamp):
+    """Convert a builtin_interfaces/Time to seconds."""
     return stamp.sec + 1e-9 * stamp.nanosec
 
 

@@ -121,7 +121,8 @@ class MPCCBF(Controller):
 
         Raises
         ------
-        SolverError : as of `MPCCBF`, which then keeps its walls; or the controller belongs to another thread.
+        SolverError : as of `MPCCBF`, and the walls stay as they were; or the controller belongs to another
+            thread.
         """
         self._check_thread()
         self._take_walls(walls)

@@ -37,7 +37,7 @@ def with_first(step: Step, a: np.ndarray) -> Step:
 
 @pytest.mark.parametrize("n_h", [2, 8])
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_inside_every_row_is_obeyed_and_outside_one_is_not(moment: str, n_h: int) -> None:
+def test_points_satisfy_every_row_exactly_if_they_lie_inside_the_polygon(moment: str, n_h: int) -> None:
     step = step_at(*MOMENTS[moment], N_h=n_h)
     polygon = find_admissible_controls(step).polygon
     edge, inside = polygon.boundary, 0
@@ -50,7 +50,7 @@ def test_inside_every_row_is_obeyed_and_outside_one_is_not(moment: str, n_h: int
     assert 5 < inside < 295
 
 
-def test_nothing_beyond_the_bounds_of_the_acceleration_is_allowed() -> None:
+def test_the_polygon_lies_within_the_bounds_of_the_acceleration() -> None:
     step = step_at(*MOMENTS["at full speed"])
     assert shapely.box(-1, -1, 1, 1).buffer(1e-9).covers(find_admissible_controls(step).polygon)
 
@@ -62,7 +62,7 @@ def test_the_control_of_a_feasible_step_is_allowed(moment: str) -> None:
     assert find_admissible_controls(step).polygon.distance(shapely.Point(step.control)) < 1e-3
 
 
-def test_alone_at_rest_every_acceleration_is_allowed() -> None:
+def test_a_robot_alone_at_rest_may_choose_every_acceleration() -> None:
     step = step_at([0.0, 0.0, 0.0, 0.0], szlib.Person((500.0, 0.0), heading=0.0), [])
     found = find_admissible_controls(step)
     assert found.limits == ()
@@ -70,7 +70,7 @@ def test_alone_at_rest_every_acceleration_is_allowed() -> None:
     assert find_admissible_controls(slow).polygon.area == pytest.approx(4.0)
 
 
-def test_each_limit_says_who_and_has_what_is_allowed_on_its_left() -> None:
+def test_each_limit_names_its_obstacle_and_has_the_allowed_side_on_its_left() -> None:
     found = find_admissible_controls(step_at(*MOMENTS["backing out"]))
     assert {(each.kind, each.number) for each in found.limits} == {("person", 0), ("wall", 1)}
     inner = np.array(found.polygon.representative_point().coords[0])
@@ -79,7 +79,7 @@ def test_each_limit_says_who_and_has_what_is_allowed_on_its_left() -> None:
         assert along[0] * off[1] - along[1] * off[0] > 0
 
 
-def test_where_no_plan_is_feasible_the_control_is_not_called_allowed() -> None:
+def test_the_control_of_an_infeasible_plan_lies_outside_the_polygon() -> None:
     step = step_at([0.0, 0.0, 1.0, 0.0], szlib.Person((1.6, 0.0), (-0.5, 0.0)), [])
     assert not step.feasible
     assert not find_admissible_controls(step).polygon.covers(shapely.Point(step.control))

@@ -97,12 +97,12 @@ def test_numbers_and_symbols_agree_and_so_do_the_gradients(formula, numbers):
         assert gradient == pytest.approx(numeric, abs=1e-7)
 
 
-def test_shapes_are_kept():
+def test_distances_have_the_shape_of_the_points():
     assert szlib.segment_distance(np.zeros((4, 3, 2)), (0, 1), (1, 1)).shape == (4, 3)
     assert szlib.ellipse_distance((0, 0), ZONE).shape == ()
 
 
-def test_the_condition_lets_h_fall_by_the_share_gamma_and_no_more():
+def test_the_condition_allows_h_to_fall_by_the_fraction_gamma_only():
     h = barrier(2.0, 0.5, 0.05)
     assert h == pytest.approx(1.45)
     assert cbf_residual((1 - 0.05) * h, h, 0.05) == pytest.approx(0)
@@ -119,6 +119,6 @@ def test_the_condition_lets_h_fall_by_the_share_gamma_and_no_more():
         ((("a", "b"), (0, 0), (1, 0)), "points must be numbers"),
     ],
 )
-def test_what_has_no_distance_is_refused(arguments, message):
+def test_points_and_walls_that_cannot_be_used_raise_an_error(arguments, message):
     with pytest.raises(szlib.SolverError, match=message):
         szlib.segment_distance(*arguments)

@@ -86,7 +86,7 @@ def test_the_point_lands_where_the_plan_says_near_its_chord_and_within_the_limit
         assert np.hypot(*(poses[:, :2] - points).T) == pytest.approx(drive.ahead)
 
 
-def test_the_bow_and_the_limits_are_attained():
+def test_the_chord_error_and_the_limits_are_attained():
     """No slack is left in the bounds: some motion turns at omega_max, and bows as far as allowed."""
     for drive in islice(drives(2), 20):
         if drive.v_max < drive.settings.v_max:  # the turning rate is what limits
@@ -100,7 +100,7 @@ def test_the_bow_and_the_limits_are_attained():
             )
 
 
-def test_where_the_point_is_safe_the_disc_is_whatever_its_heading():
+def test_the_disc_is_safe_at_any_heading_where_the_point_is_safe():
     """For people and walls, of any length: also those so short that their own margin is more than eps."""
     rng, near = np.random.default_rng(3), 0
     for _ in range(150):
@@ -157,7 +157,7 @@ def test_the_loop_of_the_point_is_that_of_a_double_integrator():
 
 
 @pytest.mark.parametrize("heading", np.linspace(-3, 3, 7))
-def test_it_reaches_its_goal_past_a_person_from_any_heading(heading):
+def test_the_drive_reaches_its_goal_past_a_person_from_any_heading(heading):
     drive = szlib.DifferentialDrive(ZONE)
     person = szlib.Person((3.0, 0.5), heading=np.pi)
     states, steps = loop(drive, np.r_[0.0, 0.0, heading, 0.0, 0.0], OPEN, [person])
@@ -166,7 +166,7 @@ def test_it_reaches_its_goal_past_a_person_from_any_heading(heading):
     assert all(step.safe for step in steps)
 
 
-def test_the_disc_keeps_out_on_a_fine_grid_after_every_step_that_said_it_was_safe():
+def test_the_disc_stays_clear_between_samples_after_every_safe_step():
     """People and walls, by Euclidean distance, ten times within each step; positions by integration."""
     checked = 0
     for seed in range(8):
@@ -195,7 +195,7 @@ def test_the_disc_keeps_out_on_a_fine_grid_after_every_step_that_said_it_was_saf
     assert checked > 1000
 
 
-def test_among_people_who_stand_a_plan_that_ends_at_rest_is_never_without_a_next_one():
+def test_plans_that_end_at_rest_stay_feasible_among_standing_people():
     """Recursive feasibility, proved of the double integrator in `szlib.control.mpc`, holds of the wheels."""
     settings, quiet = szlib.MPCSettings(terminal="rest"), Worlds(standing=1.0, start_speed=0.0, min_h=0.6)
     for seed in range(10):
@@ -210,8 +210,8 @@ def test_among_people_who_stand_a_plan_that_ends_at_rest_is_never_without_a_next
         assert min(drive.barriers(state[:2], scene.people).min() for state in states) >= -TOLERANCE
 
 
-def test_a_robot_that_was_held_back_begins_again_where_it_is():
-    """With (v, omega) it is told; without, it believes that it did what it was told."""
+def test_a_plan_begins_at_the_true_velocity_of_a_robot_that_was_stopped():
+    """With (v, omega) the stop is seen; without, the robot is assumed to follow its commands."""
     own, held, trusted = np.zeros(5), szlib.DifferentialDrive(ZONE), szlib.DifferentialDrive(ZONE)
     for _ in range(8):
         fast = held.step(own, OPEN)
@@ -223,7 +223,7 @@ def test_a_robot_that_was_held_back_begins_again_where_it_is():
     assert trusted.step(own[:3], OPEN).control[0] > fast.control[0]
 
 
-def test_pose_alone_is_enough_for_a_robot_that_does_as_it_is_told():
+def test_the_pose_is_enough_for_a_robot_that_follows_its_commands():
     person = szlib.Person((2.5, 0.4), (-0.3, 0.0))
     drive = szlib.DifferentialDrive(ZONE)
     states, steps = loop(drive, np.r_[0.0, 0.0, 1.0, 0.0, 0.0], OPEN, [person], 40)
@@ -232,7 +232,7 @@ def test_pose_alone_is_enough_for_a_robot_that_does_as_it_is_told():
         assert drive.step(state[:3], OPEN, [person.after(0.1 * k)]).control == pytest.approx(step.control)
 
 
-def test_a_world_turned_and_moved_is_driven_through_alike():
+def test_turning_and_moving_the_world_does_not_change_the_commands():
     """By a quarter turn: the box of accelerations is the same again."""
     rotation, shift = np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([30.0, -8.0])
     person = szlib.Person((2.5, 0.4), (-0.3, 0.05))
@@ -244,7 +244,7 @@ def test_a_world_turned_and_moved_is_driven_through_alike():
 
 
 @pytest.mark.parametrize("name", list(szlib.SCENARIOS))
-def test_it_drives_through_the_scenarios_of_the_paper(name):
+def test_the_drive_reaches_the_goal_in_the_scenarios_of_the_paper(name):
     """In the loop of szlib. At 8 rad/s: with 4, two passages are too narrow for the point ahead."""
     scenario = szlib.SCENARIOS[name]
     log = szlib.simulate(scenario, szlib.DifferentialDrive(ZONE, walls=scenario.walls, omega_max=8.0))
@@ -255,7 +255,7 @@ def test_it_drives_through_the_scenarios_of_the_paper(name):
     assert list(log.table.columns[6:8]) == ["v", "omega"]
 
 
-def test_one_who_runs_into_the_robot_is_flagged_before_it_happens():
+def test_a_collision_by_a_person_is_flagged_before_it_happens():
     person = szlib.Person((2.2, 0.0), (-2.0, 0.0))
     drive = szlib.DifferentialDrive(ZONE)
     own = np.zeros(5)
@@ -269,10 +269,10 @@ def test_one_who_runs_into_the_robot_is_flagged_before_it_happens():
     raise AssertionError("nobody ran into the robot: the test is void")
 
 
-# --- what it is told and given -----------------------------------------------------------------------
+# --- limits and arguments ------------------------------------------------------------------------------
 
 
-def test_with_less_ahead_it_is_slower_and_by_default_it_is_not():
+def test_only_an_ahead_below_the_default_makes_the_robot_slower():
     settings = szlib.MPCSettings(v_max=0.8)
     assert szlib.DifferentialDrive(ZONE, settings=settings).v_max == pytest.approx(0.8)
     near = szlib.DifferentialDrive(ZONE, settings=settings, ahead=0.1, omega_max=2.0)
@@ -281,7 +281,7 @@ def test_with_less_ahead_it_is_slower_and_by_default_it_is_not():
     assert near._point.settings.r_robot == pytest.approx(0.5 + 0.05 + 0.1 + near.chord_error)
 
 
-def test_people_come_as_an_array_with_ids_and_whoever_is_lost_makes_the_step_unsafe():
+def test_people_may_be_an_array_with_ids_and_an_unknown_person_makes_the_step_unsafe():
     rows = np.array([[3.0, 0.4, -0.3, 0.0], [2.0, 3.0, 0.0, 0.0]])
     by_row, by_person = szlib.DifferentialDrive(ZONE), szlib.DifferentialDrive(ZONE)
     people = [szlib.Person((3.0, 0.4), (-0.3, 0.0)), szlib.Person((2.0, 3.0))]
@@ -293,7 +293,7 @@ def test_people_come_as_an_array_with_ids_and_whoever_is_lost_makes_the_step_uns
     assert lost.point.unknown == 1
 
 
-def test_walls_may_change_between_steps_and_a_copy_goes_on_alike():
+def test_walls_may_change_between_steps_and_a_copy_continues_identically():
     drive = szlib.DifferentialDrive(ZONE)
     own = np.zeros(5)
     for _ in range(5):
@@ -310,7 +310,7 @@ def test_walls_may_change_between_steps_and_a_copy_goes_on_alike():
         assert thread.submit(there.step, np.zeros(3), OPEN).result().safe
 
 
-def test_a_goal_that_turns_out_too_close_to_a_wall_is_a_status_of_a_moving_robot():
+def test_a_goal_too_close_to_a_wall_raises_nothing_while_the_robot_moves():
     drive = szlib.DifferentialDrive(ZONE, walls=[((4.0, -3.0), (4.0, 3.0))])
     drive.step((0.0, 0.0, 0.0), (2.0, 0.0))
     step = drive.step((0.0, 0.0, 0.0), (3.9, 0.0))
@@ -319,7 +319,7 @@ def test_a_goal_that_turns_out_too_close_to_a_wall_is_a_status_of_a_moving_robot
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ({"omega_max": 0.0}, "omega_max must lie in"),
         ({"omega_max": 40.0}, "omega_max must lie in"),
@@ -328,12 +328,12 @@ def test_a_goal_that_turns_out_too_close_to_a_wall_is_a_status_of_a_moving_robot
         ({"ahead": -0.2}, "ahead must be positive"),
     ],
 )
-def test_what_cannot_be_used_is_told(given, told):
-    with pytest.raises(szlib.SolverError, match=told):
+def test_limits_that_cannot_be_used_raise_an_error(given, message):
+    with pytest.raises(szlib.SolverError, match=message):
         szlib.DifferentialDrive(ZONE, **given)
 
 
-def test_a_state_of_the_wrong_shape_and_a_goal_inside_a_wall_are_told():
+def test_a_state_of_the_wrong_shape_and_a_goal_inside_a_wall_raise_an_error():
     drive = szlib.DifferentialDrive(ZONE, walls=[((4.0, -3.0), (4.0, 3.0))])
     with pytest.raises(szlib.SolverError, match="state must have shape"):
         drive.step((0.0, 0.0, 0.0, 0.0), (2.0, 0.0))
@@ -342,7 +342,7 @@ def test_a_state_of_the_wrong_shape_and_a_goal_inside_a_wall_are_told():
     drive.step((0.0, 0.0, 0.0), (3.0, 0.0))
 
 
-def test_the_robot_starts_where_it_goes_or_as_it_is_told():
+def test_the_robot_starts_in_its_direction_of_motion_or_at_the_given_heading():
     robot = Unicycle(heading=1.0)
     assert robot.start([1, 2, 0, 0]) == pytest.approx([1, 2, 1, 0, 0])
     assert robot.start([1, 2, 0, -0.5]) == pytest.approx([1, 2, -np.pi / 2, 0.5, 0])

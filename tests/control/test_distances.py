@@ -27,7 +27,7 @@ radii = st.floats(0.1, 1)
 
 
 @given(points, points, points)
-def test_segment_is_shapelys(point, a, b):
+def test_euclidean_distance_to_a_segment_equals_shapelys(point, a, b):
     if np.hypot(*np.subtract(a, b)) < 1e-3:
         return
     exact = shapely.LineString([a, b]).distance(shapely.Point(point))
@@ -35,7 +35,7 @@ def test_segment_is_shapelys(point, a, b):
 
 
 @given(points, ellipses)
-def test_ellipse_is_shapelys(point, ellipse):
+def test_euclidean_distance_to_an_ellipse_equals_shapelys(point, ellipse):
     # The polygon of n corners lies inside the curve, by at most a (1 - cos(pi/n)).
     n = 20_000
     exact = shapely.LinearRing(ellipse.curve(n + 1)).distance(shapely.Point(point))
@@ -45,7 +45,7 @@ def test_ellipse_is_shapelys(point, ellipse):
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0])
-def test_on_the_axes_of_an_ellipse(angle):
+def test_euclidean_distance_is_exact_on_the_axes_of_an_ellipse(angle):
     ellipse = szlib.Ellipse((0.0, 0.0), (2.0, 1.0), angle)
     along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     at = np.array([0 * along, 3 * along, 3 * across, 1.9 * along, 0.5 * across])
@@ -73,7 +73,7 @@ def test_required_margin_of_a_wall_is_enough(length, radius, phi, share):
 
 
 @given(lengths, radii)
-def test_and_no_smaller_one_is(length, radius):
+def test_no_margin_of_a_wall_below_the_required_one_is_enough(length, radius):
     half = np.array([length / 2, 0.0])
     tip = half + np.array([radius, 0.0])
     assert szlib.segment_distance(tip, -half, half) == pytest.approx(
@@ -82,21 +82,21 @@ def test_and_no_smaller_one_is(length, radius):
 
 
 @given(ellipses, st.floats(0.05, 1.5))
-def test_safe_boundary_of_an_ellipse(ellipse, distance):
+def test_safe_boundary_of_an_ellipse_lies_at_its_distance(ellipse, distance):
     assert szlib.ellipse_distance(find_safe_boundary(ellipse, distance, 50), ellipse) == pytest.approx(
         distance, abs=1e-9
     )
 
 
 @given(points, points, st.floats(0.05, 1.5))
-def test_safe_boundary_of_a_wall(a, b, distance):
+def test_safe_boundary_of_a_wall_lies_at_its_distance(a, b, distance):
     if np.hypot(*np.subtract(a, b)) < 1e-2:
         return
     edge = find_safe_boundary([a, b], distance, 50)
     assert szlib.segment_distance(edge, a, b) == pytest.approx(distance, abs=1e-6)
 
 
-def test_the_papers_margin():
+def test_the_margin_of_the_paper_is_too_small_for_short_walls_only():
     wall = lambda length: [(-length / 2, 0.0), (length / 2, 0.0)]  # noqa: E731
     one = compare_distances(wall(1.0), r_robot=0.5, eps=0.05)
     assert one.nearest == pytest.approx((np.sqrt(1 + 4 * 0.55) - 1) / 2 - 0.5)  # d = s + s^2/L on the line
@@ -109,7 +109,7 @@ def test_the_papers_margin():
     assert zone.farthest > 0.05
 
 
-def test_controller_uses_the_margin():
+def test_controller_keeps_the_required_margin_of_each_wall():
     walls = [[(0.0, 0.0), (1.0, 0.0)], [(0.0, 5.0), (9.0, 5.0)]]
     settings = szlib.MPCSettings(margin="paper", eps=max(required_margin(wall, 0.5) for wall in walls))
     assert settings.eps == 0.25

@@ -127,7 +127,7 @@ def test_the_problem_is_built_once_for_each_number_of_people(solver):
     assert build_problem.cache_info().misses - before == 3
 
 
-def test_more_people_than_built_for_make_the_controller_grow_once_and_say_so(caplog):
+def test_more_people_than_expected_make_the_controller_grow_once_and_log_it(caplog):
     caplog.set_level("INFO", logger="szlib")
     controller = szlib.MPCCBF(ZONE, max_people=1)
     crowd = [szlib.Person((3.0 * i, 2.0), (0.1, 0.0)) for i in range(3)]
@@ -141,7 +141,7 @@ def test_more_people_than_built_for_make_the_controller_grow_once_and_say_so(cap
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_after_a_reset_the_same_questions_get_the_same_answers(solver):
+def test_after_a_reset_the_same_states_give_the_same_steps(solver):
     controller, states = (
         szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver)),
         np.linspace((-4, 0.2, 0, 0), (-3, 0, 0.8, 0), 6),
@@ -184,7 +184,7 @@ def test_turning_and_shifting_the_world_turns_the_plan(solver):
     assert other.control == pytest.approx(turn @ step.control, abs=1e-4)
 
 
-def test_a_person_may_bring_an_own_zone():
+def test_the_zone_of_a_person_replaces_the_controllers():
     wide = szlib.Ellipse((0.0, 0.0), (1.6, 1.2))
     controller = szlib.MPCCBF(ZONE)
     people = [szlib.Person((0, 0), heading=0.0), szlib.Person((0, 0), heading=0.0, zone=wide)]
@@ -193,7 +193,7 @@ def test_a_person_may_bring_an_own_zone():
     )
 
 
-def test_a_zone_that_depends_on_speed_is_asked_for_the_one_of_the_settings():
+def test_a_zone_that_depends_on_speed_is_used_at_the_speed_of_the_settings():
     class Growing:
         def ellipse(self, speed):
             return szlib.Ellipse((0.0, 0.0), (speed, speed / 2))
@@ -290,7 +290,7 @@ def test_a_wall_on_the_chosen_side_sends_the_robot_around_the_other(solver):
     assert controller.step((-2.5, 0, 0, 0), GOAL, [FACING]).target[1] > 0
 
 
-def test_the_goal_stays_the_goal_unless_somebody_is_met_head_on():
+def test_the_target_is_the_goal_unless_a_person_is_met_head_on():
     controller = szlib.MPCCBF(ZONE)
     state = (-3, 0, 0, 0)
     crossing, beside = szlib.Person((0, -1.0), (0, 0.5)), szlib.Person((0, 2.5), heading=0.0)
@@ -333,7 +333,7 @@ def test_a_start_inside_a_zone_or_a_wall_is_flagged_and_left(solver):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_robot_that_is_too_fast_slows_down_and_says_so(solver):
+def test_a_robot_that_is_too_fast_slows_down_and_reports_slack(solver):
     step = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver)).step((-4, -5, 1.5, 0.0), (9.0, -5.0))
     assert step.status == "relaxed"
     assert step.slack == pytest.approx(1.4**2 - 1, rel=1e-3)
@@ -367,7 +367,7 @@ def test_where_a_distance_has_no_gradient_the_robot_still_gets_a_control(solver)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_no_state_whatever_gets_a_control_out_of_bounds_or_a_false_optimal(solver):
+def test_every_state_gets_a_control_within_bounds_and_a_true_status(solver):
     rng = np.random.default_rng(7)
     seen = set()
     for _ in range(150):
@@ -406,13 +406,13 @@ def test_no_state_whatever_gets_a_control_out_of_bounds_or_a_false_optimal(solve
         ((0, 0, 0, 0), (1e155, 0), r"goal must lie within"),
     ],
 )
-def test_a_question_without_a_meaning_is_refused(state, goal, message):
+def test_a_state_or_goal_that_cannot_be_used_raises_an_error(state, goal, message):
     controller = szlib.MPCCBF(ZONE, walls=[((-6, 3), (6, 3))])
     with pytest.raises(szlib.SolverError, match=message):
         controller.step(state, goal, [FACING])
 
 
-def test_a_person_who_stops_on_the_goal_does_not_leave_a_moving_robot_without_control():
+def test_a_person_who_stops_on_the_goal_raises_nothing_while_the_robot_moves():
     controller = szlib.MPCCBF(ZONE)
     assert controller.step((0, 0, 0, 0), GOAL, [szlib.Person((3, 0), (0.5, 0))]).status == "optimal"
     step = controller.step((0.1, 0, 0.5, 0), GOAL, [szlib.Person((4, 0), heading=0.0)])
@@ -431,7 +431,7 @@ def test_a_person_who_stops_on_the_goal_does_not_leave_a_moving_robot_without_co
         ({"position": (0, 0), "velocity": (0, -1e155)}, "velocity must lie within"),
     ],
 )
-def test_a_person_who_is_nowhere_is_refused(arguments, message):
+def test_a_person_with_unusable_numbers_raises_an_error(arguments, message):
     with pytest.raises(szlib.SolverError, match=message):
         szlib.Person(**arguments)
 
@@ -446,7 +446,7 @@ def test_a_person_who_is_nowhere_is_refused(arguments, message):
         ((0, 0), (1e155, 0)),
     ],
 )
-def test_a_wall_that_is_none_is_refused(wall):
+def test_an_invalid_wall_raises_an_error(wall):
     with pytest.raises(szlib.SolverError, match="wall"):
         szlib.MPCCBF(ZONE, walls=[wall])
 
@@ -463,12 +463,12 @@ def test_a_wall_that_is_none_is_refused(wall):
         {"time_limit": "1"}, {"margin": "none"}, {"v_max": 1e155},
     ],
 )  # fmt: skip
-def test_a_setting_out_of_its_range_is_refused_by_name(change):
+def test_a_setting_out_of_its_range_is_named_in_the_error(change):
     with pytest.raises(szlib.SolverError, match=f"^{next(iter(change))} must"):
         szlib.MPCSettings(**change)
 
 
-def test_every_setting_is_documented_and_says_where_it_comes_from():
+def test_every_setting_is_documented_with_the_source_of_its_default():
     settings = szlib.MPCSettings()
     assert set(settings.badges()) == {f.name for f in fields(settings)}
     assert set(settings.badges().values()) == {"paper", "assumed", "measured"}

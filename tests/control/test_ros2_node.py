@@ -50,26 +50,28 @@ OccupancyGrid = message(
 
 
 class Node:
-    """What of rclpy.node.Node the example calls, with the same arguments."""
+    """The part of rclpy.node.Node that the example uses, with the same arguments."""
 
     given, now = {}, 1.75e9
 
     def __init__(self, node_name):
-        self.heard, self.said, self.told, self.every = {}, {}, [], {}
+        self.subscribed, self.published, self.logged, self.every = {}, {}, [], {}
 
     def declare_parameter(self, name, value):
-        self.told += [] if type(self.given.get(name, value)) is type(value) else [f"{name} has another type"]
+        self.logged += (
+            [] if type(self.given.get(name, value)) is type(value) else [f"{name} has another type"]
+        )
 
     def get_parameter(self, name):
         return SimpleNamespace(value=self.given.get(name, DEFAULTS()[name]))
 
     def create_subscription(self, msg_type, topic, callback, qos_profile):
-        self.heard[topic] = (msg_type, callback)
+        self.subscribed[topic] = (msg_type, callback)
 
     def create_publisher(self, msg_type, topic, qos_profile):
         def publish(what):
             assert type(what) is msg_type
-            self.said.setdefault(topic, []).append(what)
+            self.published.setdefault(topic, []).append(what)
 
         return SimpleNamespace(publish=publish)
 
@@ -81,7 +83,7 @@ class Node:
 
     def get_logger(self):
         def say(text, throttle_duration_sec=0.0):
-            self.told.append(text)
+            self.logged.append(text)
 
         return SimpleNamespace(warning=say, error=say)
 
@@ -158,7 +160,7 @@ def goal(x, y, **how):
 
 
 def hear(node, topic, what):
-    msg_type, callback = node.heard[topic]
+    msg_type, callback = node.subscribed[topic]
     assert type(what) is msg_type
     callback(what)
 
@@ -168,7 +170,7 @@ def tick(node):
     ((period, callback),) = node.every.items()
     assert period == 0.1
     callback()
-    twist = node.said["cmd_vel"][-1]
+    twist = node.published["cmd_vel"][-1]
     assert vars(twist.linear) | {"x": 0.0} == vars(xyz())  # two wheels move ahead and turn, nothing else
     return np.array([twist.linear.x, twist.angular.z])
 
@@ -192,12 +194,12 @@ def drive(node, walker, steps, silent=(), late=0.04):
     return path
 
 
-def test_it_reaches_its_goal_past_a_person(make):
+def test_the_robot_reaches_its_goal_past_a_person(make):
     node = make(walls="-1 3 7 3; -1 -3 7 -3")
     hear(node, "goal_pose", goal(*GOAL))
     walker = (4.0, 0.2, -0.4, 0.0)
     path = drive(node, walker, 150)
-    assert node.told == []
+    assert node.logged == []
     assert hypot(path[-1][0][0] - GOAL[0], path[-1][0][1] - GOAL[1]) < 0.1
     assert np.abs(path[-1][1]).max() < 0.05
     for k, (own, _) in enumerate(path):
@@ -206,14 +208,14 @@ def test_it_reaches_its_goal_past_a_person(make):
 
 
 @pytest.mark.parametrize("topic", ["odom", "people"])
-def test_a_lost_topic_makes_it_stop(make, topic):
+def test_the_robot_stops_when_a_topic_falls_silent(make, topic):
     node = make()
     hear(node, "goal_pose", goal(*GOAL))
     path = drive(node, (4.0, 2.5, 0.0, 0.0), 60, silent=(topic,))
     commands = np.array([command for _, command in path])
     assert np.abs(commands[25:30, 0]).min() > 0.3  # it was on its way
     assert not commands[36:].any()  # 0.5 s after the last message, and a step
-    assert {"odom": "no recent odometry", "people": "no recent people"}[topic] in node.told[-1]
+    assert {"odom": "no recent odometry", "people": "no recent people"}[topic] in node.logged[-1]
     last = path[-1][0]
     hear(node, "odom", odometry(last))
     hear(node, "people", people())
@@ -222,7 +224,7 @@ def test_a_lost_topic_makes_it_stop(make, topic):
     assert abs(again[0]) <= 2 * 0.1
 
 
-def test_it_stands_until_it_has_heard_all_three(make):
+def test_the_robot_waits_for_odometry_people_and_goal(make):
     node = make()
     assert not tick(node).any()
     hear(node, "odom", odometry(np.zeros(5)))
@@ -232,42 +234,42 @@ def test_it_stands_until_it_has_heard_all_three(make):
     assert tick(node).any()
 
 
-def test_messages_in_another_frame_are_not_used_and_said(make):
+def test_messages_in_another_frame_are_ignored_with_a_warning(make):
     node = make()
     hear(node, "odom", odometry(np.zeros(5)))
     hear(node, "goal_pose", goal(*GOAL))
     hear(node, "people", people(frame="camera"))
     assert not tick(node).any()
-    assert "people is in the frame 'camera', not in 'odom'" in node.told[0]
+    assert "people is in the frame 'camera', not in 'odom'" in node.logged[0]
 
 
-def test_odometry_that_is_not_finite_is_no_odometry(make):
+def test_odometry_that_is_not_finite_is_ignored(make):
     node = make()
     hear(node, "people", people())
     hear(node, "goal_pose", goal(*GOAL))
     hear(node, "odom", odometry(np.array([0.0, np.nan, 0.0, 0.0, 0.0])))
     assert not tick(node).any()
-    assert "odom is not finite" in node.told[0]
+    assert "odom is not finite" in node.logged[0]
     hear(node, "odom", odometry(np.zeros(5)))
     assert tick(node).any()
 
 
-def test_people_without_usable_numbers_are_never_driven_through(make):
+def test_the_robot_stays_clear_of_people_whose_numbers_cannot_be_used(make):
     node = make()
     hear(node, "goal_pose", goal(*GOAL))
     hear(node, "odom", odometry(np.zeros(5)))
     hear(node, "people", people(("anna", (np.nan, 0.0, 0.0, 0.0))))
     assert np.abs(tick(node)).max() < 1e-3
-    assert "1 lost" in node.told[-1]
+    assert "1 unknown" in node.logged[-1]
 
 
-def test_a_goal_inside_a_wall_is_given_up_and_said(make):
+def test_a_goal_inside_a_wall_is_dropped_with_an_error(make):
     node = make(walls="4 -3 4 3")
     hear(node, "odom", odometry(np.zeros(5)))
     hear(node, "people", people())
     hear(node, "goal_pose", goal(3.95, 0.0))
     assert not tick(node).any()
-    assert "the goal is given up" in node.told[-1]
+    assert "the goal is dropped" in node.logged[-1]
     hear(node, "goal_pose", goal(2.0, 0.0))
     assert tick(node).any()
 
@@ -278,7 +280,7 @@ def test_the_costmap_lies_where_the_people_are(make):
     hear(node, "odom", odometry(np.array([20.3, -7.1, 0.0, 0.0, 0.0])))
     hear(node, "people", people(("anna", (21.55, -6.05, 0.5, 0.0))))
     tick(node)
-    (grid,) = node.said["social_costmap"]
+    (grid,) = node.published["social_costmap"]
     assert (grid.header.frame_id, grid.info.width, grid.info.height) == ("odom", 80, 80)
     assert grid.header.stamp == node.people.header.stamp
     corner = grid.info.origin.position
@@ -290,6 +292,6 @@ def test_the_costmap_lies_where_the_people_are(make):
     assert all(type(cost) is int for cost in grid.data)
 
 
-def test_without_a_zone_it_says_which_parameter_is_missing(make):
+def test_a_missing_zone_parameter_is_named_in_the_error(make):
     with pytest.raises(szlib.ZoneError, match="parameter `zone`"):
         make(zone="")

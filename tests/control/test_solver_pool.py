@@ -98,7 +98,7 @@ def test_a_run_is_the_same_whether_or_not_a_size_was_built_ahead(monkeypatch, so
     assert np.array_equal(ahead, racing) and np.array_equal(ahead, in_place)
 
 
-def test_a_controller_is_ready_for_eight_and_grows_ahead_from_when_half_of_them_are_there(caplog):
+def test_a_controller_is_built_for_eight_people_and_doubles_when_half_are_present(caplog):
     caplog.set_level("INFO", logger="szlib")
     controller = controller_of()
     built = controller._pool._solvers
@@ -115,7 +115,7 @@ def test_a_controller_is_ready_for_eight_and_grows_ahead_from_when_half_of_them_
     assert "built for 8 people and now grows to 24" in caplog.text
 
 
-def test_a_number_that_is_told_is_taken_at_its_word():
+def test_a_controller_with_a_given_number_of_people_builds_no_more_sizes():
     controller = controller_of(max_people=4)
     drive(controller, [4])
     assert controller._pool._builder is None
@@ -168,13 +168,13 @@ def test_the_same_wall_in_any_shape_gives_the_same_control():
     "walls",
     [5, "wall", None, shapely.Point(0, 0), [(0, 0)], [(0, 0, 0), (1, 1, 1)], [[(0, 0), (0, 0), (0, 0)]]],
 )
-def test_what_is_no_wall_is_refused(walls):
+def test_objects_that_are_not_walls_raise_an_error(walls):
     with pytest.raises(szlib.SolverError, match="wall"):
         szlib.MPCCBF(ZONE, walls=walls)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_walls_set_between_steps_are_those_of_a_controller_that_knew_them_all_along(solver):
+def test_walls_set_between_steps_give_the_steps_of_a_controller_built_with_them(solver):
     some, more = [[(-6, 1.5), (6, 1.5)]], shapely.box(-8, -3, 9, 3)
     state, controller = np.array([-4.0, 0.0, 0.0, 0.0]), controller_of(solver, some)
     for k, walls in enumerate([some, more, [], some, more] * 3):
@@ -186,7 +186,7 @@ def test_walls_set_between_steps_are_those_of_a_controller_that_knew_them_all_al
         state = advance(state, step.control, 0.1)
 
 
-def test_a_wall_set_around_the_goal_of_a_moving_robot_is_a_status():
+def test_a_wall_set_around_the_goal_of_a_moving_robot_sets_goal_blocked():
     controller = controller_of()
     assert not controller.step((-4, 0, 0, 0), GOAL).goal_blocked
     controller.set_walls([[(4, -1), (4, 1)]])
@@ -203,7 +203,7 @@ def test_a_wall_set_around_the_goal_of_a_moving_robot_is_a_status():
 
 @pytest.mark.parametrize("again", [copy.deepcopy, lambda c: pickle.loads(pickle.dumps(c))])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_copy_goes_on_as_the_original_does(solver, again):
+def test_a_copy_continues_as_the_original(solver, again):
     original = controller_of(solver, walls=[[(-6, 2), (6, 2)]], max_people=4)
     state = np.array([-4.0, 0.3, 0.0, 0.0])
     rows = np.array([[0.0, 0.2, -0.3, 0.0], [2.0, -1.0, 0.0, 0.0]])
@@ -222,7 +222,7 @@ def test_a_copy_goes_on_as_the_original_does(solver, again):
     assert step.scene.people[0].heading == pytest.approx(np.pi), "remembered"
 
 
-def test_a_copy_has_no_thread_yet_and_one_each_works():
+def test_copies_can_be_used_in_other_threads():
     controller = controller_of()
     expected = drive(controller, [2] * 30)
     with pytest.raises(szlib.SolverError, match="another thread"), ThreadPoolExecutor(1) as other:

@@ -1,4 +1,4 @@
-"""The two solvers side by side, the fallbacks of the ladder, and what the terminal conditions promise."""
+"""The two solvers compared, the fallbacks, and the guarantees of the terminal conditions."""
 
 import ast
 from dataclasses import replace
@@ -24,7 +24,7 @@ FORMULATIONS = ({}, {"N_h": 8}, {"terminal": "rest"})
 
 
 def settings_of(solver, **settings):
-    """However busy the machine is: no solver is cut short."""
+    """Settings without a time limit, so that a busy machine changes nothing."""
     return szlib.MPCSettings(solver=solver, **{"time_limit": np.inf} | settings)
 
 
@@ -50,7 +50,7 @@ def test_both_solvers_find_the_same_plan_or_another_local_one_of_the_same_proble
 
 
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
-def test_the_scenarios_of_the_paper_run_the_same_with_both(name):
+def test_both_solvers_drive_the_scenarios_of_the_paper_alike(name):
     scenario = szlib.SCENARIOS[name]
     sqp, ipopt = (szlib.simulate(scenario, controller_of(s, scenario.walls)) for s in SOLVERS)
     for log in (sqp, ipopt):
@@ -63,7 +63,7 @@ def test_the_scenarios_of_the_paper_run_the_same_with_both(name):
 @pytest.mark.parametrize(
     ("package", "where"), [("casadi", {"problem", "ipopt", "sqp_functions"}), ("daqp", {"sqp"})]
 )
-def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
+def test_each_solver_package_is_imported_by_its_modules_only(package, where):
     found = set()
     for file in Path(szlib.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
@@ -75,7 +75,7 @@ def test_a_solver_is_imported_where_it_belongs_and_nowhere_else(package, where):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
-def test_derivatives_by_structure_are_those_of_the_whole_expressions(formulation):
+def test_structured_derivatives_equal_automatic_ones(formulation):
     settings = szlib.MPCSettings(**formulation)
     p, derive = build_problem(settings, 2, 1), build_sqp_functions(settings, 2, 1).derive
     values = ca.vertcat(p.rows, p.terminal)
@@ -103,7 +103,7 @@ def test_derivatives_by_structure_are_those_of_the_whole_expressions(formulation
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
-def test_steps_that_raise_the_merit_for_a_while_end_in_the_same_plan(monkeypatch, formulation):
+def test_steps_that_raise_the_merit_at_first_lead_to_the_same_plan(monkeypatch, formulation):
     asked = list(islice(questions(seed=9), 60))
     answers = []
     for rises in (0, 1, sqp.RISES):
@@ -125,7 +125,7 @@ def broken(monkeypatch, controller, *names):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_rungs_warm_and_cold_give_the_same_control(solver):
+def test_fallbacks_warm_and_cold_give_the_same_control(solver):
     controller = controller_of(solver)
     state = np.array([-3.0, 0.4, 0.5, 0.0])
     warm = controller.step(state, GOAL, [FACING])
@@ -137,7 +137,7 @@ def test_the_rungs_warm_and_cold_give_the_same_control(solver):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_rung_kept_goes_on_with_a_plan_that_still_holds(solver, monkeypatch):
+def test_fallback_kept_follows_the_last_plan_while_it_is_feasible(solver, monkeypatch):
     controller = controller_of(solver, terminal="rest")
     state = np.array([-2.6, 0.4, 0.5, 0.0])
     before = controller.step(state, GOAL, [FACING])
@@ -152,7 +152,7 @@ def test_the_rung_kept_goes_on_with_a_plan_that_still_holds(solver, monkeypatch)
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("formulation", ({}, {"N_h": 8}), ids=str)
-def test_the_rung_relaxed_says_by_how_much_the_hard_problem_is_violated(solver, formulation):
+def test_fallback_relaxed_reports_the_violation_of_the_hard_problem(solver, formulation):
     step = controller_of(solver, **formulation).step((-1.9, 0.0, 0.7, 0.0), GOAL, [FACING])
     assert step.fallback == step.status == "relaxed"
     assert step.slack == pytest.approx(-step.residual.min()) and step.slack > 1e-3
@@ -160,7 +160,7 @@ def test_the_rung_relaxed_says_by_how_much_the_hard_problem_is_violated(solver, 
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_rung_braking_is_what_remains_when_no_solver_has_an_answer(solver, monkeypatch):
+def test_fallback_braking_is_used_when_no_solver_finds_a_plan(solver, monkeypatch):
     controller = controller_of(solver)
     broken(monkeypatch, controller, "hard", "relaxed")
     step = controller.step((-3.0, 0.0, 0.8, -0.4), GOAL, [FACING])
@@ -178,7 +178,7 @@ def test_a_robot_too_fast_to_stop_within_the_horizon_brakes(solver):
     assert step.control == pytest.approx((-1.0, 0.0))
 
 
-def test_the_rungs_are_counted():
+def test_the_metrics_count_each_fallback():
     close = szlib.Person((0.0, 0.0), (-0.5, 0.0))
     scenario = szlib.Scenario("close", (-1.9, 0.0, 0.0, 0.0), (4.0, 0.0), (close,))
     log = szlib.simulate(scenario, controller_of("sqp"))
@@ -188,7 +188,7 @@ def test_the_rungs_are_counted():
     assert log.metrics()["infeasible_steps"] == (log.table["slack"][:-1] > TOLERANCE).sum() > 0
 
 
-# what the terminal conditions promise
+# guarantees of the terminal conditions
 
 
 def drive(controller, state, goal, people, steps):
@@ -201,7 +201,7 @@ def drive(controller, state, goal, people, steps):
 
 
 @pytest.mark.parametrize(("solver", "worlds"), [("sqp", 60), ("ipopt", 3)])
-def test_with_rest_at_its_end_no_plan_among_walls_and_standing_people_is_ever_infeasible(solver, worlds):
+def test_terminal_rest_keeps_plans_feasible_among_walls_and_standing_people(solver, worlds):
     asked = 0
     for question in islice(questions(seed=2), worlds):
         people = [replace(p, velocity=(0.0, 0.0)) for p in question.people]
@@ -218,7 +218,7 @@ def test_with_rest_at_its_end_no_plan_among_walls_and_standing_people_is_ever_in
 
 
 def rooms(seed):
-    """A robot at rest in a closed room, and two people who walk through it at up to 1.2 m/s, without end."""
+    """A robot at rest in a closed room, and two people who keep walking through it at up to 1.2 m/s."""
     rng = np.random.default_rng(seed)
     corners = 3.0 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     walls = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
@@ -234,7 +234,7 @@ def rooms(seed):
 
 
 @pytest.mark.parametrize(("solver", "worlds"), [("sqp", 60), ("ipopt", 3)])
-def test_with_rest_at_its_end_nobody_who_walks_as_predicted_is_hit_by_a_moving_robot(solver, worlds):
+def test_terminal_rest_never_lets_a_moving_robot_hit_a_person_who_walks_as_predicted(solver, worlds):
     fallbacks, reached = set(), 0
     for state, goal, people, walls in islice(rooms(seed=3), worlds):
         controller = controller_of(solver, walls, terminal="rest")
@@ -249,7 +249,7 @@ def test_with_rest_at_its_end_nobody_who_walks_as_predicted_is_hit_by_a_moving_r
 
 
 @pytest.mark.parametrize(("solver", "worlds"), [("sqp", 30), ("ipopt", 3)])
-def test_at_a_persons_pace_at_its_end_no_plan_is_infeasible_although_they_walk(solver, worlds):
+def test_terminal_person_keeps_plans_feasible_although_the_person_walks(solver, worlds):
     rng, asked = np.random.default_rng(4), 0
     while asked < worlds * 100:
         person = szlib.Person(tuple(rng.uniform(-1, 1, 2)), tuple(rng.uniform(-0.5, 0.5, 2)))
@@ -264,7 +264,7 @@ def test_at_a_persons_pace_at_its_end_no_plan_is_infeasible_although_they_walk(s
             assert step.predicted[-1, 2:] == pytest.approx(person.velocity, abs=TOLERANCE)
 
 
-def test_a_terminal_condition_that_makes_no_sense_is_refused():
+def test_an_invalid_terminal_condition_raises_an_error():
     with pytest.raises(szlib.SolverError, match="open space; got 1 walls"):
         controller_of("sqp", [((0, 5), (1, 5))], terminal="person")
     with pytest.raises(szlib.SolverError, match="max_people must be"):
@@ -276,14 +276,14 @@ def test_a_terminal_condition_that_makes_no_sense_is_refused():
 
 
 @pytest.mark.parametrize(("solver", "count"), [("sqp", 40), ("ipopt", 5)])
-def test_symmetric_meetings_are_passed_on_the_chosen_side_or_where_there_is_room(solver, count):
+def test_symmetric_meetings_are_passed_on_the_chosen_side_or_on_the_free_one(solver, count):
     for scenario, place in islice(meetings(seed=5), count):
         log = szlib.simulate(scenario, controller_of(solver, scenario.walls))
         assert log.success, (place, scenario)
         assert log.metrics()["passing_side"] == ("left" if place == "wall" else "right"), (place, scenario)
 
 
-def test_a_symmetric_meeting_is_the_same_every_time():
+def test_a_symmetric_meeting_is_reproducible():
     scenario, _ = next(meetings(seed=6))
     first, again = (szlib.simulate(scenario, controller_of("sqp", scenario.walls)) for _ in range(2))
     assert np.array_equal(first.predicted, again.predicted)

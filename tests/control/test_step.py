@@ -30,7 +30,7 @@ def controller_of(solver="sqp", walls=(), **settings):
 # clearance, and what "safe" covers
 
 
-def test_clearance_is_that_of_the_disc_and_the_bodies_by_independent_geometry():
+def test_clearance_equals_the_gap_that_shapely_computes():
     for question in islice(questions(seed=21), 40):
         step = question.ask(szlib.MPCSettings())
         for k, (x, y) in enumerate(step.predicted[:, :2]):
@@ -47,7 +47,7 @@ def end_of_wall(margin):
     return drive(scenario, controller_of(walls=wall, margin=margin, gamma=0.5, N_h=8), until_arrival=False)
 
 
-def test_the_euclidean_margin_keeps_the_disc_off_the_end_of_a_short_wall_and_the_papers_does_not():
+def test_only_the_euclidean_margin_keeps_the_disc_off_the_end_of_a_short_wall():
     careful, paper = end_of_wall("euclidean"), end_of_wall("paper")
     assert careful.clearance.min() >= -1e-6
     assert careful.h.min() >= -1e-6
@@ -89,7 +89,7 @@ def test_the_margin_of_a_wall_is_what_it_requires_and_never_less_than_eps(length
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_goal_on_which_somebody_stands_is_said_and_not_raised(solver):
+def test_a_goal_where_a_person_stands_sets_goal_blocked_and_raises_nothing(solver):
     controller = controller_of(solver)
     assert not controller.step((-3, 0.5, 0.8, 0), GOAL, [FACING]).goal_blocked
     step = controller.step((-2.92, 0.5, 0.8, 0), (0.3, 0.2), [FACING])
@@ -137,7 +137,7 @@ def test_a_robot_on_the_focus_of_a_zone_to_the_last_digit_gets_a_control():
     assert np.isfinite(step.control).all() and not step.safe
 
 
-def test_a_zone_beyond_all_measure_is_refused():
+def test_a_zone_that_is_too_large_raises_an_error():
     huge = szlib.Ellipse((0.0, 0.0), (1e155, 1.0))
     with pytest.raises(szlib.ZoneError, match="within 1e\\+08 m of its person"):
         szlib.MPCCBF(huge)
@@ -189,7 +189,7 @@ def test_one_controller_a_thread_gives_the_same_answers_as_one_after_another(sol
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_controller_shared_by_threads_says_no(solver):
+def test_a_controller_used_in_a_second_thread_raises_an_error(solver):
     def ask(controller):
         try:
             return controller.step((-4, 0, 0, 0), GOAL).status
@@ -205,7 +205,7 @@ def test_a_controller_shared_by_threads_says_no(solver):
         assert ask(mine) == other.submit(ask, theirs).result() == "optimal"
 
 
-def test_solvers_are_lent_and_come_back():
+def test_ipopt_solvers_of_a_deleted_controller_are_used_again():
     settings = szlib.MPCSettings(solver="ipopt", max_iterations=98)
     one, two = (szlib.MPCCBF(ZONE, settings=settings, max_people=0) for _ in range(2))
     first = one._pool.get(0, 0)._hard
@@ -226,7 +226,7 @@ def ticking(monkeypatch, seconds):
 
 @pytest.mark.parametrize("terminal", ["none", "rest"])
 @pytest.mark.parametrize("tick", [1e-4, 3e-3, 0.02, 1.0])
-def test_a_step_whose_time_is_up_takes_the_next_rung_and_says_so(monkeypatch, tick, terminal):
+def test_a_step_out_of_time_uses_the_next_fallback_and_reports_it(monkeypatch, tick, terminal):
     for question in islice(questions(seed=22), 15):
         s = szlib.MPCSettings(terminal=terminal)
         controller = szlib.MPCCBF(ZONE, walls=question.walls, settings=s, max_people=3)
@@ -243,7 +243,7 @@ def test_a_step_whose_time_is_up_takes_the_next_rung_and_says_so(monkeypatch, ti
             assert step.control == pytest.approx(unhurried.control, abs=1e-9)
 
 
-def test_a_plan_cut_short_is_taken_only_if_it_violates_no_more_than_braking(monkeypatch):
+def test_an_unfinished_plan_is_used_only_if_it_violates_no_more_than_braking(monkeypatch):
     for question in islice(questions(seed=23), 20):
         controller = szlib.MPCCBF(ZONE, walls=question.walls, max_people=3)
         with monkeypatch.context() as clock:

@@ -23,7 +23,7 @@ def controller_of(solver="sqp", walls=(), **settings):
     return szlib.MPCCBF(ZONE, walls=walls, settings=szlib.MPCSettings(solver=solver, **settings))
 
 
-def test_the_report_uses_nothing_of_what_it_checks():
+def test_the_report_imports_no_formula_of_the_controller():
     source = Path(report.__file__).read_text(encoding="utf-8")
     taken = {
         alias.name
@@ -36,7 +36,7 @@ def test_the_report_uses_nothing_of_what_it_checks():
 
 @pytest.mark.parametrize("formulation", ({}, {"N_h": 8}, {"terminal": "rest"}, {"margin": "paper"}), ids=str)
 @pytest.mark.parametrize(("solver", "count"), [("sqp", 60), ("ipopt", 15)])
-def test_steps_are_as_they_say(solver, count, formulation):
+def test_every_claim_of_a_step_is_verified(solver, count, formulation):
     for question in islice(questions(seed=41), count):
         step = question.ask(szlib.MPCSettings(solver=solver, **formulation))
         found = step.verify()
@@ -47,7 +47,7 @@ def test_steps_are_as_they_say(solver, count, formulation):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_steps_from_where_nobody_should_be_are_as_they_say(solver):
+def test_every_claim_of_a_step_from_an_unsafe_state_is_verified(solver):
     s = szlib.MPCSettings(solver=solver, N_h=8, gamma=0.5)
     for state, goal, people, walls in islice(cruel_states(6), 25 if solver == "sqp" else 8):
         step = szlib.MPCCBF(ZONE, walls=walls, settings=s, max_people=5).step(state, goal, people)
@@ -89,7 +89,7 @@ LIES = {
 
 
 @pytest.mark.parametrize("lie", LIES)
-def test_a_step_that_says_what_is_not_so_is_found_out(lie):
+def test_a_false_claim_of_a_step_is_reported_as_a_fault(lie):
     step = controller_of(walls=[[(-6, 2.0), (6, 2.0)]]).step((-4, 0, 0.3, 0), GOAL, [FACING])
     assert step.verify().ok
     found = LIES[lie](step).verify()
@@ -97,7 +97,7 @@ def test_a_step_that_says_what_is_not_so_is_found_out(lie):
     assert "WRONG" in LIES[lie](step).explain()
 
 
-def test_a_plan_beyond_its_bounds_or_falsely_feasible_is_found_out():
+def test_a_plan_out_of_bounds_or_falsely_feasible_is_reported_as_a_fault():
     step = controller_of().step((-4, 0, 0.3, 0), GOAL, [FACING])
     plan = step.predicted.copy()
     plan[1:, :2] += 0.5 * 0.1**2 * 3.0
@@ -122,7 +122,7 @@ def test_a_plan_beyond_its_bounds_or_falsely_feasible_is_found_out():
         ((-1.0, 0, 0, 0), {}, [FACING], ("person", 0), "already too close"),
     ],
 )
-def test_the_row_that_is_the_cause_is_named_and_what_helps(state, settings, people, worst, words):
+def test_explain_names_the_violated_row_and_what_helps(state, settings, people, worst, words):
     step = controller_of(walls=[[(-12, 2.2), (6, 2.2)]], **settings).step(state, GOAL, people)
     assert not step.feasible
     assert step.verify().worst[: len(worst)] == worst
@@ -130,7 +130,7 @@ def test_the_row_that_is_the_cause_is_named_and_what_helps(state, settings, peop
     assert re.search(words, step.explain(), re.DOTALL), step.explain()
 
 
-def test_a_step_says_in_words_what_happened():
+def test_explain_describes_the_step_in_sentences():
     controller = controller_of()
     step = controller.step((-4, 0, 0, 0), GOAL, [[0, 0, 0.1, 0], [np.nan] * 4], ids=["ann", "bob"])
     said = step.explain()

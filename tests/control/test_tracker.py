@@ -1,4 +1,4 @@
-"""People in a real loop: headings by id, time stamps, who is not seen any more, numbers that are none."""
+"""People as a sensor measures them: headings by id, time stamps, hidden people, unusable numbers."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def headings(seen):
     return [person.heading for person in seen.people]
 
 
-# a zone around somebody of whom nobody knows where they face
+# the zone of a person whose heading is unknown
 
 
 def test_the_circle_contains_the_zone_in_every_heading_and_touches_it():
@@ -37,7 +37,7 @@ def test_the_circle_contains_the_zone_in_every_heading_and_touches_it():
     assert circle_around(circle).semi_axes == pytest.approx(circle.semi_axes)
 
 
-def test_who_stands_and_whose_heading_nobody_knows_is_kept_out_of_by_the_circle():
+def test_a_person_with_unknown_heading_gets_the_circle():
     unknown, controller = szlib.Person((0.0, 0.0)), controller_of()
     assert unknown.heading is None and unknown.stands and unknown.after(1.0) == unknown
     zone = controller.zone_of(unknown)
@@ -55,7 +55,7 @@ def test_who_stands_and_whose_heading_nobody_knows_is_kept_out_of_by_the_circle(
 # headings by id
 
 
-def test_noise_does_not_turn_the_zone_of_somebody_who_stands():
+def test_noise_does_not_turn_the_zone_of_a_standing_person():
     rng, tracker = np.random.default_rng(1), szlib.Tracker()
     walked = tracker.see([[-1.0, 0.0, 0.3, 0.4], [2.0, 2.0, 0.0, 0.0]], ids=["a", "b"], now=0.0)
     assert headings(walked) == [pytest.approx(np.arctan2(0.4, 0.3)), None]
@@ -67,7 +67,7 @@ def test_noise_does_not_turn_the_zone_of_somebody_who_stands():
         assert headings(tracker.see(noisy, now=0.1 * k))[:2] == [None, None], "nobody knows them without ids"
 
 
-def test_the_heading_is_that_of_the_walk_and_a_given_one_is_kept():
+def test_the_heading_is_the_direction_of_walking_unless_it_is_given():
     for angle in np.linspace(-3, 3, 13):
         tracker = szlib.Tracker()
         step = 0.2 * np.array([np.cos(angle), np.sin(angle)])
@@ -75,14 +75,14 @@ def test_the_heading_is_that_of_the_walk_and_a_given_one_is_kept():
         assert person.heading == pytest.approx(angle)
         assert headings(tracker.see([[0, 0, *(0.99 * step)]], ids=[7], now=0.0)) == [person.heading]
         assert headings(tracker.see([szlib.Person((0, 0), id=7)], now=0.0)) == [person.heading]
-        told = szlib.Person((0, 0), (1.0, 0.0), heading=2.0, id=8)
-        assert tracker.see([told], now=0.0).people[0] == told
+        turned = szlib.Person((0, 0), (1.0, 0.0), heading=2.0, id=8)
+        assert tracker.see([turned], now=0.0).people[0] == turned
         facing = szlib.Person((0, 0), heading=0.0, id=9)
         assert tracker.see([facing], now=0.0).people[0] == facing
     assert headings(tracker.see([[0, 0, 0, 0]], ids=[7], now=9.0)) == [None], "forgotten meanwhile"
 
 
-def test_persons_without_id_are_taken_at_their_word():
+def test_persons_without_id_are_used_unchanged():
     people = (szlib.Person((0, 0), (0.01, 0.02)), szlib.Person((1, 1), heading=1.0))
     assert szlib.Tracker().see(people, now=3.0) == (people, 0, 0)
 
@@ -90,7 +90,7 @@ def test_persons_without_id_are_taken_at_their_word():
 # time
 
 
-def test_people_are_brought_forward_to_now():
+def test_people_are_moved_forward_to_now():
     rng, tracker = np.random.default_rng(2), szlib.Tracker()
     rows, stamps = rng.uniform(-2, 2, (5, 4)), rng.uniform(1.7e9 - 0.5, 1.7e9, 5)
     seen = tracker.see(rows, ids=range(5), stamps=stamps, now=1.7e9)
@@ -101,7 +101,7 @@ def test_people_are_brought_forward_to_now():
     assert alone.people[0].position == (1.0, 0.5)
 
 
-def test_who_is_not_seen_any_more_is_kept_for_a_while_at_constant_velocity():
+def test_people_not_seen_any_more_are_remembered_at_constant_velocity():
     tracker = szlib.Tracker(memory=0.5)
     tracker.see([[0, 0, 1.0, 0], [5, 5, 0, 0.5]], ids=["a", "b"], now=0.0)
     for k in range(1, 6):
@@ -114,13 +114,13 @@ def test_who_is_not_seen_any_more_is_kept_for_a_while_at_constant_velocity():
     assert tracker.see(now=0.6).people == ()
 
 
-def test_a_clock_that_is_set_back_forgets():
+def test_people_are_forgotten_when_the_clock_is_set_back():
     tracker = szlib.Tracker()
     tracker.see([[0, 0, 1.0, 0]], ids=[1], now=1000.0)
     assert tracker.see(now=0.0).people == ()
 
 
-def test_a_controller_counts_its_own_steps_where_it_is_given_no_time():
+def test_without_a_time_each_step_is_dt_after_the_last():
     controller = controller_of(tracker=szlib.Tracker(memory=0.25))
     controller.step((-3, 0, 0, 0), GOAL, [[0, 1, 0.5, 0]], ids=["a"])
     there = [controller.step((-3, 0, 0, 0), GOAL).scene.people for _ in range(3)]
@@ -137,7 +137,7 @@ BAD = [np.nan, np.inf, -np.inf, 1e300]
 
 
 @pytest.mark.parametrize("bad", BAD)
-def test_known_people_with_bad_numbers_go_on_and_are_counted(bad):
+def test_known_people_with_bad_numbers_are_moved_forward_and_counted(bad):
     tracker = szlib.Tracker()
     tracker.see([[0, 0, 1.0, 0]], ids=["a"], now=0.0)
     for column in (0, 1):
@@ -157,7 +157,7 @@ def test_known_people_with_bad_numbers_go_on_and_are_counted(bad):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("bad", BAD)
-def test_a_robot_that_does_not_know_where_somebody_is_comes_to_rest_and_says_so(solver, bad):
+def test_the_robot_brakes_if_the_position_of_a_person_is_unknown(solver, bad):
     controller, dt = controller_of(solver), 0.1
     state = np.array([-4.0, 1.4, 0.9, 0.3])
     assert controller.step(state, GOAL, [[0, 0, 0, 0]]).safe
@@ -171,7 +171,7 @@ def test_a_robot_that_does_not_know_where_somebody_is_comes_to_rest_and_says_so(
     assert controller.step(state, GOAL, [[0, 0, 0, 0]]).safe
 
 
-def test_somebody_with_a_place_and_no_velocity_is_kept_out_of_and_counts_as_lost():
+def test_a_person_without_usable_velocity_keeps_a_zone_and_counts_as_unknown():
     step = controller_of().step((-3, 0, 0.5, 0), GOAL, [[0, 0, np.nan, np.nan]], ids=["new"])
     assert (step.rejected, step.unknown) == (1, 1) and not step.safe
     assert step.h == pytest.approx(controller_of().barriers((-3, 0), [szlib.Person((0, 0))]))
@@ -190,7 +190,7 @@ def test_somebody_with_a_place_and_no_velocity_is_kept_out_of_and_counts_as_lost
         ([[0, 0, 0, 0]], {"now": np.nan}, "now must be a finite time"),
     ],
 )
-def test_errors_of_a_program_are_refused(people, more, message):
+def test_arguments_of_the_wrong_shape_raise_an_error(people, more, message):
     with pytest.raises(szlib.SolverError, match=message):
         controller_of().step((-4, 0, 0, 0), GOAL, people, **more)
 
@@ -207,7 +207,7 @@ def test_tracker_parameters_must_be_finite_and_not_negative(name, value):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("side", ["right", "left"])
-def test_head_on_with_arrays(solver, side):
+def test_head_on_rule_holds_for_people_given_as_arrays(solver, side):
     controller = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver, pass_side=side))
     by_persons = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver, pass_side=side))
     state, person = np.array([-4.0, 0.0, 0.0, 0.0]), np.array([2.0, 0.0, -0.5, 0.0])
@@ -225,7 +225,7 @@ def test_head_on_with_arrays(solver, side):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_noisy_array_head_on_is_passed(solver):
+def test_a_person_met_head_on_is_passed_despite_noise(solver):
     rng, controller = np.random.default_rng(4), controller_of(solver)
     state, person = np.array([-4.0, 0.0, 0.0, 0.0]), np.array([2.0, 0.0, -0.5, 0.0])
     for k in range(300):
@@ -241,7 +241,7 @@ def test_a_noisy_array_head_on_is_passed(solver):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_goal_at_a_wall_is_refused_before_the_first_step_and_a_status_after_it(solver):
+def test_a_goal_at_a_wall_raises_at_the_first_step_and_sets_goal_blocked_later(solver):
     walls, behind = [[(-6, 3), (6, 3)]], (3.0, 2.9)
     settings = szlib.MPCSettings(solver=solver)
     controller = szlib.MPCCBF(ZONE, walls=walls, settings=settings)
@@ -258,7 +258,7 @@ def test_a_goal_at_a_wall_is_refused_before_the_first_step_and_a_status_after_it
     assert 0 <= step.h[0] < 0.15
 
 
-def test_somebody_who_stands_on_the_goal_blocks_it_whatever_the_noise():
+def test_a_person_standing_on_the_goal_blocks_it_despite_noise():
     rng, controller = np.random.default_rng(5), controller_of()
     assert all(
         controller.step((-3, 0, 0, 0), GOAL, [np.r_[GOAL, rng.normal(0, 0.02, 2)]]).goal_blocked

@@ -10,10 +10,11 @@ with the exact Hessian H of the Lagrangian where it is positive definite; else w
 of the barriers (Gauss-Newton). Rows are soft, by an exact penalty, so that every program has a
 solution. A step has to lower cost + price * violation, with a price just above the largest multiplier so
 far. Near the solution a full step may miss that and still be good, so up to `RISES` in a row are taken all
-the same (a watchdog: R. Chamberlain et al., Math. Programming Study 16, 1982). After that, back where they
-began, a step is corrected to second order, then shortened. Where no row has a multiplier, the program's cost
-is exact, and the first solution that satisfies the true rows is the answer. Where not even a bound is met,
-the answer is a linear feedback of the error, K (x - g), without any program.
+the same (a watchdog: R. Chamberlain et al., Math. Programming Study 16, 1982). If the merit is still not
+lower, the solver returns to where they began, corrects the step to second order, and then shortens it. If no
+row has a multiplier, the program's cost is exact, and the first solution that satisfies the true rows is the
+answer. If no bound is active either, the answer is a linear feedback of the error, K (x - g), without any
+program.
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ from .sqp_functions import SqpFunctions, build_sqp_functions
 
 Outcome = Literal["converged", "stalled", "timed out", "failed"]
 CONVERGED = {True: 1e-2, False: 1e-5}
-"""The last step of the SQP moves no input by more than this [m/s2]: with the exact Hessian, when the
-error is of the order of its square, and without."""
+"""The SQP has converged if its last step moves no input by more than this [m/s2]: with the exact Hessian,
+when the error is of the order of its square, and without."""
 VIOLATED = 1e-8
-"""Nor does it leave the rows violated by more than this in sum, unless all of it is slack; an input that
-violates a row by so much is 2 / dt^2 times as much off, 2e-6 m/s2."""
+"""The rows are satisfied if their violations sum up to no more than this. The error of an input is up to
+2 / dt^2 times as large, 2e-6 m/s2."""
 PRICE = 1.1
 """Price of violation in the merit, as a multiple of the largest multiplier: exact above 1."""
 SHORTEST = 1e-3
@@ -46,7 +47,7 @@ RISES = 2
 """Full steps in a row that need not lower the merit."""
 _HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
 _DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3}
-"""Convex programs as they stand; next to the exact penalty, a quadratic one too small to matter."""
+"""No regularisation of convex programs; beside the exact penalty, a negligible quadratic one."""
 
 
 class Sqp(ProblemSolver):
@@ -62,15 +63,17 @@ class Sqp(ProblemSolver):
         with CASADI_LOCK:
             self._allocate(build_sqp_functions(settings, n_people, n_walls))
 
-    def _allocate(self, of: SqpFunctions) -> None:
+    def _allocate(self, functions: SqpFunctions) -> None:
         """Memory for the functions and for the program."""
-        n, m, n_rows = of.derive.nnz_in(0), of.derive.nnz_in(2), self.evaluate.n_rows
+        derive, n_rows = functions.derive, self.evaluate.n_rows
+        n, m = derive.nnz_in(0), derive.nnz_in(2)
         self._inputs, self._step, self._share = np.zeros(n), np.zeros(n), np.ones(1)
-        self._parameters, self._multipliers = np.zeros(of.derive.nnz_in(1)), np.zeros(m)
+        self._parameters, self._multipliers = np.zeros(derive.nnz_in(1)), np.zeros(m)
         arguments = self._inputs, self._parameters, self._multipliers
-        self._derive = BufferedFunction(of.derive, *arguments)
-        self._measure = BufferedFunction(of.measure, *arguments, self._step, self._share)
-        self._free = None if of.free is None else BufferedFunction(of.free, self._parameters)
+        self._derive = BufferedFunction(derive, *arguments)
+        self._measure = BufferedFunction(functions.measure, *arguments, self._step, self._share)
+        free = functions.free
+        self._free = None if free is None else BufferedFunction(free, self._parameters)
         self._before, self._lower, self._upper, gradient, jacobian, exact, gauss = self._derive.results
         self._after, self._trial, self._values, states, h = self._measure.results
         self._jacobian = jacobian.reshape(m, n)
@@ -78,7 +81,7 @@ class Sqp(ProblemSolver):
         self._gauss_newton = (gauss.reshape(n, n), *self._program[1:])
         self._sense = np.repeat(np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows])
         self._measured = (self._trial, *self.evaluate.shaped(self._values, states, h))
-        self._is_held, self._model = False, daqp.Model()
+        self._has_multipliers, self._model = False, daqp.Model()
         self._model.settings = _DAQP
         self._model.setup(np.eye(n), *self._program[1:], self._sense)
         weights = np.full(n + m, self.settings.slack_weight)
@@ -91,12 +94,12 @@ class Sqp(ProblemSolver):
 
     @remembered.setter
     def remembered(self, multipliers: Array) -> None:
-        """Go on from these."""
-        self._multipliers[:], self._is_held = multipliers, bool(multipliers.any())
+        """Continue from these multipliers."""
+        self._multipliers[:], self._has_multipliers = multipliers, bool(multipliers.any())
 
     def reset(self) -> None:
         """Forget every multiplier and active row."""
-        self._multipliers[:], self._is_held = 0, False
+        self._multipliers[:], self._has_multipliers = 0, False
         self._model.update(sense=self._sense)
 
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
@@ -110,11 +113,11 @@ class Sqp(ProblemSolver):
         return self._plan(), outcome in ("converged", "stalled")
 
     def _solve(self, guess: Array, parameters: Array, share: float) -> Outcome:
-        """Leave the plan in `_trial`, and what was measured of it in the buffers beside that."""
+        """Solve; the plan is then in `_trial`, and its measures are in the buffers of `measure`."""
         self._parameters[:] = parameters
         outcome: Outcome = "converged"
-        # A robot that was held by a row nearly always still is; then the quadratic program finds out.
-        if self._is_held or not self._is_free():
+        # If a row had a multiplier in the last step, it nearly always has one now.
+        if self._has_multipliers or not self._is_free():
             self._inputs[:] = guess
             outcome = self._iterate(share)
             if outcome == "failed":
@@ -130,20 +133,20 @@ class Sqp(ProblemSolver):
         return PlanEvaluation(cost, slack, *[array.copy() for array in self._measured])
 
     def _is_free(self) -> bool:
-        """True if the minimum of the cost alone satisfies everything; then it is the plan."""
+        """True if the minimum of the cost alone satisfies all bounds and rows; then it is the plan."""
         if self._free is None:
             return False
         self._free.call()
-        least, violation = self._free.results
+        inputs, violation = self._free.results
         if violation[0] != 0:
             return False
-        self._inputs[:] = least
+        self._inputs[:] = inputs
         self._measure_inputs()
         return True
 
     def _iterate(self, share: float) -> Outcome:
         """Improve `_inputs`, within this share of the budget; no price goes above the weight of slack."""
-        price, rises, least, limit = 0.0, 0, (0.0, 0.0), self.settings.slack_weight
+        price, rises, best, limit = 0.0, 0, (0.0, 0.0), self.settings.slack_weight
         for _ in range(self.settings.max_iterations):
             if self.budget.is_spent(share):
                 return "timed out"
@@ -154,19 +157,19 @@ class Sqp(ProblemSolver):
             self._step[:], self._multipliers[:] = step, info["lam"][step.size :]
             self._share[0] = 1.0
             self._measure.call()
-            cost, violation, _, _, size, steepest, on_rows = self._after.tolist()
-            self._is_held = steepest > 0
-            price = max(price, min(PRICE * steepest, limit))
+            cost, violation, _, _, size, largest_multiplier, on_rows = self._after.tolist()
+            self._has_multipliers = largest_multiplier > 0
+            price = max(price, min(PRICE * largest_multiplier, limit))
             cost_before, violation_before, on_rows_before, on_speed = self._before.tolist()
             curved = on_rows_before if exact else on_speed
             if rises == 0:
-                least = cost_before, violation_before
-            before, after = least[0] + price * least[1], cost + price * violation
+                best = cost_before, violation_before
+            before, after = best[0] + price * best[1], cost + price * violation
             if isnan(before):
                 return "failed"
-            settled = violation <= VIOLATED or steepest >= limit
-            solved = curved == on_rows == violation == 0 or (size <= CONVERGED[exact] and settled)
-            if solved or after <= before * (1 + ROUNDING):
+            is_satisfied = violation <= VIOLATED or largest_multiplier >= limit
+            has_converged = curved == on_rows == violation == 0 or (size <= CONVERGED[exact] and is_satisfied)
+            if has_converged or after <= before * (1 + ROUNDING):
                 rises = 0
             elif rises < RISES:
                 if rises == 0:
@@ -181,7 +184,7 @@ class Sqp(ProblemSolver):
             else:
                 self._measure_inputs()
                 return "converged" if size <= CONVERGED[False] else "stalled"
-            if solved:
+            if has_converged:
                 return "converged"
             self._inputs[:] = self._trial
         return "failed"

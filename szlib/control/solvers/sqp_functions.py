@@ -30,13 +30,13 @@ class SqpFunctions(NamedTuple):
     Attributes
     ----------
     derive : (inputs, parameters, multipliers) -> (scaled cost, violation, largest multiplier of a row, of a
-        speed row), lower and upper bounds, gradient, Jacobian, Hessian of the Lagrangian, and the same
+        speed row), lower and upper bounds, gradient, Jacobian, Hessian of the Lagrangian, and that Hessian
         without the curvature of the barriers.
     measure : (inputs, parameters, multipliers, step, share) -> (scaled cost, violation, cost, slack, largest
-        element of the step, largest multiplier, largest of a row) there, the inputs there, the values of
-        rows and terminal condition there, the states and h.
-    free : parameters -> the inputs of least cost alone, and by how much they violate bounds and rows in sum;
-        None if there is a terminal condition.
+        element of the step, largest multiplier, largest of a row), inputs, values of the rows and of the
+        terminal condition, states and h, all after this share of the step.
+    free : parameters -> the inputs of smallest cost without any row or bound, and the sum of their
+        violations; None if there is a terminal condition.
     """
 
     derive: Any
@@ -83,49 +83,52 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
         return SqpFunctions(derive, measure, None)
     given = p.parameters[:6]
     to_inputs, to_given = (ca.evalf(ca.jacobian(gradient, by)) for by in (u, given))
-    least = -ca.solve(to_inputs, to_given) @ given
-    beyond = ca.sum1(ca.fmax(0, ca.fabs(least) - s.a_max))
-    free = dense_function("unbound", [p.parameters], [least, beyond + there(least, p.parameters)[1]])
-    return SqpFunctions(derive, measure, free)
+    free = -ca.solve(to_inputs, to_given) @ given
+    beyond = ca.sum1(ca.fmax(0, ca.fabs(free) - s.a_max))
+    free_plan = dense_function("unbound", [p.parameters], [free, beyond + there(free, p.parameters)[1]])
+    return SqpFunctions(derive, measure, free_plan)
 
 
 def _jacobian(p: Problem, s: MPCSettings, to_position: Any, to_velocity: Any) -> Any:
-    """Of rows and terminal condition by the inputs, shape (rows, 2N)."""
+    """Jacobian of the rows and the terminal condition by the inputs, shape (rows, 2N)."""
     maps, n = [ca.sparsify(ca.DM(row[None])) for row in to_position], p.h.shape[0]
     by_axis = []
-    for of in p.slope:
-        slopes = ca.horzsplit(of)
+    for slope in p.slope:
+        slopes = ca.horzsplit(slope)
         ends = [cbf_residual(slopes[k + 1] @ maps[k + 1], slopes[k] @ maps[k], s.gamma) for k in range(s.N_h)]
         by_axis.append(ca.vertcat(*ends))
     rows = np.arange(s.N_h * n).reshape(s.N_h, n).T.ravel()
     columns = np.arange(2 * s.N).reshape(2, s.N).T.ravel()
     velocities = ca.diagcat(*(-2 * p.states[2:, k].T for k in range(1, s.N + 1)))
-    blocks = [ca.horzcat(*by_axis)[rows.tolist(), columns.tolist()], ca.cse(velocities @ _both(to_velocity))]
+    blocks = [
+        ca.horzcat(*by_axis)[rows.tolist(), columns.tolist()],
+        ca.cse(velocities @ _for_x_and_y(to_velocity)),
+    ]
     if p.terminal.numel():
-        blocks.append(_both(to_velocity[-1:]))
+        blocks.append(_for_x_and_y(to_velocity[-1:]))
     return ca.vertcat(*blocks)
 
 
 def _hessians(p: Problem, s: MPCSettings, multipliers: Any, to_position: Any) -> tuple[Any, Any]:
-    """Of multipliers' rows by the inputs: what comes from the speed limits, and from the barriers."""
+    """Hessians by the inputs of the speed rows and of the barrier rows, each weighted by its multipliers."""
     # V_k' V_k is dt^2 for any two inputs before k: the later of the two says which rows have both.
     later = np.maximum.outer(range(s.N), range(s.N)).ravel(order="F")
     on_speed = multipliers[p.n_cbf : p.n_cbf + s.N]
     after = ca.DM(np.triu(np.ones((s.N, s.N)))) @ on_speed
     of_speed = ca.kron(ca.reshape((-2 * s.dt**2 * after)[later.tolist()], s.N, s.N), ca.DM.eye(2))
-    weights = (_change(s).T @ ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0])).T
+    weights = (_residual_matrix(s).T @ ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0])).T
     xx, xy, yy = (ca.sum1(weights * bend) for bend in p.bend)
     bends = [ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h + 1)]
-    to_xy = _both(to_position)
+    to_xy = _for_x_and_y(to_position)
     return of_speed, to_xy.T @ ca.diagcat(*bends) @ to_xy
 
 
-def _change(s: MPCSettings) -> Any:
+def _residual_matrix(s: MPCSettings) -> Any:
     """The matrix that takes h_0 .. h_{N_h} to the rows h_{k+1} - (1 - gamma) h_k."""
     rows = np.eye(s.N_h, s.N_h + 1, 1) - (1 - s.gamma) * np.eye(s.N_h, s.N_h + 1)
     return ca.sparsify(ca.DM(rows))
 
 
-def _both(of_one: Any) -> Any:
-    """The same linear map for x and for y, in turn."""
-    return ca.kron(ca.sparsify(ca.DM(of_one)), ca.DM.eye(2))
+def _for_x_and_y(one: Any) -> Any:
+    """The linear map `one` of an axis, for x and y in turn."""
+    return ca.kron(ca.sparsify(ca.DM(one)), ca.DM.eye(2))
