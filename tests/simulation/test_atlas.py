@@ -14,7 +14,7 @@ from szlib.simulation.strategies import MIN_RETREAT, STRATEGIES, classify_strate
 
 
 def made(x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: object) -> SimulationLog:
-    """A run along x, beside somebody who stands at the origin, made by hand."""
+    """A run along x, beside a person who stands at the origin, made by hand."""
     n, s = len(x), szlib.MPCSettings()
     scene = replace(szlib.SCENARIOS["passing"], start=np.array([x[0], y, 0.0, 0.0]), goal=np.array([4.0, y]))
     states = np.column_stack([x, np.full(n, y), np.gradient(x, s.dt), np.zeros(n)])
@@ -59,7 +59,7 @@ def test_every_strategy_has_a_run() -> None:
     assert set(RUNS) == set(STRATEGIES)
 
 
-def test_the_worst_strategy_has_precedence() -> None:
+def test_the_worst_strategy_is_reported() -> None:
     both = replace(RUNS["infeasible"], arrival=None)
     assert classify_strategy(both) == "infeasible"
     assert classify_strategy(replace(RUNS["backs out"], arrival=None)) == "deadlock"
@@ -84,7 +84,7 @@ def test_a_cell_of_the_paper_is_the_scenario_of_the_paper(scene: str) -> None:
     assert same.people == own.people
 
 
-def test_a_width_moves_the_walls_of_a_pathway_and_keeps_its_mouth_closed() -> None:
+def test_width_moves_the_walls_of_a_pathway_without_gaps() -> None:
     walls = AtlasCell("waiting", width=3.0).scenario().walls
     assert np.array_equal(np.unique(np.abs(walls[:2, :, 1])), [1.5])
     assert np.array_equal(np.sort(np.abs(walls[2:, :, 1]), axis=1), [[1.5, 4.0]] * 2)
@@ -109,7 +109,7 @@ def test_invalid_cells_are_rejected(wrong: dict[str, object]) -> None:
         AtlasCell(**wrong)  # type: ignore[arg-type]
 
 
-def test_a_run_can_be_asked_again_at_any_of_its_times() -> None:
+def test_the_controller_decides_again_at_each_time_of_a_run() -> None:
     log = AtlasCell("corridor", size=0.5).run(REFERENCE)
     controller = szlib.MPCCBF(log.zones[0], walls=log.scenario.walls)
     for time in (0.0, 3.0):

@@ -46,7 +46,7 @@ def person(x, y, velocity=(0.0, 0.0), zone=None):
 
 
 def visitor(t, _):
-    """A person who stands beside the way, from 2 s to 4 s only, and somebody who never comes."""
+    """A person who stands beside the way, from 2 s to 4 s only, and a person who never comes."""
     return (person(-1.0, 1.6) if 2 <= t < 4 else None, None)
 
 
@@ -67,7 +67,7 @@ def test_a_foreign_controller_drives_and_missing_reports_are_empty(tmp_path):
     assert "arrived" in repr(log)
 
 
-def test_a_controller_that_promises_nothing_breaks_no_promise_and_its_violations_count():
+def test_violations_count_for_a_controller_without_safety_claims():
     scenario = szlib.Scenario("blind", WALK.start, WALK.goal, (person(0.0, 0.0, zone=ZONE),))
     log = szlib.simulate(scenario, Straight())
     metrics = log.metrics()
@@ -88,7 +88,7 @@ def test_every_step_of_mpc_cbf_is_claimed_safe_or_flagged():
     assert metrics["violations"] == metrics["overlaps"] == 0
 
 
-def test_people_without_a_zone_have_the_controllers_or_their_body():
+def test_people_without_a_zone_get_that_of_the_controller_or_their_body():
     scenario = szlib.Scenario("met", WALK.start, WALK.goal, (person(0.0, 3.0), person(1.0, 3.0, zone=ZONE)))
     assert szlib.simulate(scenario, Straight()).zones == (BODY_ZONE, ZONE)
     other = szlib.Ellipse((0.0, 0.0), (0.5, 0.5))
@@ -162,7 +162,7 @@ def test_another_robot_is_logged_by_its_disc():
 
 
 @pytest.mark.parametrize("controller", [Straight(), szlib.MPCCBF(ZONE)])
-def test_people_are_there_only_while_they_are_there(controller):
+def test_absent_people_are_nan_in_the_log(controller):
     log = szlib.simulate(WALK, controller, crowd=visitor)
     there = (log.time >= 2) & (log.time < 4)
     assert log.people.shape == (len(log.states), 2, 5)
@@ -176,7 +176,7 @@ def test_people_are_there_only_while_they_are_there(controller):
     assert log.table["clearance"][0] == np.inf
 
 
-def test_the_controller_gets_those_who_are_there_with_the_zones_that_are_kept():
+def test_the_controller_gets_present_people_with_their_zones():
     controller = Straight()
     log = szlib.simulate(WALK, controller, crowd=visitor)
     there = (log.time >= 2) & (log.time < 4)
@@ -201,7 +201,7 @@ def test_an_absent_person_changes_nothing():
     pd.testing.assert_series_equal(ours, theirs)
 
 
-def test_who_appears_inside_ran_into_the_robot_and_the_way_is_told():
+def test_a_person_who_appears_in_the_robot_counts_as_run_into():
     def ghost(t, state):
         return [person(state[0] + 0.5, state[1]) if t >= 3 else None]
 
@@ -222,7 +222,7 @@ def test_a_crowd_sees_the_robot():
     assert (log.people[:, 0, 3] == 0.1).all()
 
 
-def test_who_comes_without_a_heading_is_kept_as_a_circle_and_who_loses_it_keeps_the_last():
+def test_people_without_a_heading_get_a_circle_or_keep_their_last_heading():
     def crowd(t, _):
         still, walked = (
             szlib.Person((0.0, 2.0)),
@@ -238,7 +238,7 @@ def test_who_comes_without_a_heading_is_kept_as_a_circle_and_who_loses_it_keeps_
     assert log.metrics()["violations"] == 0
 
 
-def test_a_log_of_visitors_comes_back_from_its_files(tmp_path):
+def test_a_log_with_absent_people_is_saved_and_loaded(tmp_path):
     log = szlib.simulate(WALK, szlib.MPCCBF(ZONE), crowd=visitor)
     log.save(tmp_path / "run")
     back = szlib.SimulationLog.load(tmp_path / "run")
@@ -292,7 +292,7 @@ def test_invalid_controllers_and_crowds_are_rejected(controller, crowd, message)
         szlib.simulate(WALK, controller, crowd=crowd, max_time=2.0)
 
 
-def test_a_loop_has_one_dt():
+def test_settings_with_another_dt_are_rejected():
     with pytest.raises(szlib.SolverError, match=r"every 0.1 s, the loop every 0.2 s"):
         drive(WALK, szlib.MPCCBF(ZONE), settings=szlib.MPCSettings(dt=0.2))
 
@@ -300,7 +300,7 @@ def test_a_loop_has_one_dt():
 # --- rollouts and comparisons ------------------------------------------------------------------------
 
 
-def test_rollouts_with_a_controller_of_ones_own():
+def test_rollouts_accepts_any_controller():
     rows = rollouts(3, worlds=ALONE, controller=straight, n_jobs=1, progress=False)
     assert rows["success"].all() and (rows["claimed_safe_steps"] == 0).all()
     slow = rollouts(3, worlds=ALONE, controller=partial(straight, pace=0.5), n_jobs=1, progress=False)
@@ -319,7 +319,7 @@ def test_any_function_of_the_seed_makes_worlds():
     assert rows["path_length"].to_numpy() == pytest.approx([1, 2, 3], abs=0.1)
 
 
-def test_the_controller_is_part_of_what_chunks_are_of(tmp_path):
+def test_stored_chunks_depend_on_the_controller(tmp_path):
     def run(controller):
         rollouts(1, worlds=ALONE, controller=controller, out=tmp_path, n_jobs=1, progress=False)
         return sum(path.is_dir() for path in tmp_path.iterdir())

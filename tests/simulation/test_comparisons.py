@@ -21,7 +21,7 @@ from szlib.simulation.monte_carlo import rerun_world
 FITTED = szlib.Ellipse((0.1, -0.02), (1.0, 0.7), 0.3)
 
 
-def test_zones():
+def test_zones_have_the_sizes_of_their_sources():
     zones = {name: zone(FITTED) for name, zone in ZONES.items()}
     assert zones["fitted"] == FITTED
     assert zones["equal circle"].area == pytest.approx(FITTED.area)
@@ -29,7 +29,7 @@ def test_zones():
     assert zones["none"].semi_axes == (0.25, 0.25)
 
 
-def test_kirbys_zone_is_enclosed_by_its_ellipse_and_not_by_a_smaller_one():
+def test_kirbys_ellipse_is_the_smallest_around_its_curve():
     curve = kirby_curve(np.linspace(-np.pi, np.pi, 2001), 0.5)
     reach = [curve[:, 0].max(), curve[:, 0].min(), curve[:, 1].max()]
     assert reach == pytest.approx([1.0, -0.5, 2 / 3], abs=1e-5)
@@ -41,7 +41,7 @@ def test_kirbys_zone_is_enclosed_by_its_ellipse_and_not_by_a_smaller_one():
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_nobody_begins_inside_any_zone(seed):
+def test_robots_start_outside_each_zone(seed):
     scenario = WORLDS(seed)
     for zone in ZONES.values():
         controller = szlib.MPCCBF(zone(scenario.people[0].zone), walls=scenario.walls)
@@ -49,7 +49,7 @@ def test_nobody_begins_inside_any_zone(seed):
         assert controller.barriers(scenario.start[:2], people).min() >= 0
 
 
-def test_time_inside_counts_the_worlds_own_zone_whatever_is_kept():
+def test_time_inside_is_measured_with_the_zones_of_the_world():
     log = rerun_world(0, worlds=WORLDS, zone_transform=ZONES["none"])
     inside = measure_time_inside(log)
     bodies = log.clearance[:, : len(log.scenario.people)]
@@ -95,7 +95,7 @@ def test_missing_values_are_left_out():
     assert found["n"].tolist() == [100, 100]
 
 
-def test_names():
+def test_unknown_names_are_rejected():
     assert list(FORMULATIONS) == ["paper", "whole horizon", "rest"]
     assert FORMULATIONS["whole horizon"].N_h == szlib.MPCSettings().N
     assert "as expected" in BEHAVIOURS

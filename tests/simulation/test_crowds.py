@@ -1,4 +1,4 @@
-"""Other people's crowds: who reacts comes to their goal, who is replayed is where they were."""
+"""Crowds: reacting people reach their goals, replayed people are where they were recorded."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TWO = (Person((-4.0, 0.0), (0.5, 0.0)), Person((4.0, 0.1), (-0.5, 0.0)))
 
 
 def walk(crowd: Crowd, robot: np.ndarray = FAR, seconds: float = 20.0) -> np.ndarray:
-    """x, y, vx, vy, heading of everybody every 0.1 s, shape (n, P, 5); a robot that moves drives on."""
+    """x, y, vx, vy, heading of each person every 0.1 s, shape (n, P, 5); a robot that moves drives on."""
     rows = []
     for k in range(round(seconds * 10) + 1):
         here = np.r_[robot[:2] + 0.1 * k * robot[2:], robot[2:]]
@@ -40,7 +40,7 @@ def gaps(paths: np.ndarray) -> np.ndarray:
     return np.hypot(*(paths[:, 0, :2] - paths[:, 1, :2]).T)
 
 
-def test_who_is_alone_walks_straight_to_their_goal_at_their_pace(model: str) -> None:
+def test_a_person_alone_walks_straight_to_the_goal_at_their_pace(model: str) -> None:
     path = walk(ReactingPeople(model, jitter=0).start(scene(TWO[0], duration=10.0), 0), seconds=10.0)[:, 0]
     assert path[0, :2] == pytest.approx((-4, 0))
     assert np.abs(path[:, 1]).max() < 1e-6
@@ -48,19 +48,19 @@ def test_who_is_alone_walks_straight_to_their_goal_at_their_pace(model: str) -> 
     assert abs(path[-1, 0] - 1.0) <= 0.61, "within the 0.5 m where PySocialForce stops, and a start from rest"
 
 
-def test_velocity_is_what_brought_people_here(model: str) -> None:
+def test_velocity_is_the_displacement_per_time_step(model: str) -> None:
     paths = walk(ReactingPeople(model).start(scene(*TWO), 3))
     assert np.diff(paths[:, :, :2], axis=0) == pytest.approx(0.1 * paths[1:, :, 2:4], abs=1e-6)
 
 
-def test_two_who_meet_head_on_pass_each_other(model: str) -> None:
+def test_two_people_who_meet_head_on_pass_each_other(model: str) -> None:
     head_on = (TWO[0], Person((4.0, 0.0), (-0.5, 0.0)))
     paths = walk(ReactingPeople(model).start(scene(*head_on), 1))
     assert paths[-1, 0, 0] > 3 and paths[-1, 1, 0] < -3
     assert gaps(paths).min() > 0.35
 
 
-def test_they_avoid_the_robot_that_they_see_and_not_the_one_that_they_do_not(model: str) -> None:
+def test_people_avoid_the_robot_only_if_they_see_it(model: str) -> None:
     alone = scene(Person((-4.0, 0.1), (0.5, 0.0)))
     robot = np.array([0.0, 0.0, 0.0, 0.0])
     nearest = {
@@ -74,21 +74,21 @@ def test_they_avoid_the_robot_that_they_see_and_not_the_one_that_they_do_not(mod
         assert nearest["robot"] > 0.5 + BODY_RADIUS - 0.11
 
 
-def test_nobody_walks_through_a_wall(model: str) -> None:
+def test_people_do_not_walk_through_walls(model: str) -> None:
     wall = [[(0.0, -1.0), (0.0, 1.5)]]
     paths = walk(ReactingPeople(model).start(scene(TWO[0], walls=wall), 2), seconds=40.0)[:, 0, :2]
     crossing = np.flatnonzero(np.diff(np.sign(paths[:, 0])) != 0)
     assert all(not -1.0 <= paths[k, 1] <= 1.5 for k in crossing)
 
 
-def test_who_stands_stays_and_keeps_their_heading(model: str) -> None:
+def test_standing_people_keep_position_and_heading(model: str) -> None:
     standing = Person((0.0, 3.0), heading=1.0)
     path = walk(ReactingPeople(model).start(scene(standing), 0))[:, 0]
     assert path[:, :2] == pytest.approx(np.tile((0.0, 3.0), (201, 1)), abs=1e-3)
     assert (path[:, 4] == 1.0).all()
 
 
-def test_goals_can_be_given(model: str) -> None:
+def test_people_walk_to_given_goals(model: str) -> None:
     crowd = ReactingPeople(model, goals=((3.0, 4.0),), jitter=0).start(
         scene(Person((0.0, 0.0), heading=0.0)), 0
     )
@@ -102,15 +102,15 @@ def test_the_same_seed_gives_the_same_people_and_another_seed_others(model: str)
     assert not np.allclose(first, other, atol=1e-4)
 
 
-def test_people_keep_their_zones_and_an_empty_place_stays_empty(model: str) -> None:
+def test_people_keep_their_zones_and_an_empty_crowd_stays_empty(model: str) -> None:
     zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
     crowd = ReactingPeople(model).start(scene(Person((0.0, 0.0), (0.5, 0.0), zone=zone)), 0)
     assert [crowd(t, FAR)[0].zone for t in (0.0, 0.1, 0.2)] == [zone] * 3
-    nobody = ReactingPeople(model).start(scene(), 0)
-    assert [len(nobody(t, FAR)) for t in (0.0, 0.1)] == [0, 0]
+    empty = ReactingPeople(model).start(scene(), 0)
+    assert [len(empty(t, FAR)) for t in (0.0, 0.1)] == [0, 0]
 
 
-def test_time_does_not_go_back(model: str) -> None:
+def test_decreasing_time_is_rejected(model: str) -> None:
     crowd = ReactingPeople(model).start(scene(*TWO), 0)
     crowd(0.5, FAR)
     assert crowd(0.5, FAR)[0] == crowd(0.5, FAR)[0]
@@ -119,7 +119,7 @@ def test_time_does_not_go_back(model: str) -> None:
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_a_missing_package_is_named_with_what_installs_it(
+def test_a_missing_package_is_named_with_its_install_command(
     model: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, PACKAGES[model], None)
@@ -138,12 +138,12 @@ def test_invalid_parameters_are_rejected() -> None:
         ReactingPeople("orca", goals=((0.0, 0.0),)).start(scene(*TWO), 0)
 
 
-def test_importing_the_social_force_leaves_no_file_and_no_logging_behind(tmp_path: Path) -> None:
+def test_social_force_leaves_no_file_and_restores_logging(tmp_path: Path) -> None:
     pytest.importorskip("numba")
     code = (
         "import logging, os, numba, szlib\n"
-        "from szlib.simulation.crowds.social_force import _import_pysocialforce\n"
-        "_import_pysocialforce()\n"
+        "from szlib.simulation.crowds import ReactingPeople\n"
+        "ReactingPeople('social force').start(szlib.SCENARIOS['corridor'], 0)\n"
         "root = logging.getLogger()\n"
         "print(root.level, root.handlers, os.listdir())\n"
         "print(numba.config.DISABLE_JIT, logging.FileHandler.__name__, logging.root.manager.disable)"
@@ -182,7 +182,7 @@ def replay_of(tracks: pd.DataFrame, person: int) -> Replay:
     return next(each for each in find_replays(tracks, 99) if each.walker.id == person)
 
 
-def test_the_robot_goes_where_the_walker_went_among_all_the_others() -> None:
+def test_a_replay_has_the_start_and_goal_of_the_walker_and_all_other_people() -> None:
     replay = replay_of(recording(), 1)
     assert replay.scenario.start == pytest.approx((0, 0, 0.99, 0)), "as fast as they were, or as it may be"
     assert replay.scenario.goal == pytest.approx((8, 0))
@@ -190,7 +190,7 @@ def test_the_robot_goes_where_the_walker_went_among_all_the_others() -> None:
     assert {other.id for other in replay.others} == {2, 3, 4, 5}
 
 
-def test_people_come_go_and_are_where_they_were() -> None:
+def test_replayed_people_are_at_their_recorded_positions() -> None:
     tracks = recording()
     crowd, robot = replay_of(tracks, 1).start(scene(), 0), np.array([4.0, 0.0, 0.0, 0.0])
     for t in np.arange(0.0, 16.0, 0.1):
@@ -203,13 +203,13 @@ def test_people_come_go_and_are_where_they_were() -> None:
     assert [len([p for p in crowd(t, robot) if p]) for t in (0.0, 5.0, 15.0)] == [2, 3, 1]
 
 
-def test_between_ticks_people_walk_straight_on() -> None:
+def test_positions_between_ticks_are_interpolated() -> None:
     crowd = replay_of(recording(), 1).start(scene(), 0)
     (other,) = (p for p in crowd(1.23, np.array([4.0, -2.0, 0, 0])) if p is not None and p.velocity[1])
     assert other.position == pytest.approx((4.0, -4.0 + 1.0 + 1.23))
 
 
-def test_a_person_who_stops_keeps_facing_where_they_walked() -> None:
+def test_a_person_who_stops_keeps_their_heading() -> None:
     tracks = make_tracks(
         make_walk((0, 0), (1.0, 0.0), person=1, duration=8.0),
         make_walk((0, 3), (0.0, 1.0), person=2, duration=2.0),
@@ -232,7 +232,7 @@ def test_the_walker_replaced_can_be_driven_like_a_controller() -> None:
     assert np.array(bodies)[81:, :2] == pytest.approx(np.tile((8.0, 0.0), (20, 1)))
 
 
-def test_ways_begin_and_end_in_the_area_and_in_open_space() -> None:
+def test_replays_start_and_end_in_the_area_away_from_people() -> None:
     area = szlib.Square(x=(1.0, 7.0), y=(-5.0, 5.0))
     (replay,) = (each for each in find_replays(recording(), 99, area=area) if each.walker.id == 1)
     assert (replay.scenario.start[0], replay.scenario.goal[0]) == pytest.approx((1.0, 7.0))
@@ -243,13 +243,13 @@ def test_ways_begin_and_end_in_the_area_and_in_open_space() -> None:
         find_replays(recording(), 5, area=szlib.Square(x=(0.0, 1.0), y=(0.0, 1.0)))
 
 
-def test_the_seed_draws_the_walkers() -> None:
+def test_the_seed_selects_the_walkers() -> None:
     ids = [[each.walker.id for each in find_replays(recording(), 2, seed=seed)] for seed in (0, 0, 1, 2, 3)]
     assert ids[0] == ids[1]
     assert len({tuple(each) for each in ids}) > 1
 
 
-def test_days_are_scenes_of_their_own() -> None:
+def test_each_day_is_a_separate_scene() -> None:
     other_day = make_walk((4, 1), (0.0, 1.0), person=2, begin=10.0, duration=9.0, day="2012-10-28")
     first = next(r for r in find_replays(make_tracks(recording(), other_day), 99) if r.walker.id == 1)
     assert [other.id for other in first.others].count(2) == 1

@@ -16,7 +16,7 @@ ZONE = szlib.Ellipse((0.05, 0.0), (1.0, 0.7))
 SETTINGS = szlib.MPCSettings()
 
 
-def test_all_eleven_are_there_and_the_papers_four_keep_their_names():
+def test_meetings_and_scenarios_have_their_names():
     assert list(MEETINGS) == [
         "frontal approach", "pedestrian obstruction", "narrow hallway", "narrow doorway", "overtaking",
         "intersection", "blind corner", "parallel traffic", "perpendicular traffic", "circular crossing",
@@ -35,7 +35,7 @@ def test_alone_the_robot_drives_straight_to_the_goal(name):
 
 
 @pytest.mark.parametrize("name", MEETINGS)
-def test_nobody_starts_or_walks_where_they_cannot_be(name):
+def test_people_and_the_robot_start_and_walk_clear_of_walls_and_each_other(name):
     scenario = MEETINGS[name]
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
     assert controller.barriers(scenario.start[:2], scenario.people).min() > 0.5
@@ -49,7 +49,7 @@ def test_nobody_starts_or_walks_where_they_cannot_be(name):
 
 
 @pytest.mark.parametrize("name", MEETINGS)
-def test_the_controller_arrives_and_keeps_its_promise(name):
+def test_the_controller_arrives_and_its_safety_claims_hold(name):
     scenario = Variations(MEETINGS[name], ZONE, shift=0.0, pace=(1.0, 1.0))(0)
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
     metrics = drive(scenario, controller, behaviour=VisiblePeople()).metrics()
@@ -75,7 +75,7 @@ def test_variations_are_close_to_the_scene_and_the_same_for_a_seed():
     assert np.array_equal(vary(7).goal, scene.goal) and np.array_equal(vary(7).walls, scene.walls)
 
 
-def test_people_keep_their_own_zones_where_none_is_given():
+def test_variations_without_a_zone_keep_the_zones_of_people():
     own = replace(MEETINGS["overtaking"], people=(szlib.Person((0, 0), (0.3, 0), zone=ZONE),))
     assert Variations(own)(0).people[0].zone == ZONE
     assert Variations(MEETINGS["overtaking"])(0).people[0].zone is None
@@ -105,7 +105,7 @@ def test_variations_are_worlds_for_rollouts(tmp_path):
 # --- in sight ----------------------------------------------------------------------------------------
 
 
-def test_walls_hide_who_is_behind_them():
+def test_walls_hide_people_behind_them():
     wall = np.array([[(0.0, -1.0), (0.0, 1.0)]])
     here = np.array([-1.0, 0.0])
     assert not is_visible(here, (1.0, 0.5), wall)
@@ -128,7 +128,7 @@ def test_hidden_people_are_present_but_not_seen():
     assert np.isfinite(log.residual[:, 1:]).all()  # of the walls
 
 
-def test_what_was_seen_is_no_part_of_what_a_model_is():
+def test_the_identity_of_a_crowd_model_does_not_depend_on_runs():
     model, used = VisiblePeople(), VisiblePeople()
     used.start(MEETINGS["blind corner"], 0)(0.0, np.zeros(4))
     assert identify(model) == identify(used)

@@ -1,4 +1,4 @@
-"""Rollouts: the same rows whatever the order, honest flags, failures told apart and replayed."""
+"""Rollouts: rows do not depend on the order, violations are reported, outcomes are classified."""
 
 import importlib
 
@@ -33,7 +33,7 @@ def whole(world):
     return drive(world, szlib.MPCCBF(ZONE, walls=world.walls, settings=SETTINGS), until_arrival=False)
 
 
-def test_driving_on_after_the_arrival_changes_nothing_before_it():
+def test_driving_after_the_arrival_does_not_change_earlier_rows():
     world = scenario(people=(person((1.0, 0.3)),), walls=[[(-3, 2.5), (5, 2.5)]])
     log, longer = szlib.simulate(world, szlib.MPCCBF(ZONE, walls=world.walls)), whole(world)
     n = len(log.states)
@@ -45,7 +45,7 @@ def test_driving_on_after_the_arrival_changes_nothing_before_it():
     assert set(ours) == set(theirs)
 
 
-def test_jobs_and_interruptions_change_nothing(tmp_path, monkeypatch):
+def test_parallel_and_interrupted_calls_give_the_same_rows(tmp_path, monkeypatch):
     monkeypatch.setattr(MODULE, "CHUNK_SIZE", 2)
     alone = rollouts(5, worlds=SHORT, n_jobs=1, progress=False)
     kept = rollouts(3, worlds=SHORT, n_jobs=1, progress=False, out=tmp_path)
@@ -60,7 +60,7 @@ def test_jobs_and_interruptions_change_nothing(tmp_path, monkeypatch):
     assert sum(path.is_dir() for path in tmp_path.iterdir()) == 2
 
 
-def test_a_row_can_be_replayed_to_the_last_bit_though_its_controller_drove_before():
+def test_rerun_world_gives_exactly_the_row_of_rollouts():
     alike = Worlds(people=(3, 3), walls=1.0, max_walls=1, duration=3.0)  # of one size: they share one
     rows = rollouts(3, seed=7, worlds=alike, n_jobs=1, progress=False)
     again = pd.DataFrame([rerun_world(seed, worlds=alike).metrics() for seed in rows["seed"]])
@@ -69,7 +69,7 @@ def test_a_row_can_be_replayed_to_the_last_bit_though_its_controller_drove_befor
     )
 
 
-def test_columns_hold_numbers_and_no_breach_is_silent():
+def test_columns_are_numbers_and_each_violation_is_flagged():
     table = rollouts(12, worlds=Worlds(people=(3, 5), walls=1.0), n_jobs=1, progress=False)
     assert table["seed"].tolist() == list(range(12))
     assert not table.drop(columns="time_to_goal").isna().any().any()  # walls and people in every world
@@ -101,11 +101,10 @@ def test_each_outcome_is_classified(ending):
 PILLARS = Worlds(walls=1.0, max_walls=4, wall_length=(0.1, 1.0), size=6.0, travel=(2.0, 5.0))
 
 
-def test_no_wall_is_touched_however_short_but_with_the_papers_margin():
+def test_the_euclidean_margin_avoids_short_walls_and_the_papers_does_not():
     hasty = [szlib.MPCSettings(margin=margin, gamma=0.5, N_h=8) for margin in ("euclidean", "paper")]
     careful, paper = (
-        rollouts(12, seed=1, worlds=PILLARS, settings=settings, n_jobs=1, progress=False)
-        for settings in hasty
+        rollouts(4, seed=4, worlds=PILLARS, settings=settings, n_jobs=1, progress=False) for settings in hasty
     )
     assert careful["min_clearance_walls"].min() >= -1e-6
     assert paper["min_clearance_walls"].min() < -0.1
@@ -115,17 +114,17 @@ def test_no_wall_is_touched_however_short_but_with_the_papers_margin():
         assert (rows["min_clearance"] == gaps).all()
 
 
-def test_open_space_with_the_whole_horizon():
+def test_the_whole_barrier_horizon_is_safe_around_one_person():
     table = rollouts(10, worlds=ONE_PERSON, settings=szlib.MPCSettings(N_h=8), n_jobs=1, progress=False)
     assert table["min_h"].min() >= -1e-6
 
 
-def test_bad_input():
+def test_a_number_of_worlds_below_one_is_rejected():
     with pytest.raises(szlib.SolverError, match="n must be at least 1"):
         rollouts(0)
 
 
-def test_a_world_that_breaks_the_controller_is_named():
+def test_a_failing_world_is_named_by_its_seed():
     with pytest.raises(szlib.SolverError, match="the controller failed in world 5: a zone must lie within"):
         rerun_world(5, worlds=Worlds(standing=1.0), zone_transform=huge)
 

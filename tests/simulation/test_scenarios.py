@@ -34,7 +34,7 @@ def logs():
     return {name: run(scenario) for name, scenario in szlib.SCENARIOS.items()}
 
 
-def test_the_four_scenarios_of_the_paper_are_there():
+def test_the_papers_four_scenarios_have_claims_and_titles():
     assert list(szlib.SCENARIOS) == ["passing", "corridor", "waiting", "making_room"]
     for scenario in szlib.SCENARIOS.values():
         assert scenario.walls.shape[1:] == (2, 2) and scenario.start.shape == (4,)
@@ -53,7 +53,7 @@ def test_the_robot_arrives_and_never_leaves_the_safe_set(logs, name):
 
 
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
-def test_what_the_paper_claims_holds(logs, name):
+def test_the_papers_claims_hold(logs, name):
     for claim in szlib.SCENARIOS[name].claims:
         holds, value = claim.check(logs[name])
         assert holds, f"{claim.text} got {value}"
@@ -70,7 +70,7 @@ def test_what_the_paper_claims_holds(logs, name):
         szlib.Ellipse((0.15, 0.0), (0.85, 0.6), -0.2),
     ],
 )
-def test_the_claims_do_not_hang_on_one_zone(name, zone):
+def test_the_papers_claims_hold_for_other_zones(name, zone):
     scenario = szlib.SCENARIOS[name]
     log = run(scenario, zone)
     assert log.success and log.min_h().min() >= 0 and log.metrics()["infeasible_steps"] == 0
@@ -85,7 +85,7 @@ def test_a_zone_without_a_front_starts_avoidance_at_the_same_distance_from_eithe
     assert not scenario.claims[0].check(run(scenario, szlib.Ellipse((-0.2, 0.0), (1.0, 0.7))))[0]
 
 
-def test_the_other_hand_gives_the_mirror_image():
+def test_the_other_passing_side_gives_the_mirror_image():
     for name in ("passing", "corridor"):
         right, left = run(szlib.SCENARIOS[name]), run(szlib.SCENARIOS[name], pass_side="left")
         assert (right.metrics()["passing_side"], left.metrics()["passing_side"]) == ("right", "left")
@@ -100,7 +100,7 @@ def test_a_run_is_repeatable(logs):
     )
 
 
-def test_the_table_tells_the_motion_and_the_barriers(logs):
+def test_the_table_has_motion_and_barriers(logs):
     log = logs["waiting"]
     table, dt, controller = log.table, 0.1, szlib.MPCCBF(ZONE, walls=log.scenario.walls)
     assert len(table) == len(log.predicted)
@@ -121,7 +121,7 @@ def test_the_table_tells_the_motion_and_the_barriers(logs):
         assert table["clearance"][i] == pytest.approx(min(gaps) - 0.5)
 
 
-def test_the_metrics_of_a_walk_without_company():
+def test_metrics_without_people():
     scenario = szlib.Scenario("alone", (0.0, 0.0, 0.0, 0.0), (3.0, 4.0))
     metrics = run(scenario).metrics()
     assert metrics["success"] and metrics["passing_side"] == "none"
@@ -131,7 +131,7 @@ def test_the_metrics_of_a_walk_without_company():
     assert metrics["min_speed"] > 0.9
 
 
-def test_a_run_that_is_given_up_is_no_success():
+def test_a_run_that_ends_early_is_no_success():
     scenario = szlib.SCENARIOS["waiting"]
     log = szlib.simulate(scenario, szlib.MPCCBF(ZONE, walls=scenario.walls), max_time=5)
     assert not log.success and np.isnan(log.metrics()["time_to_goal"])
@@ -186,7 +186,7 @@ def passing_log(y, x=(-2.0, -1.0, 0.5, 2.0)):
     return SimulationLog(scenario, settings, (ZONE,), states, people=people, **plans, **steps, **times)
 
 
-def test_the_passing_side_is_where_the_person_is_not():
+def test_the_passing_side_is_opposite_to_the_person():
     assert find_passing_side(passing_log(y=-1.0)) == "right"
     assert find_passing_side(passing_log(y=1.0)) == "left"
     assert find_passing_side(passing_log(y=1.0, x=(-2, -1.5, -1, -1))) == "none"
@@ -203,7 +203,7 @@ def test_avoidance_starts_where_the_line_is_left():
     assert np.isnan(find_avoidance_start(passing_log(y=0.0))).all()
 
 
-def test_turning_everybody_around_turns_only_the_headings():
+def test_turn_people_changes_only_headings():
     scenario = szlib.SCENARIOS["corridor"]
     turned = scenario.turn_people().people[0]
     assert np.cos(turned.heading) == pytest.approx(1)
@@ -219,7 +219,7 @@ def test_turning_everybody_around_turns_only_the_headings():
         ({"walls": [((-5, 0.3), (5, 0.3))]}, "starts in violation: .* for wall 0"),
     ],
 )
-def test_a_scenario_that_cannot_be_run_is_refused(change, message):
+def test_invalid_starts_and_goals_are_rejected(change, message):
     with pytest.raises(szlib.SolverError, match=message):
         run(replace(szlib.SCENARIOS["passing"], **change))
 
@@ -233,17 +233,17 @@ def test_a_scenario_that_cannot_be_run_is_refused(change, message):
         ({"duration": -1}, "duration must be a positive"),
     ],
 )
-def test_a_scenario_without_a_meaning_cannot_be_made(change, message):
+def test_invalid_scenarios_are_rejected(change, message):
     with pytest.raises(szlib.SolverError, match=message):
         replace(szlib.SCENARIOS["passing"], **change)
 
 
-def test_a_controller_that_knows_other_walls_is_refused():
+def test_a_controller_with_other_walls_is_rejected():
     with pytest.raises(szlib.SolverError, match="knows 0 walls, and not the 2 of 'corridor'"):
         szlib.simulate(szlib.SCENARIOS["corridor"], szlib.MPCCBF(ZONE))
 
 
-def test_scenarios_cannot_be_changed_by_accident():
+def test_scenarios_are_read_only():
     with pytest.raises(ValueError, match="read-only"):
         szlib.SCENARIOS["corridor"].walls[0] = 0
 
@@ -252,7 +252,7 @@ def test_scenarios_cannot_be_changed_by_accident():
 
 
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
-def test_a_log_comes_back_from_its_files_as_it_was(logs, name, tmp_path):
+def test_a_log_is_saved_and_loaded_unchanged(logs, name, tmp_path):
     log = logs[name]
     log.save(tmp_path / "run.json")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.json", "run.parquet"]
@@ -264,7 +264,7 @@ def test_a_log_comes_back_from_its_files_as_it_was(logs, name, tmp_path):
     assert back.scenario.claims == ()
 
 
-def test_a_log_without_company_comes_back_too(tmp_path):
+def test_a_log_without_people_is_saved_and_loaded(tmp_path):
     log = run(szlib.Scenario("alone", (0.0, 0.0, 0.0, 0.0), (3.0, 4.0)))
     log.save(tmp_path / "alone")
     pd.testing.assert_frame_equal(szlib.SimulationLog.load(tmp_path / "alone").table, log.table)
@@ -279,19 +279,19 @@ def test_a_log_without_company_comes_back_too(tmp_path):
         (lambda folder: (folder / "run.json").write_text("[]"), "TypeError"),
     ],
 )
-def test_a_damaged_log_is_refused(logs, tmp_path, change, message):
+def test_damaged_logs_are_rejected(logs, tmp_path, change, message):
     logs["passing"].save(tmp_path / "run")
     change(tmp_path)
     with pytest.raises(szlib.DataError, match=message):
         szlib.SimulationLog.load(tmp_path / "run")
 
 
-def test_a_log_that_cannot_be_written_says_so(logs, tmp_path):
+def test_a_log_that_cannot_be_written_is_an_error(logs, tmp_path):
     with pytest.raises(szlib.DataError, match="cannot be written"):
         logs["passing"].save(tmp_path / "missing" / "run")
 
 
-def test_a_log_shows_itself_in_few_lines(logs):
+def test_the_repr_of_a_log_is_short(logs):
     shown = repr(logs["corridor"])
     assert len(shown.splitlines()) <= 3 and len(shown) < 300
     assert "'corridor'" in shown and "outcome arrived" in shown and "1 people, 2 walls" in shown

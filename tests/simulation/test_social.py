@@ -42,7 +42,7 @@ def still(n, x, y, velocity=(0.0, 0.0)):
     return np.tile([x, y, 0.0, *velocity], (n, 1))
 
 
-def test_spaces_are_the_share_of_time_at_halls_distances():
+def test_halls_distances_are_fractions_of_time():
     # distances of the disc (0.5 m) to a person at the origin: 0.2, 0.44, 0.45, 1.1, 1.2, 3.5, 3.6, 9
     gaps = np.array([0.2, 0.44, 0.451, 1.1, 1.201, 3.5, 3.601, 9.0])
     found = compute_social_metrics(made(line(0.5 + gaps), [still(8, 0.0, 0.0)]))
@@ -50,7 +50,7 @@ def test_spaces_are_the_share_of_time_at_halls_distances():
     assert found["closest_person"] == pytest.approx((gaps - 0.25).mean())
 
 
-def test_the_nearest_of_several_counts_and_who_is_away_does_not():
+def test_only_the_nearest_present_person_counts():
     far, near = still(4, 0.0, 4.0), still(4, 0.0, 1.5)
     near[2:] = np.nan
     found = compute_social_metrics(made(line([0.0] * 4, 0.0), [far, near]))
@@ -58,7 +58,7 @@ def test_the_nearest_of_several_counts_and_who_is_away_does_not():
     assert (found["personal"], found["social"]) == (0.5, 0.5)
 
 
-def test_where_nobody_is_there_is_nothing_to_intrude_upon():
+def test_social_metrics_without_people():
     found = compute_social_metrics(made(line([0.0, 0.1])))
     assert np.isnan(found["closest_person"])
     assert found["intimate"] == found["personal"] == found["social"] == 0
@@ -68,8 +68,8 @@ def test_where_nobody_is_there_is_nothing_to_intrude_upon():
 @pytest.mark.parametrize(
     ("robot", "person", "expected"),
     [
-        (1.0, 0.0, (1, 0)),  # it drives into somebody who stands
-        (0.0, -1.0, (0, 1)),  # somebody walks into it while it stands
+        (1.0, 0.0, (1, 0)),  # the robot drives into a standing person
+        (0.0, -1.0, (0, 1)),  # a person walks into a standing robot
         (1.0, -0.4, (1, 0)),  # both, the robot faster
         (0.3, -1.0, (0, 1)),  # both, the person faster
         (1.0, 0.5, (1, 0)),  # from behind
@@ -90,7 +90,7 @@ def test_a_collision_counts_once_and_again_after_a_gap():
     assert (found["robot_on_person"], found["person_on_robot"]) == (2, 0)
 
 
-def test_one_who_appears_in_the_robot_is_a_collision():
+def test_a_person_who_appears_in_the_robot_is_a_collision():
     ghost = still(4, 0.2, 0.0, (-1.0, 0.0))
     ghost[:2] = np.nan
     found = compute_social_metrics(made(line([0.0] * 4, 0.0), [ghost]))
@@ -130,7 +130,7 @@ def test_path_efficiency():
     )
 
 
-def test_moving_the_world_changes_nothing():
+def test_social_metrics_do_not_depend_on_the_frame():
     t = np.linspace(0, 6, 61)
     states = np.column_stack([t, 0.3 * np.sin(t), np.ones_like(t), 0.3 * np.cos(t)])
     people = np.column_stack([3 - 0.5 * t, 0.5 + 0 * t, np.pi + 0 * t, -0.5 + 0 * t, 0 * t])
