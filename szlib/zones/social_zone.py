@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,8 +100,7 @@ class SocialZone:
     null_test: NullTest | None = None
 
     def __post_init__(self) -> None:
-        if self.method not in METHODS:
-            raise ZoneError(f"method must be one of {', '.join(METHODS)}; got {self.method!r}")
+        _check_method(self.method)
         if (self.method == "hull") != isinstance(self.shape, HullZone):
             raise ZoneError(
                 f"a {type(self.shape).__name__} is not the shape of a zone of method {self.method!r}"
@@ -173,7 +172,7 @@ class SocialZone:
         >>> zone.method, list(zone.ellipses)
         ('hull', [1.1])
         """
-        _check_options(method, options)
+        _check_method(method, options)
         check_columns(samples, ["los_angle", "distance", "speed"])
         fitted_speeds = sorted({float(speed) for speed in speeds})
         if not fitted_speeds:
@@ -195,15 +194,13 @@ class SocialZone:
                 "choose a speed near that, or add data"
             )
         provenance = _provenance(samples, {"method": method, "r_max": float(r_max)}, estimator)
-        zone = cls(shape, float(r_max), ellipses, undefined, provenance, method)
-        zone = replace(zone, null_test=None if null is None else null_test(samples, null))
+        test = None if null is None else null_test(samples, null)
+        sides = uncertainty = None
         if "encounter" in samples:
-            zone = replace(zone, side_counts=count_by_side(samples, fitted_speeds, r_max=r_max))
-            if n_resamples:
-                uncertainty = estimate_uncertainty(
-                    estimator, list(ellipses), n_resamples=n_resamples, seed=seed
-                )
-                zone = replace(zone, uncertainty=uncertainty)
+            sides = count_by_side(samples, fitted_speeds, r_max=r_max)
+        if "encounter" in samples and n_resamples:
+            uncertainty = estimate_uncertainty(estimator, list(ellipses), n_resamples=n_resamples, seed=seed)
+        zone = cls(shape, float(r_max), ellipses, undefined, provenance, method, sides, uncertainty, test)
         problems = [*undefined.values(), *filter(None, map(zone.missing_data, ellipses))]
         if problems:
             warnings.warn("; ".join(dict.fromkeys(problems)), DataWarning, stacklevel=2)
@@ -296,15 +293,10 @@ def _provenance(samples: pd.DataFrame, parameters: Mapping[str, Any], estimator:
     }
 
 
-def _check_options(method: str, options: Mapping[str, Any]) -> None:
-    """Raise ZoneError if the method is unknown, or an option does not belong to it."""
+def _check_method(method: str, options: Iterable[str] = ()) -> None:
+    """Raise ZoneError if the method is unknown, or does not have one of the options."""
     if method not in METHODS:
         raise ZoneError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
-    for name in options.keys() - set(METHODS[method][1]):
-        owners = [owner for owner, (_, names) in METHODS.items() if name in names]
-        if owners:
-            raise ZoneError(
-                f'{name} belongs to method="{owners[0]}"; got method="{method}": drop {name}, or pass '
-                f'method="{owners[0]}"'
-            )
-        raise ZoneError(f"unknown option {name!r}; method {method!r} has {', '.join(METHODS[method][1])}")
+    for name in set(options).difference(METHODS[method][1]):
+        known = "; ".join(f"{each!r} has {', '.join(names)}" for each, (_, names) in METHODS.items())
+        raise ZoneError(f"method {method!r} has no option {name!r}; {known}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,7 +22,7 @@ from .ellipses import Ellipse
 from .hulls import HullZone
 from .polar import PolarZone
 from .respect_significance import NullTest
-from .uncertainty import SIDES, Uncertainty
+from .uncertainty import Uncertainty
 
 Zone = TypeVar("Zone")
 
@@ -31,12 +31,6 @@ MIN_SEMI_AXIS = 0.05
 """Smallest semi-axis in a file without a checksum [m]: a thinner zone is a sign of damage."""
 UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
 
-_TABLES = {
-    "intervals": ("speed", "quantity", "low", "high"),
-    "bands": ("speed", "direction", "low", "high"),
-    "influence": ("speed", "encounter", "metres"),
-}
-_SIDE_COUNTS = ("speed", "encounters", *SIDES)
 _KEYS = {
     "n_resamples": "resamples", "description": "how", "n_encounters": "encounters", "excluded_below": "beyond"
 }  # fmt: skip
@@ -45,8 +39,7 @@ _KEYS = {
 
 def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
     """Write the `fields` of a `SocialZone` to `path`; raises ZoneError if this is impossible."""
-    shape, side_counts = fields["shape"], fields["side_counts"]
-    uncertainty, null_test = fields["uncertainty"], fields["null_test"]
+    shape = fields["shape"]
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -59,13 +52,14 @@ def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
         ],
         "undefined": [{"speed": v, "why": reason} for v, reason in sorted(fields["undefined"].items())],
         "provenance": fields["provenance"],
-        "seen": None if side_counts is None else _to_json(side_counts),
-        "uncertainty": None if uncertainty is None else _to_json(vars(uncertainty)),
-        "null_test": None if null_test is None else _to_json(vars(null_test)),
-        "radii": _to_json(vars(shape)) if isinstance(shape, PolarZone) else None,
-        "hull_vertices": _to_json(shape.vertices) if isinstance(shape, HullZone) else None,
+        "seen": fields["side_counts"],
+        "uncertainty": fields["uncertainty"],
+        "null_test": fields["null_test"],
+        "radii": shape if isinstance(shape, PolarZone) else None,
+        "hull_vertices": shape.vertices if isinstance(shape, HullZone) else None,
     }
     try:
+        content = json.loads(json.dumps(content, default=_to_json))
         content["checksum"] = _checksum(content)
         write_file(path, json.dumps(content, indent=1))
     except (SzlibError, OSError, TypeError, ValueError) as error:
@@ -81,17 +75,16 @@ def read_zone(path: Path, build: Callable[..., Zone]) -> Zone:
     Raises ZoneError if the file holds no zone, is damaged, or was written by a newer szlib.
     """
     content = _read_content(path)
-    try:
-        zone = build(**_fields(content))
-    except (KeyError, TypeError, IndexError, ValueError, OverflowError, AttributeError) as error:
-        raise ZoneError(f"{path}: the zone in it is damaged ({error!r}); fit and save it again") from error
-    expected = content.get("checksum")
+    expected = content.pop("checksum", None)
     if content["version"] > 1 and expected != _checksum(content):
         raise ZoneError(
             f"{path}: the zone in it is damaged: its checksum is {expected!r}, which is not that of its "
             "content; do not edit zone files: fit and save the zone again"
         )
-    return zone
+    try:
+        return build(**_fields(content))
+    except (KeyError, TypeError, IndexError, ValueError, OverflowError, AttributeError) as error:
+        raise ZoneError(f"{path}: the zone in it is damaged ({error!r}); fit and save it again") from error
 
 
 def _read_content(path: Path) -> dict[str, Any]:
@@ -130,9 +123,8 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         raise ValueError("expected either radii or hull_vertices")
     uncertainty, null_test = (_rename_keys(content[name]) for name in ("uncertainty", "null_test"))
     if uncertainty is not None:
-        uncertainty = Uncertainty(
-            **{**uncertainty, **{name: _table(uncertainty[name], c) for name, c in _TABLES.items()}}
-        )
+        tables = {name: _table(uncertainty[name]) for name in ("intervals", "bands", "influence")}
+        uncertainty = Uncertainty(**{**uncertainty, **tables})
     if null_test is not None:
         lists = {name: tuple(map(float, null_test[name])) for name in ("null_statistics", "null_radii")}
         null_test = NullTest(**{**null_test, **lists})
@@ -145,16 +137,15 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
         "provenance": dict(content["provenance"]),
         "method": str(content["method"]),
-        "side_counts": None if side_counts is None else _table(side_counts, _SIDE_COUNTS),
+        "side_counts": None if side_counts is None else _table(side_counts),
         "uncertainty": uncertainty,
         "null_test": null_test,
     }
 
 
 def _checksum(content: Mapping[str, Any]) -> str:
-    """SHA-256 of everything else, in the form in which it is read."""
-    rest = json.loads(json.dumps({name: value for name, value in content.items() if name != "checksum"}))
-    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
+    """SHA-256 of everything else in the file."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _number(value: Any) -> float:
@@ -174,20 +165,21 @@ def _rename_keys(record: Mapping[str, Any] | None) -> Any:
     return None if record is None else {names.get(key, key): value for key, value in record.items()}
 
 
-def _table(content: Mapping[str, Any], columns: Sequence[str]) -> pd.DataFrame:
-    table = pd.DataFrame({name: content[name] for name in columns})
-    numbers = [name for name in columns if name in ("speed", "direction", "low", "high", "metres")]
+def _table(content: Mapping[str, Any]) -> pd.DataFrame:
+    table = pd.DataFrame(content)
+    numbers = table.columns.intersection(["speed", "direction", "low", "high", "metres"])
     return table.astype(dict.fromkeys(numbers, float))
 
 
 def _to_json(value: Any) -> Any:
-    """JSON values; NaN and infinity, which JSON does not have, become null and "Infinity"."""
+    """JSON values of a table, array or group of fields; NaN is null and infinity "Infinity"."""
     if isinstance(value, pd.DataFrame):
-        return {str(name): _to_json(value[name].to_numpy()) for name in value}
-    if isinstance(value, Mapping):
-        return {_KEYS.get(name, name): _to_json(each) for name, each in value.items()}
-    if not isinstance(value, np.ndarray) or value.dtype.kind != "f":
-        return value.tolist() if isinstance(value, np.ndarray) else value
+        return {name: column.to_numpy() for name, column in value.items()}
+    if isinstance(value, Uncertainty | NullTest | PolarZone):
+        return {_KEYS.get(name, name): each for name, each in vars(value).items()}
+    if not isinstance(value, np.ndarray):
+        raise TypeError(f"{type(value).__name__} is no JSON value")
     out = value.astype(object)
-    out[np.isnan(value)], out[np.isposinf(value)] = None, "Infinity"
+    if value.dtype.kind == "f":
+        out[np.isnan(value)], out[np.isposinf(value)] = None, "Infinity"
     return out.tolist()

@@ -17,16 +17,19 @@ KINDS = ("opposite", "crossing")
 SHIFTS = 39
 
 
-def encounters(seed: int, shift: int, *, n: int = 40, away: float = 0.0) -> pd.DataFrame:
-    """Single samples, their nearest approach even between `away` and 3 m."""
-    rng = np.random.default_rng([seed, shift])
-    table = pd.DataFrame({"encounter": 1000 * (shift + 1) + np.arange(n), "shift": shift})
-    table["los_angle"], table["distance"] = rng.uniform(-3, 3, n), rng.uniform(away, 3, n)
-    return table.assign(speed=1.0)
+def encounters(seed: int, *shifts: int, n: int = 40, away: float = 0.0) -> pd.DataFrame:
+    """`n` single samples of each shift, their nearest approach even between `away` and 3 m."""
+    draws = [np.random.default_rng([seed, k]).uniform([[-3], [away]], 3, (2, n)) for k in shifts]
+    angle, distance = np.concatenate(draws, axis=1)
+    shift = np.repeat(shifts, n)
+    table = pd.DataFrame(
+        {"encounter": 1000 * (shift + 1) + np.tile(np.arange(n), len(shifts)), "shift": shift}
+    )
+    return table.assign(los_angle=angle, distance=distance, speed=1.0)
 
 
 def null_of(seed: int, shifts: int = SHIFTS) -> szlib.NullEncounters:
-    rows = pd.concat([encounters(seed, k) for k in range(shifts)])
+    rows = encounters(seed, *range(shifts))
     found = rows[["shift", "encounter"]].assign(nearest=rows["distance"])
     return szlib.NullEncounters(rows[rows["distance"] <= 2], found, shifts, 2.0)
 
@@ -46,7 +49,7 @@ def test_noninteracting_crowd_shows_no_respect() -> None:
     """notebooks/tables/15_nobody.csv has 100 seeds."""
     p = []
     for seed in range(6):
-        tracks = noninteracting_crowd(seed=seed, people=600, minutes=40)
+        tracks = noninteracting_crowd(seed=seed, people=300, minutes=20)
         null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
         p.append(null_test(szlib.find_encounters(tracks), null, fit_null_radii=False).p_value)
     assert np.sum(np.array(p) <= 0.05) <= 1  # 2 and more of 6: 3 %
@@ -123,10 +126,11 @@ def test_excluded_encounters_do_not_count() -> None:
 def test_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.DataFrame) -> None:
     null = szlib.null_encounters(real_tracks, shifts=20, progress=False)
     for kinds in ("strangers", KINDS):
-        test = null_test(szlib.of_kind(real_samples, kinds), null.of_kind(kinds), excluded_below=0.5)
+        data, model = szlib.of_kind(real_samples, kinds), null.of_kind(kinds)
+        test = null_test(data, model, excluded_below=0.5, fit_null_radii=kinds == "strangers")
         assert test.p_value == pytest.approx(1 / 21)
         assert 0.78 < test.radius < 1.27  # 0.98 m (0.78-1.27) for strangers
-        assert np.nanpercentile(test.null_radii, 95) < 0.5
+        assert not test.null_radii or np.nanpercentile(test.null_radii, 95) < 0.5
 
 
 # --- the object, and errors --------------------------------------------------------------------------

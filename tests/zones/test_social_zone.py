@@ -319,6 +319,7 @@ def broken(change: Callable[[dict], object]) -> Callable[[str], str]:
     return apply
 
 
+CHECKSUM = "is damaged: its checksum"
 BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
     "empty": (lambda _: "", "cannot be read as a zone"),
     "truncated": (lambda text: text[: len(text) // 2], "cannot be read as a zone"),
@@ -330,30 +331,28 @@ BROKEN: dict[str, tuple[Callable[[str], str | bytes], str]] = {
     "other JSON": (lambda _: '{"type": "FeatureCollection"}', "is JSON but no zone"),
     "newer": (broken(lambda c: c.update(version=3)), r"version 3, .* reads 1 to 2; install a newer szlib"),
     "no version": (broken(lambda c: c.pop("version") and None), "has format version None"),
-    "no r_max": (broken(lambda c: c.pop("r_max") and None), "is damaged .*r_max"),
-    "r_max below 0": (broken(lambda c: c.update(r_max=-2)), "is damaged .*r_max must be a positive distance"),
-    "r_max is NaN": (broken(lambda c: c.update(r_max=math.nan)), "is damaged .*r_max"),
-    "no ellipses": (broken(lambda c: c.pop("ellipses") and None), "is damaged .*ellipses"),
-    "an ellipse without an axis": (broken(lambda c: c["ellipses"][0].update(semi_axes=[1])), "is damaged"),
-    "an ellipse inside out": (broken(lambda c: c["ellipses"][0].update(semi_axes=[1, 2])), "is damaged"),
-    "an ellipse of text": (broken(lambda c: c["ellipses"][0].update(angle="north")), "is damaged"),
-    "a speed beyond numbers": (broken(lambda c: c["ellipses"][0].update(speed=10**400)), "is damaged"),
-    "a hull that is flat": (broken(lambda c: c.update(hull_vertices=[[0, 0, 0]] * 9)), "is damaged"),
-    "a ragged hull": (broken(lambda c: c.update(hull_vertices=[[0, 0, 0], [1]])), "is damaged"),
-    "no hull": (broken(lambda c: c.update(hull_vertices=None)), "is damaged"),
-    "an unknown method": (broken(lambda c: c.update(method="guess")), "is damaged .*one of quantile, hull"),
-    "a method without its radii": (broken(lambda c: c.update(method="quantile")), "is damaged .*HullZone is"),
-    "counts without sides": (broken(lambda c: c["seen"].pop("behind") and None), "is damaged .*behind"),
-    "ragged counts": (broken(lambda c: c["seen"]["left"].pop() and None), "is damaged"),
-    "no interval": (broken(lambda c: c["uncertainty"].pop("intervals") and None), "is damaged .*intervals"),
-    "no provenance": (broken(lambda c: c.update(provenance=3)), "is damaged"),
-    "a centre of digits": (broken(lambda c: c["ellipses"][0].update(center="12")), "is damaged .*number"),
-    "a speed of text": (broken(lambda c: c["ellipses"][0].update(speed="1.1")), "is damaged .*number"),
-    "another zone": (
-        broken(lambda c: c["ellipses"][0].update(semi_axes=[0.01, 0.01])), "is damaged: its checksum"
-    ),
-    "a moved centre": (broken(lambda c: c["ellipses"][0].update(center=[0, 0])), "is damaged: its checksum"),
-    "another origin": (broken(lambda c: c["provenance"].update(szlib="9")), "is damaged: its checksum"),
+    "no r_max": (broken(lambda c: c.pop("r_max") and None), CHECKSUM),
+    "r_max below 0": (broken(lambda c: c.update(r_max=-2)), CHECKSUM),
+    "r_max is NaN": (broken(lambda c: c.update(r_max=math.nan)), CHECKSUM),
+    "no ellipses": (broken(lambda c: c.pop("ellipses") and None), CHECKSUM),
+    "an ellipse without an axis": (broken(lambda c: c["ellipses"][0].update(semi_axes=[1])), CHECKSUM),
+    "an ellipse inside out": (broken(lambda c: c["ellipses"][0].update(semi_axes=[1, 2])), CHECKSUM),
+    "an ellipse of text": (broken(lambda c: c["ellipses"][0].update(angle="north")), CHECKSUM),
+    "a speed beyond numbers": (broken(lambda c: c["ellipses"][0].update(speed=10**400)), CHECKSUM),
+    "a hull that is flat": (broken(lambda c: c.update(hull_vertices=[[0, 0, 0]] * 9)), CHECKSUM),
+    "a ragged hull": (broken(lambda c: c.update(hull_vertices=[[0, 0, 0], [1]])), CHECKSUM),
+    "no hull": (broken(lambda c: c.update(hull_vertices=None)), CHECKSUM),
+    "an unknown method": (broken(lambda c: c.update(method="guess")), CHECKSUM),
+    "a method without its radii": (broken(lambda c: c.update(method="quantile")), CHECKSUM),
+    "counts without sides": (broken(lambda c: c["seen"].pop("behind") and None), CHECKSUM),
+    "ragged counts": (broken(lambda c: c["seen"]["left"].pop() and None), CHECKSUM),
+    "no interval": (broken(lambda c: c["uncertainty"].pop("intervals") and None), CHECKSUM),
+    "no provenance": (broken(lambda c: c.update(provenance=3)), CHECKSUM),
+    "a centre of digits": (broken(lambda c: c["ellipses"][0].update(center="12")), CHECKSUM),
+    "a speed of text": (broken(lambda c: c["ellipses"][0].update(speed="1.1")), CHECKSUM),
+    "another zone": (broken(lambda c: c["ellipses"][0].update(semi_axes=[0.01, 0.01])), CHECKSUM),
+    "a moved centre": (broken(lambda c: c["ellipses"][0].update(center=[0, 0])), CHECKSUM),
+    "another origin": (broken(lambda c: c["provenance"].update(szlib="9")), CHECKSUM),
     "no checksum": (broken(lambda c: c.pop("checksum") and None), "is damaged: its checksum is None"),
 }  # fmt: skip
 
@@ -431,9 +430,9 @@ def test_intervals_do_not_change_the_zone(samples: pd.DataFrame, zone: SocialZon
     ("options", "message"),
     [
         ({"method": "guess"}, "method must be one of quantile, hull, respect; got 'guess'"),
-        ({"q": 0.05}, 'q belongs to method="quantile"; got method="hull"'),
-        ({"method": "quantile", "n_neighbours": 200}, 'neighbours belongs to method="hull"; got'),
-        ({"outlier_share": 0.1}, "unknown option 'outlier_share'; method 'hull' has fraction, n_neighbours"),
+        ({"q": 0.05}, "method 'hull' has no option 'q'; 'quantile' has q; 'hull' has fraction, n_neigh"),
+        ({"method": "quantile", "n_neighbours": 200}, "has no option 'n_neighbours'; .*'hull' has"),
+        ({"outlier_share": 0.1}, "method 'hull' has no option 'outlier_share'"),
         ({"method": "quantile", "q": 0.0}, "q must be a share of encounters, 0 < q < 1; got 0"),
         ({"n_resamples": 1}, "resamples must be a whole number, 0 .no intervals. or at least 2; got 1"),
     ],
@@ -545,19 +544,41 @@ def test_version_1_file_loads_without_quality(zone: SocialZone, tmp_path: Path) 
     assert loaded.table()["a_low"].isna().all()
 
 
-def test_version_1_file_with_damaged_ellipse_is_refused(zone: SocialZone, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda c: c["ellipses"][0].update(semi_axes=[0.01, 0.01]), "thinner than 0.05 m"),
+        (lambda c: c["ellipses"][0].update(center="12"), "number"),
+        (lambda c: c["ellipses"][0].update(speed="1.1"), "number"),
+        (lambda c: c["ellipses"][0].update(speed=10**400), "is damaged"),
+        (lambda c: c["ellipses"][0].update(semi_axes=[1]), "is damaged"),
+        (lambda c: c["ellipses"][0].update(semi_axes=[1, 2]), "semi-axes must satisfy"),
+        (lambda c: c["ellipses"][0].update(angle="north"), "number"),
+        (lambda c: c.pop("ellipses"), "ellipses"),
+        (lambda c: c.pop("r_max"), "r_max"),
+        (lambda c: c.update(r_max=-2), "r_max must be a positive distance"),
+        (lambda c: c.update(r_max=math.nan), "r_max"),
+        (lambda c: c.update(hull_vertices=[[0, 0, 0]] * 9), "lie in one plane"),
+        (lambda c: c.update(hull_vertices=[[0, 0, 0], [1]]), "is damaged"),
+        (lambda c: c.update(hull_vertices=None), "either radii or hull_vertices"),
+        (lambda c: c.update(method="guess"), "one of quantile, hull"),
+        (lambda c: c.update(method="quantile"), "HullZone is not the shape"),
+        (lambda c: c.update(provenance=3), "is damaged"),
+    ],
+)
+def test_damaged_file_of_version_1_is_refused(
+    zone: SocialZone, tmp_path: Path, damage: Callable[[dict], object], message: str
+) -> None:
+    """It has no checksum."""
     zone.save(tmp_path / "zone.json")
     content = json.loads((tmp_path / "zone.json").read_text(encoding="utf-8"))
-    old = {key: content[key] for key in ("format", "units", "r_max", "ellipses", "undefined", "provenance")}
-    old |= {"version": 1, "hull_vertices": content["hull_vertices"]}
-    for damage, message in (
-        ({"semi_axes": [0.01, 0.01]}, "thinner than 0.05 m"),
-        ({"center": "12"}, "number"),
-    ):
-        old["ellipses"] = [content["ellipses"][0] | damage]
-        (tmp_path / "old.json").write_text(json.dumps(old), encoding="utf-8")
-        with pytest.raises(szlib.ZoneError, match=f"old.json: .* is damaged .*{message}"):
-            SocialZone.load(tmp_path / "old.json")
+    names = ("format", "units", "r_max", "ellipses", "undefined", "provenance", "hull_vertices")
+    old = {"version": 1, **{name: content[name] for name in names}}
+    damage(old)
+    (tmp_path / "old.json").write_text(json.dumps(old), encoding="utf-8")
+    with pytest.raises(szlib.ZoneError, match=r"old\.json: .* is damaged") as error:
+        SocialZone.load(tmp_path / "old.json")
+    assert message in str(error.value)
 
 
 def test_samples_without_encounter_give_a_zone_of_unknown_quality(samples: pd.DataFrame) -> None:
