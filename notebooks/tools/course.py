@@ -1,9 +1,9 @@
-"""The shell of the course: the navigation cell of every notebook, and the maps of 00_start_here.
+"""Write the navigation cell of every notebook, and the lists of notebooks and words in 00_start_here.
 
-    python notebooks/tools/course.py        write them anew: titles, questions and minutes are the notebooks' own
+    python notebooks/tools/course.py
 
-What a notebook gives a reader, and the glossary, stand here.  A test holds that every cell is what this makes
-of it.
+Titles, questions and reading times come from the notebooks. What a reader learns from each notebook, and the
+glossary, are in this file. A test checks that the cells in the notebooks are up to date.
 """
 
 import math
@@ -19,7 +19,7 @@ HERE = Path(__file__).parents[1]
 START = "00_start_here"
 PAPER = "https://arxiv.org/abs/2405.15101"
 WORDS, LINES = 120, 15
-"""Of prose, and of code, that are read in a minute (assumed)."""
+"""Words of prose, and lines of code, that are read in a minute (assumed)."""
 HEADING = "**Afterwards you can** "
 
 GIVES: dict[str, tuple[str, str]] = {
@@ -55,12 +55,19 @@ GIVES: dict[str, tuple[str, str]] = {
     "19": ("sec. 4-5", "predict from gamma, width, speed and zone what the robot will do."),
     "20": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
 }
-"""By number of the notebook: the paper's section, and what a reader is able to do after it."""
+"""By number of the notebook: the section of the paper, and what a reader can do after reading it."""
 
 
 @dataclass(frozen=True)
 class Word:
-    """A word of the glossary, what it means, and whether the first notebook to use it leaves that open."""
+    """A word of the glossary.
+
+    Parameters
+    ----------
+    means : the meaning.
+    pattern : regular expression that finds the word in a text; empty: the word itself.
+    new : whether the navigation of the first notebook that uses the word explains it.
+    """
 
     means: str
     pattern: str = ""
@@ -126,7 +133,7 @@ GLOSSARY: dict[str, Word] = {
     "tidy": Word("of a table: one row for each observation, one column for each quantity", r"\btidy\b"),
     "window": Word("the 3 s for which two people are watched", new=False),
 }
-"""Words that this workbook takes for granted, and what they mean."""
+"""The words that the notebooks use, and their meanings."""
 
 WEEKS: list[tuple[str, tuple[str, ...], str]] = [
     ("People: who is where, who meets whom", ("01", "02", "14"), "sheet1_tracks"),
@@ -148,49 +155,49 @@ ROUTES: list[tuple[str, tuple[str, ...]]] = [
 """Shorter routes, by number of the notebook."""
 
 
-# --- what the notebooks say of themselves -------------------------------------------------------------
+# --- reading the notebooks ----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Page:
-    """A notebook, or an exercise sheet: its script, its cells, the folder that its links start from."""
+    """A notebook or an exercise sheet: its script and its cells."""
 
     source: Path
     cells: tuple[nbformat.NotebookNode, ...]
 
     @property
     def number(self) -> str:
-        """Such as "06b"; of a sheet its name."""
+        """The number, such as "06b"; for an exercise sheet its name."""
         return self.source.stem.split("_")[0] if self.source.parent == HERE else self.source.stem
 
     @property
     def title(self) -> str:
-        """Such as "6 - Barriers"."""
+        """The title, such as "6 - Barriers"."""
         return self.cells[0].source.splitlines()[0].removeprefix("# ")
 
     @property
     def question(self) -> str:
-        """The question it begins with, up to its first question mark."""
+        """The question of the notebook, up to the first question mark."""
         text = self.cells[0].source.partition("**Question.**")[2].partition("**Expectation.**")[0]
         asked, mark, _ = " ".join(text.split()).partition("?")
         return asked + mark
 
     @property
     def prose(self) -> list[str]:
-        """Its text, without the navigation."""
+        """The texts of the markdown cells, without the navigation."""
         texts = [cell.source for cell in self.cells if cell.cell_type == "markdown"]
         return [text for text in texts if HEADING not in text]
 
     @property
     def minutes(self) -> int:
-        """To read it, in steps of 5 [min]."""
+        """Reading time, rounded up to 5 minutes [min]."""
         words = sum(len(text.split()) for text in self.prose)
         lines = sum(len(cell.source.splitlines()) for cell in self.cells if cell.cell_type == "code")
         return 5 * math.ceil((words / WORDS + lines / LINES) / 5)
 
 
 def pages() -> list[Page]:
-    """The notebooks in the order of the story."""
+    """The notebooks in reading order."""
     return [_page(source) for source in sorted(HERE.glob("[0-9][0-9]*_*.py"))]
 
 
@@ -199,7 +206,7 @@ def _page(source: Path) -> Page:
 
 
 def first_uses(story: list[Page]) -> dict[str, str]:
-    """The number of the notebook that uses each word of the glossary first; words of none are left out."""
+    """The number of the first notebook that uses each word of the glossary; unused words are left out."""
     found: dict[str, str] = {}
     for page in story:
         if page.source.stem == START:
@@ -212,27 +219,29 @@ def first_uses(story: list[Page]) -> dict[str, str]:
     return found
 
 
-# --- what is made of it -------------------------------------------------------------------------------
+# --- making the cells ---------------------------------------------------------------------------------
 
 
-def navigation(page: Page, story: list[Page], uses: dict[str, str]) -> str:
+def make_navigation(page: Page, story: list[Page], uses: dict[str, str]) -> str:
     """The navigation cell of a notebook."""
     at = [each.number for each in story].index(page.number)
     places = [f"[Start]({START}.ipynb)"] if at > 1 else []
     places += [f"before: {_link(each)}" for each in story[max(at - 1, 0) : at]]
     places += [f"next: {_link(each)}" for each in story[at + 1 : at + 2]]
-    section, able = GIVES[page.number]
+    section, aim = GIVES[page.number]
     places += [f"[paper]({PAPER}): {section}", f"{page.minutes} min to read"]
-    told = [_wrapped(" · ".join(places)), _wrapped(HEADING + able)]
+    paragraphs = [_wrapped(" · ".join(places)), _wrapped(HEADING + aim)]
     new = sorted(
         (word for word, number in uses.items() if number == page.number and GLOSSARY[word].new), key=str.lower
     )
     if new:
-        told.append(_wrapped(f"**Words.** {'; '.join(f'*{word}*: {GLOSSARY[word].means}' for word in new)}."))
-    return "\n\n".join(told)
+        paragraphs.append(
+            _wrapped(f"**Words.** {'; '.join(f'*{word}*: {GLOSSARY[word].means}' for word in new)}.")
+        )
+    return "\n\n".join(paragraphs)
 
 
-def sheet_navigation(name: str) -> str:
+def make_sheet_navigation(name: str) -> str:
     """The navigation cell of an exercise sheet, the same in both folders."""
     from szlib.workbook.exercises import SHEETS
 
@@ -255,97 +264,103 @@ def _link(page: Page) -> str:
     return f"[{page.title}]({page.source.stem}.ipynb)"
 
 
-def the_map(story: list[Page]) -> str:
+def make_map(story: list[Page]) -> str:
     """The cell of 00 that lists every notebook."""
     rows = ["## The map", "", "| notebook | question | to read |", "|---|---|---|"]
     rows += [f"| {_link(p)} | {p.question} | {p.minutes} min |" for p in story if p.source.stem != START]
     return "\n".join(rows)
 
 
-def the_routes(story: list[Page]) -> str:
+def make_routes(story: list[Page]) -> str:
     """The cell of 00 with the three routes."""
     from szlib.workbook.exercises import SHEETS
 
     rows = ["## Three routes", ""]
     for name, numbers in ROUTES:
-        links, minutes = _chosen(story, numbers)
+        links, minutes = _links_and_time(story, numbers)
         rows.append(f"- **{name}.** {links}: {minutes} to read.")
     rows.append(
         "- **Six weeks: the course.** One exercise sheet a week; running and looking around come on top."
     )
     rows += ["", "| week | topic | notebooks | to read | sheet | to do |", "|---|---|---|---|---|---|"]
     for week, (topic, numbers, sheet) in enumerate(WEEKS, 1):
-        links, minutes = _chosen(story, numbers)
+        links, minutes = _links_and_time(story, numbers)
         work = _time(sum(task.minutes for task in SHEETS[sheet]))
         to_do = f"[sheet {sheet[5]}](exercises/{sheet}.ipynb)"
         rows.append(f"| {week} | {topic} | {links} | {minutes} | {to_do} | {work} |")
     return "\n".join(rows)
 
 
-def _chosen(story: list[Page], numbers: tuple[str, ...]) -> tuple[str, str]:
+def _links_and_time(story: list[Page], numbers: tuple[str, ...]) -> tuple[str, str]:
     """Links to notebooks, and the time to read them."""
-    there = [page for page in story if page.number in numbers]
-    links = ", ".join(f"[{page.number}]({page.source.stem}.ipynb)" for page in there)
-    return links, _time(sum(page.minutes for page in there))
+    chosen = [page for page in story if page.number in numbers]
+    links = ", ".join(f"[{page.number}]({page.source.stem}.ipynb)" for page in chosen)
+    return links, _time(sum(page.minutes for page in chosen))
 
 
 def _time(minutes: int) -> str:
-    """In minutes, or hours and minutes."""
+    """A time as text, in minutes or in hours and minutes."""
     hours, left = divmod(minutes, 60)
     return f"{hours} h {left:02} min" if hours else f"{left} min"
 
 
-def the_glossary(story: list[Page], uses: dict[str, str]) -> str:
-    """The cell of 00 with every word that is used, and where first."""
-    by = {page.number: page for page in story}
+def make_glossary(story: list[Page], uses: dict[str, str]) -> str:
+    """The cell of 00 that lists every word in use, its meaning, and the first notebook that uses it."""
+    by_number = {page.number: page for page in story}
     rows = ["## Words", "", "| word | meaning | first used in |", "|---|---|---|"]
     for word in sorted(uses, key=str.lower):
-        page = by[uses[word]]
+        page = by_number[uses[word]]
         rows.append(f"| {word} | {GLOSSARY[word].means} | [{page.number}]({page.source.stem}.ipynb) |")
     return "\n".join(rows)
 
 
-# --- writing it down ----------------------------------------------------------------------------------
+# --- writing the scripts ------------------------------------------------------------------------------
 
 
-def renewed(script: str, cells: dict[str, str], navigates: str) -> str:
-    """A percent script with its second cell, the navigation, and the cells of these headings written anew."""
+def replace_cells(script: str, cells: dict[str, str], navigation: str) -> str:
+    """Replace the navigation of a notebook, its second cell, and the cells with these headings.
+
+    `script` is the notebook as a percent script, `cells` the new text by heading, `navigation` the new
+    navigation. Returns the script.
+    """
     header, title, *rest = re.split(r"^(?=# %%)", script, flags=re.MULTILINE)
     if rest and (HEADING in rest[0] or f"[Start](../{START}" in rest[0]):
         rest = rest[1:]
     for heading, text in cells.items():
         (at,) = [i for i, cell in enumerate(rest) if cell.startswith(f"# %% [markdown]\n# {heading}\n")]
         rest[at] = _cell(text)
-    return "".join([header, title, _cell(navigates), *rest])
+    return "".join([header, title, _cell(navigation), *rest])
 
 
 def _cell(text: str) -> str:
     return "\n".join(["# %% [markdown]", *(f"# {line}".rstrip() for line in text.split("\n"))]) + "\n\n"
 
 
-def shell() -> dict[Path, str]:
-    """Every script of the course as it should be."""
+def make_scripts() -> dict[Path, str]:
+    """The text of every script of the course with up-to-date navigation and lists."""
     story = pages()
     uses, scripts = first_uses(story), {}
-    cells = {"## The map": the_map(story), "## Three routes": the_routes(story)}
-    cells["## Words"] = the_glossary(story, uses)
+    cells = {"## The map": make_map(story), "## Three routes": make_routes(story)}
+    cells["## Words"] = make_glossary(story, uses)
     for page in story:
         own = cells if page.source.stem == START else {}
         text = page.source.read_text(encoding="utf-8")
-        scripts[page.source] = renewed(text, own, navigation(page, story, uses))
+        scripts[page.source] = replace_cells(text, own, make_navigation(page, story, uses))
     for source in sorted((HERE / "solutions").glob("*.py")):
-        scripts[source] = renewed(source.read_text(encoding="utf-8"), {}, sheet_navigation(source.stem))
+        scripts[source] = replace_cells(
+            source.read_text(encoding="utf-8"), {}, make_sheet_navigation(source.stem)
+        )
     return scripts
 
 
-def renew() -> None:
-    """Write every script as it should be; twice, for the map in 00 adds to the time to read 00."""
+def write_scripts() -> None:
+    """Update every script; twice, since the lists in 00 add to the time to read 00."""
     for _ in range(2):
-        for source, text in shell().items():
+        for source, text in make_scripts().items():
             if source.read_text(encoding="utf-8") != text:
                 print(source.name)
                 source.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    renew()
+    write_scripts()

@@ -1,4 +1,4 @@
-"""Execute the committed copies of the notebooks again, and copy the pictures of the README: `make notebooks`."""
+"""Execute the notebooks, store the copies, and copy the pictures of the README: `make notebooks`."""
 
 import re
 import shutil
@@ -21,7 +21,7 @@ PICTURES = {
     "making_room.gif": "10_making_room-run.gif",
     "laboratory.png": "20_laboratory-strip.png",
 }
-"""The pictures of the README, and the figures of the notebooks that they are copies of."""
+"""The pictures of the README, and the figures of the notebooks from which they are copied."""
 WARNING = re.compile(r"^\S+\.py:\d+: (\w*Warning: .*\n)(  .*\n)?", re.MULTILINE)
 """A warning with the path of a file on this machine, and the line that caused it."""
 REAL_DAY = ("01", "02", "03", "04", "05", "16")
@@ -29,7 +29,7 @@ REAL_DAY = ("01", "02", "03", "04", "05", "16")
 
 
 def replace_data(source: Path, data: str) -> nbformat.NotebookNode:
-    """Read a notebook with other data than its own, and links as from the folder `real_day`."""
+    """Read the notebook `source` with other `data`, and with links that start in the folder `real_day`."""
     notebook = jupytext.read(source)
     for cell in notebook.cells:
         if "parameters" in cell.metadata.get("tags", []):
@@ -45,7 +45,7 @@ def refresh(source: Path, data: str = "") -> None:
     The copy holds no times and no paths, so that two copies can be compared.
     """
     notebook = replace_data(source, data) if data else jupytext.read(source)
-    for number, cell in enumerate(notebook.cells):  # the same at every execution
+    for number, cell in enumerate(notebook.cells):  # the same identifiers at every execution
         cell.id = f"{source.stem[:2]}-{number}"
     target = (HERE / "real_day" if data else HERE) / f"{source.stem}.ipynb"
     target.parent.mkdir(exist_ok=True)

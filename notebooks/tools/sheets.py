@@ -1,12 +1,12 @@
-"""Make the exercise sheets from their solutions; for a class, make a course of nbgrader.
+"""Make the exercise sheets from their solutions, or a course of nbgrader for a class.
 
-    python notebooks/tools/sheets.py                 exercises/, and the executed copies of solutions/
-    python notebooks/tools/sheets.py --text          the same where only text has changed: nothing is executed
-    python notebooks/tools/sheets.py --class FOLDER  a course of nbgrader, its sheets ready to be handed out
+    python notebooks/tools/sheets.py                 write exercises/, and execute the copies of solutions/
+    python notebooks/tools/sheets.py --text          the same if only text has changed: execute nothing
+    python notebooks/tools/sheets.py --class FOLDER  make a course of nbgrader with its sheets
 
-The solutions are the source.  What stands between `### BEGIN SOLUTION` and `### END SOLUTION` becomes the
-stub that nbgrader makes of it, and cells that begin with "**Solution.**" are left out.  nbgrader is not among
-the packages of the workbook: `pip install nbgrader` first.
+The exercises are made from the solutions. The code between `### BEGIN SOLUTION` and `### END SOLUTION` is
+replaced by the stub of nbgrader, and cells that begin with "**Solution.**" are left out. nbgrader is not
+among the packages of the workbook: `pip install nbgrader` first.
 """
 
 import argparse
@@ -31,78 +31,80 @@ c.ExecutePreprocessor.timeout = 120
 """
 
 
-def exercise_of(solutions: str) -> str:
-    """The sheet, a percent script, without its solutions."""
+def make_exercise(solutions: str) -> str:
+    """Remove the answers from the percent script `solutions`, and return the exercise sheet."""
     return SOLVED.sub(STUB, REMARK.sub("", solutions))
 
 
-def graded(solutions: str, points: dict[str, int]) -> nbformat.NotebookNode:
-    """The sheet as a source of nbgrader: answers are cleared, checks give the points of their task."""
+def make_graded(solutions: str, points: dict[str, int]) -> nbformat.NotebookNode:
+    """Make the source of nbgrader for a sheet: answers are cleared, checks give the `points` of their task."""
     sheet = jupytext.reads(REMARK.sub("", solutions), fmt="py:percent")
     for cell, after in zip(sheet.cells, [*sheet.cells[1:], None], strict=True):
-        if after is not None and (asked := CHECK.match(after.source)):
-            cell.metadata["nbgrader"] = _marked(f"{asked[1]}-answer", solution=True)
-        if asked := CHECK.match(cell.source):
-            mark = _marked(f"{asked[1]}-check", grade=True)
-            cell.metadata["nbgrader"] = mark | {"points": points[asked[1]]}
+        if after is not None and (task := CHECK.match(after.source)):
+            cell.metadata["nbgrader"] = _nbgrader_metadata(f"{task[1]}-answer", solution=True)
+        if task := CHECK.match(cell.source):
+            mark = _nbgrader_metadata(f"{task[1]}-check", grade=True)
+            cell.metadata["nbgrader"] = mark | {"points": points[task[1]]}
             cell.source += ".require()"
     return sheet
 
 
-def _marked(name: str, *, solution: bool = False, grade: bool = False) -> dict[str, object]:
+def _nbgrader_metadata(name: str, *, solution: bool = False, grade: bool = False) -> dict[str, object]:
     mark = {"schema_version": 3, "grade_id": name, "solution": solution, "grade": grade, "locked": grade}
     return mark | {"task": False}
 
 
 def make_sheets(*, text_only: bool = False) -> None:
-    """Write the exercises, and the executed copies of the solutions; `text_only` keeps what was executed."""
+    """Write the exercises, and the executed copies of the solutions; `text_only`: execute nothing again."""
     for source in sorted(SOLUTIONS.glob("*.py")):
         print(source.stem, flush=True)
         text = source.read_text(encoding="utf-8")
         exercise = EXERCISES / source.name
-        exercise.write_text(exercise_of(text), encoding="utf-8")
-        sheet, solved = (jupytext.reads(each, fmt="py:percent") for each in (exercise_of(text), text))
-        jupytext.write(_kept(sheet, exercise) or sheet, exercise.with_suffix(".ipynb"))
-        kept = _kept(solved, source) if text_only else None
-        if kept is None:
+        exercise.write_text(make_exercise(text), encoding="utf-8")
+        sheet, solved = (jupytext.reads(each, fmt="py:percent") for each in (make_exercise(text), text))
+        jupytext.write(_copy_with_text(sheet, exercise) or sheet, exercise.with_suffix(".ipynb"))
+        copy = _copy_with_text(solved, source) if text_only else None
+        if copy is None:
             quiet = {"record_timing": False, "extra_arguments": ["--log-level=CRITICAL"]}
             NotebookClient(solved, kernel_name="python3", **quiet).execute(cwd=str(SOLUTIONS))
-        jupytext.write(kept or solved, source.with_suffix(".ipynb"))
+        jupytext.write(copy or solved, source.with_suffix(".ipynb"))
 
 
-def _kept(new: nbformat.NotebookNode, script: Path) -> nbformat.NotebookNode | None:
-    """The copy beside a script with the new text; None where its code is another, or there is none."""
+def _copy_with_text(new: nbformat.NotebookNode, script: Path) -> nbformat.NotebookNode | None:
+    """The executed copy of `script` with the text of `new`; None if there is no copy with the same code."""
     if not (file := script.with_suffix(".ipynb")).exists():
         return None
     copy = nbformat.read(file, as_version=4)
     code = [[c.source for c in each.cells if c.cell_type == "code"] for each in (copy, new)]
     if code[0] != code[1] or len(copy.cells) != len(new.cells):
         return None
-    for cell, renewed in zip(copy.cells, new.cells, strict=True):
-        cell.source = renewed.source
+    for cell, new_cell in zip(copy.cells, new.cells, strict=True):
+        cell.source = new_cell.source
     return copy
 
 
 def make_course(folder: Path) -> None:
-    """Write a course of nbgrader; nbgrader makes of it what is handed out, `release/`."""
+    """Write a course of nbgrader into `folder`; nbgrader then makes the sheets for students, `release/`."""
     from szlib.workbook.exercises import SHEETS
 
     for name, tasks in SHEETS.items():
         place = folder / "source" / name
         place.mkdir(parents=True, exist_ok=True)
         text = (SOLUTIONS / f"{name}.py").read_text(encoding="utf-8")
-        sheet = graded(text, {task.name: task.minutes for task in tasks})
+        sheet = make_graded(text, {task.name: task.minutes for task in tasks})
         jupytext.write(sheet, place / f"{name}.ipynb")
     (folder / "nbgrader_config.py").write_text(CONFIG, encoding="utf-8")
     for name in SHEETS:
         command = ["-m", "nbgrader", "generate_assignment", name, "--create", "--force"]
         subprocess.run([sys.executable, *command], cwd=folder, check=True)
-    print(f"{folder / 'release'} is ready to be handed out; graded is with `nbgrader autograde` in {folder}")
+    print(
+        f"{folder / 'release'} holds the sheets for students; grade them with `nbgrader autograde` in {folder}"
+    )
 
 
 if __name__ == "__main__":
-    asked = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    asked.add_argument("--class", dest="folder", type=Path, help="folder of the course")
-    asked.add_argument("--text", action="store_true", help="only text has changed: execute nothing")
-    given = asked.parse_args()
-    make_course(given.folder) if given.folder else make_sheets(text_only=given.text)
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--class", dest="folder", type=Path, help="folder of the course")
+    parser.add_argument("--text", action="store_true", help="only text has changed: execute nothing")
+    options = parser.parse_args()
+    make_course(options.folder) if options.folder else make_sheets(text_only=options.text)

@@ -32,17 +32,17 @@ def without_times(text: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def shell():
-    return course.shell()
+def scripts():
+    return course.make_scripts()
 
 
 # --- navigation and maps -----------------------------------------------------------------------------
 
 
-def test_navigation_and_maps_are_up_to_date(shell):
+def test_navigation_and_maps_are_up_to_date(scripts):
     stale = [
         s.name
-        for s, text in shell.items()
+        for s, text in scripts.items()
         if without_times(text) != without_times(s.read_text(encoding="utf-8"))
     ]
     assert stale == [], "python notebooks/tools/course.py"
@@ -111,7 +111,7 @@ def test_every_reference_has_a_doi_or_says_that_there_is_none():
 def test_only_the_navigation_is_replaced():
     script = "# ---\n# ---\n\n# %% [markdown]\n# # 1 - A\n\n# %%\nx = 1\n"
     navigation = f"5 min\n\n{course.HEADING}x"
-    once = course.renewed(script, {}, navigation)
+    once = course.replace_cells(script, {}, navigation)
     cell = f"# %% [markdown]\n# 5 min\n#\n# {course.HEADING}x\n\n"
     assert once == script.replace("# %%\nx", f"{cell}# %%\nx")
-    assert course.renewed(once, {}, navigation.replace("5", "10")) == once.replace("5 min", "10 min")
+    assert course.replace_cells(once, {}, navigation.replace("5", "10")) == once.replace("5 min", "10 min")

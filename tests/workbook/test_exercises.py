@@ -230,7 +230,7 @@ class TestSheet:
     def test_the_exercise_is_generated_from_the_solutions(self, sheet):
         solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
         exercise = (sheets.EXERCISES / f"{sheet}.py").read_text(encoding="utf-8")
-        assert exercise == sheets.exercise_of(solutions)
+        assert exercise == sheets.make_exercise(solutions)
         assert "SOLUTION" not in exercise
         assert exercise.count("raise NotImplementedError()") == len(SHEETS[sheet])
 
@@ -261,7 +261,7 @@ class TestSheet:
     def test_each_check_of_a_class_is_graded_and_locked(self, sheet):
         solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
         points = {task.name: task.minutes for task in SHEETS[sheet]}
-        marked = [c for c in sheets.graded(solutions, points).cells if "nbgrader" in c.metadata]
+        marked = [c for c in sheets.make_graded(solutions, points).cells if "nbgrader" in c.metadata]
         assert len(marked) == 2 * len(points)
         for answer, test in zip(marked[::2], marked[1::2], strict=True):
             assert "### BEGIN SOLUTION" in answer.source
@@ -273,7 +273,7 @@ class TestSheet:
     def test_nbgrader_makes_the_same_stubs(self, sheet):
         preprocessors = pytest.importorskip("nbgrader.preprocessors", reason="nbgrader is not installed")
         solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
-        source = sheets.graded(solutions, {task.name: task.minutes for task in SHEETS[sheet]})
+        source = sheets.make_graded(solutions, {task.name: task.minutes for task in SHEETS[sheet]})
         released = preprocessors.ClearSolutions().preprocess(source, {})[0].cells
         expected = [cell.source for cell in cells(sheets.EXERCISES / f"{sheet}.py")]
         assert [cell.source.removesuffix(".require()") for cell in released] == expected
