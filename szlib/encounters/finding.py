@@ -24,7 +24,7 @@ import pandas as pd
 from ..tracks import funnels
 from .areas import area_for
 from .geometry import ATC_SQUARE, Area
-from .kinds import REACH, kinds_of_pairs, number_people, of_kind
+from .kinds import REACH, kinds_of_pairs, of_kind
 from .occupants import TrackRows, find_occupants, occupant_changes
 from .samples import sample_windows
 from .settings import EncounterSettings
@@ -79,10 +79,8 @@ def find_encounters(
     ref, other = openings.rows[chosen], openings.other[openings.rows[chosen]]
 
     samples = sample_windows(tracks, rows.order, ref, other, settings.steps)
-    number, _ = number_people(rows.day, rows.person)
     counts = area.grown(REACH).contains(rows.x, rows.y)
-    position, velocity = (rows.x, rows.y), (rows.vx, rows.vy)
-    kind = kinds_of_pairs(number[ref], number[other], number, rows.tick, position, velocity, counts)
+    kind = kinds_of_pairs(rows.person[ref], rows.person[other], rows, counts)
     samples["kind"] = kind.repeat(settings.steps + 1)
     samples.attrs["area"] = str(area)
     n_rows, n_openings, opening = len(rows), len(openings.rows), "encounters: ticks that open a window"

@@ -30,8 +30,9 @@ import pandas as pd
 from ..checks import check_columns, check_rows
 from ..errors import DataError
 from ..tracks import funnels
-from ..tracks.clock import TICKS_PER_SECOND, clock_index
+from ..tracks.clock import TICKS_PER_SECOND
 from .areas import as_area
+from .occupants import TrackRows
 
 COMPANIONS, STANDING, SAME, OPPOSITE, CROSSING = KINDS = (
     "companions", "standing", "same direction", "opposite", "crossing",
@@ -80,19 +81,18 @@ def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, area: object =
     ['companions']
     """
     check_columns(pairs, ["day", "ref_id", "other_id"])
-    order, tick, _ = clock_index(tracks)
-    x, y, vx, vy = (tracks[name].to_numpy(float)[order] for name in ("x", "y", "vx", "vy"))
-    days, ids = tracks["day"].astype(str).to_numpy()[order], tracks["id"].to_numpy()[order]
-    person, begins = number_people(days, ids)
-    known = pd.MultiIndex.from_arrays([days[begins], ids[begins]])
+    rows = TrackRows.from_tracks(tracks)
+    people = tracks.iloc[rows.order[np.flatnonzero(np.diff(rows.person, prepend=-1))]]
+    known = pd.MultiIndex.from_arrays([people["day"].astype(str), people["id"]])
     ref, other = (
         known.get_indexer(pd.MultiIndex.from_arrays([pairs["day"].astype(str), pairs[column]]))
         for column in ("ref_id", "other_id")
     )
     expected = "not in these tracks; pass the tracks in which the pairs were found"
     check_rows(pairs, (ref >= 0) & (other >= 0), ["day", "ref_id", "other_id"], expected)
-    counts = np.ones(len(x), bool) if area is None else as_area(area).grown(REACH).contains(x, y)
-    return kinds_of_pairs(ref, other, person, tick, (x, y), (vx, vy), counts)
+    everywhere = np.ones(len(rows), bool)
+    counts = everywhere if area is None else as_area(area).grown(REACH).contains(rows.x, rows.y)
+    return kinds_of_pairs(ref, other, rows, counts)
 
 
 def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.DataFrame:
@@ -136,35 +136,18 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
     return funnels.attach(selected, [*funnels.get(samples), stage])
 
 
-def number_people(days: np.ndarray, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Number the people of rows sorted by person, from `days` and `ids` of the rows.
-
-    Returns the number of each row's person, from 0, and the first row of each person.
-    """
-    begins = np.flatnonzero(np.r_[True, (ids[1:] != ids[:-1]) | (days[1:] != days[:-1])][: len(ids)])
-    return np.repeat(np.arange(len(begins)), np.diff(np.r_[begins, len(ids)])), begins
-
-
 def kinds_of_pairs(
-    first: np.ndarray,
-    second: np.ndarray,
-    person: np.ndarray,
-    tick: np.ndarray,
-    position: tuple[np.ndarray, np.ndarray],
-    velocity: tuple[np.ndarray, np.ndarray],
-    counts: np.ndarray,
+    first: np.ndarray, second: np.ndarray, rows: TrackRows, counts: np.ndarray
 ) -> pd.Categorical:
-    """Decide the kinds of pairs of people from rows sorted by person and tick.
+    """Decide the kinds of pairs of people from the `rows` that count (`counts`, one for each row).
 
-    `first` and `second` are the numbers of the two people of each pair, (n,).  `person`, `tick`, `counts`
-    (whether the row counts), and x and y of `position` [m] and `velocity` [m/s] have shape (rows,).
+    `first` and `second` are the numbers of the two people of each pair, (n,).
     """
     pairs, index = np.unique(np.sort(np.column_stack([first, second]), axis=1), axis=0, return_inverse=True)
-    pair, a, b = _common_track(pairs, person, tick, counts)
-    apart = np.hypot(*(each[a] - each[b] for each in position))
-    relative = np.hypot(*(each[a] - each[b] for each in velocity))
-    slow = [np.hypot(*(each[rows] for each in velocity)) < WALKING for rows in (a, b)]
-    (ax, ay), (bx, by) = ([np.nan_to_num(each[rows]) for each in velocity] for rows in (a, b))
+    pair, a, b = _common_track(pairs, rows.person, rows.tick, counts)
+    apart = np.hypot(rows.x[a] - rows.x[b], rows.y[a] - rows.y[b])
+    relative = np.hypot(rows.vx[a] - rows.vx[b], rows.vy[a] - rows.vy[b])
+    (ax, ay), (bx, by) = (np.nan_to_num([rows.vx[each], rows.vy[each]]) for each in (a, b))
 
     def over_time(values: np.ndarray) -> np.ndarray:
         """Sum of the `values` of each pair over its common track."""
@@ -174,7 +157,7 @@ def kinds_of_pairs(
     together = ticks >= TOGETHER * TICKS_PER_SECOND
     together &= over_time(apart <= NEAR) >= NEAR_SHARE * ticks
     together &= over_time(relative <= EQUAL_VELOCITY) >= EQUAL_SHARE * ticks
-    stands = np.maximum(*(over_time(each) for each in slow)) > ticks / 2
+    stands = np.maximum(*(over_time(rows.speed[each] < WALKING) for each in (a, b))) > ticks / 2
     angle = np.abs(np.arctan2(over_time(ax * by - ay * bx), over_time(ax * bx + ay * by)))
     rules = [ticks == 0, together, stands, angle <= ALONG, angle >= np.pi - ALONG]
     found = [-1, *map(KINDS.index, (COMPANIONS, STANDING, SAME, OPPOSITE))]
@@ -186,7 +169,7 @@ def _common_track(
     pairs: np.ndarray, person: np.ndarray, tick: np.ndarray, counts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Every tick at which the rows of both people of a pair count: the pair's number, and the two rows."""
-    in_pair = np.zeros(person[-1] + 1 if len(person) else 0, bool)
+    in_pair = np.zeros(person[-1] + 1, bool)
     in_pair[pairs] = True
     rows = np.flatnonzero(counts & in_pair[person])
     if len(rows) == 0:

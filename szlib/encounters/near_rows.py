@@ -26,7 +26,7 @@ from . import near_rows_cache
 from .blocks import FileRows, FileSummary, UsableBlocks
 from .cells import Cells, UnsortedError, select_in_one_pass, select_in_two_passes
 from .geometry import Area
-from .kinds import REACH, number_people
+from .kinds import REACH
 from .near_rows_cache import Content
 from .occupants import TrackRows
 
@@ -41,7 +41,7 @@ def select_near_rows(tracks: pd.DataFrame, area: Area, duration: float) -> pd.Da
     of `duration` [s] or less.  The funnel counts the other rows.  Raises DataError as `find_encounters`.
     """
     rows = TrackRows.from_tracks(tracks)
-    near = is_near(rows.x, rows.y, number_people(rows.day, rows.person)[0], area, duration)
+    near = is_near(rows.x, rows.y, rows.person, area, duration)
     stage = funnels.stage("near the area", len(near), near.sum(), {"elsewhere": (~near).sum()})
     table = tracks.iloc[rows.order[near]].reset_index(drop=True)
     return funnels.attach(table, [*funnels.get(tracks), stage])
@@ -54,7 +54,7 @@ def is_near(x: np.ndarray, y: np.ndarray, person: np.ndarray, area: Area, durati
     are the rows in the area grown by `REACH` (for kinds of encounter), half a second around them (for
     velocities), and the `duration` [s] after them (both people must be tracked).
     """
-    visits = np.zeros(person[-1] + 1 if len(person) else 0, bool)
+    visits = np.zeros(person.max(initial=-1) + 1, bool)
     visits[person[area.contains(x, y)]] = True
     inside = area.grown(REACH).contains(x, y) & visits[person]
     count, row = np.r_[0, np.cumsum(inside)], np.arange(len(inside))

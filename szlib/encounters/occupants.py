@@ -25,7 +25,7 @@ class TrackRows:
     ----------
     order : position of each row in the table.
     tick, piece : number of the tick and of the gap-free piece, as from `clock_index`.
-    day, person : number of the day, and id of the person.
+    day, person : number of the day and of the person, each from 0.
     x, y : position [m].
     vx, vy : velocity [m/s], NaN where unknown.
     speed, heading : magnitude [m/s] and direction [rad] of the velocity.
@@ -48,7 +48,8 @@ class TrackRows:
         """The rows of the table `tracks`.  Raises DataError as `clock_index`."""
         order, tick, piece = clock_index(tracks)
         x, y, vx, vy = (tracks[name].to_numpy(float)[order] for name in ("x", "y", "vx", "vy"))
-        day, person = pd.factorize(tracks["day"])[0][order], tracks["id"].to_numpy()[order]
+        day, ids = pd.factorize(tracks["day"], sort=True)[0][order], tracks["id"].to_numpy()[order]
+        person = np.cumsum(np.r_[False, (np.diff(day) != 0) | (ids[1:] != ids[:-1])])
         return cls(order, tick, piece, day, person, x, y, vx, vy, np.hypot(vx, vy), np.arctan2(vy, vx))
 
     def __len__(self) -> int:

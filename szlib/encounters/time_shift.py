@@ -23,10 +23,11 @@ from scipy.spatial import cKDTree
 
 from ..errors import DataError
 from ..tracks import funnels
-from ..tracks.clock import TICKS_PER_SECOND, clock_index, to_clock
+from ..tracks.clock import TICKS_PER_SECOND, compute_velocities
 from .geometry import Area
-from .kinds import NEAR, TOGETHER, number_people
+from .kinds import NEAR, TOGETHER
 from .near_rows import is_near
+from .occupants import TrackRows
 
 MINUTES = (1.0, 10.0)
 """Shortest and longest shift [min]: longer than a meeting, shorter than the day's ups and downs (assumed)."""
@@ -96,14 +97,15 @@ class ShiftableTracks:
     @classmethod
     def from_tracks(cls, tracks: pd.DataFrame) -> ShiftableTracks:
         """Prepare the people of a track table `tracks`."""
-        order, tick, _ = clock_index(tracks)
-        table = tracks.iloc[order].reset_index(drop=True)
-        days = pd.factorize(table["day"], sort=True)[0]
-        person, begins = number_people(days, table["id"].to_numpy())
-        day_starts = np.flatnonzero(np.r_[True, days[1:] != days[:-1]])
-        first = np.minimum.reduceat(tick, day_starts)
-        period = np.maximum.reduceat(tick, day_starts) - first + 2
-        return cls(table, person, tick, days[begins], first, period, _companions(table, person, days, tick))
+        rows = TrackRows.from_tracks(tracks)
+        day_starts = np.flatnonzero(np.diff(rows.day, prepend=-1))
+        first = np.minimum.reduceat(rows.tick, day_starts)
+        period = np.maximum.reduceat(rows.tick, day_starts) - first + 2
+        table, day = (
+            tracks.iloc[rows.order].reset_index(drop=True),
+            rows.day[np.diff(rows.person, prepend=-1) > 0],
+        )
+        return cls(table, rows.person, rows.tick, day, first, period, _companions(rows))
 
     def near(self, area: Area, duration: float) -> ShiftableTracks:
         """The rows that encounters in the `area`, in windows of `duration` [s], can depend on."""
@@ -162,23 +164,18 @@ class ShiftableTracks:
         across = (self.person[1:] == self.person[:-1]) & (turns[1:] != turns[:-1])
         cut = np.isin(self.person[order], self.person[1:][across])
         if cut.any():  # within half a second of the seam the velocity is that of the end of a piece
-            raw = table.loc[cut, ["day", "id", "t", "x", "y"]]
-            raw.attrs.clear()
-            table.loc[cut, ["vx", "vy"]] = to_clock(raw, max_gap=1.5 / TICKS_PER_SECOND)[
-                ["vx", "vy"]
-            ].to_numpy()
+            table.loc[cut, ["vx", "vy"]] = compute_velocities(table[cut])
         rejected = {"on the seam of the day": len(since) - len(rows)}
         stage = funnels.stage("time shifted: ticks", len(since), len(rows), rejected)
         return funnels.attach(table, [*funnels.get(self.table), stage])
 
 
-def _companions(table: pd.DataFrame, person: np.ndarray, days: np.ndarray, tick: np.ndarray) -> np.ndarray:
+def _companions(rows: TrackRows) -> np.ndarray:
     """Pairs of people who were within `NEAR` [m] of each other for `TOGETHER` [s] or more; (n, 2)."""
-    whole = np.flatnonzero(tick % TICKS_PER_SECOND == 0)
-    second = tick[whole] // TICKS_PER_SECOND
-    moment = np.unique(np.column_stack([days[whole], second]), axis=0, return_inverse=True)[1].ravel()
-    where = table[["x", "y"]].to_numpy(float)[whole]
-    points = np.column_stack([where, 2 * NEAR * moment])  # points of two moments are never near
-    pairs = np.sort(person[whole][cKDTree(points).query_pairs(NEAR, output_type="ndarray")], axis=1)
+    whole = np.flatnonzero(rows.tick % TICKS_PER_SECOND == 0)
+    moments = np.column_stack([rows.day, rows.tick])[whole]
+    moment = np.unique(moments, axis=0, return_inverse=True)[1].ravel()
+    points = np.column_stack([rows.x[whole], rows.y[whole], 2 * NEAR * moment])  # two moments are never near
+    pairs = np.sort(rows.person[whole][cKDTree(points).query_pairs(NEAR, output_type="ndarray")], axis=1)
     pairs, seconds = np.unique(pairs, axis=0, return_counts=True)
     return np.asarray(pairs[seconds >= TOGETHER])

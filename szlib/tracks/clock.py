@@ -187,6 +187,11 @@ def _on_clock(t: np.ndarray, x: np.ndarray, y: np.ndarray, within: np.ndarray) -
     return {"row": row, "t": moment, "x": x, "y": y, "vx": vx, "vy": vy, "covered": any_tick[piece].sum()}
 
 
+def compute_velocities(tracks: pd.DataFrame) -> np.ndarray:
+    """Velocities vx, vy of rows `tracks` on the clock, from their positions, shape (n, 2) [m/s]."""
+    return to_clock(tracks, max_gap=1.5 / TICKS_PER_SECOND)[["vx", "vy"]].to_numpy()
+
+
 def nearest_tick(t: np.ndarray) -> np.ndarray:
     """Number of the clock's tick nearest to each time `t` [s], counted from t = 0."""
     return np.asarray(np.rint(t * TICKS_PER_SECOND).astype(np.int64))

@@ -27,7 +27,7 @@ import pandas as pd
 
 from ..errors import DataError, DataWarning
 from . import funnels
-from .clock import COLUMNS, TICKS_PER_SECOND, clock_index, nearest_tick, to_clock
+from .clock import COLUMNS, TICKS_PER_SECOND, clock_index, compute_velocities, nearest_tick
 
 if TYPE_CHECKING:
     from pedpy import TrajectoryData
@@ -58,7 +58,7 @@ def check_tracks(tracks: pd.DataFrame) -> None:
     ...
     szlib.errors.DataError: row 4 is out of order; expected rows sorted by day, id, t
     """
-    order, tick, piece = clock_index(tracks)
+    order = clock_index(tracks)[0]
     if (order != np.arange(len(order))).any():
         at = int(np.flatnonzero(order != np.arange(len(order)))[0])
         raise DataError(f"row {tracks.index[at]} is out of order; expected rows sorted by day, id, t")
@@ -66,7 +66,7 @@ def check_tracks(tracks: pd.DataFrame) -> None:
         raise DataError(f"columns are {list(tracks.columns)}; expected {COLUMNS} first, in this order")
     if not pd.api.types.is_integer_dtype(tracks["id"]):
         raise DataError(f"id is {tracks['id'].dtype}; expected whole numbers")
-    _check_velocities(tracks, tick, piece)
+    _check_velocities(tracks)
     stages = funnels.get(tracks)
     if not stages:
         raise DataError('the table has no funnel; expected its stages in .attrs["funnel"]')
@@ -74,11 +74,9 @@ def check_tracks(tracks: pd.DataFrame) -> None:
         funnels.stage(stage["stage"], stage["entered"], stage["kept"], stage["rejected"])
 
 
-def _check_velocities(tracks: pd.DataFrame, tick: np.ndarray, piece: np.ndarray) -> None:
+def _check_velocities(tracks: pd.DataFrame) -> None:
     """Raise DataError where velocity is not the displacement over +-0.5 s within its piece."""
-    raw = tracks[["day", "id", "t", "x", "y"]].copy()
-    raw.attrs.clear()
-    expected = to_clock(raw, max_gap=1.5 / TICKS_PER_SECOND)[["vx", "vy"]].to_numpy()
+    expected = compute_velocities(tracks)
     wrong = ~np.isclose(
         tracks[["vx", "vy"]].to_numpy(float), expected, rtol=0, atol=_TOLERANCE, equal_nan=True
     )
