@@ -11,6 +11,7 @@ import numpy as np
 import polars as pl
 
 from ..tracks.formats import TrackFormat
+from ..tracks.readers import reject_rows
 
 _BLOCK_ROWS = 1 << 17
 """Rows of one block [about 5 minutes of a raw day]."""
@@ -97,17 +98,10 @@ class UsableBlocks:
 
     def _usable(self, block: pl.DataFrame, read: int) -> FileRows:
         """The usable rows of a block; counts the others."""
-        rows = _as_numbers(block)
-        if self._all_usable(block, rows):
-            return rows
-        lines = block.with_row_index("line", offset=read + 1)
-        lines = lines.with_columns(reason=self.layout.rejection_reason())
-        bad = lines.filter(pl.col("reason").is_not_null())
-        if bad.height:
-            first = self.summary.first_fault
-            self.summary.first_fault = first or bad.select("line", "reason").row(0)
-            self.summary.reasons.update(dict(bad.group_by("reason", maintain_order=True).len().iter_rows()))
-        return rows.take(np.flatnonzero(lines["reason"].is_null().to_numpy()))
+        good, reasons, first = reject_rows(block.with_row_index("line", offset=read + 1), self.layout)
+        self.summary.first_fault = self.summary.first_fault or first
+        self.summary.reasons.update(reasons)
+        return _as_numbers(good)
 
 
 def _batches(scan: pl.LazyFrame) -> Iterator[pl.DataFrame]:

@@ -50,13 +50,11 @@ class DataSet:
     url : folder of the files.
     hashes : hash by file name.
     hash_file : computes the hash of a file.
-    hash_name : what the hash is called.
     """
 
     url: str
     hashes: dict[str, str]
     hash_file: Callable[[str], str]
-    hash_name: str
 
 
 def _read_hashes(name: str) -> dict[str, str]:
@@ -71,14 +69,12 @@ DATA_SETS = {
         "1b44eb4f1be13a669d0b8349d4c71dbb8711078e/dataset/atc/split_data_random/",
         _read_hashes("atc-1hz"),
         pooch.file_hash,
-        "SHA-256",
     ),
     "atc-10-days": DataSet(
         "https://raw.githubusercontent.com/test-bai-cpu/LaCE-LHMP/"
         "ef93d1265ab26cb0a3084dc2e267579b11614607/atc_data/middle_area/",
         _read_hashes("atc-10-days"),
         git_blob_id,
-        "git blob id",
     ),
 }
 """Data sets by name."""
@@ -172,8 +168,7 @@ def _verify(file: Path, data: DataSet) -> Path:
         )
     if (found := data.hash_file(str(file))) != (expected := data.hashes[file.name]):
         raise DataError(
-            f"{file}: {data.hash_name} is {found}, expected {expected}; the file is damaged or of another "
-            "version"
+            f"{file}: its hash is {found}, expected {expected}; the file is damaged or of another version"
         )
     return file
 
@@ -185,23 +180,18 @@ def _expand(name: str | Path) -> list[Path]:
         if path.is_dir():
             found = [file for file in path.iterdir() if not file.name.startswith(".")]
         elif path.exists() or path.is_symlink():
-            if not path.is_file():
-                raise DataError(
-                    f"{printable(name)}: is no regular file (or leads nowhere); only those are read"
-                )
-            return [path]
+            found = [path]
         else:
             found = list(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
     except (OSError, ValueError, NotImplementedError, IndexError, re.error) as error:
-        if isinstance(error, DataError):
-            raise
         raise DataError(
             f"{printable(name)}: cannot be looked up ({error}); expected {_NAMED}, or paths"
         ) from error
     files = sorted(file for file in found if file.is_file())
     if not files:
+        reason = "is no regular file (or leads nowhere)" if found else "no such file"
         raise DataError(
-            f"{printable(name)}: no such file; expected {_NAMED}, or a file, folder or glob of tracks"
+            f"{printable(name)}: {reason}; expected {_NAMED}, or a file, folder or glob of tracks"
         )
     others = sum(not file.is_file() and not (path.is_dir() and file.is_dir()) for file in found)
     if others:

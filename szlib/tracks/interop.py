@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from scipy.cluster.hierarchy import DisjointSet
 
 from ..errors import DataError, DataWarning
 from . import funnels
@@ -120,7 +121,7 @@ def read_groups(path: str | Path) -> pd.DataFrame:
         raise DataError(
             f"{path}: cannot be read as groups ({error}); expected ids, a group a line"
         ) from error
-    groups: list[dict[int, None]] = []
+    groups: DisjointSet = DisjointSet()
     joined = []
     for number, line in enumerate(lines, start=1):
         fields = line.split()
@@ -128,16 +129,12 @@ def read_groups(path: str | Path) -> pd.DataFrame:
             continue
         if not all(field.isdecimal() for field in fields) or len(set(fields)) < 2:
             raise DataError(f"{path}, line {number}: {line[:80]!r} is no group; expected two or more ids")
-        group = dict.fromkeys(map(int, fields))
-        shared = [known for known in groups if not known.keys().isdisjoint(group)]
-        if shared:
+        people = list(map(int, fields))
+        if any(person in groups for person in people):
             joined.append(number)
-            for other in shared[1:]:
-                shared[0] |= other
-                groups.remove(other)
-            shared[0] |= group
-        else:
-            groups.append(group)
+        for person in people:
+            groups.add(person)
+            groups.merge(people[0], person)
     if joined:
         where = ", ".join(map(str, joined))
         warnings.warn(
@@ -145,8 +142,9 @@ def read_groups(path: str | Path) -> pd.DataFrame:
             DataWarning,
             stacklevel=2,
         )
-    rows = [(number, person) for number, group in enumerate(groups) for person in group]
-    return pd.DataFrame(rows, columns=["group", "id"]).astype("int64")
+    ids = list(groups)
+    table = pd.DataFrame({"group": pd.factorize(np.array([groups[person] for person in ids]))[0], "id": ids})
+    return table.astype("int64").sort_values("group", kind="stable", ignore_index=True)
 
 
 def to_pedpy(tracks: pd.DataFrame) -> TrajectoryData:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from zoneinfo import ZoneInfo
 
+import polars as pl
+
 from ..errors import DataError
 
 Columns = Mapping[str, str | int]
@@ -89,5 +91,6 @@ class ReadOptions:
             raise DataError(f"max_gap must be longer than the clock's 0.1 s; got {self.max_gap}")
         try:
             ZoneInfo(self.tz)
-        except (KeyError, ValueError, OSError) as error:
+            pl.select(pl.from_epoch(pl.lit(0)).dt.convert_time_zone(self.tz))
+        except (KeyError, ValueError, OSError, pl.exceptions.PolarsError) as error:
             raise DataError(f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'") from error

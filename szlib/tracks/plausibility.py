@@ -119,11 +119,10 @@ def check_people(rows: pl.DataFrame, layout: TrackFormat, path: Path, *, is_unit
     is_unit_given : whether the user has given the unit; then a DataWarning is enough, as where people may
         just all be standing.
     """
-    seen = _convert(rows, layout)
-    found = measure_motion(seen)
+    found = measure_motion(_convert(rows, layout))
     if found is None or not (found.fault or found.irregularity > _REGULAR):
         return
-    advice = _suggest(seen, layout)
+    advice = suggest_reading(rows, layout)
     if not (found.fault or advice):
         return  # people may be seen at irregular times
     fault = found.fault or "people are seen at irregular times"
@@ -135,8 +134,13 @@ def check_people(rows: pl.DataFrame, layout: TrackFormat, path: Path, *, is_unit
 
 
 def suggest_reading(rows: pl.DataFrame, layout: TrackFormat) -> str:
-    """Advice for a table of which most `rows` are rejected as `layout`; empty where no reading fits."""
-    return _suggest(_convert(rows, layout), layout)
+    """Advice for the first other reading of `rows`, read as `layout`, in which people walk; empty if none."""
+    seen = _convert(rows, layout)
+    for reading, advice in _readings(seen):
+        found = measure_motion(reading)
+        if found is not None and found.is_walking:
+            return advice
+    return _suggest_columns(seen, layout)
 
 
 def check_unit(rows: pl.DataFrame, layout: TrackFormat, path: Path) -> None:
@@ -162,34 +166,17 @@ def _convert(rows: pl.DataFrame, layout: TrackFormat) -> np.ndarray:
     return np.asarray(first * np.array([[layout.seconds], [1.0], [layout.metres], [layout.metres]]))
 
 
-def _suggest(rows: np.ndarray, layout: TrackFormat) -> str:
-    """Advice for the first other reading of rows (4, n) in which people walk; empty where there is none."""
-    for reading, advice in _readings(rows):
-        found = measure_motion(reading)
-        if found is not None and found.is_walking:
-            return advice
-    return _suggest_columns(rows, layout)
-
-
 def _readings(rows: np.ndarray) -> Iterator[tuple[np.ndarray, str]]:
     """Other readings of rows (4, n), the likeliest first, each with its advice."""
     t, person, x, y = rows[:, np.isfinite(rows).all(axis=0)]
     for unit, name, factor in (("mm", "millimetres", 1e-3), ("cm", "centimetres", 1e-2)):
         yield np.array([t, person, x * factor, y * factor]), f"positions look like {name}: pass unit={unit!r}"
-    yield (
-        np.array([t / 1000, person, x, y]),
-        "times look like milliseconds: divide them by 1000",
-    )
+    yield np.array([t / 1000, person, x, y]), "times look like milliseconds: divide them by 1000"
     if (t % 1 == 0).all():
-        yield (
-            np.array([t / _FRAMES, person, x, y]),
-            "times look like numbers of frames: pass columns={'frame': 't'} and frame_rate=, frames a second",
-        )
+        advice = "pass columns={'frame': 't'} and frame_rate=, frames a second"
+        yield np.array([t / _FRAMES, person, x, y]), f"times look like numbers of frames: {advice}"
     project = "project them to metres first: x = 111320 cos(lat) (lon - lon0), y = 111320 (lat - lat0)"
-    for one, other, names in (
-        (x, y, "longitude and latitude"),
-        (y, x, "latitude and longitude"),
-    ):
+    for one, other, names in ((x, y, "longitude and latitude"), (y, x, "latitude and longitude")):
         if (np.abs(one) <= 180).all() and (np.abs(other) <= 90).all():
             east, north = one * _DEGREE * np.cos(np.radians(other)), other * _DEGREE
             yield np.array([t, person, east, north]), f"positions look like degrees of {names}: {project}"

@@ -124,17 +124,28 @@ def _read_file(source: Any, path: Path, options: ReadOptions) -> LoadedFile:
     else:
         with open_file(path, options, is_whole=True) as (layout, scan, _):
             rows = scan.collect()
-    rows = rows.with_columns(reason=layout.rejection_reason())
-    bad, good = rows.filter(pl.col("reason").is_not_null()), rows.filter(pl.col("reason").is_null())
-    reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
-    first = bad.select("line", "reason").row(0) if bad.height else None
-    hint = suggest_reading(rows, layout) if layout.is_ambiguous and bad.height > good.height else ""
+    good, reasons, first = reject_rows(rows, layout)
+    hint = suggest_reading(rows, layout) if layout.is_ambiguous and 2 * good.height < rows.height else ""
     stage = read_stage(path, layout, good.height, reasons, first, hint)
     if layout.is_ambiguous:
         check_people(good, layout, path, is_unit_given=options.unit is not None)
     if options.unit is None:
         check_unit(good, layout, path)
     return LoadedFile(path, layout.to_metres(good, path, options.tz), [stage], layout)
+
+
+def reject_rows(
+    rows: pl.DataFrame, layout: TrackFormat
+) -> tuple[pl.DataFrame, dict[str, int], tuple[int, str] | None]:
+    """The usable `rows` of a file in this `layout`.
+
+    Also returns the number of the other rows by reason, and line and reason of the first one.
+    """
+    rows = rows.with_columns(reason=layout.rejection_reason())
+    bad = rows.filter(pl.col("reason").is_not_null())
+    reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
+    first = bad.select("line", "reason").row(0) if bad.height else None
+    return rows.filter(pl.col("reason").is_null()), reasons, first
 
 
 def read_stage(

@@ -100,7 +100,7 @@ def test_ten_days_are_read_from_a_data_folder(served_days, tmp_path, monkeypatch
     monkeypatch.setenv(datasets.DATA_DIR_VARIABLE, str(tmp_path / "data"))
     assert datasets.find("atc-10-days") == [folder / "1024.csv", folder / "1028.csv"]
     (folder / "1028.csv").write_text("damaged")
-    with pytest.raises(DataError, match=r"1028\.csv: git blob id is .* expected"):
+    with pytest.raises(DataError, match=r"1028\.csv: its hash is .* expected"):
         datasets.find("atc-10-days")
 
 
@@ -140,7 +140,7 @@ def test_a_data_folder_is_used_and_verified(tmp_path, monkeypatch):
     change(monkeypatch, "atc-1hz", hashes={"a.csv": sha256(folder / "a.csv")})
     assert datasets.find("atc-1hz") == [folder / "a.csv"]
     (folder / "a.csv").write_text("other")
-    with pytest.raises(DataError, match=r"a\.csv: SHA-256 is .* expected"):
+    with pytest.raises(DataError, match=r"a\.csv: its hash is .* expected"):
         datasets.find("atc-1hz")
     (folder / "a.csv").unlink()
     with pytest.raises(DataError, match=r"a\.csv: no such file; \$SZLIB_DATA_DIR"):

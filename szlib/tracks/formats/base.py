@@ -148,13 +148,8 @@ class TrackFormat:
         if "day" not in good.columns:
             last = good["t"].max()
             is_named = self.is_sequence or (isinstance(last, float) and last * self.seconds < CALENDAR_BEGINS)
-            try:
-                day = pl.lit(file_stem(path)) if is_named else _find_days(good["t"], tz)
-                good = good.with_columns(day=day)
-            except pl.exceptions.PolarsError as error:
-                raise DataError(
-                    f"unknown time zone {tz!r} ({error}); expected one like 'Asia/Tokyo'"
-                ) from error
+            day = pl.lit(file_stem(path)) if is_named else _find_days(good["t"], tz)
+            good = good.with_columns(day=day)
         units = {"t": self.seconds, "x": self.metres, "y": self.metres}
         numbers = (pl.col(name) if unit == 1 else pl.col(name) * unit for name, unit in units.items())
         return good.select("day", pl.col("id").cast(pl.Int64), *numbers)

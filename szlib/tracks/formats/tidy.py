@@ -52,14 +52,13 @@ class _TidyText(TrackFormat):
         """
         given = dict(options.columns or {})
         has_frames = "frame" in given or ("t" not in given and "t" not in names and "frame" in names)
-        wanted = {name: given.get(name, name) for name in ("id", "x", "y")}
-        wanted["t"] = given.get("frame", "frame") if has_frames else given.get("t", "t")
+        time = "frame" if has_frames else "t"
+        wanted = {"t": given.get(time, time)} | {name: given.get(name, name) for name in ("id", "x", "y")}
         if "day" in given or "day" in names:
             wanted["day"] = given.get("day", "day")
         numbered = {name: k for name, k in wanted.items() if isinstance(k, int)}
         texts = {name: str(k) for name, k in wanted.items() if not isinstance(k, int)}
-        order = [name for name in ("t", "id", "x", "y", "day") if name in texts]
-        if missing := [texts[name] for name in order if texts[name] not in names]:
+        if missing := [text for text in texts.values() if text not in names]:
             raise DataError(
                 f"{where} has no column {', '.join(missing)}; name the right ones with "
                 f"columns={{'t': ..., 'id': ..., 'x': ..., 'y': ...}}; {EXPECTED}"
