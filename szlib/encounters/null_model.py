@@ -136,14 +136,9 @@ def null_encounters(
         for part in run_tasks([joblib.delayed(find)(batch) for batch in batches], n_jobs=n_jobs):
             found |= part
             bar.update(len(part))
-    made_by: dict[str, Any] = {
-        "shifts": shifts,
-        "seed": seed,
-        "minutes": list(minutes),
-        "companions": companions,
-    }
-    made_by |= {"kinds": kinds, **settings.as_json()}
-    return NullEncounters(*_concatenate(found), shifts, float(r_max), made_by)
+    made_by = {"shifts": shifts, "seed": seed, "minutes": list(minutes), "companions": companions}
+    parameters = {**made_by, "kinds": kinds, **settings.as_json()}
+    return NullEncounters(*_concatenate(found), shifts, float(r_max), parameters)
 
 
 def _find_shifted(
@@ -171,15 +166,11 @@ def _find_shifted(
 
 def _concatenate(found: dict[int, tuple[pd.DataFrame, pd.DataFrame]]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Samples and encounters of all shifts, numbered consecutively; their funnels are added up."""
-    parts = [found[k] for k in sorted(found)]
-    first = np.cumsum(
-        [0, *(1 + encounters["encounter"].to_numpy().max(initial=-1) for _, encounters in parts)]
-    )
-    tables = [
-        pd.concat(
-            [part.assign(encounter=part["encounter"] + n) for part, n in zip(side, first, strict=False)]
-        )
-        for side in zip(*parts, strict=True)
-    ]
-    samples, encounters = (table.reset_index(drop=True) for table in tables)
-    return funnels.attach(samples, funnels.add([funnels.get(part) for part, _ in parts])), encounters
+    first, samples, encounters = 0, [], []
+    for _, (close, every) in sorted(found.items()):
+        samples.append(close.assign(encounter=close["encounter"] + first))
+        encounters.append(every.assign(encounter=every["encounter"] + first))
+        first += 1 + every["encounter"].to_numpy().max(initial=-1)
+    stages = funnels.add([funnels.get(part) for part in samples])
+    table = funnels.attach(pd.concat(samples, ignore_index=True), stages)
+    return table, pd.concat(encounters, ignore_index=True)

@@ -55,7 +55,7 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
     found = list(files)
     if len(files) < 2:
         return found
-    _check_sequences(files)
+    check_names([file_stem(file.path) for file in files if file.layout.is_sequence])
     names = name_recordings([file.path for file in files])
     has_text_day = [file.rows["day"].dtype == pl.String for file in files]
     is_named = [
@@ -135,11 +135,10 @@ def find_day(path: Path, options: ReadOptions) -> str | None:
         return None
 
 
-def _check_sequences(files: Sequence[LoadedFile]) -> None:
-    """Raise DataError where two EWAP files of one name would become one day."""
-    names = [file_stem(file.path) for file in files if file.layout.is_sequence]
+def check_names(names: Sequence[str]) -> None:
+    """Raise DataError where two files of one name in `names` would become one day."""
     if doubled := sorted({name for name in names if names.count(name) > 1}):
         raise DataError(
-            f"several EWAP files are called {', '.join(doubled)}: their people would be mixed; "
+            f"several files are called {', '.join(doubled)}: their people would be mixed; "
             "pass each file once, and rename those that are other recordings"
         )

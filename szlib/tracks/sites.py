@@ -32,6 +32,7 @@ from ..errors import DataError
 from . import funnels
 from .clock import to_clock
 from .options import ReadOptions
+from .recordings import check_names
 
 GRAND_CENTRAL_RATE = 25.0
 """Frames a second of the video of Grand Central; every 20th is annotated."""
@@ -128,8 +129,7 @@ def read_edinburgh(
     if not files:
         raise DataError("no file of Edinburgh was given; pass at least one path")
     ReadOptions(frame_rate=frame_rate)  # checks the rate
-    if doubled := sorted({file.stem for file in files if [each.stem for each in files].count(file.stem) > 1}):
-        raise DataError(f"several files are called {', '.join(doubled)}: their people would be mixed")
+    check_names([file.stem for file in files])
     parts, n_repeated = zip(*(_read_edinburgh_file(file, frame_rate) for file in files), strict=True)
     name = files[0].name if len(files) == 1 else f"{len(files)} files"
     reasons = {"a blob of an earlier track": sum(n_repeated)}

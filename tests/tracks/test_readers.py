@@ -157,7 +157,7 @@ def test_ewap_files_of_one_name_are_refused(tmp_path: Path) -> None:
     for name in ("eth", "hotel"):
         (tmp_path / name).mkdir()
         paths.append(write(tmp_path / name / "obsmat.txt", as_ewap(samples())))
-    with pytest.raises(szlib.DataError, match="several EWAP files are called obsmat"):
+    with pytest.raises(szlib.DataError, match="several files are called obsmat"):
         read_raw(paths)
     assert set(read_raw([paths[0], write(tmp_path / "hotel.txt", as_ewap(samples()))])["day"]) == {
         "obsmat",
