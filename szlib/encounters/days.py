@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -220,17 +221,17 @@ def extract_day(
     row, folder = _row(day, files, status="failed"), Path(out)
     try:
         with file_contents(files) as contents:
-            samples, status = None, "kept"
-            if (folder / f"{day}.parquet").is_file():
-                samples = load_day(folder, day, describe_source(files, contents, settings, options))
+            describe = partial(describe_source, files, contents, settings, options)
+            is_stored, status = (folder / f"{day}.parquet").is_file(), "kept"
+            samples = load_day(folder, day, describe()) if is_stored else None
             if samples is None:
                 status = "done"
                 with warnings.catch_warnings():  # the table and the funnel count the rejected rows
                     warnings.simplefilter("ignore", DataWarning)
                     paths = [Path(file) for file in files]
                     samples = find_encounters_in_files(paths, settings, options, contents)
-                store_day(folder, day, samples, describe_source(files, contents, settings, options))
-            row["source"] = describe_source(files, contents, settings, options)
+                store_day(folder, day, samples, describe())
+            row["source"] = describe()
         read = [stage for stage in funnels.get(samples) if stage["stage"].startswith("read ")]
         row |= {
             "status": status,

@@ -99,7 +99,7 @@ class _Openings:
     ----------
     rows : the ticks at which an encounter may open.
     other : row of one person in the space of each row; -1 if the space is empty.
-    one, several : whether one person, or more, are in the space.
+    people : number of other people in the space of each row.
     space_inside : whether the corners of the space are inside the area.
     ready : whether they are, and the reference pedestrian is fast enough.
     reasons : number of rejected ticks, by reason.
@@ -107,8 +107,7 @@ class _Openings:
 
     rows: np.ndarray
     other: np.ndarray
-    one: np.ndarray
-    several: np.ndarray
+    people: np.ndarray
     space_inside: np.ndarray
     ready: np.ndarray
     reasons: dict[str, int]
@@ -141,7 +140,7 @@ def _find_openings(rows: TrackRows, area: Area, settings: EncounterSettings) -> 
             (f"other person nearer than {settings.min_distance} m", far),
         ],
     )
-    return _Openings(found, other, one, people > 1, space_inside, ready, reasons)
+    return _Openings(found, other, people, space_inside, ready, reasons)
 
 
 def _find_windows(
@@ -153,7 +152,8 @@ def _find_windows(
     tracked = np.ones(len(first), bool)
     for start, end in ((first, last), (partner, partner_last)):
         tracked &= (rows.piece[end] == rows.piece[start]) & (rows.tick[end] - rows.tick[start] == steps)
-    third_person = occupant_changes(rows, openings.other, openings.one) | openings.several
+    one = openings.people == 1
+    third_person = occupant_changes(rows, openings.other, one) | (openings.people > 1)
     conditions = [
         ("a track ends within the window", tracked),
         ("a corner leaves the area within the window", _holds_throughout(openings.space_inside, first, last)),
@@ -161,8 +161,7 @@ def _find_windows(
         ("somebody else enters the space", _holds_throughout(~third_person, first + 1, last)),
     ]
     if settings.throughout:
-        stays = _holds_throughout(openings.one, first, last)
-        conditions.append(("the other person leaves the space", stays))
+        conditions.append(("the other person leaves the space", _holds_throughout(one, first, last)))
     valid = np.logical_and.reduce([condition for _, condition in conditions])
     conditions.append(("overlaps an earlier window", _drop_overlaps(first, valid, steps)))
     return _apply_conditions(np.arange(len(first)), conditions)

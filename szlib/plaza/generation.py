@@ -249,11 +249,8 @@ def _is_possible(
     velocity = velocity + swerve * until
     x, y = position[:, 0].T
     is_in_view = (x >= MARGIN) & (x <= SPACE.length - MARGIN) & (np.abs(y) <= SPACE.width / 2 - MARGIN)
-    pace, is_standing, is_respectful = (
-        np.linalg.norm(velocity, axis=-1),
-        plan == "standing",
-        plan != "intruder",
-    )
+    pace = np.linalg.norm(velocity, axis=-1)
+    is_standing, is_respectful = plan == "standing", plan != "intruder"
     is_fast_enough = (pace >= MIN_WALKING_SPEED) | is_standing[:, None]
     has_walking_speed = ((pace <= settings.max_speed) & is_fast_enough).all(axis=1)
     possible = is_in_view & (np.hypot(x, y) >= 1 + MARGIN) & has_walking_speed

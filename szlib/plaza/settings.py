@@ -134,12 +134,8 @@ class PlazaSettings:
 
 def _check_convex(settings: PlazaSettings) -> None:
     """Raise ZoneError unless the midpoint of any two free points (x', y', speed) is free too."""
-    unit, speed = (
-        unit_vectors(np.linspace(0, 2 * np.pi, 90, endpoint=False)),
-        np.linspace(*settings.speeds, 3),
-    )
-    shape = (len(speed), len(unit))
-    speed, unit = np.repeat(speed, shape[1]), np.tile(unit, (shape[0], 1))
+    directions = unit_vectors(np.linspace(0, 2 * np.pi, 90, endpoint=False))
+    speed, unit = np.repeat(np.linspace(*settings.speeds, 3), 90), np.tile(directions, (3, 1))
     reach = _zone_reach(settings, unit, speed)
     if not (reach < R_MAX).all():
         raise ZoneError(
@@ -150,11 +146,8 @@ def _check_convex(settings: PlazaSettings) -> None:
     middle, between = (free[:, None] + free) / 2, (speed[:, None] + speed) / 2
     distance = np.linalg.norm(middle, axis=-1)
     middle = np.where(distance[..., None] > 0, middle, [1.0, 0.0])
-    excess = (
-        distance
-        + _zone_reach(settings, middle / np.linalg.norm(middle, axis=-1, keepdims=True), between)
-        - R_MAX
-    )
+    direction = middle / np.linalg.norm(middle, axis=-1, keepdims=True)
+    excess = distance + _zone_reach(settings, direction, between) - R_MAX
     if excess.max() > _MAX_BULGE:
         raise ZoneError(
             f"{settings.slow_zone}, {settings.fast_zone}: no hull finds this zone, because the space "

@@ -234,11 +234,11 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
             "bring the table to the clock with szlib.tracks.clock.to_clock"
         )
     person = _person_codes(tracks)
-    order = _order(person, tick)
+    order = np.arange(len(person)) if is_sorted(person, tick) else np.lexsort((tick, person))
     tick, person = tick[order], person[order]
     same = person[1:] == person[:-1]
-    if (same & (tick[1:] == tick[:-1])).any():
-        row = order[int(np.flatnonzero(same & (tick[1:] == tick[:-1]))[0])]
+    if (doubled := same & (tick[1:] == tick[:-1])).any():
+        row = order[int(np.flatnonzero(doubled)[0])]
         raise DataError(f"person {tracks['id'].iloc[row]} has two rows at t = {t[row]} s; keep one of them")
     piece = np.r_[0, np.cumsum(~(same & (np.diff(tick) == 1)))]
     return order, tick, piece
@@ -304,8 +304,3 @@ def _person_codes(frame: pd.DataFrame) -> np.ndarray:
     day = pd.factorize(days[begins], sort=True)[0].astype(np.int64)
     person, people = pd.factorize(ids[begins], sort=True)
     return np.repeat(day * len(people) + person, np.diff(begins, append=len(ids)))
-
-
-def _order(person: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Row order by person, then time; a sorted table is not sorted again."""
-    return np.arange(len(person)) if is_sorted(person, time) else np.lexsort((time, person))

@@ -93,16 +93,9 @@ def summarise_people(path: str | Path) -> pd.DataFrame:
     """
     time = pl.col("t")
     with open_file(Path(path), ReadOptions()) as (layout, scan, _):
-        summary = (
-            _usable_rows(layout, scan)
-            .group_by("id")
-            .agg(
-                first_seen=time.min(),
-                last_seen=time.max(),
-                longest_gap=time.sort().diff().max(),
-                rows=pl.len(),
-            )
-        )
+        people = _usable_rows(layout, scan).group_by("id")
+        gap = time.sort().diff().max()
+        summary = people.agg(first_seen=time.min(), last_seen=time.max(), longest_gap=gap, rows=pl.len())
         return summary.sort("id").collect(engine="streaming").to_pandas()
 
 
