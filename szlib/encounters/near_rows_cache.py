@@ -62,7 +62,7 @@ def load(size: int, selection: dict[str, Any], content: Content) -> tuple[FileRo
 def _unpack(entry: bytes) -> tuple[FileRows, FileSummary]:
     with pq.ParquetFile(io.BytesIO(entry)) as file:  # column by column, to save memory
         summary = json.loads(file.schema_arrow.metadata[b"summary"])
-        columns = [file.read([name])[name].to_numpy() for name in FileRows._fields]
+        columns = [file.read([name])[name].to_numpy().copy() for name in FileRows._fields]
     first = tuple(summary["first_fault"]) if summary["first_fault"] else None
     reasons = Counter(summary["reasons"])
     return FileRows(*columns), FileSummary(**summary | {"reasons": reasons, "first_fault": first})
