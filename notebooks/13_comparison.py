@@ -60,7 +60,7 @@ parameters(
         ("walls", WORLDS.walls, ASSUMED, "share of worlds that have some"),
         ("least h at the start", WORLDS.min_h, ASSUMED, "outside every zone that is compared"),
         ("Hall's radius", comparisons.HALL_PERSONAL, ASSUMED, "far end of the personal distance [m]"),
-        ("Kirby's walking speed", comparisons.KIRBY_PACE, ASSUMED, "that of the people [m/s]"),
+        ("Kirby's walking speed", comparisons.KIRBY_SPEED, ASSUMED, "that of the people [m/s]"),
     ]
 )
 

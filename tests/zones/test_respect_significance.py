@@ -49,7 +49,7 @@ def test_noninteracting_crowd_shows_no_respect() -> None:
     """notebooks/tables/15_nobody.csv has 100 seeds."""
     p = []
     for seed in range(6):
-        tracks = noninteracting_crowd(seed=seed, people=300, minutes=20)
+        tracks = noninteracting_crowd(seed=seed, people=600, minutes=40)
         null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
         p.append(null_test(szlib.find_encounters(tracks), null, fit_null_radii=False).p_value)
     assert np.sum(np.array(p) <= 0.05) <= 1  # 2 and more of 6: 3 %
