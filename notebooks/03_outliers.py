@@ -69,12 +69,7 @@ parameters(
             MEASURED,
             "1 % miss crowds of intruders, 5 % those who come less near",
         ),
-        (
-            "factor of an outlier",
-            f"> {outliers.OUTLIER_FACTOR:g}",
-            MEASURED,
-            "at the edge of a zone: up to 1.7",
-        ),
+        ("factor of an outlier", f"> {outliers.OUTLIER_FACTOR:g}", MEASURED, "at a zone's edge: up to 1.7"),
         ("features", "x', y'", ASSUMED, "speed would need a scale: metres for a difference of 1 m/s"),
     ]
 )

@@ -48,9 +48,12 @@ class ForkingProvisioner(LocalProvisioner):
         context = get_context("forkserver")
         context.set_forkserver_preload(_PRELOADED)
         self.cwd = Path(options.get("cwd") or ".").absolute()
-        process = _KernelProcess(
-            context.Process(target=_serve, args=(cmd[3:], options["env"], str(self.cwd)))
-        )
+        try:
+            process = _KernelProcess(
+                context.Process(target=_serve, args=(cmd[3:], options["env"], str(self.cwd)))
+            )
+        except OSError:  # the path of the temporary folder is too long for a socket
+            return await super().launch_kernel(cmd, **options)
         self.process = process  # type: ignore[assignment]
         self.pid = self.pgid = process.pid  # it leads a session of its own
         return self.connection_info
