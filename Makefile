@@ -28,7 +28,7 @@ test: $(INSTALLED)  ## style, types, and every test
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 # root, as in most containers, must be allowed to; there too: make lab LAB_FLAGS="--allow-root --no-browser --ip=0.0.0.0"
 LAB_FLAGS ?= $(if $(filter 0,$(shell id -u 2>/dev/null)),--allow-root)
