@@ -7,6 +7,7 @@ import inspect
 import re
 import subprocess
 import sys
+import tomllib
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -97,6 +98,19 @@ def test_the_top_level_is_fixed() -> None:
         "CHANGELOG.md", "CITATION.cff", "Makefile", "README.md", "environment.lock", "notebooks",
         "pyproject.toml", "szlib", "tests",
     }  # fmt: skip
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    root = PACKAGE.parent
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = (root / "CITATION.cff").read_text(encoding="utf-8")
+    changes = (root / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert project["version"] == szlib.__version__
+    assert f"\nversion: {szlib.__version__}\n" in citation
+    released = re.search(r"\n## (\S+) - (\d{4}-\d\d-\d\d)\n", changes)
+    assert released is not None
+    assert released.group(1) == szlib.__version__
+    assert f"\ndate-released: {released.group(2)}\n" in citation
 
 
 def test_names_of_test_modules_are_unique() -> None:

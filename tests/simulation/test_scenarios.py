@@ -1,5 +1,6 @@
 """The four scenarios of the paper, their claims, and the metrics of a run."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -262,6 +263,16 @@ def test_a_log_is_saved_and_loaded_unchanged(logs, name, tmp_path):
     assert np.array_equal(back.predicted, log.predicted) and np.array_equal(back.residual, log.residual)
     assert (back.settings, back.zones) == (log.settings, log.zones)
     assert back.scenario.claims == ()
+
+
+def test_a_log_of_another_version_of_szlib_is_loaded(logs, tmp_path):
+    log = logs["passing"]
+    log.save(tmp_path / "run")
+    file = tmp_path / "run.json"
+    content = json.loads(file.read_text(encoding="utf-8"))
+    assert content["szlib"] == szlib.__version__
+    file.write_text(json.dumps(content | {"szlib": "0.1.0"}), encoding="utf-8")
+    pd.testing.assert_frame_equal(szlib.SimulationLog.load(file).table, log.table)
 
 
 def test_a_log_without_people_is_saved_and_loaded(tmp_path):

@@ -291,6 +291,14 @@ def test_file_states_format_version_and_units(zone: SocialZone, tmp_path: Path) 
     assert content["provenance"]["szlib"] == szlib.__version__
 
 
+def test_zone_of_another_version_of_szlib_loads(zone: SocialZone, tmp_path: Path) -> None:
+    old = replace(zone, provenance=zone.provenance | {"szlib": "0.1.0"})
+    old.save(tmp_path / "zone.json")
+    loaded = SocialZone.load(tmp_path / "zone.json")
+    assert loaded.ellipses == zone.ellipses
+    assert loaded.provenance["szlib"] == "0.1.0" != szlib.__version__
+
+
 def test_saving_replaces_a_file_as_a_whole(zone: SocialZone, tmp_path: Path) -> None:
     path = tmp_path / "zone.json"
     zone.save(path)
