@@ -40,7 +40,7 @@ import pandas as pd
 
 import szlib
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -58,7 +58,7 @@ parameters(
     [
         ("dt, top speed", "0.1 s, 1 m/s", PAPER, "sec. 4"),
         ("N, N_h", f"{N}, {N_h}", PAPER, "sec. 4: steps of the plan, and those under the barrier condition"),
-        ("gamma", gamma, MEASURED, "notebook 07: the four scenarios against gamma"),
+        ("gamma", gamma, TUNED, "on these four scenarios: notebook 07"),
         ("a_max", f"{a_max} m/s²", ASSUMED, "the paper gives none"),
         ("Q, R, P", "diag(10, 10, 1, 1), I, 10 Q", ASSUMED, "the paper gives none"),
     ]
@@ -361,7 +361,7 @@ record.figure(fig, "corridor")
 # %% [markdown]
 # ## The same as szlib's?
 #
-# `szlib.MPCCBF` with either of its solvers, asked in states along this run. `tie=0` switches off the one
+# `szlib.MPCCBF` with either of its solvers, asked in states along this run. `head_on_share=0` switches off the one
 # thing that it adds to the problem of the paper, a side for people met exactly head-on (notebook 07). Both
 # IPOPTs go on to the last digits; the SQP stops where it expects no more than 1e-4 m/s² from going on.
 
@@ -369,7 +369,7 @@ record.figure(fig, "corridor")
 rows = []
 for k in (k for k in range(0, 100, 10) if tuple(path[k]) not in unsolved):
     for solver in ("sqp", "ipopt"):
-        settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max, tie=0.0, solver=solver)
+        settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max, head_on_share=0.0, solver=solver)
         controller = szlib.MPCCBF(zone, walls=scene.walls, settings=settings)
         step = controller.step(path[k], scene.goal, [scene.people[0].after(k * dt)])
         rows.append((k * dt, solver, np.abs(step.control - controls[k]).max()))

@@ -37,7 +37,7 @@ import szlib
 from szlib.simulation.atlas import AtlasCell
 from szlib.simulation.strategies import classify_strategy
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -60,8 +60,13 @@ parameters(
         ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
         ("corridor", f"{width} m", ASSUMED, "the paper shows walls without numbers"),
         ("N, N_h, dt", f"{settings.N}, {settings.N_h}, {settings.dt} s", PAPER, "sec. 4"),
-        ("gamma", gamma, MEASURED, "notebook 07: the four scenarios against gamma"),
-        ("a_max; Q, R, P, tie", f"{a_max} m/s²; as in notebook 07", ASSUMED, "the paper gives none"),
+        ("gamma", gamma, TUNED, "on these four scenarios: notebook 07"),
+        (
+            "a_max; Q, R, P, head_on_share",
+            f"{a_max} m/s²; as in notebook 07",
+            ASSUMED,
+            "the paper gives none",
+        ),
     ]
 )
 

@@ -121,7 +121,7 @@ record.key["h at worst, N_h = 2, gamma = 0.8 [m]"] = float(paper.loc[0.8, "min_h
 # %% [markdown]
 # ## One infeasible step, three answers
 #
-# The first scenario with $\gamma = 0.8$ and, as in the paper, no side chosen beforehand (`tie=0`): the
+# The first scenario with $\gamma = 0.8$ and, as in the paper, no side chosen beforehand (`head_on_share=0`): the
 # robot drives at full speed until, shortly before the zone, two steps can no longer hold it back. The ticks
 # are steps without a solution. Three answers:
 #
@@ -150,7 +150,7 @@ def follow(answer: str, settings: szlib.MPCSettings) -> pd.DataFrame:
 
 
 zone = record.cache.ellipse()
-hasty = szlib.MPCSettings(gamma=0.8, tie=0.0)
+hasty = szlib.MPCSettings(gamma=0.8, head_on_share=0.0)
 answers = {answer: follow(answer, hasty) for answer in ("dropped", "relaxed", "braking")}
 
 # %%

@@ -49,7 +49,7 @@ from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.simulation.social_metrics import compute_replay_metrics
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -74,7 +74,7 @@ full_speed = "times the walker's, or the robot's own at full speed"
 parameters(
     [
         ("N, N_h", f"{paper.N}, {paper.N_h}", PAPER, "sec. 4"),
-        ("gamma", paper.gamma, MEASURED, "notebook 11, with people at 0.5 m/s or less"),
+        ("gamma", paper.gamma, TUNED, "on the paper's four scenarios: notebook 07"),
         ("people in a world", crowded.people, ASSUMED, f"in {crowded.size:g} m x {crowded.size:g} m"),
         ("their pace", crowded.pace, ASSUMED, "m/s; a fifth of them stand; the paper has 0.5"),
         ("sight", f"{replay.SENSING_RANGE:g} m", ASSUMED, "recorded people farther away are not given"),

@@ -30,7 +30,7 @@ def find_target(
     position, goal : (x, y) of the robot and of its goal [m].
     zones : the zone of each person, in the world.
     walls : end points and margin of each wall, (xa, ya, xb, yb, margin) [m].
-    settings : `tie`, `pass_side`, and what the barriers need.
+    settings : `head_on_share`, `pass_side`, and what the barriers need.
 
     Notes
     -----
@@ -38,11 +38,11 @@ def find_target(
     the zone. Its two tangents from the robot lie at the angles +-w about -grad h, the bisector of the
     directions to the foci (this holds for all confocal ellipses). Let the goal lie at the angle b from there.
     At b = 0 both ways around are equally long, the optimum is to stand still in front of the person, and
-    every solver stays there for ever. So for |b| <= tie * w the target lies along the tangent on
-    `pass_side`, as far away as the goal. Once the robot is on that side, the target turns back to the goal
-    between |b| = tie * w and 2 tie * w, without a jump. If a wall leaves no space beside the person on that
-    side, the same holds for the other side. If there is no space at all, the target stays the goal, and the
-    robot yields.
+    every solver stays there for ever. So for |b| <= share * w, with share = `head_on_share`, the target lies
+    along the tangent on `pass_side`, as far away as the goal. Once the robot is on that side, the target
+    turns back to the goal between |b| = share * w and 2 share * w, without a jump. If a wall leaves no space
+    beside the person on that side, the same holds for the other side. If there is no space at all, the
+    target stays the goal, and the robot yields. The paper has no such rule.
 
     The rule holds only if the barrier is active now, h <= closing speed * dt / gamma, or may become so
     within the horizon, h <= closing speed * dt * N. (With the first condition alone and gamma > 1/N, the
@@ -53,12 +53,12 @@ def find_target(
     s = settings
     (x, y), way = position, (goal[0] - position[0], goal[1] - position[1])
     distance = hypot(*way)
-    if distance == 0 or s.tie == 0:
+    if distance == 0 or s.head_on_share == 0:
         return goal
     nearest, target = inf, goal
     for zone in zones:
         speed = hypot(zone.vx, zone.vy)
-        if abs(way[0] * zone.vy - way[1] * zone.vx) > s.tie * speed * distance:
+        if abs(way[0] * zone.vy - way[1] * zone.vx) > s.head_on_share * speed * distance:
             continue
         h, closing = barrier(zone.distance(x, y), s.r_robot, s.eps), (s.v_max + speed) * s.dt
         if h > min(nearest, distance, max(closing / s.gamma, closing * s.N)):
@@ -99,10 +99,10 @@ def _find_turn(
     s: MPCSettings,
 ) -> float | None:
     """Angle by which the way is turned to a free side, `pass_side` first [rad]; None if it is not turned."""
-    if s.tie * w == 0:
+    if s.head_on_share * w == 0:
         return None
     for left in (s.pass_side == "left", s.pass_side != "left"):
-        lead = (b if left else -b) / (s.tie * w)
+        lead = (b if left else -b) / (s.head_on_share * w)
         if not -1 <= lead < 2:
             continue
         if _is_side_free(zone, way, left, walls, s) and not zone.blocks(goal, s):

@@ -18,24 +18,31 @@ Solver = Literal["sqp", "ipopt"]
 Terminal = Literal["none", "rest", "person"]
 
 
-def _setting(badge: str, default: Any) -> Any:
-    return field(default=default, metadata={"badge": badge})
+def _setting(badge: str, default: Any, **paper: Any) -> Any:
+    """A default and its source; `paper`: the value that the paper has instead."""
+    return field(default=default, metadata={"badge": badge, **paper})
 
 
 @dataclass(frozen=True)
 class MPCSettings:
-    """Every parameter of the controller; `MPCSettings.badges()` gives the source of each default.
+    """Every parameter of the controller.
+
+    `MPCSettings()` has szlib's defaults, `MPCSettings.paper()` the paper's values to the letter.  They differ
+    in the solver, the margin around walls, the rule of the side and the time limit.  `badges` gives the
+    source of each value.
 
     Parameters
     ----------
     dt : time step [s].
     N : steps of the prediction horizon.
     N_h : steps with barrier conditions, 1 <= N_h <= N; all N steps if there is a terminal condition.
-    gamma : fraction of h that a step may use up, 0 < gamma <= 1.
+    gamma : fraction of h that a step may use up, 0 < gamma <= 1. The default was tuned on the paper's four
+        scenarios (notebook 07).
     Q, P : weights of the state (x, y, vx, vy) against the goal, on the way and at the end, >= 0.
     R : weights of the accelerations (ax, ay), > 0.
     a_max : largest |ax| and |ay| [m/s2].
-    v_max : largest Euclidean speed [m/s].
+    v_max : largest Euclidean speed [m/s]. The paper gives 1 m/s, and does not say that it is the Euclidean
+        speed (assumed).
     r_robot : radius of the robot [m].
     eps : margin for the error of the approximate distances [m].
     margin : around walls. "euclidean": what each wall requires so that the robot does not touch it, and at
@@ -43,8 +50,9 @@ class MPCSettings:
         than r_robot^2 / eps.
     zone_speed : walking speed whose social zone is used, if a zone depends on speed [m/s].
     pass_side : the side on which the robot passes a person whom it meets head-on: "right" or "left".
-    tie : a meeting is head-on while the goal lies within this fraction of the half-angle under which the
-        robot sees the person's zone; see `head_on.find_target`. At most 0.5.
+    head_on_share : a meeting is head-on while the goal lies within this share of the half-angle under which
+        the robot sees the person's zone; the rule of the side acts up to twice this share. At most 0.5; 0
+        switches the rule off, as in the paper. See `head_on.find_target`.
     terminal : what the plan ends in. "none": nothing, as in the paper. "rest": zero velocity. "person": the
         velocity of the only person, in open space; "rest" unless there is one person. See the proof in
         `szlib.control.mpc`.
@@ -66,14 +74,14 @@ class MPCSettings:
     >>> settings = szlib.MPCSettings(gamma=0.1, terminal="rest")
     >>> settings.N_h == settings.N  # a terminal condition needs barriers on the whole horizon
     True
-    >>> szlib.MPCSettings.badges()["dt"]
-    'paper'
+    >>> settings.badges()["dt"], settings.badges()["gamma"]
+    ('paper', 'chosen')
     """
 
     dt: float = _setting("paper", 0.1)
     N: int = _setting("paper", 8)
     N_h: int = _setting("paper", 2)
-    gamma: float = _setting("measured", 0.05)
+    gamma: float = _setting("tuned", 0.05)
     Q: tuple[float, float, float, float] = _setting("assumed", (10.0, 10.0, 1.0, 1.0))
     R: tuple[float, float] = _setting("assumed", (1.0, 1.0))
     P: tuple[float, float, float, float] = _setting("assumed", (100.0, 100.0, 10.0, 10.0))
@@ -81,15 +89,15 @@ class MPCSettings:
     v_max: float = _setting("paper", 1.0)
     r_robot: float = _setting("paper", 0.5)
     eps: float = _setting("paper", 0.05)
-    margin: Margin = _setting("measured", "euclidean")  # noqa: RUF009
+    margin: Margin = _setting("measured", "euclidean", paper="paper")  # noqa: RUF009
     zone_speed: float = _setting("paper", 1.1)
     pass_side: Side = _setting("assumed", "right")  # noqa: RUF009
-    tie: float = _setting("assumed", 0.25)
+    head_on_share: float = _setting("assumed", 0.25, paper=0.0)
     terminal: Terminal = _setting("paper", "none")  # noqa: RUF009
-    solver: Solver = _setting("measured", "sqp")  # noqa: RUF009
+    solver: Solver = _setting("measured", "sqp", paper="ipopt")  # noqa: RUF009
     slack_weight: float = _setting("measured", 1e5)
     max_iterations: int = _setting("assumed", 100)
-    time_limit: float = _setting("assumed", 0.05)
+    time_limit: float = _setting("assumed", 0.05, paper=np.inf)
 
     def __post_init__(self) -> None:
         for name, length in (("Q", 4), ("R", 2), ("P", 4)):
@@ -98,7 +106,8 @@ class MPCSettings:
         for name in ("N", "N_h", "max_iterations"):
             value = getattr(self, name)
             _require(isinstance(value, int | np.integer) and value >= 1, name, value, "a whole number >= 1")
-        for name in ("dt", "gamma", "a_max", "v_max", "r_robot", "eps", "zone_speed", "tie", "slack_weight"):
+        numbers = ("dt", "gamma", "a_max", "v_max", "r_robot", "eps", "zone_speed", "slack_weight")
+        for name in (*numbers, "head_on_share"):
             object.__setattr__(self, name, float(check_array(name, getattr(self, name), ())))
         for name in ("dt", "a_max", "v_max", "zone_speed", "slack_weight"):
             _require(getattr(self, name) > 0, name, getattr(self, name), "a positive number")
@@ -117,12 +126,37 @@ class MPCSettings:
         _require(positive, "time_limit", self.time_limit, "a positive number of seconds, or inf")
         if self.terminal != "none":
             object.__setattr__(self, "N_h", self.N)
-        _require(0 <= self.tie <= 0.5, "tie", self.tie, "in [0, 0.5]")
+        _require(0 <= self.head_on_share <= 0.5, "head_on_share", self.head_on_share, "in [0, 0.5]")
 
     @classmethod
-    def badges(cls) -> dict[str, str]:
-        """Source of each default: 'paper', 'assumed' or 'measured'."""
-        return {setting.name: setting.metadata["badge"] for setting in fields(cls)}
+    def paper(cls, **changes: Any) -> MPCSettings:
+        """The paper's controller to the letter (eq. 2, sec. 4), with `changes` by name.
+
+        IPOPT, a margin of 5 cm around every wall, no rule of the side, no time limit.  The paper does not
+        give gamma, Q, R, P and a_max: they are szlib's (see `badges`), as is what happens if a step has no
+        solution.
+
+        Examples
+        --------
+        >>> import szlib
+        >>> szlib.MPCSettings.paper(gamma=0.1).solver
+        'ipopt'
+        """
+        differing = {f.name: f.metadata["paper"] for f in fields(cls) if "paper" in f.metadata}
+        return cls(**{**differing, **changes})
+
+    def badges(self) -> dict[str, str]:
+        """The source of each value, by name.
+
+        "paper", "assumed", "measured", "tuned" (on the paper's four scenarios), or "chosen" by the user.
+        """
+        badges = {}
+        for each in fields(self):
+            value = getattr(self, each.name)
+            badges[each.name] = each.metadata["badge"] if value == each.default else "chosen"
+            if value == each.metadata.get("paper", object()):
+                badges[each.name] = "paper"
+        return badges
 
 
 def _require(holds: bool | np.bool, name: str, value: Any, expected: str) -> None:

@@ -74,6 +74,14 @@ class EncounterSettings:
                 f"duration must be a multiple of 0.1 s, the step of the clock; got {self.duration} s"
             )
 
+    @classmethod
+    def paper(cls, area: object = None) -> EncounterSettings:
+        """The four conditions of the paper (sec. 2) in an `area`, whose coordinates the paper does not give.
+
+        They are the defaults: a space of 4 m x 5 m ahead, windows of 3 s, 1 m, 0.4 m/s.
+        """
+        return cls(area=area, space=PAPER_SPACE, duration=3.0, min_distance=1.0, min_speed=0.4)
+
     @property
     def steps(self) -> int:
         """Steps of the clock in a window."""

@@ -204,7 +204,7 @@ class HullZone:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HullEstimator(Estimator):
-    """The estimator of the paper: remove outliers, take the hull, slice it, enclose the slices by ellipses.
+    """Remove outliers, take the hull, slice it, enclose the slices by ellipses (paper, sec. 2).
 
     Parameters
     ----------

@@ -1,9 +1,10 @@
 """The social zone: from samples of encounters to one ellipse for each speed, and to a file.
 
-`SocialZone.fit` has three estimators:
+`SocialZone.fit` has these methods:
 
 quantile  all but a share q of the encounters stay outside; does not shrink as the data grows
-hull      (nearly) no person was ever inside: outliers, hull, slices, smallest ellipses (paper, sec. 2)
+paper     (nearly) no person was ever inside: outliers, hull, slices, smallest ellipses (paper, sec. 2)
+hull      the same, but whole encounters are outliers, as many as there are (ours)
 respect   people are half as frequent inside as if they ignored each other
 
 It also estimates how certain the zone is: intervals, the number of encounters on each side, and the speeds at
@@ -13,8 +14,9 @@ which this number is sufficient.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +30,7 @@ from ..errors import DataWarning, ZoneError
 from .ellipses import Ellipse
 from .estimators import Estimator, ZoneShape
 from .hulls import HullEstimator, HullZone
-from .outliers import R_MAX, encounter_numbers
+from .outliers import FRACTION, N_NEIGHBOURS, R_MAX, encounter_numbers
 from .quantile import QuantileEstimator
 from .respect import RespectEstimator
 from .respect_significance import NullTest, null_test
@@ -48,12 +50,14 @@ if TYPE_CHECKING:
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Default speeds of the reference pedestrian [m/s] (assumed; the paper shows a range)."""
 
-METHODS: dict[str, tuple[Any, tuple[str, ...]]] = {
-    "quantile": (QuantileEstimator, ("q",)),
-    "hull": (HullEstimator, ("fraction", "n_neighbours", "speed_scale")),
-    "respect": (RespectEstimator, ("speed_width",)),
+_PAPER = partial(HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_NEIGHBOURS)
+METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
+    "quantile": (QuantileEstimator.from_samples, ("q",)),
+    "paper": (_PAPER, ()),
+    "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours", "speed_scale")),
+    "respect": (RespectEstimator.from_samples, ("speed_width",)),
 }
-"""The estimators, and their options in `SocialZone.fit`."""
+"""The methods of `SocialZone.fit`: the estimator, and its options."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,7 +105,7 @@ class SocialZone:
 
     def __post_init__(self) -> None:
         _check_method(self.method)
-        if (self.method == "hull") != isinstance(self.shape, HullZone):
+        if (self.method in ("hull", "paper")) != isinstance(self.shape, HullZone):
             raise ZoneError(
                 f"a {type(self.shape).__name__} is not the shape of a zone of method {self.method!r}"
             )
@@ -141,8 +145,10 @@ class SocialZone:
         ----------
         samples : as from `szlib.find_encounters`: los_angle [rad], distance [m], speed [m/s], encounter. With
             ref_id and other_id, people are resampled, not encounters. With t, paths are smoothed.
-        method : "quantile", "hull" (the paper's) or "respect". The quantile does not shrink as the data
-            grows.
+        method : "quantile", "paper", "hull" or "respect". "paper" is the paper's method to the letter: LOF
+            over samples with 20 neighbours removes 0.2 %, then hull, slices, ellipses. "hull" differs in one
+            step: it judges whole encounters and removes as many as are outliers. Both zones shrink as the
+            data grows; the quantile does not.
         r_max : distance within which people count [m].
         speeds : speeds of the zones [m/s].
         null : the null model, from `szlib.null_encounters`. "respect" needs it; with any method, the data is
@@ -150,9 +156,8 @@ class SocialZone:
         n_resamples : number of zones estimated again for the intervals; 0: no intervals.
         seed : of the resampling.
         options : options of the method. "quantile": `q`, the share of encounters that may enter (0.05).
-            "hull": `fraction`, `n_neighbours` and `speed_scale` as in `szlib.remove_outliers`; the paper has
-            fraction=0.002 and n_neighbours=20, the default judges whole encounters. "respect":
-            `speed_width`, the range over which speeds are pooled (0.2) [m/s]; inf: all speeds.
+            "hull": `fraction`, `n_neighbours` and `speed_scale` as in `szlib.remove_outliers`. "respect":
+            `speed_width`, the range over which speeds are pooled (0.2) [m/s]; inf: all speeds. "paper": none.
 
         Raises
         ------
@@ -168,9 +173,9 @@ class SocialZone:
         >>> import szlib
         >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=300))
         >>> samples = szlib.find_encounters(szlib.read_tracks(path))
-        >>> zone = szlib.SocialZone.fit(samples, method="hull", fraction=0.002, speeds=[1.1], n_resamples=0)
+        >>> zone = szlib.SocialZone.fit(samples, method="paper", speeds=[1.1], n_resamples=0)
         >>> zone.method, list(zone.ellipses)
-        ('hull', [1.1])
+        ('paper', [1.1])
         """
         _check_method(method, options)
         check_columns(samples, ["los_angle", "distance", "speed"])
@@ -179,7 +184,7 @@ class SocialZone:
             raise ZoneError("no speed has a zone: `speeds` is empty")
         if method == "respect":
             options["null"] = null
-        estimator = METHODS[method][0].from_samples(samples, r_max=r_max, **options)
+        estimator = METHODS[method][0](samples, r_max=r_max, **options)
         shape = estimator.fit_shape(fitted_speeds)
         ellipses, undefined = {}, {}
         for speed in fitted_speeds:
@@ -298,5 +303,7 @@ def _check_method(method: str, options: Iterable[str] = ()) -> None:
     if method not in METHODS:
         raise ZoneError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
     for name in set(options).difference(METHODS[method][1]):
-        known = "; ".join(f"{each!r} has {', '.join(names)}" for each, (_, names) in METHODS.items())
+        known = "; ".join(
+            f"{each!r} has {', '.join(names) or 'none'}" for each, (_, names) in METHODS.items()
+        )
         raise ZoneError(f"method {method!r} has no option {name!r}; {known}")

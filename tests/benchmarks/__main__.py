@@ -174,7 +174,7 @@ def check_agreement(count: int) -> dict[str, float]:
     found |= dict.fromkeys(("only sqp", "only ipopt"), 0)
     apart, residual = [0.0], [0.0]
     for question in tqdm(itertools.islice(questions(seed=10), count), "agreement", count):
-        sqp, other = (question.ask(szlib.MPCSettings(solver=s, tie=0.0)) for s in ("sqp", "ipopt"))
+        sqp, other = (question.ask(szlib.MPCSettings(solver=s, head_on_share=0.0)) for s in ("sqp", "ipopt"))
         solved = [step.status == "optimal" for step in (sqp, other)]
         found["states"] += 1
         found["both solve"] += all(solved)

@@ -267,7 +267,7 @@ def test_the_two_sides_are_mirror_images(solver):
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_without_the_rule_only_rounding_would_choose_a_side(solver):
     in_front = (-1.8, 0.0, 0.0, 0.0)
-    undecided = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver, tie=0.0)).step(
+    undecided = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver, head_on_share=0.0)).step(
         in_front, GOAL, [FACING]
     )
     assert undecided.status == "optimal"
@@ -457,8 +457,8 @@ def test_an_invalid_wall_raises_an_error(wall):
         {"gamma": 0.0}, {"gamma": 1.01}, {"gamma": np.nan}, {"gamma": "0.1"}, {"dt": 0.0}, {"N": 0},
         {"N": 8.0}, {"N_h": 9}, {"N_h": 0}, {"Q": (1, 1, 1)}, {"Q": (-1, 1, 1, 1)}, {"P": (1, 1, 1, np.nan)},
         {"R": (0, 1)}, {"N_h": 2.5}, {"a_max": -1}, {"v_max": np.inf}, {"r_robot": -0.1}, {"eps": -1},
-        {"zone_speed": 0},
-        {"tie": 0.6}, {"pass_side": "up"}, {"solver": "osqp"}, {"terminal": "wall"}, {"R": (-1, 1)},
+        {"zone_speed": 0}, {"head_on_share": 0.6}, {"pass_side": "up"}, {"solver": "osqp"}, {"R": (-1, 1)},
+        {"terminal": "wall"},
         {"slack_weight": 0}, {"max_iterations": 0}, {"time_limit": 0}, {"time_limit": np.nan},
         {"time_limit": "1"}, {"margin": "none"}, {"v_max": 1e155},
     ],
@@ -471,8 +471,28 @@ def test_a_setting_out_of_its_range_is_named_in_the_error(change):
 def test_every_setting_is_documented_with_the_source_of_its_default():
     settings = szlib.MPCSettings()
     assert set(settings.badges()) == {f.name for f in fields(settings)}
-    assert set(settings.badges().values()) == {"paper", "assumed", "measured"}
+    assert set(settings.badges().values()) == {"paper", "assumed", "measured", "tuned"}
     listed = inspect.getdoc(szlib.MPCSettings).split("Raises")[0]
     for name in settings.badges():
         assert re.search(rf"^(\w+, )*{name}(, \w+)* : ", listed, re.MULTILINE), name
     assert replace(settings, gamma=1.0, N_h=8).N_h == 8
+
+
+def test_the_papers_settings_are_ipopt_with_5_cm_and_no_rule_of_the_side():
+    paper, ours = szlib.MPCSettings.paper(), szlib.MPCSettings()
+    differing = {f.name for f in fields(paper) if getattr(paper, f.name) != getattr(ours, f.name)}
+    assert differing == {"solver", "margin", "head_on_share", "time_limit"}
+    assert (paper.dt, paper.N, paper.N_h, paper.eps, paper.v_max, paper.r_robot) == (
+        0.1,
+        8,
+        2,
+        0.05,
+        1.0,
+        0.5,
+    )
+    assert (paper.solver, paper.margin, paper.head_on_share) == ("ipopt", "paper", 0.0)
+    not_in_paper = {name for name, badge in paper.badges().items() if badge != "paper"}
+    assert {"gamma", "Q", "R", "P", "a_max"} <= not_in_paper
+    assert szlib.MPCSettings.paper(gamma=0.1).badges()["gamma"] == "chosen"
+    with pytest.raises(szlib.SolverError, match="gamma must"):
+        szlib.MPCSettings.paper(gamma=2)

@@ -36,7 +36,9 @@ def controller_of(solver, walls=(), **settings):
 def test_both_solvers_find_the_same_plan_or_another_local_one_of_the_same_problem(formulation):
     same = other = only_one = 0
     for question in islice(questions(seed=1), 100):
-        sqp, ipopt = (question.ask(settings_of(solver, tie=0.0, **formulation)) for solver in SOLVERS)
+        sqp, ipopt = (
+            question.ask(settings_of(solver, head_on_share=0.0, **formulation)) for solver in SOLVERS
+        )
         if not (sqp.status == ipopt.status == "optimal"):
             only_one += sqp.status != ipopt.status
             continue

@@ -615,3 +615,30 @@ def test_real_day_has_zones_at_walking_speeds(real_samples: pd.DataFrame, tmp_pa
     assert not any(map(zone.adequate, SPEEDS))  # hardly anybody is seen behind
     zone.save(tmp_path / "zone.json")
     assert SocialZone.load(tmp_path / "zone.json").provenance == zone.provenance
+
+
+def test_the_papers_method_is_a_hull_after_lof_over_samples() -> None:
+    samples = passers(400, seed=3)
+    paper = fit(samples, method="paper", speeds=(1.1,))
+    same = fit(samples, fraction=0.002, n_neighbours=20, speeds=(1.1,))
+    assert paper.method == "paper"
+    assert paper.ellipses == same.ellipses
+    assert [stage["rejected"] for stage in paper.provenance["funnel"]] == [
+        stage["rejected"] for stage in same.provenance["funnel"]
+    ]
+    with pytest.raises(szlib.ZoneError, match="method 'paper' has no option 'fraction'"):
+        fit(samples, method="paper", fraction=0.01)
+
+
+def test_the_papers_zone_is_saved_under_its_name(tmp_path: Path) -> None:
+    zone = fit(passers(400, seed=3), method="paper", speeds=(1.1,))
+    zone.save(tmp_path / "zone.json")
+    assert SocialZone.load(tmp_path / "zone.json").method == "paper"
+
+
+@pytest.mark.parametrize(("people", "size"), [("everybody", (1.01, 0.77)), ("strangers", (1.31, 1.03))])
+@pytest.mark.filterwarnings("ignore::szlib.DataWarning")
+def test_the_papers_zone_of_the_real_day(people: str, size: tuple[float, float], real_samples) -> None:
+    samples = real_samples if people == "everybody" else szlib.of_kind(real_samples, people)
+    zone = fit(samples, method="paper")
+    assert tuple(round(axis, 2) for axis in zone.ellipse(1.1).semi_axes) == size

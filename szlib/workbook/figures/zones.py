@@ -180,7 +180,7 @@ def plot_zone(
     ax = get_axes(ax, size=(5, 4.5))
     with warnings.catch_warnings(action="ignore", category=DataWarning):  # dashed, and said in the title
         ellipse = zone.ellipse(speed)
-    boundary, adequate, is_hull = zone.boundary(speed), zone.adequate(speed), zone.method == "hull"
+    boundary, adequate, is_hull = zone.boundary(speed), zone.adequate(speed), zone.method in ("hull", "paper")
     if is_hull:
         ax.fill(*boundary.T, facecolor=GREY, alpha=0.4, label="zone: r_max - R'")
     else:

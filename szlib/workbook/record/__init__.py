@@ -7,6 +7,6 @@ display          how tables, figures and parameters are shown
 """
 
 from .data_cache import DataCache
-from .display import ASSUMED, MEASURED, PAPER, parameters, settings_table
+from .display import ASSUMED, CHOSEN, MEASURED, PAPER, TUNED, parameters, settings_table
 from .notebook_record import NotebookRecord
 from .parameters import ZoneMethod

@@ -16,8 +16,8 @@ from ...control.settings import MPCSettings
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAPER, ASSUMED, MEASURED = "paper", "assumed", "measured"
-"""Badges: the source of a parameter."""
+PAPER, ASSUMED, MEASURED, TUNED, CHOSEN = "paper", "assumed", "measured", "tuned", "chosen"
+"""Badges: the source of a parameter; tuned on the paper's four scenarios; chosen by the user."""
 _SHOWN_WIDTH = 2 / 3
 """Width of a figure in the notebook, as a fraction of the saved figure's."""
 
@@ -27,7 +27,8 @@ def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
 
     Parameters
     ----------
-    rows : name, value, badge (`PAPER`, `ASSUMED` or `MEASURED`) and reason of each parameter.
+    rows : name, value, badge (`PAPER`, `ASSUMED`, `MEASURED`, `TUNED` or `CHOSEN`) and reason of each
+        parameter.
 
     Examples
     --------
@@ -36,9 +37,9 @@ def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
     parameter value badge    why
        window   3 s paper sec. 2
     """
-    unknown = {badge for _, _, badge, _ in rows} - {PAPER, ASSUMED, MEASURED}
-    if unknown:
-        raise ValueError(f"badges must be {PAPER}, {ASSUMED} or {MEASURED}; got {sorted(unknown)}")
+    known = (PAPER, ASSUMED, MEASURED, TUNED, CHOSEN)
+    if unknown := {badge for _, _, badge, _ in rows}.difference(known):
+        raise ValueError(f"badges must be {', '.join(known)}; got {sorted(unknown)}")
     return style_table(pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"]))
 
 
