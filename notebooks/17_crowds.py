@@ -65,8 +65,9 @@ paper, bold = szlib.MPCSettings(), szlib.MPCSettings(gamma=0.2, N_h=8)
 crowded = Worlds(
     people=(6, 10), standing=0.2, pace=(0.3, 1.2), walls=0.3, size=8.0, travel=(5.0, 8.0), start_speed=0.0
 )
-packages = {"orca": "pyrvo", "social force": "pysocialforce", "speed model": "jupedsim"}
+packages = {"orca": "pyrvo", "social force": "pysocialforce"}
 models = [name for name, package in packages.items() if find_spec(package)]
+simulated = [*packages, "speed model"]  # in the saved tables
 record.key["models of walking"] = ", ".join(models) or "none"
 
 # %%
@@ -91,15 +92,17 @@ parameters(
 # %% [markdown]
 # ## People who react
 #
-# Three models of walking, each by its authors' or somebody else's package, behind one behaviour:
-# `ReactingPeople`. Everybody has somewhere to go; walls are obstacles; the robot is seen as a disc of its
-# size, as a person, or not at all ("nothing").
+# `ReactingPeople` walk by a model, from its authors' or somebody else's package. Each person has a goal;
+# walls are obstacles; the robot is seen as a disc of its size, as a person, or not at all ("nothing").
 #
 # - **orca** (pyrvo): everybody takes half of what keeps two apart for 3 s and expects the other half;
 # - **social force** (PySocialForce): people are pushed by each other, and by walls;
-# - **speed model** (JuPedSim): as fast as the gap ahead allows, around whoever is near.
+# - **speed model** (JuPedSim): as fast as the gap ahead allows, around people who are near.
 #
-# The first two come with the extra `crowds`; the third is used where it is installed.
+# The first two come with the extra `crowds`. The third shows how to add a model: it is a class in
+# `tests/helpers/speed_model.py`, and `ReactingPeople(SpeedModel)` uses it. Its results below are saved. To
+# compute them again, install JuPedSim and run the study:
+# `pip install --no-deps jupedsim deprecated wrapt`, then `python tests/studies/crowd_trials.py`.
 
 # %%
 missing = [name for name in packages if name not in models]
@@ -186,7 +189,7 @@ formatted(
 
 # %%
 saved = pd.read_csv("tables/17_crowds.csv")
-reacting = saved[saved["crowd"].isin(packages)]
+reacting = saved[saved["crowd"].isin(simulated)]
 formatted(reacting, ["crowd", "sees", "controller"])
 
 # %%
@@ -235,14 +238,14 @@ record.figure(ax.figure, "replay")
 # in the place of walkers, and the synthetic plaza, where few are near.
 
 # %%
-sites = saved[~saved["crowd"].isin(packages) & saved["controller"].isin(shown)]
+sites = saved[~saved["crowd"].isin(simulated) & saved["controller"].isin(shown)]
 labels["path_efficiency"] = "straight way over way gone"
 title = "In the place of recorded walkers, among people who do not see it"
 fig = figures.draw_interval_grid(sites, labels, rows="crowd", colour="controller", columns=2, title=title)
 record.figure(fig, "sites")
 
 # %%
-formatted(saved[~saved["crowd"].isin(packages)], ["crowd", "controller"])
+formatted(saved[~saved["crowd"].isin(simulated)], ["crowd", "controller"])
 
 # %% [markdown]
 # ## What is promised, and to whom

@@ -2,7 +2,7 @@
 
 scenario              the scene of a run, the paper's claims of it, and how people move: `Scenario`
 scenarios             the paper's four scenarios, eleven meetings, random worlds
-crowds                people who react, by three models of walking: `ReactingPeople`
+crowds                people who react, by a model of walking: `ReactingPeople`
 run                   the arrays of a run, and the quantities that follow from them: `Run`
 metrics               the motion of a run in numbers: `compute_metrics`
 outcomes              how a run ends: `classify_outcome`

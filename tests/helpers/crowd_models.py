@@ -1,12 +1,17 @@
 """The packages of the models of walking, and small scenes for their people."""
 
 import numpy as np
+from helpers.speed_model import SpeedModel
 
 from szlib.control.person import Person
+from szlib.simulation.crowds.reacting import MODELS
+from szlib.simulation.crowds.walking_model import ModelFactory
 from szlib.simulation.scenario import Scenario
 
 PACKAGES = {"orca": "pyrvo", "social force": "pysocialforce", "speed model": "jupedsim"}
 """The package of each model."""
+FACTORIES: dict[str, ModelFactory] = {**MODELS, "speed model": SpeedModel}
+"""Every model by name: those of szlib, and one that is written here."""
 
 
 def scene(*people: Person, walls: object = (), duration: float = 20.0) -> Scenario:

@@ -16,6 +16,7 @@ import szlib
 from szlib.control.person import Person
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.crowds.reacting import ReactingPeople
+from szlib.simulation.crowds.walking_model import ModelFactory
 from szlib.simulation.replay import ReplacedWalker, find_replays
 from szlib.simulation.safety_claims import safety_violations
 from szlib.simulation.scenario import Scenario
@@ -42,7 +43,7 @@ def straight(*people: Person, y: float = 0.0) -> Scenario:
 
 
 @pytest.mark.parametrize("sees", ["robot", "nothing"])
-def test_claims_hold_for_people_who_keep_their_velocity(model: str, sees: str) -> None:
+def test_claims_hold_for_people_who_keep_their_velocity(model: str | ModelFactory, sees: str) -> None:
     rows = szlib.rollouts(
         3,
         worlds=CROWDED,

@@ -18,10 +18,14 @@ from helpers.track_tables import make_tracks, make_walk
 import szlib
 from szlib.control.person import Person
 from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
+from szlib.simulation.crowds.social_force import SocialForceModel
+from szlib.simulation.crowds.walking_model import ModelFactory, Walkers
+from szlib.simulation.monte_carlo import identify
 from szlib.simulation.replay import MIN_START_DISTANCE, SENSING_RANGE, ReplacedWalker, Replay, find_replays
 from szlib.simulation.scenario import Crowd
 from szlib.zones.ellipses import BODY_RADIUS
 
+Model = str | ModelFactory
 FAR = np.array([50.0, 50.0, 0.0, 0.0])
 TWO = (Person((-4.0, 0.0), (0.5, 0.0)), Person((4.0, 0.1), (-0.5, 0.0)))
 
@@ -40,7 +44,7 @@ def gaps(paths: np.ndarray) -> np.ndarray:
     return np.hypot(*(paths[:, 0, :2] - paths[:, 1, :2]).T)
 
 
-def test_a_person_alone_walks_straight_to_the_goal_at_their_pace(model: str) -> None:
+def test_a_person_alone_walks_straight_to_the_goal_at_their_pace(model: Model) -> None:
     path = walk(ReactingPeople(model, jitter=0).start(scene(TWO[0], duration=10.0), 0), seconds=10.0)[:, 0]
     assert path[0, :2] == pytest.approx((-4, 0))
     assert np.abs(path[:, 1]).max() < 1e-6
@@ -48,19 +52,19 @@ def test_a_person_alone_walks_straight_to_the_goal_at_their_pace(model: str) -> 
     assert abs(path[-1, 0] - 1.0) <= 0.61, "within the 0.5 m where PySocialForce stops, and a start from rest"
 
 
-def test_velocity_is_the_displacement_per_time_step(model: str) -> None:
+def test_velocity_is_the_displacement_per_time_step(model: Model) -> None:
     paths = walk(ReactingPeople(model).start(scene(*TWO), 3))
     assert np.diff(paths[:, :, :2], axis=0) == pytest.approx(0.1 * paths[1:, :, 2:4], abs=1e-6)
 
 
-def test_two_people_who_meet_head_on_pass_each_other(model: str) -> None:
+def test_two_people_who_meet_head_on_pass_each_other(model: Model) -> None:
     head_on = (TWO[0], Person((4.0, 0.0), (-0.5, 0.0)))
     paths = walk(ReactingPeople(model).start(scene(*head_on), 1))
     assert paths[-1, 0, 0] > 3 and paths[-1, 1, 0] < -3
     assert gaps(paths).min() > 0.35
 
 
-def test_people_avoid_the_robot_only_if_they_see_it(model: str) -> None:
+def test_people_avoid_the_robot_only_if_they_see_it(model: Model) -> None:
     alone = scene(Person((-4.0, 0.1), (0.5, 0.0)))
     robot = np.array([0.0, 0.0, 0.0, 0.0])
     nearest = {
@@ -74,21 +78,21 @@ def test_people_avoid_the_robot_only_if_they_see_it(model: str) -> None:
         assert nearest["robot"] > 0.5 + BODY_RADIUS - 0.11
 
 
-def test_people_do_not_walk_through_walls(model: str) -> None:
+def test_people_do_not_walk_through_walls(model: Model) -> None:
     wall = [[(0.0, -1.0), (0.0, 1.5)]]
     paths = walk(ReactingPeople(model).start(scene(TWO[0], walls=wall), 2), seconds=40.0)[:, 0, :2]
     crossing = np.flatnonzero(np.diff(np.sign(paths[:, 0])) != 0)
     assert all(not -1.0 <= paths[k, 1] <= 1.5 for k in crossing)
 
 
-def test_standing_people_keep_position_and_heading(model: str) -> None:
+def test_standing_people_keep_position_and_heading(model: Model) -> None:
     standing = Person((0.0, 3.0), heading=1.0)
     path = walk(ReactingPeople(model).start(scene(standing), 0))[:, 0]
     assert path[:, :2] == pytest.approx(np.tile((0.0, 3.0), (201, 1)), abs=1e-3)
     assert (path[:, 4] == 1.0).all()
 
 
-def test_people_walk_to_given_goals(model: str) -> None:
+def test_people_walk_to_given_goals(model: Model) -> None:
     crowd = ReactingPeople(model, goals=((3.0, 4.0),), jitter=0).start(
         scene(Person((0.0, 0.0), heading=0.0)), 0
     )
@@ -96,13 +100,13 @@ def test_people_walk_to_given_goals(model: str) -> None:
     assert np.hypot(*(path[-1, :2] - (3.0, 4.0))) < 0.6
 
 
-def test_the_same_seed_gives_the_same_people_and_another_seed_others(model: str) -> None:
+def test_the_same_seed_gives_the_same_people_and_another_seed_others(model: Model) -> None:
     first, again, other = (walk(ReactingPeople(model).start(scene(*TWO), seed)) for seed in (1, 1, 2))
     assert (first == again).all()
     assert not np.allclose(first, other, atol=1e-4)
 
 
-def test_people_keep_their_zones_and_an_empty_crowd_stays_empty(model: str) -> None:
+def test_people_keep_their_zones_and_an_empty_crowd_stays_empty(model: Model) -> None:
     zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
     crowd = ReactingPeople(model).start(scene(Person((0.0, 0.0), (0.5, 0.0), zone=zone)), 0)
     assert [crowd(t, FAR)[0].zone for t in (0.0, 0.1, 0.2)] == [zone] * 3
@@ -110,7 +114,30 @@ def test_people_keep_their_zones_and_an_empty_crowd_stays_empty(model: str) -> N
     assert [len(empty(t, FAR)) for t in (0.0, 0.1)] == [0, 0]
 
 
-def test_decreasing_time_is_rejected(model: str) -> None:
+class Straight:
+    """People who walk straight on, whatever is there: a `WalkingModel`."""
+
+    def __init__(self, walkers: Walkers) -> None:
+        self.walking = walkers.velocities
+
+    def velocities(self, positions: np.ndarray, robot: np.ndarray, dt: float) -> np.ndarray:
+        return self.walking
+
+
+def test_a_class_can_be_the_model_of_walking() -> None:
+    paths = walk(ReactingPeople(Straight).start(scene(*TWO), 0))
+    assert paths[:, :, 2:4] == pytest.approx(np.tile([(0.5, 0.0), (-0.5, 0.0)], (201, 1, 1)))
+    assert paths[-1, :, :2] == pytest.approx(np.array([(6.0, 0.0), (-6.0, 0.1)]))
+
+
+def test_models_of_walking_are_part_of_the_key_of_rollouts() -> None:
+    models: list[Model] = ["orca", "social force", Straight, SocialForceModel]
+    keys = [identify(ReactingPeople(model)) for model in models]
+    assert len(set(keys)) == 4
+    assert keys == [identify(ReactingPeople(model)) for model in models]
+
+
+def test_decreasing_time_is_rejected(model: Model) -> None:
     crowd = ReactingPeople(model).start(scene(*TWO), 0)
     crowd(0.5, FAR)
     assert crowd(0.5, FAR)[0] == crowd(0.5, FAR)[0]
@@ -123,12 +150,14 @@ def test_a_missing_package_is_named_with_its_install_command(
     model: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, PACKAGES[model], None)
-    with pytest.raises(szlib.SolverError, match=r"pip install .*(crowds|jupedsim)"):
+    with pytest.raises(szlib.SolverError, match=r"pip install .*crowds"):
         ReactingPeople(model).start(scene(*TWO), 0)
 
 
 def test_invalid_parameters_are_rejected() -> None:
-    with pytest.raises(szlib.SolverError, match="orca, social force, speed model; got 'boids'"):
+    with pytest.raises(
+        szlib.SolverError, match="orca, social force, or make a model from walkers; got 'boids'"
+    ):
         ReactingPeople("boids")
     with pytest.raises(szlib.SolverError, match="robot, person, nothing"):
         ReactingPeople("orca", sees="everything")  # type: ignore[arg-type]

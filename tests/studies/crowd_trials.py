@@ -7,7 +7,8 @@ python tests/studies/crowd_trials.py --n 10    at most 10 trials of each kind
 17_safety_claims.csv   steps that said they were safe, how many led to h < 0, and what the people did
 
 They go to notebooks/tables, or to --out.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/,
-eth/); JuPedSim is left out where it is not installed.  An exception in any trial ends the run.
+eth/).  The speed model is left out where JuPedSim is not installed (`INSTALL_JUPEDSIM` in
+tests/helpers/speed_model.py).  An exception in any trial ends the run.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from szlib.simulation.social_metrics import compute_replay_metrics
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
 
+from helpers.crowd_models import FACTORIES
 from studies.claims import SITES, TABLES
 
 CROWDED = Worlds(
@@ -129,7 +131,7 @@ def reacting(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
                 trials,
                 settings=settings,
                 worlds=CROWDED,
-                behaviour=ReactingPeople(model, sees=sees),
+                behaviour=ReactingPeople(FACTORIES[model], sees=sees),
                 controller=factory,
                 measure=measure,
                 out=work,

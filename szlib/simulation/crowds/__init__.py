@@ -1,3 +1,3 @@
-"""People who react to the robot and to each other, by three interchangeable models of walking."""
+"""People who react to the robot and to each other, by interchangeable models of walking."""
 
 from .reacting import MODELS, ReactingPeople

@@ -18,13 +18,10 @@ from ...zones.ellipses import BODY_RADIUS
 from ..scenario import Crowd, CrowdModel, Scenario
 from .orca import OrcaModel
 from .social_force import SocialForceModel
-from .speed_model import SpeedModel
 from .walking_model import ModelFactory, Walkers, WalkingModel
 
-MODELS: Mapping[str, ModelFactory] = MappingProxyType(
-    {"orca": OrcaModel, "social force": SocialForceModel, "speed model": SpeedModel}
-)
-"""Models of walking, by name; the first two need the extra `crowds`, the third JuPedSim."""
+MODELS: Mapping[str, ModelFactory] = MappingProxyType({"orca": OrcaModel, "social force": SocialForceModel})
+"""Models of walking, by name; they need the extra `crowds`."""
 RobotAppearance = Literal["robot", "person", "nothing"]
 MIN_HEADING_SPEED = 0.2
 """Slower people keep their last heading [m/s] (assumed)."""
@@ -36,7 +33,8 @@ class ReactingPeople(CrowdModel):
 
     Parameters
     ----------
-    model : a name in `MODELS`.
+    model : a name in `MODELS`, or a `ModelFactory` of `szlib.simulation.crowds.walking_model`: a class or a
+        function of a module that makes a `WalkingModel` from `Walkers`.
     sees : what people take the robot for: a disc of its radius, a person, or nothing (they do not see it).
     goals : goal of each person of the scenario, shape (n, 2) [m]; None: their position at the end of the
         scenario at constant velocity; people who stand stay.
@@ -50,7 +48,7 @@ class ReactingPeople(CrowdModel):
     SolverError : an unknown name, or a number that is negative or not finite.
     """
 
-    model: str
+    model: str | ModelFactory
     sees: RobotAppearance = "robot"
     goals: tuple[tuple[float, float], ...] | None = None
     pace: float = 0.5
@@ -58,9 +56,12 @@ class ReactingPeople(CrowdModel):
     r_robot: float = MPCSettings.r_robot
 
     def __post_init__(self) -> None:
-        for name, known in (("model", tuple(MODELS)), ("sees", get_args(RobotAppearance))):
-            if getattr(self, name) not in known:
-                raise SolverError(f"{name} must be one of {', '.join(known)}; got {getattr(self, name)!r}")
+        models, appearances = tuple(MODELS), get_args(RobotAppearance)
+        if not callable(self.model) and self.model not in models:
+            known = ", ".join(models)
+            raise SolverError(f"model must be {known}, or make a model from walkers; got {self.model!r}")
+        if self.sees not in appearances:
+            raise SolverError(f"sees must be one of {', '.join(appearances)}; got {self.sees!r}")
         for name in ("pace", "jitter", "r_robot"):
             if not 0 <= getattr(self, name) < np.inf:
                 raise SolverError(f"{name} must be finite and >= 0; got {getattr(self, name)}")
@@ -84,7 +85,8 @@ class ReactingPeople(CrowdModel):
             speeds = np.where(speeds > 0, speeds, self.pace)
         positions = np.array([p.position for p in people]).reshape(-1, 2)
         walkers = Walkers(positions, velocities, goals, speeds, scenario.walls, r_robot)
-        return _ReactingCrowd(people, walkers, MODELS[self.model](walkers))
+        make_model = self.model if callable(self.model) else MODELS[self.model]
+        return _ReactingCrowd(people, walkers, make_model(walkers))
 
     def _shifted_goals(self, scenario: Scenario, rng: np.random.Generator) -> Array:
         people = scenario.people

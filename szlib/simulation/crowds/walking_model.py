@@ -51,7 +51,7 @@ class WalkingModel(Protocol):
         """
 
 
-ModelFactory = Callable[[Walkers], WalkingModel]
+ModelFactory = Callable[[Walkers], WalkingModel]  # a function of a module, so that other processes find it
 
 
 def import_package(name: str, install: str) -> ModuleType:

@@ -1,10 +1,10 @@
-"""The collision-free speed model, by JuPedSim, with its own parameters.
+"""A model of walking of our own for `ReactingPeople`: the collision-free speed model, by JuPedSim.
 
 A. Tordeux, M. Chraibi, A. Seyfried, "Collision-free speed model for pedestrian dynamics", 2016.  JuPedSim
 leads people around walls.  It cannot move an agent: the robot is removed and added again at each step, and
 stands in between.  People do not see it in the first 0.01 s of a step, nor while its centre is in a body.
 
-JuPedSim is not in the extra `crowds`, because it would install a desktop; `INSTALL_JUPEDSIM` leaves that out.
+JuPedSim would install a desktop; `INSTALL_JUPEDSIM` leaves that out. Its parameters are its own.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ...checks import Array
-from ...errors import SolverError
-from .walking_model import Walkers, import_package
+from szlib.checks import Array
+from szlib.errors import SolverError
+from szlib.simulation.crowds.walking_model import Walkers, import_package
 
 INSTALL_JUPEDSIM = "pip install --no-deps jupedsim deprecated wrapt"
 TICK = 0.01
