@@ -10,15 +10,14 @@ import io
 import json
 import re
 from base64 import b64encode
-from collections.abc import Iterator, Mapping
-from html import escape
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import nbformat
 import pandas as pd
 from bs4 import BeautifulSoup
-from jinja2 import FileSystemLoader, pass_context
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError, pass_context
 from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
@@ -27,18 +26,16 @@ from ..control.settings import MPCSettings
 from ..errors import DataError, ZoneError
 from ..files import write_file
 from ..plaza.settings import PlazaSettings
+from ..simulation.scenario import Scenario
 from ..simulation.scenarios.paper import SCENARIOS
 from ..tracks import datasets, funnels
 from ..zones.social_zone import SocialZone
 from . import folders
 from .record.display import format_value
 
-REPORT = "report.html"
-"""The file of the report, in the folder of a run."""
-TEMPLATE = Path(__file__).parent / "static" / "report.html.j2"
-"""Extends the template `lab` of nbconvert."""
+REPORT = "report.html"  # the file of the report, in the folder of a run
+_STATIC = Path(__file__).parent / "static"
 _FILE_LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:|#|mailto:|data:)([^)\s]+)\)")
-_NOT_IN_RUN = "*Not part of this run.*"
 
 
 def write_report(home: Path) -> Path:
@@ -50,24 +47,26 @@ def write_report(home: Path) -> Path:
     if not notebooks:
         raise DataError(f"{home}: holds no executed notebooks; `szlib run` makes them")
     try:
-        front_page = list(make_front_page(home, notebooks))
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        front_page = _render_front_page(home, notebooks)
+    except (LookupError, TypeError, ValueError, AttributeError, TemplateError) as error:
         raise DataError(
             f"{home}: the results are damaged or of another version of szlib ({error!r}); `szlib run` writes "
             "them again"
         ) from error
-    page = nbformat.v4.new_notebook(cells=front_page)
+    output = nbformat.v4.new_output("display_data", {"text/html": front_page})
+    page = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("", outputs=[output])])
     page.metadata["title"] = f"szlib: {home.name}"
     page.metadata["language_info"] = {"name": "python", "pygments_lexer": "ipython3"}
     for name, notebook in notebooks.items():
-        page.cells += [_markdown(f'<a id="{name}"></a>[to the front page](#top)'), *notebook.cells]
+        link = f'<a id="{name}"></a>[to the front page](#top)'
+        page.cells += [nbformat.v4.new_markdown_cell(link), *notebook.cells]
     for i, cell in enumerate(page.cells):
         cell["id"] = f"cell-{i}"
         if cell.cell_type == "markdown":
             cell.source = _FILE_LINK.sub(lambda link: _local_link(link, notebooks), cell.source)
     exporter = _Exporter(
-        extra_loaders=[FileSystemLoader(TEMPLATE.parent)],
-        template_file=TEMPLATE.name,
+        extra_loaders=[FileSystemLoader(_STATIC)],
+        template_file="report.html.j2",
         exclude_input_prompt=True,
         exclude_output_prompt=True,
     )
@@ -112,145 +111,81 @@ class _Exporter(HTMLExporter):
         return MarkdownWithMath(renderer=renderer).render(source)
 
 
-def make_front_page(home: Path, notebooks: Mapping[str, Any]) -> Iterator[Any]:
-    """Yield the cells of the front page, made from the results in `home` and the executed `notebooks`."""
-    zone, funnel = _load_results(home)
+def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> str:
+    """The front page as HTML, made from the results in `home` and the executed `notebooks`."""
+    pages = Environment(loader=FileSystemLoader(_STATIC), autoescape=True, undefined=StrictUndefined)
+    pages.filters["format_value"] = format_value
     summary, run = _read_json(home / "summary.json"), _read_json(home / "parameters.json")
     outcomes: dict[str, Any] = summary.get("notebooks", {})
-    is_synthetic = run.get("data") == datasets.SYNTHETIC
-    yield _markdown(
-        f"# Results for {'the synthetic plaza' if is_synthetic else summary.get('data', home.name)}"
+    outputs = [(name, html) for name, notebook in notebooks.items() for html in _html_outputs(notebook)]
+    is_synthetic, area = run.get("data") == datasets.SYNTHETIC, home / "area.txt"
+    return pages.get_template("front_page.html.j2").render(
+        title="the synthetic plaza" if is_synthetic else summary.get("data", home.name),
+        outcomes=outcomes,
+        checks=[c | {"notebook": name} for name, outcome in outcomes.items() for c in outcome["checks"]],
+        run=run,
+        area=area.read_text(encoding="utf-8") if area.exists() else "",
+        questions={name: _find_question(notebook) for name, notebook in notebooks.items()},
+        funnel=_show_funnel(home),
+        zone=_show_zone(home, is_synthetic=is_synthetic),
+        players={scenario.title: _find_player(scenario, outputs) for scenario in SCENARIOS.values()},
+        parameters=_list_parameters(outputs),
     )
-    yield from _describe_run(home, run, outcomes)
-    yield _markdown("## The notebooks")
-    yield _table(_list_notebooks(notebooks, outcomes))
-    yield _markdown("## From rows to encounters")
-    yield _table(funnel)
-    yield _markdown("## The social zone")
-    yield from _show_zone(zone, is_synthetic=is_synthetic) if zone else [_markdown(_NOT_IN_RUN)]
-    yield _markdown("## Claims of the paper, measured")
-    yield _table(_list_claims(outcomes))
-    yield _markdown("## The four scenarios")
-    outputs = {name: list(_html_outputs(notebook)) for name, notebook in notebooks.items()}
-    yield from _show_scenarios(outputs)
-    yield _markdown("## Parameters and their sources")
-    yield _table(_list_parameters(outputs))
 
 
-def _load_results(home: Path) -> tuple[SocialZone | None, pd.DataFrame]:
-    """The zone if there is one, and the funnel of the encounters with each stage named once."""
-    try:
-        zone = SocialZone.load(home / "zone.json")
-    except (OSError, ZoneError):
-        zone = None
+def _find_question(notebook: Any) -> str:
+    """The question in the first cell of a notebook."""
+    found = re.search(r"\*\*Question\.\*\*(.*?)(\n\n|\*\*|$)", notebook.cells[0].source, re.DOTALL)
+    return " ".join(found[1].replace("*", "").split()) if found else ""
+
+
+def _show_funnel(home: Path) -> str:
+    """The funnel of the encounters with each stage named once; "" if there are no encounters."""
     if not (home / "encounters.parquet").exists():
-        return zone, pd.DataFrame()
+        return ""
     funnel = funnels.table(funnels.get(pd.read_parquet(home / "encounters.parquet")))
     funnel["stage"] = funnel["stage"].where(~funnel["stage"].duplicated(), "")
-    funnel["rows"] = [f"{rows:,}" for rows in funnel["rows"]]
-    return zone, funnel
+    return _to_html(funnel.assign(rows=funnel["rows"].map("{:,}".format)))
 
 
-def _describe_run(home: Path, run: Mapping[str, Any], outcomes: Mapping[str, Any]) -> Iterator[Any]:
-    """How many checks hold, which do not, and what the run was made from."""
-    checks = [(name, c) for name, outcome in outcomes.items() for c in outcome["checks"]]
-    passed = [c["passed"] for _, c in checks if c["kind"] == "check"]
-    observed = [c["passed"] for _, c in checks if c["kind"] == "observation"]
-    text = f"**{sum(passed)} of {len(passed)} checks hold."
-    if observed:
-        text += f" {sum(observed)} of {len(observed)} checks that assume the default parameters hold as well."
-    problems = [
-        f"{name}: {c['name']} ({format_value(c['value'])})"
-        for name, c in checks
-        if c["kind"] == "check" and not c["passed"]
-    ]
-    problems += [
-        f"{name}: {o.get('error', o['status'])}" for name, o in outcomes.items() if o["status"] != "done"
-    ]
-    yield _markdown("\n".join([f"{text}**", *(f"\n- {escape(problem)}" for problem in problems)]))
-    area = home / "area.txt"
-    rows = {
-        "data": ", ".join(f"{name} ({size:,} bytes)" for name, size, *_ in run.get("files", [])),
-        "area": area.read_text(encoding="utf-8") if area.exists() else "",
-        "changed parameters": ", ".join(f"{k} = {v}" for k, v in run.get("parameters", {}).items()) or "none",
-        "szlib": run.get("szlib", ""),
-    }
-    yield _table(pd.DataFrame([(k, escape(str(v))) for k, v in rows.items() if v], columns=["", " "]))
-
-
-def _list_notebooks(notebooks: Mapping[str, Any], outcomes: Mapping[str, Any]) -> pd.DataFrame:
-    rows = []
-    for name, notebook in notebooks.items():
-        outcome = outcomes.get(name, {"checks": [], "status": "", "seconds": None})
-        checks = [c["passed"] for c in outcome["checks"] if c["kind"] == "check"]
-        found = re.search(r"\*\*Question\.\*\*(.*?)(\n\n|\*\*|$)", notebook.cells[0].source, re.DOTALL)
-        question = " ".join(found[1].replace("*", "").split()) if found else ""
-        seconds = "" if outcome["seconds"] is None else f"{outcome['seconds']:.0f}"
-        link = f'<a href="#{name}">{name.replace("_", " ")}</a>'
-        rows.append((link, escape(question), f"{sum(checks)}/{len(checks)}", seconds, outcome["status"]))
-    return pd.DataFrame(rows, columns=["notebook", "question", "checks", "seconds", "status"])
-
-
-def _show_zone(zone: SocialZone, *, is_synthetic: bool) -> Iterator[Any]:
-    speed = MPCSettings().zone_speed
-    if speed in zone.ellipses:
-        yield _draw_zone(zone, speed, PlazaSettings().true_zone(speed) if is_synthetic else None)
-    table = zone.table()
-    bounds = [f"{name}{end}" for name in ("a", "b") for end in ("", "_low", "_high")]
-    shown = [c for c in ("speed", "center_x", *bounds, "encounters", "adequate") if c in table]
-    yield _markdown(f"By `{zone.method}`, with 95 % intervals [m]; `adequate`: enough people on every side.")
-    yield _table(table[shown].round(2))
-
-
-def _draw_zone(zone: SocialZone, speed: float, truth: Any) -> Any:
+def _show_zone(home: Path, *, is_synthetic: bool) -> dict[str, str]:
+    """The zone's method, table and picture; empty if there is no zone."""
     from matplotlib.figure import Figure
 
     from . import figures
 
-    figure = Figure(figsize=(6, 4.5), layout="constrained")
-    figures.plot_zone(zone, speed, truth=truth, ax=figure.subplots())
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=100)
-    alt = escape(figures.alt_text(figure), quote=True)
-    return _html(f'<img src="data:image/png;base64,{b64encode(content.getvalue()).decode()}" alt="{alt}">')
+    try:
+        zone = SocialZone.load(home / "zone.json")
+    except (OSError, ZoneError):
+        return {}
+    table = zone.table()
+    bounds = [f"{name}{end}" for name in ("a", "b") for end in ("", "_low", "_high")]
+    shown = [c for c in ("speed", "center_x", *bounds, "encounters", "adequate") if c in table]
+    texts = {"method": zone.method, "table": _to_html(table[shown].round(2)), "picture": ""}
+    speed = MPCSettings().zone_speed
+    if speed in zone.ellipses:
+        figure, content = Figure(figsize=(6, 4.5), layout="constrained"), io.BytesIO()
+        truth = PlazaSettings().true_zone(speed) if is_synthetic else None
+        figures.plot_zone(zone, speed, truth=truth, ax=figure.subplots())
+        figure.savefig(content, format="png", dpi=100)
+        texts |= {"picture": b64encode(content.getvalue()).decode(), "alt": figures.alt_text(figure)}
+    return texts
 
 
-def _list_claims(outcomes: Mapping[str, Any]) -> pd.DataFrame:
-    rows = [
-        (_short_link(name), *(escape(format_value(c[key])) for key in ("name", "result", "value")))
-        for name, outcome in outcomes.items()
-        for c in outcome["checks"]
-        if c["kind"] == "claim"
-    ]
-    return pd.DataFrame(rows, columns=["notebook", "claim", "verdict", "effect, or value"])
+def _find_player(scenario: Scenario, outputs: Sequence[tuple[str, str]]) -> str:
+    """The first player of a `scenario` among the outputs; "" if there is none."""
+    mark = f'alt="{scenario.title}:'
+    return next((html for _, html in outputs if "szlib-player" in html and mark in html), "")
 
 
-def _show_scenarios(outputs: Mapping[str, list[str]]) -> Iterator[Any]:
-    players = [html for each in outputs.values() for html in each if "szlib-player" in html]
-    for scenario in SCENARIOS.values():
-        player = next((html for html in players if f'alt="{scenario.title}:' in html), None)
-        yield _markdown(f"**{scenario.title}**" + ("" if player else f"\n\n{_NOT_IN_RUN}"))
-        if player:
-            yield _html(player)
-
-
-def _list_parameters(outputs: Mapping[str, list[str]]) -> pd.DataFrame:
-    """The tables of parameters (`szlib.workbook.record.parameters`) of all notebooks as one."""
-    columns = ["parameter", "value", "badge", "why"]
-    rows = []
-    for name, html in outputs.items():
-        for table in BeautifulSoup("".join(h for h in html if ">badge<" in h), "html.parser").select("table"):
-            if [th.get_text(strip=True) for th in table.select("thead th")] == columns:
-                cells = (tr.select("td") for tr in table.select("tbody tr"))
-                rows += [
-                    (_short_link(name), *(escape(td.get_text(strip=True)) for td in row)) for row in cells
-                ]
-    return pd.DataFrame(rows, columns=["notebook", *columns]).drop_duplicates(columns)
-
-
-def _short_link(name: str) -> str:
-    """A link to a notebook of the report by its number."""
-    return f'<a href="#{name}">{name.split("_")[0]}</a>'
+def _list_parameters(outputs: Sequence[tuple[str, str]]) -> dict[tuple[str, ...], str]:
+    """Each row of the tables of `szlib.workbook.record.parameters`, and the first notebook that shows it."""
+    rows: dict[tuple[str, ...], str] = {}
+    for name, html in outputs:
+        if ">badge<" in html:
+            for row in BeautifulSoup(html, "html.parser").select("tbody tr"):
+                rows.setdefault(tuple(cell.get_text(strip=True) for cell in row.select("td")), name)
+    return rows
 
 
 def _html_outputs(notebook: Any) -> Iterator[str]:
@@ -265,18 +200,5 @@ def _read_json(file: Path) -> dict[str, Any]:
     return dict(json.loads(file.read_text(encoding="utf-8"))) if file.exists() else {}
 
 
-def _markdown(text: str) -> Any:
-    return nbformat.v4.new_markdown_cell(text)
-
-
-def _html(html: str) -> Any:
-    output = nbformat.v4.new_output("display_data", {"text/html": html})
-    return nbformat.v4.new_code_cell("", outputs=[output])
-
-
-def _table(table: pd.DataFrame) -> Any:
-    """A cell with a table whose entries are HTML; a remark if the table is empty."""
-    if table.empty:
-        return _markdown(_NOT_IN_RUN)
-    with pd.option_context("display.max_colwidth", None):
-        return _html(table.to_html(index=False, escape=False, border=0, justify="left", classes="front"))
+def _to_html(table: pd.DataFrame) -> str:
+    return str(table.to_html(index=False, border=0, justify="left", classes="front"))
