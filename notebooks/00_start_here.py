@@ -25,7 +25,7 @@
 # ![A robot makes room for a person in a passage, then goes on](figures/making_room.gif)
 
 # %% [markdown]
-# next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 25 min
+# next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 30 min
 # to read
 #
 # **Afterwards you can** choose a route, and find any notebook, word or symbol again.
@@ -225,6 +225,22 @@ for sheet in SHEETS:
 # - A. Francis and others: Principles and guidelines for evaluating social robot navigation algorithms, 2025.
 #   [10.1145/3700599](https://doi.org/10.1145/3700599)
 # - E. T. Hall: The hidden dimension. Doubleday, 1966 (no DOI).
+
+# %% [markdown]
+# ## Related work
+#
+# What else there is, by its documentation and source code in 2026. Only `szlib` goes from tracks to a zone with its
+# uncertainty and on to a controller; it is neither a planner nor a simulator of crowds nor a general toolbox for control.
+#
+# | project | what it does | what it does not |
+# |---|---|---|
+# | [PedPy](https://pedpy.readthedocs.io) | density, speed, flow, Voronoi cells, profiles and pair distributions from tracks; reads the files of five simulators | zones by direction and speed; robots |
+# | [OpenTraj](https://github.com/crowdbotp/OpenTraj) | loads a dozen data sets of tracks, and describes them: density, entropy, smallest distances to others | encounters of two, intervals; robots |
+# | [cbfpy](https://github.com/danielpmorton/cbfpy) | filters the control of one step by a quadratic program (JAX); the user writes the dynamics and the barrier | a horizon; people and their zones |
+# | [do-mpc](https://www.do-mpc.com) | model predictive control and state estimation of any model (CasADi), robust and with multiple stages | barriers that are ready to use; people and their zones |
+# | [HuNavSim](https://github.com/robotics-upo/hunav_sim) | people who walk by a social force model and react to a robot, in ROS 2 with Gazebo; metrics | zones from data; a controller for the robot |
+# | [CrowdNav](https://github.com/vita-epfl/CrowdNav) | trains and tests policies of a robot among simulated people (ORCA) by reinforcement learning | real tracks; constraints that hold at every step |
+# | [Social-Neural-CBF](https://github.com/dohjh0219/Social-Neural-CBF) | the paper's elliptical barrier, and a network that learns it, in a controller; it aims at the ATC data | its code reads no tracks: the axes are set by hand, and the network learns from samples of that barrier |
 
 # %% [markdown]
 # **What it means.** One question, a story of notebooks in order, and an exercise sheet for each part of it. Go on with
