@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: run report docs test lab bench lock audit hostile notebooks dist clean
 
-run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza
+run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza; fails where a check does not hold
 	$(BIN)/szlib run
 
 report: $(INSTALLED)  ## open what the last run on the plaza wrote: one HTML file
@@ -24,11 +24,13 @@ docs: $(INSTALLED)  ## results/site: that report, and beside it what each name o
 	$(BIN)/pdoc --docformat numpy --output-directory results/site szlib
 	$(BIN)/python -c "import shutil; shutil.copyfile('results/synthetic/report.html', 'results/site/report.html')"
 
+# Types are checked beside the tests; both must pass.  The notebooks are executed by `make run`, not here.
 test: $(INSTALLED)  ## style, types, and every test
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+	@$(BIN)/mypy & types=$$!; \
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder; tests=$$?; \
+	wait $$types && exit $$tests
 
 # root, as in most containers, must be allowed to; there too: make lab LAB_FLAGS="--allow-root --no-browser --ip=0.0.0.0"
 LAB_FLAGS ?= $(if $(filter 0,$(shell id -u 2>/dev/null)),--allow-root)

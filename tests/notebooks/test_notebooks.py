@@ -1,7 +1,8 @@
-"""The notebooks: script and copy agree, every cell was executed, and all checks hold."""
+"""The notebooks: script and copy agree, and in the copy every cell was executed and every check holds.
 
-import json
-import os
+`make run` executes the notebooks anew and fails where a check does not hold.
+"""
+
 import re
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import jupytext
 import nbformat
 import pytest
 
-from szlib.workbook import folders, runner
+from szlib.workbook import folders
 from szlib.workbook.record.parameters import METHOD_DEFAULTS, read_defaults
 
 SOURCES = folders.list_notebooks()
@@ -22,6 +23,16 @@ def cells(source: Path) -> list[nbformat.NotebookNode]:
 
 def code_lines(cell: nbformat.NotebookNode) -> int:
     return sum(1 for line in cell.source.splitlines() if line.strip() and not line.strip().startswith("#"))
+
+
+RESULT = re.compile(r"^(check|claim|observation): (.+): (holds|FAILED|supported|not supported here)\b", re.M)
+
+
+def read_results(source: Path) -> list[tuple[str, str, str]]:
+    """Kind, name and result of each check and claim that the executed copy of a notebook shows."""
+    executed = nbformat.read(source.with_suffix(".ipynb"), as_version=4)
+    outputs = [out for cell in executed.cells for out in cell.get("outputs", ())]
+    return RESULT.findall("\n".join(out.text for out in outputs if out.output_type == "stream"))
 
 
 def test_each_notebook_has_a_copy_and_no_number_is_missing():
@@ -46,6 +57,11 @@ class TestEach:
         ]
         assert [c.execution_count for c in code] == list(range(1, len(code) + 1))
         assert all(out.output_type != "error" for c in code for out in c.outputs)
+
+    def test_every_check_of_the_copy_holds(self, source):
+        checks = [result for kind, _, result in read_results(source) if kind != "claim"]
+        assert checks
+        assert set(checks) == {"holds"}
 
     def test_committed_copies_are_small_and_name_no_machine(self, source):
         text = source.with_suffix(".ipynb").read_text(encoding="utf-8")
@@ -91,37 +107,12 @@ def test_parameter_has_the_same_type_in_all_notebooks():
     assert all(len(found) == 1 for found in types.values()), types
 
 
-REAL_DAY = ("01", "02", "03", "04", "05", "14")
-"""Notebooks that read the data; the others only use the encounters and the zone."""
+def test_more_than_half_of_the_claims_are_supported_on_the_plaza():
+    claims = [result for s in SOURCES for kind, _, result in read_results(s) if kind == "claim"]
+    assert len(claims) > 20
+    assert claims.count("supported") > len(claims) / 2
 
 
-def check_run(summary: dict, home: Path, only: tuple[str, ...] = ("",)) -> None:
-    assert summary["passed"], runner.format_summary(summary)
-    assert json.loads((home / "summary.json").read_text(encoding="utf-8"))["passed"]
-    assert list(summary["notebooks"]) == [s.stem for s in SOURCES if s.stem.startswith(only)]
-    for name, record in summary["notebooks"].items():
-        assert record["seconds"] > 0
-        assert record["checks"], name
-        assert all({"name", "passed", "value"} <= set(c) for c in record["checks"])
-        assert all((home / "figures" / figure).stat().st_size > 1000 for figure in record["figures"])
-    for artefact in ("encounters.parquet", "zone.json"):
-        assert (home / artefact).exists()
-
-
-def test_all_checks_hold_on_the_plaza(tmp_path):
-    summary = runner.run(out=tmp_path, jobs=2)
-    check_run(summary, tmp_path / "synthetic")
-    claims = [c for record in summary["notebooks"].values() for c in record["checks"] if c["kind"] == "claim"]
-    assert sum(c["passed"] for c in claims) > len(claims) / 2
-    assert any("true zone found" in c["name"] for c in summary["notebooks"]["05_zones"]["checks"])
-
-
-@pytest.mark.skipif(
-    not os.environ.get("SZLIB_DATA_DIR"), reason="SZLIB_DATA_DIR names no folder with real data"
-)
-def test_notebooks_complete_on_the_real_day(tmp_path):
-    summary = runner.run("atc-1hz", out=tmp_path, jobs=2, only=REAL_DAY)
-    check_run(summary, tmp_path / "atc-1hz", only=REAL_DAY)
-    assert summary["notebooks"]["01_tracks"]["key_figures"]["rows"] == 624_951
-    results = {c["name"]: c["result"] for record in summary["notebooks"].values() for c in record["checks"]}
-    assert results["the zone at 1.1 m/s reaches farther ahead than behind"] == "not supported here"
+def test_both_methods_find_the_true_zone_of_the_plaza():
+    names = [name for _, name, _ in read_results(folders.NOTEBOOKS / "05_zones.py")]
+    assert sum("true zone found" in name for name in names) == 8  # two methods, four speeds

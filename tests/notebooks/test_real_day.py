@@ -32,6 +32,13 @@ class TestCopy:
         assert [c.execution_count for c in code] == list(range(1, len(code) + 1))
         assert all(out.output_type != "error" for c in code for out in c.outputs)
 
+    def test_every_check_of_the_copy_holds(self, copy):
+        outputs = [o for c in nbformat.read(copy, as_version=4).cells for o in c.get("outputs", ())]
+        text = "\n".join(out.text for out in outputs if out.output_type == "stream")
+        checks = re.findall(r"^check: .+", text, re.M)
+        assert checks
+        assert [line for line in checks if ": holds" not in line] == []
+
     def test_copy_is_small_and_names_no_machine(self, copy):
         text = copy.read_text(encoding="utf-8")
         assert len(text) < 1_500_000
@@ -45,3 +52,9 @@ def test_copy_has_other_data_and_links_from_its_folder():
     links = re.findall(r"\]\(([^)]+)\)", notebook.cells[1].source)
     assert links
     assert all(link.startswith(("../", "http")) for link in links)
+
+
+def test_zone_does_not_reach_farther_ahead_on_the_real_day():
+    executed = nbformat.read(folders.NOTEBOOKS / "real_day" / "05_zones.ipynb", as_version=4)
+    text = "".join(out.get("text", "") for cell in executed.cells for out in cell.get("outputs", ()))
+    assert "the zone at 1.1 m/s reaches farther ahead than behind: not supported here" in text

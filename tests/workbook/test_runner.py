@@ -39,7 +39,6 @@ def test_run_records_checks_claims_and_key_figures(notebooks, tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("without_kernels")
-@pytest.mark.usefixtures("without_kernels")
 def test_with_changed_parameters_only_checks_that_always_hold_fail_the_run(notebooks, tmp_path, capsys):
     notebooks(_01_good='record.check("no infeasible step", seed == 0, 4)')
     assert run("-p", "seed=3") == 0
