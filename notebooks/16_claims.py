@@ -59,7 +59,7 @@ parameters(
             "intervals",
             f"95 %, {resamples} resamples of pairs of people",
             ASSUMED,
-            "one pair is one piece of evidence",
+            "one pair is one piece of evidence; delays in deterministic runs: range over scenarios",
         ),
         (
             "verdict",
@@ -118,7 +118,8 @@ record.figure(ax.figure, "claims")
 #
 # The plaza, the real ATC day, Grand Central, THOR-MAGNI, and the ETH sequence
 # (`python tests/studies/claims.py`). A site without enough people on every side decides nothing about
-# zones, and says so.
+# zones, and says so. Brackets hold 95 % intervals; those of the robot's delay hold the range over the four
+# scenarios, because the runs are deterministic.
 
 # %%
 everywhere = pd.read_csv("tables/16_claims.csv")
@@ -268,6 +269,7 @@ driven = pd.DataFrame(
 driven.pivot(index="scenario", columns="zone", values=["time to goal [s]", "yields [s]"]).round(1)
 
 # %%
+# the runs are deterministic: the brackets hold the range over the four scenarios, no 95 % interval
 trade = claims.measure_delay_by_size(zone.ellipses[zone_speed])
 record.claim(trade.claim, trade.low > 0, str(trade))
 fig, ax = plt.subplots(figsize=(7, 3.5), layout="constrained")

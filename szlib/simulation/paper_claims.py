@@ -1,11 +1,13 @@
-"""The claims of the paper, tested on data: each is an effect with its 95 % interval, and a verdict.
+"""The claims of the paper, tested on data: each is an effect with an interval, and a verdict.
 
-An effect above 0 supports the claim.  Where the interval contains 0, the data decide nothing.
+An effect above 0 supports the claim.  Where the interval contains 0, the data decide nothing.  The interval
+is a 95 % interval, but for the delay of the robot: its runs are deterministic, so it is the range over the
+scenarios.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log2, sqrt
 from typing import Any
@@ -26,7 +28,11 @@ from .scenarios.paper import SCENARIOS
 PAPER_RATE = 16_181 / 92
 """Encounters a day in the paper (sec. 2)."""
 LEVEL = 0.95
-"""Level of all intervals here."""
+"""Level of all confidence intervals here."""
+CONFIDENCE = "95 % interval"
+"""What `Finding.low` and `high` are, if people are a sample of all people."""
+RANGE = "range over scenarios"
+"""What they are, if the runs are deterministic: the smallest and the largest effect."""
 LARGER_AHEAD = "the zone reaches farther ahead than behind"
 GROWS_WITH_SPEED = "the zone grows with walking speed"
 ENCOUNTER_RATE = "as many encounters a day as in the paper, within a factor of two"
@@ -43,6 +49,7 @@ class Finding:
     unit : unit of the effect.
     n : number of encounters, pairs, days or runs.
     adequate : False if there are too few people on some side; then nothing is decided.
+    interval : what `low` and `high` are: `CONFIDENCE` or `RANGE`.
 
     Examples
     --------
@@ -59,6 +66,7 @@ class Finding:
     unit: str
     n: int
     adequate: bool = True
+    interval: str = CONFIDENCE
 
     @property
     def verdict(self) -> str:
@@ -70,18 +78,26 @@ class Finding:
         return f"not decidable with n = {self.n:,}"
 
     def __str__(self) -> str:
-        return f"{self.effect:+.2f} [{self.low:+.2f}, {self.high:+.2f}] {self.unit}: {self.verdict}"
+        return format_finding(self._row())
+
+    def _row(self) -> dict[str, Any]:
+        names = ("claim", "effect", "low", "high", "interval", "unit", "n", "verdict")
+        return {name: getattr(self, name) for name in names}
 
 
 def tabulate_findings(findings: Iterable[Finding], *, data: str) -> pd.DataFrame:
-    """One row for each of `findings` on `data`: data, claim, effect, low, high, unit, n, verdict."""
-    rows = [(data, f.claim, f.effect, f.low, f.high, f.unit, f.n, f.verdict) for f in findings]
-    return pd.DataFrame(rows, columns=["data", "claim", "effect", "low", "high", "unit", "n", "verdict"])
+    """One row for each of `findings` on `data`: data, claim, effect, low, high, interval, unit, n, verdict."""
+    return pd.DataFrame([{"data": data} | finding._row() for finding in findings])
 
 
-def format_finding(row: pd.Series[Any]) -> str:
-    """A `row` of `tabulate_findings` in few words: effect [low, high] unit: verdict."""
-    return f"{row['effect']:+.2f} [{row['low']:+.2f}, {row['high']:+.2f}] {row['unit']}: {row['verdict']}"
+def format_finding(row: Mapping[str, Any] | pd.Series[Any]) -> str:
+    """A `row` of `tabulate_findings` in few words: effect [low, high] unit: verdict.
+
+    An interval that is not a 95 % interval is named after the unit.
+    """
+    name = "" if row["interval"] == CONFIDENCE else f" ({row['interval']})"
+    numbers = f"{row['effect']:+.2f} [{row['low']:+.2f}, {row['high']:+.2f}] {row['unit']}"
+    return f"{numbers}{name}: {row['verdict']}"
 
 
 def measure_reach_ahead(zone: SocialZone, *, speed: float = 1.1) -> Finding:
@@ -152,6 +168,8 @@ def measure_delay_by_size(
 ) -> Finding:
     """A larger zone makes the robot later at its goal (sec. 4): mean and range over scenarios of the paper.
 
+    The runs are deterministic: the claim is supported if the robot is later in every scenario.
+
     Parameters
     ----------
     zone : the zone.
@@ -163,9 +181,8 @@ def measure_delay_by_size(
         times = [run_scenario(name, zone.scaled(scale))["time_to_goal"] for scale in scales]
         delays.append(times[-1] - times[0])
     claim = f"a zone {scales[-1] / scales[0]:.1f} times as large makes the robot later"
-    return Finding(
-        claim, float(np.mean(delays)), float(np.min(delays)), float(np.max(delays)), "s", len(delays)
-    )
+    mean, low, high = float(np.mean(delays)), float(np.min(delays)), float(np.max(delays))
+    return Finding(claim, mean, low, high, "s", len(delays), interval=RANGE)
 
 
 def run_scenario(name: str, zone: Ellipse) -> dict[str, float]:

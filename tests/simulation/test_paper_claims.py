@@ -78,6 +78,12 @@ def test_wilsons_interval_contains_zero_for_equal_shares() -> None:
     assert 0.92 <= np.mean([f.low <= 0 <= f.high for f in undecided]) <= 0.98
 
 
+def test_what_lof_removes_may_be_people() -> None:
+    assert claims.measure_intruders_removed(60, 80).verdict == "supported"
+    assert claims.measure_intruders_removed(20, 80).verdict == "contradicted"
+    assert claims.measure_intruders_removed(0, 0).verdict.startswith("not decidable")
+
+
 def zone_of(people: pd.DataFrame, **options: object) -> szlib.SocialZone:
     return szlib.SocialZone.fit(people, method="quantile", speeds=(0.7, 1.1, 1.3), **options)
 
@@ -94,6 +100,57 @@ def test_the_plaza_is_larger_ahead_and_grows_as_it_was_made_to(tmp_path) -> None
     assert growth.high - growth.low >= row["area_high"] - row["area_low"]
     with pytest.raises(szlib.ZoneError, match=r"no interval at 1\.2 m/s; fit with this speed"):
         claims.measure_reach_ahead(zone, speed=1.2)
+
+
+@pytest.fixture(scope="module")
+def plaza(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    """Encounters of the plaza, whose zone reaches farther ahead and grows with speed."""
+    path = tmp_path_factory.mktemp("plaza") / "plaza.csv"
+    return szlib.find_encounters(szlib.read_tracks(szlib.make_plaza(path, seed=3)))
+
+
+def test_the_reach_ahead_is_the_difference_of_both_reaches(plaza: pd.DataFrame) -> None:
+    zone = zone_of(plaza, n_resamples=20)
+    outline = zone.ellipses[1.1].curve(2000)
+    found, row = claims.measure_reach_ahead(zone), zone.table().set_index("speed").loc[1.1]
+    assert found.effect == pytest.approx(outline[:, 0].max() + outline[:, 0].min(), abs=1e-5)
+    assert (found.low, found.high) == pytest.approx((2 * row["center_x_low"], 2 * row["center_x_high"]))
+    assert found.n == row["encounters"]
+
+
+def test_zones_that_reach_farther_behind_or_shrink_contradict_the_paper(plaza: pd.DataFrame) -> None:
+    zone = zone_of(plaza.assign(los_angle=np.pi - plaza["los_angle"]), n_resamples=60)
+    assert claims.measure_reach_ahead(zone).verdict == "contradicted"
+    assert claims.measure_growth_with_speed(zone, slow=1.3, fast=0.7).verdict == "contradicted"
+
+
+def test_zones_without_people_on_some_side_decide_nothing(plaza: pd.DataFrame) -> None:
+    ahead = plaza[np.cos(plaza["los_angle"]) > 0.2]
+    with pytest.warns(szlib.DataWarning):
+        zone = zone_of(ahead, n_resamples=20)
+    assert not zone.adequate(1.1)
+    for found in (claims.measure_reach_ahead(zone), claims.measure_growth_with_speed(zone)):
+        assert found.verdict.startswith("not decidable")
+
+
+def test_delays_have_their_range_over_scenarios(monkeypatch: pytest.MonkeyPatch) -> None:
+    zone, times = szlib.Ellipse((0.0, 0.0), (1.0, 0.7)), {"passing": 3.0, "corridor": 5.0, "waiting": 1.0}
+
+    def run_scenario(name: str, zone: szlib.Ellipse) -> dict[str, float]:
+        return {"time_to_goal": 10 + times[name] * zone.semi_axes[0]}
+
+    monkeypatch.setattr(claims, "run_scenario", run_scenario)
+    found = claims.measure_delay_by_size(zone, scales=(1.0, 1.5, 2.0), names=times)
+    assert (found.effect, found.low, found.high, found.n) == (3.0, 1.0, 5.0, 3)
+    assert found.verdict == "supported"
+    assert str(found) == "+3.00 [+1.00, +5.00] s (range over scenarios): supported"
+    table = claims.tabulate_findings([found, finding(0.1, 0.3)], data="here")
+    assert table["interval"].tolist() == ["range over scenarios", "95 % interval"]
+    times["waiting"] = -1.0
+    mixed = claims.measure_delay_by_size(zone, scales=(1.0, 2.0), names=times)
+    assert mixed.low == -1 and mixed.verdict == "not decidable with n = 3"
+    earlier = claims.measure_delay_by_size(zone, scales=(2.0, 1.0), names=("passing", "corridor"))
+    assert earlier.verdict == "contradicted"
 
 
 def test_a_larger_zone_makes_the_robot_later() -> None:

@@ -79,6 +79,18 @@ def test_implausible_files_are_refused_like_tables(tmp_path: Path) -> None:
         read_raw(without)
 
 
+def test_only_formats_that_leave_doubt_get_a_suggestion(tmp_path: Path) -> None:
+    """Times in milliseconds since 1970: every row is rejected. Eight numbers in a row are atc-raw for sure."""
+    spoiled = SPOILED["milliseconds: divide them"]().assign(v=1.0, a=0.1)
+    spoiled.to_csv(tmp_path / "public.csv", index=False, header=False)
+    with pytest.raises(szlib.DataError, match="as atc-1hz; times look like milliseconds: divide them"):
+        read_raw(tmp_path / "public.csv")
+    raw = spoiled.assign(x=1e3 * spoiled["x"], y=1e3 * spoiled["y"], b=0.0, c=0.0)
+    raw.to_csv(tmp_path / "raw.csv", index=False, header=False)
+    with pytest.raises(szlib.DataError, match="as atc-raw; expected one of: atc-raw"):
+        read_raw(tmp_path / "raw.csv")
+
+
 def test_exchanged_columns_of_a_file_without_header_are_named_by_number(tmp_path: Path) -> None:
     wrong = table().assign(v=1.0, a=0.1)[["id", "t", "x", "y", "v", "a"]]
     wrong.to_csv(tmp_path / "a.csv", index=False, header=False)

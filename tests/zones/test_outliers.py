@@ -8,6 +8,7 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.optimize import brentq
 from sklearn.neighbors import LocalOutlierFactor
 
 import szlib
@@ -184,6 +185,21 @@ def test_distant_encounters_are_no_outliers() -> None:
     factors = local_outlier_factors(complementary_points(samples), N_NEIGHBOURS)
     assert (factors[-2:] > OUTLIER_FACTOR).all()
     assert removed_encounters(samples) == {300}
+
+
+@pytest.mark.parametrize(("factor", "is_removed"), [(1.9, False), (2.1, True)])
+def test_an_encounter_is_an_outlier_above_a_factor_of_two(factor: float, is_removed: bool) -> None:
+    ring = make_samples(300, nearest=0.9, farthest=1.1)
+
+    def with_one_at(distance: float) -> pd.DataFrame:
+        one = pd.DataFrame({"los_angle": [1.0], "distance": [distance], "speed": 1.0})
+        return pd.concat([ring, one], ignore_index=True).assign(encounter=range(301))
+
+    def factor_at(distance: float) -> float:
+        return local_outlier_factors(complementary_points(with_one_at(distance)), N_NEIGHBOURS)[-1]
+
+    distance = brentq(lambda d: factor_at(d) - factor, 0.5, 0.9, xtol=1e-4)
+    assert removed_encounters(with_one_at(distance)) == ({300} if is_removed else set())
 
 
 def test_number_of_neighbours_is_a_share_of_the_encounters() -> None:

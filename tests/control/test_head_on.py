@@ -1,0 +1,46 @@
+"""People whom the robot meets head-on: the target beside them."""
+
+from math import asin, atan2, cos, pi, sin
+
+import numpy as np
+import pytest
+
+import szlib
+from szlib.control.head_on import find_target
+from szlib.control.person import place_zone
+
+CIRCLE = szlib.Ellipse((0.0, 0.0), (0.7, 0.7))
+STANDING = place_zone(szlib.Person((0.0, 0.0), heading=pi), CIRCLE)
+ROBOT = (-3.0, 0.0)
+
+
+def find_turn(bearing: float, settings: szlib.MPCSettings, walls: tuple = ()) -> float:
+    """Angle from the goal, 8 m away at a `bearing`, to the target [rad], both seen from the robot."""
+    goal = (ROBOT[0] + 8 * cos(bearing), ROBOT[1] + 8 * sin(bearing))
+    x, y = find_target(ROBOT, goal, [STANDING], walls, settings)
+    assert np.hypot(x - ROBOT[0], y - ROBOT[1]) == pytest.approx(8), "as far away as the goal"
+    return atan2(y - ROBOT[1], x - ROBOT[0]) - bearing
+
+
+def half_angle(settings: szlib.MPCSettings) -> float:
+    """Half the angle under which the robot sees the set h < 0 of a round zone."""
+    return asin((0.7 + settings.r_robot + settings.eps) / 3)
+
+
+@pytest.mark.parametrize("tie", [0.1, 0.25, 0.5])
+@pytest.mark.parametrize(("side", "sign"), [("right", -1), ("left", 1)])
+def test_the_target_lies_along_the_tangent_and_turns_back_without_a_jump(side, sign, tie):
+    settings = szlib.MPCSettings(pass_side=side, tie=tie)
+    w = half_angle(settings)
+    shares = np.linspace(-0.999, 2.5, 400)
+    turns = sign * np.array([find_turn(sign * share * tie * w, settings) for share in shares])
+    expected = (w - shares * tie * w) * np.clip(2 - shares, 0, 1)
+    assert turns == pytest.approx(expected, abs=1e-9)
+    assert np.abs(np.diff(turns)).max() < 2 * w * (shares[1] - shares[0]), "without a jump"
+
+
+def test_beyond_the_tie_on_the_other_side_the_robot_passes_there():
+    settings = szlib.MPCSettings(pass_side="right")
+    limit = settings.tie * half_angle(settings)
+    assert find_turn(0.99 * limit, settings) < 0 < find_turn(1.01 * limit, settings)
+    assert find_turn(2.01 * limit, settings) == pytest.approx(0)
