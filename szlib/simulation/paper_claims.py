@@ -33,6 +33,8 @@ CONFIDENCE = "95 % interval"
 """What `Finding.low` and `high` are, if people are a sample of all people."""
 RANGE = "range over scenarios"
 """What they are, if the runs are deterministic: the smallest and the largest effect."""
+COLUMNS = ("claim", "effect", "low", "high", "interval", "unit", "n", "verdict")
+"""Attributes of a `Finding` that are columns of a table of findings."""
 LARGER_AHEAD = "the zone reaches farther ahead than behind"
 GROWS_WITH_SPEED = "the zone grows with walking speed"
 ENCOUNTER_RATE = "as many encounters a day as in the paper, within a factor of two"
@@ -81,13 +83,13 @@ class Finding:
         return format_finding(self._row())
 
     def _row(self) -> dict[str, Any]:
-        names = ("claim", "effect", "low", "high", "interval", "unit", "n", "verdict")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in COLUMNS}
 
 
 def tabulate_findings(findings: Iterable[Finding], *, data: str) -> pd.DataFrame:
-    """One row for each of `findings` on `data`: data, claim, effect, low, high, interval, unit, n, verdict."""
-    return pd.DataFrame([{"data": data} | finding._row() for finding in findings])
+    """One row for each of `findings` on `data`: data, then the columns of `COLUMNS`."""
+    rows = [{"data": data} | finding._row() for finding in findings]
+    return pd.DataFrame(rows, columns=["data", *COLUMNS])
 
 
 def format_finding(row: Mapping[str, Any] | pd.Series[Any]) -> str:

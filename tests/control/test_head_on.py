@@ -27,20 +27,20 @@ def half_angle(settings: szlib.MPCSettings) -> float:
     return asin((0.7 + settings.r_robot + settings.eps) / 3)
 
 
-@pytest.mark.parametrize("tie", [0.1, 0.25, 0.5])
+@pytest.mark.parametrize("share", [0.1, 0.25, 0.5])
 @pytest.mark.parametrize(("side", "sign"), [("right", -1), ("left", 1)])
-def test_the_target_lies_along_the_tangent_and_turns_back_without_a_jump(side, sign, tie):
-    settings = szlib.MPCSettings(pass_side=side, tie=tie)
+def test_the_target_lies_along_the_tangent_and_turns_back_without_a_jump(side, sign, share):
+    settings = szlib.MPCSettings(pass_side=side, head_on_share=share)
     w = half_angle(settings)
-    shares = np.linspace(-0.999, 2.5, 400)
-    turns = sign * np.array([find_turn(sign * share * tie * w, settings) for share in shares])
-    expected = (w - shares * tie * w) * np.clip(2 - shares, 0, 1)
+    leads = np.linspace(-0.999, 2.5, 400)
+    turns = sign * np.array([find_turn(sign * lead * share * w, settings) for lead in leads])
+    expected = (w - leads * share * w) * np.clip(2 - leads, 0, 1)
     assert turns == pytest.approx(expected, abs=1e-9)
-    assert np.abs(np.diff(turns)).max() < 2 * w * (shares[1] - shares[0]), "without a jump"
+    assert np.abs(np.diff(turns)).max() < 2 * w * (leads[1] - leads[0]), "without a jump"
 
 
-def test_beyond_the_tie_on_the_other_side_the_robot_passes_there():
+def test_the_robot_passes_on_the_other_side_if_the_goal_lies_there():
     settings = szlib.MPCSettings(pass_side="right")
-    limit = settings.tie * half_angle(settings)
+    limit = settings.head_on_share * half_angle(settings)
     assert find_turn(0.99 * limit, settings) < 0 < find_turn(1.01 * limit, settings)
     assert find_turn(2.01 * limit, settings) == pytest.approx(0)

@@ -1,7 +1,7 @@
 """The paper's claims on every data set, and what moves the zone most: the tables of notebook 16.
 
-python tests/studies/claims.py claims        16_claims.csv        effect, interval, verdict: claim by data set;
-                                                                    the delay has its range over scenarios
+python tests/studies/claims.py claims        16_claims.csv        effect, interval, verdict: claim by data set
+                                                                    (of delays: the range over scenarios)
 python tests/studies/claims.py sensitivity   16_sensitivity.csv   the real day, each parameter varied alone
 
 They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/, magni/, eth/).

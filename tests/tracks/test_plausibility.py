@@ -80,7 +80,7 @@ def test_implausible_files_are_refused_like_tables(tmp_path: Path) -> None:
 
 
 def test_only_formats_that_leave_doubt_get_a_suggestion(tmp_path: Path) -> None:
-    """Times in milliseconds since 1970: every row is rejected. Eight numbers in a row are atc-raw for sure."""
+    """Times in milliseconds since 1970: every row is rejected. Eight numbers in a row are atc-raw."""
     spoiled = SPOILED["milliseconds: divide them"]().assign(v=1.0, a=0.1)
     spoiled.to_csv(tmp_path / "public.csv", index=False, header=False)
     with pytest.raises(szlib.DataError, match="as atc-1hz; times look like milliseconds: divide them"):
