@@ -11,10 +11,8 @@ from ...plaza.accuracy import precision_and_recall
 from ...zones.outliers import N_NEIGHBOURS, complementary_points, local_outlier_factors
 from .task import Case, Rng, formula, make_task
 
-_WINDOW = 31
-"""Samples of one encounter: 3 s at 10 Hz."""
-_MIN_GAP = 0.3
-"""Least distance of an intruder's samples to all other samples [m]."""
+_WINDOW = 31  # samples of one encounter: 3 s at 10 Hz
+_MIN_GAP = 0.3  # least distance of an intruder's samples to all other samples [m]
 
 
 def _draw_close_samples(rng: Rng) -> tuple[Any, ...]:
@@ -96,10 +94,5 @@ TASKS = (
         not_removed=lambda removed, intruder: precision_and_recall(~removed, intruder),
         not_intruders=lambda removed, intruder: precision_and_recall(removed, ~intruder),
     ),
-    make_task(
-        "blind_spot",
-        _draw_cloud,
-        judge=_judge_intruder,
-        n_cases=2,
-    ),
+    make_task("blind_spot", _draw_cloud, judge=_judge_intruder),
 )

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import shapely
 
 from ...encounters.finding import find_encounters
 from ...plaza.generation import make_plaza
@@ -19,11 +20,10 @@ from ...zones.enclosing_ellipse import minimum_enclosing_ellipse
 from ...zones.hulls import Slice
 from .task import Case, Rng, formula, make_task
 
-_TOLERANCE = 0.08
-"""Largest error of the learner's zone, in centre and semi-axes [m]."""
-_SPEED = 1.1
-"""Walking speed of the zone [m/s] (paper, sec. 4)."""
+_TOLERANCE = 0.08  # largest error of the learner's zone, in centre and semi-axes [m]
+_SPEED = 1.1  # walking speed of the zone [m/s] (paper, sec. 4)
 _R_MAX = 2.0  # paper, sec. 2 [m]
+_ORIGIN = shapely.Point(0, 0)
 
 
 def _draw_edge(rng: Rng) -> tuple[Any, ...]:
@@ -47,13 +47,6 @@ def _reach(polygon: Any, theta: float) -> float:
     return float(Slice(np.asarray(polygon), _SPEED, _R_MAX).reach(theta))
 
 
-def _nearest_edge(polygon: Any) -> float:
-    """Distance from the origin to the nearest line through an edge of the polygon [m]."""
-    along = np.roll(polygon, -1, axis=0) - polygon
-    doubled = np.abs(polygon[:, 0] * along[:, 1] - polygon[:, 1] * along[:, 0])
-    return float((doubled / np.hypot(*along.T)).min())
-
-
 def _nearest_corner(polygon: Any, theta: float) -> float:
     """Distance of the corner nearest to the direction theta [m]."""
     off = np.angle(np.exp(1j * (np.arctan2(polygon[:, 1], polygon[:, 0]) - theta)))
@@ -65,18 +58,13 @@ def _draw_triangle(rng: Rng) -> tuple[Any, ...]:
     return ((np.column_stack([np.cos(turn), 0.5 * np.sin(turn)]) + rng.uniform(-1, 1, 2)).round(2),)
 
 
-def _area(triangle: Any) -> float:
-    (ax, ay), (bx, by) = triangle[1:] - triangle[0]
-    return float(abs(ax * by - ay * bx) / 2)
-
-
 def _smallest(triangle: Any) -> float:
     return minimum_enclosing_ellipse(triangle).area
 
 
 def _circumscribed(triangle: Any) -> float:
     sides = np.prod(np.hypot(*(np.roll(triangle, 1, axis=0) - triangle).T))
-    return float(np.pi * (sides / (4 * _area(triangle))) ** 2)
+    return float(np.pi * (sides / (4 * shapely.Polygon(triangle).area)) ** 2)
 
 
 @lru_cache(maxsize=2)
@@ -128,21 +116,16 @@ TASKS = (
         formula(_draw_polygon, lambda polygon, theta, r_max: r_max - _reach(polygon, theta)),
         reach=lambda polygon, theta, r_max: _reach(polygon, theta),
         corner=lambda polygon, theta, r_max: r_max - _nearest_corner(polygon, theta),
-        any_direction=lambda polygon, theta, r_max: r_max - _nearest_edge(polygon),
+        any_direction=lambda polygon, theta, r_max: r_max - shapely.LinearRing(polygon).distance(_ORIGIN),
         degrees=lambda polygon, theta, r_max: r_max - _reach(polygon, np.radians(theta)),
     ),
     make_task(
         "triangle_ellipse",
         formula(_draw_triangle, _smallest),
         circle=_circumscribed,
-        triangle=_area,
+        triangle=lambda triangle: shapely.Polygon(triangle).area,
         inside=lambda triangle: _smallest(triangle) / 4,
         box=lambda triangle: np.pi / 4 * float(np.prod(np.ptp(triangle, axis=0))),
     ),
-    make_task(
-        "my_zone",
-        _draw_plaza,
-        judge=_judge_zone,
-        n_cases=1,
-    ),
+    make_task("my_zone", _draw_plaza, judge=_judge_zone),
 )

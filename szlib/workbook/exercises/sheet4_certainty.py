@@ -52,7 +52,6 @@ TASKS = (
         one_person=lambda mean, n: mean,
         uniform=lambda mean, n: mean / (n + 1),
         median=lambda mean, n: mean * np.log(2) / n,
-        tolerance=1e-9,
     ),
     make_task(
         "p_value",

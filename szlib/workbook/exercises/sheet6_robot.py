@@ -15,8 +15,7 @@ from ...simulation.scenarios.paper import SCENARIOS
 from ...zones.ellipses import Ellipse
 from .task import Case, Rng, formula, make_task
 
-_GAMMAS = (0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.12, 0.15, 0.2)
-"""Values that the experiment tries."""
+_GAMMAS = (0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.12, 0.15, 0.2)  # that the experiment tries
 
 
 def _draw_approach(rng: Rng) -> tuple[Any, ...]:
@@ -59,12 +58,12 @@ def _draw_plan(rng: Rng) -> tuple[Any, ...]:
     return (np.vstack([plan[:-1], plan[-1:] + 0.1]),)
 
 
+# Question -> the answers for a smaller and for a larger number.
 QUESTIONS = {
     "passing, gamma from 0.05 to 0.1: the least h is": ("smaller", "larger"),
     "waiting at gamma 0.2, N_h from 2 to 8: the infeasible steps are": ("fewer", "more"),
     "passing, from the front to from behind: avoidance starts": ("nearer", "farther away"),
 }
-"""Question -> the answers for a smaller and for a larger number."""
 
 
 def _draw_runs(rng: Rng) -> Case:
@@ -109,7 +108,6 @@ TASKS = (
         smallest=lambda zone, a_max, gammas: gammas[0],
         largest=lambda zone, a_max, gammas: gammas[-1],
         default_brake=lambda zone, a_max, gammas: _largest(zone, 1.0, gammas),
-        n_cases=1,
     ),
     make_task(
         "next_plan",
@@ -119,10 +117,5 @@ TASKS = (
         wrong_way=lambda plan: np.vstack([np.zeros((1, 2)), plan[:-1]]),
         shorter=lambda plan: plan[1:],
     ),
-    make_task(
-        "prediction",
-        _draw_runs,
-        judge=_judge_prediction,
-        n_cases=1,
-    ),
+    make_task("prediction", _draw_runs, judge=_judge_prediction),
 )

@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import DataError
-from . import (
-    sheet1_tracks,
-    sheet2_outliers,
-    sheet3_zones,
-    sheet4_certainty,
-    sheet5_barriers,
-    sheet6_robot,
-)
+from . import sheet1_tracks, sheet2_outliers, sheet3_zones, sheet4_certainty, sheet5_barriers, sheet6_robot
 from .task import Answer, Task, Verdict
 
 _MODULES = (sheet1_tracks, sheet2_outliers, sheet3_zones, sheet4_certainty, sheet5_barriers, sheet6_robot)

@@ -7,7 +7,7 @@ functions as well: if one of them gives the learner's answer in every case, the 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
@@ -20,10 +20,10 @@ import pandas as pd
 from ...errors import SzlibError
 
 Answer = Callable[..., Any]
+# The arguments for the learner's function, and the correct answer.
 Case = tuple[tuple[Any, ...], Any]
-"""The arguments for the learner's function, and the correct answer."""
+# Function of the arguments, the correct answer and the learner's answer; "" accepts the answer.
 Judge = Callable[[tuple[Any, ...], Any, Any], str]
-"""Function of the arguments, the correct answer and the learner's answer; "" accepts the answer."""
 Rng = np.random.Generator
 
 _MAX_SHOWN = 6  # numbers of an array in a message
@@ -89,7 +89,7 @@ class Task:
 
     name: str
     minutes: int
-    hints: tuple[str, ...]
+    hints: Sequence[str]
     case: Callable[[Rng], Case]
     mistakes: Mapping[str, Answer]
     judge: Judge | None = None
@@ -158,26 +158,24 @@ def make_task(
     case: Callable[[Rng], Case],
     *,
     judge: Judge | None = None,
-    tolerance: float = 1e-6,
-    n_cases: int = 5,
     **mistakes: Answer,
 ) -> Task:
-    """Build a task with the texts of `texts.toml`.
+    """Build a task with the texts and numbers of `texts.toml`.
 
     Parameters
     ----------
     name : name of the task, and of its section in `texts.toml`.
-    case, judge, tolerance, n_cases : as for `Task`.
+    case, judge : as for `Task`.
     mistakes : key -> function that makes the mistake. `texts.toml` holds the message of each key.
 
     Raises
     ------
     KeyError : a task or a mistake has no text.
     """
-    texts = load_texts()[name]
-    hints, unit = tuple(texts["hints"]), texts.get("unit", "")
-    messages = {texts["mistakes"][key]: answer for key, answer in mistakes.items()}
-    return Task(name, texts["minutes"], hints, case, messages, judge, tolerance, unit, n_cases)
+    texts = dict(load_texts()[name])
+    messages = texts.pop("mistakes", {})
+    described = {messages[key]: answer for key, answer in mistakes.items()}
+    return Task(name, case=case, mistakes=described, judge=judge, **texts)
 
 
 @cache
