@@ -54,7 +54,6 @@ from .zones import (
     null_test,
     pair_correlation,
     remove_outliers,
-    respect_boundary,
     respect_radius,
 )
 
@@ -117,7 +116,6 @@ __all__ = [
     "plaza",
     "read_tracks",
     "remove_outliers",
-    "respect_boundary",
     "respect_radius",
     "rollouts",
     "segment_distance",

@@ -24,7 +24,7 @@ from .hulls import HullZone, hull_vertices, slice_hull
 from .occupancy import OccupancyHistogram, PairCorrelation, pair_correlation
 from .outliers import complementary_points, is_outlier, remove_outliers
 from .polar import PolarZone
-from .respect import Respect, fit_respect, respect_boundary, respect_radius
+from .respect import Respect, fit_respect, respect_radius
 from .respect_significance import NullTest, null_test
 from .social_zone import SocialZone
 from .uncertainty import count_by_side
@@ -34,5 +34,5 @@ __all__ = [
     "PolarZone", "Respect", "SocialZone", "circle_around", "complementary_points", "count_by_side",
     "draw_costmap", "fit_respect", "hull_vertices", "is_outlier", "minimum_enclosing_ellipse",
     "minimum_enclosing_ellipse_of_curve", "null_test", "pair_correlation", "remove_outliers",
-    "respect_boundary", "respect_radius", "slice_hull",
+    "respect_radius", "slice_hull",
 ]  # fmt: skip

@@ -152,37 +152,6 @@ def fit_respect(
     return _fit(real, model, against.r_max)
 
 
-def respect_boundary(
-    samples: pd.DataFrame | OccupancyHistogram,
-    null: NullEncounters | OccupancyHistogram,
-    theta: ArrayLike,
-    *,
-    speed: float | None = None,
-    speed_width: float = SPEED_WIDTH,
-) -> Array:
-    """Compute the radii of the respect zone in some directions.
-
-    Parameters
-    ----------
-    samples, null, speed, speed_width : as in `fit_respect`.
-    theta : directions (...) [rad].
-
-    Returns
-    -------
-    Radii, of the same shape as `theta` [m].
-
-    Examples
-    --------
-    >>> import szlib
-    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
-    >>> tracks = szlib.read_tracks(path)
-    >>> null = szlib.null_encounters(tracks, shifts=3, minutes=(0.5, 2.0), progress=False)
-    >>> szlib.respect_boundary(szlib.find_encounters(tracks), null, [0.0, 1.57]).shape
-    (2,)
-    """
-    return fit_respect(samples, null, speed=speed, speed_width=speed_width).radii(theta)
-
-
 def respect_radius(
     samples: pd.DataFrame | OccupancyHistogram, null: NullEncounters | OccupancyHistogram
 ) -> float:
@@ -309,10 +278,8 @@ class RespectEstimator(Estimator):
         """Radii (s, 72) [m] for weights (n,) of the samples and a null model."""
         data = OccupancyHistogram.from_samples(self.samples, r_max=self.null.r_max, weights=weights)
         distinct = speeds[:1] if np.isinf(self.speed_width) else speeds
-        radii = [
-            respect_boundary(data, null, DIRECTIONS, speed=v, speed_width=self.speed_width) for v in distinct
-        ]
-        return np.broadcast_to(radii, (len(speeds), len(DIRECTIONS)))
+        fits = [fit_respect(data, null, speed=v, speed_width=self.speed_width) for v in distinct]
+        return np.broadcast_to([fit.radii(DIRECTIONS) for fit in fits], (len(speeds), len(DIRECTIONS)))
 
 
 def _fit(real: Array, null: Array, r_max: float) -> Respect:

@@ -33,7 +33,6 @@ from ..checks import check_columns
 from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
 from ..errors import DataWarning, ZoneError
-from .occupancy import OccupancyHistogram
 from .respect import respect_radius
 
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
@@ -53,14 +52,13 @@ class NullTest:
     p_value : of the one-sided test (see the top of this module).
     statistic, null_statistics : of the data, and of each shift.
     n_encounters : of the data, within r_max.
-    radius, null_radii : radius of the respect zone of the data, and of each shift against all others (empty
-        if not asked for), all directions pooled [m].
+    radius : of the respect zone of the data, all directions pooled [m].
     excluded_below : encounters nearer than this were left out [m].
 
     Examples
     --------
     >>> import szlib
-    >>> result = szlib.NullTest(0.25, 0.4, (0.1, 0.6, 0.2), n_encounters=50, radius=0.0, null_radii=())
+    >>> result = szlib.NullTest(0.25, 0.4, (0.1, 0.6, 0.2), n_encounters=50, radius=0.0)
     >>> result.is_significant
     False
     >>> print(result)
@@ -72,7 +70,6 @@ class NullTest:
     null_statistics: tuple[float, ...] = field(repr=False)
     n_encounters: int
     radius: float
-    null_radii: tuple[float, ...] = field(repr=False)
     excluded_below: float = 0.0
 
     @property
@@ -90,9 +87,7 @@ class NullTest:
         return f"{result}: p = {self.p_value:.3g} ({self.n_shifts} shifts, {self.n_encounters} encounters)"
 
 
-def null_test(
-    samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0, fit_null_radii: bool = True
-) -> NullTest:
+def null_test(samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0) -> NullTest:
     """Test whether people keep away from each other, one-sided (see the top of this module).
 
     Each kind of encounter is compared with the same kind of the null model; without a column `kind`, all
@@ -104,7 +99,6 @@ def null_test(
     null : the null model of the same tracks, with the same parameters and kinds.
     excluded_below : leave out encounters nearer than this [m]. With 0.5, respect means more than that two
         bodies cannot be in one place.
-    fit_null_radii : whether to fit the respect zone of each shift, which takes most of the time.
 
     Raises
     ------
@@ -121,7 +115,7 @@ def null_test(
     >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
     >>> tracks = szlib.read_tracks(path)
     >>> null = szlib.null_encounters(tracks, shifts=3, minutes=(0.5, 2.0), progress=False)
-    >>> test = szlib.null_test(szlib.find_encounters(tracks), null, fit_null_radii=False)
+    >>> test = szlib.null_test(szlib.find_encounters(tracks), null)
     >>> test.p_value >= 0.25  # the smallest possible value with 3 shifts
     True
     """
@@ -145,7 +139,6 @@ def null_test(
         null_statistics=tuple(map(float, statistics[1:])),
         n_encounters=int(counted[0].sum()),
         radius=respect_radius(samples, null),
-        null_radii=_fit_null_radii(null) if fit_null_radii else (),
         excluded_below=float(excluded_below),
     )
 
@@ -183,20 +176,6 @@ def _find_deficits(
         variance = variance + n * share * (1 - share) * (total - n) / max(total - 1, 1)
     deviations = np.divide(deficit, np.sqrt(variance), out=np.zeros_like(deficit), where=variance > 0)
     return np.asarray(deviations.max(axis=1))
-
-
-def _fit_null_radii(null: NullEncounters) -> tuple[float, ...]:
-    """Radius of the respect zone of each shift against all others [m]; NaN if there is nothing to compare."""
-    total = OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
-    radii = []
-    for shift in range(null.shifts):
-        samples, radius = null.one(shift), float("nan")
-        if len(samples):
-            own = OccupancyHistogram.from_samples(samples, r_max=null.r_max)
-            rest = OccupancyHistogram(total.counts - own.counts, null.r_max)
-            radius = respect_radius(own, rest) if rest.counts.any() else radius
-        radii.append(radius)
-    return tuple(radii)
 
 
 def _warn_about_kinds(samples: pd.DataFrame, null: NullEncounters) -> None:

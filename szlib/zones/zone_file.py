@@ -1,7 +1,6 @@
 """The JSON file of a social zone: written as a whole or not at all, and checked when it is read.
 
-Version 2 holds the estimation method, polar zones, encounters by side, intervals, and a checksum of all of
-it. Version 1, which holds hulls only, can be read.
+It holds a checksum of its content.
 """
 
 from __future__ import annotations
@@ -27,14 +26,12 @@ from .uncertainty import Uncertainty
 Zone = TypeVar("Zone")
 
 FORMAT, VERSION = "szlib.SocialZone", 2
-MIN_SEMI_AXIS = 0.05
-"""Smallest semi-axis in a file without a checksum [m]: a thinner zone is a sign of damage."""
 UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
 
+# Keys in the file of attributes that have another name.
 _KEYS = {
     "n_resamples": "resamples", "description": "how", "n_encounters": "encounters", "excluded_below": "beyond"
 }  # fmt: skip
-"""Keys in the file of attributes that have another name."""
 
 
 def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
@@ -76,7 +73,7 @@ def read_zone(path: Path, build: Callable[..., Zone]) -> Zone:
     """
     content = _read_content(path)
     expected = content.pop("checksum", None)
-    if content["version"] > 1 and expected != _checksum(content):
+    if expected != _checksum(content):
         raise ZoneError(
             f"{path}: the zone in it is damaged: its checksum is {expected!r}, which is not that of its "
             "content; do not edit zone files: fit and save the zone again"
@@ -99,41 +96,32 @@ def _read_content(path: Path) -> dict[str, Any]:
         raise ZoneError(
             f'{path}: is JSON but no zone; expected "format": "{FORMAT}", as SocialZone.save writes it'
         )
-    if content.get("version") not in range(1, VERSION + 1):
+    if content.get("version") != VERSION:
         raise ZoneError(
             f"{path}: has format version {content.get('version')!r}, this szlib {__version__} reads "
-            f"1 to {VERSION}; install a newer szlib or fit the zone again"
+            f"{VERSION}; install the szlib that wrote it, or fit the zone again"
         )
-    if content["version"] == 1:
-        content = {
-            "method": "hull",
-            **dict.fromkeys(("seen", "uncertainty", "null_test", "radii")),
-            **content,
-        }
     return content
 
 
 def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a `SocialZone` from the content of its file; damage raises an ordinary Python error."""
-    r_max, side_counts = _number(content["r_max"]), content["seen"]
-    ellipses = {_number(e["speed"]): _ellipse(e) for e in content["ellipses"]}
-    if content["version"] == 1 and any(e.semi_axes[1] < MIN_SEMI_AXIS for e in ellipses.values()):
-        raise ValueError(f"an ellipse is thinner than {MIN_SEMI_AXIS} m")
-    if (content["radii"] is None) == (content["hull_vertices"] is None):
-        raise ValueError("expected either radii or hull_vertices")
+    r_max, side_counts = float(content["r_max"]), content["seen"]
     uncertainty, null_test = (_rename_keys(content[name]) for name in ("uncertainty", "null_test"))
     if uncertainty is not None:
         tables = {name: _table(uncertainty[name]) for name in ("intervals", "bands", "influence")}
         uncertainty = Uncertainty(**{**uncertainty, **tables})
     if null_test is not None:
-        lists = {name: tuple(map(float, null_test[name])) for name in ("null_statistics", "null_radii")}
-        null_test = NullTest(**{**null_test, **lists})
+        statistics = tuple(map(float, null_test["null_statistics"]))
+        null_test = NullTest(**{**null_test, "null_statistics": statistics})
     return {
         "shape": HullZone(np.array(content["hull_vertices"], float), r_max)
         if content["radii"] is None
         else PolarZone(**{name: np.array(values, float) for name, values in content["radii"].items()}),
         "r_max": r_max,
-        "ellipses": ellipses,
+        "ellipses": {
+            float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"]) for e in content["ellipses"]
+        },
         "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
         "provenance": dict(content["provenance"]),
         "method": str(content["method"]),
@@ -146,17 +134,6 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
 def _checksum(content: Mapping[str, Any]) -> str:
     """SHA-256 of everything else in the file."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(f"expected a number; got {value!r}")
-    return float(value)
-
-
-def _ellipse(record: Mapping[str, Any]) -> Ellipse:
-    (m, n), (a, b) = ([_number(each) for each in record[name]] for name in ("center", "semi_axes"))
-    return Ellipse((m, n), (a, b), _number(record["angle"]))
 
 
 def _rename_keys(record: Mapping[str, Any] | None) -> Any:

@@ -270,15 +270,10 @@ def test_invalid_settings_are_refused(given: dict[str, object]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("zone", "why"),
-    [
-        (szlib.Ellipse((0.0, 0.0), (1.1, 0.6)), "not convex"),
-        (szlib.Ellipse((1.0, 0.0), (0.9, 0.7)), "contain the person"),
-        (szlib.Ellipse((0.0, 0.0), (2.1, 2.0)), "contain the person"),
-    ],
+    "zone", [szlib.Ellipse((1.0, 0.0), (0.9, 0.7)), szlib.Ellipse((0.0, 0.0), (2.1, 2.0))]
 )
-def test_truth_without_a_hull_is_refused(zone: szlib.Ellipse, why: str) -> None:
-    with pytest.raises(szlib.ZoneError, match=why):
+def test_truth_that_is_no_zone_within_r_max_is_refused(zone: szlib.Ellipse) -> None:
+    with pytest.raises(szlib.ZoneError, match="contain the person"):
         PlazaSettings(slow_zone=zone, fast_zone=zone)
 
 

@@ -81,7 +81,7 @@ def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
     rows = []
     for name in ("all", "opposite, crossing"):
         data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
-        test = szlib.null_test(data, against, fit_null_radii=False)
+        test = szlib.null_test(data, against)
         result = {"p_value": test.p_value, "encounters": test.n_encounters, "radius": test.radius}
         rows.append({"bunch": bunch, "kinds": name, "seed": seed, "shifts": null.shifts} | result)
     return rows
@@ -122,7 +122,7 @@ def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
             for name, kinds in SETS.items():
                 data, against = szlib.of_kind(samples, kinds), null.of_kind(kinds)
                 test = szlib.null_test(data, against)
-                bodies = szlib.null_test(data, against, excluded_below=0.5, fit_null_radii=False)
+                bodies = szlib.null_test(data, against, excluded_below=0.5)
                 fit = szlib.fit_respect(data, against)
                 radii = [np.r_[test.radius, fit.radii(theta)], *resampled(data, against, theta)]
                 low, high = np.percentile(radii[1:], [2.5, 97.5], axis=0)
@@ -131,7 +131,7 @@ def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
                 row |= {"null_encounters": len(against.encounters) / null.shifts, "shifts": null.shifts}
                 for i, where in enumerate(("radius", "ahead", "left", "behind", "right")):
                     row |= {where: radii[0][i], f"{where}_low": low[i], f"{where}_high": high[i]}
-                row |= {"null_radius_high": np.nanpercentile(test.null_radii, 97.5)}
+                row |= {"null_radius_high": np.nanpercentile(null_radii(against), 97.5)}
                 row |= {"softness": fit.softness, "careless": fit.careless}
                 row |= {"p_value": test.p_value, "p_value_beyond_0.5m": bodies.p_value}
                 row |= {"hull_a": hull_a(data)}
@@ -140,6 +140,18 @@ def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
                 row |= {"null_hull_a": np.nanmedian(hulls) if np.isfinite(hulls).any() else np.nan}
                 print(row, file=sys.stderr, flush=True)
                 yield row
+
+
+def null_radii(null: szlib.NullEncounters) -> list[float]:
+    """Radius of the respect zone of each shift against all others [m]; NaN if there is nothing to compare."""
+    total = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
+    radii = []
+    for shift in range(null.shifts):
+        own = szlib.OccupancyHistogram.from_samples(null.one(shift), r_max=null.r_max)
+        rest = szlib.OccupancyHistogram(total.counts - own.counts, null.r_max)
+        is_known = own.counts.any() and rest.counts.any()
+        radii.append(szlib.respect_radius(own, rest) if is_known else np.nan)
+    return radii
 
 
 def resampled(samples: pd.DataFrame, null: szlib.NullEncounters, theta: np.ndarray) -> Iterator[np.ndarray]:
@@ -151,7 +163,7 @@ def resampled(samples: pd.DataFrame, null: szlib.NullEncounters, theta: np.ndarr
         drawn = np.bincount(rng.integers(pair.max() + 1, size=pair.max() + 1), minlength=pair.max() + 1)
         data = szlib.OccupancyHistogram.from_samples(samples, r_max=null.r_max, weights=drawn[pair])
         if data.counts.any():
-            yield np.r_[szlib.respect_radius(data, against), szlib.respect_boundary(data, against, theta)]
+            yield np.r_[szlib.respect_radius(data, against), szlib.fit_respect(data, against).radii(theta)]
 
 
 def pairs(samples: pd.DataFrame) -> np.ndarray:

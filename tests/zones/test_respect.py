@@ -11,7 +11,7 @@ import pytest
 import szlib
 from szlib.errors import ZoneError
 from szlib.zones.occupancy import OccupancyHistogram, pair_correlation
-from szlib.zones.respect import RespectEstimator, fit_respect, respect_boundary, respect_radius
+from szlib.zones.respect import RespectEstimator, fit_respect, respect_radius
 
 R_MAX = 2.0
 THETA = np.linspace(-np.pi, np.pi, 24, endpoint=False)
@@ -70,14 +70,14 @@ def null() -> szlib.NullEncounters:
 
 def test_a_known_ellipse_comes_back(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(1, 50_000), ZONE)
-    assert respect_boundary(data, null, THETA) == pytest.approx(reach(ZONE, THETA), abs=0.05)
+    assert fit_respect(data, null).radii(THETA) == pytest.approx(reach(ZONE, THETA), abs=0.05)
 
 
 @pytest.mark.parametrize("radius", [0.4, 0.8, 1.2])
 def test_a_known_circle_comes_back_from_all_bearings(null: szlib.NullEncounters, radius: float) -> None:
     data = kept_out(scattered(2, 5_000), szlib.Ellipse((0, 0), (radius, radius)))
     assert respect_radius(data, null) == pytest.approx(radius, abs=0.02)
-    assert respect_boundary(data, null, THETA) == pytest.approx(radius, abs=0.04)
+    assert fit_respect(data, null).radii(THETA) == pytest.approx(radius, abs=0.04)
 
 
 def test_radius_does_not_depend_on_the_number_of_samples(null: szlib.NullEncounters) -> None:
@@ -105,7 +105,7 @@ def test_people_who_ignore_others_change_little(null: szlib.NullEncounters, igno
 def test_most_people_ignoring_others_leave_no_zone(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(4, 50_000), ZONE, 0.7)
     assert respect_radius(data, null) == 0
-    assert (respect_boundary(data, null, THETA) == 0).all()
+    assert (fit_respect(data, null).radii(THETA) == 0).all()
 
 
 def test_null_data_has_no_zone(null: szlib.NullEncounters) -> None:
@@ -128,7 +128,7 @@ def test_radius_follows_the_speed(null: szlib.NullEncounters) -> None:
     data = scattered(7, 60_000)
     data = data[data["distance"] > 0.4 + 0.4 * data["speed"]]
     for speed in (0.7, 1.0, 1.3):
-        found = respect_boundary(data, null, THETA, speed=speed, speed_width=0.1)
+        found = fit_respect(data, null, speed=speed, speed_width=0.1).radii(THETA)
         assert found == pytest.approx(0.4 + 0.4 * speed, abs=0.06)
 
 
@@ -139,16 +139,16 @@ def test_mix_of_directions_does_not_matter(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(8, 40_000), ZONE)
     ahead = np.abs(data["los_angle"]) < np.pi / 2
     fewer = pd.concat([data[ahead], data[~ahead].iloc[::4]])
-    assert respect_boundary(fewer, null, THETA) == pytest.approx(
-        respect_boundary(data, null, THETA), abs=0.04
+    assert fit_respect(fewer, null).radii(THETA) == pytest.approx(
+        fit_respect(data, null).radii(THETA), abs=0.04
     )
 
 
 def test_mirrored_samples_mirror_the_respect_zone(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(9, 20_000), ZONE)
     other = null_of(null.samples.assign(los_angle=-null.samples["los_angle"]))
-    found = respect_boundary(data.assign(los_angle=-data["los_angle"]), other, -THETA)
-    assert found == pytest.approx(respect_boundary(data, null, THETA), abs=1e-3)
+    found = fit_respect(data.assign(los_angle=-data["los_angle"]), other).radii(-THETA)
+    assert found == pytest.approx(fit_respect(data, null).radii(THETA), abs=1e-3)
 
 
 def test_weights_equal_copies(null: szlib.NullEncounters) -> None:
@@ -164,8 +164,8 @@ def test_weights_equal_copies(null: szlib.NullEncounters) -> None:
 def test_far_samples_do_not_matter(null: szlib.NullEncounters) -> None:
     data = kept_out(scattered(11, 2_000), ZONE)
     far = data.assign(distance=data["distance"] + 2.0)
-    found = respect_boundary(pd.concat([data, far]), null, THETA)
-    np.testing.assert_array_equal(found, respect_boundary(data, null, THETA))
+    found = fit_respect(pd.concat([data, far]), null).radii(THETA)
+    np.testing.assert_array_equal(found, fit_respect(data, null).radii(THETA))
 
 
 def test_shifts_of_the_null_are_resampled(null: szlib.NullEncounters) -> None:
@@ -227,7 +227,7 @@ def test_the_plaza_truth_comes_back(tmp_path: Path) -> None:
     samples = szlib.find_encounters(tracks)
     null = szlib.null_encounters(tracks, shifts=30, progress=False)
     for speed in (0.7, 1.1):
-        found = respect_boundary(samples, null, THETA, speed=speed)
+        found = fit_respect(samples, null, speed=speed).radii(THETA)
         assert found == pytest.approx(reach(settings.true_zone(speed), THETA), abs=0.08)
         assert found.mean() == pytest.approx(reach(settings.true_zone(speed), THETA).mean(), abs=0.03)
     assert szlib.null_test(samples, null).is_significant

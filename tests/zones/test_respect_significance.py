@@ -38,7 +38,7 @@ def null_of(seed: int, shifts: int = SHIFTS) -> szlib.NullEncounters:
 
 
 def test_p_values_are_uniform_under_the_null() -> None:
-    tests = [null_test(encounters(seed, SHIFTS), null_of(seed), fit_null_radii=False) for seed in range(100)]
+    tests = [null_test(encounters(seed, SHIFTS), null_of(seed)) for seed in range(100)]
     p = np.array([test.p_value for test in tests])
     assert (p <= 0.05).mean() <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / len(p))
     share = np.searchsorted(np.sort(p), [0.25, 0.5, 0.75], side="right") / len(p)
@@ -51,7 +51,7 @@ def test_noninteracting_crowd_shows_no_respect() -> None:
     for seed in range(6):
         tracks = noninteracting_crowd(seed=seed, people=600, minutes=40)
         null = szlib.null_encounters(tracks, shifts=19, seed=seed, progress=False)
-        p.append(null_test(szlib.find_encounters(tracks), null, fit_null_radii=False).p_value)
+        p.append(null_test(szlib.find_encounters(tracks), null).p_value)
     assert np.sum(np.array(p) <= 0.05) <= 1  # 2 and more of 6: 3 %
     assert np.median(p) > 0.15
 
@@ -74,8 +74,8 @@ def test_different_mix_of_kinds_is_no_respect() -> None:
         found = rows[["shift", "encounter", "kind"]].assign(nearest=rows["distance"])
         null = szlib.NullEncounters(rows[rows["distance"] <= 2], found, SHIFTS, 2.0)
         data = mixed(seed, SHIFTS, 0.2)
-        by_kind.append(null_test(data, null, fit_null_radii=False).p_value)
-        in_one.append(null_test(data.drop(columns="kind"), null, fit_null_radii=False).p_value)
+        by_kind.append(null_test(data, null).p_value)
+        in_one.append(null_test(data.drop(columns="kind"), null).p_value)
     assert max(in_one) <= 0.05
     assert np.sum(np.array(by_kind) <= 0.05) <= 3  # 4 and more of 20: 2 %
     assert np.median(by_kind) > 0.3
@@ -105,7 +105,6 @@ def test_people_who_keep_away_show_respect() -> None:
     assert test.statistic > max(test.null_statistics)
     assert test.is_significant
     assert test.radius == pytest.approx(0.5, abs=0.15)
-    assert np.nanmedian(test.null_radii) < 0.2
     assert "respect: p = 0.025 (39 shifts" in str(test)
 
 
@@ -127,10 +126,9 @@ def test_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.Data
     null = szlib.null_encounters(real_tracks, shifts=20, progress=False)
     for kinds in ("strangers", KINDS):
         data, model = szlib.of_kind(real_samples, kinds), null.of_kind(kinds)
-        test = null_test(data, model, excluded_below=0.5, fit_null_radii=kinds == "strangers")
+        test = null_test(data, model, excluded_below=0.5)
         assert test.p_value == pytest.approx(1 / 21)
         assert 0.78 < test.radius < 1.27  # 0.98 m (0.78-1.27) for strangers
-        assert not test.null_radii or np.nanpercentile(test.null_radii, 95) < 0.5
 
 
 # --- the object, and errors --------------------------------------------------------------------------
