@@ -29,10 +29,10 @@ from .. import __version__, memory
 from ..errors import DataError, DataWarning, SzlibError
 from ..files import printable
 
+# Packages of the extra `workbook`, which the commands `run` and `report` need.
 _WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbconvert", "papermill")
-"""Packages of the extra `workbook`, which the commands `run` and `report` need."""
+# Errors of standard output or standard error that is full, closed or missing.
 _BROKEN_STREAM = (OSError, ValueError, AttributeError)
-"""Errors of standard output or standard error that is full, closed or missing."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -226,8 +226,7 @@ def _inspect(options: argparse.Namespace) -> int:
         raise DataError(
             f"{options.file}: stands for {len(files)} files; expected one file; inspect each by itself"
         )
-    with warnings.catch_warnings():  # the table shows the same counts
-        warnings.simplefilter("ignore", DataWarning)
+    with warnings.catch_warnings(action="ignore", category=DataWarning):  # the table shows the same counts
         samples = find_encounters_in_files(files, EncounterSettings(area=options.area), ReadOptions())
     if "area" in samples.attrs:
         print(f"area {samples.attrs['area']}")

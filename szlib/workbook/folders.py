@@ -21,16 +21,12 @@ from ..errors import DataError
 from ..files import claim_folder, folder_purpose, printable
 from ..tracks import datasets
 
+# The folder of the notebooks, beside the package in the repository.
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
-"""The folder of the notebooks, beside the package in the repository."""
-RESULTS = "../results"
-"""The default folder of all results, relative to the notebooks."""
-PURPOSE = "results of the workbook"
-"""The purpose that marks the folder of all results."""
-LAB = "lab"
-"""The folder, among all results, of notebooks that are executed by hand."""
-RUN_VARIABLE = "SZLIB_RUN"
-"""Environment variable of a kernel: the results folder of the run that the kernel belongs to."""
+RESULTS = "../results"  # the default folder of all results, relative to the notebooks
+PURPOSE = "results of the workbook"  # the purpose that marks the folder of all results
+LAB = "lab"  # the folder, among all results, of notebooks that are executed by hand
+RUN_VARIABLE = "SZLIB_RUN"  # environment variable of a kernel: the results folder of the kernel's run
 
 
 def results_root(results: str | Path) -> Path:

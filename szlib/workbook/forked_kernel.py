@@ -16,8 +16,7 @@ from typing import Any
 from jupyter_client.manager import AsyncKernelManager
 from jupyter_client.provisioning.local_provisioner import LocalProvisioner
 
-_INLINE = "module://matplotlib_inline.backend_inline"
-"""The backend that shows figures in a notebook."""
+_INLINE = "module://matplotlib_inline.backend_inline"  # the backend that shows figures in a notebook
 _PRELOADED = [
     "ipykernel.kernelapp", "matplotlib.pyplot", "sklearn.neighbors", "pandas.io.formats.style",
     "szlib.workbook.figures.simulation", "szlib.workbook.figures.zones", "szlib.workbook.record",

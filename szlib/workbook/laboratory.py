@@ -34,16 +34,7 @@ from .figures.movies import read_scripts, scene_layout, snapshot
 
 __all__ = ["Experiment", "LaboratoryWidget", "RobotOptions", "is_interactive", "make_scene", "show_sliders"]
 
-_SLIDERS = [
-    {"name": "gamma", "label": "gamma", "low": 0.01, "high": 1.0, "step": 0.01},
-    {"name": "N_h", "label": "N_h [steps]", "low": 1, "high": 24, "step": 1},
-    {"name": "a_max", "label": "a_max [m/s\u00b2]", "low": 0.2, "high": 3.0, "step": 0.1},
-    {"name": "size", "label": "size of the zone [times]", "low": 0.3, "high": 2.0, "step": 0.05},
-]
-"""Sliders of each robot, one for each field of `RobotOptions` that is a number."""
-_SPEED_SLIDER = {"label": "speed of the person [m/s]", "low": 0.0, "high": 2.0, "step": 0.05}
-_MARGIN = 0.7
-"""Margin around everything that can be dragged [m]."""
+_MARGIN = 0.7  # around everything that can be dragged [m]
 
 
 @dataclass(frozen=True)
@@ -335,8 +326,7 @@ class LaboratoryWidget(anywidget.AnyWidget):
             "layout": self._layout(),
             "robots": [asdict(options) for options in experiment.robots],
             "estimators": list(experiment.zones),
-            "sliders": _SLIDERS,
-            "speed": {**_SPEED_SLIDER, "value": round(speed, 2)},
+            "speed": round(speed, 2),
         }
         super().__init__(content=content)
         self._thread = ThreadPoolExecutor(1)  # controllers belong to one thread; messages come in several

@@ -14,16 +14,16 @@ from typing import Any
 from ..errors import SzlibError
 from ..files import printable, write_file
 
+# Errors caused by data, disk or memory, not by the notebook.
 REFUSED = {
     "DataError", "StorageError", "MemoryLimitError", "ZoneError", "SolverError", "SzlibError", "MemoryError",
     "OSError", "PermissionError", "FileNotFoundError", "IsADirectoryError", "NotADirectoryError",
     "DeadKernelError",
 }  # fmt: skip
-"""Errors caused by data, disk or memory, not by the notebook."""
+# The clients of nbclient whose kernels run in this process.
 _CLIENTS: set[Any] = set()
-"""The clients of nbclient whose kernels run in this process."""
+# The record of a notebook that wrote none.
 EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
-"""The record of a notebook that wrote none."""
 
 
 def execute_notebook(

@@ -27,12 +27,10 @@ from .record.data_cache import DataCache
 from .record.display import format_value
 from .record.parameters import check_parameters
 
+# Notebooks whose results later ones need: the encounters and the zone. All others are independent.
 PRODUCERS = ("02", "05")
-"""Notebooks whose results later ones need: the encounters and the zone. All others are independent."""
-NOT_STARTED = "not started"
-"""Status of a notebook that needs the result of one that was refused."""
+# Files of a run: its data and parameters, and its outcome.
 PARAMETERS, SUMMARY = "parameters.json", "summary.json"
-"""Files of a run: its data and parameters, and its outcome."""
 
 
 def run(
@@ -122,7 +120,7 @@ def _execute_all(
             memory.VARIABLE: str(memory.limit() // jobs),
             "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", str(threads)),
         }
-    not_started = {"status": NOT_STARTED, "seconds": 0.0, **EMPTY_RECORD}
+    not_started = {"status": "not started", "seconds": 0.0, **EMPTY_RECORD}
     outcomes = {script.stem: not_started for script in scripts}
     bar = tqdm(total=len(scripts), unit="notebook", desc=home.name)
     with bar, cluster(scheduler) as client, _open_executor(client, jobs) as executor:

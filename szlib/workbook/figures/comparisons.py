@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from ...simulation.safety_claims import MOTION_CHANGES
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, add_legend_below, add_shared_legend, get_axes
 
+# Colour and hatching of each kind of safety violation.
 _BARS = {
     "came": (BLACK, ""),
     "turned": (RED, "///"),
@@ -20,7 +21,6 @@ _BARS = {
     "sped up": (ORANGE, "xxx"),
     "faced elsewhere": (BLUE, "|||"),
 }
-"""Colour and hatching of each kind of safety violation."""
 
 
 def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> Axes:

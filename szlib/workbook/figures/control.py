@@ -21,8 +21,8 @@ from ...control.step import Step
 from ...zones.ellipses import Ellipse
 from .style import BLACK, BLUE, GREEN, GREY, RED, add_legend_below, draw_person, get_axes, label_metres
 
+# Line styles of walls 0, 1, 2, 3; then again from the first.
 _WALL_LINES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
-"""Line styles of walls 0, 1, 2, 3; then again from the first."""
 
 
 def plot_distance(

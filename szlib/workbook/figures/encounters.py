@@ -26,8 +26,7 @@ from .style import (
     label_metres,
 )
 
-_N_BINS = 40
-"""Cells across r_max, or twice r_max: 5 or 10 cm for the paper's 2 m."""
+_N_BINS = 40  # cells across r_max, or twice r_max: 5 or 10 cm for the paper's 2 m
 
 
 def plot_attentional_space(

@@ -20,8 +20,7 @@ from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
 from .style import BLUE, GREEN, RED
 
-_SCRIPTS = Path(__file__).parents[1] / "static"
-"""Folder of the scripts that draw in a browser."""
+_SCRIPTS = Path(__file__).parents[1] / "static"  # they draw in a browser
 
 
 def scene_layout(scenario: Scenario, settings: MPCSettings, limits: Sequence[float]) -> dict[str, Any]:

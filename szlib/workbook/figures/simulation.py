@@ -40,14 +40,10 @@ from .style import (
 
 _ROBOT_COLOURS = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
 _ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
-_PADDING = 0.2
-"""Margin around everything that is drawn [m]."""
-_SAME_PLACE = 0.35
-"""Positions nearer than this share one time label [m]."""
-_WALL_EXTENT = 3.0
-"""A wall is drawn to its end if the end is at most this far from all else [m]."""
-_CROWD_MARGIN = 3.0
-"""Margin around the robot's path in a crowd [m]."""
+_PADDING = 0.2  # margin around everything that is drawn [m]
+_SAME_PLACE = 0.35  # positions nearer than this share one time label [m]
+_WALL_EXTENT = 3.0  # a wall is drawn to its end if the end is at most this far from all else [m]
+_CROWD_MARGIN = 3.0  # margin around the robot's path in a crowd [m]
 
 
 def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Axes:

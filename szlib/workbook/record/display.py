@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 PAPER, ASSUMED, MEASURED, TUNED, CHOSEN = "paper", "assumed", "measured", "tuned", "chosen"
 """Badges: the source of a parameter; tuned on the paper's four scenarios; chosen by the user."""
-_SHOWN_WIDTH = 2 / 3
-"""Width of a figure in the notebook, as a fraction of the saved figure's."""
+_SHOWN_WIDTH = 2 / 3  # width of a figure in the notebook, as a fraction of the saved figure's
 
 
 def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
@@ -46,20 +45,11 @@ def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
 def settings_table(settings: MPCSettings) -> Styler:
     """Make a table of the controller's `settings`, with the descriptions of the class's docstring."""
     descriptions: dict[str, str] = {}
-    names: list[str] = []
-    for line in (inspect.getdoc(type(settings)) or "").splitlines():
-        entry = re.fullmatch(r"([A-Za-z_]\w*(?:, \w+)*) : (.*)", line)
-        if entry:
-            names = entry[1].split(", ")
-            descriptions |= dict.fromkeys(names, entry[2])
-        elif line.startswith("    ") and names:
-            descriptions |= {name: f"{descriptions[name]} {line.strip()}" for name in names}
-        else:
-            names = []
-    badges = settings.badges()
-    return parameters(
-        [(name, getattr(settings, name), badge, descriptions[name]) for name, badge in badges.items()]
-    )
+    entries = re.findall(r"^(\w+(?:, \w+)*) : (.*(?:\n    .*)*)", str(inspect.getdoc(settings)), re.MULTILINE)
+    for names, text in entries:
+        descriptions |= dict.fromkeys(names.split(", "), " ".join(text.split()))
+    badges = settings.badges().items()
+    return parameters([(name, getattr(settings, name), badge, descriptions[name]) for name, badge in badges])
 
 
 class _Table(Styler):

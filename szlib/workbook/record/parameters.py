@@ -20,10 +20,11 @@ from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
 
-SETTINGS = {"gamma": "gamma", "gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
+# Parameters that set the controller under another name, or that list values of one of its settings.
+SETTINGS = {"gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
 SETTINGS |= {f"{name}_b": name for name in ("gamma", "N_h", "a_max")}
-"""Parameters that set the controller under another name, or that list values of one of its settings."""
 _LARGEST = 2**31
+# Lowest and highest value of a parameter that is not a setting of the controller.
 RANGES: dict[str, tuple[float, float]] = {
     "seed": (0, 2**63), "space_width": (0.1, 100), "space_length": (0.1, 100), "duration": (0.1, 60),
     "min_distance": (0, 100), "min_speed": (0.01, 10), "q": (0.001, 0.5), "zone_speed": (0.01, 10),
@@ -31,11 +32,9 @@ RANGES: dict[str, tuple[float, float]] = {
     "fraction": (1e-6, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
     "eccentricities": (0, 0.999999), "size": (0.05, 20), "size_b": (0.05, 20), "speed": (0, 10),
 }  # fmt: skip
-"""Lowest and highest value of a parameter that is not a setting of the controller."""
-OPTIONS = {"data": "--data", "results": "--out"}
-"""Parameters that are options of the command line."""
+OPTIONS = {"data": "--data", "results": "--out"}  # parameters that are options of the command line
+# Parameters that no check depends on: the data, the way of computing, and the amount shown.
 NEUTRAL = {*OPTIONS, "area", "n_jobs", "examples"}
-"""Parameters that no check depends on: the data, the way of computing, and the amount shown."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,6 @@ class ZoneMethod:
 
 
 METHOD_DEFAULTS: Mapping[str, Any] = asdict(ZoneMethod())
-"""The default values of `ZoneMethod`."""
 
 
 def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dict[str, Any]:

@@ -3,6 +3,15 @@
 
 const GRAB_RADIUS = 16;  // distance within which the pointer takes hold of a thing [pixels]
 
+// The sliders of each robot: one for each field of `RobotOptions` that is a number.
+const SLIDERS = [
+  { name: "gamma", label: "gamma", low: 0.01, high: 1.0, step: 0.01 },
+  { name: "N_h", label: "N_h [steps]", low: 1, high: 24, step: 1 },
+  { name: "a_max", label: "a_max [m/s\u00b2]", low: 0.2, high: 3.0, step: 0.1 },
+  { name: "size", label: "size of the zone [times]", low: 0.3, high: 2.0, step: 0.05 },
+];
+const SPEED_SLIDER = { name: "speed", label: "speed of the person [m/s]", low: 0.0, high: 2.0, step: 0.05 };
+
 // The snapshot between two snapshots: `share` of the way from `before` to `now`.
 function interpolate(before, now, share) {
   const mix = (a, b) => (a && b && a.length === b.length ? b.map((v, i) => a[i] + share * (v - a[i])) : b);
@@ -84,7 +93,7 @@ function addPanel(parent, index, content, configure) {
       status.textContent = `t = ${now.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}, solver: ${snapshot.fallback}, ${safety}`;
     },
   };
-  for (const options of content.sliders) addSlider(box, options, content.robots[index][options.name], (value) => configure(index, options.name, value));
+  for (const options of SLIDERS) addSlider(box, options, content.robots[index][options.name], (value) => configure(index, options.name, value));
   const label = addElement(box, "label", {}, { display: "flex", gap: "8px", fontSize: "12px" });
   addElement(label, "span", { textContent: "estimator" }, { width: "150px" });
   const select = addElement(label, "select", { ariaLabel: `estimator of robot ${name}` });
@@ -134,7 +143,7 @@ function render({ model, el }) {
   const pace = addElement(bar, "select", { ariaLabel: "playback speed" });
   for (const factor of [0.5, 1, 2, 4]) addElement(pace, "option", { value: factor, textContent: `${factor}\u00d7`, selected: factor === 2 });
   const speed = addElement(bar, "div", {}, { width: "330px" });
-  addSlider(speed, { ...content.speed, name: "speed" }, content.speed.value, (value) => { changes.speed = value; update(); });
+  addSlider(speed, SPEED_SLIDER, content.speed, (value) => { changes.speed = value; update(); });
   const shareButton = addElement(bar, "button", { type: "button", textContent: "share", className: "szlib-share" });
   const rate = addElement(bar, "span", { className: "szlib-rate" }, { fontSize: "12px" });
   const row = addElement(el, "div", {}, { display: "flex", gap: "14px", flexWrap: "wrap" });
