@@ -41,13 +41,13 @@ def test_points_satisfy_every_row_exactly_if_they_lie_inside_the_polygon(moment:
     step = step_at(*MOMENTS[moment], N_h=n_h)
     polygon = find_admissible_controls(step).polygon
     edge, inside = polygon.boundary, 0
-    for a in np.random.default_rng(n_h).uniform(-1, 1, (300, 2)):
+    for a in np.random.default_rng(n_h).uniform(-1, 1, (120, 2)):
         point = shapely.Point(a)
         if edge.distance(point) < 2e-3:
             continue
         inside += polygon.covers(point)
         assert polygon.covers(point) == with_first(step, a).verify().feasible
-    assert 5 < inside < 295
+    assert 2 < inside < 118
 
 
 def test_the_polygon_lies_within_the_bounds_of_the_acceleration() -> None:

@@ -66,7 +66,7 @@ def loop(drive, own, goal, people=(), steps=150):
 
 def test_the_point_lands_where_the_plan_says_near_its_chord_and_within_the_limits():
     rng = np.random.default_rng(0)
-    for drive in islice(drives(1), 200):
+    for drive in islice(drives(1), 60):
         s, own = drive.settings, np.r_[rng.uniform(-5, 5, 2), rng.uniform(-np.pi, np.pi), 0, 0]
         way = drive.v_max * s.dt * rng.choice([1.0, rng.uniform()])
         angle = rng.uniform(-np.pi, np.pi)
@@ -103,7 +103,7 @@ def test_the_chord_error_and_the_limits_are_attained():
 def test_the_disc_is_safe_at_any_heading_where_the_point_is_safe():
     """For people and walls, of any length: also those so short that their own margin is more than eps."""
     rng, near = np.random.default_rng(3), 0
-    for _ in range(150):
+    for _ in range(50):
         s = szlib.MPCSettings(eps=rng.choice([0.0, 0.05]), margin=rng.choice(["euclidean", "paper"]))
         wall = rng.uniform(-2, 2, 2) + np.outer([-1, 1], rng.uniform(-1, 1, 2)) * rng.choice([0.1, 2.0])
         drive = szlib.DifferentialDrive(
@@ -122,7 +122,7 @@ def test_the_disc_is_safe_at_any_heading_where_the_point_is_safe():
                 assert drive.barriers(disc, [person]).min() >= -1e-12
             assert euclidean_to_segment(discs, *wall).min() >= s.r_robot
             assert euclidean_to_ellipse(discs, zone).min() >= s.r_robot + s.eps - 1e-9
-    assert near > 190
+    assert near > 60
 
 
 def test_the_barriers_are_those_of_the_disc():
@@ -169,7 +169,7 @@ def test_the_drive_reaches_its_goal_past_a_person_from_any_heading(heading):
 def test_the_disc_stays_clear_between_samples_after_every_safe_step():
     """People and walls, by Euclidean distance, ten times within each step; positions by integration."""
     checked = 0
-    for seed in range(8):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         zone, wall = draw_zone(rng), np.array([[1.0, -4.0], [1.0 + rng.uniform(-1, 1), -1.2]])
         people = [
@@ -192,7 +192,7 @@ def test_the_disc_stays_clear_between_samples_after_every_safe_step():
                 assert gap[[0, -1]].min() >= 0.05 - 2 * TOLERANCE  # eps, at the samples
                 assert gap.min() >= 0.05 - (1.5 * 0.1) ** 2 / 8 / 0.8 - drive.chord_error
                 assert (np.hypot(*(discs - at).T) - 0.5 - BODY_RADIUS).min() >= 0
-    assert checked > 1000
+    assert checked > 500
 
 
 def test_plans_that_end_at_rest_stay_feasible_among_standing_people():

@@ -61,7 +61,7 @@ def test_the_plan_is_optimal_by_an_independent_solver(solver):
     rng, compared = np.random.default_rng(0), 0
     walls = [((-3.0, 2.5), (5.0, 2.5)), ((3.0, -4.0), (3.0, -1.5))]
     controller = szlib.MPCCBF(ZONE, walls=walls, settings=szlib.MPCSettings(solver=solver))
-    while compared < 12:
+    while compared < 6:
         people = [
             szlib.Person((0.0, 0.0), tuple(rng.uniform(-0.5, 0.5, 2))),
             szlib.Person(tuple(rng.uniform(-4, 4, 2)), heading=rng.uniform(-3, 3)),
@@ -219,12 +219,16 @@ def drive(controller, state, goal, people, steps=350):
 
 
 @pytest.mark.parametrize(
-    ("solver", "walks", "side"),
-    [*product(["sqp"], [False, True], ["right", "left"]), ("ipopt", False, "left"), ("ipopt", True, "right")],
+    ("solver", "count", "walks", "side"),
+    [
+        *product(["sqp"], [10], [False, True], ["right", "left"]),
+        ("ipopt", 3, False, "left"),
+        ("ipopt", 3, True, "right"),
+    ],
 )
-def test_a_symmetric_meeting_at_any_angle_is_passed_on_the_chosen_side(solver, side, walks):
+def test_a_symmetric_meeting_at_any_angle_is_passed_on_the_chosen_side(solver, count, side, walks):
     rng = np.random.default_rng(3)
-    for _ in range(15):
+    for _ in range(count):
         angle, before, behind = rng.uniform((-np.pi, 3.0, 1.6), (np.pi, 6.0, 6.0))
         along = np.array([np.cos(angle), np.sin(angle)])
         position = rng.uniform(-3, 3, 2)
@@ -366,11 +370,11 @@ def test_where_a_distance_has_no_gradient_the_robot_still_gets_a_control(solver)
         assert np.isfinite(step.control).all() and np.abs(step.control).max() <= 1
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_every_state_gets_a_control_within_bounds_and_a_true_status(solver):
+@pytest.mark.parametrize(("solver", "count"), [("sqp", 150), ("ipopt", 30)])
+def test_every_state_gets_a_control_within_bounds_and_a_true_status(solver, count):
     rng = np.random.default_rng(7)
     seen = set()
-    for _ in range(150):
+    for _ in range(count):
         walls = [
             np.array([p, p + rng.uniform(0.5, 3, 2)]) for p in rng.uniform(-4, 4, (rng.integers(0, 3), 2))
         ]

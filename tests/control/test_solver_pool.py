@@ -63,7 +63,7 @@ def test_sizes_are_powers_of_two_and_three_quarters_of_them():
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
-@pytest.mark.parametrize(("solver", "count"), [("sqp", 200), ("ipopt", 8)])
+@pytest.mark.parametrize(("solver", "count"), [("sqp", 60), ("ipopt", 3)])
 def test_empty_slots_do_not_change_the_control(monkeypatch, solver, count, formulation):
     for question in islice(questions(seed=31), count):
         answers = []

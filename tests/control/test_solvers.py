@@ -1,6 +1,6 @@
 """The two solvers compared, the fallbacks, and the guarantees of the terminal conditions."""
 
-import ast
+import re
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -32,10 +32,10 @@ def controller_of(solver, walls=(), **settings):
     return szlib.MPCCBF(ZONE, walls=walls, settings=settings_of(solver, **settings))
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
-def test_both_solvers_find_the_same_plan_or_another_local_one_of_the_same_problem(formulation):
+@pytest.mark.parametrize(("formulation", "count"), [*zip(FORMULATIONS, (50, 50, 100), strict=True)], ids=str)
+def test_both_solvers_find_the_same_plan_or_another_local_one_of_the_same_problem(formulation, count):
     same = other = only_one = 0
-    for question in islice(questions(seed=1), 100):
+    for question in islice(questions(seed=1), count):
         sqp, ipopt = (
             question.ask(settings_of(solver, head_on_share=0.0, **formulation)) for solver in SOLVERS
         )
@@ -48,7 +48,7 @@ def test_both_solvers_find_the_same_plan_or_another_local_one_of_the_same_proble
             assert sqp.control == pytest.approx(ipopt.control, abs=1e-3)
         else:
             other += 1
-    assert same > 70 and other <= 2 and only_one <= 1
+    assert same > 0.7 * count and other <= 0.02 * count and only_one <= 0.01 * count
 
 
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
@@ -62,18 +62,14 @@ def test_both_solvers_drive_the_scenarios_of_the_paper_alike(name):
     assert sqp.metrics()["time_to_goal"] == pytest.approx(ipopt.metrics()["time_to_goal"], abs=0.2)
 
 
-@pytest.mark.parametrize(
-    ("package", "where"), [("casadi", {"problem", "ipopt", "sqp_functions"}), ("daqp", {"sqp"})]
-)
-def test_each_solver_package_is_imported_by_its_modules_only(package, where):
-    found = set()
+def test_each_solver_package_is_imported_by_its_modules_only():
+    found = {"casadi": set(), "daqp": set()}
     for file in Path(szlib.__file__).parent.rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
-            names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []
-            if any(name.split(".")[0] == package for name in names):
-                found.add(file.stem)
-    assert found == where
+        text = file.read_text(encoding="utf-8")
+        for package, where in found.items():
+            if re.search(rf"^\s*(import|from) {package}\b", text, re.MULTILINE):
+                where.add(file.stem)
+    assert found == {"casadi": {"problem", "ipopt", "sqp_functions"}, "daqp": {"sqp"}}
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
@@ -202,7 +198,7 @@ def drive(controller, state, goal, people, steps):
         people = [p.after(controller.settings.dt) for p in people]
 
 
-@pytest.mark.parametrize(("solver", "worlds"), [("sqp", 60), ("ipopt", 3)])
+@pytest.mark.parametrize(("solver", "worlds"), [("sqp", 40), ("ipopt", 1)])
 def test_terminal_rest_keeps_plans_feasible_among_walls_and_standing_people(solver, worlds):
     asked = 0
     for question in islice(questions(seed=2), worlds):
@@ -235,7 +231,7 @@ def rooms(seed):
         yield np.r_[rng.uniform(-2, 2, 2), 0, 0], rng.uniform(-2, 2, 2), people, walls
 
 
-@pytest.mark.parametrize(("solver", "worlds"), [("sqp", 60), ("ipopt", 3)])
+@pytest.mark.parametrize(("solver", "worlds"), [("sqp", 40), ("ipopt", 1)])
 def test_terminal_rest_never_lets_a_moving_robot_hit_a_person_who_walks_as_predicted(solver, worlds):
     fallbacks, reached = set(), 0
     for state, goal, people, walls in islice(rooms(seed=3), worlds):
@@ -250,7 +246,7 @@ def test_terminal_rest_never_lets_a_moving_robot_hit_a_person_who_walks_as_predi
     assert solver == "ipopt" or {"warm", "kept", "relaxed"} <= fallbacks
 
 
-@pytest.mark.parametrize(("solver", "worlds"), [("sqp", 30), ("ipopt", 3)])
+@pytest.mark.parametrize(("solver", "worlds"), [("sqp", 20), ("ipopt", 1)])
 def test_terminal_person_keeps_plans_feasible_although_the_person_walks(solver, worlds):
     rng, asked = np.random.default_rng(4), 0
     while asked < worlds * 100:
@@ -277,7 +273,7 @@ def test_an_invalid_terminal_condition_raises_an_error():
 # head-on
 
 
-@pytest.mark.parametrize(("solver", "count"), [("sqp", 40), ("ipopt", 5)])
+@pytest.mark.parametrize(("solver", "count"), [("sqp", 40), ("ipopt", 2)])
 def test_symmetric_meetings_are_passed_on_the_chosen_side_or_on_the_free_one(solver, count):
     for scenario, place in islice(meetings(seed=5), count):
         log = szlib.simulate(scenario, controller_of(solver, scenario.walls))
