@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Mapping
 from contextlib import closing
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -66,38 +67,54 @@ def execute_notebook(
 def run_cells(
     script: Path, parameters: Mapping[str, Any], folder: Path, environment: Mapping[str, str]
 ) -> None:
-    """Run the cells of a notebook in a kernel, and write the executed copy also if a cell fails.
+    """Run the cells of a notebook by papermill, and write the executed copy also if a cell fails.
 
     `script`, `parameters`, `folder` and `environment` are those of `execute_notebook`.
-    Raises the error of nbclient for a cell that fails or for a kernel that ends.
+    Raises the error of papermill for a cell that fails, or of nbclient for a kernel that ends.
     """
     import jupytext
     import nbformat
     import papermill
     from jupyter_core.utils import ensure_event_loop
-    from nbclient import NotebookClient
+    from papermill.clientwrap import PapermillNotebookClient
+    from papermill.engines import Engine, papermill_engines
 
     from .forked_kernel import ForkedKernelManager
 
+    class KernelEngine(Engine):
+        """Papermill's own engine, but the kernel has an environment and the copy is written atomically."""
+
+        @classmethod
+        def execute_managed_notebook(cls, nb_man: Any, kernel_name: str, **_: Any) -> None:
+            """Execute the notebook of the manager `nb_man` in the kernel `kernel_name`."""
+            client = PapermillNotebookClient(
+                nb_man,
+                kernel_name=kernel_name,
+                kernel_manager_class=ForkedKernelManager,
+                resources={"metadata": {"path": str(script.parent)}},
+                extra_arguments=["--log-level=CRITICAL"],  # no messages about the transport
+            )
+            _CLIENTS.add(client)
+            try:
+                with closing(ensure_event_loop()):  # the loop of this thread, which Jupyter leaves open
+                    client.execute(env={**os.environ, **environment})
+            finally:
+                _CLIENTS.discard(client)
+                copy = deepcopy(nb_man.nb)
+                copy.metadata.pop("papermill", None)  # times and paths of this machine
+                write_file(folder / f"{script.stem}.ipynb", nbformat.writes(copy))
+
     logging.getLogger("papermill").setLevel(logging.ERROR)  # a notebook need not know every parameter
-    notebook = papermill.execute_notebook(
-        jupytext.read(script), None, parameters, prepare_only=True, kernel_name="python3", language="python"
-    )
-    client = NotebookClient(
-        notebook,
+    papermill_engines.register(script.stem, KernelEngine)
+    papermill.execute_notebook(
+        jupytext.read(script),
+        None,
+        parameters,
+        engine_name=script.stem,
         kernel_name="python3",
-        kernel_manager_class=ForkedKernelManager,
-        resources={"metadata": {"path": str(script.parent)}},
-        extra_arguments=["--log-level=CRITICAL"],  # no messages about the transport
+        language="python",
+        progress_bar=False,
     )
-    _CLIENTS.add(client)
-    try:
-        with closing(ensure_event_loop()):  # the loop of this thread, which Jupyter leaves open
-            client.execute(env={**os.environ, **environment})
-    finally:
-        _CLIENTS.discard(client)
-        del notebook.metadata["papermill"]  # times and paths of this machine
-        write_file(folder / f"{script.stem}.ipynb", nbformat.writes(notebook))
 
 
 def end_kernels() -> None:

@@ -227,14 +227,17 @@ class HullEstimator(Estimator):
         r_max: float,
         fraction: float | None = None,
         n_neighbours: int | None = None,
+        speed_scale: float | None = None,
     ) -> HullEstimator:
         """Remove outliers from samples; parameters and errors as in `szlib.remove_outliers`.
 
         Parameters
         ----------
-        samples, r_max, fraction, n_neighbours : as in `szlib.remove_outliers`.
+        samples, r_max, fraction, n_neighbours, speed_scale : as in `szlib.remove_outliers`.
         """
-        inliers = remove_outliers(samples, fraction=fraction, r_max=r_max, n_neighbours=n_neighbours)
+        inliers = remove_outliers(
+            samples, fraction=fraction, r_max=r_max, n_neighbours=n_neighbours, speed_scale=speed_scale
+        )
         speed = inliers["speed"].to_numpy(float)
         points = np.column_stack([complementary_points(inliers, r_max=r_max), speed])
         n_vertices = len(hull_vertices(points))
@@ -248,6 +251,7 @@ class HullEstimator(Estimator):
             parameters={
                 "fraction": None if fraction is None else float(fraction),
                 "n_neighbours": None if n_neighbours is None else int(n_neighbours),
+                "speed_scale": None if speed_scale is None else float(speed_scale),
             },
             funnel=[*funnels.get(inliers), stage],
         )

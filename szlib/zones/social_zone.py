@@ -54,7 +54,7 @@ _PAPER = partial(HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_N
 METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
     "quantile": (QuantileEstimator.from_samples, ("q",)),
     "paper": (_PAPER, ()),
-    "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours")),
+    "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours", "speed_scale")),
     "respect": (RespectEstimator.from_samples, ("speed_width",)),
 }
 """The methods of `SocialZone.fit`: the estimator, and its options."""
@@ -156,7 +156,7 @@ class SocialZone:
         n_resamples : number of zones estimated again for the intervals; 0: no intervals.
         seed : of the resampling.
         options : options of the method. "quantile": `q`, the share of encounters that may enter (0.05).
-            "hull": `fraction` and `n_neighbours` as in `szlib.remove_outliers`. "respect":
+            "hull": `fraction`, `n_neighbours` and `speed_scale` as in `szlib.remove_outliers`. "respect":
             `speed_width`, the range over which speeds are pooled (0.2) [m/s]; inf: all speeds. "paper": none.
 
         Raises

@@ -206,7 +206,7 @@ def test_the_provenance_counts_every_sample(samples: pd.DataFrame, zone: SocialZ
     assert hull["kept"] == len(zone.shape.vertices)
     assert zone.provenance["days"] == ["2012-10-24"]
     assert zone.provenance["encounters"] == samples["encounter"].nunique()
-    options = {"method": "hull", "r_max": 2.0, "fraction": None, "n_neighbours": None}
+    options = {"method": "hull", "r_max": 2.0} | dict.fromkeys(("fraction", "n_neighbours", "speed_scale"))
     assert zone.provenance["parameters"] == options
     table = funnels.table(zone.provenance["funnel"])
     assert table.columns.tolist() == ["stage", "what", "rows"]
