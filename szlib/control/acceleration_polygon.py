@@ -19,12 +19,9 @@ from ..checks import Array
 from .barriers import cbf_residual, compute_h
 from .step import Step
 
-_REACH = 3
-"""Reach of the curves, in half-widths of the box of accelerations: enough to cross the whole box."""
-_POINTS = 49
-"""Points of each curve: between two of them it is straight to 1e-3 m/s2."""
-_BISECTIONS = 20
-"""Halvings after which the rest of the box is too narrow to be seen."""
+_REACH = 3  # reach of the curves, in half-widths of the box of accelerations: enough to cross the whole box
+_POINTS = 49  # points of each curve: between two of them it is straight to 1e-3 m/s2
+_BISECTIONS = 20  # halvings after which the rest of the box is too narrow to be seen
 
 
 class BarrierLimit(NamedTuple):

@@ -23,8 +23,8 @@ from ..checks import Array, check_array
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 
+# Below this length the direction of a wall cannot be used [m]; a pillar may be a wall of a millimetre.
 SHORTEST_WALL = 1e-3
-"""Below this length the direction of a wall cannot be used [m]; a pillar may be a wall of a millimetre."""
 
 
 def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:

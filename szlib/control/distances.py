@@ -31,8 +31,7 @@ from ..zones.ellipses import Ellipse
 from .barriers import check_wall, ellipse_distance, euclidean_segment_formula, segment_distance
 from .settings import MPCSettings
 
-_BISECTIONS = 60
-"""Halvings of a quarter turn that reach double precision."""
+_BISECTIONS = 60  # halvings of a quarter turn that reach double precision
 
 
 def euclidean_to_segment(points: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:

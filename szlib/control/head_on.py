@@ -11,8 +11,8 @@ from .barriers import barrier, compute_h
 from .person import PlacedZone
 from .settings import MPCSettings
 
+# Where free space is looked for, from the zone's centre to where the robot passes.
 _ALONG = np.linspace(0, 1, 20)
-"""Where free space is looked for, from the zone's centre to where the robot passes."""
 _Walls = Sequence[Sequence[float]]
 
 

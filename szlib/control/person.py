@@ -13,8 +13,8 @@ from ..zones.ellipses import Ellipse, circle_around
 from .barriers import barrier, ellipse_formula
 from .settings import MPCSettings
 
+# Below this speed a person counts as standing, to allow for a tracker's noise [m/s] (assumed).
 STANDING_SPEED = 0.1
-"""Below this speed a person counts as standing, to allow for a tracker's noise [m/s] (assumed)."""
 
 
 class SpeedZone(Protocol):

@@ -33,12 +33,12 @@ from ..checks import Array
 from .barriers import barrier, cbf_residual, ellipse_formula, segment_formula
 from .settings import MPCSettings
 
+# Share of a step's time for the hard problem. The second try begins within half of this share, or not at all,
+# so that time is left for the relaxed problem.
 HARD_SHARE = 0.4
-"""Share of a step's time for the hard problem. The second try begins within half of this share, or not at
-all, so that time is left for the relaxed problem."""
+# Held while CasADi's symbols and functions are made or released, because their reference counts are not safe
+# for threads. Functions may run at the same time, each in memory of its own.
 CASADI_LOCK = RLock()
-"""Held while CasADi's symbols and functions are made or released, because their reference counts are not safe
-for threads. Functions may run at the same time, each in memory of its own."""
 
 
 @dataclass(frozen=True)

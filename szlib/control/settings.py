@@ -10,8 +10,7 @@ import numpy as np
 from ..checks import check_array
 from ..errors import SolverError
 
-TOLERANCE = 1e-6
-"""Largest violation of a hard row, in its own unit, that still counts as satisfied."""
+TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still counts as satisfied
 Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
 Solver = Literal["sqp", "ipopt"]

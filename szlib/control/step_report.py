@@ -16,8 +16,8 @@ from ..zones.ellipses import BODY_RADIUS
 from .scene import Scene
 from .settings import TOLERANCE
 
+# Two computations of one number may differ by this much, relative to the largest number (at least 1).
 ROUNDING = 1e-7
-"""Two computations of one number may differ by this much, relative to the largest number (at least 1)."""
 
 
 class ProblemRow(NamedTuple):

@@ -23,8 +23,7 @@ from ..checks import LARGEST
 from ..errors import SolverError
 from .person import Person
 
-_LastSeen = tuple[Person, float]
-"""A person as last seen, and when [s]."""
+_LastSeen = tuple[Person, float]  # a person as last seen, and when [s]
 People = Sequence[Person] | ArrayLike
 """People as `Person`s, or as an array, shape (n, 4): x, y [m], vx, vy [m/s]."""
 

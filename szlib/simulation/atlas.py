@@ -28,8 +28,8 @@ SCENES = {"corridor": 4.6, "waiting": 2.0, "making_room": 2.0}
 """Scenarios with walls, by name, and the width between the walls in the paper's scenario [m]."""
 REFERENCE = Ellipse((0.03, 0.0), (0.97, 0.75))
 """Zone of the saved atlas: that of the synthetic plaza at 1.1 m/s, rounded to a centimetre."""
+# Strategy of a cell whose start violates a barrier: the space is too narrow for the robot alone.
 CANNOT_START = "cannot start"
-"""Strategy of a cell whose start violates a barrier: the space is too narrow for the robot alone."""
 
 
 @dataclass(frozen=True)

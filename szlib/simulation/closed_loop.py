@@ -25,11 +25,11 @@ from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .log import SimulationLog
 from .scenario import GOAL_RADIUS, STOPPED_SPEED, UNAFFECTED, Crowd, CrowdModel, Scenario
 
+# Makes the zone that the robot keeps out of from a person's own zone.
 ZoneTransform = Callable[[Ellipse], Ellipse]
-"""Makes the zone that the robot keeps out of from a person's own zone."""
 
+# Zone of people if neither they nor the controller have one: their body.
 BODY_ZONE = Ellipse((0.0, 0.0), (BODY_RADIUS, BODY_RADIUS))
-"""Zone of people if neither they nor the controller have one: their body."""
 _ABSENT = (np.nan,) * 5
 _NO_PLAN = np.zeros((0, 4))
 

@@ -130,8 +130,7 @@ CONTROLLERS: Mapping[str, ControllerFactory] = MappingProxyType(
 )
 """Controllers, by name."""
 
-METHOD = ("controller", "zone", "formulation", "behaviour")
-"""Columns of `compare` that name a method."""
+METHOD = ("controller", "zone", "formulation", "behaviour")  # columns of `compare` that name a method
 
 WORLDS = Worlds(people=(3, 5), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=1.0)
 """Worlds with space for each of the zones at the start and at the goal: the robot starts outside all."""

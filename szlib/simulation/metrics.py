@@ -20,20 +20,18 @@ from .outcomes import classify_outcome
 from .run import Run, nanmin
 from .scenario import GOAL_RADIUS, STOPPED_SPEED
 
-START_UP_TIME = 1.0
-"""Time after the start that does not count as slow or yielding [s]: v_max / a_max."""
+START_UP_TIME = 1.0  # time after the start that does not count as slow or yielding [s]: v_max / a_max
+# The robot brakes into its goal after it last has this fraction of its greatest speed (assumed).
 CRUISE_FRACTION = 0.95
-"""The robot brakes into its goal after it last has this fraction of its greatest speed (assumed)."""
-ACTIVE_RESIDUAL = 1e-4
-"""A barrier condition with at most this residual holds the robot back [m]."""
+ACTIVE_RESIDUAL = 1e-4  # a barrier condition with at most this residual holds the robot back [m]
 
+# Metrics of `Step.solve_time`, each with its quantile.
 SOLVE_TIMES = {
     "solve_time_median": 0.5,
     "solve_time_p95": 0.95,
     "solve_time_p99": 0.99,
     "solve_time_max": 1.0,
 }
-"""Metrics of `Step.solve_time`, each with its quantile."""
 
 
 def compute_metrics(run: Run) -> dict[str, Any]:

@@ -38,23 +38,20 @@ from .run import Run
 from .scenario import UNAFFECTED, Behaviour, CrowdModel, Scenario
 from .scenarios.random_worlds import Worlds
 
-PURPOSE = "rollouts"
-"""Purpose with which the folder of finished chunks is marked."""
+PURPOSE = "rollouts"  # purpose with which the folder of finished chunks is marked
 
-CHUNK_SIZE = 50
-"""Worlds in one file and in one task: half a second of work."""
+CHUNK_SIZE = 50  # worlds in one file and in one task: half a second of work
 
+# Zone of people who have none [m] (assumed); in random worlds all people have one.
 DEFAULT_ZONE = Ellipse((0.0, 0.0), (1.0, 1.0))
-"""Zone of people who have none [m] (assumed); in random worlds all people have one."""
 
+# Makes a controller for a scenario. A function of a module, so that other processes find it.
 ControllerFactory = Callable[[Scenario, MPCSettings], Controller]
-"""Makes a controller for a scenario.  A function of a module, so that other processes find it."""
 
+# Makes the scenario of a seed, the same one each time: `Worlds` or another function.
 ScenarioSource = Callable[[int], Scenario]
-"""Makes the scenario of a seed, the same one each time: `Worlds` or another function."""
 
-Measure = Callable[[Run], dict[str, float]]
-"""Further columns of a row.  A function of a module."""
+Measure = Callable[[Run], dict[str, float]]  # further columns of a row; a function of a module
 
 
 def rollouts(

@@ -17,14 +17,10 @@ Outcome = Literal[
     "arrived", "hit wall", "run into", "squeezed", "drove in", "boxed in", "deadlock", "out of time"
 ]
 """How a run ends; see `classify_outcome`."""
-CROWDED_H = 0.2
-"""If two barriers are below this h, the robot has no way out [m] (assumed)."""
-STOP_WINDOW = 3.0
-"""A robot that stands for this time at the end of a run has stopped for good [s] (assumed)."""
-_CELL = 0.1
-"""Cell size of the grid for the search of a free path to the goal [m]."""
-_MARGIN = 2.5
-"""Margin of the grid around everything: enough for a zone and the robot beside it [m]."""
+CROWDED_H = 0.2  # if two barriers are below this h, the robot has no way out [m] (assumed)
+STOP_WINDOW = 3.0  # a robot that stands for this time at the end of a run has stopped for good [s] (assumed)
+_CELL = 0.1  # cell size of the grid for the search of a free path to the goal [m]
+_MARGIN = 2.5  # margin of the grid around everything: enough for a zone and the robot beside it [m]
 
 
 def classify_outcome(run: Run) -> Outcome:

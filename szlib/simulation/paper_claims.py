@@ -25,16 +25,14 @@ from ..zones.social_zone import SocialZone
 from .closed_loop import simulate
 from .scenarios.paper import SCENARIOS
 
-PAPER_RATE = 16_181 / 92
-"""Encounters a day in the paper (sec. 2)."""
-LEVEL = 0.95
-"""Level of all confidence intervals here."""
+PAPER_RATE = 16_181 / 92  # encounters a day in the paper (sec. 2)
+LEVEL = 0.95  # level of all confidence intervals here
+# What `Finding.low` and `high` are, if people are a sample of all people.
 CONFIDENCE = "95 % interval"
-"""What `Finding.low` and `high` are, if people are a sample of all people."""
+# What they are, if the runs are deterministic: the smallest and the largest effect.
 RANGE = "range over scenarios"
-"""What they are, if the runs are deterministic: the smallest and the largest effect."""
+# Attributes of a `Finding` that are columns of a table of findings.
 COLUMNS = ("claim", "effect", "low", "high", "interval", "unit", "n", "verdict")
-"""Attributes of a `Finding` that are columns of a table of findings."""
 LARGER_AHEAD = "the zone reaches farther ahead than behind"
 GROWS_WITH_SPEED = "the zone grows with walking speed"
 ENCOUNTER_RATE = "as many encounters a day as in the paper, within a factor of two"

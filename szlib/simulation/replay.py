@@ -34,8 +34,7 @@ SENSING_RANGE = 6.0
 """The controller sees people within this distance of the robot [m] (assumed)."""
 MIN_START_DISTANCE = 2.0
 """No person is within this distance of the robot's start [m] (assumed): the robot has no companions."""
-MIN_TRAVEL = 5.0
-"""Walkers who cover a smaller distance are not replaced [m] (assumed)."""
+MIN_TRAVEL = 5.0  # walkers who cover a smaller distance are not replaced [m] (assumed)
 _ROUNDING = 1e-6
 
 

@@ -18,9 +18,9 @@ from ..control.settings import TOLERANCE
 from ..encounters.geometry import wrap_angle
 from .run import Run
 
+# A person within this distance of the expected position keeps their velocity [m]; the same for the heading
+# [rad].
 SAME_MOTION = 1e-6
-"""A person within this distance of the expected position keeps their velocity [m]; the same for the heading
-[rad]."""
 MOTION_CHANGES = (
     "came", "turned", "slowed down", "sped up", "faced elsewhere", "kept their velocity", "wall",
 )  # fmt: skip

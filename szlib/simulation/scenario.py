@@ -17,10 +17,9 @@ from ..control.barriers import check_wall
 from ..control.person import Person
 from ..errors import SolverError
 
-GOAL_RADIUS = 0.1
-"""The robot has arrived within this distance of the goal [m], when it has stopped (assumed)."""
+GOAL_RADIUS = 0.1  # the robot has arrived within this distance of the goal [m], when it has stopped (assumed)
+# Below this speed the robot stands; below this progress to the goal it yields [m/s] (assumed).
 STOPPED_SPEED = 0.05
-"""Below this speed the robot stands; below this progress to the goal it yields [m/s] (assumed)."""
 
 Crowd = Callable[[float, Array], Sequence[Person | None]]
 """The true people at a time [s], given the robot's state (x, y, vx, vy) at that time.
@@ -175,5 +174,5 @@ class Behaviour:
         )
 
 
+# People who walk on at constant velocity and are seen without noise (paper, sec. 4).
 UNAFFECTED = Behaviour()
-"""People who walk on at constant velocity and are seen without noise (paper, sec. 4)."""

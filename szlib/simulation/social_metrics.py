@@ -19,14 +19,12 @@ from .metrics import measure_path_length
 from .run import Run, nanmin
 from .scenario import STOPPED_SPEED
 
+# Range of each of Hall's distances [m].
 HALL_DISTANCES = {"intimate": (0.0, 0.45), "personal": (0.45, 1.2), "social": (1.2, 3.6)}
-"""Range of each of Hall's distances [m]."""
-NOT_MOVING = 0.001
-"""Below this speed HuNavSim's robot does not move [m/s]."""
+NOT_MOVING = 0.001  # below this speed HuNavSim's robot does not move [m/s]
+# Within this distance a person or a robot has reached the goal [m] (assumed): people walk on there.
 REACHED = 0.5
-"""Within this distance a person or a robot has reached the goal [m] (assumed): people walk on there."""
-_N_POINTS = 21
-"""Points of the straight path to the goal that are checked against walls."""
+_N_POINTS = 21  # points of the straight path to the goal that are checked against walls
 
 
 def compute_social_metrics(run: Run) -> dict[str, float]:

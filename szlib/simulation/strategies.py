@@ -15,10 +15,8 @@ Strategy = Literal[
 ]
 """What a robot does in a run; see `classify_strategy`."""
 STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
-MIN_WAIT = 1.0
-"""A robot that yields for this time waits [s] (assumed)."""
-MIN_RETREAT = 0.5
-"""A robot that goes back by this distance, its radius, backs out [m] (assumed)."""
+MIN_WAIT = 1.0  # a robot that yields for this time waits [s] (assumed)
+MIN_RETREAT = 0.5  # a robot that goes back by this distance, its radius, backs out [m] (assumed)
 
 
 def classify_strategy(run: Run) -> Strategy:

@@ -27,12 +27,9 @@ from ..settings import MPCSettings
 from .ipopt import Ipopt
 from .sqp import Sqp
 
-DEFAULT_MAX_PEOPLE = 8
-"""Number of people for whom solvers are built by default (assumed)."""
-INACTIVE_H = 1e9
-"""Smallest h of an unused slot [m]."""
-_AWAY = 1e6
-"""Distance of an unused slot from the robot [m]: its distance has a gradient there, of length 1."""
+DEFAULT_MAX_PEOPLE = 8  # number of people for whom solvers are built by default (assumed)
+INACTIVE_H = 1e9  # smallest h of an unused slot [m]
+_AWAY = 1e6  # distance of an unused slot from the robot [m]: its distance has a gradient there, of length 1
 
 
 def round_up_size(n: int) -> int:

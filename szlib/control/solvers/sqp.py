@@ -31,23 +31,19 @@ from ..settings import MPCSettings
 from .sqp_functions import SqpFunctions, build_sqp_functions
 
 Outcome = Literal["converged", "stalled", "timed out", "failed"]
+# The SQP has converged if its last step moves no input by more than this [m/s2]: with the exact Hessian, when
+# the error is of the order of its square, and without.
 CONVERGED = {True: 1e-2, False: 1e-5}
-"""The SQP has converged if its last step moves no input by more than this [m/s2]: with the exact Hessian,
-when the error is of the order of its square, and without."""
+# The rows are satisfied if their violations sum up to no more than this. The error of an input is up to
+# 2 / dt^2 times as large, 2e-6 m/s2.
 VIOLATED = 1e-8
-"""The rows are satisfied if their violations sum up to no more than this. The error of an input is up to
-2 / dt^2 times as large, 2e-6 m/s2."""
-PRICE = 1.1
-"""Price of violation in the merit, as a multiple of the largest multiplier: exact above 1."""
-SHORTEST = 1e-3
-"""Smallest share of a step that is still tried."""
-ROUNDING = 1e-12
-"""Share by which the merit may rise from rounding alone."""
-RISES = 2
-"""Full steps in a row that need not lower the merit."""
+PRICE = 1.1  # price of violation in the merit, as a multiple of the largest multiplier: exact above 1
+SHORTEST = 1e-3  # smallest share of a step that is still tried
+ROUNDING = 1e-12  # share by which the merit may rise from rounding alone
+RISES = 2  # full steps in a row that need not lower the merit
 _HARD, _EQUAL, _SOFT = 0, 5, 8  # DAQP's kinds of constraints
+# No regularisation of convex programs; beside the exact penalty, a negligible quadratic one.
 _DAQP = {"primal_tol": 1e-9, "eps_prox": 0.0, "rho_soft": 1e3}
-"""No regularisation of convex programs; beside the exact penalty, a negligible quadratic one."""
 
 
 class Sqp(ProblemSolver):

@@ -15,12 +15,10 @@ from ...checks import Array
 from ...zones.ellipses import BODY_RADIUS
 from .walking_model import INSTALL_CROWDS, MAX_SPEED_FACTOR, Walkers, import_package
 
-HORIZON, WALL_HORIZON = 3.0, 1.0
-"""Time for which people keep apart from others and from walls [s] (assumed)."""
+HORIZON, WALL_HORIZON = 3.0, 1.0  # time for which people keep apart from others and from walls [s] (assumed)
 SENSING_RANGE, MAX_NEIGHBOURS = 10.0, 10
 """How far they see [m], and to how many at once they react (as in RVO2's examples)."""
-STEP_ASIDE_SPEED = 0.5
-"""Largest speed of people who stand [m/s] (assumed)."""
+STEP_ASIDE_SPEED = 0.5  # largest speed of people who stand [m/s] (assumed)
 
 
 class OrcaModel:

@@ -23,8 +23,7 @@ from .walking_model import ModelFactory, Walkers, WalkingModel
 MODELS: Mapping[str, ModelFactory] = MappingProxyType({"orca": OrcaModel, "social force": SocialForceModel})
 """Models of walking, by name; they need the extra `crowds`."""
 RobotAppearance = Literal["robot", "person", "nothing"]
-MIN_HEADING_SPEED = 0.2
-"""Slower people keep their last heading [m/s] (assumed)."""
+MIN_HEADING_SPEED = 0.2  # slower people keep their last heading [m/s] (assumed)
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,10 @@ from ...checks import Array
 from ...errors import SolverError
 from .walking_model import INSTALL_CROWDS, Walkers, import_package
 
+# A shorter wall counts as one of this length, because walls are points at 0.1 m from each other [m].
 MIN_WALL_LENGTH = 0.2
-"""A shorter wall counts as one of this length, because walls are points at 0.1 m from each other [m]."""
+# Time ahead at which the robot's goal lies [s]; PySocialForce does not decide the robot's motion.
 _GOAL_TIME = 1e3
-"""Time ahead at which the robot's goal lies [s]; PySocialForce does not decide the robot's motion."""
 
 
 class SocialForceModel:

@@ -11,10 +11,9 @@ from typing import Protocol
 from ...checks import Array
 from ...errors import SolverError
 
+# Largest speed of people who avoid others, as a multiple of their own (Helbing and Molnar 1995).
 MAX_SPEED_FACTOR = 1.3
-"""Largest speed of people who avoid others, as a multiple of their own (Helbing and Molnar 1995)."""
-INSTALL_CROWDS = "pip install -e '.[crowds]'"
-"""Command that installs pyrvo and PySocialForce."""
+INSTALL_CROWDS = "pip install -e '.[crowds]'"  # command that installs pyrvo and PySocialForce
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,7 @@ from ...control.person import Person
 from ...zones.ellipses import Ellipse
 from ..scenario import UNAFFECTED, Crowd, Scenario
 
-WALKING_SPEED = 0.5
-"""Speed of people who walk [m/s] (paper, sec. 4)."""
+WALKING_SPEED = 0.5  # speed of people who walk [m/s] (paper, sec. 4)
 _START, _GOAL = (-5.0, 0.0, 0.0, 0.0), (5.0, 0.0)
 
 Place = tuple[float, float]

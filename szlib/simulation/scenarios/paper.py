@@ -22,14 +22,10 @@ from ..run import Run
 from ..scenario import GOAL_RADIUS, Claim, Scenario
 from ..strategies import MIN_RETREAT, MIN_WAIT
 
-EARLY_H = 0.5
-"""Avoidance that starts above this h starts well before the zone [m] (assumed)."""
-PASSING_DISTANCE = 1.0
-"""The robot passes a person who is within this distance ahead or behind [m] (assumed)."""
-SLOW_FRACTION = 0.8
-"""Below this fraction of its greatest speed the robot has slowed down (assumed)."""
-MOUTH = 0.0
-"""x of the near end of the restricted pathway [m]."""
+EARLY_H = 0.5  # avoidance that starts above this h starts well before the zone [m] (assumed)
+PASSING_DISTANCE = 1.0  # the robot passes a person who is within this distance ahead or behind [m] (assumed)
+SLOW_FRACTION = 0.8  # below this fraction of its greatest speed the robot has slowed down (assumed)
+MOUTH = 0.0  # x of the near end of the restricted pathway [m]
 
 _CORRIDOR = np.array([[(-6.0, y), (7.0, y)] for y in (2.3, -2.3)])
 _PATHWAY = np.array(

@@ -19,12 +19,10 @@ from ...errors import SolverError
 from ...zones.ellipses import BODY_RADIUS, Ellipse
 from ..scenario import Scenario
 
-_ROBOT = MPCSettings()
-"""Settings of the robot that must have space."""
-_TRIES = 5_000
-"""Draws after which the search for a world ends; a usual world takes fewer than a hundred."""
+_ROBOT = MPCSettings()  # settings of the robot that must have space
+_TRIES = 5_000  # draws after which the search for a world ends; a usual world takes fewer than a hundred
+# Fractions of a person's path at which it is checked against walls.
 _FRACTIONS = np.linspace(0, 1, 31)[:, None]
-"""Fractions of a person's path at which it is checked against walls."""
 
 
 @dataclass(frozen=True)
