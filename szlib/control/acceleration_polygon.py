@@ -81,14 +81,11 @@ def find_admissible_controls(step: Step) -> AdmissibleControls:
         disc = shapely.Point(u0 - velocity / s.dt).buffer(s.v_max / s.dt, quad_segs=256)
         free = free.intersection(disc)
     polygon, limits = free, []
-    people = len(step.scene.people)
     for row, (curve, inward) in enumerate(_edges(step)):
         i, k = divmod(row, s.N_h)
         allowed = shapely.Polygon(np.vstack([curve, curve[::-1] + 2 * _REACH * s.a_max * inward]))
         if not allowed.covers(free):
-            limits.append(
-                BarrierLimit("person" if i < people else "wall", i - people * (i >= people), k, curve)
-            )
+            limits.append(BarrierLimit(*step.scene.obstacle(i), k, curve))
             polygon = polygon.intersection(allowed)
     return AdmissibleControls(polygon, tuple(limits))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import hypot
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .barriers import compute_h, euclidean_segment_formula
@@ -52,6 +52,11 @@ class Scene(NamedTuple):
         s = self.settings
         at_walls = compute_h(*self.goal, (), self.walls, r_robot=s.r_robot, eps=s.eps)
         return any(zone.blocks(self.goal, s) for zone in self.zones) or any(h < 0 for h in at_walls)
+
+    def obstacle(self, row: int) -> tuple[Literal["person", "wall"], int]:
+        """Kind and number of the person or wall of a `row` of `Step.h`."""
+        people = len(self.people)
+        return ("person", row) if row < people else ("wall", row - people)
 
     def h(self, x: float, y: float, time: float = 0.0) -> list[float]:
         """Barriers of people and then of walls for the robot at (`x`, `y`), `time` seconds from now [m]."""

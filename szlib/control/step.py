@@ -176,11 +176,9 @@ class Step:
 
     def _obstacle(self, i: int) -> str:
         """Name of the person or wall of row `i` of `h`."""
-        people = len(self.scene.people)
-        if i >= people:
-            return f"wall {i - people}"
-        known = self.scene.people[i].id
-        return f"person {i}" + ("" if known is None else f" (id {known!r})")
+        kind, number = self.scene.obstacle(i)
+        known = self.scene.people[i].id if kind == "person" else None
+        return f"{kind} {number}" + ("" if known is None else f" (id {known!r})")
 
     def _row_of_h(self, row: ProblemRow) -> int:
         return row.number + (len(self.scene.people) if row.kind == "wall" else 0)

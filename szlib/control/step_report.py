@@ -130,13 +130,8 @@ def verify_plan(scene: Scene, predicted: Array, control: Array, claims: Claims) 
 
 def _list_rows(scene: Scene, x: Array, residual: Array) -> list[ProblemRow]:
     """Every row of the hard problem."""
-    s, people = scene.settings, len(scene.people)
-    rows = [
-        ProblemRow("person", i, k, float(value))
-        if i < people
-        else ProblemRow("wall", i - people, k, float(value))
-        for (i, k), value in np.ndenumerate(residual)
-    ]
+    s = scene.settings
+    rows = [ProblemRow(*scene.obstacle(i), k, float(value)) for (i, k), value in np.ndenumerate(residual)]
     speed = s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1)
     rows += [ProblemRow("speed", 0, k + 1, float(value)) for k, value in enumerate(speed)]
     if scene.terminal != "none":

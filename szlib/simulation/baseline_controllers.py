@@ -17,8 +17,8 @@ avoidance", IEEE Robotics & Automation Magazine 4(1), 1997.  World frame, metres
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -31,40 +31,38 @@ from ..zones.ellipses import BODY_RADIUS
 from .scenario import Scenario
 
 
-class Command(NamedTuple):
-    """The decision of a baseline: `control`, (ax, ay) [m/s2]."""
-
-    control: Array
-
-
-@dataclass(frozen=True)
 class BaselineController(Controller):
-    """Base of the baselines: `settings` with the limits, `walls`, and a desired velocity."""
+    """Base of the baselines: the limits of the robot, and a desired velocity.
 
-    settings: MPCSettings = field()
-    walls: Array = field()
+    Parameters
+    ----------
+    scenario : gives the walls.
+    settings : gives the limits and the sizes.
+    """
 
-    def step(self, state: Array, goal: Array, people: Sequence[Person]) -> Command:
+    settings: MPCSettings
+
+    def __init__(self, scenario: Scenario, settings: MPCSettings) -> None:
+        self.settings, self.walls = settings, scenario.walls
+
+    def step(self, state: Array, goal: Array, people: Sequence[Person]) -> SimpleNamespace:
         """The acceleration towards the desired velocity; see `Controller.step` for `state`, `goal`,
         `people`.
         """
-        s, velocity = self.settings, state[2:]
-        desired = self.desired_velocity(state[:2], velocity, goal, people)
-        change = (desired / max(1.0, np.hypot(*desired) / s.v_max) - velocity) / s.dt
-        return Command(change / max(1.0, np.abs(change).max() / s.a_max))
+        s, desired = self.settings, self.desired_velocity(state, goal, people)
+        change = (desired / max(1.0, np.hypot(*desired) / s.v_max) - state[2:]) / s.dt
+        return SimpleNamespace(control=change / max(1.0, np.abs(change).max() / s.a_max))
 
-    def desired_velocity(
-        self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
-    ) -> Array:
+    def desired_velocity(self, state: Array, goal: Array, people: Sequence[Person]) -> Array:
         """The velocity that the robot desires now [m/s].
 
         Parameters
         ----------
-        position, velocity : of the robot, shape (2,) [m, m/s].
+        state : (x, y, vx, vy) [m, m/s].
         goal : (x, y) [m].
         people : the people whom the robot sees.
         """
-        return self.velocity_to_goal(goal - position)
+        raise NotImplementedError
 
     def velocity_to_goal(self, offset: Array) -> Array:
         """A velocity along the `offset` to the goal [m]: full speed, or slower so that the robot can stop
@@ -91,30 +89,22 @@ class BaselineController(Controller):
         return nearest - self.settings.r_robot - self.settings.eps
 
 
-@dataclass(frozen=True)
 class StraightController(BaselineController):
-    """Drives straight to the goal; stops if something is within its braking distance and `margin` [m].
+    """Drives straight to the goal; stops if something is within its braking distance and `margin` [m]."""
 
-    `settings`, `walls` : as of `BaselineController`.
-    """
+    margin = 0.5
 
-    margin: float = 0.5
-
-    def desired_velocity(
-        self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
-    ) -> Array:
-        """See `BaselineController.desired_velocity` for `position`, `velocity`, `goal`, `people`."""
-        s, ahead = self.settings, self.velocity_to_goal(goal - position)
+    def desired_velocity(self, state: Array, goal: Array, people: Sequence[Person]) -> Array:
+        """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
+        s, position, velocity = self.settings, state[:2], state[2:]
+        ahead = self.velocity_to_goal(goal - position)
         reach = float(velocity @ velocity) / (2 * s.a_max) + s.v_max * s.dt + self.margin
         lane = position + np.linspace(0.0, 1.0, 9)[:, None] * reach * ahead / max(np.hypot(*ahead), 1e-9)
         return ahead if self.gap(lane, people).min() > 0 else np.zeros(2)
 
 
-@dataclass(frozen=True)
 class SocialForceController(BaselineController):
     """Attracted to the goal within `tau` [s], pushed by people and walls; numbers of Moussaid et al. (2009).
-
-    `settings`, `walls` : as of `BaselineController`.
 
     The interaction is along D = e + `relative` (v - v'), e the direction to the person: with B = `reach` |D|
     and theta the angle from D to e, `strength` exp(-d/B) [m/s2], slowing by exp(-(2 B theta)^2), turning by
@@ -122,17 +112,16 @@ class SocialForceController(BaselineController):
     the same gap, because the robot is larger than a person.  A bias of theta, 0.005 B, prefers the right.
     """
 
-    tau: float = 0.54
-    strength: float = 4.5
-    relative: float = 2.0
-    reach: float = 0.35
-    wall: float = 3.0
-    wall_reach: float = 0.1
+    tau = 0.54
+    strength = 4.5
+    relative = 2.0
+    reach = 0.35
+    wall = 3.0
+    wall_reach = 0.1
 
-    def desired_velocity(
-        self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
-    ) -> Array:
-        """See `BaselineController.desired_velocity` for `position`, `velocity`, `goal`, `people`."""
+    def desired_velocity(self, state: Array, goal: Array, people: Sequence[Person]) -> Array:
+        """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
+        position, velocity = state[:2], state[2:]
         force = (self.velocity_to_goal(goal - position) - velocity) / self.tau
         for person in people:
             force = force + self._push(position, velocity, person)
@@ -158,11 +147,8 @@ class SocialForceController(BaselineController):
         return np.asarray(-self.strength * np.exp(-apart / b) * (slow * drive + np.sign(theta) * turn * left))
 
 
-@dataclass(frozen=True)
 class DynamicWindowController(BaselineController):
     """The dynamic window for a robot that accelerates in any direction; weights and sizes are assumed.
-
-    `settings`, `walls` : as of `BaselineController`.
 
     The window has `samples` squared velocities that the robot can reach in one step.  A velocity is
     admissible if the robot, held at it, can brake before it touches a wall, or a person at constant
@@ -170,15 +156,13 @@ class DynamicWindowController(BaselineController):
     times the smallest gap on the path, up to 1 m.  Without an admissible velocity the robot brakes.
     """
 
-    horizon: float = 2.0
-    clearance: float = 0.5
-    samples: int = 9
+    horizon = 2.0
+    clearance = 0.5
+    samples = 9
 
-    def desired_velocity(
-        self, position: Array, velocity: Array, goal: Array, people: Sequence[Person]
-    ) -> Array:
-        """See `BaselineController.desired_velocity` for `position`, `velocity`, `goal`, `people`."""
-        s = self.settings
+    def desired_velocity(self, state: Array, goal: Array, people: Sequence[Person]) -> Array:
+        """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
+        s, position, velocity = self.settings, state[:2], state[2:]
         change = np.linspace(-1, 1, self.samples) * s.a_max * s.dt
         window = velocity + np.stack(np.meshgrid(change, change), axis=-1).reshape(-1, 2)
         window = window[np.hypot(*window.T) <= s.v_max]
@@ -192,18 +176,3 @@ class DynamicWindowController(BaselineController):
         to_goal = np.hypot(*(at[:, -1] - goal).T)
         value = self.clearance * np.minimum(gap.min(axis=1), 1.0) - to_goal
         return np.asarray(window[np.where(admissible, value, -np.inf).argmax()])
-
-
-def make_straight(scenario: Scenario, settings: MPCSettings) -> StraightController:
-    """Make a `StraightController` for a `scenario` with `settings`."""
-    return StraightController(settings, scenario.walls)
-
-
-def make_social_force(scenario: Scenario, settings: MPCSettings) -> SocialForceController:
-    """Make a `SocialForceController` for a `scenario` with `settings`."""
-    return SocialForceController(settings, scenario.walls)
-
-
-def make_dynamic_window(scenario: Scenario, settings: MPCSettings) -> DynamicWindowController:
-    """Make a `DynamicWindowController` for a `scenario` with `settings`."""
-    return DynamicWindowController(settings, scenario.walls)

@@ -30,7 +30,7 @@ from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from ..zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
-from .baseline_controllers import make_dynamic_window, make_social_force, make_straight
+from .baseline_controllers import DynamicWindowController, SocialForceController, StraightController
 from .closed_loop import BODY_ZONE, ZoneTransform
 from .monte_carlo import ControllerFactory, ScenarioSource, make_mpc_cbf, rollouts
 from .run import Run
@@ -123,9 +123,9 @@ BEHAVIOURS: Mapping[str, Behaviour] = MappingProxyType(
 CONTROLLERS: Mapping[str, ControllerFactory] = MappingProxyType(
     {
         "MPC-CBF": make_mpc_cbf,
-        "straight": make_straight,
-        "social force": make_social_force,
-        "dynamic window": make_dynamic_window,
+        "straight": StraightController,
+        "social force": SocialForceController,
+        "dynamic window": DynamicWindowController,
     }
 )
 """Controllers, by name."""

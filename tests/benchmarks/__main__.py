@@ -111,12 +111,12 @@ def ratios(times: dict[str, Array], rival: str) -> dict[str, float]:
 
 def bench_solvers(scenario: szlib.Scenario) -> dict[str, float]:
     """One control step by SQP against IPOPT, warm: as tuned here, and as it comes."""
-    ipopt._idle.clear()  # of an earlier case, with other options
+    ipopt._build.cache_clear()  # of an earlier case, with other options
     baselines = {name: controller_of(scenario, solver=name) for name in ("sqp", "ipopt")}
     tuned = dict(ipopt._OPTIONS)
     for name in tuned.keys() - {"print_level", "sb"}:
         del ipopt._OPTIONS[name]
-    ipopt._idle.clear()
+    ipopt._build.cache_clear()
     baselines["plain ipopt"] = controller_of(scenario, solver="ipopt")
     ipopt._OPTIONS.update(tuned)
     times = race(scenario, {name: asking(controller, scenario) for name, controller in baselines.items()})
@@ -160,7 +160,7 @@ def bench_build() -> dict[str, float]:
     def anew(x: Array, people: Sequence[szlib.Person], target: Array) -> None:
         problem.build_problem.cache_clear()
         problem._evaluation.cache_clear()
-        ipopt._idle.clear()
+        ipopt._build.cache_clear()
         rebuilt._pool._solvers[1, 0] = ipopt.Ipopt(rebuilt.settings, 1, 0)
         rebuilt.step(x, scenario.goal, people)
 

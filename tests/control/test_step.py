@@ -202,13 +202,12 @@ def test_a_controller_used_in_a_second_thread_raises_an_error(solver):
         assert ask(mine) == other.submit(ask, theirs).result() == "optimal"
 
 
-def test_ipopt_solvers_of_a_deleted_controller_are_used_again():
+def test_controllers_with_the_same_settings_share_their_ipopt_solvers():
     settings = szlib.MPCSettings(solver="ipopt", max_iterations=98)
     one, two = (szlib.MPCCBF(ZONE, settings=settings, max_people=0) for _ in range(2))
-    first = one._pool.get(0, 0)._hard
-    assert two._pool.get(0, 0)._hard is not first
-    del one
-    assert szlib.MPCCBF(ZONE, settings=settings, max_people=0)._pool.get(0, 0)._hard is first
+    assert one._pool.get(0, 0)._hard is two._pool.get(0, 0)._hard
+    other = szlib.MPCCBF(ZONE, settings=replace(settings, max_iterations=97), max_people=0)
+    assert other._pool.get(0, 0)._hard is not one._pool.get(0, 0)._hard
 
 
 # the time of a step

@@ -4,14 +4,18 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.simulation.baseline_controllers import make_dynamic_window, make_social_force, make_straight
+from szlib.simulation.baseline_controllers import (
+    DynamicWindowController,
+    SocialForceController,
+    StraightController,
+)
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS
 from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.scenarios.random_worlds import Worlds
 
 SETTINGS = szlib.MPCSettings()
-BASELINES = [make_straight, make_social_force, make_dynamic_window]
+BASELINES = [StraightController, SocialForceController, DynamicWindowController]
 START, GOAL = (-4.0, 0.0, 0.0, 0.0), (4.0, 0.0)
 LANE = [((-6.0, y), (6.0, y)) for y in (1.2, -1.2)]
 
@@ -40,7 +44,7 @@ def test_the_goal_is_reached_where_nothing_is_in_the_way(factory, walls):
 
 
 def test_straight_stops_and_waits_for_a_standing_person():
-    log = run(make_straight, (person(0.0, 0.0),))
+    log = run(StraightController, (person(0.0, 0.0),))
     assert not log.success and log.metrics()["overlaps"] == 0
     assert np.abs(log.states[:, 1]).max() == 0
     assert log.speed[-1] < 0.05 and 0.05 < log.clearance[-1, 0] < 1.0
@@ -52,7 +56,7 @@ def test_baselines_let_a_person_cross(factory):
     assert metrics["success"] and metrics["overlaps"] == 0
 
 
-@pytest.mark.parametrize("factory", [make_social_force, make_dynamic_window])
+@pytest.mark.parametrize("factory", [SocialForceController, DynamicWindowController])
 def test_other_baselines_go_around_a_standing_person(factory):
     metrics = run(factory, (person(0.0, 0.05),)).metrics()
     assert metrics["success"] and metrics["overlaps"] == 0
@@ -60,16 +64,16 @@ def test_other_baselines_go_around_a_standing_person(factory):
 
 
 def test_social_force_passes_a_person_straight_ahead_on_the_right():
-    assert run(make_social_force, (person(0.0, 0.0),)).metrics()["passing_side"] == "right"
+    assert run(SocialForceController, (person(0.0, 0.0),)).metrics()["passing_side"] == "right"
 
 
-@pytest.mark.parametrize("factory", [make_straight, make_dynamic_window])
+@pytest.mark.parametrize("factory", [StraightController, DynamicWindowController])
 def test_baselines_stop_before_a_wall(factory):
     log = run(factory, walls=[((0.0, -8.0), (0.0, 8.0))])
     assert not log.success and log.metrics()["overlaps"] == 0
 
 
-@pytest.mark.parametrize("factory", [make_straight, make_social_force])
+@pytest.mark.parametrize("factory", [StraightController, SocialForceController])
 # Of equal velocities the dynamic window takes the first one, so that it has no such symmetry.
 def test_rotating_the_world_rotates_the_path(factory):
     turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # by a right angle: the box of accelerations stays a box
@@ -94,7 +98,7 @@ def largest(log):
 STILL = Worlds(standing=1.0, walls=1.0, start_speed=0.0)
 
 
-@pytest.mark.parametrize("factory", [make_straight, make_dynamic_window])
+@pytest.mark.parametrize("factory", [StraightController, DynamicWindowController])
 def test_baselines_do_not_touch_people_who_stand(factory):
     rows = rollouts(8, worlds=STILL, controller=factory, n_jobs=1, progress=False)
     assert rows["overlaps"].sum() == 0
@@ -115,11 +119,9 @@ def test_the_social_force_between_two_people_is_that_of_its_source():
     slow = -4.5 * np.exp(-d / b - (2 * b * theta) ** 2)
     turn = -4.5 * np.sign(theta) * np.exp(-d / b - (3 * b * theta) ** 2)
     equal = szlib.MPCSettings(r_robot=0.25)  # a robot as large as a person
-    model = make_social_force(szlib.Scenario("two", START, GOAL), equal)
+    model = SocialForceController(szlib.Scenario("two", START, GOAL), equal)
     # the source has no bias of the angle here; it turns theta by 0.005 B
-    at, velocity, goal = np.zeros(2), np.array([v, 0.0]), np.array(GOAL)
-    alone, beside = (
-        model.desired_velocity(at, velocity, goal, people) for people in ((), (person(*offset),))
-    )
+    state, goal = np.array([0.0, 0.0, v, 0.0]), np.array(GOAL)
+    alone, beside = (model.desired_velocity(state, goal, people) for people in ((), (person(*offset),)))
     found = (beside - alone) / equal.dt
     assert found == pytest.approx(slow * t + turn * n, abs=0.05)

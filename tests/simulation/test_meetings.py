@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.simulation.baseline_controllers import make_straight
+from szlib.simulation.baseline_controllers import StraightController
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.monte_carlo import identify, rollouts
 from szlib.simulation.scenarios.meetings import MEETINGS, Variations, VisiblePeople, is_visible
@@ -29,7 +29,7 @@ def test_meetings_and_scenarios_have_their_names():
 @pytest.mark.parametrize("name", MEETINGS)
 def test_alone_the_robot_drives_straight_to_the_goal(name):
     alone = replace(MEETINGS[name], people=())
-    log = drive(alone, make_straight(alone, SETTINGS))
+    log = drive(alone, StraightController(alone, SETTINGS))
     assert log.success and log.metrics()["overlaps"] == 0
     assert np.abs(log.states[:, 1]).max() < 1e-9
 
@@ -88,7 +88,7 @@ def test_variations_are_worlds_for_rollouts(tmp_path):
             2,
             worlds=worlds,
             behaviour=VisiblePeople(),
-            controller=make_straight,
+            controller=StraightController,
             out=tmp_path,
             n_jobs=1,
             progress=False,

@@ -49,11 +49,9 @@ def solve_with_fallbacks(
     if relaxed and (not shifted_is_safe or _reaches_safe_end(relaxed, parameters)):
         is_satisfied = converged and relaxed.slack <= TOLERANCE
         return "warm" if is_satisfied else "relaxed", relaxed, attempts.timed_out
-    return (
-        ("kept", shifted, attempts.timed_out)
-        if shifted_is_safe
-        else ("braking", full_braking, attempts.timed_out)
-    )
+    if shifted_is_safe:
+        return "kept", shifted, attempts.timed_out
+    return "braking", full_braking, attempts.timed_out
 
 
 class _Attempts:

@@ -1,14 +1,14 @@
 """The problem of `szlib.control.problem`, solved by IPOPT as in the paper.
 
-A built solver keeps its iterations in memory of its own, so it belongs to one controller at a time. When the
-controller is gone, the solver is used again, because building one takes as long as many steps.
+All controllers share the solvers, because building one takes as long as many steps. A solver keeps its
+iterations in memory of its own, so one thread calls IPOPT at a time.
 """
 
 from __future__ import annotations
 
-import weakref
-from collections import deque
+from functools import lru_cache
 from math import inf
+from threading import Lock
 from typing import Any
 
 import casadi as ca
@@ -43,10 +43,7 @@ _OPTIONS = {
     "min_refinement_steps": 0,
 }
 
-_Key = tuple[MPCSettings, int, int]
-_Solvers = tuple[Any, Any]
-# Pairs of solvers that wait for another controller; if there are more, the oldest are dropped.
-_idle: deque[tuple[_Key, _Solvers]] = deque(maxlen=64)
+_CALL_LOCK = Lock()  # held from the call of a solver until its result is read
 
 
 class Ipopt(ProblemSolver):
@@ -59,10 +56,8 @@ class Ipopt(ProblemSolver):
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
         super().__init__(settings, n_people, n_walls)
-        key = (settings, n_people, n_walls)
-        solvers = _borrow(key)
-        weakref.finalize(self, _give_back, key, solvers).atexit = False
-        self._hard, self._relaxed = solvers
+        with CASADI_LOCK:
+            self._hard, self._relaxed = _build(settings, n_people, n_walls)
         self._upper = np.zeros(self._hard.numel_out("g"))  # 0 for the terminal condition
         self._upper[: self.evaluate.n_rows] = inf
         self.remembered = np.zeros(0)
@@ -70,8 +65,7 @@ class Ipopt(ProblemSolver):
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan from a `guess` and `parameters`; True if IPOPT converged."""
         a_max = self.settings.a_max
-        found = self._hard(x0=guess, p=parameters, lbx=-a_max, ubx=a_max, lbg=0, ubg=self._upper)
-        return self._plan(self._hard, found, parameters)
+        return self._solve(self._hard, parameters, x0=guess, p=parameters, lbx=-a_max, ubx=a_max)
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan of the relaxed problem from a `guess` and `parameters`; True if IPOPT converged."""
@@ -80,41 +74,28 @@ class Ipopt(ProblemSolver):
         free = np.ones(rows.size)
         free[self.evaluate.n_cbf :] = np.hypot(*parameters[2:4]) > s.v_max
         weight = s.slack_weight * remaining_distance(*parameters[[0, 1, 4, 5]])
-        found = self._relaxed(
+        return self._solve(
+            self._relaxed,
+            parameters,
             x0=np.r_[guess, np.maximum(-rows, 0) * free * weight],
             p=np.r_[parameters, weight],
             lbx=np.r_[np.full(guess.size, -s.a_max), np.zeros(rows.size)],
             ubx=np.r_[np.full(guess.size, s.a_max), np.where(free > 0, np.inf, 0.0)],
-            lbg=0,
-            ubg=self._upper,
         )
-        return self._plan(self._relaxed, found, parameters)
 
-    def _plan(self, solver: Any, found: dict[str, Any], parameters: Array) -> tuple[PlanEvaluation, bool]:
-        """The plan that `solver` has found, and True if it converged."""
-        s, stats = self.settings, solver.stats()
+    def _solve(self, solver: Any, parameters: Array, **problem: Any) -> tuple[PlanEvaluation, bool]:
+        """The plan that `solver` finds, and True if it converged."""
+        with _CALL_LOCK:
+            found, stats = solver(lbg=0, ubg=self._upper, **problem), solver.stats()
+        s = self.settings
         self.timed_out = stats["return_status"] == "Maximum_CpuTime_Exceeded"
         inputs = np.clip(np.asarray(found["x"]).ravel()[: 2 * s.N], -s.a_max, s.a_max)
         return self.evaluate(inputs, parameters), bool(stats["success"])
 
 
-def _borrow(key: _Key) -> _Solvers:
-    """Solvers that no controller uses: idle ones, or else new ones."""
-    with CASADI_LOCK:
-        for _ in range(len(_idle)):
-            known, solvers = _idle.popleft()
-            if known == key:
-                return solvers
-            _idle.append((known, solvers))
-        return _build(*key)
-
-
-def _give_back(key: _Key, solvers: _Solvers) -> None:
-    with CASADI_LOCK:
-        _idle.append((key, solvers))
-
-
-def _build(settings: MPCSettings, n_people: int, n_walls: int) -> _Solvers:
+@lru_cache(maxsize=256)
+def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any]:
+    """The solvers of the hard and of the relaxed problem."""
     p = build_problem(settings, n_people, n_walls)
     options: dict[str, Any] = {"expand": True, "print_time": False, "calc_lam_p": False}
     options["show_eval_warnings"] = False  # a failure shows in `Step.status`

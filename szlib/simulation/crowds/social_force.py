@@ -8,8 +8,6 @@ stop within 0.5 m of their goal; people who stand do not move.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
 from types import ModuleType
 
@@ -72,27 +70,19 @@ def _obstacle(wall: Array) -> tuple[float, float, float, float]:
 def _import_pysocialforce() -> ModuleType:
     """PySocialForce without compilation, which takes seconds; a step of ten people takes half a
     millisecond.
+
+    Its import would open ``file.log`` in the working folder, and set the root logger to log everything.
     """
-    numba = import_package("numba", INSTALL_CROWDS)
-    before = numba.config.DISABLE_JIT
-    numba.config.DISABLE_JIT = 1
-    try:
-        with _unchanged_logging():
-            return import_package("pysocialforce", INSTALL_CROWDS)
-    finally:
-        numba.config.DISABLE_JIT = before
-
-
-@contextmanager
-def _unchanged_logging() -> Iterator[None]:
-    """Undo what its import does: open ``file.log`` in the working folder, set the root logger to log all."""
-    root, handler = logging.getLogger(), logging.FileHandler
-    before = root.level, root.handlers[:], root.manager.disable
+    numba, root, handler = import_package("numba", INSTALL_CROWDS), logging.getLogger(), logging.FileHandler
+    level, handlers, disabled = root.level, root.handlers[:], root.manager.disable
+    jit_is_off = numba.config.DISABLE_JIT
     logging.disable(logging.CRITICAL)
     logging.FileHandler = partial(handler, delay=True)  # type: ignore[assignment,misc]
+    numba.config.DISABLE_JIT = 1
     try:
-        yield
+        return import_package("pysocialforce", INSTALL_CROWDS)
     finally:
+        numba.config.DISABLE_JIT = jit_is_off
         logging.FileHandler = handler  # type: ignore[misc]
-        root.level, root.handlers[:] = before[:2]
-        logging.disable(before[2])
+        root.level, root.handlers[:] = level, handlers
+        logging.disable(disabled)
