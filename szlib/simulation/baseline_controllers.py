@@ -90,7 +90,10 @@ class BaselineController(Controller):
 
 
 class StraightController(BaselineController):
-    """Drives straight to the goal; stops if something is within its braking distance and `margin` [m]."""
+    """Drives straight to the goal; stops if something is within its braking distance and `margin` [m].
+
+    `scenario`, `settings` : as of `BaselineController`.
+    """
 
     margin = 0.5
 
@@ -105,6 +108,8 @@ class StraightController(BaselineController):
 
 class SocialForceController(BaselineController):
     """Attracted to the goal within `tau` [s], pushed by people and walls; numbers of Moussaid et al. (2009).
+
+    `scenario`, `settings` : as of `BaselineController`.
 
     The interaction is along D = e + `relative` (v - v'), e the direction to the person: with B = `reach` |D|
     and theta the angle from D to e, `strength` exp(-d/B) [m/s2], slowing by exp(-(2 B theta)^2), turning by
@@ -149,6 +154,8 @@ class SocialForceController(BaselineController):
 
 class DynamicWindowController(BaselineController):
     """The dynamic window for a robot that accelerates in any direction; weights and sizes are assumed.
+
+    `scenario`, `settings` : as of `BaselineController`.
 
     The window has `samples` squared velocities that the robot can reach in one step.  A velocity is
     admissible if the robot, held at it, can brake before it touches a wall, or a person at constant
