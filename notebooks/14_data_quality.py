@@ -224,8 +224,7 @@ record.check("frames are at most 1 s apart (median)", usual <= 1.0, f"{usual:.3f
 #
 # A raw day of 1 GB is streamed: only rows near the area are kept in memory, and the encounters are bit for bit those of the
 # whole day. A day is identified by the content of its files and every parameter. A run that was stopped or killed resumes, and
-# a day that fails does not stop the others. Rows near the area are cached (at most 2.5 GB in all; `SZLIB_CACHE` names
-# another folder, or is "off").
+# a day that fails does not stop the others.
 #
 # | where | how |
 # |---|---|

@@ -20,7 +20,6 @@ from helpers.track_tables import real_data
 
 import szlib
 
-os.environ["SZLIB_CACHE"] = "off"  # nor do tests leave anything in the user's cache
 hypothesis.settings.register_profile("szlib", deadline=None)  # tests are never timed
 hypothesis.settings.load_profile("szlib")
 

@@ -9,7 +9,6 @@ finding          the four conditions of the paper: `find_encounters`
 samples          what is measured in a window: `reference_frame`
 near_rows        the rows of a track table or file that encounters in an area can depend on
 blocks, cells    how they are read from a raw file, and how they are selected
-near_rows_cache  the user's cache of these rows
 one_day          from the files of a day to its encounters
 days             many days, resumable, on one machine or many: `extract_days`
 time_shift       the same people, each moved in time: `time_shifted`

@@ -18,8 +18,8 @@ encounter are decided.
    of a cell that can have a tick inside are selected.  (Kinds need only ticks inside and their velocities.)
 
 Cells are stored in a hash table.  If one cell of a slot is selected, all cells of that slot are.  Then more
-whole cells are selected, so that 1 to 3 still hold.  Files sorted by time, as ATC's are, need one pass,
-because a cell depends only on a few later ones; other files need two passes.
+whole cells are selected, so that 1 to 3 still hold.  One pass over a file sorted by time, as ATC's are, is
+enough, because a cell depends only on a few later ones.
 """
 
 from __future__ import annotations
@@ -29,19 +29,16 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
+import polars as pl
 
 from ..tracks.clock import VELOCITY_SPAN
-from .blocks import FileRows
+from .blocks import NUMBERS
 from .geometry import Square
 
-_CELLS, _ALL_CELLS = 1 << 16, 1 << 24
-"""Slots of the hash table: for one block, and for a whole day that is not sorted by time."""
+_SLOTS = 1 << 16  # of the hash table
+# Fibonacci hashing (Knuth, TAOCP 3, 6.4) spreads ids over the table, also regular ones.
 _MIXER, _SHIFT = np.int64(-7_046_029_254_386_353_131), 40
-"""Fibonacci hashing (Knuth, TAOCP 3, 6.4): spreads ids over the table, also regular ones."""
-_TIME_ROUNDING = 0.1
-"""Larger than every rounding error of a time [s]."""
-_POSITION_ROUNDING = 1e-6
-"""Larger than every rounding error of a position [m]."""
+_TIME_ROUNDING, _POSITION_ROUNDING = 0.1, 1e-6  # larger than every rounding error of a time [s], position [m]
 
 
 class UnsortedError(Exception):
@@ -80,77 +77,48 @@ class Cells:
         """Number of cells needed after one with a tick inside."""
         return ceil((max(self.duration, VELOCITY_SPAN) + self.max_gap + _TIME_ROUNDING) / self.width)
 
-    def number(self, t: np.ndarray | np.floating) -> np.ndarray:
+    def number(self, t: np.ndarray) -> np.ndarray:
         """Number of the cell in time, for times `t` [s]."""
         return np.asarray(np.floor(t * (1 / self.width)).astype(np.int64))
 
-    def slot(self, rows: FileRows, number: np.ndarray, slots: int) -> np.ndarray:
-        """Slot of the cell of each of `rows`, whose cells in time have this `number`, in a table of `slots`.
-
-        Successive cells of a person have successive slots.
-        """
-        person = (rows.id.astype(np.int64) * _MIXER) >> _SHIFT
-        return np.asarray((person + number) & (slots - 1))
-
-    def sides(self, rows: FileRows, slot: np.ndarray, slots: int) -> np.ndarray:
-        """Whether each of `slots` has a row on the inner side of each of the square's four edges; (4, slots).
-
-        `slot` is the slot of each of `rows`.
-        """
-        (x0, x1), (y0, y1) = np.divide([self.square.x, self.square.y], self.metres)
-        rounding = _POSITION_ROUNDING / self.metres
-        within = (
-            rows.x >= x0 - rounding,
-            rows.x <= x1 + rounding,
-            rows.y >= y0 - rounding,
-            rows.y <= y1 + rounding,
-        )
-        edges = np.bitwise_or.reduce([side.view(np.uint8) << k for k, side in enumerate(within)])
-        occurs = np.zeros((1 << len(within), slots), bool)
-        occurs.ravel()[edges.astype(np.int64) * slots + slot] = True
-        codes = np.arange(len(occurs))
-        return np.array([occurs[(codes >> k) & 1 == 1].any(axis=0) for k in range(len(within))])
-
-    def needed(self, sides: np.ndarray) -> np.ndarray:
-        """Whether each slot is needed, from `sides` (4, slots); shape (slots,)."""
-        pair = sides | np.roll(sides, -1, axis=1)
+    def needed(self, rows: pl.DataFrame, number: np.ndarray) -> np.ndarray:
+        """Whether the cell of each of the `rows` is needed; `number` as from `number`; shape (n,)."""
+        person = (rows["id"].to_numpy().astype(np.int64) * _MIXER) >> _SHIFT
+        slot = (person + number) & (_SLOTS - 1)
+        pair = self._find_sides(rows, slot)
+        pair |= np.roll(pair, -1, axis=1)
         inside = pair.all(axis=0)
         needed = inside.copy()
         for cell in range(-self.before, self.after + 2):  # the tick may be in the pair's second cell
             needed |= np.roll(inside, cell)
-        return np.asarray(needed)
+        return np.asarray(needed[slot])
+
+    def _find_sides(self, rows: pl.DataFrame, slot: np.ndarray) -> np.ndarray:
+        """Whether a row of each slot is on the inner side of each edge of the square; shape (4, slots)."""
+        (x0, x1), (y0, y1) = np.divide([self.square.x, self.square.y], self.metres)
+        rounding = _POSITION_ROUNDING / self.metres
+        x, y = rows["x"].to_numpy(), rows["y"].to_numpy()
+        within = (x >= x0 - rounding, x <= x1 + rounding, y >= y0 - rounding, y <= y1 + rounding)
+        sides = np.zeros((len(within), _SLOTS), bool)
+        for side, is_within in zip(sides, within, strict=True):
+            side[slot[is_within]] = True
+        return sides
 
 
-def select_in_one_pass(cells: Cells, blocks: Iterable[FileRows]) -> Iterator[FileRows]:
+def select_near(cells: Cells, blocks: Iterable[pl.DataFrame]) -> Iterator[pl.DataFrame]:
     """Yield the rows of needed `cells` from `blocks` sorted by time; else raise UnsortedError."""
-    waiting = FileRows(*np.zeros((4, 0)))
+    waiting = pl.DataFrame(schema=dict.fromkeys(NUMBERS, pl.Float64))
     decided = newest = np.iinfo(np.int64).min // 2
     for block in blocks:
-        if cells.number(block.t.min()) < newest:
+        number = cells.number(block["t"].to_numpy())
+        if number.min() < newest:
             raise UnsortedError
-        known = FileRows(*map(np.concatenate, zip(waiting, block, strict=True)))
-        number = cells.number(known.t)
-        needed = _needed(cells, known, number)
         newest = int(number.max())
+        known = pl.concat([waiting, block], rechunk=True)
+        number = cells.number(known["t"].to_numpy())
         complete = newest - cells.before - 2
-        yield known.take(np.flatnonzero(needed & (number > decided) & (number <= complete)))
+        yield known.filter(cells.needed(known, number) & (number > decided) & (number <= complete))
         decided = max(decided, complete)
-        waiting = known.take(np.flatnonzero(number >= decided - cells.after))
-    number = cells.number(waiting.t)
-    yield waiting.take(np.flatnonzero(_needed(cells, waiting, number) & (number > decided)))
-
-
-def _needed(cells: Cells, rows: FileRows, number: np.ndarray) -> np.ndarray:
-    slot = cells.slot(rows, number, _CELLS)
-    return np.asarray(cells.needed(cells.sides(rows, slot, _CELLS))[slot])
-
-
-def select_in_two_passes(cells: Cells, blocks: Iterable[FileRows]) -> Iterator[FileRows]:
-    """Yield the rows of needed `cells` from `blocks` in any order."""
-    sides = np.zeros((4, _ALL_CELLS), bool)
-    for block in blocks:
-        used, at = np.unique(cells.slot(block, cells.number(block.t), _ALL_CELLS), return_inverse=True)
-        sides[:, used] |= cells.sides(block, at, len(used))
-    needed = cells.needed(sides)
-    for block in blocks:
-        yield block.take(np.flatnonzero(needed[cells.slot(block, cells.number(block.t), _ALL_CELLS)]))
+        waiting = known.filter(number >= decided - cells.after)
+    number = cells.number(waiting["t"].to_numpy())
+    yield waiting.filter(cells.needed(waiting, number) & (number > decided))

@@ -12,9 +12,9 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,6 @@ from ..tracks.recordings import find_day, name_recordings
 from .geometry import Area
 from .one_day import (
     describe_source,
-    file_contents,
     find_encounters_in_files,
     load_day,
     store_day,
@@ -159,11 +158,6 @@ def extract_days(
     DataError : there is no such file or parameter.
     StorageError : the folder cannot be made, holds files that szlib did not write, or holds the input.
 
-    Notes
-    -----
-    The rows of a raw day near the area are cached, so that a search with other conditions does not read the
-    file again (`szlib.encounters.near_rows_cache`).  $SZLIB_CACHE names the folder of the cache, or is "off".
-
     Examples
     --------
     >>> import szlib
@@ -220,18 +214,18 @@ def extract_day(
     start = time.perf_counter()
     row, folder = _row(day, files, status="failed"), Path(out)
     try:
-        with file_contents(files) as contents:
-            describe = partial(describe_source, files, contents, settings, options)
+        with ThreadPoolExecutor(1) as thread:  # checksums are computed while the files are read
+            source = thread.submit(describe_source, files, settings, options)
             is_stored, status = (folder / f"{day}.parquet").is_file(), "kept"
-            samples = load_day(folder, day, describe()) if is_stored else None
+            samples = load_day(folder, day, source.result()) if is_stored else None
             if samples is None:
                 status = "done"
                 with warnings.catch_warnings():  # the table and the funnel count the rejected rows
                     warnings.simplefilter("ignore", DataWarning)
                     paths = [Path(file) for file in files]
-                    samples = find_encounters_in_files(paths, settings, options, contents)
-                store_day(folder, day, samples, describe())
-            row["source"] = describe()
+                    samples = find_encounters_in_files(paths, settings, options)
+                store_day(folder, day, samples, source.result())
+            row["source"] = source.result()
         read = [stage for stage in funnels.get(samples) if stage["stage"].startswith("read ")]
         row |= {
             "status": status,

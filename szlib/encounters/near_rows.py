@@ -6,8 +6,8 @@ file.  `szlib.find_encounters` finds the same encounters in them as in all rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -22,16 +22,13 @@ from ..tracks.options import ReadOptions
 from ..tracks.plausibility import check_unit
 from ..tracks.readers import merge, order_by_person, read_raw, read_stage
 from ..tracks.recordings import LoadedFile
-from . import near_rows_cache
-from .blocks import FileRows, FileSummary, UsableBlocks
-from .cells import Cells, UnsortedError, select_in_one_pass, select_in_two_passes
+from .blocks import UsableBlocks
+from .cells import Cells, UnsortedError, select_near
 from .geometry import Area
 from .kinds import REACH
-from .near_rows_cache import Content
 from .occupants import TrackRows
 
-_ROW_BYTES = 180
-"""Memory that a row near the area takes until its day is done (15.6 million of them: 2.7 GB)."""
+_ROW_BYTES = 180  # memory of a row near the area until its day is done (15.6 million of them: 2.7 GB)
 
 
 def select_near_rows(tracks: pd.DataFrame, area: Area, duration: float) -> pd.DataFrame:
@@ -69,19 +66,16 @@ def read_near_area(
     area: Area | None,
     duration: float,
     options: ReadOptions | None = None,
-    content: Content | None = None,
 ) -> pd.DataFrame:
     """Read the rows of files that encounters in an area can depend on, as `tracks.readers.read_raw` does.
 
-    A single ATC raw file is streamed.  Other files are small: all their rows are read.
+    A single ATC raw file that is sorted by time is streamed.  Of other files all rows are read.
 
     Parameters
     ----------
     paths : one file, or several of one day.
     area, duration : as in `szlib.EncounterSettings`; area None reads all rows.
     options : how the files are read.
-    content : gives size and checksum of a single file, as `szlib.files.file_content`; with it the rows are
-        stored in the user's cache, and loaded from there (`near_rows_cache`).
 
     Returns
     -------
@@ -95,58 +89,34 @@ def read_near_area(
     files = [Path(paths)] if isinstance(paths, str | Path) else list(paths)
     path = files[0]
     if area is not None and len(files) == 1 and path.is_file():
-        with open_file(path, options) as (layout, scan, plain):
+        with open_file(path, options) as (layout, scan, _):
             if layout.is_streamed:
                 max_gap = options.max_gap or layout.max_gap or 0.0
                 cells = Cells(area.grown(REACH).box, duration, max_gap, layout.metres)
-                blocks = UsableBlocks(layout.quick_scan(plain), scan, layout)
-                near, summary = _load_or_select(blocks, path, layout, cells, content)
-                return _as_table(near, summary, path, layout, options)
+                with suppress(UnsortedError):
+                    blocks, parts, n_near = UsableBlocks(scan, layout), [], 0
+                    for rows in select_near(cells, blocks):
+                        parts.append(rows)
+                        n_near += rows.height
+                        what = f"{path}: to hold {n_near:,} rows near the area, or more,"
+                        memory.require(n_near * _ROW_BYTES, what)
+                    near = pl.concat(parts, rechunk=True)
+                    near = near[order_by_person(near["id"].to_numpy())]
+                    return _as_table(near, blocks, path, layout, options)
     return read_raw(files, options=options)
 
 
-def _load_or_select(
-    blocks: UsableBlocks, path: Path, layout: TrackFormat, cells: Cells, content: Content | None
-) -> tuple[FileRows, FileSummary]:
-    """The rows near the area, loaded from the cache or selected from the file, and a summary of the file."""
-    selection = {"format": asdict(layout), "cells": asdict(cells)}
-    if content and (found := near_rows_cache.load(path.stat().st_size, selection, content)):
-        return found
-    try:
-        parts = _collect(select_in_one_pass(cells, blocks), path)
-    except UnsortedError:
-        parts = _collect(select_in_two_passes(cells, blocks), path)
-    order = order_by_person(np.concatenate([rows.id for rows in parts]))
-    near = FileRows(*(np.concatenate(values)[order] for values in zip(*parts, strict=True)))
-    if content:
-        near_rows_cache.store(content(), selection, near, blocks.summary)
-    return near, blocks.summary
-
-
-def _collect(blocks: Iterator[FileRows], path: Path) -> list[FileRows]:
-    """The rows of all blocks; raises MemoryLimitError as soon as they are too many."""
-    parts, count = [], 0
-    for rows in blocks:
-        parts.append(rows)
-        count += len(rows.t)
-        memory.require(count * _ROW_BYTES, f"{path}: to hold {count:,} rows near the area, or more,")
-    return parts
-
-
 def _as_table(
-    near: FileRows, summary: FileSummary, path: Path, layout: TrackFormat, options: ReadOptions
+    near: pl.DataFrame, blocks: UsableBlocks, path: Path, layout: TrackFormat, options: ReadOptions
 ) -> pd.DataFrame:
-    """The rows as a table as from `read_raw`, with the funnel of the whole file; it overwrites `near`."""
-    stage = read_stage(path, layout, summary.usable, dict(summary.reasons), summary.first_fault)
+    """The rows as a table as from `read_raw`, with the funnel of the whole file."""
+    stage = read_stage(path, layout, blocks.n_usable, dict(blocks.reasons), blocks.first_fault)
     if options.unit is None:
-        check_unit(pl.DataFrame({"x": [summary.farthest], "y": [0.0]}), layout, path)
-    far = {"never near the area": summary.usable - len(near.t)}
-    stages = [stage, funnels.stage("near the area", summary.usable, len(near.t), far)]
-    if len(near.t) == 0:
+        check_unit(pl.DataFrame({"x": [blocks.farthest], "y": [0.0]}), layout, path)
+    far = {"never near the area": blocks.n_usable - near.height}
+    stages = [stage, funnels.stage("near the area", blocks.n_usable, near.height, far)]
+    if near.height == 0:
         empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
         return funnels.attach(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
-    for values in (near.x, near.y):
-        values *= layout.metres
-    layout = replace(layout, metres=1.0)
-    rows = layout.to_metres(pl.DataFrame(near._asdict()), path, options.tz)
+    rows = layout.to_metres(near, path, options.tz)
     return merge([LoadedFile(path, rows, stages, layout)], copy=False)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -24,10 +22,10 @@ from .areas import AUTO, walked_area
 from .finding import find_encounters
 from .geometry import Area, Region, Square
 from .near_rows import read_near_area
-from .near_rows_cache import Content
 from .samples import no_samples
 from .settings import EncounterSettings
 
+# Advice by a word of the condition that rejected everything.
 _ADVICE = {
     "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
     "not in the area": 'give an area in which people walked: four numbers or a polygon, or "auto"',
@@ -39,16 +37,13 @@ _ADVICE = {
     "nearer": "people came into view late: pass a smaller min_distance",
     "somebody else": "more data, or other conditions (szlib.find_encounters)",
 }
-"""Advice by a word of the condition that rejected everything."""
-_VERSION = 5
-"""Version of the cached result of a day; a result of another version is computed again."""
+_VERSION = 6  # of the cached result of a day; a result of another version is computed again
 
 
 def find_encounters_in_files(
     files: Sequence[Path],
     settings: EncounterSettings,
     options: ReadOptions,
-    contents: Sequence[Content] = (),
 ) -> pd.DataFrame:
     """Find the encounters of the `files` of one day: the same as in ``szlib.read_tracks(files)``.
 
@@ -56,8 +51,7 @@ def find_encounters_in_files(
     content of each file, as `file_contents`; with them, the rows near the area are cached for the next call.
     """
     area = _known_area(settings, files, options)
-    content = contents[0] if contents else None
-    raw = read_near_area(files, area=area, duration=settings.duration, options=options, content=content)
+    raw = read_near_area(files, area=area, duration=settings.duration, options=options)
     tracks = to_clock(raw, max_gap=options.max_gap) if len(raw) else raw
     if len(tracks) == 0:
         return funnels.attach(no_samples(), funnels.get(tracks))
@@ -111,24 +105,14 @@ def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-@contextmanager
-def file_contents(files: Sequence[str]) -> Iterator[list[Content]]:
-    """Compute size and checksum of each of `files` in a thread, while the files are read.
-
-    Yields a function for each file, which waits for the result.
-    """
-    with ThreadPoolExecutor(1) as thread:
-        yield [thread.submit(file_content, Path(file)).result for file in files]
-
-
 def describe_source(
-    files: Sequence[str], contents: Sequence[Content], settings: EncounterSettings, options: ReadOptions
+    files: Sequence[str], settings: EncounterSettings, options: ReadOptions
 ) -> dict[str, Any]:
     """What the encounters of a day are made of, in JSON values.
 
-    It holds names and `contents` of the `files`, `settings`, `options`, and the version of szlib.
+    It holds names, sizes and checksums of the `files`, `settings`, `options`, and the version of szlib.
     """
-    content = sorted([Path(file).name, *known()] for file, known in zip(files, contents, strict=True))
+    content = sorted([Path(file).name, *file_content(Path(file))] for file in files)
     parameters = settings.as_json() | asdict(options)
     return {"version": _VERSION, "szlib": __version__, "files": content, "parameters": parameters}
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import polars as pl
 import pytest
 from helpers.raw_days import SPACE, assert_streamed_as_whole, encounters, make_raw_day, write_raw_day
 
@@ -50,17 +51,18 @@ def test_order_of_rows_does_not_matter(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(blocks, "_BLOCK_ROWS", 1000)
     rows = make_raw_day(1, wild=False)
     shuffled = write_raw_day(tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0))
-    assert assert_streamed_as_whole(shuffled, square=szlib.ATC_SQUARE, duration=1.0) > 0
     in_order = read_near_area(write_raw_day(tmp_path / "a.csv", rows), area=szlib.ATC_SQUARE, duration=1.0)
     given = {"duration": 1.0, "space": SPACE}
     any_order = read_near_area(shuffled, area=szlib.ATC_SQUARE, duration=1.0)
-    pd.testing.assert_frame_equal(encounters(in_order, **given), encounters(any_order, **given))
+    found = encounters(any_order, **given)
+    assert len(found) > 0
+    pd.testing.assert_frame_equal(encounters(in_order, **given), found)
 
 
 def test_shared_slots_select_more_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_raw_day(tmp_path / "day.csv", make_raw_day(3))
     apart = len(read_near_area(path, area=szlib.ATC_SQUARE, duration=1.0))
-    monkeypatch.setattr(cells, "_CELLS", 64)
+    monkeypatch.setattr(cells, "_SLOTS", 64)
     assert len(read_near_area(path, area=szlib.ATC_SQUARE, duration=1.0)) > apart
     assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=1.0) > 0
 
@@ -107,22 +109,24 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("bad", DAMAGED.values(), ids=DAMAGED.keys())
-def test_quick_scan_detects_every_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bad: str) -> None:
+def test_damaged_rows_are_rejected_as_by_read_raw(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, bad: str
+) -> None:
     monkeypatch.setattr(blocks, "_BLOCK_ROWS", 7)
     path = tmp_path / "day.csv"
     lines = [(bad if k == 30 else GOOD).format(id=k) for k in range(50)]
     path.write_bytes("\n".join(lines).encode("latin-1"))
-    with open_file(path, szlib.ReadOptions()) as (layout, scan, plain):
-        found = blocks.UsableBlocks(layout.quick_scan(plain), scan, layout)
-    rows = blocks.FileRows(*map(np.concatenate, zip(*found, strict=True)))
+    with open_file(path, szlib.ReadOptions()) as (layout, scan, _):
+        found = blocks.UsableBlocks(scan, layout)
+        rows = pl.concat(found)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)
         whole = read_raw(path)
     read = funnels.get(whole)[0]
-    assert (found.summary.usable, dict(found.summary.reasons)) == (read["kept"], read["rejected"])
-    assert found.summary.first_fault is None or found.summary.first_fault[0] == 31
-    np.testing.assert_array_equal(rows.id, whole["id"])
-    np.testing.assert_array_equal(rows.y * layout.metres, whole["y"])
+    assert (found.n_usable, dict(found.reasons)) == (read["kept"], read["rejected"])
+    assert found.first_fault is None or found.first_fault[0] == 31
+    np.testing.assert_array_equal(rows["id"], whole["id"])
+    np.testing.assert_array_equal(rows["y"] * layout.metres, whole["y"])
 
 
 def test_area_without_people_gives_an_empty_table(tmp_path: Path) -> None:

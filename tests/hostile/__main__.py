@@ -3,12 +3,11 @@
 Every module here that is not a test has a function `attack(long)`, which returns counts of what it tried
 and found.  Counts whose name begins with "broken" must be 0; otherwise the exit code is 1.  Several attacks
 run in one interpreter each, because some fork, which is not safe with threads.  The counts are printed and
-written to results/hostile.json.  The user's cache is not used.
+written to results/hostile.json.
 """
 
 import importlib
 import json
-import os
 import subprocess
 import sys
 import time
@@ -21,7 +20,6 @@ TALLY = Path("results/hostile.json")
 
 def main() -> int:
     sys.path.insert(0, str(HERE.parent))
-    os.environ["SZLIB_CACHE"] = "off"
     long = ["--long"] if "--long" in sys.argv else []
     names = [name for name in sys.argv[1:] if name != "--long"] or ATTACKS
     if unknown := sorted(set(names) - set(ATTACKS)):

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import ClassVar, Self
 
 import polars as pl
 
 from ...errors import DataError
 from ..options import UNITS, ReadOptions
-from .unpack import read_first_line
 
 EXPECTED = (
     "expected one of: atc-raw (8 numbers, commas, no header), atc-1hz (6 numbers, commas, no header), "
@@ -118,15 +116,10 @@ class TrackFormat:
         """
         return None
 
-    def value_limits(self) -> dict[str, tuple[float, float]]:
-        """Of t, id, x and y: one unit of the file, and the greatest usable magnitude, both in s, 1 and m."""
-        place = (self.metres, _FARTHEST)
-        return {"t": (self.seconds, _LAST_SECOND), "id": (1.0, 2.0**53), "x": place, "y": place}
-
     def rejection_reason(self) -> pl.Expr:
         """Why a row is rejected; null where it is usable."""
-        limit, person = self.value_limits(), pl.col("id")
-        numbers = list(limit)
+        numbers, person, place = ["t", "id", "x", "y"], pl.col("id"), (self.metres, _FARTHEST)
+        limit = {"t": (self.seconds, _LAST_SECOND), "id": (1.0, 2.0**53), "x": place, "y": place}
         beyond = {name: pl.col(name).abs() * unit > most for name, (unit, most) in limit.items()}
         reasons = {
             "missing or extra fields": pl.col("ragged"),
@@ -154,29 +147,15 @@ class TrackFormat:
         numbers = (pl.col(name) if unit == 1 else pl.col(name) * unit for name, unit in units.items())
         return good.select("day", pl.col("id").cast(pl.Int64), *numbers)
 
-    def scan(
-        self, plain: Path, types: Mapping[str, pl.datatypes.DataTypeClass] = MappingProxyType({})
-    ) -> pl.LazyFrame:
-        """Scan the lines of file `plain`; `types` of some fields f0, f1, ..., if not the usual ones."""
-        return self._scan_blanks(plain) if self.separator == " " else self._scan_separated(plain, types)
+    def scan(self, plain: Path) -> pl.LazyFrame:
+        """Scan the lines of file `plain`."""
+        return self._scan_blanks(plain) if self.separator == " " else self._scan_separated(plain)
 
-    def quick_scan(self, plain: Path) -> pl.LazyFrame:
-        """Scan file `plain` in two thirds of the time, if all its rows are like the first one.
-
-        Numbers are read as integers where they are whole in the first row, and the last field as a number.  A
-        row has null where it is no such number, and is `ragged` where its last field is none.
-        """
-        first = decode_line(read_first_line(plain)).split(self.separator) + [""] * self.n_fields
-        numbers = {*self.columns.values(), self.n_fields - 1}
-        types = {f"f{k}": pl.Int64 if first[k].lstrip("-").isdecimal() else pl.Float64 for k in numbers}
-        return self.scan(plain, types)
-
-    def _scan_separated(self, plain: Path, types: Mapping[str, pl.datatypes.DataTypeClass]) -> pl.LazyFrame:
+    def _scan_separated(self, plain: Path) -> pl.LazyFrame:
         numbers = {index for name, index in self.columns.items() if name != "day"}
         fields = {f"f{i}": pl.Float64 if i in numbers else pl.String for i in range(self.n_fields)}
-        schema: dict[str, pl.datatypes.DataTypeClass] = {**fields, **types, "extra": pl.String}
         scan = pl.scan_csv(
-            plain, schema=schema, has_header=False, skip_lines=int(self.has_header),
+            plain, schema={**fields, "extra": pl.String}, has_header=False, skip_lines=int(self.has_header),
             separator=self.separator, quote_char=None, encoding="utf8-lossy", ignore_errors=True,
             truncate_ragged_lines=True,
             missing_columns="insert", extra_columns="ignore", raise_if_empty=False, glob=False,
