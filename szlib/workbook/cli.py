@@ -17,6 +17,7 @@ import os
 import signal
 import sys
 import threading
+import tomllib
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
@@ -61,89 +62,54 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """Build the parser of the command line."""
-    parser = argparse.ArgumentParser(
-        prog="szlib", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )  # fmt: skip
+    """Build the parser of the command line; `help.toml` describes the commands and their arguments."""
+    texts = tomllib.loads(Path(__file__).with_name("help.toml").read_text(encoding="utf-8"))
+    as_written = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog="szlib", description=__doc__, formatter_class=as_written)
     parser.add_argument("--version", action="version", version=f"szlib {__version__}")
     parser.set_defaults(memory=None)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    data = argparse.ArgumentParser(add_help=False)
+    text, rectangle = texts["shared"], ("X0", "X1", "Y0", "Y1")
+    data, cluster = argparse.ArgumentParser(add_help=False), argparse.ArgumentParser(add_help=False)
     area = data.add_mutually_exclusive_group()
-    area.add_argument(
-        "--area", "--square", nargs=4, type=float, metavar=("X0", "X1", "Y0", "Y1"),
-        help="the rectangle in which encounters are found [m] (default: the open square for ATC files, "
-        "else as with --auto)",
-    )  # fmt: skip
-    area.add_argument(
-        "--polygon", dest="area", metavar="FILE", help="the area as a polygon in a WKT or GeoJSON file [m]"
-    )
-    area.add_argument(
-        "--auto", dest="area", action="store_const", const="auto",
-        help="use the largest rectangle in which people walked everywhere",
-    )  # fmt: skip
-    data.add_argument(
-        "--memory", metavar="SIZE",
-        help="refuse data that needs more memory, such as 4GB (default: 80 %% of the free memory)",
-    )  # fmt: skip
-    cluster = argparse.ArgumentParser(add_help=False)
-    cluster.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster at this address")
+    area.add_argument("--area", "--square", nargs=4, type=float, metavar=rectangle, help=text["area"])
+    area.add_argument("--polygon", dest="area", metavar="FILE", help=text["polygon"])
+    area.add_argument("--auto", dest="area", action="store_const", const="auto", help=text["auto"])
+    data.add_argument("--memory", metavar="SIZE", help=text["memory"])
+    cluster.add_argument("--scheduler", metavar="ADDRESS", help=text["scheduler"])
 
     summary, _, rules = str(inspect.getdoc(_run)).partition("\n\n")
+    text, n_jobs = texts["run"], min(os.cpu_count() or 1, 4)
     run = commands.add_parser(
-        "run", help="execute the notebooks and check their results", parents=[data, cluster],
-        description=summary, epilog=rules, formatter_class=argparse.RawDescriptionHelpFormatter,
-    )  # fmt: skip
-    run.add_argument(
-        "--data", nargs="+", default=["synthetic"], metavar="DATA",
-        help="synthetic (default), atc-1hz, atc-10-days, or files, folders or globs of tracks",
-    )  # fmt: skip
-    run.add_argument(
-        "--out", type=os.path.abspath, metavar="FOLDER",
-        help="the folder of all results (default: results, beside the notebooks)",
-    )  # fmt: skip
-    run.add_argument(
-        "-j", "--jobs", type=_job_count, default=min(os.cpu_count() or 1, 4), metavar="N",
-        help="notebooks that run at the same time (default: one for each core, at most 4)",
-    )  # fmt: skip
-    run.add_argument(
-        "--only", nargs="+", default=[], metavar="NN", help="run only these notebooks, such as 07"
+        "run", help=text["summary"], parents=[data, cluster], formatter_class=as_written
     )
-    run.add_argument(
-        "-p", "--parameter", action="append", default=[], metavar="NAME=VALUE",
-        help="set a parameter of the notebooks, such as seed=1",
-    )  # fmt: skip
+    run.description, run.epilog = summary, rules
+    run.add_argument("--data", nargs="+", default=["synthetic"], metavar="DATA", help=text["data"])
+    run.add_argument("--out", type=os.path.abspath, metavar="FOLDER", help=text["out"])
+    run.add_argument("-j", "--jobs", type=_job_count, default=n_jobs, metavar="N", help=text["jobs"])
+    run.add_argument("--only", nargs="+", default=[], metavar="NN", help=text["only"])
+    pair = "NAME=VALUE"
+    run.add_argument("-p", "--parameter", action="append", default=[], metavar=pair, help=text["parameter"])
     run.set_defaults(command=_run)
 
-    report = commands.add_parser("report", help="write the report of a run again, as one HTML file")
-    report.add_argument(
-        "folder", nargs="?", metavar="FOLDER",
-        help="the folder of the run (default: results/synthetic, beside the notebooks)",
-    )  # fmt: skip
-    report.add_argument("--open", action="store_true", help="open the report in a browser")
+    text = texts["report"]
+    report = commands.add_parser("report", help=text["summary"])
+    report.add_argument("folder", nargs="?", metavar="FOLDER", help=text["folder"])
+    report.add_argument("--open", action="store_true", help=text["open"])
     report.set_defaults(command=_report)
 
-    look = commands.add_parser(
-        "inspect", help="print how many rows of a file are used, and why others are rejected", parents=[data]
-    )
-    look.add_argument("file", help="a file of tracks: ATC, EWAP or a table; plain or .gz")
+    text = texts["inspect"]
+    look = commands.add_parser("inspect", help=text["summary"], parents=[data])
+    look.add_argument("file", help=text["file"])
     look.set_defaults(command=_inspect)
 
-    extract = commands.add_parser(
-        "extract", help="find the encounters of many days; a stopped extraction continues where it was",
-        parents=[data, cluster],
-    )  # fmt: skip
-    extract.add_argument("data", nargs="+", metavar="PATH", help="files, folders or globs of tracks")
-    extract.add_argument(
-        "--out", default="results/days", metavar="FOLDER",
-        help="the folder for one Parquet file a day (default: %(default)s)",
-    )  # fmt: skip
-    extract.add_argument(
-        "-j", "--jobs", type=_job_count, default=1, metavar="N",
-        help="days that run at the same time (default: %(default)s)",
-    )  # fmt: skip
-    extract.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help="days to leave out")
+    text = texts["extract"]
+    extract = commands.add_parser("extract", help=text["summary"], parents=[data, cluster])
+    extract.add_argument("data", nargs="+", metavar="PATH", help=text["data"])
+    extract.add_argument("--out", default="results/days", metavar="FOLDER", help=text["out"])
+    extract.add_argument("-j", "--jobs", type=_job_count, default=1, metavar="N", help=text["jobs"])
+    extract.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help=text["exclude"])
     extract.set_defaults(command=_extract)
     return parser
 

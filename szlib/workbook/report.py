@@ -17,7 +17,7 @@ from typing import Any
 import nbformat
 import pandas as pd
 from bs4 import BeautifulSoup
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError, pass_context
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
 from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
@@ -64,12 +64,13 @@ def write_report(home: Path) -> Path:
         cell["id"] = f"cell-{i}"
         if cell.cell_type == "markdown":
             cell.source = _FILE_LINK.sub(lambda link: _local_link(link, notebooks), cell.source)
-    exporter = _Exporter(
+    exporter = HTMLExporter(
         extra_loaders=[FileSystemLoader(_STATIC)],
         template_file="report.html.j2",
         exclude_input_prompt=True,
         exclude_output_prompt=True,
     )
+    exporter.register_filter("markdown2html", _render_markdown)
     write_file(home / REPORT, exporter.from_notebook_node(page)[0])
     return home / REPORT
 
@@ -103,12 +104,10 @@ class _Renderer(IPythonRenderer):
         return convert(body)
 
 
-class _Exporter(HTMLExporter):
-    @pass_context
-    def markdown2html(self, context: Any, source: str) -> str:
-        """Render a markdown cell with its pictures embedded."""
-        renderer = _Renderer(escape=False, path=str(folders.NOTEBOOKS), embed_images=True)
-        return MarkdownWithMath(renderer=renderer).render(source)
+def _render_markdown(source: str) -> str:
+    """Render a markdown cell with its pictures embedded."""
+    renderer = _Renderer(escape=False, path=str(folders.NOTEBOOKS), embed_images=True)
+    return MarkdownWithMath(renderer=renderer).render(source)
 
 
 def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> str:

@@ -154,11 +154,7 @@ class Task:
 
 
 def make_task(
-    name: str,
-    case: Callable[[Rng], Case],
-    *,
-    judge: Judge | None = None,
-    **mistakes: Answer,
+    name: str, case: Callable[[Rng], Case], *, judge: Judge | None = None, **mistakes: Answer
 ) -> Task:
     """Build a task with the texts and numbers of `texts.toml`.
 

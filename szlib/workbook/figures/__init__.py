@@ -15,7 +15,6 @@ comparisons  many runs or fits: sweeps, strategies, intervals, claims
 from .comparisons import (
     draw_interval_grid,
     plot_claims,
-    plot_intervals,
     plot_safety_claims,
     plot_sensitivity,
     plot_strategies,

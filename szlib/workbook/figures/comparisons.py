@@ -84,43 +84,6 @@ def _draw_heat_map(
     return ax
 
 
-def plot_intervals(
-    table: pd.DataFrame, metric: str, *, rows: str, colour: str, label: str, ax: Axes | None = None
-) -> Axes:
-    """Plot means of one metric with their intervals.
-
-    Parameters
-    ----------
-    table : one row for each mean, with metric, mean, low and high.
-    metric : metric to draw.
-    rows : column of `table` with the names beside the axis.
-    colour : column of `table` with the names of the colours.
-    label : label of the axis, with its unit.
-    ax : axes to draw on; None makes new ones.
-
-    Examples
-    --------
-    >>> import pandas as pd
-    >>> from szlib.workbook import figures
-    >>> row = {"crowd": "ETH", "robot": "MPC-CBF", "metric": "time", "mean": 9.0, "low": 8.0, "high": 10.0}
-    >>> table = pd.DataFrame([row])
-    >>> ax = figures.plot_intervals(table, "time", rows="crowd", colour="robot", label="time [s]")
-    """
-    ax = get_axes(ax, size=(5.5, 3.5))
-    shown = table[table["metric"] == metric]
-    names, groups = list(dict.fromkeys(shown[rows])), list(dict.fromkeys(shown[colour]))
-    styles = zip(groups, (BLUE, ORANGE, GREEN, RED, BLACK), ("o", "s", "^", "D", "v"), strict=False)
-    for i, (group, shade, marker) in enumerate(styles):
-        part = shown[shown[colour] == group].set_index(rows).reindex(names)
-        at = np.arange(len(names)) + 0.16 * (i - (len(groups) - 1) / 2)
-        ax.hlines(at, part["low"], part["high"], color=shade, linewidth=1.5)
-        ax.plot(part["mean"], at, marker, color=shade, markersize=5, label=group)
-    ax.set_yticks(range(len(names)), names)
-    ax.set(xlabel=label, ylim=(len(names) - 0.5, -0.5))
-    ax.grid(axis="x", color=GREY, alpha=0.3)
-    return ax
-
-
 def draw_interval_grid(
     table: pd.DataFrame,
     labels: Mapping[str, str],
@@ -130,12 +93,12 @@ def draw_interval_grid(
     columns: int = 3,
     title: str = "",
 ) -> Figure:
-    """Draw a panel of `plot_intervals` for each metric, with one legend.
+    """Draw the means of each metric with their intervals: a panel for each metric, and one legend.
 
     Parameters
     ----------
-    table : as for `plot_intervals`.
-    labels : metric -> label of the axis.
+    table : one row for each mean, with metric, mean, low and high.
+    labels : metric -> label of the axis, with its unit.
     rows : column of `table` with the names beside the axes.
     colour : column of `table` with the names of the colours.
     columns : number of panels side by side.
@@ -155,12 +118,27 @@ def draw_interval_grid(
         n_rows, columns, figsize=size, layout="constrained", sharey=True, squeeze=False
     )
     for ax, (metric, label) in zip(grid.flat, labels.items(), strict=False):
-        plot_intervals(table, metric, rows=rows, colour=colour, label=label, ax=ax)
+        _plot_intervals(ax, table[table["metric"] == metric], rows=rows, colour=colour)
+        ax.set_xlabel(label)
     for ax in grid.flat[len(labels) :]:
         ax.axis("off")
     add_shared_legend(list(grid.flat))
     figure.suptitle(title)
     return figure
+
+
+def _plot_intervals(ax: Axes, table: pd.DataFrame, *, rows: str, colour: str) -> None:
+    """Plot the means of one metric with their intervals."""
+    names, groups = list(dict.fromkeys(table[rows])), list(dict.fromkeys(table[colour]))
+    styles = zip(groups, (BLUE, ORANGE, GREEN, RED, BLACK), ("o", "s", "^", "D", "v"), strict=False)
+    for i, (group, shade, marker) in enumerate(styles):
+        part = table[table[colour] == group].set_index(rows).reindex(names)
+        at = np.arange(len(names)) + 0.16 * (i - (len(groups) - 1) / 2)
+        ax.hlines(at, part["low"], part["high"], color=shade, linewidth=1.5)
+        ax.plot(part["mean"], at, marker, color=shade, markersize=5, label=group)
+    ax.set_yticks(range(len(names)), names)
+    ax.set_ylim(len(names) - 0.5, -0.5)
+    ax.grid(axis="x", color=GREY, alpha=0.3)
 
 
 def plot_zone_sizes(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes | None = None) -> Axes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -17,12 +17,10 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.spatial import ConvexHull
 
-from ...checks import Array
 from ...errors import DataWarning, ZoneError
 from ...zones.ellipses import Ellipse
 from ...zones.hulls import HullZone
 from ...zones.occupancy import PairCorrelation
-from ...zones.uncertainty import Uncertainty
 from .style import (
     BLACK,
     BLUE,
@@ -36,36 +34,10 @@ from .style import (
     pick_colours,
 )
 
+if TYPE_CHECKING:
+    from ...zones.social_zone import SocialZone
+
 _LINES = ("-", "--", ":", "-.")
-
-
-class FittedZone(Protocol):
-    """A zone that the figures can draw: a `szlib.SocialZone`, whose attributes these are."""
-
-    @property
-    def shape(self) -> Any:
-        """The boundary by speed and direction."""
-
-    @property
-    def method(self) -> str:
-        """The name of the estimator."""
-
-    @property
-    def ellipses(self) -> dict[float, Ellipse]:
-        """The fitted ellipse by speed [m/s]."""
-
-    @property
-    def uncertainty(self) -> Uncertainty | None:
-        """The intervals, if they are known."""
-
-    def ellipse(self, speed: float) -> Ellipse:
-        """The ellipse at a `speed` [m/s]."""
-
-    def boundary(self, speed: float) -> Array:
-        """The boundary at a `speed` [m/s], shape (n, 2) [m]."""
-
-    def adequate(self, speed: float) -> bool:
-        """Whether there are enough encounters at a `speed` [m/s]."""
 
 
 def plot_outliers(
@@ -99,7 +71,7 @@ def plot_outliers(
 
 
 def plot_hull(
-    zone: FittedZone,
+    zone: SocialZone,
     speeds: Sequence[float] = (0.7, 0.9, 1.1, 1.3),
     *,
     points: np.ndarray | None = None,
@@ -153,7 +125,7 @@ def plot_hull(
 
 
 def plot_zone(
-    zone: FittedZone, speed: float, *, truth: Ellipse | None = None, ax: Axes | None = None
+    zone: SocialZone, speed: float, *, truth: Ellipse | None = None, ax: Axes | None = None
 ) -> Axes:
     """Plot a zone's boundary at one speed, its ellipse and the ellipse's interval.
 
@@ -198,7 +170,7 @@ def plot_zone(
     return label_metres(ax, f"Minimum social zone at {speed:g} m/s{warning}", person=True)
 
 
-def plot_zones(zones: FittedZone | Mapping[float, Ellipse], *, ax: Axes | None = None) -> Axes:
+def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None = None) -> Axes:
     """Plot ellipses by speed around a person who walks to the right (paper, fig. 5).
 
     Parameters
@@ -274,7 +246,7 @@ def plot_pair_correlation(
     return label_metres(ax, person=True)
 
 
-def _draw_interval(ax: Axes, zone: FittedZone, speed: float, **style: Any) -> None:
+def _draw_interval(ax: Axes, zone: SocialZone, speed: float, **style: Any) -> None:
     """Fill the interval of the ellipse's radius, in the directions where both ends are known."""
     bands = None if zone.uncertainty is None else zone.uncertainty.bands
     if bands is None or not (bands["speed"] == speed).any():
