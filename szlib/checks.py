@@ -13,11 +13,10 @@ from .errors import DataError, SolverError
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
-"""An array of floats."""
+Array = NDArray[np.float64]  # an array of floats
+# Largest coordinate, speed or parameter that is accepted [m, m/s, ...]. Floats are spaced 1.5e-8 there,
+# well below the tolerance of the controller. Every map projection of the Earth stays below it.
 LARGEST = 1e8
-"""Largest coordinate, speed or parameter that is accepted [m, m/s, ...]. Floats are spaced 1.5e-8 there,
-well below the tolerance of the controller. Every map projection of the Earth stays below it."""
 _DOUBLE = np.dtype(float)
 
 

@@ -17,8 +17,8 @@ import psutil
 
 from .errors import MemoryLimitError
 
+# Environment variable: the limit of each process, such as 4GB; ``--memory`` of the command line sets it.
 VARIABLE = "SZLIB_MEMORY"
-"""Environment variable: the limit of each process, such as 4GB; ``--memory`` of the command line sets it."""
 _SHARE = 0.8
 _granted: ContextVar[int | None] = ContextVar("granted", default=None)
 

@@ -20,12 +20,9 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from . import memory
 from .errors import SzlibError
 
-_CONNECT_TIMEOUT = 10
-"""Longest wait for the answer of a scheduler [s]."""
-_MAX_PER_CORE = 4
-"""More processes than this for each core slow each other down."""
-_HEARTBEAT = 0.5
-"""Interval at which a process checks that its parent lives [s]."""
+_CONNECT_TIMEOUT = 10  # longest wait for the answer of a scheduler [s]
+_MAX_PER_CORE = 4  # more processes than this for each core slow each other down
+_HEARTBEAT = 0.5  # interval at which a process checks that its parent lives [s]
 
 
 def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:

@@ -19,32 +19,27 @@ from .geometry import PAPER_SPACE, Area, Region, Square
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-AUTO = "auto"
-"""Stands for the area that `walked_area` finds."""
+AUTO = "auto"  # stands for the area that `walked_area` finds
 EXPECTED = (
     'expected "X0 X1 Y0 Y1" in metres, a polygon as well-known text or GeoJSON, a file of one of these, or '
     f'"{AUTO}"'
 )
 
+# People walked everywhere where at least so many walked on each cell of this width [m] (measured: it finds
+# the rectangle of the ATC mall that was found by eye, and the hall of Grand Central; 1 m misses pillars).
 _CELL, _PEOPLE = 0.5, 3
-"""People walked everywhere where at least so many walked on each cell of this width [m] (measured: it finds
-the rectangle of the ATC mall that was found by eye, and the hall of Grand Central; 1 m misses pillars)."""
+# While the median visited cell saw no more people, cells are doubled, up to this width [m]: with few people
+# a cell is empty by chance (measured on plazas of 100 to 2,600 encounters).
 _SPARSE, _WIDEST = 4 * _PEOPLE, 2.0
-"""While the median visited cell saw no more people, cells are doubled, up to this width [m]: with few people
-a cell is empty by chance (measured on plazas of 100 to 2,600 encounters)."""
-_WALKING = 0.4
-"""A slower person [m/s] stands, queues or sits (paper: 0.4 for a reference pedestrian)."""
+_WALKING = 0.4  # a slower person [m/s] stands, queues or sits (paper: 0.4 for a reference pedestrian)
+# The attentional space cannot turn in a narrower rectangle [m].
 _MIN_WIDTH = float(np.hypot(PAPER_SPACE.length, PAPER_SPACE.width))
-"""The attentional space cannot turn in a narrower rectangle [m]."""
-_MIN_LENGTH = PAPER_SPACE.length + 3 * 1.2
-"""The space, and 3 s of walking behind it [m]."""
+_MIN_LENGTH = PAPER_SPACE.length + 3 * 1.2  # the space, and 3 s of walking behind it [m]
+# Where no rectangle is wide enough, a cell where nobody walked costs as much as this number of other cells
+# is worth (measured on THOR-MAGNI, a laboratory with furniture, and ETH, an entrance: 16 % and 8 %).
 _LOSS = 2.0
-"""Where no rectangle is wide enough, a cell where nobody walked costs as much as this number of other cells
-is worth (measured on THOR-MAGNI, a laboratory with furniture, and ETH, an entrance: 16 % and 8 %)."""
-_MOST_CELLS = 400
-"""Largest number of cells along an axis; cells grow with the site."""
-_OUTLYING = 1e-3
-"""Share of positions on either side that does not belong to the site: trackers jump."""
+_MOST_CELLS = 400  # largest number of cells along an axis; cells grow with the site
+_OUTLYING = 1e-3  # share of positions on either side that does not belong to the site: trackers jump
 
 
 def as_area(area: object) -> Area:

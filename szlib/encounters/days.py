@@ -38,10 +38,8 @@ from .one_day import (
 )
 from .settings import EncounterSettings
 
-PURPOSE = "encounters by day"
-"""Purpose of an extraction's folder, as its marker states it."""
-_READ = "read all files"
-"""The first stage of the funnel of many days."""
+PURPOSE = "encounters by day"  # purpose of an extraction's folder, as its marker states it
+_READ = "read all files"  # the first stage of the funnel of many days
 
 
 @dataclass(frozen=True, eq=False)

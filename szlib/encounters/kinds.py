@@ -37,20 +37,18 @@ from .occupants import TrackRows
 COMPANIONS, STANDING, SAME, OPPOSITE, CROSSING = KINDS = (
     "companions", "standing", "same direction", "opposite", "crossing",
 )  # fmt: skip
-STRANGERS = "strangers"
-"""All kinds but companions."""
+STRANGERS = "strangers"  # all kinds but companions
 
+# The common track reaches this far beyond the area [m] (measured: it finds all 62 pairs of the real day that
+# the rule finds on whole tracks, and 7 more; 10 m finds one fewer, with twice the rows of a raw day).
 REACH = 5.0
-"""The common track reaches this far beyond the area [m] (measured: it finds all 62 pairs of the real day that
-the rule finds on whole tracks, and 7 more; 10 m finds one fewer, with twice the rows of a raw day)."""
+# Companions: shortest time together [s], largest distance [m], for this share of the time (measured).
 TOGETHER, NEAR, NEAR_SHARE = 5.0, 2.0, 0.8
-"""Companions: shortest time together [s], largest distance [m], for this share of the time (measured)."""
+# Companions: largest relative velocity [m/s], for this share of the time (measured).
 EQUAL_VELOCITY, EQUAL_SHARE = 0.4, 0.5
-"""Companions: largest relative velocity [m/s], for this share of the time (measured)."""
-WALKING = 0.4
-"""A slower person [m/s] is standing (paper: 0.4 for a reference pedestrian)."""
+WALKING = 0.4  # a slower person [m/s] is standing (paper: 0.4 for a reference pedestrian)
+# Directions at most this far apart [rad] are the same, from pi less this on opposite (assumed).
 ALONG = np.pi / 4
-"""Directions at most this far apart [rad] are the same, from pi less this on opposite (assumed)."""
 
 
 def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, area: object = None) -> pd.Categorical:

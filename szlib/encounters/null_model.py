@@ -26,11 +26,9 @@ from .kinds import of_kind
 from .settings import EncounterSettings
 from .time_shift import MINUTES, ShiftableTracks
 
-CLOSE = 2.0
-"""Samples farther away [m] do not belong to a zone (paper: r_max)."""
+CLOSE = 2.0  # samples farther away [m] do not belong to a zone (paper: r_max)
 
-_TASK_SHIFTS = 5
-"""Shifts of one task."""
+_TASK_SHIFTS = 5  # shifts of one task
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,8 @@ import pandas as pd
 from ..tracks.clock import clock_index
 from .geometry import AttentionalSpace
 
-_PAIRS_AT_ONCE = 4_000_000
-"""Pairs of people held in memory at a time."""
-_ROUNDING = 1e-3
-"""Larger than every rounding error of a position, for any number of ticks [m]."""
+_PAIRS_AT_ONCE = 4_000_000  # pairs of people held in memory at a time
+_ROUNDING = 1e-3  # larger than every rounding error of a position, for any number of ticks [m]
 
 
 @dataclass(frozen=True, eq=False)

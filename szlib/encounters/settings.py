@@ -13,8 +13,7 @@ from ..tracks.clock import TICKS_PER_SECOND
 from .areas import AUTO, as_area
 from .geometry import PAPER_SPACE, AttentionalSpace
 
-_LONGEST_WINDOW = 3600.0
-"""Upper limit of the duration of a window [s]."""
+_LONGEST_WINDOW = 3600.0  # upper limit of the duration of a window [s]
 
 
 @dataclass(frozen=True)

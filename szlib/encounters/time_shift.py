@@ -29,14 +29,13 @@ from .kinds import NEAR, TOGETHER
 from .near_rows import is_near
 from .occupants import TrackRows
 
+# Shortest and longest shift [min]: longer than a meeting, shorter than the day's ups and downs (assumed).
 MINUTES = (1.0, 10.0)
-"""Shortest and longest shift [min]: longer than a meeting, shorter than the day's ups and downs (assumed)."""
+# Smallest difference between the shifts of companions [s] (assumed: some 10 m of walking).
 COMPANION_SEPARATION = 10.0
-"""Smallest difference between the shifts of companions [s] (assumed: some 10 m of walking)."""
 
 _MINUTE = 60 * TICKS_PER_SECOND
-_ATTEMPTS = 1000
-"""Number of times that shifts of companions are drawn again where they are too similar."""
+_ATTEMPTS = 1000  # number of times that shifts of companions are drawn again where they are too similar
 
 
 def time_shifted(

@@ -40,8 +40,8 @@ from .settings import (
 
 KINDS = ("overtaking", "head-on", "crossing", "together", "standing", "intruder")
 """Kinds of encounter; the first three by the angle between the directions of motion when closest."""
+# First id, and step between ids, as on the first day of ATC. The ids of a pair are successive.
 FIRST_ID, ID_STEP = 9_190_600, 100
-"""First id, and step between ids, as on the first day of ATC. The ids of a pair are successive."""
 
 _VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")  # of staged encounters, each with x and y
 _TRACKED = 3.4  # a pair is tracked for the window of 3 s, wherever the ticks of the clock fall [s]

@@ -14,11 +14,9 @@ from ..zones.ellipses import Ellipse
 from ..zones.outliers import R_MAX
 from ..zones.polar import ellipse_reach
 
-MIN_WALKING_SPEED = 0.45
-"""Lowest speed of a walking person [m/s]; the paper has speeds from 0.4 m/s."""
+MIN_WALKING_SPEED = 0.45  # lowest speed of a walking person [m/s]; the paper has speeds from 0.4 m/s
 SPACE = AttentionalSpace()
-MARGIN = 0.15
-"""Distance from an edge at which a point stays inside in spite of the noise [m]."""
+MARGIN = 0.15  # distance from an edge at which a point stays inside in spite of the noise [m]
 RUSHING_INTRUDERS, SLOW_INTRUDERS = (1.5, np.inf), (0.25, 1.0)
 """Speeds of intruders relative to the walker, (lowest, highest) [m/s]."""
 

@@ -28,26 +28,21 @@ from . import funnels
 from .options import SHORTEST_GAP, Columns, ReadOptions
 from .readers import is_sorted, read_raw
 
-TICKS_PER_SECOND = 10
-"""The common clock: positions at multiples of 0.1 s."""
+TICKS_PER_SECOND = 10  # the common clock: positions at multiples of 0.1 s
 
 VELOCITY_SPAN = 0.5
 """Half the time over which displacement gives velocity [s] (assumed)."""
 
+# Longest gap across which positions are interpolated, unless the user allows more [s] (assumed).
 _LONGEST_INTERVAL = 5.0
-"""Longest gap across which positions are interpolated, unless the user allows more [s] (assumed)."""
 
-_ROUNDING = 1e-6
-"""Rounding error of time stamps [s]; those near 1e9 s are exact to 2e-7 s."""
+_ROUNDING = 1e-6  # rounding error of time stamps [s]; those near 1e9 s are exact to 2e-7 s
 
-_LAST_SECOND = 1e11
-"""Latest time [s]; up to here ticks are exact."""
+_LAST_SECOND = 1e11  # latest time [s]; up to here ticks are exact
 
-_ROWS_AT_ONCE = 1 << 17
-"""Rows brought to the clock at a time; their arrays fit into the processor's cache."""
+_ROWS_AT_ONCE = 1 << 17  # rows brought to the clock at a time; their arrays fit into the processor's cache
 
-_BYTES_PER_TICK = 160
-"""Memory of a tick while a table is brought to the clock [bytes] (measured: 147 to 153)."""
+_BYTES_PER_TICK = 160  # memory of a tick while a table is brought to the clock [bytes] (measured: 147 to 153)
 
 COLUMNS = ["day", "id", "t", "x", "y", "vx", "vy"]
 

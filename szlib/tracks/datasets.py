@@ -24,12 +24,11 @@ from ..errors import DataError, DataWarning
 from ..files import printable
 
 SYNTHETIC = "synthetic"
+# A folder that holds `atc-1hz/` or `atc-10-days/`, to be used instead of the network.
 DATA_DIR_VARIABLE = "SZLIB_DATA_DIR"
-"""A folder that holds `atc-1hz/` or `atc-10-days/`, to be used instead of the network."""
 
 _LONGEST_LABEL = 60
-_ATTEMPTS = 3
-"""Number of times that a file with a wrong hash is fetched."""
+_ATTEMPTS = 3  # number of times that a file with a wrong hash is fetched
 
 
 def git_blob_id(file: str | Path) -> str:
@@ -63,6 +62,7 @@ def _read_hashes(name: str) -> dict[str, str]:
     return {file: value for value, file in (line.split() for line in lines)}
 
 
+# Data sets by name.
 DATA_SETS = {
     "atc-1hz": DataSet(
         "https://raw.githubusercontent.com/test-bai-cpu/online-mod/"
@@ -77,7 +77,6 @@ DATA_SETS = {
         git_blob_id,
     ),
 }
-"""Data sets by name."""
 NAMES = (SYNTHETIC, *DATA_SETS)
 _NAMED = ", ".join(map(repr, NAMES))
 

@@ -33,8 +33,7 @@ from .clock import COLUMNS, TICKS_PER_SECOND, clock_index, compute_velocities, n
 if TYPE_CHECKING:
     from pedpy import TrajectoryData
 
-_TOLERANCE = 1e-6
-"""Greatest difference between velocities and those from positions [m/s]."""
+_TOLERANCE = 1e-6  # greatest difference between velocities and those from positions [m/s]
 
 
 def check_tracks(tracks: pd.DataFrame) -> None:

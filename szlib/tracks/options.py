@@ -10,21 +10,17 @@ import polars as pl
 
 from ..errors import DataError
 
+# Which column holds t [s] or frame, id, x, y and day: its name, or the number of the field from 0.
 Columns = Mapping[str, str | int]
-"""Which column holds t [s] or frame, id, x, y and day: its name, or the number of the field from 0."""
-COLUMN_NAMES = ("t", "id", "x", "y", "frame", "day")
-"""What a column can hold."""
+COLUMN_NAMES = ("t", "id", "x", "y", "frame", "day")  # what a column can hold
+# Formats of files that szlib reads.
 FORMAT_NAMES = (
     "atc-raw", "atc-1hz", "ewap", "tidy",
     "juelich-text", "juelich-hdf5", "viswalk", "vadere", "jupedsim",
 )  # fmt: skip
-"""Formats of files that szlib reads."""
-FRAME_RATES = (1.0, 240.0)
-"""Lowest and highest number of frames a second that a video can have."""
-SHORTEST_GAP = 0.1
-"""One step of the common clock [s]; a track cannot end after a shorter gap."""
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-"""Metres in a unit of position."""
+FRAME_RATES = (1.0, 240.0)  # lowest and highest number of frames a second that a video can have
+SHORTEST_GAP = 0.1  # one step of the common clock [s]; a track cannot end after a shorter gap
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # metres in a unit of position
 
 
 @dataclass(frozen=True)

@@ -19,24 +19,16 @@ import polars as pl
 from ..errors import DataError, DataWarning
 from .formats import TrackFormat
 
-_MAX_SITE = 1000.0
-"""A wider site [m] means that millimetres were read as metres."""
-_MIN_SITE = 0.5
-"""A smaller site [m] means that metres were read as millimetres."""
-_FASTEST = (4.0, 6.0)
-"""Greatest median and greatest 90 % quantile of the speed of people [m/s]."""
+_MAX_SITE = 1000.0  # a wider site [m] means that millimetres were read as metres
+_MIN_SITE = 0.5  # a smaller site [m] means that metres were read as millimetres
+_FASTEST = (4.0, 6.0)  # greatest median and greatest 90 % quantile of the speed of people [m/s]
+# Smallest 90 % quantile of the speed of people [m/s]; the same where times are whole numbers (frames?).
 _SLOWEST, _SLOWEST_FRAMES = 0.1, 0.3
-"""Smallest 90 % quantile of the speed of people [m/s]; the same where times are whole numbers (frames?)."""
-_LONGEST_STEP = 5.0
-"""Longest time between two samples of a person [s]."""
-_MIN_STEPS, _ROWS = 20, 200_000
-"""Number of steps that allows a judgement; number of rows that are looked at."""
-_REGULAR = 0.5
-"""Greatest interquartile range of the sampling interval, over its median, of a regular clock."""
-_DEGREE = 111_320.0
-"""Metres in a degree of latitude, or of longitude at the equator."""
-_FRAMES = 25.0
-"""A typical frame rate [1/s]."""
+_LONGEST_STEP = 5.0  # longest time between two samples of a person [s]
+_MIN_STEPS, _ROWS = 20, 200_000  # number of steps that allows a judgement; number of rows that are looked at
+_REGULAR = 0.5  # greatest interquartile range of the sampling interval, over its median, of a regular clock
+_DEGREE = 111_320.0  # metres in a degree of latitude, or of longitude at the equator
+_FRAMES = 25.0  # a typical frame rate [1/s]
 
 
 class Motion(NamedTuple):

@@ -18,9 +18,9 @@ from .formats.base import CALENDAR_BEGINS, decode_line, file_stem
 from .formats.unpack import read_first_line
 from .options import ReadOptions
 
+# A person who is in two files walks from one place to the other at most this fast [m/s], give or take this
+# distance [m]; pairs of rows that are farther apart than this time [s] are not compared.
 _FASTEST, _BLUR, _SOON = 5.0, 0.5, 5.0
-"""A person who is in two files walks from one place to the other at most this fast [m/s], give or take this
-distance [m]; pairs of rows that are farther apart than this time [s] are not compared."""
 
 
 class LoadedFile(NamedTuple):

@@ -34,16 +34,12 @@ from .clock import to_clock
 from .options import ReadOptions
 from .recordings import check_names
 
-GRAND_CENTRAL_RATE = 25.0
-"""Frames a second of the video of Grand Central; every 20th is annotated."""
-GRAND_CENTRAL_SCALE = 0.8
-"""Metres in one unit of its homography (OpenTraj)."""
-EDINBURGH_RATE = 9.0
-"""Approximate frames a second of Edinburgh's files; the rate varies over short times."""
-EDINBURGH_PIXEL, EDINBURGH_ROWS = 0.0247, 480
-"""Metres in a pixel on the floor, and rows of an image."""
+GRAND_CENTRAL_RATE = 25.0  # frames a second of the video of Grand Central; every 20th is annotated
+GRAND_CENTRAL_SCALE = 0.8  # metres in one unit of its homography (OpenTraj)
+EDINBURGH_RATE = 9.0  # approximate frames a second of Edinburgh's files; the rate varies over short times
+EDINBURGH_PIXEL, EDINBURGH_ROWS = 0.0247, 480  # metres in a pixel on the floor, and rows of an image
+# Samples of THOR-MAGNI closer than this [s] belong to two sessions (0.01 s between them, 0.4 within).
 _SESSION = 0.2
-"""Samples of THOR-MAGNI closer than this [s] belong to two sessions (0.01 s between them, 0.4 within)."""
 _MAGNI = ["Time", "ag_id", "x", "y", "data_label"]
 _TRACK = re.compile(r"TRACK\.R(\d+)\s*=\s*\[(.*?)\]\s*;\s*$", flags=re.MULTILINE)
 

@@ -23,14 +23,12 @@ from ..checks import Array
 from ..errors import ZoneError
 from .ellipses import BODY_RADIUS, Ellipse, circle_around
 
-FADE = 0.5
-"""Distance from a zone at which its cost reaches 0 [m] (assumed)."""
-MIN_HEADING_SPEED = 0.2
-"""Speed above which the velocity gives the heading of a person [m/s] (assumed)."""
+FADE = 0.5  # distance from a zone at which its cost reaches 0 [m] (assumed)
+MIN_HEADING_SPEED = 0.2  # speed above which the velocity gives the heading of a person [m/s] (assumed)
+# Walking speed of the zone that is drawn, if a zone depends on speed [m/s] (paper, sec. 4).
 ZONE_SPEED = 1.1
-"""Walking speed of the zone that is drawn, if a zone depends on speed [m/s] (paper, sec. 4)."""
+# Costs of a body, at the centre of a zone, and at its boundary.
 BODY_COST, CENTER_COST, BOUNDARY_COST = 100, 99, 50
-"""Costs of a body, at the centre of a zone, and at its boundary."""
 
 
 @dataclass(frozen=True)

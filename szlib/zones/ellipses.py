@@ -21,8 +21,7 @@ from ..errors import ZoneError
 BODY_RADIUS = 0.25
 """Radius of a person's body: half the breadth of the shoulders [m] (assumed)."""
 
-_BISECTIONS = 60
-"""Halvings of a quarter turn that reach double precision."""
+_BISECTIONS = 60  # halvings of a quarter turn that reach double precision
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ from ..checks import Array
 from ..errors import ZoneError
 from .ellipses import Ellipse
 
-Curve = Callable[[Array], Array]
-"""A closed curve: angles (n,) [rad] to points (n, 2) [m]."""
+Curve = Callable[[Array], Array]  # a closed curve: angles (n,) [rad] to points (n, 2) [m]
 
 _MIN_WIDTH = 1e-9  # width over length below which points count as collinear (a choice, far from any zone)
 _POINT_TOLERANCE, _CURVE_TOLERANCE = 1e-13, 1e-12  # excess of the level that counts as rounding

@@ -25,8 +25,8 @@ from ..tracks import funnels
 
 R_MAX = 2.0
 """Longest distance that counts as close [m] (paper, sec. 2)."""
+# Share of samples that the paper removes as outliers (paper, sec. 2).
 FRACTION = 0.002
-"""Share of samples that the paper removes as outliers (paper, sec. 2)."""
 N_NEIGHBOURS = 20
 """Neighbours that LOF compares a sample with, and the minimum for an encounter (assumed; scikit-learn's
 default)."""
@@ -34,8 +34,8 @@ NEIGHBOUR_SHARE = 0.02
 """Neighbours of an encounter, as a share of all (measured: 1 % misses crowds of intruders, 5 % near ones)."""
 OUTLIER_FACTOR = 2.0
 """Local outlier factor above which an encounter is an outlier (measured: up to 1.7 at the edge of a zone)."""
+# Spread of the noise that separates identical samples for LOF [m] (assumed; the sensor's resolution).
 JITTER = 1e-3
-"""Spread of the noise that separates identical samples for LOF [m] (assumed; the sensor's resolution)."""
 
 
 def complementary_points(samples: pd.DataFrame, *, r_max: float = R_MAX) -> Array:

@@ -16,10 +16,10 @@ from ..checks import Array
 from ..errors import ZoneError
 from .ellipses import Ellipse
 
+# Directions of the radii, counter-clockwise from ahead [rad].
 DIRECTIONS: Array = np.radians(np.arange(-180.0, 180.0, 5.0))
-"""Directions of the radii, counter-clockwise from ahead [rad]."""
+# Range of directions without data from which on there is no zone [rad]; the hull has the same limit.
 WIDEST_GAP = np.pi
-"""Range of directions without data from which on there is no zone [rad]; the hull has the same limit."""
 
 _MAX_ITERATIONS, _CONVERGED = 100, 1e-12  # of Levenberg and Marquardt; step relative to the mean radius
 

@@ -22,15 +22,14 @@ from .estimators import Estimator
 from .outliers import encounter_numbers, is_close
 from .polar import DIRECTIONS, PolarZone, fill_gaps, fit_ellipses
 
-QUANTILE = 0.05
-"""Share q of the encounters that may enter the zone (assumed)."""
+QUANTILE = 0.05  # share q of the encounters that may enter the zone (assumed)
+# Number of directions, 5 deg apart, over which the nearest approach is taken: 35 deg (assumed; 25 to 45 deg
+# do as well).
 SECTOR = 7
-"""Number of directions, 5 deg apart, over which the nearest approach is taken: 35 deg (assumed; 25 to 45 deg
-do as well)."""
+# Encounters of reference pedestrians up to this much slower or faster are pooled [m/s] (assumed).
 SPEED_BAND = 0.2
-"""Encounters of reference pedestrians up to this much slower or faster are pooled [m/s] (assumed)."""
+# Paths are smoothed over this time before and after [s] (measured: 0.5 s leaves an effect of 5 cm noise).
 SMOOTHING = 0.7
-"""Paths are smoothed over this time before and after [s] (measured: 0.5 s leaves an effect of 5 cm noise)."""
 
 _DEGREE = 2  # of the smoothing polynomial
 _TICK = 0.1  # time between samples [s]

@@ -51,8 +51,7 @@ from .occupancy import OccupancyHistogram
 from .outliers import encounter_numbers
 from .polar import DIRECTIONS, PolarZone, fit_ellipses
 
-SPEED_WIDTH = 0.2
-"""Standard deviation of the Gaussian weight of samples at other speeds [m/s]."""
+SPEED_WIDTH = 0.2  # standard deviation of the Gaussian weight of samples at other speeds [m/s]
 
 _N_WAVES = 4  # cos theta, sin theta, cos 2 theta, sin 2 theta
 _MIN_SUM = 0.1  # of the sum under the root: no direction reaches farther than 3 q0

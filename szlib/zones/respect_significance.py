@@ -35,12 +35,12 @@ from ..encounters.null_model import NullEncounters
 from ..errors import DataWarning, ZoneError
 from .respect import respect_radius
 
+# Radii of the statistic [m]; the radius of the zone need not be among them.
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
-"""Radii of the statistic [m]; the radius of the zone need not be among them."""
 SIGNIFICANCE_LEVEL = 0.05
 
+# A kind that is expected more often than this and is missing was filtered out on one side only.
 _MIN_EXPECTED = 30
-"""A kind that is expected more often than this and is missing was filtered out on one side only."""
 
 
 @dataclass(frozen=True)

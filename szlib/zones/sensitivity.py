@@ -16,6 +16,7 @@ from ..encounters.near_rows import select_near_rows
 from ..errors import DataError, DataWarning, ZoneError
 from .social_zone import SocialZone
 
+# Values of `szlib.find_encounters`, besides its defaults.
 SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
     {
         "min_distance": (0.0, 0.5, 2.0),
@@ -24,15 +25,13 @@ SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
         "kinds": ("strangers", ("opposite", "crossing")),
     }
 )
-"""Values of `szlib.find_encounters`, besides its defaults."""
+# Values of `szlib.SocialZone.fit`, besides its defaults.
 FIT: Mapping[str, Sequence[Any]] = MappingProxyType(
     {"r_max": (1.5, 2.5), "fraction": (0.0, 0.002, 0.01), "n_neighbours": (10, 50)}
 )
-"""Values of `szlib.SocialZone.fit`, besides its defaults."""
 SPEEDS = (0.9, 1.3)
 """Speeds besides `speed` [m/s]."""
-NARROWER = 1.0
-"""The area is made narrower by this on each side [m]."""
+NARROWER = 1.0  # the area is made narrower by this on each side [m]
 
 
 def sensitivity(

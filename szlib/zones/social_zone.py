@@ -51,13 +51,13 @@ SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Default speeds of the reference pedestrian [m/s] (assumed; the paper shows a range)."""
 
 _PAPER = partial(HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_NEIGHBOURS)
+# The methods of `SocialZone.fit`: the estimator, and its options.
 METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
     "quantile": (QuantileEstimator.from_samples, ("q",)),
     "paper": (_PAPER, ()),
     "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours", "speed_scale")),
     "respect": (RespectEstimator.from_samples, ("speed_width",)),
 }
-"""The methods of `SocialZone.fit`: the estimator, and its options."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

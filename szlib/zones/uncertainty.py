@@ -39,23 +39,19 @@ from .outliers import encounter_numbers
 from .polar import DIRECTIONS, ellipse_reach
 from .quantile import SPEED_BAND
 
+# Sides of the reference pedestrian, 45 deg each.
 SIDES = (
     "ahead", "ahead left", "left", "behind left", "behind", "behind right", "right", "ahead right"
 )  # fmt: skip
-"""Sides of the reference pedestrian, 45 deg each."""
-MIN_ENCOUNTERS = 20
-"""Encounters needed on each side: a share of 5 % of fewer is less than one (assumed)."""
-MIN_DAYS = 10
-"""Number of days from which on whole days are resampled instead of pairs of people (assumed)."""
-LEVEL = 0.95
-"""Share of data sets whose interval contains the limit."""
-N_RESAMPLES = 200
-"""Zones estimated again for the intervals (assumed)."""
+MIN_ENCOUNTERS = 20  # encounters needed on each side: a share of 5 % of fewer is less than one (assumed)
+MIN_DAYS = 10  # number of days from which on whole days are resampled instead of pairs of people (assumed)
+LEVEL = 0.95  # share of data sets whose interval contains the limit
+N_RESAMPLES = 200  # zones estimated again for the intervals (assumed)
+# Quantities with intervals: centre and semi-axes [m], angle [deg], area [m2].
 QUANTITIES = ("center_x", "center_y", "a", "b", "angle_deg", "area")
-"""Quantities with intervals: centre and semi-axes [m], angle [deg], area [m2]."""
+# Share of the pairs in a subsample, and rate at which a hull in d = 3 dimensions approaches a smooth body,
+# n^-(2 / (d + 1)) (Barany, Math. Ann. 285, 1989); measured on plazas: 0.49.
 SUBSAMPLE, RATE = 0.25, 0.5
-"""Share of the pairs in a subsample, and rate at which a hull in d = 3 dimensions approaches a smooth body,
-n^-(2 / (d + 1)) (Barany, Math. Ann. 285, 1989); measured on plazas: 0.49."""
 
 _MAX_BIAS = 1.0  # largest bias that is corrected [standard deviations]
 _MAX_FAILED = 0.1  # share of resamples without a zone beyond which there is no interval

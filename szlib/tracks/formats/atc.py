@@ -10,8 +10,8 @@ from zoneinfo import ZoneInfo
 from .base import TrackFormat
 
 _DAY, _JAPAN = 86_400.0, ZoneInfo("Asia/Tokyo")
+# Central square of the mall, (lowest, highest) x and y [m] (assumed; free of pillars, walls and queues).
 ATC_AREA = ((-18.5, -7.5), (-10.0, 8.0))
-"""Central square of the mall, (lowest, highest) x and y [m] (assumed; free of pillars, walls and queues)."""
 _COLUMNS = {"t": 0, "id": 1, "x": 2, "y": 3}
 
 

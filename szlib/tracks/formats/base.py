@@ -19,12 +19,10 @@ EXPECTED = (
     "Grand Central, Edinburgh and THOR-MAGNI are read by szlib.tracks.sites"
 )
 """The formats, for error messages."""
+# A clock that stays below this (1973) does not count from 1970, and gives no calendar day.
 CALENDAR_BEGINS = 1e8
-"""A clock that stays below this (1973) does not count from 1970, and gives no calendar day."""
-_LAST_SECOND = 4_102_444_800.0
-"""2100-01-01; later time stamps are not seconds since 1970."""
-_FARTHEST = 2e7
-"""Farther [m] from the origin of any grid is no place on Earth."""
+_LAST_SECOND = 4_102_444_800.0  # 2100-01-01; later time stamps are not seconds since 1970
+_FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
 _MINUTES_PER_DAY = 24 * 60
 
 

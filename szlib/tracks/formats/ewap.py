@@ -18,17 +18,14 @@ from ...errors import DataError, DataWarning
 from ..options import FRAME_RATES, ReadOptions
 from .base import TrackFormat, decode_first_line
 
+# Sampling intervals without a sample after which a track ends: 0.9 s where samples are 0.4 s apart.
 _GAP = 2.25
-"""Sampling intervals without a sample after which a track ends: 0.9 s where samples are 0.4 s apart."""
-_USUAL_RATES = (15.0, 25.0)
-"""Frames a second of EWAP files: ETH 15; hotel, zara and students 25."""
+_USUAL_RATES = (15.0, 25.0)  # frames a second of EWAP files: ETH 15; hotel, zara and students 25
+# A rate needs at least so many steps, and quartiles of their rates at most this share of the median apart;
+# it is rounded to a whole number within 1 % of one.
 _FEWEST_STEPS, _SPREAD, _WHOLE = 10, 0.1, 0.01
-"""A rate needs at least so many steps, and quartiles of their rates at most this share of the median apart;
-it is rounded to a whole number within 1 % of one."""
-_FARTHEST_NUMBER = 1e12
-"""Larger numbers are damage."""
-_STEP = 0.02
-"""Shorter steps [m] are ignored."""
+_FARTHEST_NUMBER = 1e12  # larger numbers are damage
+_STEP = 0.02  # shorter steps [m] are ignored
 
 
 @dataclass(frozen=True)

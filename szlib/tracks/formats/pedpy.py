@@ -16,8 +16,8 @@ from ...errors import DataError
 from ..options import ReadOptions
 from .base import TrackFormat, decode_line, scan_table
 
+# Vadere records footsteps; PedPy brings them to as many frames a second as the clock has ticks.
 _VADERE_RATE = 10.0
-"""Vadere records footsteps; PedPy brings them to as many frames a second as the clock has ticks."""
 
 
 @dataclass(frozen=True)

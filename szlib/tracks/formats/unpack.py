@@ -14,8 +14,8 @@ from ...errors import DataError, StorageError
 from ...files import printable, temporary_folder
 
 LONGEST_LINE = 100_000
+# Bytes that a row takes while its file is read as a whole (measured: 100 at 1 Hz, 126 tidy).
 BYTES_PER_ROW = 130
-"""Bytes that a row takes while its file is read as a whole (measured: 100 at 1 Hz, 126 tidy)."""
 
 
 @contextmanager
