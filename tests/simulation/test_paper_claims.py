@@ -184,3 +184,49 @@ def test_without_a_zone_a_claim_is_not_decidable() -> None:
         zone = szlib.SocialZone.fit(fast, method="hull", speeds=(0.7, 1.5), n_resamples=5)
     found = claims.measure_growth_with_speed(zone, slow=0.7, fast=1.5)
     assert np.isnan(found.effect) and found.verdict.startswith("not decidable")
+
+
+TILTED = szlib.Ellipse((0.03, 0.0), (0.96, 0.75), 0.02)
+
+
+@pytest.fixture(scope="module")
+def chains() -> pd.DataFrame:
+    letter = szlib.MPCSettings.paper(time_limit=np.inf)
+    ours = szlib.MPCSettings(time_limit=np.inf)
+    table = claims.compare_chains((TILTED, letter), (TILTED.scaled(1.2), ours), names=("passing", "waiting"))
+    return table.set_index(["scenario", "chain"])
+
+
+def test_each_difference_is_switched_on_alone(chains: pd.DataFrame) -> None:
+    assert list(chains.loc["passing"].index) == ["paper", "solver", "zone", "margin", "side rule", "ours"]
+    passing, waiting = chains.loc["passing"], chains.loc["waiting"]
+    assert not passing.loc["paper", "changed"] and not waiting.loc["paper", "changed"]
+    assert not chains.xs("solver", level="chain")["changed"].any()
+    assert not passing.loc["margin", "changed"], "the scenario has no walls"
+    assert passing.loc["zone", "changed"] and passing.loc["zone", "passing_side"] == "left"
+    assert passing.loc["zone", "time_to_goal"] > passing.loc["paper", "time_to_goal"]
+    assert waiting.loc["side rule", "min_h"] == waiting.loc["solver", "min_h"]
+
+
+def test_the_side_is_due_to_the_rule_and_not_to_the_paper(chains: pd.DataFrame) -> None:
+    sides = chains.loc["passing", "passing_side"]
+    assert sides[["side rule", "ours"]].tolist() == ["right", "right"]
+    mirrored = szlib.Ellipse((0.03, 0.0), (0.96, 0.75), -0.02)
+    for zone, side in ((TILTED, "left"), (mirrored, "right")):
+        settings = szlib.MPCSettings.paper(solver="sqp")
+        found = claims.compare_chains((zone, settings), (zone, settings), names=("passing",))
+        assert set(found["passing_side"]) == {side}
+        assert not found["changed"].any()
+
+
+@pytest.mark.parametrize(
+    ("change", "differs"),
+    [({}, False), ({"time_to_goal": 10.2}, False), ({"time_to_goal": 10.3}, True), ({"min_h": 0.13}, True),
+     ({"min_speed": 0.44}, True), ({"passing_side": "left"}, True), ({"claims_held": 1}, True),
+     ({"time_to_goal": np.nan}, True)],
+)  # fmt: skip
+def test_a_run_differs_in_a_number_a_side_or_a_claim(change: dict[str, object], differs: bool) -> None:
+    row = {"time_to_goal": 10.0, "min_h": 0.1, "min_speed": 0.5, "passing_side": "right", "claims_held": 2}
+    assert claims._differs(row | change, row) == differs
+    stuck = row | {"time_to_goal": np.nan}
+    assert not claims._differs(stuck, stuck)

@@ -76,6 +76,8 @@ def test_the_papers_claims_hold_for_other_zones(name, zone):
     log = run(scenario, zone)
     assert log.success and log.min_h().min() >= 0 and log.metrics()["infeasible_steps"] == 0
     assert all(claim.check(log)[0] for claim in scenario.claims)
+    if name in ("passing", "corridor"):
+        assert log.metrics()["passing_side"] == log.settings.pass_side
 
 
 def test_a_zone_without_a_front_starts_avoidance_at_the_same_distance_from_either_side():

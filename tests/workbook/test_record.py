@@ -105,6 +105,18 @@ def test_damaged_zone_is_fitted_again(record, monkeypatch, capsys):
     assert "zone is fitted again" in capsys.readouterr().out
 
 
+def test_zone_of_the_paper_is_fitted_once_at_the_speed_of_the_robot(record, monkeypatch):
+    path = szlib.make_plaza(record.out / "plaza.csv", settings=szlib.PlazaSettings(n_encounters=400))
+    samples = szlib.find_encounters(szlib.read_tracks(path))
+    monkeypatch.setattr(DataCache, "encounters", lambda self: samples)
+    found = record.cache.paper_ellipse()
+    expected = szlib.SocialZone.fit(samples, method="paper", speeds=[1.1], n_resamples=0)
+    assert found == expected.ellipses[1.1]
+    monkeypatch.setattr(data_cache.SocialZone, "fit", lambda *_, **__: pytest.fail("fitted again"))
+    assert record.cache.paper_ellipse() == found
+    assert not (record.out / "zone.json").exists()
+
+
 def test_unknown_badge_is_refused():
     table = parameters([("gamma", 0.05, "measured", "why")])
     assert table.data.set_index("parameter").loc["gamma", "badge"] == "measured"

@@ -3,6 +3,9 @@
 The paper gives no coordinates.  They are assumed: a person stands, or walks at 0.5 m/s (sec. 4), in the
 way of a robot that starts at rest.  World frame, metres and seconds.
 
+The side on which the robot passes is not among the claims: nothing in the paper's formulation prefers one
+(see `szlib.control.head_on`).
+
 >>> import szlib
 >>> list(szlib.SCENARIOS)
 ['passing', 'corridor', 'waiting', 'making_room']
@@ -17,7 +20,7 @@ import numpy as np
 from ...control.mpc import MPCCBF
 from ...control.person import Person
 from ..closed_loop import simulate
-from ..metrics import compute_metrics, find_avoidance_start, find_passing_side, locate_along_course
+from ..metrics import compute_metrics, find_avoidance_start, locate_along_course
 from ..run import Run
 from ..scenario import GOAL_RADIUS, Claim, Scenario
 from ..strategies import MIN_RETREAT, MIN_WAIT
@@ -46,12 +49,6 @@ def _avoids_well_before(run: Run) -> tuple[bool, float]:
     """h where avoidance starts [m]."""
     h = find_avoidance_start(run)[1]
     return h > EARLY_H, h
-
-
-def _passes_on_chosen_side(run: Run) -> tuple[bool, float]:
-    """Distance of the person to the robot's left when abeam [m]."""
-    ahead, left = locate_along_course(run, 0)
-    return find_passing_side(run) == run.settings.pass_side, float(left[np.abs(ahead).argmin()])
 
 
 def _slows_while_passing(run: Run) -> tuple[bool, float]:
@@ -92,7 +89,6 @@ def _goes_on(run: Run) -> tuple[bool, float]:
     return run.success, float(compute_metrics(run)["time_to_goal"])
 
 
-_CHOSEN_SIDE = Claim("The robot passes the person on the chosen side.", _passes_on_chosen_side)
 _OUT_FIRST = Claim("It enters the pathway after the person has left it.", _lets_person_out_first)
 _GOES_ON = Claim("Then it goes on to its goal.", _goes_on)
 
@@ -106,7 +102,6 @@ _SCENARIOS = (
         claims=(
             Claim("Avoidance starts farther away head-on than from behind.", _avoids_earlier_head_on),
             Claim("Avoidance starts well before the zone.", _avoids_well_before),
-            _CHOSEN_SIDE,
         ),
     ),
     Scenario(
@@ -116,7 +111,7 @@ _SCENARIOS = (
         goal=np.array([4.0, 0.0]),
         people=(Person((4.0, 0.0), (-0.5, 0.0)),),
         walls=_CORRIDOR,
-        claims=(Claim("The robot slows down while passing.", _slows_while_passing), _CHOSEN_SIDE),
+        claims=(Claim("The robot slows down while passing.", _slows_while_passing),),
     ),
     Scenario(
         name="waiting",

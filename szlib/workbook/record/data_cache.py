@@ -125,13 +125,18 @@ class DataCache:
         """The ellipse that the robot keeps out of: the zone at `zone_speed`, in the person's frame."""
         return self.zone().ellipse(self.method.zone_speed)
 
+    def paper_ellipse(self) -> Ellipse:
+        """The ellipse of the paper's method at `zone_speed` (sec. 2), fitted once, in the person's frame."""
+        r_max, speed = self.method.r_max, self.method.zone_speed
+        options: dict[str, Any] = {"method": "paper", "r_max": r_max, "speeds": [speed], "n_resamples": 0}
+        file, source = self._path("paper_zone.json"), self._source() | {"fit": options}
+        if load_cached(file, source) is not None:
+            return SocialZone.load(file).ellipse(speed)
+        return _store(SocialZone.fit(self.encounters(), **options), file, source).ellipse(speed)
+
     def store_zone(self, zone: SocialZone) -> SocialZone:
         """Store the `zone` for later notebooks, and return it with its source."""
-        source, file = self._zone_source(), self._path("zone.json")
-        zone = replace(zone, provenance={**zone.provenance, "source": source})
-        zone.save(file)
-        write_checksum(file, file.read_bytes(), source)
-        return zone
+        return _store(zone, self._path("zone.json"), self._zone_source())
 
     def _path(self, name: str) -> Path:
         """A file in the folder, which is made if it is missing."""
@@ -149,3 +154,11 @@ class DataCache:
     def _zone_source(self) -> dict[str, Any]:
         """What the zone is made from."""
         return self._source() | {"fit": self.method.fit_options()}
+
+
+def _store(zone: SocialZone, file: Path, source: dict[str, Any]) -> SocialZone:
+    """Write a zone and its checksum to a file; the zone with its source."""
+    zone = replace(zone, provenance={**zone.provenance, "source": source})
+    zone.save(file)
+    write_checksum(file, file.read_bytes(), source)
+    return zone
