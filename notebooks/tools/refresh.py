@@ -3,13 +3,14 @@
 import re
 import shutil
 import sys
+from itertools import chain
 from pathlib import Path
 
 import jupytext
 import nbformat
 from nbclient import NotebookClient
 
-from szlib.workbook import folders
+from szlib.workbook import folders, runner
 
 HERE = Path(__file__).parents[1]
 LAB = HERE.parent / "results" / "lab"
@@ -70,7 +71,7 @@ def main(names: list[str]) -> None:
                 refresh(source, "atc-1hz")
         shutil.copyfile(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", HERE / "figures" / "mall.png")
         return
-    for source in folders.list_notebooks():
+    for source in chain(*runner.split_batches(folders.list_notebooks())):
         if not names or any(folders.has_name(source, name) for name in names):
             print(source.stem, flush=True)
             refresh(source)

@@ -27,8 +27,10 @@ from .record.data_cache import DataCache
 from .record.display import format_value
 from .record.parameters import check_parameters
 
-# Notebooks whose results later ones need: the encounters and the zone. All others are independent.
+# Notebooks whose results later ones need: the encounters and the zone.
 PRODUCERS = ("02", "05")
+# Notebooks that read the records of all others. The others are independent of each other.
+SUMMARIES = ("16",)
 # Files of a run: its data and parameters, and its outcome.
 PARAMETERS, SUMMARY = "parameters.json", "summary.json"
 
@@ -137,9 +139,16 @@ def _execute_all(
 
 
 def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:
-    """Split `scripts` after each of `PRODUCERS`; the notebooks of a batch can run at the same time."""
-    batch = [sum(script.stem[:2] > producer for producer in PRODUCERS) for script in scripts]
-    return [[s for s, n in zip(scripts, batch, strict=True) if n == k] for k in range(len(PRODUCERS) + 1)]
+    """Split `scripts` after each of `PRODUCERS`, with `SUMMARIES` in the last batch.
+
+    The notebooks of a batch can run at the same time.
+    """
+    batches: list[list[Path]] = [[] for _ in range(len(PRODUCERS) + 2)]
+    for script in scripts:
+        number = script.stem[:2]
+        last = number in SUMMARIES
+        batches[-1 if last else sum(number > producer for producer in PRODUCERS)].append(script)
+    return batches
 
 
 @contextmanager

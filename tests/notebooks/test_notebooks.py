@@ -25,7 +25,10 @@ def code_lines(cell: nbformat.NotebookNode) -> int:
     return sum(1 for line in cell.source.splitlines() if line.strip() and not line.strip().startswith("#"))
 
 
-RESULT = re.compile(r"^(check|claim|observation): (.+): (holds|FAILED|supported|not supported here)\b", re.M)
+RESULT = re.compile(
+    r"^(check|claim|observation): (.+): (holds|FAILED|supported|not supported here|not decidable here)\b",
+    re.M,
+)
 
 
 def read_results(source: Path) -> list[tuple[str, str, str]]:

@@ -24,13 +24,14 @@ def test_checks_and_claims_are_recorded(record, capsys):
     record.check("holds", np.True_, np.float64(0.5))
     record.check("breaks", np.bool_(False), np.array([1, 2]))
     record.claim("claimed", False, {"n": np.int64(3)})
+    record.claim("undecided", None)
     record.key["count"] = np.int64(7)
     table = record.close()
     left = json.loads((record.out / "records" / "01_test.json").read_text())
-    assert [c["passed"] for c in left["checks"]] == [True, False, False]
-    assert [c["value"] for c in left["checks"]] == [0.5, [1, 2], {"n": 3}]
+    assert [c["passed"] for c in left["checks"]] == [True, False, False, False]
+    assert [c["value"] for c in left["checks"]] == [0.5, [1, 2], {"n": 3}, None]
     assert left["key_figures"] == {"count": 7}
-    assert list(table.data["result"]) == ["holds", "FAILED", "not supported here"]
+    assert list(table.data["result"]) == ["holds", "FAILED", "not supported here", "not decidable here"]
     assert "FAILED" in capsys.readouterr().out
 
 

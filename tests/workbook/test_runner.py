@@ -96,12 +96,23 @@ def test_notebooks_are_ordered_and_chosen_by_full_number(notebooks):
         runner.choose_notebooks(["0"])
 
 
-def test_notebooks_wait_only_for_encounters_and_zone(notebooks):
-    names = ["00_start", "01_tracks", "02_met", "03_far", "05_zone", "06_robot", "06b_build", "15_respect"]
+def test_notebooks_wait_only_for_encounters_and_zone_and_the_summary_for_all(notebooks):
+    names = [
+        "00_start",
+        "01_tracks",
+        "02_met",
+        "03_far",
+        "05_zone",
+        "06_robot",
+        "06b_build",
+        "16_claims",
+        "17_a",
+    ]
     notebooks(**{f"_{name}": "" for name in names})
     stems = [[s.stem for s in batch] for batch in runner.split_batches(runner.choose_notebooks([]))]
-    assert stems == [names[:3], names[3:5], names[5:]]
-    assert runner.split_batches(runner.choose_notebooks(["06"])) == [[], [], runner.choose_notebooks(["06"])]
+    assert stems == [names[:3], names[3:5], ["06_robot", "06b_build", "17_a"], ["16_claims"]]
+    one = runner.choose_notebooks(["06"])
+    assert runner.split_batches(one) == [[], [], one, []]
 
 
 @pytest.mark.parametrize(("jobs", "threads"), [(1, "6"), (2, "3"), (4, "1")])

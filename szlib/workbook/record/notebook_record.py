@@ -107,10 +107,12 @@ class NotebookRecord:
         Parameters
         ----------
         what : the claim, as a statement.
-        supported : whether the data supports it. If not, the run goes on.
+        supported : whether the data supports it; None if the data cannot decide. If not, the run goes on.
         value : the number, or the numbers, that decide it.
         """
         result = "supported" if supported else "not supported here"
+        if supported is None:
+            result = "not decidable here"
         self._record("claim", what, bool(supported), value, result)
 
     def figure(self, figure: Figure, name: str) -> None:

@@ -1,0 +1,96 @@
+"""The sentences of the paper that can be checked, and their verdicts in a run.
+
+The sentences are in paper_sentences.toml, which describes its fields.  The verdict of each is computed from
+the checks and claims that the notebooks of the run recorded.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from .record.display import format_value
+from .record.notebook_record import NotebookRecord
+
+NOT_RUN = "not run with this data"
+"""Verdict of a sentence whose checks were not made in this run."""
+_FIXED = {"untestable": "untestable here", "open": "not done here"}  # verdicts that no check decides
+_TESTS = "tests/"  # begins the name of a test, which a run does not execute
+
+
+def load_sentences() -> pd.DataFrame:
+    """Read the sentences: one row for each, with the fields of paper_sentences.toml.
+
+    Examples
+    --------
+    >>> from szlib.workbook.paper_sentences import load_sentences
+    >>> load_sentences()["place"].iloc[0]
+    'abstract'
+    """
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    return pd.DataFrame(tomllib.loads(text)["sentence"])
+
+
+def judge_sentences(record: NotebookRecord) -> pd.DataFrame:
+    """The sentences with their verdicts in a run.
+
+    Parameters
+    ----------
+    record : of the notebook that asks. Its own checks count, and those of other notebooks in its folder.
+
+    Returns
+    -------
+    The table of `load_sentences` with the columns verdict, numbers (each check with its result and value) and
+    unknown (checks that were not made, although their notebook was run).
+    """
+    records = {
+        file.stem: json.loads(file.read_text(encoding="utf-8"))["checks"]
+        for file in sorted((record.out / "records").glob("*.json"))
+    }
+    records[record.name] = record.checks
+    checks = {
+        f"{notebook.split('_')[0]}: {check['name']}": check
+        for notebook, made in records.items()
+        for check in made
+    }
+    numbers = {name: f"{name}: {check['result']}" + _in_brackets(check) for name, check in checks.items()}
+    made_in = {notebook.split("_")[0] for notebook in records}
+    table = load_sentences()
+    table["verdict"] = [
+        judge(kind, names, checks) for kind, names in zip(table["kind"], table["held_by"], strict=True)
+    ]
+    table["numbers"] = ["; ".join(numbers.get(name, name) for name in names) for names in table["held_by"]]
+    table["unknown"] = [
+        [name for name in names if name.split(": ")[0] in made_in and name not in checks]
+        for names in table["held_by"]
+    ]
+    return table
+
+
+def judge(kind: str, names: Sequence[str], checks: Mapping[str, Mapping[str, Any]]) -> str:
+    """The verdict of a sentence of this `kind`, from the `checks` of a run that have these `names`.
+
+    Tests among the names do not count: a run does not execute them.
+    """
+    names = [name for name in names if not name.startswith(_TESTS)]
+    if kind in _FIXED:
+        return _FIXED[kind]
+    if not all(name in checks for name in names):
+        return NOT_RUN
+    failed = [checks[name]["result"] for name in names if not checks[name]["passed"]]
+    if kind != "claim":
+        return f"{kind}, but a check fails" if failed else kind
+    if not failed:
+        return "supported"
+    return (
+        "not decidable" if all(result.startswith("not decidable") for result in failed) else "not supported"
+    )
+
+
+def _in_brackets(check: Mapping[str, Any]) -> str:
+    return "" if check["value"] is None else f" ({format_value(check['value'])})"

@@ -1,0 +1,131 @@
+"""The sentences of the paper: what each row names exists, and its verdict is computed in a run."""
+
+import importlib
+import json
+from functools import cache
+from pathlib import Path
+
+import jupytext
+import nbformat
+import pytest
+
+from szlib.workbook import folders, paper_sentences
+from szlib.workbook.record import NotebookRecord
+
+ROOT = Path(__file__).parents[2]
+SENTENCES = paper_sentences.load_sentences().to_dict("records")
+NAMES = sorted({name for row in SENTENCES for name in row["held_by"]})
+CHECKS = [name for name in NAMES if not name.startswith("tests/")]
+each = pytest.mark.parametrize("row", SENTENCES, ids=lambda row: row["sentence"][:40])
+
+
+def find_notebook(number: str) -> Path:
+    (script,) = (s for s in folders.list_notebooks() if s.stem.split("_")[0] == number)
+    return script
+
+
+@cache
+def read_copy(script: Path) -> tuple[bool, str]:
+    """Whether the executed copy has the cells of the script, and what it printed."""
+    copy = nbformat.read(script.with_suffix(".ipynb"), as_version=4)
+    same = [c.source for c in copy.cells] == [c.source for c in jupytext.read(script).cells]
+    outputs = [out for cell in copy.cells for out in cell.get("outputs", ())]
+    return same, "\n".join(out.text for out in outputs if out.output_type == "stream")
+
+
+# --- what a row names exists --------------------------------------------------------------------------
+
+
+@each
+def test_row_is_complete_and_holds_no_verdict(row):
+    assert set(row) == {
+        "place", "sentence", "kind", "how", "code", "notebook", "cell", "held_by"
+    }  # fmt: skip
+    assert row["kind"] in {"implemented", "altered", "claim", "untestable", "open"}
+    assert 0 < len(row["sentence"].split()) <= 25
+    assert row["held_by"] or row["kind"] == "untestable"
+    assert row["how"] or row["kind"] in {"implemented", "claim"}
+
+
+@each
+def test_code_of_a_sentence_can_be_imported(row):
+    module, _, name = row["code"].partition(":")
+    found = importlib.import_module(module)
+    for part in name.split("."):
+        found = getattr(found, part)
+
+
+@each
+def test_cell_of_a_sentence_is_in_its_notebook(row):
+    script = (folders.NOTEBOOKS / f"{row['notebook']}.py").read_text(encoding="utf-8")
+    assert row["cell"] in {line.removeprefix("# ") for line in script.splitlines()}
+
+
+@each
+def test_verdict_of_a_claim_comes_from_the_run(row):
+    from_run = [name for name in row["held_by"] if name in CHECKS]
+    assert from_run or row["kind"] != "claim"
+
+
+@pytest.mark.parametrize("name", sorted(set(NAMES) - set(CHECKS)))
+def test_named_test_exists(name):
+    file, _, function = name.partition("::")
+    assert f"def {function}(" in (ROOT / file).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_named_check_is_made(name):
+    number, _, check = name.partition(": ")
+    is_current, printed = read_copy(find_notebook(number))
+    if not is_current:
+        pytest.skip("the copy is older than its script; another test fails for that")
+    assert any(f"\n{kind}: {check}: " in f"\n{printed}" for kind in ("check", "claim"))
+
+
+# --- verdicts -----------------------------------------------------------------------------------------
+
+RUN = {
+    "07: arrives": {"passed": True, "result": "holds", "value": None},
+    "07: is right": {"passed": True, "result": "supported", "value": 0.5},
+    "07: is left": {"passed": False, "result": "not supported here", "value": 0.5},
+    "07: is neither": {"passed": False, "result": "not decidable here", "value": "n = 3"},
+    "07: breaks": {"passed": False, "result": "FAILED", "value": 1},
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "names", "verdict"),
+    [
+        ("claim", ["07: is right", "07: arrives"], "supported"),
+        ("claim", ["07: is right", "07: is left"], "not supported"),
+        ("claim", ["07: is right", "07: is neither"], "not decidable"),
+        ("claim", ["07: is left", "07: is neither"], "not supported"),
+        ("claim", ["07: is right", "08: is right"], paper_sentences.NOT_RUN),
+        ("claim", ["07: is right", "tests/test_a.py::test_a"], "supported"),
+        ("implemented", ["07: arrives"], "implemented"),
+        ("implemented", ["tests/test_a.py::test_a"], "implemented"),
+        ("implemented", ["07: arrives", "07: breaks"], "implemented, but a check fails"),
+        ("altered", ["08: arrives"], paper_sentences.NOT_RUN),
+        ("altered", ["07: breaks"], "altered, but a check fails"),
+        ("untestable", ["07: breaks"], "untestable here"),
+        ("open", ["08: arrives"], "not done here"),
+    ],
+)
+def test_verdict_follows_from_the_checks(kind, names, verdict):
+    assert paper_sentences.judge(kind, names, RUN) == verdict
+
+
+def test_checks_come_from_the_records_of_the_run(tmp_path, monkeypatch):
+    file = tmp_path / "mine.csv"
+    file.write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n")
+    record = NotebookRecord("16_test", {"data": str(file), "results": tmp_path / "results"})
+    made = {"name": "arrives", "kind": "check", "passed": True, "value": 0.25, "result": "holds"}
+    (record.out / "records" / "07_test.json").write_text(json.dumps({"checks": [made]}))
+    record.claim("is right", None, "n = 3")
+    names = [["07: arrives"], ["16: is right", "07: arrives"], ["07: stops"], ["08: arrives"]]
+    rows = paper_sentences.load_sentences().head(4).assign(kind="claim", held_by=names)
+    monkeypatch.setattr(paper_sentences, "load_sentences", rows.copy)
+    table = paper_sentences.judge_sentences(record)
+    assert table["verdict"].tolist() == ["supported", "not decidable", *2 * [paper_sentences.NOT_RUN]]
+    assert table["numbers"].iloc[0] == "07: arrives: holds (0.25)"
+    assert table["unknown"].tolist() == [[], [], ["07: stops"], []]
