@@ -118,6 +118,7 @@ class DriveStep:
         disc has h >= 0 and overlaps no body and no wall, neither now nor dt later, if people keep their
         velocity.
     point : the step of the point ahead of the axle, a `Step`.
+    fallback, slack, residual : of that step: see `Step`.
     solve_time : wall-clock time of the whole step [s].
     """
 
@@ -126,22 +127,10 @@ class DriveStep:
     h: Array
     safe: bool
     point: Step = field(repr=False)
+    fallback: Fallback
+    slack: float
+    residual: Array = field(repr=False)
     solve_time: float
-
-    @property
-    def fallback(self) -> Fallback:
-        """The way in which the plan was found: see `Step.fallback`."""
-        return self.point.fallback
-
-    @property
-    def slack(self) -> float:
-        """Largest violation of a hard row by the plan of the point: see `Step.slack`."""
-        return self.point.slack
-
-    @property
-    def residual(self) -> Array:
-        """The barrier conditions of the point: see `Step.residual`."""
-        return self.point.residual
 
 
 class _Point(MPCCBF):
@@ -285,6 +274,9 @@ class DifferentialDrive(Controller):
             h=np.array(h),
             safe=point.feasible and not point.unknown and smallest >= -TOLERANCE,
             point=point,
+            fallback=point.fallback,
+            slack=point.slack,
+            residual=point.residual,
             solve_time=perf_counter() - began,
         )
 

@@ -134,9 +134,8 @@ class PlacedZone(NamedTuple):
 
     def blocks(self, goal: tuple[float, float], settings: MPCSettings) -> bool:
         """True if a person slower than `STANDING_SPEED` has the `goal` in their zone: h < 0 by `settings`."""
-        if hypot(self.vx, self.vy) >= STANDING_SPEED:
-            return False
-        return bool(barrier(self.distance(*goal), settings.r_robot, settings.eps) < 0)
+        stands = hypot(self.vx, self.vy) < STANDING_SPEED
+        return stands and bool(barrier(self.distance(*goal), settings.r_robot, settings.eps) < 0)
 
 
 def place_zone(person: Person, zone: Ellipse) -> PlacedZone:

@@ -76,10 +76,6 @@ class SimulationLog(Run):
         columns |= {f"h_wall_{j}": self.h[:, n + j] for j in range(len(self.scenario.walls))}
         return pd.DataFrame(columns)
 
-    def min_h(self) -> pd.Series[float]:
-        """Smallest h of each person and wall over the run [m]."""
-        return self.table.filter(regex="^h_").min()
-
     def metrics(self) -> dict[str, Any]:
         """The run in numbers; see `szlib.simulation.compute_metrics` for the meaning of each."""
         return compute_metrics(self)
@@ -127,17 +123,13 @@ class SimulationLog(Run):
             "version": _VERSION,
             "szlib": __version__,
             "units": "m, s, rad; world frame, zones in the frame of their person",
-            "run": {name: getattr(self, name) for name in ("arrival", "has_safety_claims", "inputs")},
+            "run": _pick(self, "arrival", "has_safety_claims", "inputs"),
             "shapes": {name: a.shape for name, a in arrays.items() if a.ndim == 3},
             "settings": asdict(self.settings),
-            "zones": [
-                {name: getattr(z, name) for name in ("center", "semi_axes", "angle")} for z in self.zones
-            ],
-            "scenario": {name: getattr(scenario, name) for name in ("name", "title", "duration")}
+            "zones": [_pick(zone, "center", "semi_axes", "angle") for zone in self.zones],
+            "scenario": _pick(scenario, "name", "title", "duration")
             | {name: getattr(scenario, name).tolist() for name in ("start", "goal", "walls")},
-            "people": [
-                {"position": p.position, "velocity": p.velocity, "heading": p.heading} for p in people
-            ],
+            "people": [_pick(person, "position", "velocity", "heading") for person in people],
         }
         buffer = io.BytesIO()
         pd.DataFrame(flat).to_parquet(buffer)
@@ -175,6 +167,10 @@ class SimulationLog(Run):
             raise DataError(
                 f"{stem}: cannot be read as a run ({error!r}); expected the two files of SimulationLog.save"
             ) from error
+
+
+def _pick(whole: Any, *names: str) -> dict[str, Any]:
+    return {name: getattr(whole, name) for name in names}
 
 
 def _format(value: Any) -> str:

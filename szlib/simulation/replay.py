@@ -75,14 +75,12 @@ class Replay(CrowdModel):
     walker : the person who is replaced.
     others : all other people; a person who was lost and found again counts twice.
     zone : zone of all people; None: that of the controller.
-    sensing_range : distance at which the controller sees people [m].
     """
 
     scenario: Scenario
     walker: RecordedPerson
     others: tuple[RecordedPerson, ...] = field(repr=False)
     zone: Ellipse | None = None
-    sensing_range: float = SENSING_RANGE
 
     def start(self, scenario: Scenario, seed: int) -> Crowd:
         """The recorded people within range of the robot, whatever the `scenario` and the `seed`."""
@@ -92,16 +90,19 @@ class Replay(CrowdModel):
         x, y = robot[:2].tolist()
         people = (other.at(t, self.zone) for other in self.others)
         return tuple(
-            p if p and hypot(p.position[0] - x, p.position[1] - y) <= self.sensing_range else None
-            for p in people
+            p if p and hypot(p.position[0] - x, p.position[1] - y) <= SENSING_RANGE else None for p in people
         )
 
 
-class Replays(tuple[Replay, ...]):
+class Replays(tuple[Replay, ...], CrowdModel):
     """Several replays, each with its seed: worlds and behaviour of `rollouts`.
 
     ``szlib.rollouts(len(replays), worlds=replays, behaviour=replays)``: seed 0 is the first replay; after the
     last the first follows again.
+
+    Parameters
+    ----------
+    iterable : the replays.
     """
 
     def __call__(self, seed: int) -> Scenario:
@@ -111,10 +112,6 @@ class Replays(tuple[Replay, ...]):
     def start(self, scenario: Scenario, seed: int) -> Crowd:
         """The people of the replay of a `seed`, whatever the `scenario`."""
         return self[seed % len(self)].start(scenario, seed)
-
-    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
-        """The `people` themselves; nothing is drawn from `rng`."""
-        return people
 
 
 class ReplacedWalker(Controller):

@@ -116,17 +116,13 @@ def _hessians(p: Problem, s: MPCSettings, multipliers: Any, to_position: Any) ->
     on_speed = multipliers[p.n_cbf : p.n_cbf + s.N]
     after = ca.DM(np.triu(np.ones((s.N, s.N)))) @ on_speed
     of_speed = ca.kron(ca.reshape((-2 * s.dt**2 * after)[later.tolist()], s.N, s.N), ca.DM.eye(2))
-    weights = (_residual_matrix(s).T @ ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0])).T
+    # The matrix from h_0 .. h_{N_h} to the rows h_{k+1} - (1 - gamma) h_k.
+    to_rows = cbf_residual(np.eye(s.N_h, s.N_h + 1, 1), np.eye(s.N_h, s.N_h + 1), s.gamma)
+    weights = (ca.sparsify(ca.DM(to_rows)).T @ ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0])).T
     xx, xy, yy = (ca.sum1(weights * bend) for bend in p.bend)
     bends = [ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h + 1)]
     to_xy = _for_x_and_y(to_position)
     return of_speed, to_xy.T @ ca.diagcat(*bends) @ to_xy
-
-
-def _residual_matrix(s: MPCSettings) -> Any:
-    """The matrix that takes h_0 .. h_{N_h} to the rows h_{k+1} - (1 - gamma) h_k."""
-    rows = np.eye(s.N_h, s.N_h + 1, 1) - (1 - s.gamma) * np.eye(s.N_h, s.N_h + 1)
-    return ca.sparsify(ca.DM(rows))
 
 
 def _for_x_and_y(one: Any) -> Any:
