@@ -207,11 +207,7 @@ def _extract(options: argparse.Namespace) -> int:
 
     with cluster(options.scheduler):
         extraction = extract_days(
-            options.data,
-            out=options.out,
-            n_jobs=options.jobs,
-            exclude=options.exclude,
-            area=options.area,
+            options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude, area=options.area
         )
     print(extraction)
     return 1 if len(extraction.failed) else 0

@@ -98,8 +98,6 @@ def remove_outputs(folder: Path, notebooks: Iterable[str]) -> None:
 
     Raises OSError if a file cannot be removed.
     """
-    for name in ("records", "figures"):
-        (folder / name).mkdir(exist_ok=True)
     outputs = [folder / "report.html"]
     for name in notebooks:
         outputs += [folder / f"{name}.ipynb", folder / "records" / f"{name}.json"]

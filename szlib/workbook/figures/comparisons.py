@@ -41,9 +41,8 @@ def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> 
     """
     values = table.to_numpy(float)
     labels = [f"{round(value, 3) + 0.0:.3g}" for value in values.flat]
-    return _draw_heat_map(
-        get_axes(ax, size=(5, 3.5)), table, np.clip(values / worst, 0, 1), labels, "Oranges"
-    )
+    ax = get_axes(ax, size=(5, 3.5))
+    return _draw_heat_map(ax, table, np.clip(values / worst, 0, 1), labels, "Oranges")
 
 
 def plot_strategies(

@@ -64,12 +64,7 @@ def plot_distance(
 
 
 def plot_distance_error(
-    shape: Ellipse | ArrayLike,
-    *,
-    r_robot: float,
-    eps: float,
-    extent: float = 2.0,
-    ax: Axes | None = None,
+    shape: Ellipse | ArrayLike, *, r_robot: float, eps: float, extent: float = 2.0, ax: Axes | None = None
 ) -> Axes:
     """Plot the approximate minus the Euclidean distance near a zone or a wall, and h = 0 with two margins.
 

@@ -9,6 +9,7 @@ from hashlib import sha256
 from html import escape
 from math import isnan
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
 from .style import BLUE, GREEN, RED
 
-_SCRIPTS = Path(__file__).parents[1] / "static"  # they draw in a browser
+_STATIC = Path(__file__).parents[1] / "static"  # what a browser shows
 
 
 def scene_layout(scenario: Scenario, settings: MPCSettings, limits: Sequence[float]) -> dict[str, Any]:
@@ -124,18 +125,16 @@ class Movie(bytes):
         return str(self.run["alt"])
 
     def _repr_html_(self) -> str:
-        picture = f"data:image/gif;base64,{b64encode(self).decode()}"
-        alt = escape(self.run["alt"], quote=True)
-        content = json.dumps(self.run, separators=(",", ":")).replace("</", "<\\/")
-        name = f"szlib-{sha256(self).hexdigest()[:8]}"
-        return (
-            f'<figure class="szlib-player" data-run="{name}"><img src="{picture}" alt="{alt}"></figure>\n'
-            f"<script>(() => {{\n{read_scripts('scene', 'player')}\nconst run = {content};\n"
-            f"const figures = document.querySelectorAll('[data-run={name}]:not([data-ready])');\n"
-            "figures.forEach((figure) => play(figure, run));\n})()</script>"
+        page = Template((_STATIC / "player.html").read_text(encoding="utf-8").rstrip())
+        return page.substitute(
+            name=f"szlib-{sha256(self).hexdigest()[:8]}",
+            gif=b64encode(self).decode(),
+            alt=escape(self.run["alt"], quote=True),
+            scripts=read_scripts("scene", "player"),
+            run=json.dumps(self.run, separators=(",", ":")).replace("</", "<\\/"),
         )
 
 
 def read_scripts(*names: str) -> str:
     """The text of the scripts `names`, one after the other."""
-    return "\n".join((_SCRIPTS / f"{name}.js").read_text(encoding="utf-8") for name in names)
+    return "\n".join((_STATIC / f"{name}.js").read_text(encoding="utf-8") for name in names)
