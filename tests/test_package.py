@@ -184,30 +184,31 @@ def test_the_tests_have_the_same_rooms() -> None:
 # --- cheap to import ---------------------------------------------------------------------------------
 
 
-def loaded_after(code: str) -> set[str]:
-    """Modules in memory once this code has run in an interpreter of its own."""
-    command = [sys.executable, "-c", f"{code}; import sys; print(*sys.modules)"]
-    return set(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
+def loaded_after(*codes: str) -> list[set[str]]:
+    """Modules in memory after each of these codes, which run one after another in one new interpreter."""
+    program = "".join(["import sys\n", *(f"{code}\nprint(*sys.modules)\n" for code in codes)])
+    command = [sys.executable, "-c", program]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    return [set(line.split()) for line in lines]
 
 
-def test_importing_szlib_loads_nothing_heavy() -> None:
+def test_each_way_into_the_package_loads_only_what_it_needs() -> None:
+    """Neither CasADi nor figures from tracks to zones, no figures for a robot, nothing heavy for the name."""
+    szlib_alone, zones, robot = loaded_after(
+        "import szlib",
+        "szlib.read_tracks, szlib.find_encounters, szlib.SocialZone",
+        "szlib.simulate, szlib.SCENARIOS, szlib.MPCCBF, szlib.rollouts",
+    )
     heavy = {"casadi", "matplotlib", "sklearn", "scipy", "pandas", "polars", "numpy", "nbclient"}
-    assert heavy.isdisjoint(loaded_after("import szlib"))
-
-
-def test_the_way_from_tracks_to_zones_loads_neither_casadi_nor_matplotlib() -> None:
-    loaded = loaded_after("import szlib; szlib.read_tracks, szlib.find_encounters, szlib.SocialZone")
-    assert {"casadi", "matplotlib", "sklearn"}.isdisjoint(loaded)
-    assert "szlib.zones.social_zone" in loaded
-
-
-def test_the_way_to_a_robot_loads_no_figures() -> None:
-    loaded = loaded_after("import szlib; szlib.simulate, szlib.SCENARIOS, szlib.MPCCBF, szlib.rollouts")
-    assert {"matplotlib", "sklearn", "szlib.workbook"}.isdisjoint(loaded)
+    assert heavy.isdisjoint(szlib_alone)
+    assert {"casadi", "matplotlib", "sklearn"}.isdisjoint(zones)
+    assert "szlib.zones.social_zone" in zones
+    assert {"matplotlib", "sklearn", "szlib.workbook"}.isdisjoint(robot)
+    assert "szlib.control.controller" in robot
 
 
 def test_the_command_line_loads_neither_numbers_nor_notebooks() -> None:
-    loaded = loaded_after("from szlib.workbook.cli import build_parser; build_parser()")
+    (loaded,) = loaded_after("from szlib.workbook.cli import build_parser; build_parser()")
     assert {"numpy", "pandas", "matplotlib", "nbclient", "jupytext", "casadi"}.isdisjoint(loaded)
 
 

@@ -198,7 +198,7 @@ def test_covers_requires_every_point_inside(name: str) -> None:
 def test_square_given_as_polygon_gives_identical_encounters() -> None:
     pedpy = pytest.importorskip("pedpy")
     found = 0
-    for seed in range(12):
+    for seed in range(6):
         tracks = make_crowd(seed)
         expected = find_encounters(tracks)
         forms = [Region(ATC_POLYGON.wkt), ATC_POLYGON, pedpy.WalkableArea(ATC_POLYGON), "-18.5 -7.5 -10 8"]
@@ -211,7 +211,7 @@ def test_square_given_as_polygon_gives_identical_encounters() -> None:
     assert szlib.as_area(expected.attrs["area"]) == szlib.ATC_SQUARE
 
 
-@pytest.mark.parametrize("angle", [0.3, 1.0, 2.5, -2.0])
+@pytest.mark.parametrize("angle", [0.3, -2.0])
 def test_encounters_do_not_depend_on_the_direction_of_the_axes(angle: float) -> None:
     crowd = make_crowd(77, people=160, seconds=200, square=ROOM)
     for shape in (shapely.box(-20, -20, 20, 20), shapely.box(-20, -20, 20, 20) - shapely.box(-3, -3, 3, 3)):
@@ -234,7 +234,7 @@ def test_no_encounter_where_the_space_holds_a_pillar() -> None:
 )
 def test_streaming_in_a_polygon_gives_the_encounters_of_the_whole_day(tmp_path: Path, shape: object) -> None:
     found = 0
-    for seed in range(3):
+    for seed in range(2):
         path = write_raw_day(tmp_path / "day.csv", make_raw_day(seed, wild=seed % 2 == 0))
         found += assert_streamed_as_whole(path, square=szlib.as_area(shape), duration=1.0)
     assert found > 0
@@ -285,7 +285,7 @@ def test_walked_area_reaches_the_walls_of_a_hall() -> None:
 
 
 def test_walked_area_excludes_a_pillar() -> None:
-    tracks = make_hall(people=2500, pillar=(14, 9, 16, 11), size=(30, 20))
+    tracks = make_hall(people=1500, pillar=(14, 9, 16, 11), size=(30, 20))
     found = szlib.walked_area(tracks)
     around = shapely.box(found.x[0], found.y[0], found.x[1], found.y[1])
     assert around.intersection(shapely.box(14.5, 9.5, 15.5, 10.5)).area == 0

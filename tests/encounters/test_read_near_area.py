@@ -29,21 +29,28 @@ SETTINGS = [
 ]
 
 
-@pytest.mark.parametrize("rows_at_once", [97, 1000, 1 << 17])
+@pytest.fixture(scope="module")
+def raw_days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("raw")
+    days = (make_raw_day(seed, wild=seed % 2 == 0) for seed in range(4))
+    return [write_raw_day(folder / f"day{seed}.csv", day) for seed, day in enumerate(days)]
+
+
+@pytest.mark.parametrize(("rows_at_once", "seeds"), [(97, (0, 1)), (1000, (2, 3)), (1 << 17, (0, 3))])
 @pytest.mark.parametrize(("square", "duration", "max_gap"), SETTINGS)
 def test_streamed_encounters_equal_those_of_the_whole_day(
-    tmp_path: Path,
+    raw_days: list[Path],
     monkeypatch: pytest.MonkeyPatch,
     square: szlib.Square,
     duration: float,
     max_gap: float | None,
     rows_at_once: int,
+    seeds: tuple[int, ...],
 ) -> None:
     monkeypatch.setattr(blocks, "_BLOCK_ROWS", rows_at_once)
     found = 0
-    for seed in range(4):
-        path = write_raw_day(tmp_path / "day.csv", make_raw_day(seed, wild=seed % 2 == 0))
-        found += assert_streamed_as_whole(path, square=square, duration=duration, max_gap=max_gap)
+    for seed in seeds:
+        found += assert_streamed_as_whole(raw_days[seed], square=square, duration=duration, max_gap=max_gap)
     assert found > 0
 
 
@@ -130,7 +137,7 @@ def test_damaged_rows_are_rejected_as_by_read_raw(
 
 
 def test_area_without_people_gives_an_empty_table(tmp_path: Path) -> None:
-    path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=100))
+    path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=30))
     assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=3.0) > 0
     elsewhere = read_near_area(path, area=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0)
     assert len(elsewhere) == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -38,10 +39,14 @@ def make_tracks(*walks: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(walks, ignore_index=True).astype({"day": "category"})
 
 
+@cache
 def make_crowd(
     seed: int, *, people: int = 14, seconds: int = 40, square: szlib.Square = szlib.ATC_SQUARE
 ) -> pd.DataFrame:
-    """People who come and go, wander through the square, stop, and are sometimes out of sight."""
+    """People who come and go, wander through the square, stop, and are sometimes out of sight.
+
+    Made once for each seed: copy it to change it.
+    """
     rng = np.random.default_rng(seed)
     walks = []
     for person in range(people):
@@ -62,10 +67,14 @@ def make_crowd(
     return make_tracks(*walks)
 
 
+@cache
 def make_hall(
     seed: int = 0, *, people: int = 250, pillar: tuple[float, ...] = (), size: tuple[float, float] = (12, 8)
 ) -> pd.DataFrame:
-    """People who walk straight through a hall from wall to wall, but not through the pillar."""
+    """People who walk straight through a hall from wall to wall, but not through the pillar.
+
+    Made once for each seed: copy it to change it.
+    """
     rng = np.random.default_rng(seed)
     walks = []
     for person in range(people):

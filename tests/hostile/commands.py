@@ -32,7 +32,7 @@ from szlib.tracks.clock import read_tracks
 from szlib.workbook import folders
 from szlib.workbook.cli import main
 
-COUNT = {False: 30, True: 1000}
+COUNT = {False: 15, True: 1000}
 LONGEST = 60
 """Time limit of a command [s]."""
 NOTEBOOK = """# %% tags=["parameters"]

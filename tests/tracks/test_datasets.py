@@ -27,7 +27,7 @@ def served(tmp_path, monkeypatch):
     home.mkdir()
     (home / "a.csv").write_text("1351051200.0,1,0.0,0.0,0.0,0.0\n")
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(QuietHandler, directory=str(home)))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     monkeypatch.delenv(datasets.DATA_DIR_VARIABLE, raising=False)
     monkeypatch.setattr(datasets.pooch, "os_cache", lambda name: tmp_path / "cache" / name)
     url = f"http://127.0.0.1:{server.server_port}/"
@@ -197,7 +197,7 @@ class UnreliableHandler(QuietHandler):
 def server_faults(served, monkeypatch):
     """The faults that the same server shows; retries do not wait."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(UnreliableHandler, directory=str(served)))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     change(monkeypatch, "atc-1hz", url=f"http://127.0.0.1:{server.server_port}/")
     monkeypatch.setattr("pooch.core.time.sleep", lambda seconds: None)
     yield UnreliableHandler.faults

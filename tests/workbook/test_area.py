@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 
 import pandas as pd
 import pytest
@@ -86,7 +87,10 @@ def test_every_form_of_an_area_gives_the_same_run(notebooks, tmp_path, capsys):
 # --- in a notebook -----------------------------------------------------------------------------------
 
 
-def test_plaza_has_the_square_of_the_mall(tmp_path):
+def test_plaza_has_the_square_of_the_mall(tmp_path, monkeypatch):
+    small = szlib.PlazaSettings(n_encounters=3)
+    make = partial(szlib.make_plaza, settings=small)
+    monkeypatch.setattr("szlib.workbook.record.data_cache.make_plaza", make)
     assert record_of(tmp_path, "", data="synthetic").cache.find_area() == szlib.ATC_SQUARE
 
 

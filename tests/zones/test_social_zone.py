@@ -82,7 +82,7 @@ def samples() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def zone(samples: pd.DataFrame) -> SocialZone:
-    return SocialZone.fit(samples, method="hull")
+    return SocialZone.fit(samples, method="hull", n_resamples=20)
 
 
 # --- the truth ---------------------------------------------------------------------------------------
