@@ -437,8 +437,8 @@ def test_intervals_do_not_change_the_zone(samples: pd.DataFrame, zone: SocialZon
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "guess"}, "method must be one of quantile, hull, respect; got 'guess'"),
-        ({"q": 0.05}, "method 'hull' has no option 'q'; 'quantile' has q; 'hull' has fraction, n_neigh"),
+        ({"method": "guess"}, "method must be one of quantile, paper, hull, respect; got 'guess'"),
+        ({"q": 0.05}, "method 'hull' has no option 'q'; 'quantile' has q; 'paper' has none; 'hull' has fraction, n_neigh"),
         ({"method": "quantile", "n_neighbours": 200}, "has no option 'n_neighbours'; .*'hull' has"),
         ({"outlier_share": 0.1}, "method 'hull' has no option 'outlier_share'"),
         ({"method": "quantile", "q": 0.0}, "q must be a share of encounters, 0 < q < 1; got 0"),
@@ -550,7 +550,7 @@ def test_speed_without_encounters_is_not_adequate(zone: SocialZone) -> None:
         (lambda c: c.update(hull_vertices=[[0, 0, 0]] * 9), "lie in one plane"),
         (lambda c: c.update(hull_vertices=[[0, 0, 0], [1]]), "is damaged"),
         (lambda c: c.update(hull_vertices=None), "points must have shape"),
-        (lambda c: c.update(method="guess"), "one of quantile, hull"),
+        (lambda c: c.update(method="guess"), "one of quantile, paper, hull"),
         (lambda c: c.update(method="quantile"), "HullZone is not the shape"),
         (lambda c: c.update(provenance=3), "is damaged"),
     ],
