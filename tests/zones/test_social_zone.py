@@ -438,7 +438,7 @@ def test_intervals_do_not_change_the_zone(samples: pd.DataFrame, zone: SocialZon
     ("options", "message"),
     [
         ({"method": "guess"}, "method must be one of quantile, paper, hull, respect; got 'guess'"),
-        ({"q": 0.05}, "method 'hull' has no option 'q'; 'quantile' has q; 'paper' has none; 'hull' has fraction, n_neigh"),
+        ({"q": 0.05}, "method 'hull' has no option 'q'; 'quantile' has q; 'paper' has none; 'hull' has"),
         ({"method": "quantile", "n_neighbours": 200}, "has no option 'n_neighbours'; .*'hull' has"),
         ({"outlier_share": 0.1}, "method 'hull' has no option 'outlier_share'"),
         ({"method": "quantile", "q": 0.0}, "q must be a share of encounters, 0 < q < 1; got 0"),
