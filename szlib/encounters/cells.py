@@ -87,11 +87,11 @@ class Cells:
         slot = (person + number) & (_SLOTS - 1)
         pair = self._find_sides(rows, slot)
         pair |= np.roll(pair, -1, axis=1)
-        inside = pair.all(axis=0)
+        inside = np.asarray(pair.all(axis=0))
         needed = inside.copy()
         for cell in range(-self.before, self.after + 2):  # the tick may be in the pair's second cell
             needed |= np.roll(inside, cell)
-        return np.asarray(needed)[slot]
+        return np.asarray(needed[slot])
 
     def _find_sides(self, rows: pl.DataFrame, slot: np.ndarray) -> np.ndarray:
         """Whether a row of each slot is on the inner side of each edge of the square; shape (4, slots)."""
