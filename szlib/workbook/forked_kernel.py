@@ -70,8 +70,7 @@ class _KernelProcess:
 
     def poll(self) -> int | None:
         """The exit code, or None while the process runs."""
-        exit_code: int | None = self._process.exitcode
-        return exit_code
+        return self._process.exitcode  # type: ignore[no-any-return]
 
     def wait(self) -> int | None:
         """Wait for the end of the process, and return its exit code."""

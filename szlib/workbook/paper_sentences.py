@@ -17,8 +17,7 @@ import pandas as pd
 from .record.display import format_value
 from .record.notebook_record import NotebookRecord
 
-NOT_RUN = "not run with this data"
-"""Verdict of a sentence whose checks were not made in this run."""
+NOT_RUN = "not run with this data"  # verdict of a sentence whose checks were not made in this run
 _FIXED = {"untestable": "untestable here", "open": "not done here"}  # verdicts that no check decides
 _TESTS = "tests/"  # begins the name of a test, which a run does not execute
 

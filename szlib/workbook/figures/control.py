@@ -152,10 +152,8 @@ def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
         name = f"{limit.kind} {limit.number}, step {limit.k} to {limit.k + 1}"
         ax.plot(*limit.curve.T, linestyle=line, color=colour, linewidth=1.8, label=name)
         if not forbidden.is_empty:
-            hatched = patch_from_polygon(
-                forbidden, fill=False, hatch="///", edgecolor=colour, lw=0, alpha=0.35
-            )
-            ax.add_patch(hatched)
+            style = {"fill": False, "hatch": "///", "edgecolor": colour, "lw": 0, "alpha": 0.35}
+            ax.add_patch(patch_from_polygon(forbidden, **style))
     ax.axhline(0, color=GREY, linewidth=0.6)
     ax.axvline(0, color=GREY, linewidth=0.6)
     ax.plot(*step.control, "*", color=BLUE, markersize=15, markeredgecolor=BLACK, label="chosen")
