@@ -33,13 +33,12 @@
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 
 import szlib
 from szlib.plaza import accuracy
 from szlib.plaza.settings import SLOW_INTRUDERS
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table
 from szlib.zones import outliers
 
 # %% tags=["parameters"]
@@ -231,10 +230,10 @@ record.claim(
 # ## At the size of the paper
 #
 # The paper has 16,181 encounters. Plazas of several seeds in one table come as far; that takes half an
-# hour (`python tests/studies/pooled_plazas.py`), so it is saved beside the notebooks:
+# hour (`python -m studies.pooled_plazas`), so it is saved beside the notebooks:
 
 # %%
-table = pd.read_csv("tables/03_outliers.csv")
+table = read_table("03_outliers")
 shown = {
     "0.2 %, 20 neighbours": (figures.RED, "o-"),
     "0.2 %, 200 neighbours": (figures.ORANGE, "s--"),

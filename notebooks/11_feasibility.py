@@ -45,7 +45,7 @@ from szlib.control.controller import advance
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -97,7 +97,7 @@ mine.round(3)
 # `limits=[0.5,1,2]`) is saved beside the notebooks:
 
 # %%
-full = pd.read_csv("tables/11_feasibility.csv")
+full = read_table("11_feasibility")
 shown = {"infeasible_steps": ("infeasible steps a world", 8.0), "min_h": ("smallest h [m]", -0.5)}
 fig, grid = plt.subplots(2, 3, figsize=(12, 6.5), layout="constrained")
 for column, (a_max, part) in enumerate(full.groupby("a_max")):
@@ -238,7 +238,7 @@ record.check("once there is a solution there always is one", start_only, 4 * wor
 #
 # 150 steps each: 1-5 people who walk or stand, walls in half of the worlds, any start, heading and goal;
 # and one person in open space with a robot that starts at rest, $h \ge 0.3$ m. The table is saved beside
-# the notebooks; `python tests/studies/rollout_table.py` makes it anew, from blocks of seeds far apart, with
+# the notebooks; `python -m studies.rollout_table` makes it anew, from blocks of seeds far apart, with
 # 95 % Clopper-Pearson intervals (`low`, `high`). *Unflagged violations* are steps that called themselves safe
 # and led to $h < 0$, *unflagged overlaps* those that led the robot's disc into a wall or a body, by
 # Euclidean distance. "paper, margin = paper" is the paper's eps of 5 cm around every wall; all others give
@@ -251,7 +251,7 @@ record.check("once there is a solution there always is one", start_only, 4 * wor
 # $v / a_{max}$ to stop.
 
 # %%
-thousands = pd.read_csv("tables/11_rollouts.csv")
+thousands = read_table("11_rollouts")
 flagged = (thousands["unflagged_violations"] == 0).all()
 record.check("no step with h < 0 that was not flagged before", flagged, always=True)
 apart = (thousands["unflagged_overlaps"].dropna() == 0).all()

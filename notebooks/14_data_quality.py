@@ -40,7 +40,7 @@ from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels, quality
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters, read_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -170,7 +170,7 @@ days
 # notebooks; of the hour from 12 it holds a tenth of the people).
 
 # %%
-mall = pd.read_csv("tables/14_hours.csv")
+mall = read_table("14_hours")
 figure, panels = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
 lines = zip(hours.groupby("day"), figures.pick_colours(days["day"]), cycle("os^Dv"), strict=False)
 for (day, rows), colour, marker in lines:

@@ -35,7 +35,7 @@ from IPython.display import Markdown
 
 import szlib
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters, read_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -166,11 +166,11 @@ record.figure(fig, "test")
 # %% [markdown]
 # A test is only worth something if it stays silent where there is nothing. So it was run on crowds in
 # which nobody minds anybody, straight across at a speed of their own, singly or in bunches of ten as from
-# a train (`python tests/studies/respect.py nobody`). At a level of 5 % five false alarms in a hundred crowds
+# a train (`python -m studies.respect nobody`). At a level of 5 % five false alarms in a hundred crowds
 # are due.
 
 # %%
-nobody = pd.read_csv("tables/15_nobody.csv")
+nobody = read_table("15_nobody")
 nobody["alarm"] = nobody["p_value"] <= 0.05
 alarms = nobody.groupby(["bunch", "kinds"])["alarm"].agg(["sum", "size"])
 every_kind = alarms.xs("all", level="kinds")
@@ -237,10 +237,10 @@ for (method, who), line in zones.dropna(subset="a").iterrows():
 #
 # Take fewer encounters of the same place at random, and estimate again. An extreme shrinks with every
 # person added, until one careless passer-by sets it; a share of encounters does not. The real ATC day and
-# Grand Central, New York (`python tests/studies/respect.py n-curve`):
+# Grand Central, New York (`python -m studies.respect n-curve`):
 
 # %%
-curves = pd.read_csv("tables/15_n_curve.csv")
+curves = read_table("15_n_curve")
 curves = curves[curves["kinds"] == "strangers"]
 fig, panels = plt.subplots(1, 2, figsize=(11, 4), layout="constrained", sharey=True)
 shown = {
@@ -253,7 +253,7 @@ for ax, (site, part) in zip(panels, curves.groupby("site"), strict=True):
 record.figure(fig, "n-curve")
 
 # %%
-sites = pd.read_csv("tables/15_sites.csv")
+sites = read_table("15_sites")
 sites = sites[(sites["min_distance"] == 1) & sites["kinds"].isin(["all", "strangers", "opposite, crossing"])]
 sites[
     [
@@ -275,10 +275,10 @@ sites[
 #
 # At Grand Central: on who counts, on the shifts of the null model, on the area, on the scale and the frame
 # rate of its video, and on whether $g$ is fitted (dots, with 95 %) or counted in bins of 0.1 m (crosses)?
-# (`python tests/studies/respect.py changes`)
+# (`python -m studies.respect changes`)
 
 # %%
-changes = pd.read_csv("tables/15_changes.csv")
+changes = read_table("15_changes")
 fig, ax = plt.subplots(figsize=(9, 4.5), layout="constrained")
 looks = zip((figures.GREY, figures.BLUE, figures.ORANGE), "os^", (-0.2, 0.0, 0.2), strict=True)
 for (who, part), (shade, marker, up) in zip(changes.groupby("kinds", sort=False), looks, strict=True):

@@ -41,7 +41,7 @@ from szlib.control.distances import compare_distances
 from szlib.plaza.accuracy import true_kinds
 from szlib.simulation import paper_claims as claims
 from szlib.workbook import figures, paper_sentences
-from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
 from szlib.workbook.record.display import style_table
 from szlib.zones.outliers import is_outlier
 from szlib.zones.sensitivity import sensitivity
@@ -123,12 +123,12 @@ record.figure(ax.figure, "claims")
 # ## The same on every data set at hand
 #
 # The plaza, the real ATC day, Grand Central, THOR-MAGNI, and the ETH sequence
-# (`python tests/studies/claims.py`). A site without enough people on every side decides nothing about
+# (`python -m studies.claims`). A site without enough people on every side decides nothing about
 # zones, and says so. Brackets hold 95 % intervals; those of the robot's delay hold the range over the four
 # scenarios, because the runs are deterministic.
 
 # %%
-everywhere = pd.read_csv("tables/16_claims.csv")
+everywhere = read_table("16_claims")
 wide = everywhere.assign(cell=everywhere.agg(claims.format_finding, axis=1)).pivot(
     index=["claim", "method"], columns="data", values="cell"
 )
@@ -161,10 +161,10 @@ wide[list(dict.fromkeys(everywhere["data"]))]
 # ## Can the zones and their intervals be trusted?
 #
 # On plazas the truth is known: the largest error of centre and axes, with intruders, with 5 cm of noise
-# (`python tests/studies/zones.py errors 3`).
+# (`python -m studies.zones errors 3`).
 
 # %%
-errors = pd.read_csv("tables/16_estimators.csv").pivot_table("error_m", "case", "method", aggfunc="max")
+errors = read_table("16_estimators").pivot_table("error_m", "case", "method", aggfunc="max")
 off = float(errors["quantile"].max())
 record.check("the quantile zone is within 4 cm in every case", off <= 0.04, off, always=True)
 errors.round(3)
@@ -172,11 +172,11 @@ errors.round(3)
 # %% [markdown]
 # A 95 % interval is to hold something in 95 % of data sets. Of what? Of the *limit*: the zone that the same
 # method would give of all the people there are. Or of the *truth*: the edge that the plaza's people keep to.
-# From 600 pairs of people each (`python tests/studies/zones.py coverage 200 quantile centred default`, the
+# From 600 pairs of people each (`python -m studies.zones coverage 200 quantile centred default`, the
 # hull and respect likewise):
 
 # %%
-tables = [pd.read_csv(f"tables/16_coverage{which}.csv") for which in ("", "_hull", "_respect")]
+tables = [read_table(f"16_coverage{which}") for which in ("", "_hull", "_respect")]
 coverage = pd.concat(tables)
 limit = coverage["limit"].dropna()
 record.check(
@@ -188,13 +188,13 @@ record.check(
 coverage.pivot_table(["limit", "truth"], "quantity", ["plaza", "method"]).round(2)
 
 # %%
-levels = pd.read_csv("tables/16_levels.csv").set_index(["clearance", "q"])[["a", "b"]]
+levels = read_table("16_levels").set_index(["clearance", "q"])[["a", "b"]]
 (100 * levels).round(1).rename(columns="{}, outside of the truth [cm]".format)
 
 # %% [markdown]
 # The truth is held less often, because the limit is another line. The share of encounters that may enter
 # is 5 %; whether that ends right at the edge, or 1 cm inside, or 3 cm outside of it, hangs on how far people
-# keep clear of the edge (`clearance`, mean, in m; `python tests/studies/zones.py levels 3`), which the
+# keep clear of the edge (`clearance`, mean, in m; `python -m studies.zones levels 3`), which the
 # data does not tell. So an interval says how far other people of the same kind would move the zone.
 
 # %% [markdown]
@@ -203,10 +203,10 @@ levels = pd.read_csv("tables/16_levels.csv").set_index(["clearance", "q"])[["a",
 # Who is behind me has me ahead: both people's zones keep a pair apart, and a fit of one side mixes them.
 # Truths shifted ahead by 0.1, 0.2 and -0.1 m come back from one-sided fits as some 0.04, 0.04 and -0.03 m. A
 # *two-sided* fit estimates one shape from both people's samples, each with their own heading
-# (`python tests/studies/zones.py two_sided 3`).
+# (`python -m studies.zones two_sided 3`).
 
 # %%
-sides = pd.read_csv("tables/16_two_sided.csv")
+sides = read_table("16_two_sided")
 columns = ["found_ahead", "error_a", "largest_error", "mean_gap"]
 sides.groupby(["ahead", "fit"], sort=False)[columns].mean().round(3)
 
@@ -226,7 +226,7 @@ record.claim("and its axes as well", worst <= 0.05, f"{worst:.3f} m")
 # ## What moves the zone most
 #
 # Each parameter of the method alone, the others at their defaults: on this data with the paper's hull, and
-# on the real day with both estimators (`python tests/studies/claims.py`).
+# on the real day with both estimators (`python -m studies.claims`).
 
 # %%
 tracks = record.cache.tracks()
@@ -238,7 +238,7 @@ record.key |= {"moves the zone most": strongest["parameter"], "by": f"{100 * str
 moved.round(2)
 
 # %%
-saved = pd.read_csv("tables/16_sensitivity.csv")
+saved = read_table("16_sensitivity")
 fig, panels = plt.subplots(1, 3, figsize=(15, 4.6), layout="constrained")
 figures.plot_sensitivity(moved, ax=panels[0]).set_title("This data, hull")
 for ax, (method, part) in zip(panels[1:], saved.groupby("method"), strict=True):

@@ -49,7 +49,7 @@ from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.simulation.social_metrics import compute_replay_metrics
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters, read_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -102,7 +102,7 @@ parameters(
 # The first two come with the extra `crowds`. The third shows how to add a model: it is a class in
 # `tests/helpers/speed_model.py`, and `ReactingPeople(SpeedModel)` uses it. Its results below are saved. To
 # compute them again, install JuPedSim and run the study:
-# `pip install --no-deps jupedsim deprecated wrapt`, then `python tests/studies/crowd_trials.py`.
+# `pip install --no-deps jupedsim deprecated wrapt`, then `python -m studies.crowd_trials`.
 
 # %%
 missing = [name for name in packages if name not in models]
@@ -183,12 +183,12 @@ formatted(
 ) if parts else "no model is installed"
 
 # %% [markdown]
-# `tests/studies/crowd_trials.py` does this with hundreds of worlds, and with what people would otherwise use:
+# `notebooks/studies/crowd_trials.py` does this with hundreds of worlds, and with what people would otherwise use:
 # straight ahead with a stop, the social force, a dynamic window. Its tables are committed beside the
 # notebooks.
 
 # %%
-saved = pd.read_csv("tables/17_crowds.csv")
+saved = read_table("17_crowds")
 reacting = saved[saved["crowd"].isin(simulated)]
 formatted(reacting, ["crowd", "sees", "controller"])
 
@@ -255,7 +255,7 @@ formatted(saved[~saved["crowd"].isin(simulated)], ["crowd", "controller"])
 # *to_who_kept* counts those who had kept theirs, from positions alone and by another formula.
 
 # %%
-promises = pd.read_csv("tables/17_safety_claims.csv")
+promises = read_table("17_safety_claims")
 total = promises[
     ["trials", "steps", "claimed_safe_steps", "broken_steps", *MOTION_CHANGES, "unexplained", "to_who_kept"]
 ].sum()
@@ -322,12 +322,12 @@ means.loc[["reached", "path_efficiency", "time_intruding"]].round(2)
 # %% [markdown]
 # ## Two wheels, and numbers to compare with
 #
-# **Differential drive** (`python tests/studies/differential_table.py`): in 2,000 random worlds no step that claimed to be safe led to
+# **Differential drive** (`python -m studies.differential_table`): in 2,000 random worlds no step that claimed to be safe led to
 # h < 0, nor to an overlap on ten points between samples. 80 % arrive (90.9 % of the double integrator), 0.86 s (0.80 to 0.92)
 # later. The disc grows by the distance ahead of the axle, 25 cm at 4 rad/s. That is too much for the passages of notebooks 09
 # and 10, which need 8 rad/s.
 #
-# **All crowds** (`python tests/studies/crowd_trials.py`): 2,341 trials among ORCA, social forces, JuPedSim's speed model and recorded
+# **All crowds** (`python -m studies.crowd_trials`): 2,341 trials among ORCA, social forces, JuPedSim's speed model and recorded
 # people, without an exception. Of 467,672 steps that claimed to be safe 265 led to h < 0. In each of them a person had appeared
 # (157), turned (71), sped up (40) or slowed down (11).
 #

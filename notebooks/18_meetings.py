@@ -28,8 +28,6 @@
 # **Afterwards you can** say in which meetings this controller is good, and in which it is bad.
 
 # %%
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import pandas as pd
 
@@ -40,7 +38,7 @@ from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.scenarios.meetings import Variations, VisiblePeople
 from szlib.simulation.social_metrics import compute_social_metrics
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -176,7 +174,7 @@ formatted(table, "time_to_goal")
 # variations.
 
 # %%
-full, change = (pd.read_csv(Path("tables") / f"{name}.csv") for name in ("18_meetings", "18_meetings_paired"))
+full, change = (read_table(name) for name in ("18_meetings", "18_meetings_paired"))
 record.key["variations in the saved table"] = int(full["n"].max())
 formatted(full, "time_to_goal")
 

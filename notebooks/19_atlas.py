@@ -31,13 +31,12 @@
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 from IPython.display import Markdown
 
 from szlib.simulation.atlas import REFERENCE, SCENES, AtlasCell, run_atlas
 from szlib.simulation.strategies import STRATEGIES, classify_strategy
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -77,10 +76,10 @@ parameters(
 # | goes ahead | none of these |
 #
 # The atlas is a saved table of 1,384 runs, made by
-# `python tests/studies/atlas.py > notebooks/tables/19_atlas.csv`. A part of it is driven anew here.
+# `python -m studies.atlas`. A part of it is driven anew here.
 
 # %%
-atlas = pd.read_csv("tables/19_atlas.csv")
+atlas = read_table("19_atlas")
 some = atlas.sample(again, random_state=seed)
 named = ["scene", "gamma", "width", "pace", "size"]
 anew = run_atlas([AtlasCell(**cell) for cell in some[named].to_dict("records")], REFERENCE, n_jobs=n_jobs)

@@ -102,12 +102,13 @@ ZONES: Mapping[str, ZoneTransform] = MappingProxyType(
 
 FORMULATIONS: Mapping[str, MPCSettings] = MappingProxyType(
     {
-        "paper": MPCSettings(),
+        "paper": MPCSettings.paper(),
+        "szlib": MPCSettings(),
         "whole horizon": MPCSettings(N_h=MPCSettings.N),
         "rest": MPCSettings(terminal="rest"),
     }
 )
-"""Settings of barrier horizon and terminal condition, by name."""
+"""Settings by name: the paper's to the letter, szlib's defaults, and two changes of them."""
 
 BEHAVIOURS: Mapping[str, Behaviour] = MappingProxyType(
     {
@@ -203,10 +204,10 @@ def compare(
     >>> import szlib
     >>> worlds = szlib.Worlds(duration=1.0)
     >>> table = szlib.simulation.compare(
-    ...     1, zones=["none", "fitted"], formulations=["paper"], worlds=worlds, progress=False
+    ...     1, zones=["none", "fitted"], formulations=["szlib"], worlds=worlds, progress=False
     ... )
     >>> table[["zone", "formulation", "seed"]].to_numpy().tolist()
-    [['none', 'paper', 0], ['fitted', 'paper', 0]]
+    [['none', 'szlib', 0], ['fitted', 'szlib', 0]]
     """
     methods = (controllers, zones, formulations, behaviours)
     tables = []
@@ -267,8 +268,8 @@ def summarise(
 
     Returns
     -------
-    One row for each method and metric: `by`, metric, mean, low, high, n (number of worlds with a value); NaN
-    without a value.
+    One row for each method and metric: `by`, metric, mean, low, high, n (number of worlds with a value), and
+    first, the value in the first world; NaN without a value.
 
     Raises
     ------
@@ -294,4 +295,4 @@ def summarise(
     table = pd.DataFrame(wide.columns.tolist(), columns=["metric", *by])
     mean = np.where(some, data.sum(axis=0) / np.maximum(has_value.sum(axis=0), 1), np.nan)
     table = table.assign(mean=mean, low=low, high=high, n=has_value.sum(axis=0))
-    return table[[*by, "metric", "mean", "low", "high", "n"]]
+    return table.assign(first=wide.iloc[0].to_numpy())[[*by, "metric", "mean", "low", "high", "n", "first"]]

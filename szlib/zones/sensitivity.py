@@ -14,6 +14,7 @@ from ..encounters.finding import find_encounters
 from ..encounters.geometry import Area
 from ..encounters.near_rows import select_near_rows
 from ..errors import DataError, DataWarning, ZoneError
+from .outliers import FRACTION, N_NEIGHBOURS
 from .social_zone import SocialZone
 
 # Values of `szlib.find_encounters`, besides its defaults.
@@ -25,9 +26,9 @@ SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
         "kinds": ("strangers", ("opposite", "crossing")),
     }
 )
-# Values of `szlib.SocialZone.fit`, besides its defaults.
+# Values of `szlib.SocialZone.fit`, besides the paper's.
 FIT: Mapping[str, Sequence[Any]] = MappingProxyType(
-    {"r_max": (1.5, 2.5), "fraction": (0.0, 0.002, 0.01), "n_neighbours": (10, 50)}
+    {"r_max": (1.5, 2.5), "fraction": (0.0, 0.01), "n_neighbours": (10, 50)}
 )
 SPEEDS = (0.9, 1.3)
 """Speeds besides `speed` [m/s]."""
@@ -39,7 +40,7 @@ def sensitivity(
     *,
     area: Area,
     speed: float = 1.1,
-    method: str = "hull",
+    method: str = "paper",
     fit: Mapping[str, Sequence[Any]] = FIT,
 ) -> pd.DataFrame:
     """Fit the zone at one speed with each parameter varied alone.
@@ -48,7 +49,7 @@ def sensitivity(
     ----------
     tracks, area : as for `szlib.find_encounters`.
     speed : speed of the zone [m/s].
-    method : of every fit.
+    method : of every fit, as for `szlib.SocialZone.fit`.
     fit : options of `SocialZone.fit` to vary, and their values. `SEARCH` are those of the search.
 
     Returns
@@ -60,6 +61,9 @@ def sensitivity(
     ------
     ZoneError : there is no zone with the defaults.
     """
+    usual_fit: dict[str, Any] = {"method": method, "n_resamples": 0}
+    if method == "paper":  # whose options are those of the hull
+        usual_fit |= {"method": "hull", "fraction": FRACTION, "n_neighbours": N_NEIGHBOURS}
     rows: list[tuple[str, str, int, float, float, float]] = []
 
     def add(parameter: str, value: Any, samples: pd.DataFrame, at: float = speed, **keywords: Any) -> None:
@@ -68,7 +72,7 @@ def sensitivity(
         try:
             with warnings.catch_warnings():  # the number of encounters is in the table
                 warnings.simplefilter("ignore", DataWarning)
-                zone = SocialZone.fit(samples, speeds=(at,), method=method, n_resamples=0, **keywords)
+                zone = SocialZone.fit(samples, speeds=(at,), **{**usual_fit, **keywords})
             ellipse = zone.ellipses[at]
             sizes = (*ellipse.semi_axes, ellipse.area)
         except (ZoneError, DataError):

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from helpers.noninteracting_crowd import noninteracting_crowd
 from helpers.track_tables import make_tracks, make_walk
+from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.errors import DataError

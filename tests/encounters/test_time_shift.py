@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from helpers.noninteracting_crowd import noninteracting_crowd
 from helpers.track_tables import DAY, make_tracks, make_walk
+from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.encounters.time_shift import COMPANION_SEPARATION, ShiftableTracks

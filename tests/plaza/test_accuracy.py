@@ -9,6 +9,7 @@ from studies.pooled_plazas import PACES, TABLE, judged, plaza_samples, pooled
 
 import szlib
 from szlib.plaza import accuracy
+from szlib.workbook.record import read_table
 
 TOO_FAR, TOO_FAR_WITH_MANY = 0.035, 0.05
 """Error of the zone without many intruders, and with 1 % or 2 % of them [m]."""
@@ -99,7 +100,7 @@ def test_the_zone_does_not_shrink_at_the_size_of_the_paper(plazas: list[pd.DataF
 
 
 def test_notebook_table_shows_it_for_all_sizes() -> None:
-    table = pd.read_csv(TABLE)
+    table = read_table(TABLE)
     assert table["encounters"].max() > 20_000
     ours = table[table["rule"] == "encounters"]
     assert len(ours) == 60

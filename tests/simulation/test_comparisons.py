@@ -58,7 +58,7 @@ def test_time_inside_is_measured_with_the_zones_of_the_world():
 
 
 def test_compare_is_paired():
-    rows = compare(2, zones=("none", "fitted"), formulations=("paper",), n_jobs=1, progress=False)
+    rows = compare(2, zones=("none", "fitted"), formulations=("szlib",), n_jobs=1, progress=False)
     assert len(rows) == 4
     assert rows.groupby("zone")["seed"].apply(list).tolist() == [[0, 1], [0, 1]]
     assert rows["people"].tolist()[:2] == rows["people"].tolist()[2:]
@@ -96,6 +96,7 @@ def test_missing_values_are_left_out():
 
 
 def test_unknown_names_are_rejected():
-    assert list(FORMULATIONS) == ["paper", "whole horizon", "rest"]
+    assert list(FORMULATIONS) == ["paper", "szlib", "whole horizon", "rest"]
+    assert FORMULATIONS["paper"] == szlib.MPCSettings.paper()
     assert FORMULATIONS["whole horizon"].N_h == szlib.MPCSettings().N
     assert "as expected" in BEHAVIOURS

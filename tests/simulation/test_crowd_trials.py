@@ -1,4 +1,4 @@
-"""Safety claims hold among reacting and recorded people.  In full: `tests/studies/crowd_trials.py`."""
+"""Safety claims hold among reacting and recorded people.  In full: `notebooks/studies/crowd_trials.py`."""
 
 from __future__ import annotations
 

@@ -168,6 +168,9 @@ def test_sensitivity_varies_one_parameter_at_a_time(tmp_path) -> None:
     assert {"min_distance", "duration", "kinds", "area", "r_max", "speed"} <= set(table["parameter"])
     assert (table.loc[table["parameter"] == "r_max", "encounters"] == table.loc[0, "encounters"]).all()
     assert table.loc[table["parameter"] == "min_distance", "encounters"].is_monotonic_decreasing
+    samples = szlib.find_encounters(tracks, area=szlib.ATC_SQUARE)
+    zone = szlib.SocialZone.fit(samples, method="paper", speeds=[1.1], n_resamples=0)
+    assert tuple(table.loc[0, ["a", "b"]]) == zone.ellipse(1.1).semi_axes, "the paper's zone to the letter"
 
 
 def test_without_a_zone_a_claim_is_not_decidable() -> None:

@@ -8,7 +8,14 @@ import pandas as pd
 import pytest
 
 import szlib
-from szlib.workbook.record import DataCache, NotebookRecord, data_cache, parameters, settings_table
+from szlib.workbook.record import (
+    DataCache,
+    NotebookRecord,
+    committed_tables,
+    data_cache,
+    parameters,
+    settings_table,
+)
 from szlib.zones.polar import PolarZone
 
 
@@ -131,3 +138,29 @@ def test_every_controller_setting_has_description_and_badge():
     assert set(table["parameter"]) == set(szlib.MPCSettings.__dataclass_fields__)
     assert table["why"].str.len().min() > 5
     assert "v_max" in table.set_index("parameter").index
+
+
+def test_committed_table_says_how_it_was_made_and_fails_if_a_row_is_not_reproduced(
+    record, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(committed_tables, "TABLES", tmp_path)
+    monkeypatch.setattr("sys.argv", ["somewhere/study.py", "3"])
+    monkeypatch.setattr(committed_tables, "_describe_commit", lambda: "1234567")
+    made = pd.DataFrame({"name": ["a", "b", "c"], "mean": [0.123456, np.nan, 1e6], "probe": [1, 2, np.nan]})
+    committed_tables.write_table(made, "99_made", seed=7)
+    table = committed_tables.read_table("99_made")
+    assert table.attrs == {"command": "python -m studies.study 3", "seed": 7, "commit": "1234567"}
+    pd.testing.assert_frame_equal(table, made.astype({"probe": float}), check_exact=True)
+    record.committed_table("99_made", lambda row: made.loc[row.name].to_dict())
+    record.committed_table("99_made", lambda row: {"mean": row["mean"] + 0.001}, where="name == 'a'")
+    record.committed_table("99_made", lambda row: {"name": "other"}, where="name == 'b'")
+    assert [c["passed"] for c in record.checks] == [True, False, False]
+    assert record.checks[1]["value"] == {"mean": [0.123456, 0.124456]}
+    assert record.checks[1]["name"] == "row 0 of tables/99_made.csv is reproduced"
+
+
+def test_every_committed_table_says_how_it_was_made():
+    for file in committed_tables.TABLES.glob("*.csv"):
+        table = committed_tables.read_table(file.stem)
+        assert table.attrs["command"].startswith("python -m studies.")
+        assert len(table) and table.attrs.keys() == {"command", "seed", "commit"}

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from helpers.noninteracting_crowd import noninteracting_crowd
+from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.errors import DataError, DataWarning, ZoneError

@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from pandas.io.formats.style import Styler
 
 from ...files import claim_folder, write_file
 from .. import folders
+from .committed_tables import find_differences, read_table
 from .data_cache import DataCache
 from .display import format_outputs, format_value, show_figure, style_table
 from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, ZoneMethod, read_defaults
@@ -129,6 +130,31 @@ class NotebookRecord:
     def table(self, table: pd.DataFrame, name: str) -> None:
         """Save a `table` in the results as `name`.csv."""
         write_file(self.out / f"{name}.csv", table.to_csv(index=False))
+
+    def committed_table(
+        self,
+        name: str,
+        recompute: Callable[[pd.Series[Any]], Mapping[str, Any]],
+        *,
+        where: str = "index >= 0",
+    ) -> pd.DataFrame:
+        """Read a table that is committed beside the notebooks, and check that one of its rows is reproduced.
+
+        Parameters
+        ----------
+        name : of the table, without ".csv".
+        recompute : computes values of a row, by column, with the function that made the table. The row is
+            drawn with the seed of the notebook. Columns that take long are left out; a column "probe" holds
+            a part that does not.
+        where : the rows to draw from, as for `pandas.DataFrame.query`.
+        """
+        table = read_table(name)
+        row = table.query(where).sample(1, random_state=self.cache.seed).iloc[0]
+        again = dict(recompute(row))
+        different = find_differences(row, again)
+        what = f"row {row.name} of tables/{name}.csv is reproduced"
+        self.check(what, not different, different or again, always=True)
+        return table
 
     def close(self) -> Styler:
         """Write the record for the summary of the run, and return a table of its checks and claims."""

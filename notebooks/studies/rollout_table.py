@@ -1,6 +1,6 @@
 """The table of random worlds, with intervals.
 
-    python tests/studies/rollout_table.py [--blocks 4] [--worlds 2000]
+    python -m studies.rollout_table [--blocks 4] [--worlds 2000]
 
 Writes notebooks/tables/11_rollouts.csv: a row for each set of worlds and formulation, over blocks of seeds
 far apart, each share with its 95 % Clopper-Pearson interval, and the counts of the single blocks. Finished
@@ -8,9 +8,10 @@ worlds are kept in results/rollouts, so that a run that was stopped goes on.
 """
 
 import argparse
-from pathlib import Path
+from dataclasses import replace
 from typing import Any, get_args
 
+import numpy as np
 import pandas as pd
 from scipy.stats import beta
 
@@ -19,23 +20,28 @@ from szlib.control.settings import TOLERANCE
 from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.outcomes import Outcome
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
+from szlib.workbook.record import write_table
 
-TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "11_rollouts.csv"
+TABLE = "11_rollouts"
 APART = 1_000_000
 """Seeds between the first ones of two blocks; block 0 starts at this as well."""
+FIRST = 3
+"""Worlds whose path is computed again in each run of notebook 11."""
 FORMULATIONS = {
-    "paper": szlib.MPCSettings(),
+    "paper": szlib.MPCSettings.paper(),
+    "szlib": szlib.MPCSettings(),
+    "margin = paper": szlib.MPCSettings(margin="paper"),
     "whole horizon": szlib.MPCSettings(N_h=szlib.MPCSettings.N),
     "rest": szlib.MPCSettings(terminal="rest"),
-    "paper, margin = paper": szlib.MPCSettings(margin="paper"),
-    "paper, gamma = 0.2": szlib.MPCSettings(gamma=0.2),
-    "paper, gamma = 0.8": szlib.MPCSettings(gamma=0.8),
+    "gamma = 0.2": szlib.MPCSettings(gamma=0.2),
+    "gamma = 0.8": szlib.MPCSettings(gamma=0.8),
 }
+"""The paper's controller to the letter, szlib's defaults, and the defaults with one change."""
 SETS: dict[str, tuple[Worlds, tuple[str, ...]]] = {
-    "all": (Worlds(), ("paper", "rest", "paper, margin = paper")),
+    "all": (Worlds(), ("paper", "szlib", "rest", "margin = paper")),
     "one person": (
         ONE_PERSON,
-        ("paper", "whole horizon", "rest", "paper, gamma = 0.2", "paper, gamma = 0.8"),
+        ("paper", "szlib", "whole horizon", "rest", "gamma = 0.2", "gamma = 0.8"),
     ),
 }
 """Worlds, and the formulations that drive in them."""
@@ -86,12 +92,23 @@ def row(blocks: list[pd.DataFrame]) -> dict[str, Any]:
     return line
 
 
+def probe(worlds: Worlds, formulation: str) -> float:
+    """Path in the first worlds [m], without a time limit: the same on every machine."""
+    settings = replace(FORMULATIONS[formulation], time_limit=np.inf)
+    first = rollouts(FIRST, seed=APART, settings=settings, worlds=worlds, progress=False)
+    return float(first["path_length"].sum())
+
+
+def recompute(row: pd.Series) -> dict[str, float]:
+    return {"probe": probe(SETS[row["set"]][0], row["formulation"])}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blocks", type=int, default=4, help="blocks of fresh seeds")
     parser.add_argument("--worlds", type=int, default=2000, help="worlds in a block")
     parser.add_argument("--jobs", type=int, default=-1, help="processes")
-    parser.add_argument("--out", default="results/rollouts", help="where finished worlds are kept")
+    parser.add_argument("--out", default="../results/rollouts", help="where finished worlds are kept")
     given = parser.parse_args()
     tables: dict[tuple[str, str], list[pd.DataFrame]] = {}
     for name, (worlds, formulations) in SETS.items():
@@ -106,8 +123,11 @@ def main() -> None:
                     n_jobs=given.jobs,
                 )
                 tables.setdefault((name, formulation), []).append(table)
-                lines = [{"set": s, "formulation": f, **row(blocks)} for (s, f), blocks in tables.items()]
-                pd.DataFrame(lines).round(6).to_csv(TABLE, index=False)
+                lines = [
+                    {"set": s, "formulation": f, **row(blocks), "probe": probe(SETS[s][0], f)}
+                    for (s, f), blocks in tables.items()
+                ]
+                write_table(pd.DataFrame(lines), TABLE, seed=APART)
 
 
 if __name__ == "__main__":

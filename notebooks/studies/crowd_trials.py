@@ -1,14 +1,13 @@
 """Robots among other people's crowds, real and simulated: the tables of notebook 17.
 
-python tests/studies/crowd_trials.py           both tables, as they are saved: some 15 min on one core
-python tests/studies/crowd_trials.py --n 10    at most 10 trials of each kind
+python -m studies.crowd_trials           both tables, as they are saved: some 15 min on one core
+python -m studies.crowd_trials --n 10    at most 10 trials of each kind
 
 17_crowds.csv     means with 95 % intervals: crowd by what people see by controller
 17_safety_claims.csv   steps that said they were safe, how many led to h < 0, and what the people did
 
-They go to notebooks/tables, or to --out.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/,
-eth/).  The speed model is left out where JuPedSim is not installed (`INSTALL_JUPEDSIM` in
-tests/helpers/speed_model.py).  An exception in any trial ends the run.
+They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/, eth/).  The speed
+model is left out where JuPedSim is not installed (`INSTALL_JUPEDSIM` in tests/helpers/speed_model.py).  An exception in any trial ends the run.
 """
 
 from __future__ import annotations
@@ -16,19 +15,23 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import chain, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from studies.claims import SITES
 
 import szlib
 from szlib.control.controller import Controller
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.comparisons import CONTROLLERS, summarise
-from szlib.simulation.crowds.reacting import ReactingPeople
+from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
+from szlib.simulation.crowds.walking_model import ModelFactory
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.monte_carlo import ControllerFactory
 from szlib.simulation.replay import ReplacedWalker, Replays, find_replays
@@ -36,11 +39,7 @@ from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
 from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.simulation.social_metrics import compute_replay_metrics
-
-sys.path.insert(0, str(Path(__file__).parents[1]))  # the folder of all tests
-
-from helpers.crowd_models import FACTORIES
-from studies.claims import SITES, TABLES
+from szlib.workbook.record import write_table
 
 CROWDED = Worlds(
     people=(6, 10),
@@ -56,14 +55,14 @@ CROWDED = Worlds(
 WORLDS = {"orca": 250, "speed model": 250, "social force": 150}
 WALKERS = {"ATC day": 200, "plaza": 100, "ETH": 150, "Grand Central": 12}
 OTHERS, BASELINES, IN_PLACE = 40, 25, 20
-"""Trials of the paper's controller with each model and at each site (fewer where fewer walkers may be
-replaced), at most of it with other settings, of each baseline, and of both in the place of walkers."""
+"""Trials of the controller with its defaults with each model and at each site (fewer where fewer walkers may
+be replaced), at most of it with other settings, of each baseline, and of both in the place of walkers."""
 SETTINGS = {
     "MPC-CBF": szlib.MPCSettings(),
     "MPC-CBF, rest": szlib.MPCSettings(terminal="rest"),
     "MPC-CBF, gamma 0.2": szlib.MPCSettings(gamma=0.2, N_h=8),
 }
-"""The paper's settings; plans that end at rest; barriers on the whole horizon that may be used up faster."""
+"""szlib's defaults; plans that end at rest; barriers on the whole horizon that may be used up faster."""
 BY = ("crowd", "sees", "controller")
 SCORES = ("reached", "time_to_goal", "path_efficiency", "intrusions", "time_intruding", "nearest")
 
@@ -122,22 +121,65 @@ def controllers(
         yield name, CONTROLLERS[name], szlib.MPCSettings(), min(n, most, baselines)
 
 
+def factories() -> dict[str, ModelFactory]:
+    """The models of walking: szlib's, and JuPedSim's, which the tests define, where it is installed."""
+    if not find_spec("jupedsim"):
+        return dict(MODELS)
+    sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+    from helpers.speed_model import SpeedModel
+
+    return {**MODELS, "speed model": SpeedModel}
+
+
+def react(
+    n: int,
+    model: ModelFactory,
+    sees: str,
+    factory: ControllerFactory,
+    settings: szlib.MPCSettings,
+    **more: Any,
+) -> pd.DataFrame:
+    """Trials of one controller among people who walk by a model; `more`: as of `szlib.rollouts`."""
+    return szlib.rollouts(
+        n,
+        settings=settings,
+        worlds=CROWDED,
+        behaviour=ReactingPeople(model, sees=sees),
+        controller=factory,
+        measure=measure,
+        progress=False,
+        **more,
+    )
+
+
+def first_trial(row: pd.Series) -> pd.Series:
+    """The first trial of a row among people who react, without a time limit: the same on every machine."""
+    known = {name: (factory, settings) for name, factory, settings, _ in controllers(1, 1, 1, 1)}
+    factory, settings = known[row["controller"]]
+    settings = replace(settings, time_limit=np.inf)
+    return react(1, factories()[row["crowd"]], row["sees"], factory, settings).iloc[0]
+
+
+def recompute(row: pd.Series) -> dict[str, float]:
+    """The first trial of a row of the means, again."""
+    return {"first": first_trial(row)[row["metric"]]}
+
+
+def recompute_promises(row: pd.Series) -> dict[str, float]:
+    """The steps of the first trial that said they were safe, and its path, again."""
+    first = first_trial(row)
+    return {
+        "first_claimed_safe_steps": first["claimed_safe_steps"],
+        "first_path_efficiency": first["path_efficiency"],
+    }
+
+
 def reacting(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
     """Trials among people who react, or would if they saw the robot."""
-    models = [model for model in WORLDS if model != "speed model" or find_spec("jupedsim")]
-    for model, sees in product(models, ("robot", "nothing")):
+    known = factories()
+    for model, sees in product((name for name in WORLDS if name in known), ("robot", "nothing")):
         for name, factory, settings, trials in controllers(n, WORLDS[model], OTHERS, BASELINES):
-            rows = szlib.rollouts(
-                trials,
-                settings=settings,
-                worlds=CROWDED,
-                behaviour=ReactingPeople(FACTORIES[model], sees=sees),
-                controller=factory,
-                measure=measure,
-                out=work,
-                n_jobs=1,
-                progress=False,
-            )
+            rows = react(trials, known[model], sees, factory, settings, out=work)
             yield rows.assign(crowd=model, sees=sees, controller=name)
 
 
@@ -189,20 +231,24 @@ def promises(rows: pd.DataFrame) -> pd.DataFrame:
         "flagged_steps",
     ]
     table = of_mpc.groupby(list(BY), sort=False).agg(
-        trials=("seed", "size"), **{name: (name, "sum") for name in sums}, worst=("worst", "min")
+        trials=("seed", "size"),
+        **{name: (name, "sum") for name in sums},
+        worst=("worst", "min"),
+        first_claimed_safe_steps=("claimed_safe_steps", "first"),
+        first_path_efficiency=("path_efficiency", "first"),
     )
     return table.astype(dict.fromkeys(sums, int)).reset_index()
 
 
-def main(n: int, out: Path, work: Path | None) -> None:
+def main(n: int, work: Path | None) -> None:
     parts = []
     for rows in chain(reacting(n, work), recorded(n, work)):
         parts.append(rows)
         print(*rows[list(BY)].iloc[0], len(rows), flush=True)
     means = pd.concat([summarise(rows, by=BY, metrics=SCORES) for rows in parts], ignore_index=True)
     table = promises(pd.concat(parts, ignore_index=True))
-    means.round(4).to_csv(out / "17_crowds.csv", index=False)
-    table.round(4).to_csv(out / "17_safety_claims.csv", index=False)
+    write_table(means, "17_crowds")
+    write_table(table, "17_safety_claims")
     print(table.to_string())
 
 
@@ -211,7 +257,6 @@ if __name__ == "__main__":
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--n", type=int, default=10**6, help="at most so many trials of each kind")
-    parser.add_argument("--out", type=Path, default=TABLES)
     parser.add_argument("--work", type=Path, help="folder of finished chunks, to go on from")
     given = parser.parse_args()
-    main(given.n, given.out, given.work)
+    main(given.n, given.work)

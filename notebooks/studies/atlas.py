@@ -1,6 +1,6 @@
 """The sensitivity atlas: the paper's scenarios over gamma, width, the person's pace and the zone's size.
 
-    python tests/studies/atlas.py > notebooks/tables/19_atlas.csv
+    python -m studies.atlas    19_atlas.csv
 
 A row for each run, as in `szlib.simulation.atlas.chart`, with its zone `REFERENCE`; 1,384 runs,
 four minutes on one core.  Notebook 19 drives a part of it anew and holds it against the table.
@@ -8,10 +8,10 @@ four minutes on one core.  Notebook 19 drives a part of it anew and holds it aga
 
 from __future__ import annotations
 
-import sys
 from itertools import product
 
 from szlib.simulation.atlas import REFERENCE, AtlasCell, run_atlas
+from szlib.workbook.record import write_table
 
 PACES, SIZES = (0.3, 0.5, 0.8), (0.5, 0.75, 1.0, 1.25)
 CELLS = [
@@ -31,4 +31,4 @@ CELLS = [
 ]
 
 if __name__ == "__main__":
-    run_atlas(CELLS, REFERENCE, n_jobs=1).round(4).to_csv(sys.stdout, index=False)
+    write_table(run_atlas(CELLS, REFERENCE, n_jobs=1), "19_atlas")

@@ -1,12 +1,12 @@
 """Respect or emptiness: the tables of notebook 15.
 
-python tests/studies/respect.py nobody      15_nobody.csv     the test without interaction, 100 seeds
-python tests/studies/respect.py sites       15_sites.csv      radii, intervals and p-values on the real data
-python tests/studies/respect.py n-curve     15_n_curve.csv    hull and respect zone by number of encounters
-python tests/studies/respect.py changes     15_changes.csv    the radius at Grand Central, one thing changed
+python -m studies.respect nobody      15_nobody.csv     the test without interaction, 100 seeds
+python -m studies.respect sites       15_sites.csv      radii, intervals and p-values on the real data
+python -m studies.respect n-curve     15_n_curve.csv    hull and respect zone by number of encounters
+python -m studies.respect changes     15_changes.csv    the radius at Grand Central, one thing changed
 
-Set PYTHONPATH=tests. They go to notebooks/tables.
-The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/ and gc/).
+They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/ and gc/).  Rows of the
+site "plaza", a small one, are computed again in each run of notebook 15.
 """
 
 from __future__ import annotations
@@ -14,23 +14,22 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import joblib
 import numpy as np
 import pandas as pd
-from helpers.noninteracting_crowd import noninteracting_crowd
+from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.parallel import run_tasks
 from szlib.tracks.clock import to_clock
 from szlib.tracks.sites import GRAND_CENTRAL_RATE, read_grand_central
-from szlib.zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
-from szlib.zones.hulls import hull_vertices, slice_hull
-from szlib.zones.outliers import complementary_points
+from szlib.workbook.record import write_table
 
-TABLES = Path(__file__).parents[2] / "notebooks" / "tables"
 GRAND_CENTRAL = szlib.Square(x=(10.0, 40.0), y=(10.0, 50.0))
 """The hall without its walls (measured)."""
 SETS = {
@@ -43,6 +42,8 @@ SETS = {
 }
 SPEED = 1.1
 """Speed of the hull's zone [m/s]."""
+PLAZA_KINDS = ("all", "strangers")
+"""Those of a small plaza: it has few others."""
 RESAMPLES, DRAWS = 100, 30
 HULLS = 100_000
 """Samples of the null model whose hulls are found, at most: LOF is slow."""
@@ -53,14 +54,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("study", choices=["nobody", "sites", "n-curve", "changes"])
     parser.add_argument("--seeds", type=int, default=100)
-    parser.add_argument("--sites", nargs="+", default=["atc-1hz", "grand-central"])
+    parser.add_argument("--sites", nargs="+", default=["atc-1hz", "grand-central", "plaza"])
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--cache", type=Path, default=Path("results/null"), help="where null models are kept")
+    parser.add_argument(
+        "--cache", type=Path, default=Path("../results/null"), help="where null models are kept"
+    )
     asked = parser.parse_args()
     study = {"nobody": nobody, "sites": sites, "n-curve": n_curve, "changes": changes}[asked.study]
     table = pd.DataFrame(study(asked))
-    TABLES.mkdir(exist_ok=True)
-    table.to_csv(TABLES / f"15_{asked.study.replace('-', '_')}.csv", index=False, float_format="%.4g")
+    write_table(table, f"15_{asked.study.replace('-', '_')}")
     print(table.to_string())
 
 
@@ -87,11 +89,24 @@ def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
     return rows
 
 
+def recompute_nobody(row: pd.Series) -> dict[str, object]:
+    """A row, again."""
+    return {each["kinds"]: each for each in one_crowd(int(row["seed"]), int(row["bunch"]))}[row["kinds"]]
+
+
 # --- real sites --------------------------------------------------------------------------------------
 
 
 def load(site: str) -> tuple[pd.DataFrame, szlib.Square, int]:
     """Tracks, square and number of shifts of a site."""
+    if site == "plaza":
+        with tempfile.TemporaryDirectory() as folder:
+            settings = szlib.PlazaSettings(n_encounters=600)
+            return (
+                szlib.read_tracks(szlib.make_plaza(Path(folder) / "plaza.csv", settings=settings)),
+                szlib.ATC_SQUARE,
+                3,
+            )
     root = Path(os.environ.get("SZLIB_DATA_DIR", "."))
     if site == "atc-1hz":
         return szlib.read_tracks(sorted((root / "atc-1hz").glob("*.csv"))), szlib.ATC_SQUARE, 100
@@ -104,42 +119,53 @@ def data_and_null(
     """Samples of a site and its null model, kept between studies."""
     kept = asked.cache / f"{site}-{min_distance:g}.joblib"
     if not kept.exists():
-        tracks, square, shifts = load(site)
-        found = {"square": square, "min_distance": min_distance}
-        samples = szlib.find_encounters(tracks, **found)
-        null = szlib.null_encounters(tracks, shifts=shifts, n_jobs=asked.jobs, **found)
         kept.parent.mkdir(parents=True, exist_ok=True)
-        joblib.dump((samples, null), kept)
+        joblib.dump(find_both(site, min_distance, asked.jobs), kept)
     return joblib.load(kept)
+
+
+def find_both(site: str, min_distance: float, n_jobs: int = 1) -> tuple[pd.DataFrame, szlib.NullEncounters]:
+    """Samples of a site and its null model."""
+    tracks, square, shifts = load(site)
+    found = {"square": square, "min_distance": min_distance}
+    samples = szlib.find_encounters(tracks, **found)
+    return samples, szlib.null_encounters(tracks, shifts=shifts, n_jobs=n_jobs, progress=False, **found)
 
 
 def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
     """One row a site, a min_distance, a set of kinds; intervals from resampled pairs of people."""
+    for site, min_distance, (name, kinds) in product(asked.sites, (1.0, 0.0), SETS.items()):
+        samples, null = data_and_null(site, min_distance, asked)
+        data, against = szlib.of_kind(samples, kinds), null.of_kind(kinds)
+        if site == "plaza" and name not in PLAZA_KINDS:
+            continue
+        row = {"site": site, "min_distance": min_distance, "kinds": name}
+        row |= describe_site(data, against, 5 if site == "plaza" else RESAMPLES)
+        print(row, file=sys.stderr, flush=True)
+        yield row
+
+
+def describe_site(data: pd.DataFrame, null: szlib.NullEncounters, resamples: int) -> dict[str, float]:
+    """Numbers of encounters, radii with intervals, p-values and sizes of hulls of one set of kinds."""
     theta = np.radians([0.0, 90.0, 180.0, 270.0])
-    for site in asked.sites:
-        for min_distance in (1.0, 0.0):
-            samples, null = data_and_null(site, min_distance, asked)
-            for name, kinds in SETS.items():
-                data, against = szlib.of_kind(samples, kinds), null.of_kind(kinds)
-                test = szlib.null_test(data, against)
-                bodies = szlib.null_test(data, against, excluded_below=0.5)
-                fit = szlib.fit_respect(data, against)
-                radii = [np.r_[test.radius, fit.radii(theta)], *resampled(data, against, theta)]
-                low, high = np.percentile(radii[1:], [2.5, 97.5], axis=0)
-                row = {"site": site, "min_distance": min_distance, "kinds": name}
-                row |= {"encounters": data["encounter"].nunique(), "within_2m": test.n_encounters}
-                row |= {"null_encounters": len(against.encounters) / null.shifts, "shifts": null.shifts}
-                for i, where in enumerate(("radius", "ahead", "left", "behind", "right")):
-                    row |= {where: radii[0][i], f"{where}_low": low[i], f"{where}_high": high[i]}
-                row |= {"null_radius_high": np.nanpercentile(null_radii(against), 97.5)}
-                row |= {"softness": fit.softness, "careless": fit.careless}
-                row |= {"p_value": test.p_value, "p_value_beyond_0.5m": bodies.p_value}
-                row |= {"hull_a": hull_a(data)}
-                few = max(1, min(null.shifts, HULLS * null.shifts // max(len(against.samples), 1)))
-                hulls = [hull_a(against.one(k)) for k in range(few)]
-                row |= {"null_hull_a": np.nanmedian(hulls) if np.isfinite(hulls).any() else np.nan}
-                print(row, file=sys.stderr, flush=True)
-                yield row
+    test = szlib.null_test(data, null)
+    bodies = szlib.null_test(data, null, excluded_below=0.5)
+    fit = szlib.fit_respect(data, null)
+    radii = [np.r_[test.radius, fit.radii(theta)], *resampled(data, null, theta, resamples)]
+    low, high = np.percentile(radii[1:], [2.5, 97.5], axis=0)
+    row = {"encounters": data["encounter"].nunique(), "within_2m": test.n_encounters}
+    row |= {"null_encounters": len(null.encounters) / null.shifts, "shifts": null.shifts}
+    for i, where in enumerate(("radius", "ahead", "left", "behind", "right")):
+        row |= {where: radii[0][i], f"{where}_low": low[i], f"{where}_high": high[i]}
+    row |= {"null_radius_high": np.nanpercentile(null_radii(null), 97.5)}
+    row |= {"softness": fit.softness, "ignoring_share": fit.ignoring_share}
+    row |= {"p_value": test.p_value, "p_value_beyond_0.5m": bodies.p_value}
+    few = max(1, min(null.shifts, HULLS * null.shifts // max(len(null.samples), 1)))
+    hulls = [hull_a(null.one(k)) for k in range(few)]
+    return row | {
+        "hull_a": hull_a(data),
+        "null_hull_a": np.nanmedian(hulls) if np.isfinite(hulls).any() else np.nan,
+    }
 
 
 def null_radii(null: szlib.NullEncounters) -> list[float]:
@@ -154,12 +180,21 @@ def null_radii(null: szlib.NullEncounters) -> list[float]:
     return radii
 
 
-def resampled(samples: pd.DataFrame, null: szlib.NullEncounters, theta: np.ndarray) -> Iterator[np.ndarray]:
+def recompute_sites(row: pd.Series) -> dict[str, float]:
+    """A row of the plaza, again."""
+    samples, null = find_both("plaza", row["min_distance"])
+    kinds = SETS[row["kinds"]]
+    return describe_site(szlib.of_kind(samples, kinds), null.of_kind(kinds), 5)
+
+
+def resampled(
+    samples: pd.DataFrame, null: szlib.NullEncounters, theta: np.ndarray, resamples: int
+) -> Iterator[np.ndarray]:
     """Radius of all bearings, and radii in directions theta, of resampled pairs of people."""
     pair = pairs(samples)
     against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
     rng = np.random.default_rng(0)
-    for _ in range(RESAMPLES):
+    for _ in range(resamples):
         drawn = np.bincount(rng.integers(pair.max() + 1, size=pair.max() + 1), minlength=pair.max() + 1)
         data = szlib.OccupancyHistogram.from_samples(samples, r_max=null.r_max, weights=drawn[pair])
         if data.counts.any():
@@ -176,10 +211,8 @@ def pairs(samples: pd.DataFrame) -> np.ndarray:
 def hull_a(samples: pd.DataFrame) -> float:
     """Semi-major axis of the paper's zone at 1.1 m/s [m]; NaN where it is undefined."""
     try:
-        kept = szlib.remove_outliers(samples, fraction=0.002, r_max=2.0, n_neighbours=20)
-        points = np.column_stack([complementary_points(kept, r_max=2.0), kept["speed"]])
-        section = slice_hull(hull_vertices(points), SPEED, r_max=2.0)
-        return minimum_enclosing_ellipse_of_curve(section.boundary, section.corner_angles).semi_axes[0]
+        zone = szlib.SocialZone.fit(samples, method="paper", speeds=(SPEED,), n_resamples=0)
+        return zone.ellipses[SPEED].semi_axes[0]
     except szlib.SzlibError:
         return np.nan
 
@@ -189,21 +222,38 @@ def hull_a(samples: pd.DataFrame) -> float:
 
 def n_curve(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
     """One row a site, a set of kinds, a number of encounters drawn without replacement."""
-    for site in asked.sites:
+    for site, name in product(asked.sites, ("all", "strangers", "opposite, crossing")):
         samples, null = data_and_null(site, 1.0, asked)
-        for name in ("all", "strangers", "opposite, crossing"):
-            data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
-            others = szlib.OccupancyHistogram.from_samples(against.samples, r_max=null.r_max)
-            total = data["encounter"].nunique()
-            for n in sorted({*(size for size in SIZES if size < total), total}):
-                drawn = pd.DataFrame(draws(data, against, others, n, DRAWS if n < total else 1))
-                row = {"site": site, "kinds": name, "encounters": n, "draws": len(drawn)}
-                for column in drawn:
-                    row[column] = drawn[column].mean()
-                    row |= {f"{column}_low": drawn[column].quantile(0.025)}
-                    row |= {f"{column}_high": drawn[column].quantile(0.975)}
-                print(row, file=sys.stderr, flush=True)
-                yield row
+        data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
+        total = data["encounter"].nunique()
+        if site == "plaza" and name not in PLAZA_KINDS:
+            continue
+        for n in sorted({*(size for size in SIZES if size < total), total}):
+            times = 1 if n == total else 3 if site == "plaza" else DRAWS
+            row = {"site": site, "kinds": name, "encounters": n, "draws": times}
+            row |= describe_draws(data, against, n, times)
+            print(row, file=sys.stderr, flush=True)
+            yield row
+
+
+def describe_draws(data: pd.DataFrame, null: szlib.NullEncounters, n: int, times: int) -> dict[str, float]:
+    """Mean and interval of what `draws` gives."""
+    against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
+    drawn = pd.DataFrame(draws(data, null, against, n, times))
+    row: dict[str, float] = {}
+    for column in drawn:
+        row[column] = drawn[column].mean()
+        row |= {f"{column}_low": drawn[column].quantile(0.025)}
+        row |= {f"{column}_high": drawn[column].quantile(0.975)}
+    return row
+
+
+def recompute_n_curve(row: pd.Series) -> dict[str, float]:
+    """A row of the plaza, again."""
+    samples, null = find_both("plaza", 1.0)
+    kinds = SETS[row["kinds"]]
+    n, times = int(row["encounters"]), int(row["draws"])
+    return describe_draws(szlib.of_kind(samples, kinds), null.of_kind(kinds), n, times)
 
 
 def draws(
@@ -249,36 +299,46 @@ FEW = 5
 
 def changes(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
     """One row a change, a set of kinds: the fitted radius, its interval, and where bins of g cross 1/2."""
-    for change, how in CHANGES.items():
-        found = changed(asked, **how) if how else data_and_null("grand-central", 1.0, asked)
+    cases = [("grand-central", change) for change in CHANGES] + [("plaza", "nothing")]
+    for site, change in cases:
+        how = CHANGES[change]
+        found = changed(asked, **how) if how else data_and_null(site, 1.0, asked)
         for name, kinds in KINDS_OF.items():
             data, null = szlib.of_kind(found[0], kinds), found[1].of_kind(kinds)
-            data = data[data["distance"] < null.r_max]
-            against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
-            pair = pairs(data)
-            rng, drawn = np.random.default_rng(0), [np.ones(len(data))]
-            drawn += [
-                rng.multinomial(pair.max() + 1, np.full(pair.max() + 1, 1 / (pair.max() + 1)))[pair]
-                for _ in range(RESAMPLES)
-            ]
-            weighted = [
-                szlib.OccupancyHistogram.from_samples(data, r_max=null.r_max, weights=weights)
-                for weights in drawn
-            ]
-            row = {
-                "change": change,
-                "kinds": name,
-                "shifts": null.shifts,
-                "encounters": data["encounter"].nunique(),
-            }
-            for how_measured, radius in (("fitted", szlib.respect_radius), ("binned", half_in_bins)):
-                found_radii = [radius(each, against) for each in weighted]
-                row[how_measured] = found_radii[0]
-                row[f"{how_measured}_low"], row[f"{how_measured}_high"] = np.percentile(
-                    found_radii[1:], [2.5, 97.5]
-                )
+            if site == "plaza" and name not in PLAZA_KINDS:
+                continue
+            row = {"site": site, "change": change, "kinds": name, "shifts": null.shifts}
+            row |= describe_radii(data, null, 5 if site == "plaza" else RESAMPLES)
             print(row, file=sys.stderr, flush=True)
             yield row
+
+
+def describe_radii(data: pd.DataFrame, null: szlib.NullEncounters, resamples: int) -> dict[str, float]:
+    """The radius fitted and in bins, with intervals, of one set of kinds."""
+    data = data[data["distance"] < null.r_max]
+    against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
+    pair = pairs(data)
+    rng, drawn = np.random.default_rng(0), [np.ones(len(data))]
+    drawn += [
+        rng.multinomial(pair.max() + 1, np.full(pair.max() + 1, 1 / (pair.max() + 1)))[pair]
+        for _ in range(resamples)
+    ]
+    weighted = [
+        szlib.OccupancyHistogram.from_samples(data, r_max=null.r_max, weights=weights) for weights in drawn
+    ]
+    row: dict[str, float] = {"encounters": data["encounter"].nunique()}
+    for how_measured, radius in (("fitted", szlib.respect_radius), ("binned", half_in_bins)):
+        radii = [radius(each, against) for each in weighted]
+        low, high = np.percentile(radii[1:], [2.5, 97.5])
+        row |= {how_measured: radii[0], f"{how_measured}_low": low, f"{how_measured}_high": high}
+    return row
+
+
+def recompute_changes(row: pd.Series) -> dict[str, float]:
+    """A row of the plaza, again."""
+    samples, null = find_both("plaza", 1.0)
+    kinds = KINDS_OF[row["kinds"]]
+    return describe_radii(szlib.of_kind(samples, kinds), null.of_kind(kinds), 5)
 
 
 def changed(

@@ -1,4 +1,4 @@
-"""Outliers of pooled plazas, for notebook 03: `python tests/studies/pooled_plazas.py` (about half an hour).
+"""Outliers of pooled plazas, for notebook 03: `python -m studies.pooled_plazas` (about half an hour).
 
 Writes notebooks/tables/03_outliers.csv: one row for each share and pace of intruders, family of seeds,
 number of plazas pooled, and rule; with what the rule removed, its precision and recall for samples of
@@ -18,8 +18,9 @@ import szlib
 from szlib.errors import ZoneError
 from szlib.plaza import accuracy
 from szlib.plaza.settings import RUSHING_INTRUDERS, SLOW_INTRUDERS
+from szlib.workbook.record import write_table
 
-TABLE = Path(__file__).parents[2] / "notebooks" / "tables" / "03_outliers.csv"
+TABLE = "03_outliers"
 RULES: dict[str, dict[str, float | None]] = {
     "encounters": {"fraction": None, "n_neighbours": None},
     "0.2 %, 20 neighbours": {"fraction": 0.002, "n_neighbours": 20},
@@ -76,6 +77,13 @@ def judged(
     return {"removed": removed.mean(), "precision": precision, "recall": recall, "error": error}
 
 
+def recompute(row: pd.Series) -> dict[str, float]:
+    """What a rule does to a single plaza, again."""
+    settings = szlib.PlazaSettings(intruders=row["intruders"], intruder_speeds=PACES[row["pace"]])
+    samples = plaza_samples(int(row["first_seed"]), settings)
+    return judged(samples, settings, RULES[row["rule"]])
+
+
 def main() -> None:
     rows = []
     cases = [(*intruders, family) for intruders in INTRUDERS for family in FAMILIES]
@@ -89,7 +97,7 @@ def main() -> None:
             for name, rule in RULES.items():
                 if rule["n_neighbours"] != 200 or (share, pace, family, plazas) in COSTLY:
                     rows.append(case | {"rule": name} | judged(samples, settings, rule))
-            pd.DataFrame(rows).round(4).to_csv(TABLE, index=False)
+            write_table(pd.DataFrame(rows), TABLE)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """The paper's claims on every data set, and what moves the zone most: the tables of notebook 16.
 
-python tests/studies/claims.py claims        16_claims.csv        effect, interval, verdict: claim by data set
+python -m studies.claims claims        16_claims.csv        effect, interval, verdict: claim by data set
                                                                     (of delays: the range over scenarios)
-python tests/studies/claims.py sensitivity   16_sensitivity.csv   the real day, each parameter varied alone
+python -m studies.claims sensitivity   16_sensitivity.csv   the real day, each parameter varied alone
 
 They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/, magni/, eth/).
 """
@@ -14,7 +14,7 @@ import os
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,12 +25,15 @@ import szlib
 from szlib.plaza.accuracy import true_kinds
 from szlib.simulation import paper_claims as claims
 from szlib.tracks import sites
+from szlib.workbook.record import write_table
 from szlib.zones.outliers import is_outlier
 from szlib.zones.sensitivity import FIT, sensitivity
 
-TABLES = Path(__file__).parents[2] / "notebooks" / "tables"
 DATA = Path(os.environ.get("SZLIB_DATA_DIR", "."))
-RESAMPLES = 200
+METHODS = ("paper", "hull", "quantile")
+"""The paper's zone to the letter; the same hull with whole encounters as outliers; the default."""
+RESAMPLES, FEW = 200, 2
+"""Resamples for the intervals, and of those that are computed again in each run of notebook 16 (`probe`)."""
 DELAYED_BY_SIZE = "a larger zone makes the robot later"
 HOURS_A_DAY = 11.0
 """That ATC is recorded (09:20 to 20:27 on the first day)."""
@@ -61,16 +64,31 @@ SITES: dict[str, tuple[Callable[[], pd.DataFrame], szlib.Square]] = {
 
 
 def of_site(name: str) -> Iterator[pd.DataFrame]:
-    """The findings of a site, method by method."""
+    """The findings of a site, method by method; `probe` is the low end of an interval of few resamples."""
     load, square = SITES[name]
     tracks = load()
-    samples = szlib.find_encounters(tracks, square=square)
+    samples = szlib.find_encounters(tracks, settings=szlib.EncounterSettings.paper(square))
     plain = [claims.measure_passing_side(samples), lof(name, samples), as_many(name, samples, tracks)]
-    yield claims.tabulate_findings(plain, data=name).assign(method="-")
-    for method in ("hull", "quantile"):
+    yield claims.tabulate_findings(plain, data=name).assign(method="-", probe=[each.low for each in plain])
+    for method in METHODS:
         for group, people in (("everybody", samples), ("strangers", szlib.of_kind(samples, "strangers"))):
-            found = list(of_zone(people, method))
-            yield claims.tabulate_findings(found, data=name).assign(method=f"{method}, {group}")
+            found, few = (of_zone(people, method, resamples) for resamples in (RESAMPLES, FEW))
+            table = claims.tabulate_findings(found.values(), data=name)
+            yield table.assign(method=f"{method}, {group}", probe=[each.low for each in few.values()])
+
+
+def recompute(row: pd.Series) -> dict[str, float]:
+    """Effect, number and probe of a row of the plaza, again."""
+    tracks = plaza()
+    samples = szlib.find_encounters(tracks, settings=szlib.EncounterSettings.paper(szlib.ATC_SQUARE))
+    if row["method"] == "-":
+        all_found = [claims.measure_passing_side(samples), lof("plaza", samples)]
+        found = {each.claim: each for each in all_found}[row["claim"]]
+    else:
+        method, group = row["method"].split(", ")
+        people = samples if group == "everybody" else szlib.of_kind(samples, group)
+        found = of_zone(people, method, FEW, (row["claim"],))[row["claim"]]
+    return {"effect": found.effect, "n": found.n, "probe": found.low}
 
 
 def lof(name: str, samples: pd.DataFrame) -> claims.Finding:
@@ -97,21 +115,45 @@ def later(zone: szlib.SocialZone) -> claims.Finding:
     return replace(found, claim=DELAYED_BY_SIZE, adequate=zone.adequate(1.1))
 
 
-def of_zone(people: pd.DataFrame, method: str) -> Iterator[claims.Finding]:
+CLAIMS: dict[str, tuple[Callable[[szlib.SocialZone], claims.Finding], tuple[float, ...]]] = {
+    claims.LARGER_AHEAD: (claims.measure_reach_ahead, (1.1,)),
+    claims.GROWS_WITH_SPEED: (claims.measure_growth_with_speed, (0.7, 1.3)),
+    DELAYED_BY_SIZE: (later, (1.1,)),
+}
+"""Each claim about a zone: how it is measured, and the speeds of the zone [m/s]."""
+
+
+def of_zone(
+    people: pd.DataFrame, method: str, resamples: int, asked: Iterable[str] = tuple(CLAIMS)
+) -> dict[str, claims.Finding]:
     """The claims about a zone; undecided where there is no zone, or too few people on some side."""
-    for claim, text, speeds in (
-        (claims.measure_reach_ahead, claims.LARGER_AHEAD, (1.1,)),
-        (claims.measure_growth_with_speed, claims.GROWS_WITH_SPEED, (0.7, 1.3)),
-        (later, DELAYED_BY_SIZE, (1.1,)),
-    ):
+    found = {}
+    for claim in asked:
+        measure, speeds = CLAIMS[claim]
         try:
-            zone = szlib.SocialZone.fit(people, method=method, speeds=speeds, n_resamples=RESAMPLES)
-            yield claim(zone)
+            zone = szlib.SocialZone.fit(people, method=method, speeds=speeds, n_resamples=resamples)
+            found[claim] = measure(zone)
         except szlib.SzlibError as error:
             print(f"{method}: {error}", file=sys.stderr)
-            yield claims.Finding(
-                text, np.nan, np.nan, np.nan, "", people["encounter"].nunique(), adequate=False
-            )
+            n = people["encounter"].nunique()
+            found[claim] = claims.Finding(claim, np.nan, np.nan, np.nan, "", n, adequate=False)
+    return found
+
+
+VARIED: dict[str, Mapping[str, Sequence[float]]] = {
+    "paper": FIT,
+    "quantile": {"r_max": (1.5, 2.5), "q": (0.02, 0.1)},
+}
+"""Options of each method that are varied, and their values besides the defaults."""
+
+
+def moved(name: str, methods: Iterable[str] = tuple(VARIED)) -> Iterator[pd.DataFrame]:
+    """What moves the zone of a site, method by method."""
+    load, square = SITES[name]
+    tracks = load()
+    for method in methods:
+        table = sensitivity(tracks, area=square, method=method, fit=VARIED[method])
+        yield table.assign(method=method, data=name)
 
 
 def main() -> None:
@@ -124,13 +166,8 @@ def main() -> None:
         if asked.study == "claims":
             table = pd.concat([part for name in asked.sites for part in of_site(name)])
         else:
-            tracks, square = SITES["ATC day"][0](), szlib.ATC_SQUARE
-            hull, quantile = (
-                sensitivity(tracks, area=square, method=method, fit=fit).assign(method=method)
-                for method, fit in (("hull", FIT), ("quantile", {"r_max": (1.5, 2.5), "q": (0.02, 0.1)}))
-            )
-            table = pd.concat([hull, quantile])
-    table.to_csv(TABLES / f"16_{asked.study}.csv", index=False, float_format="%.4g")
+            table = pd.concat([part for name in ("ATC day", "plaza") for part in moved(name)])
+    write_table(table, f"16_{asked.study}")
     print(table.to_string())
 
 
