@@ -342,7 +342,7 @@ slow = float(alone.speed[middle].min() / alone.speed.max())
 record.claim("without the person the robot does not slow down in the corridor", slow > 0.8, slow)
 
 # %%
-atlas = pd.read_csv("tables/19_atlas.csv").query("scene == 'corridor' and width == 4.6 and pace == 0.5")
+atlas = read_table("19_atlas").query("scene == 'corridor' and width == 4.6 and pace == 0.5")
 arrives = atlas[atlas["size"] == 1.0].set_index("gamma")["time_to_goal"]
 record.claim(
     "gamma from 0.03 to 0.07 changes the time to the goal of the corridor by 20 % or more",
@@ -356,7 +356,7 @@ record.claim(
 )
 
 # %%
-sites = pd.read_csv("tables/15_sites.csv").query("min_distance == 1").set_index(["site", "kinds"])
+sites = read_table("15_sites").query("min_distance == 1").set_index(["site", "kinds"])
 for name, site in {"ATC day": "atc-1hz", "Grand Central": "grand-central"}.items():
     for kinds in ("strangers", "opposite, crossing"):
         p = float(sites.loc[(site, kinds), "p_value"])
