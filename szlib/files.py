@@ -162,12 +162,8 @@ def _remove_abandoned(folder: Path) -> None:
     """Remove unfinished files of processes that were killed."""
     for entry in folder.glob(f"{_UNFINISHED}*"):
         with suppress(OSError):
-            if _is_abandoned(entry):
+            if time.time() - entry.stat().st_mtime > _ABANDONED:
                 entry.unlink()
-
-
-def _is_abandoned(entry: Path) -> bool:
-    return time.time() - entry.stat().st_mtime > _ABANDONED
 
 
 @contextmanager

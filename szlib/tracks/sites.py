@@ -40,7 +40,6 @@ EDINBURGH_RATE = 9.0  # approximate frames a second of Edinburgh's files; the ra
 EDINBURGH_PIXEL, EDINBURGH_ROWS = 0.0247, 480  # metres in a pixel on the floor, and rows of an image
 # Samples of THOR-MAGNI closer than this [s] belong to two sessions (0.01 s between them, 0.4 within).
 _SESSION = 0.2
-_MAGNI = ["Time", "ag_id", "x", "y", "data_label"]
 _TRACK = re.compile(r"TRACK\.R(\d+)\s*=\s*\[(.*?)\]\s*;\s*$", flags=re.MULTILINE)
 
 
@@ -278,7 +277,7 @@ def _read_magni_rows(path: Path) -> pd.DataFrame:
         rows = pd.read_csv(path)
     except (OSError, ValueError) as error:  # pandas' own errors are ValueErrors
         raise DataError(f"{path}: cannot be read as CSV ({error}); expected a file of THOR-MAGNI") from error
-    check_columns(rows, _MAGNI)
+    check_columns(rows, ["Time", "ag_id", "x", "y", "data_label"])
     times = np.unique(rows["Time"])
     session = np.searchsorted(times[1:][np.diff(times) < _SESSION], rows["Time"], side="right")
     helmet = rows["ag_id"].astype(str).str.extract(r"(\d+)$")[0]
