@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -34,8 +34,8 @@ from .style import (
     pick_colours,
 )
 
-if TYPE_CHECKING:
-    from ...zones.social_zone import SocialZone
+FittedZone = Any
+"""A `szlib.SocialZone`; it imports this module for its method `plot`, so it cannot be imported here."""
 
 _LINES = ("-", "--", ":", "-.")
 
@@ -71,7 +71,7 @@ def plot_outliers(
 
 
 def plot_hull(
-    zone: SocialZone,
+    zone: FittedZone,
     speeds: Sequence[float] = (0.7, 0.9, 1.1, 1.3),
     *,
     points: np.ndarray | None = None,
@@ -125,7 +125,7 @@ def plot_hull(
 
 
 def plot_zone(
-    zone: SocialZone, speed: float, *, truth: Ellipse | None = None, ax: Axes | None = None
+    zone: FittedZone, speed: float, *, truth: Ellipse | None = None, ax: Axes | None = None
 ) -> Axes:
     """Plot a zone's boundary at one speed, its ellipse and the ellipse's interval.
 
@@ -170,7 +170,7 @@ def plot_zone(
     return label_metres(ax, f"Minimum social zone at {speed:g} m/s{warning}", person=True)
 
 
-def plot_zones(zones: SocialZone | Mapping[float, Ellipse], *, ax: Axes | None = None) -> Axes:
+def plot_zones(zones: FittedZone | Mapping[float, Ellipse], *, ax: Axes | None = None) -> Axes:
     """Plot ellipses by speed around a person who walks to the right (paper, fig. 5).
 
     Parameters
@@ -246,7 +246,7 @@ def plot_pair_correlation(
     return label_metres(ax, person=True)
 
 
-def _draw_interval(ax: Axes, zone: SocialZone, speed: float, **style: Any) -> None:
+def _draw_interval(ax: Axes, zone: FittedZone, speed: float, **style: Any) -> None:
     """Fill the interval of the ellipse's radius, in the directions where both ends are known."""
     bands = None if zone.uncertainty is None else zone.uncertainty.bands
     if bands is None or not (bands["speed"] == speed).any():
