@@ -232,8 +232,10 @@ record.figure(fig, "receding")
 fig, panels = plt.subplots(1, 2, figsize=(11, 3.4), sharey=True, layout="constrained")
 for ax, name, values in zip(panels, "RP", ((1, 30, 100), (100, 10, 0)), strict=True):
     for value, line in zip(values, ("-", "--", ":"), strict=True):
-        decide = plan_in_1d(**{"P": 100, "Q": 10, "R": 1, "rows": 0} | {name: value})
-        run = drive(lambda x, v, decide=decide: float(decide(x, v)[1][0]))
+        run = plain  # P = 100, R = 1: driven above
+        if value != values[0]:
+            decide = plan_in_1d(**{"P": 100, "Q": 10, "R": 1, "rows": 0} | {name: value})
+            run = drive(lambda x, v, decide=decide: float(decide(x, v)[1][0]))
         ax.plot(t, run[0], line, color=figures.BLUE, label=f"{name} = {value}")
     ax.axhline(5, color=figures.GREY, linewidth=0.8)
     ax.set(xlabel="time [s]", ylabel="x [m]", title=f"The weight {name}")
@@ -264,8 +266,9 @@ opti.subject_to(x[:, 0] == x0)
 opti.subject_to(x[:, 1:] == A @ x[:, :-1] + B @ u)
 
 # %% [markdown]
-# **Limits**: each acceleration, and the Euclidean speed. A limit on each component of the velocity would let
-# the robot drive 1.41 m/s on a diagonal.
+# **Limits**: each acceleration, and the Euclidean speed. The paper says only "maximum speed 1 m/s"; that it is the
+# Euclidean speed is ours. A limit on each component of the velocity would let the robot drive 1.41 m/s on a
+# diagonal.
 
 # %%
 opti.subject_to(opti.bounded(-a_max, ca.vec(u), a_max))
@@ -361,15 +364,17 @@ record.figure(fig, "corridor")
 # %% [markdown]
 # ## The same as szlib's?
 #
-# `szlib.MPCCBF` with either of its solvers, asked in states along this run. `head_on_share=0` switches off the one
-# thing that it adds to the problem of the paper, a side for people met exactly head-on (notebook 07). Both
+# `szlib.MPCCBF` with `MPCSettings.paper()` and either of its solvers, asked in states along this run. Ours,
+# `MPCSettings()`, adds one thing to the problem of the paper: a rule for the side on which a person is passed who is
+# met head-on. It acts fully while the goal lies within `head_on_share` = 0.25 of the half-angle under which the robot
+# sees the person's zone, and fades out up to twice that share. In the paper's settings the share is 0. Both
 # IPOPTs go on to the last digits; the SQP stops where it expects no more than 1e-4 m/s² from going on.
 
 # %%
 rows = []
 for k in (k for k in range(0, 100, 10) if tuple(path[k]) not in unsolved):
     for solver in ("sqp", "ipopt"):
-        settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max, head_on_share=0.0, solver=solver)
+        settings = szlib.MPCSettings.paper(gamma=gamma, N=N, N_h=N_h, a_max=a_max, solver=solver)
         controller = szlib.MPCCBF(zone, walls=scene.walls, settings=settings)
         step = controller.step(path[k], scene.goal, [scene.people[0].after(k * dt)])
         rows.append((k * dt, solver, np.abs(step.control - controls[k]).max()))
@@ -393,9 +398,9 @@ record.key["largest difference of an acceleration [m/s²]"] = float(table.to_num
 # *The sum over $\mathbf u$.* It begins at $k = 1$ there and at $k = 0$ here: $\mathbf u_0$ is the one that is
 # applied, and without a price it would be as large as it may.
 #
-# *The sets $\mathcal X_k$ and $\mathcal U_k$.* "Maximum speed 1 m/s" is taken as Euclidean; the paper gives
-# no bound on $\mathbf u$, here it is `a_max` on each axis, as a robot without one could do anything at the
-# last moment.
+# *The sets $\mathcal X_k$ and $\mathcal U_k$.* The paper says only "maximum speed 1 m/s"; the Euclidean speed is
+# ours. It gives no bound on $\mathbf u$; here it is `a_max` on each axis, as a robot without one could do anything
+# at the last moment.
 #
 # *$\Delta h(\mathbf x_k, \mathbf u_k)$.* Here $h(\mathbf x_{k+1}, k+1) - h(\mathbf x_k, k)$: the zone moves
 # on within the plan, for the paper's robot knows the person's velocity (sec. 4).
@@ -403,14 +408,17 @@ record.key["largest difference of an acceleration [m/s²]"] = float(table.to_num
 # *$\lVert t \rVert - t$ in eq. 5* is $\lvert t \rvert - t$, for $t$ is a number; and *eq. 6* lacks a minus
 # sign (notebook 06).
 #
-# *The margin* $\epsilon$ is 5 cm in both, but more for walls shorter than 5 m (notebook 12).
+# *The margin* $\epsilon$ is 5 cm for every wall in the paper and in `MPCSettings.paper()`; `MPCSettings()` gives
+# walls shorter than 5 m more (notebook 12).
 #
-# *The solver* is IPOPT in the paper; `szlib` has it and, by default, an SQP with the same answers.
+# *The solver* is IPOPT in the paper and in `MPCSettings.paper()`; that of `MPCSettings()` is an SQP with the same
+# answers.
 #
-# Two things are not in the paper. Somebody who is met exactly head-on can be passed on both sides at the same
-# cost, so a solver may stand still for ever: `pass_side` decides (notebook 07). And where the program has no
-# solution, a solver's guess may lead through a person: then it is solved again with a penalised slack, and
-# says so (notebook 11).
+# Two things are not in the paper. A person who is met head-on can be passed on both sides at nearly the same cost:
+# the smallest tilt of the zone decides, or the robot stops in front of a symmetric one. The rule of the side replaces
+# that, and acts while the goal lies within twice `head_on_share` of the half-angle of the zone; notebook 07 shows what
+# it changes. And where the program has no solution, a solver's guess may lead through a person: then it is solved
+# again with a penalised slack, and says so (notebook 11).
 #
 # **What it means.** The method is a page of code: a model, two limits, a cost, and one inequality for each
 # person and wall. What the other files of `szlib/control` add is what a robot needs besides: speed, proof,

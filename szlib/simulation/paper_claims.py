@@ -24,6 +24,8 @@ from ..errors import DataError, ZoneError
 from ..zones.ellipses import Ellipse
 from ..zones.social_zone import SocialZone
 from .closed_loop import simulate
+from .metrics import compute_metrics
+from .run import Run
 from .scenarios.paper import SCENARIOS
 
 PAPER_RATE = 16_181 / 92  # encounters a day in the paper (sec. 2)
@@ -230,6 +232,22 @@ def compare_chains(paper: Chain, ours: Chain, *, names: Iterable[str] = tuple(SC
         runs = [{"scenario": name, "chain": chain, **_drive(name, *parts)} for chain, parts in chains.items()]
         rows += [row | {"changed": _differs(row, runs[0])} for row in runs]
     return pd.DataFrame(rows)
+
+
+def describe_run(run: Run, claims: Mapping[str, tuple[bool, float]]) -> str:
+    """Describe a `run` of a scenario: its numbers, and which of the `claims` hold, by their texts."""
+    found = compute_metrics(run)
+    arrival = f"after {found['time_to_goal']:.1f} s" if run.success else "not in time"
+    held, failed = (
+        [text for text, (holds, _) in claims.items() if holds == wanted] for wanted in (True, False)
+    )
+    parts = [
+        f"The robot reaches its goal {arrival}. Its least h is {found['min_h']:.2f} m, its least speed "
+        f"{found['min_speed']:.2f} m/s, its side {found['passing_side']}.",
+        f"Claims of the paper that hold: {' '.join(held) or 'none.'}",
+        f"Claims that do not hold: {' '.join(failed) or 'none.'}",
+    ]
+    return " ".join(parts)
 
 
 def _drive(name: str, zone: Ellipse, settings: MPCSettings) -> dict[str, Any]:

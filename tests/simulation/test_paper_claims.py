@@ -233,3 +233,14 @@ def test_a_run_differs_in_a_number_a_side_or_a_claim(change: dict[str, object], 
     assert claims._differs(row | change, row) == differs
     stuck = row | {"time_to_goal": np.nan}
     assert not claims._differs(stuck, stuck)
+
+
+def test_a_run_is_described_with_its_claims() -> None:
+    scenario = szlib.SCENARIOS["passing"]
+    late = szlib.simulate(scenario, szlib.MPCCBF(TILTED), max_time=4.0)
+    text = claims.describe_run(late, {"It goes on.": (False, np.nan), "It waits.": (True, 2.0)})
+    assert text.startswith("The robot reaches its goal not in time. Its least h is ")
+    assert text.endswith("Claims of the paper that hold: It waits. Claims that do not hold: It goes on.")
+    arrived = claims.describe_run(szlib.simulate(scenario, szlib.MPCCBF(TILTED)), {"It waits.": (True, 2.0)})
+    assert "goal after 10." in arrived and "its side right" in arrived
+    assert arrived.endswith("Claims that do not hold: none.")
