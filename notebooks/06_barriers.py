@@ -29,8 +29,7 @@
 # **Afterwards you can** turn a distance into a condition on the next step, and say what gamma does.
 #
 # **Words.** *class K*: of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is
-# gamma times h; *infeasible*: of a step: no plan obeys all rows, so one that violates them least is taken,
-# and flagged.
+# gamma times h.
 
 # %%
 import matplotlib.pyplot as plt

@@ -24,9 +24,12 @@
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [6b - Build the controller yourself](06b_build_a_controller.ipynb)
 # · next: [8 - Meeting in a narrow corridor](08_corridor.ipynb) · [paper](https://arxiv.org/abs/2405.15101):
-# sec. 4, fig. 6a · 15 min to read
+# sec. 4, fig. 6a · 25 min to read
 #
 # **Afterwards you can** say when the robot begins to avoid a person, and what chooses the side.
+#
+# **Words.** *infeasible*: of a step: no plan obeys all rows, so one that violates them least is taken, and
+# flagged.
 
 # %%
 from dataclasses import replace

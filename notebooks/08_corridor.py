@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [7 - Passing a person who stands](07_passing.ipynb) · next: [9 -
-# Yielding by waiting](09_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 10
+# Yielding by waiting](09_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 15
 # min to read
 #
 # **Afterwards you can** say why the robot slows down in a corridor, and speeds up beside the person.

@@ -22,7 +22,7 @@
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [8 - Meeting in a narrow corridor](08_corridor.ipynb) · next: [10 -
 # Yielding by making room](10_making_room.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig.
-# 6c · 10 min to read
+# 6c · 15 min to read
 #
 # **Afterwards you can** say why the robot waits, although no rule tells it to.
 

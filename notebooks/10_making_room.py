@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [9 - Yielding by waiting](09_waiting.ipynb) · next: [11 -
-# Feasibility](11_feasibility.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 15 min
+# Feasibility](11_feasibility.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 20 min
 # to read
 #
 # **Afterwards you can** say why the robot backs out of a passage, although no rule tells it to.

@@ -1,8 +1,7 @@
 """How is it presented? Figures, records of notebooks, their execution, and the command line.
 
 figures       every figure, one file a room
-claims        what data says of the paper's claims: effects, intervals, verdicts
-sensitivity   what moves a zone most
+paper_sentences  every sentence of the paper that can be checked, and its verdict in a run
 exercises     the tasks of the exercise sheets, with their checkers and hints
 folders       the folders of results
 record        what a notebook records, and the data that notebooks share

@@ -44,8 +44,8 @@ def judge_sentences(record: NotebookRecord) -> pd.DataFrame:
 
     Returns
     -------
-    The table of `load_sentences` with the columns verdict, numbers (each check with its result and value) and
-    unknown (checks that were not made, although their notebook was run).
+    The table of `load_sentences` with the columns verdict, numbers (each check with its result and value, one
+    a line) and unknown (checks that were not made, although their notebook was run).
     """
     records = {
         file.stem: json.loads(file.read_text(encoding="utf-8"))["checks"]
@@ -63,7 +63,7 @@ def judge_sentences(record: NotebookRecord) -> pd.DataFrame:
     table["verdict"] = [
         judge(kind, names, checks) for kind, names in zip(table["kind"], table["held_by"], strict=True)
     ]
-    table["numbers"] = ["; ".join(numbers.get(name, name) for name in names) for names in table["held_by"]]
+    table["numbers"] = ["\n".join(numbers.get(name, name) for name in names) for names in table["held_by"]]
     table["unknown"] = [
         [name for name in names if name.split(": ")[0] in made_in and name not in checks]
         for names in table["held_by"]
