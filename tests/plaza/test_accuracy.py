@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pandas as pd
 import pytest
 from studies.pooled_plazas import PACES, TABLE, judged, plaza_samples, pooled
 
 import szlib
-from szlib.plaza import accuracy
+from szlib.plaza import accuracy, generation, stage_encounters
 from szlib.workbook.record import read_table
 
 TOO_FAR, TOO_FAR_WITH_MANY = 0.035, 0.05
@@ -17,8 +19,12 @@ TOO_FAR, TOO_FAR_WITH_MANY = 0.035, 0.05
 
 @pytest.fixture(scope="module")
 def plazas() -> list[pd.DataFrame]:
-    """Six default plazas, together as large as the paper's data."""
-    return [plaza_samples(seed, szlib.PlazaSettings()) for seed in range(6)]
+    """Six default plazas, together as large as the paper's data; each is staged once for file and kinds."""
+    staged = cache(stage_encounters)
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (accuracy, generation):
+            patch.setattr(module, "stage_encounters", staged)
+        return [plaza_samples(seed, szlib.PlazaSettings()) for seed in range(6)]
 
 
 # --- the measures ------------------------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tempfile
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,7 @@ from szlib.plaza.generation import KINDS, make_plaza, positions, stage_encounter
 from szlib.plaza.settings import RUSHING_INTRUDERS, SLOW_INTRUDERS, PlazaSettings
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
-DEFAULT = PlazaSettings()
+DEFAULT, POLITE = PlazaSettings(), PlazaSettings(intruders=0.0)
 ASIDE = PlazaSettings(
     slow_zone=szlib.Ellipse((0.0, -0.06), (0.80, 0.58), 0.2),
     fast_zone=szlib.Ellipse((0.0, -0.06), (0.86, 0.62), 0.2),
@@ -29,10 +31,16 @@ def hull_of(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
     return szlib.SocialZone.fit(samples, method="hull", n_resamples=0, **options)
 
 
-def samples_of(folder: Path, seed: int, settings: PlazaSettings) -> pd.DataFrame:
-    return szlib.find_encounters(
-        szlib.read_tracks(make_plaza(folder / "plaza.csv", seed=seed, settings=settings))
-    )
+@cache
+def tracks_of(seed: int, settings: PlazaSettings) -> pd.DataFrame:
+    """Tracks of a plaza, made once: copy them to change them."""
+    with tempfile.TemporaryDirectory() as folder:
+        return szlib.read_tracks(make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings))
+
+
+@cache
+def samples_of(seed: int, settings: PlazaSettings) -> pd.DataFrame:
+    return szlib.find_encounters(tracks_of(seed, settings))
 
 
 def raw_rows(path: Path) -> pl.DataFrame:
@@ -84,25 +92,24 @@ def raw(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pl.DataFrame]:
     return path, raw_rows(path)
 
 
-def test_tilted_truth_is_found(tmp_path: Path) -> None:
-    zone = hull_of(samples_of(tmp_path, 0, ASIDE))
+def test_tilted_truth_is_found() -> None:
+    zone = hull_of(samples_of(4, ASIDE))
     metres, degrees = errors(zone, ASIDE)
     assert metres < 0.05
     assert degrees < 10
     assert all(zone.ellipse(v).angle > 0 and zone.ellipse(v).center[1] < -0.03 for v in SPEEDS)
 
 
-def test_truth_without_intruders_is_found_with_and_without_outlier_removal(tmp_path: Path) -> None:
-    polite = PlazaSettings(intruders=0.0)
-    samples = samples_of(tmp_path, 2, polite)
+def test_truth_without_intruders_is_found_with_and_without_outlier_removal() -> None:
+    samples = samples_of(4, POLITE)
     for fraction in (0.002, 0.0):
-        metres, degrees = errors(hull_of(samples, fraction=fraction), polite)
+        metres, degrees = errors(hull_of(samples, fraction=fraction), POLITE)
         assert metres < 0.05
         assert degrees < 10
 
 
-def test_intruders_spoil_the_zone_unless_outliers_are_removed(tmp_path: Path) -> None:
-    samples = samples_of(tmp_path, 2, DEFAULT)
+def test_intruders_spoil_the_zone_unless_outliers_are_removed() -> None:
+    samples = samples_of(3, DEFAULT)
     assert errors(hull_of(samples), DEFAULT)[0] < 0.05
     try:
         metres = errors(hull_of(samples, fraction=0.0), DEFAULT)[0]
@@ -111,20 +118,19 @@ def test_intruders_spoil_the_zone_unless_outliers_are_removed(tmp_path: Path) ->
     assert metres > 0.15
 
 
-def test_swapped_x_and_y_are_detected(tmp_path: Path) -> None:
-    tracks = szlib.read_tracks(make_plaza(tmp_path / "plaza.csv", seed=4, settings=ASIDE))
+def test_swapped_x_and_y_are_detected() -> None:
+    tracks = tracks_of(4, ASIDE)
     swapped = tracks.rename(columns={"x": "y", "y": "x", "vx": "vy", "vy": "vx"})
-    assert len(szlib.find_encounters(swapped)) < len(szlib.find_encounters(tracks)) / 2
+    assert len(szlib.find_encounters(swapped)) < len(samples_of(4, ASIDE)) / 2
     square = szlib.Square(x=szlib.ATC_SQUARE.y, y=szlib.ATC_SQUARE.x)
     zone = hull_of(szlib.find_encounters(swapped, square=square))
     assert errors(zone, ASIDE)[1] > 10
 
 
-def test_late_clock_of_some_people_is_detected(tmp_path: Path) -> None:
-    polite = PlazaSettings(intruders=0.0)
-    tracks = szlib.read_tracks(make_plaza(tmp_path / "plaza.csv", seed=4, settings=polite))
+def test_late_clock_of_some_people_is_detected() -> None:
+    tracks = tracks_of(4, POLITE).copy()
     tracks.loc[tracks["id"] % 200 == 0, "t"] += 0.2
-    assert errors(hull_of(szlib.find_encounters(tracks)), polite)[0] > 0.1
+    assert errors(hull_of(szlib.find_encounters(tracks)), POLITE)[0] > 0.1
 
 
 def test_only_intruders_enter_a_zone(staged: pd.DataFrame) -> None:
@@ -180,8 +186,8 @@ def test_slow_intruders_leave_more_samples(tmp_path: Path) -> None:
     assert nearest[SLOW_INTRUDERS] == pytest.approx(nearest[RUSHING_INTRUDERS], abs=0.05)
 
 
-def test_most_pairs_are_detected_as_encounters(tmp_path: Path, staged: pd.DataFrame) -> None:
-    samples = samples_of(tmp_path, 3, DEFAULT)
+def test_most_pairs_are_detected_as_encounters(staged: pd.DataFrame) -> None:
+    samples = samples_of(3, DEFAULT)
     refs = set(samples["ref_id"])
     walkers = 9_190_600 + 200 * np.arange(len(staged))
     assert np.mean([walker in refs for walker in walkers]) > 0.9

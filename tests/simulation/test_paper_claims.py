@@ -88,9 +88,8 @@ def zone_of(people: pd.DataFrame, **options: object) -> szlib.SocialZone:
     return szlib.SocialZone.fit(people, method="quantile", speeds=(0.7, 1.1, 1.3), **options)
 
 
-def test_the_plaza_is_larger_ahead_and_grows_as_it_was_made_to(tmp_path) -> None:
-    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=3))
-    zone = zone_of(szlib.find_encounters(tracks), n_resamples=60)
+def test_the_plaza_is_larger_ahead_and_grows_as_it_was_made_to(plaza: pd.DataFrame) -> None:
+    zone = zone_of(plaza, n_resamples=60)
     ahead, growth = claims.measure_reach_ahead(zone), claims.measure_growth_with_speed(zone)
     assert ahead.verdict == growth.verdict == "supported"
     true = szlib.PlazaSettings().true_zone
