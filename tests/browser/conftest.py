@@ -14,7 +14,10 @@ import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
+import jupytext
+import nbformat
 import pytest
+from jupytext.config import load_jupytext_config
 
 ROOT = Path(__file__).parents[2]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "microsoft-edge")
@@ -25,6 +28,23 @@ SETTINGS = {
     "apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
 }
 """Show every cell on the page, and ask nothing of other servers."""
+ELLIPSE = "szlib.Ellipse((0.05, 0.0), (0.97, 0.75))"
+ZONES = {
+    "05_zones": f"""from szlib.zones.polar import DIRECTIONS, PolarZone
+shape = PolarZone([0.7, 1.5], DIRECTIONS, [np.full(72, 0.9), np.full(72, 1.2)])
+zone = szlib.SocialZone(shape, 2.0, {{1.1: {ELLIPSE}}})""",
+    "08_corridor": f"zone = {ELLIPSE}",
+    "20_laboratory": f"""zones = {{"quantile": {ELLIPSE}, "hull": {ELLIPSE}}}
+first = laboratory.RobotOptions(gamma, N_h, a_max, size, estimator)
+second = laboratory.RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)""",
+}
+"""A cell in place of those that fit the zone."""
+OPERATED = {
+    "05_zones": ("laboratory.show_sliders(",),
+    "08_corridor": ("controller = szlib.MPCCBF(", "record.animation("),
+    "20_laboratory": ("scene = laboratory.make_scene(", "laboratory.LaboratoryWidget("),
+}
+"""Cells that are operated in the browser, and what they need; `make run` executes the whole notebooks."""
 
 
 def chromium() -> str:
@@ -39,11 +59,12 @@ def chromium() -> str:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[object]:
+    """A context of Chromium, whose pages share what they have loaded."""
     executable = chromium()
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as driver:
         launched = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
-        yield launched
+        yield launched.new_context(viewport={"width": 1400, "height": 1000})
         launched.close()
 
 
@@ -54,11 +75,31 @@ def copy(browser: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("szlib", "notebooks"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", ".*"))
     shutil.copy(ROOT / "pyproject.toml", folder)
+    for name in OPERATED:
+        shorten(folder / "notebooks" / f"{name}.py")
     for arguments in (["init", "-q"], ["add", "-A"]):
         subprocess.run(["git", *arguments], cwd=folder, check=True)
     author = ["-c", "user.name=szlib", "-c", "user.email=szlib@localhost"]
     subprocess.run(["git", *author, "commit", "-q", "-m", "copy"], cwd=folder, check=True)
     return folder
+
+
+def shorten(script: Path) -> None:
+    """Leave in a pair its set-up, a given zone, and the cells that are operated."""
+    notebook, kept = jupytext.read(script), []
+    for cell in notebook.cells:
+        if any(text in cell.source for text in OPERATED[script.stem]):
+            lines = cell.source.splitlines()
+            cell.source = "\n".join(line for line in lines if "record.cache" not in line)
+            kept.append(cell)
+        elif "parameters" in cell.metadata.get("tags", []) or "import" in cell.source.split():
+            kept.append(cell)
+        elif cell.source.startswith("record = "):
+            kept += [cell, nbformat.v4.new_code_cell(ZONES[script.stem])]
+    notebook.cells = [cell for cell in kept if cell.cell_type == "code"]
+    settings = load_jupytext_config(str(script))
+    for suffix in (".py", ".ipynb"):
+        jupytext.write(notebook, script.with_suffix(suffix), config=settings)
 
 
 @pytest.fixture(scope="session")

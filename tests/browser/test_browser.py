@@ -43,7 +43,7 @@ class Notebook:
 @pytest.fixture
 def notebook(browser, lab, copy):
     """Open a notebook by its name."""
-    page = browser.new_page(viewport={"width": 1400, "height": 1000})
+    page = browser.new_page()
     page.set_default_timeout(MINUTES)
     yield lambda name: Notebook(page, lab, copy, name)
     page.evaluate("window.jupyterapp.serviceManager.sessions.shutdownAll()")

@@ -33,7 +33,7 @@ from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.workbook.record import NotebookRecord, ZoneMethod
 
-DAMAGES = {False: 4, True: 300}
+DAMAGES = {False: 2, True: 300}
 JUMPS = {False: 2, True: 40}
 
 

@@ -16,7 +16,7 @@ from sklearn.neighbors import LocalOutlierFactor
 import szlib
 from szlib.zones import outliers
 
-MANY = 40_000
+MANY = 20_000
 
 
 def test_outliers_are_those_of_scikit_learn() -> None:

@@ -225,7 +225,7 @@ def test_the_plaza_truth_comes_back(tmp_path: Path) -> None:
     settings = szlib.PlazaSettings(intruders=0.01)
     tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", seed=0, settings=settings))
     samples = szlib.find_encounters(tracks)
-    null = szlib.null_encounters(tracks, shifts=30, progress=False)
+    null = szlib.null_encounters(tracks, shifts=20, progress=False)
     for speed in (0.7, 1.1):
         found = fit_respect(samples, null, speed=speed).radii(THETA)
         assert found == pytest.approx(reach(settings.true_zone(speed), THETA), abs=0.08)
