@@ -1,7 +1,4 @@
-"""Documentation: every parameter is described, every example runs, every exported name has an example.
-
-pytest tests/test_documentation.py -k zones.ellipses --runxfail     one module, unfinished or not
-"""
+"""Documentation: every parameter is described, every example runs, every exported name has an example."""
 
 from __future__ import annotations
 
@@ -37,9 +34,9 @@ def module_names() -> Iterator[str]:
 MODULES = list(module_names())
 
 
-def fail_with(module: str, problems: list[str]) -> None:
+def fail_with(problems: list[str]) -> None:
     if problems:
-        pytest.fail("\n".join([f"{module}:", *problems]), pytrace=False)
+        pytest.fail("\n".join(problems), pytrace=False)
 
 
 # --- parameters --------------------------------------------------------------------------------------
@@ -104,27 +101,30 @@ def described(module: str) -> Iterator[tuple[str, str, set[str], set[str]]]:
             yield name, inspect.getdoc(found) or "", parameters(found), set()
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_every_parameter_is_described(module: str) -> None:
+def test_every_parameter_is_described() -> None:
     """An entry under Parameters (or Attributes), or its name in backticks; no entry for what is not there."""
     problems = []
-    for name, docstring, given, fields in described(module):
-        known = entries(docstring, "Parameters", "Attributes", "Other Parameters")
-        problems += [f"{name}: {each} is not described" for each in sorted(given - known - quoted(docstring))]
-        stray = entries(docstring, "Parameters", "Other Parameters") - given - fields
-        stray |= entries(docstring, "Attributes") - given - fields
-        problems += [f"{name}: {each} is described, but there is no such parameter" for each in sorted(stray)]
-    fail_with(module, problems)
+    for module in MODULES:
+        for name, docstring, given, fields in described(module):
+            known = entries(docstring, "Parameters", "Attributes", "Other Parameters")
+            missing = given - known - quoted(docstring)
+            stray = entries(docstring, "Parameters", "Other Parameters", "Attributes") - given - fields
+            problems += [f"{module}.{name}: {each} is not described" for each in sorted(missing)]
+            problems += [
+                f"{module}.{name}: {each} is described, but is no parameter" for each in sorted(stray)
+            ]
+    fail_with(problems)
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_everything_public_has_a_docstring(module: str) -> None:
+def test_everything_public_has_a_docstring() -> None:
     """Functions within functions as well."""
-    tree = ast.parse(Path(importlib.import_module(module).__file__ or "").read_text(encoding="utf-8"))
-    silent = [] if ast.get_docstring(tree) else ["the module"]
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
-            silent += [] if ast.get_docstring(node) else [f"{node.name}, line {node.lineno}"]
+    silent = []
+    for module in MODULES:
+        tree = ast.parse(Path(importlib.import_module(module).__file__ or "").read_text(encoding="utf-8"))
+        silent += [] if ast.get_docstring(tree) else [module]
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+                silent += [] if ast.get_docstring(node) else [f"{module}: {node.name}, line {node.lineno}"]
     assert silent == []
 
 
@@ -150,16 +150,15 @@ def test_every_example_runs(module: str, tmp_path: Path, monkeypatch: pytest.Mon
     assert not report, "".join(report)
 
 
-@pytest.mark.parametrize("name", sorted(szlib.__all__))
-def test_every_exported_name_has_an_example(name: str) -> None:
+def test_every_exported_name_has_an_example() -> None:
     """A section in its docstring; a constant is used in an example of its module or another one."""
-    found = getattr(szlib, name)
-    if inspect.ismodule(found):
-        return
-    if inspect.isclass(found) or inspect.isfunction(found):
-        missing = ">>>" not in sections(inspect.getdoc(found) or "").get("Examples", "")
-        fail_with(found.__module__, [f"{name} has no Examples"] if missing else [])
-    else:
-        used = re.compile(rf"^\s*(?:>>>|\.\.\.) .*\bszlib\.{name}\b", re.MULTILINE)
-        shown = any(used.search(path.read_text(encoding="utf-8")) for path in PACKAGE.rglob("*.py"))
-        fail_with("szlib.zones", [] if shown else [f"szlib.{name} is used in no example"])
+    text, problems = "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")), []
+    for name in sorted(szlib.__all__):
+        found = getattr(szlib, name)
+        if inspect.isclass(found) or inspect.isfunction(found):
+            examples = sections(inspect.getdoc(found) or "").get("Examples", "")
+            problems += [] if ">>>" in examples else [f"{name} has no Examples"]
+        elif not inspect.ismodule(found):
+            used = re.search(rf"^\s*(?:>>>|\.\.\.) .*\bszlib\.{name}\b", text, re.MULTILINE)
+            problems += [] if used else [f"szlib.{name} is used in no example"]
+    fail_with(problems)

@@ -29,19 +29,20 @@ SETTINGS = {
 }
 """Show every cell on the page, and ask nothing of other servers."""
 ELLIPSE = "szlib.Ellipse((0.05, 0.0), (0.97, 0.75))"
-ZONES = {
+GIVEN = {
     "05_zones": f"""from szlib.zones.polar import DIRECTIONS, PolarZone
 shape = PolarZone([0.7, 1.5], DIRECTIONS, [np.full(72, 0.9), np.full(72, 1.2)])
 zone = szlib.SocialZone(shape, 2.0, {{1.1: {ELLIPSE}}})""",
-    "08_corridor": f"zone = {ELLIPSE}",
+    "08_corridor": f"""controller = szlib.MPCCBF({ELLIPSE}, walls=scenario.walls, settings=settings)
+log = szlib.simulate(scenario, controller)""",
     "20_laboratory": f"""zones = {{"quantile": {ELLIPSE}, "hull": {ELLIPSE}}}
 first = laboratory.RobotOptions(gamma, N_h, a_max, size, estimator)
 second = laboratory.RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)""",
 }
-"""A cell in place of those that fit the zone."""
+"""A cell in place of those that fit the zone and simulate."""
 OPERATED = {
     "05_zones": ("laboratory.show_sliders(",),
-    "08_corridor": ("controller = szlib.MPCCBF(", "record.animation("),
+    "08_corridor": ("record.animation(",),
     "20_laboratory": ("scene = laboratory.make_scene(", "laboratory.LaboratoryWidget("),
 }
 """Cells that are operated in the browser, and what they need; `make run` executes the whole notebooks."""
@@ -88,14 +89,12 @@ def shorten(script: Path) -> None:
     """Leave in a pair its set-up, a given zone, and the cells that are operated."""
     notebook, kept = jupytext.read(script), []
     for cell in notebook.cells:
-        if any(text in cell.source for text in OPERATED[script.stem]):
-            lines = cell.source.splitlines()
-            cell.source = "\n".join(line for line in lines if "record.cache" not in line)
-            kept.append(cell)
-        elif "parameters" in cell.metadata.get("tags", []) or "import" in cell.source.split():
+        is_operated = any(text in cell.source for text in OPERATED[script.stem])
+        is_set_up = "parameters" in cell.metadata.get("tags", []) or "import" in cell.source.split()
+        if is_operated or is_set_up:
             kept.append(cell)
         elif cell.source.startswith("record = "):
-            kept += [cell, nbformat.v4.new_code_cell(ZONES[script.stem])]
+            kept += [cell, nbformat.v4.new_code_cell(GIVEN[script.stem])]
     notebook.cells = [cell for cell in kept if cell.cell_type == "code"]
     settings = load_jupytext_config(str(script))
     for suffix in (".py", ".ipynb"):
