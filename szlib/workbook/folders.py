@@ -62,8 +62,6 @@ def claim_results(
     results: str | Path,
     data: str | Path | Sequence[str | Path],
     parameters: Mapping[str, Any] | None = None,
-    *,
-    inputs: Iterable[Path] = (),
 ) -> Path:
     """Make and mark the folder of results for one data set and one choice of parameters.
 
@@ -72,7 +70,6 @@ def claim_results(
     results : the folder of all results.
     data : the name of a data set, or paths of track files.
     parameters : the parameters that are not at their defaults.
-    inputs : the input files, which must not be inside the folder.
 
     Returns
     -------
@@ -80,9 +77,11 @@ def claim_results(
 
     Raises
     ------
-    StorageError : the folder cannot be made, holds files of something else, or holds any of `inputs`.
+    DataError : there is no such file.
+    StorageError : the folder cannot be made, holds files of something else, or holds the data.
     """
     source = absolute_data(data)
+    inputs = [] if source in datasets.NAMES else datasets.find(source)
     purpose = f"results of {source if isinstance(source, str) else ', '.join(source)}"
     if parameters:
         purpose += f" with {json.dumps(parameters, sort_keys=True)}"

@@ -118,6 +118,11 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> str:
     outcomes: dict[str, Any] = summary.get("notebooks", {})
     outputs = [(name, html) for name, notebook in notebooks.items() for html in _html_outputs(notebook)]
     is_synthetic, area = run.get("data") == datasets.SYNTHETIC, home / "area.txt"
+    zone, samples, funnel = _show_zone(home, is_synthetic=is_synthetic), home / "encounters.parquet", ""
+    if samples.exists():
+        stages = funnels.table(funnels.get(pd.read_parquet(samples)))
+        stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")  # each is named once
+        funnel = _to_html(stages.assign(rows=stages["rows"].map("{:,}".format)))
     return pages.get_template("front_page.html.j2").render(
         title="the synthetic plaza" if is_synthetic else summary.get("data", home.name),
         outcomes=outcomes,
@@ -125,8 +130,8 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> str:
         run=run,
         area=area.read_text(encoding="utf-8") if area.exists() else "",
         questions={name: _find_question(notebook) for name, notebook in notebooks.items()},
-        funnel=_show_funnel(home),
-        zone=_show_zone(home, is_synthetic=is_synthetic),
+        funnel=funnel,
+        zone=zone,
         players={scenario.title: _find_player(scenario, outputs) for scenario in SCENARIOS.values()},
         parameters=_list_parameters(outputs),
     )
@@ -136,15 +141,6 @@ def _find_question(notebook: Any) -> str:
     """The question in the first cell of a notebook."""
     found = re.search(r"\*\*Question\.\*\*(.*?)(\n\n|\*\*|$)", notebook.cells[0].source, re.DOTALL)
     return " ".join(found[1].replace("*", "").split()) if found else ""
-
-
-def _show_funnel(home: Path) -> str:
-    """The funnel of the encounters with each stage named once; "" if there are no encounters."""
-    if not (home / "encounters.parquet").exists():
-        return ""
-    funnel = funnels.table(funnels.get(pd.read_parquet(home / "encounters.parquet")))
-    funnel["stage"] = funnel["stage"].where(~funnel["stage"].duplicated(), "")
-    return _to_html(funnel.assign(rows=funnel["rows"].map("{:,}".format)))
 
 
 def _show_zone(home: Path, *, is_synthetic: bool) -> dict[str, str]:

@@ -68,22 +68,17 @@ def run(
     StorageError : the results cannot be written, or another run writes to the same folder.
     """
     scripts = choose_notebooks(only)
-    names = [script.stem for script in scripts]
+    names, jobs = [script.stem for script in scripts], max(limit_jobs(jobs, len(scripts)), 1)
     known = sorted({*scripts, *(s for s in folders.list_notebooks() if s.stem[:2] <= PRODUCERS[-1])})
     given = check_parameters(parameters or {}, known)
-    data = folders.absolute_data(data)
-    jobs, label = max(limit_jobs(jobs, len(scripts)), 1), datasets.label(data)
-    files = [] if data == datasets.SYNTHETIC else datasets.find(data)
-    results = folders.results_root(out)
-    home = folders.claim_results(results, data, given, inputs=files)
+    results, data = folders.results_root(out), folders.absolute_data(data)
+    home = folders.claim_results(results, data, given)
     with folder_lock(home):
+        files = DataCache(home, data, seed=given.get("seed", 0)).files()
         folders.remove_outputs(home, names)
-        files = files or DataCache(home, data, seed=given.get("seed", 0)).files()
-        contents = [[file.name, *file_content(file)] for file in files]
-        source = {"szlib": __version__, "data": label, "files": contents, "parameters": dict(given)}
-        earlier = _start_summary(home, source, names)
-        given |= {"data": data, "results": str(results)}
-        outcomes = _execute_all(scripts, given, home, jobs, scheduler)
+        source, earlier = _start_summary(home, data, files, given, names)
+        variables = given | {"data": data, "results": str(results)}
+        outcomes = _execute_all(scripts, variables, home, jobs, scheduler)
         summary, everything = (_summarise(source, each) for each in (outcomes, {**earlier, **outcomes}))
         write_file(home / SUMMARY, json.dumps(everything, indent=1))
         if any((home / f"{name}.ipynb").exists() for name in everything["notebooks"]):
@@ -164,22 +159,29 @@ def _open_executor(client: Any, jobs: int) -> Iterator[Executor]:
             raise
 
 
-def _start_summary(home: Path, source: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
-    """Remove the outcomes of the notebooks `names`, and return those of the others by name.
+def _start_summary(
+    home: Path,
+    data: str | Sequence[str],
+    files: Sequence[Path],
+    parameters: Mapping[str, Any],
+    names: Sequence[str],
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Remove the outcomes of the notebooks `names`; return the source of the run, and the other outcomes.
 
-    The others stay only if parameters.json equals `source`: version, content of the data, parameters. Until
-    the run is finished, the summary in the folder has not passed.
+    The source is version, content of the data, parameters. The other outcomes stay only if parameters.json
+    equals it. Until the run is finished, the summary in the folder has not passed.
     """
-    earlier = {}
-    if _read_json(home / PARAMETERS) == json.loads(json.dumps(source)):
-        outcomes = _read_json(home / SUMMARY).get("notebooks", {})
-        earlier = {name: outcome for name, outcome in outcomes.items() if name not in names}
+    before, outcomes = _read_json(home / PARAMETERS), _read_json(home / SUMMARY).get("notebooks", {})
+    contents = [[file.name, *file_content(file)] for file in files]
+    source = {"szlib": __version__, "data": datasets.label(data), "files": contents, "parameters": parameters}
+    is_same = before == json.loads(json.dumps(source))
+    earlier = {name: outcome for name, outcome in outcomes.items() if is_same and name not in names}
     (home / SUMMARY).unlink(missing_ok=True)
     if earlier:
         unfinished = {"passed": False, "unfinished": list(names), "notebooks": earlier}
         write_file(home / SUMMARY, json.dumps(unfinished, indent=1))
     write_file(home / PARAMETERS, json.dumps(source, indent=1))
-    return earlier
+    return source, earlier
 
 
 def _summarise(source: Mapping[str, Any], notebooks: Mapping[str, Any]) -> dict[str, Any]:

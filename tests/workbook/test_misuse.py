@@ -71,6 +71,9 @@ def test_folder_name_of_links_globs_and_folders(notebooks, tmp_path):
 
 
 def test_data_sets_of_one_name_do_not_share_results(tmp_path):
+    for name in ("a/day.csv", "b/day.csv", "synthetic.csv"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
     homes = {folders.claim_results(tmp_path / "out", str(tmp_path / name / "day.csv")) for name in "ab"}
     assert len(homes) == 2
     again = folders.claim_results(tmp_path / "out", str(tmp_path / "a" / "day.csv"))

@@ -132,7 +132,7 @@ def test_notebooks_that_run_at_the_same_time_share_the_cores(notebooks, monkeypa
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["-p", "sed=1"], "unknown parameter sed; the notebooks know data, results, seed"),
+        (["-p", "sed=1"], "unknown parameter 'sed'; the notebooks know data, results, seed"),
         (["-p", "seed"], "must be NAME=VALUE"),
         (["-p", "seed=abc"], "parameter seed: expected int, such as 0; got 'abc'"),
         (["-p", "seed=1.5"], "parameter seed: expected int"),

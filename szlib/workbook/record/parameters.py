@@ -15,7 +15,6 @@ from ...encounters.areas import AUTO, as_area
 from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
 from ...encounters.settings import EncounterSettings
 from ...errors import DataError, SolverError
-from ...files import printable
 from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
@@ -112,7 +111,7 @@ def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dic
             defaults.setdefault(name, []).append(value)
     if unknown := sorted(given.keys() - defaults.keys()):
         raise DataError(
-            f"unknown parameter {', '.join(map(printable, unknown))}; the notebooks know "
+            f"unknown parameter {', '.join(map(ascii, unknown))}; the notebooks know "
             f"{', '.join(sorted(defaults))}"
         )
     for name, value in given.items():
@@ -152,7 +151,7 @@ def _check_type(name: str, value: Any, default: Any) -> None:
 def _check_range(name: str, value: Any) -> None:
     if isinstance(value, float) and not math.isfinite(value):
         raise DataError(f"parameter {name}: expected a finite number; got {value!r}")
-    if isinstance(value, str) and printable(value) != value:
+    if isinstance(value, str) and not value.isprintable():
         raise DataError(f"parameter {name}: expected readable text; got {value!a:.80}")
     low, high = RANGES.get(name, (-math.inf, math.inf))
     if not isinstance(value, str) and not low <= value <= high:
