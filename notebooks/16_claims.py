@@ -301,13 +301,13 @@ record.figure(fig, "robot")
 # by our solver (processor time of a step, ms, the median). Whether $N_h$ = 2 is enough for safety: notebook 11.
 
 # %%
-corridor, paper = szlib.SCENARIOS["corridor"], szlib.MPCSettings.paper()
-way = szlib.simulate(corridor, szlib.MPCCBF(zone, walls=corridor.walls))
+corridor, paper, ellipse = szlib.SCENARIOS["corridor"], szlib.MPCSettings.paper(), zone.ellipses[zone_speed]
+way = szlib.simulate(corridor, szlib.MPCCBF(ellipse, walls=corridor.walls))
 moments = [way.controller_inputs(t) for t in way.time[20:80]]
 solve_times = {}
 for solver, N_h in product(("ipopt", "sqp"), range(1, paper.N + 1)):
     settings = replace(paper, solver=solver, N_h=N_h)
-    controller = szlib.MPCCBF(zone, walls=corridor.walls, settings=settings)
+    controller = szlib.MPCCBF(ellipse, walls=corridor.walls, settings=settings)
     clock = []
     for moment in moments:
         controller.step(*moment)
@@ -334,7 +334,7 @@ costs.rename_axis(index="N_h", columns="").round(2)
 
 # %%
 free = replace(corridor, people=())
-alone = szlib.simulate(free, szlib.MPCCBF(zone, walls=free.walls, settings=paper))
+alone = szlib.simulate(free, szlib.MPCCBF(ellipse, walls=free.walls, settings=paper))
 middle = np.abs(alone.states[:, 0]) <= 2.0
 slow = float(alone.speed[middle].min() / alone.speed.max())
 record.claim("without the person the robot does not slow down in the corridor", slow > 0.8, slow)
@@ -357,7 +357,7 @@ record.claim(
 )
 
 # %%
-gap = compare_distances(zone.ellipses[zone_speed], r_robot=paper.r_robot, eps=paper.eps)
+gap = compare_distances(ellipse, r_robot=paper.r_robot, eps=paper.eps)
 uneven = 100 * (gap.farthest - gap.nearest)
 record.claim(
     "h = 0 keeps the same distance to the zone on all sides, to 1 cm", uneven <= 1, f"{uneven:.1f} cm"
