@@ -1,0 +1,72 @@
+"""The table of gamma in random worlds that were not used to choose it.
+
+    python -m studies.gamma_table [--worlds 2000]
+
+Writes notebooks/tables/07_gamma.csv: a row for each gamma, all of them in the same worlds, with 95 %
+Clopper-Pearson intervals. Finished worlds are kept in results/rollouts, so that a run that was stopped goes on.
+"""
+
+import argparse
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from studies.rollout_table import interval
+
+import szlib
+from szlib.control.settings import TOLERANCE
+from szlib.simulation.monte_carlo import rollouts
+from szlib.workbook.record import write_table
+
+TABLE = "07_gamma"
+SEED = 1_000_000
+"""Seed of the first world: gamma was chosen on the paper's four scenarios."""
+FIRST = 3
+"""Worlds whose path is computed again in each run of notebook 07."""
+GAMMAS = (0.02, 0.05, 0.07, 0.1, 0.2, 0.4)
+
+
+def drive(gamma: float, n: int, **options: Any) -> pd.DataFrame:
+    """Our controller in `n` worlds, without a time limit: the same on every machine."""
+    settings = szlib.MPCSettings(gamma=gamma, time_limit=np.inf)
+    return rollouts(n, seed=SEED, settings=settings, **options)
+
+
+def summarise(gamma: float, rows: pd.DataFrame) -> dict[str, Any]:
+    """The `rows` of one gamma in one line."""
+    n, arrived = len(rows), int(rows["success"].sum())
+    entered = int((rows["min_h"] < -TOLERANCE).sum())
+    line: dict[str, Any] = {"gamma": gamma, "worlds": n, "arrived": arrived / n}
+    line["arrived, low"], line["arrived, high"] = interval(arrived, n)
+    line["worlds with an infeasible step"] = int((rows["infeasible_steps"] > 0).sum())
+    line["infeasible steps"] = int(rows["infeasible_steps"].sum())
+    line["worlds with h < 0"] = entered
+    line["h < 0, low"], line["h < 0, high"] = interval(entered, n)
+    line["median time to goal [s]"] = float(rows["time_to_goal"].median())
+    return line
+
+
+def probe(gamma: float) -> float:
+    """Path in the first worlds [m]."""
+    return float(drive(gamma, FIRST, progress=False)["path_length"].sum())
+
+
+def recompute(row: pd.Series) -> dict[str, float]:
+    return {"probe": probe(row["gamma"])}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--worlds", type=int, default=2000, help="number of worlds")
+    parser.add_argument("--jobs", type=int, default=-1, help="processes")
+    parser.add_argument("--out", default="../results/rollouts", help="where finished worlds are kept")
+    given = parser.parse_args()
+    lines = []
+    for gamma in GAMMAS:
+        rows = drive(gamma, given.worlds, out=given.out, n_jobs=given.jobs)
+        lines.append(summarise(gamma, rows) | {"probe": probe(gamma)})
+    write_table(pd.DataFrame(lines), TABLE, seed=SEED)
+
+
+if __name__ == "__main__":
+    main()
