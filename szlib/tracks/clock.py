@@ -14,7 +14,7 @@ one step of the clock, the person was not seen in between; positions are not int
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -127,8 +127,7 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
     1  0.1  0.2  2.0
     2  0.2  0.4  2.0
     """
-    check_columns(raw, ["day", "id", "t", "x", "y"])
-    _check_values(raw)
+    _check_rows(raw, COLUMNS[:5])
     return _interpolate(raw, max_gap)
 
 
@@ -217,8 +216,7 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
     >>> tick.tolist(), piece.tolist()
     ([0, 1, 2, 90, 91], [0, 0, 0, 1, 1])
     """
-    check_columns(tracks, COLUMNS)
-    _check_values(tracks)
+    _check_rows(tracks, COLUMNS)
     t = tracks["t"].to_numpy(float)
     tick = nearest_tick(t)
     off = ~(np.abs(t * TICKS_PER_SECOND - tick) < 1e-3)
@@ -239,15 +237,16 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return order, tick, piece
 
 
-def _check_values(frame: pd.DataFrame) -> None:
-    """Raise DataError where a row has no person, or no finite time and position."""
+def _check_rows(frame: pd.DataFrame, columns: Sequence[str]) -> None:
+    """Raise DataError if one of the `columns` is missing, or a row has no person or no finite position."""
+    check_columns(frame, columns)
     good = frame["day"].notna().to_numpy() & frame["id"].notna().to_numpy()
     t = frame["t"].to_numpy(float)
     good &= (t > -_LAST_SECOND) & (t < _LAST_SECOND)
     for name in ("x", "y"):
         good &= np.isfinite(frame[name].to_numpy(float))
     expected = "expected a day, an id, t in seconds and finite x, y; drop the row"
-    check_rows(frame, good, ["day", "id", "t", "x", "y"], expected)
+    check_rows(frame, good, COLUMNS[:5], expected)
 
 
 def _usual_gap(intervals: np.ndarray, of_format: float | None) -> float:
