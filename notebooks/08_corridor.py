@@ -167,7 +167,7 @@ step = controller.step(*log.controller_inputs(float(log.time[slow])))
 record.figure(figures.draw_step(step), "admissible")
 
 # %% [markdown]
-# The instant at which it is slowest before they are abeam. With the paper's settings person and wall leave a
+# The instant at which it is slowest before they are abeam. With the default settings person and wall leave a
 # corner of the accelerations between them, and the chosen one sits in its tip: the person's row forbids what
 # leads nearer to the zone, the wall's what leads aside, and of the way ahead little is left.
 
@@ -204,15 +204,20 @@ ax.plot(table.index, table["slowest [m/s]"], "o-", color=figures.BLUE, label="sl
 other = ax.twinx()
 other.plot(table.index, table["to goal [s]"], "s--", color=figures.ORANGE, label="time to goal [s]")
 ax.axvline(width, color=figures.GREY, linestyle=":")
-ax.set(xlabel="width of the corridor [m]", ylabel="slowest speed [m/s]", title="Room is speed")
+ax.set(
+    xlabel="width of the corridor [m]",
+    ylabel="slowest speed [m/s]",
+    title="The wider the corridor, the faster the robot",
+)
 other.set_ylabel("time to goal [s]")
 fig.legend(loc="outside lower center", ncols=2)
 record.figure(fig, "widths")
 
 # %% [markdown]
-# **What it means.** The robot slows down because two rows hold at once, the person's and the wall's. Neither
-# alone would slow it so much: beside a person in the open it only turns (notebook 07), and a wall lets
-# it drive along. Together they leave it a slow way, and once abeam, the way opens and it drives on.
+# **What it means.** The robot slows down because two rows hold at once, the person's and the wall's, in the
+# paper's chain and in ours. Neither alone would slow it so much: beside a person in the open it is faster
+# (notebook 07), and a wall lets it drive along. Together they leave it a slow way, and once abeam, the way opens
+# and it drives on. The side on which it passes is another matter: in ours a rule decides it.
 
 # %%
 record.close()

@@ -155,7 +155,11 @@ x = log.people[:, 0, 0]
 ax.plot(log.time, x, "--", color=figures.RED, label="person")
 reach = zone.semi_axes[0]
 ax.fill_between(log.time, x - reach, x + reach, color=figures.RED, alpha=0.15, lw=0, label="zone")
-ax.set(xlabel="time [s]", ylabel="x [m]", title="Where they are when")
+out_first, between = scenario.claims[1].check(log)
+title = (
+    f"The robot enters {between:.1f} s after the person has left" if out_first else "Both are inside at once"
+)
+ax.set(xlabel="time [s]", ylabel="x [m]", title=title)
 ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1))
 record.figure(fig, "space-time")
 
@@ -180,7 +184,7 @@ Markdown(
 )
 
 # %% [markdown]
-# With the paper's settings two edges close the way. The person's zone forbids what leads to the mouth, and
+# With the default settings two edges close the way. The person's zone forbids what leads to the mouth, and
 # the wall beside the mouth what leads straight on. What is left points back and aside, and the chosen one is
 # the tip that is nearest to the goal. That is all that waiting is: a corner of the polygon near zero. The
 # robot hardly ever stands; it creeps up, is moved aside as the zone comes out, and comes back behind it.
@@ -210,7 +214,13 @@ ax.axhspan(0, 3, color=figures.GREY, alpha=0.25, label="inside the passage")
 for (start, run), colour in zip(runs.items(), figures.pick_colours(list(runs)), strict=True):
     ax.plot(run.time, run.states[:, 0], color=colour, label=f"robot, person from {start:g} m")
     ax.plot(run.time, run.people[:, 0, 0], "--", color=colour, linewidth=0.8)
-ax.set(xlabel="time [s]", ylabel="x [m]", title="The robot whole, the person dashed")
+ahead = firsts.loc[firsts["robot"] == "goes ahead", "person from x [m]"]
+title = (
+    f"The robot goes first if the person starts at {ahead.min():g} m or farther"
+    if len(ahead)
+    else "It never goes first"
+)
+ax.set(xlabel="time [s]", ylabel="x [m]", title=f"{title} (person dashed)")
 ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
 record.figure(fig, "who-first")
 

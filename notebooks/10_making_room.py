@@ -221,7 +221,9 @@ for some, marker, told in ((safe, "o", "every step has a plan"), (~safe, "X", "s
 ax.axhline(0, color=figures.BLACK, linewidth=0.8)
 nearest = paces.loc[paces["least h [m]"].idxmin(), "pace [m/s]"]
 ax.set(
-    xlabel="pace of the person [m/s]", ylabel="least h [m]", title=f"Nearest to who walks at {nearest:g} m/s"
+    xlabel="pace of the person [m/s]",
+    ylabel="least h [m]",
+    title=f"Least h for a person who walks at {nearest:g} m/s",
 )
 ax.legend()
 record.figure(fig, "paces")
