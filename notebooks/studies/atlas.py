@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from itertools import product
 
+from studies.committed import write_table
+
 from szlib.simulation.atlas import REFERENCE, AtlasCell, run_atlas
-from szlib.workbook.record import write_table
 
 PACES, SIZES = (0.3, 0.5, 0.8), (0.5, 0.75, 1.0, 1.25)
 CELLS = [

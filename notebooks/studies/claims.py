@@ -20,12 +20,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from studies.committed import write_table
 
 import szlib
 from szlib.plaza.accuracy import true_kinds
 from szlib.simulation import paper_claims as claims
 from szlib.tracks import sites
-from szlib.workbook.record import write_table
 from szlib.zones.outliers import is_outlier
 from szlib.zones.sensitivity import FIT, sensitivity
 

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from studies.committed import write_table
 
 from szlib.simulation import comparisons
 from szlib.simulation.atlas import REFERENCE
 from szlib.simulation.comparisons import BEHAVIOURS, FORMULATIONS, WORLDS
-from szlib.workbook.record import write_table
 
 RIVAL = {"zone": "equal circle"}
 """The method against which zones are compared world by world."""

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from studies.claims import SITES
+from studies.committed import write_table
 
 import szlib
 from szlib.control.controller import Controller
@@ -39,7 +40,6 @@ from szlib.simulation.safety_claims import MOTION_CHANGES, safety_violations
 from szlib.simulation.scenario import Scenario
 from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.simulation.social_metrics import compute_replay_metrics
-from szlib.workbook.record import write_table
 
 CROWDED = Worlds(
     people=(6, 10),

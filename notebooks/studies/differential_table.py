@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from studies.committed import write_table
 from studies.rollout_table import interval
 
 import szlib
@@ -25,7 +26,6 @@ from szlib.control.settings import TOLERANCE
 from szlib.simulation.monte_carlo import DEFAULT_ZONE, make_mpc_cbf
 from szlib.simulation.scenario import GOAL_RADIUS
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
-from szlib.workbook.record import write_table
 from szlib.zones.ellipses import BODY_RADIUS
 
 TABLE = "17_differential"

@@ -11,10 +11,10 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
+from studies.committed import write_table
 
 import szlib
 from szlib.simulation.scenarios.random_worlds import Worlds
-from szlib.workbook.record import write_table
 
 CROWD = Worlds(people=(2, 4), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=0.3)
 CELLS = tuple(product((0.05, 0.1, 0.2, 0.4, 0.8), (1, 2, 4, 8), (0.5, 1.0, 2.0)))

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from studies.committed import write_table
 from studies.rollout_table import interval
 
 import szlib
 from szlib.control.settings import TOLERANCE
 from szlib.simulation.monte_carlo import rollouts
-from szlib.workbook.record import write_table
 
 TABLE = "07_gamma"
 SEED = 1_000_000

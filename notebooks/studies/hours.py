@@ -11,10 +11,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pandas as pd
+from studies.committed import write_table
 
 import szlib
 from szlib.tracks import quality
-from szlib.workbook.record import write_table
 
 SMALL = szlib.PlazaSettings(n_encounters=150)
 

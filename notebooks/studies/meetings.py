@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from studies.committed import write_table
 
 import szlib
 from szlib.simulation.atlas import REFERENCE
@@ -20,7 +21,6 @@ from szlib.simulation.comparisons import CONTROLLERS, summarise
 from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.scenarios.meetings import Variations, VisiblePeople
 from szlib.simulation.social_metrics import compute_social_metrics
-from szlib.workbook.record import write_table
 
 METRICS = ["success", "time_to_goal", "path_efficiency", "heading_changes", "time_not_moving"]
 METRICS += ["closest_person", "intimate", "personal", "social", "robot_on_person", "person_on_robot"]

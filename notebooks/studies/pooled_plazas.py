@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from studies.committed import write_table
 from tqdm import tqdm
 
 import szlib
 from szlib.errors import ZoneError
 from szlib.plaza import accuracy
 from szlib.plaza.settings import RUSHING_INTRUDERS, SLOW_INTRUDERS
-from szlib.workbook.record import write_table
 
 TABLE = "03_outliers"
 RULES: dict[str, dict[str, float | None]] = {

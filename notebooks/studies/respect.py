@@ -22,13 +22,13 @@ from pathlib import Path
 import joblib
 import numpy as np
 import pandas as pd
+from studies.committed import write_table
 from studies.noninteracting_crowd import noninteracting_crowd
 
 import szlib
 from szlib.parallel import run_tasks
 from szlib.tracks.clock import to_clock
 from szlib.tracks.sites import GRAND_CENTRAL_RATE, read_grand_central
-from szlib.workbook.record import write_table
 
 GRAND_CENTRAL = szlib.Square(x=(10.0, 40.0), y=(10.0, 50.0))
 """The hall without its walls (measured)."""

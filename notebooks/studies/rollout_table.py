@@ -14,13 +14,13 @@ from typing import Any, get_args
 import numpy as np
 import pandas as pd
 from scipy.stats import beta
+from studies.committed import write_table
 
 import szlib
 from szlib.control.settings import TOLERANCE
 from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.outcomes import Outcome
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
-from szlib.workbook.record import write_table
 
 TABLE = "11_rollouts"
 APART = 1_000_000

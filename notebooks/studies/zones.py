@@ -31,10 +31,10 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import least_squares
 from studies.claims import SITES
+from studies.committed import write_table
 
 import szlib
 from szlib.plaza.settings import PlazaSettings
-from szlib.workbook.record import write_table
 from szlib.zones.ellipses import Ellipse
 from szlib.zones.quantile import smooth_paths
 from szlib.zones.uncertainty import QUANTITIES

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from studies import committed
 
 import szlib
 from szlib.workbook.record import (
@@ -143,11 +144,12 @@ def test_every_controller_setting_has_description_and_badge():
 def test_committed_table_says_how_it_was_made_and_fails_if_a_row_is_not_reproduced(
     record, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(committed_tables, "TABLES", tmp_path)
+    for module in (committed, committed_tables):
+        monkeypatch.setattr(module, "TABLES", tmp_path)
     monkeypatch.setattr("sys.argv", ["somewhere/study.py", "3"])
-    monkeypatch.setattr(committed_tables, "_describe_commit", lambda: "1234567")
+    monkeypatch.setattr(committed, "_describe_commit", lambda: "1234567")
     made = pd.DataFrame({"name": ["a", "b", "c"], "mean": [0.123456, np.nan, 1e6], "probe": [1, 2, np.nan]})
-    committed_tables.write_table(made, "99_made", seed=7)
+    committed.write_table(made, "99_made", seed=7)
     table = committed_tables.read_table("99_made")
     assert table.attrs == {"command": "python -m studies.study 3", "seed": 7, "commit": "1234567"}
     pd.testing.assert_frame_equal(table, made.astype({"probe": float}), check_exact=True)

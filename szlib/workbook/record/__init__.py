@@ -7,7 +7,7 @@ parameters       how the zone is made; checks of parameters before a notebook st
 display          how tables, figures and parameters are shown
 """
 
-from .committed_tables import TABLES, read_table, write_table
+from .committed_tables import TABLES, read_table
 from .data_cache import DataCache
 from .display import ASSUMED, CHOSEN, MEASURED, PAPER, TUNED, parameters, settings_table
 from .notebook_record import NotebookRecord

@@ -7,17 +7,12 @@ command that made the table, its seed, and the commit of the code that it ran.
 from __future__ import annotations
 
 import json
-import shlex
-import subprocess
-import sys
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ...files import write_file
 from .. import folders
 
 TABLES = folders.NOTEBOOKS / "tables"
@@ -26,17 +21,8 @@ RELATIVE, ABSOLUTE = 1e-3, 1e-4
 """Differences that are due to the four digits of a table, relative to a number and absolute."""
 
 
-def write_table(table: pd.DataFrame, name: str, *, seed: int = 0) -> None:
-    """Write `table` as `name`.csv to `TABLES`, with the command that runs, the `seed` and the commit."""
-    script, *arguments = sys.argv
-    command = shlex.join(["python", "-m", f"studies.{Path(script).stem}", *arguments])
-    header = json.dumps({"command": command, "seed": seed, "commit": _describe_commit()})
-    text = table.to_csv(index=False, float_format="%.6g", lineterminator="\n")
-    write_file(TABLES / f"{name}.csv", f"# {header}\n{text}")
-
-
 def read_table(name: str) -> pd.DataFrame:
-    """Read `name`.csv, which `write_table` wrote; its `attrs` are command, seed and commit."""
+    """Read `name`.csv from `TABLES`; its `attrs` are command, seed and commit."""
     with (TABLES / f"{name}.csv").open(encoding="utf-8") as file:
         header = file.readline()
         table = pd.read_csv(file)
@@ -47,11 +33,6 @@ def read_table(name: str) -> pd.DataFrame:
 def find_differences(row: pd.Series[Any], again: Mapping[str, Any]) -> dict[str, list[Any]]:
     """The values of a `row` and those computed `again`, by column, where they differ."""
     return {name: [row[name], value] for name, value in again.items() if not _is_same(row[name], value)}
-
-
-def _describe_commit() -> str:
-    asked = ["git", "-C", str(TABLES), "rev-parse", "--short", "HEAD"]
-    return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
 
 
 def _is_same(stored: Any, value: Any) -> bool:
