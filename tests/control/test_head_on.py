@@ -44,3 +44,28 @@ def test_the_robot_passes_on_the_other_side_if_the_goal_lies_there():
     limit = settings.head_on_share * half_angle(settings)
     assert find_turn(0.99 * limit, settings) < 0 < find_turn(1.01 * limit, settings)
     assert find_turn(2.01 * limit, settings) == pytest.approx(0)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("walls", [(), (-1.6,), (1.6,), (-2.2, 2.2), (-1.6, 1.6)])
+def test_the_target_moves_and_turns_with_the_scene(side, walls):
+    settings = szlib.MPCSettings(pass_side=side)
+    zone = szlib.Ellipse((0.1, 0.05), (0.8, 0.6), 0.3)
+
+    def find(angle, shift):
+        def move(x, y):
+            return x * cos(angle) - y * sin(angle) + shift[0], x * sin(angle) + y * cos(angle) + shift[1]
+
+        person = szlib.Person(move(0.0, 0.0), heading=pi + angle)
+        rows = [(*move(-9.0, y), *move(9.0, y), 0.05) for y in walls]
+        robot, goal = move(*ROBOT), move(5.0, 0.0)
+        x, y = np.subtract(find_target(robot, goal, [place_zone(person, zone)], rows, settings), shift)
+        return x * cos(angle) + y * sin(angle), y * cos(angle) - x * sin(angle)
+
+    expected = find(0.0, (0.0, 0.0))
+    assert find(0.0, (30.0, -20.0)) == pytest.approx(expected)
+    assert find(2.3, (-4.0, 7.0)) == pytest.approx(expected)
+    free = {"right": -1.6 not in walls, "left": 1.6 not in walls}
+    other = "left" if side == "right" else "right"
+    passed = side if free[side] else other if free[other] else "none"
+    assert np.sign(expected[1]) == {"right": -1, "left": 1, "none": 0}[passed]

@@ -461,7 +461,8 @@ def test_an_invalid_wall_raises_an_error(wall):
         {"gamma": 0.0}, {"gamma": 1.01}, {"gamma": np.nan}, {"gamma": "0.1"}, {"dt": 0.0}, {"N": 0},
         {"N": 8.0}, {"N_h": 9}, {"N_h": 0}, {"Q": (1, 1, 1)}, {"Q": (-1, 1, 1, 1)}, {"P": (1, 1, 1, np.nan)},
         {"R": (0, 1)}, {"N_h": 2.5}, {"a_max": -1}, {"v_max": np.inf}, {"r_robot": -0.1}, {"eps": -1},
-        {"zone_speed": 0}, {"head_on_share": 0.6}, {"pass_side": "up"}, {"solver": "osqp"}, {"R": (-1, 1)},
+        {"zone_speed": 0}, {"head_on_share": 0.6}, {"head_on_share": -0.1}, {"a_max": 0}, {"pass_side": "up"},
+        {"solver": "osqp"}, {"R": (-1, 1)},
         {"terminal": "wall"},
         {"slack_weight": 0}, {"max_iterations": 0}, {"time_limit": 0}, {"time_limit": np.nan},
         {"time_limit": "1"}, {"margin": "none"}, {"v_max": 1e155},
@@ -470,6 +471,13 @@ def test_an_invalid_wall_raises_an_error(wall):
 def test_a_setting_out_of_its_range_is_named_in_the_error(change):
     with pytest.raises(szlib.SolverError, match=f"^{next(iter(change))} must"):
         szlib.MPCSettings(**change)
+
+
+def test_settings_may_lie_at_the_ends_of_their_ranges():
+    zeros = {"r_robot": 0.0, "eps": 0.0, "Q": (0.0,) * 4, "P": (0.0,) * 4, "head_on_share": 0.0}
+    for change in (zeros, {"gamma": 1.0, "N_h": 8, "head_on_share": 0.5}, {"N": 1, "N_h": 1}):
+        settings = szlib.MPCSettings(**change)
+        assert {name: getattr(settings, name) for name in change} == change
 
 
 def test_every_setting_is_documented_with_the_source_of_its_default():
@@ -500,3 +508,9 @@ def test_the_papers_settings_are_ipopt_with_5_cm_and_no_rule_of_the_side():
     assert szlib.MPCSettings.paper(gamma=0.1).badges()["gamma"] == "chosen"
     with pytest.raises(szlib.SolverError, match="gamma must"):
         szlib.MPCSettings.paper(gamma=2)
+
+
+def test_what_the_paper_does_not_give_is_assumed():
+    s = szlib.MPCSettings.paper()
+    assert (s.gamma, s.a_max, s.R) == (0.05, 1.0, (1.0, 1.0))
+    assert (s.Q, s.P) == ((10.0, 10.0, 1.0, 1.0), (100.0, 100.0, 10.0, 10.0))

@@ -12,10 +12,10 @@ import shapely
 from helpers.random_states import ZONE, questions
 
 import szlib
-from szlib.control.barriers import read_walls
+from szlib.control.barriers import compute_h, read_walls
 from szlib.control.controller import advance
 from szlib.control.solvers import solver_pool
-from szlib.control.solvers.solver_pool import INACTIVE_H, round_up_size
+from szlib.control.solvers.solver_pool import INACTIVE_H, padded_parameters, round_up_size
 
 GOAL = (4.0, 0.0)
 SOLVERS = ("sqp", "ipopt")
@@ -86,6 +86,14 @@ def test_empty_slots_do_not_change_the_control(monkeypatch, solver, count, formu
 
 
 # building ahead
+
+
+def test_empty_slots_are_far_from_everything():
+    parameters = padded_parameters((3.0, -2.0, 1.0, 0.0), [], [], (2, 2))
+    people, walls = np.reshape(parameters[:14], (2, 7)), np.reshape(parameters[14:], (2, 5))
+    for x, y in ((3.0, -2.0), (13.0, -2.0), (3.0, 8.0)):
+        h = compute_h(x, y, people.tolist(), walls.tolist(), r_robot=0.5, eps=0.05)
+        assert min(h) > INACTIVE_H
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

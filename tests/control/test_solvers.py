@@ -12,9 +12,9 @@ from helpers.random_states import ZONE, meetings, questions
 
 import szlib
 from szlib.control.controller import advance
-from szlib.control.problem import build_problem, remaining_distance
+from szlib.control.problem import PlanEvaluation, build_problem, remaining_distance
 from szlib.control.settings import TOLERANCE
-from szlib.control.solvers import sqp
+from szlib.control.solvers import fallbacks, sqp
 from szlib.control.solvers.sqp_functions import build_sqp_functions
 
 SOLVERS = ("sqp", "ipopt")
@@ -285,3 +285,24 @@ def test_a_symmetric_meeting_is_reproducible():
     scenario, _ = next(meetings(seed=6))
     first, again = (szlib.simulate(scenario, controller_of("sqp", scenario.walls)) for _ in range(2))
     assert np.array_equal(first.predicted, again.predicted)
+
+
+@pytest.mark.parametrize(
+    ("end", "h", "is_safe"),
+    [
+        (0, [0.1, -0.1, -0.1, -0.1], True),  # at the terminal velocity from the start
+        (0, [-0.1, 0.1, 0.1, 0.1], False),
+        (2, [0.1, 0.1, 0.1, -0.1], True),
+        (2, [0.1, 0.1, -0.1, 0.1], False),
+        (3, [0.1, 0.1, 0.1, 0.1], True),
+        (3, [0.1, 0.1, 0.1, -0.1], False),
+        (4, [0.1, 0.1, 0.1, 0.1], False),  # never there
+    ],
+)
+def test_a_safe_end_is_the_terminal_velocity_with_every_barrier_held_until_then(end, h, is_safe):
+    states = np.zeros((4, 4))
+    states[:, 2] = np.where(np.arange(4) < end, 0.5, 0.2)
+    plan = PlanEvaluation(0.0, 0.0, np.zeros(6), np.zeros(0), states, np.array([[1.0] * 4, h]))
+    parameters = np.zeros(12)
+    parameters[6] = 0.2
+    assert fallbacks._reaches_safe_end(plan, parameters) == is_safe

@@ -305,6 +305,13 @@ def test_walked_area_ignores_queues_jumps_and_ids() -> None:
     )
 
 
+def test_walked_area_ignores_one_who_walks_just_outside() -> None:
+    tracks = make_hall()
+    for start in ((-0.4, 3.0), (4.0, -0.4), (12.2, 3.0), (4.0, 8.2)):
+        outside = make_walk(start, (0.0, 1.0) if start[1] == 3.0 else (1.0, 0.0), person=3000, duration=0.3)
+        assert szlib.walked_area(make_tracks(tracks, outside)) == szlib.walked_area(tracks)
+
+
 def test_walked_area_moves_and_turns_with_the_tracks() -> None:
     found = szlib.walked_area(make_hall())
     moved = szlib.walked_area(make_hall().assign(x=lambda t: t["x"] + 37.5, y=lambda t: t["y"] - 12))

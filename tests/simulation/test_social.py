@@ -5,7 +5,7 @@ import pytest
 
 import szlib
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.social_metrics import compute_social_metrics
+from szlib.simulation.social_metrics import compute_replay_metrics, compute_social_metrics
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 
@@ -128,6 +128,27 @@ def test_path_efficiency():
     assert compute_social_metrics(made(corner, walls=beside, arrival=3))["path_efficiency"] == pytest.approx(
         1 / 3
     )
+
+
+def test_a_replay_is_measured_until_half_a_metre_from_the_goal():
+    """The robot drives at 1 m/s along x, in steps of 0.2 m; the goal is at 3 m. A zone has radius 0.8 m."""
+    states = line(0.2 * np.arange(20))
+    states[3:6, 1] = 0.1
+    person, late = still(20, 1.0, 0.1), still(20, 3.8, 0.0)
+    found = compute_replay_metrics(made(states, [person, late], goal=(3.0, 0.0)))
+    assert (found["reached"], found["time_to_goal"]) == (1, pytest.approx(1.3))
+    driven = 0.2 * 11 + 2 * np.hypot(0.2, 0.1)
+    assert found["path_efficiency"] == pytest.approx(2.6 / driven)
+    assert (found["intrusions"], found["time_intruding"]) == (1, pytest.approx(0.7))
+    assert found["nearest"] == pytest.approx(0.0)
+    with_larger = compute_replay_metrics(
+        made(states, [person, late], goal=(3.0, 0.0)), szlib.Ellipse((0, 0), (1.3, 1.3))
+    )
+    assert (with_larger["intrusions"], with_larger["time_intruding"]) == (2, pytest.approx(1.3))
+    apart = compute_replay_metrics(made(states, [still(20, 1.0, 2.0)], goal=(30.0, 0.0)))
+    assert (apart["reached"], apart["intrusions"], apart["time_intruding"]) == (0, 0, 0)
+    assert np.isnan(apart["time_to_goal"]) and np.isnan(apart["path_efficiency"])
+    assert apart["nearest"] == pytest.approx(1.9)
 
 
 def test_social_metrics_do_not_depend_on_the_frame():

@@ -113,3 +113,10 @@ def test_between_speeds_radii_are_linear() -> None:
 def test_invalid_radii_are_refused(speeds: list, directions: list, radii: list, message: str) -> None:
     with pytest.raises(szlib.ZoneError, match=message):
         PolarZone(np.array(speeds), np.array(directions), np.array(radii))
+
+
+@pytest.mark.parametrize(("speeds", "directions"), [((), (0.0, 1.0)), ((1.1,), ())])
+def test_a_zone_without_radii_is_refused(speeds: tuple, directions: tuple) -> None:
+    radii = np.zeros((len(speeds), len(directions)))
+    with pytest.raises(szlib.ZoneError, match=r"radii must have shape \(speeds, directions\)"):
+        PolarZone(speeds=speeds, directions=directions, radii=radii)

@@ -6,14 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.passers import passers
+from scipy.stats import norm
 
 import szlib
 from szlib.zones.quantile import QuantileEstimator
 from szlib.zones.uncertainty import (
+    _MAX_FAILED,
     MIN_DAYS,
     MIN_ENCOUNTERS,
     QUANTITIES,
     SIDES,
+    _interval,
     count_by_side,
     describe_missing_sides,
     estimate_uncertainty,
@@ -154,3 +157,30 @@ def test_invalid_n_resamples_is_refused(samples: pd.DataFrame, resamples: float)
         estimate_uncertainty(
             QuantileEstimator.from_samples(samples, r_max=2.0), SPEEDS, n_resamples=resamples, seed=0
         )
+
+
+def test_intervals_are_quantiles_of_the_differences() -> None:
+    differences = np.random.default_rng(0).permuted(np.linspace(-1, 3, 4001))[:, None, None]
+    values = np.full((1, 1, 1), 5.0)
+    low, high = _interval(values, differences, 0.5).ravel()
+    assert (low, high) == pytest.approx((5 - 0.5 * 2.9, 5 + 0.5 * 0.9)), "mirrored, times the factor"
+    centred = differences - 1
+    assert _interval(values, centred, 0.0).ravel() == pytest.approx((5 - 1.9, 5 + 1.9)), "no bias"
+
+
+def test_percentiles_are_corrected_for_bias() -> None:
+    """A share of 60 % lies below: both levels are moved up by twice its normal quantile."""
+    differences = np.linspace(-0.6, 0.4, 1001)[:, None, None]
+    bias = 2 * norm.ppf((600 + 1 / 2) / 1001)
+    levels = norm.cdf(bias + norm.ppf([0.025, 0.975]))
+    found = _interval(np.zeros((1, 1, 1)), differences, 0.0).ravel()
+    assert found == pytest.approx(-0.6 + levels, abs=1e-9)
+
+
+def test_an_interval_needs_a_zone_in_most_resamples() -> None:
+    differences = np.linspace(-1, 1, 100)[:, None, None].copy()
+    failed = int(_MAX_FAILED * 100)
+    differences[:failed] = np.nan
+    assert np.isfinite(_interval(np.zeros((1, 1, 1)), differences, 0.0)).all()
+    differences[: failed + 1] = np.nan
+    assert np.isnan(_interval(np.zeros((1, 1, 1)), differences, 0.0)).all()
