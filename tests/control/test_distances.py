@@ -96,13 +96,14 @@ def test_safe_boundary_of_a_wall_lies_at_its_distance(a, b, distance):
     assert szlib.segment_distance(edge, a, b) == pytest.approx(distance, abs=1e-6)
 
 
-@pytest.mark.parametrize("length", [0.4, 3.0])
-def test_safe_boundary_of_a_wall_goes_around_it_once(length):
+@pytest.mark.parametrize(("length", "widest"), [(0.4, 0.4), (3.0, 0.5)])
+def test_safe_boundary_of_a_wall_goes_around_it_once(length, widest):
     edge = find_safe_boundary([(0.0, 0.0), (0.6 * length, 0.8 * length)], 0.5, 400)
     around = np.unwrap(np.arctan2(*(edge - (0.3 * length, 0.4 * length)).T[::-1]))
     turns = np.diff(around)
     assert (turns >= -1e-9).all() or (turns <= 1e-9).all()
     assert abs(around[-1] - around[0]) == pytest.approx(2 * np.pi, abs=0.1)
+    assert np.abs((edge - edge.mean(axis=0)) @ (-0.8, 0.6)).max() == pytest.approx(widest, abs=1e-3)
 
 
 def test_the_margin_of_the_paper_is_too_small_for_short_walls_only():

@@ -177,6 +177,12 @@ def test_a_person_without_usable_velocity_keeps_a_zone_and_counts_as_unknown():
     assert step.h == pytest.approx(controller_of().barriers((-3, 0), [szlib.Person((0, 0))]))
 
 
+def test_with_unknown_people_the_target_is_where_full_braking_ends():
+    step = controller_of().step((-3, 1, 0.6, -0.2), GOAL, [[0, 0, np.nan, np.nan]], ids=["new"])
+    time = 0.6 / step.scene.settings.a_max
+    assert step.target == pytest.approx((-3 + 0.6 * time / 2, 1 - 0.2 * time / 2))
+
+
 @pytest.mark.parametrize(
     ("people", "more", "message"),
     [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,6 +11,7 @@ from helpers.passers import passers
 from scipy.stats import norm
 
 import szlib
+from szlib.zones.estimators import Estimator, ZoneShape
 from szlib.zones.quantile import QuantileEstimator
 from szlib.zones.uncertainty import (
     _MAX_FAILED,
@@ -184,3 +187,27 @@ def test_an_interval_needs_a_zone_in_most_resamples() -> None:
     assert np.isfinite(_interval(np.zeros((1, 1, 1)), differences, 0.0)).all()
     differences[: failed + 1] = np.nan
     assert np.isnan(_interval(np.zeros((1, 1, 1)), differences, 0.0)).all()
+
+
+class Turning(Estimator):
+    """An estimator whose ellipse turns from 89 to 91 degrees in every resample."""
+
+    def fit_shape(self, speeds: Sequence[float]) -> ZoneShape:
+        raise NotImplementedError
+
+    def refit(
+        self, weights: np.ndarray, speeds: Sequence[float], rng: np.random.Generator | None = None
+    ) -> np.ndarray:
+        angle = np.radians(89 if rng is None else -89)
+        return np.broadcast_to([0.0, 0.0, 1.0, 0.7, angle], (len(weights), len(speeds), 5))
+
+    def find_influential(self, speeds: Sequence[float]) -> np.ndarray:
+        return np.arange(1)
+
+
+def test_an_axis_has_no_direction() -> None:
+    encounters = pd.DataFrame({"encounter": range(30)})
+    estimator = Turning(encounters=encounters, parameters={}, funnel=[])
+    found = estimate_uncertainty(estimator, SPEEDS, n_resamples=20, seed=0).intervals
+    angle = found[found["quantity"] == "angle_deg"].iloc[0]
+    assert (angle["low"], angle["high"]) == pytest.approx((91, 91))
