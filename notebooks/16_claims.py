@@ -393,7 +393,7 @@ about_zones = everywhere[everywhere["claim"].str.startswith("the zone")]
 decided = about_zones[~about_zones["verdict"].str.startswith("not")]["data"].value_counts()
 for name, site in {
     "no claim about the zone is decided by the ETH sequence": "ETH",
-    "nor by Grand Central": "Grand Central",
+    "no claim about the zone is decided by Grand Central": "Grand Central",
 }.items():
     number = int(decided.get(site, 0))
     record.claim(name, number == 0, f"{number} decided")
