@@ -378,7 +378,9 @@ Markdown(
 # %%
 unused = record.committed_table(gamma_table.TABLE, gamma_table.recompute)
 shown = ["arrived", "worlds with an infeasible step", "worlds with h < 0", "median time to goal [s]"]
-unused.set_index("gamma")[shown].style.format("{:.1%}", subset="arrived").format("{:.1f}", subset=shown[3:])
+unused.set_index("gamma")[shown].style.format("{:.1%}", subset="arrived").format(
+    "{:.1f}", subset=shown[3:]
+).format_index("{:g}")
 
 # %%
 rated = unused.set_index("gamma")

@@ -249,7 +249,7 @@ Markdown(
 chains = paper_claims.compare_chains((paper_zone, paper), (zone, settings))
 record.table(chains, "10_chains")
 entries = [
-    f"{r.time_to_goal:.1f}, {r.min_h:.2f}, {r.min_speed:.2f}, {r.passing_side}, {r.claims_held} of {r.claims}"
+    f"{r.time_to_goal:.1f}, {r.min_h:.2f}, {r.min_speed:.2f}, {r.passing_side}, {r.claims_held}/{r.claims}"
     for r in chains.itertuples()
 ]
 names, order = list(szlib.SCENARIOS), list(chains["chain"].unique())
@@ -270,16 +270,16 @@ record.check("h >= 0 with every chain", lowest.min() >= 0, lowest.to_dict())
 units = {"time_to_goal": ("time to the goal", " s"), "min_h": ("least h", " m")}
 units["min_speed"] = ("least speed", " m/s")
 rest = (found.loc["ours", list(units)] - found.loc["side rule", list(units)]).abs().max()
-lines = [f"- {name}: {', '.join(which) or 'nothing'}" for name, which in effects.items()]
+lines = {name: f"- {name}: {', '.join(which) or 'nothing'}" for name, which in effects.items()}
 for name in (name for name in names if "side rule" in effects[name]):
     old, new = found.loc[("paper", name)], found.loc[("side rule", name)]
     moved = [key for key in units if abs(new[key] - old[key]) > paper_claims.RESOLUTION[key]]
     parts = [f"{units[key][0]} {old[key]:.2f} to {new[key]:.2f}{units[key][1]}" for key in moved]
     parts += [f"passing side {old['passing_side']} to {new['passing_side']}"]
-    lines.append(f"- the rule of the side in {name}: {', '.join(parts)}")
+    lines[name] += f"; with it {', '.join(parts)}"
 Markdown(
     "Switched on alone, this changes the run:\n\n"
-    + "\n".join(lines)
+    + "\n".join(lines.values())
     + "\n\nWhat the rule of the side changes in ours "
     "does not come from the barrier. With that rule alone the paper's chain drives like ours, but for at most "
     + ", ".join(f"{value:.2g}{units[key][1]} ({units[key][0]})" for key, value in rest.items())
