@@ -41,7 +41,7 @@
 #
 # Each notebook begins with a question and an expectation, asks its data, and ends with what it means. A
 # *check* must hold, or the run fails; a *claim* of the paper is measured, and may turn out "not supported
-# here". Every parameter has a badge: **paper**, **assumed** or **measured**. Change the values of the cell
+# here". Every parameter has a badge: **paper**, **assumed**, **measured** or **tuned**. Change the values of the cell
 # below the imports, and run: nothing that you do here changes what `szlib run` has recorded.
 
 # %%

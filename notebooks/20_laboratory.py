@@ -33,7 +33,7 @@ import pandas as pd
 
 import szlib
 from szlib.workbook import figures, laboratory
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -60,7 +60,7 @@ record = NotebookRecord("20_laboratory", globals())
 parameters(
     [
         ("the scene", "the corridor of notebook 08", ASSUMED, "the paper gives no coordinates"),
-        ("gamma of A, of B", f"{gamma:g}, {gamma_b:g}", MEASURED, "notebook 11; B is to compare with"),
+        ("gamma of A, of B", f"{gamma:g}, {gamma_b:g}", TUNED, "notebook 07; B is to compare with"),
         (
             "N_h, a_max",
             f"{N_h} and {N_h_b} steps, {a_max:g} and {a_max_b:g} m/s2",
