@@ -348,3 +348,7 @@ def test_the_robot_starts_in_its_direction_of_motion_or_at_the_given_heading():
     assert robot.start([1, 2, 0, -0.5]) == pytest.approx([1, 2, -np.pi / 2, 0.5, 0])
     state = np.array([1.0, 2.0, 0.3, -0.4])
     assert robot.body(robot.start(state)) == pytest.approx(state)
+
+
+def test_by_default_the_robot_turns_as_fast_as_a_common_one():
+    assert szlib.DifferentialDrive(ZONE).omega_max == 4.0

@@ -514,3 +514,9 @@ def test_what_the_paper_does_not_give_is_assumed():
     s = szlib.MPCSettings.paper()
     assert (s.gamma, s.a_max, s.R) == (0.05, 1.0, (1.0, 1.0))
     assert (s.Q, s.P) == ((10.0, 10.0, 1.0, 1.0), (100.0, 100.0, 10.0, 10.0))
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_step_prints_nothing(solver, capfd):
+    szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver)).step((-3, 0, 0, 0), GOAL, [FACING])
+    assert capfd.readouterr().out == ""

@@ -12,6 +12,7 @@ import shapely
 from helpers.random_states import ZONE, questions
 
 import szlib
+from szlib.control import problem
 from szlib.control.barriers import compute_h, read_walls
 from szlib.control.controller import advance
 from szlib.control.solvers import solver_pool
@@ -245,3 +246,27 @@ def test_copies_can_be_used_in_other_threads():
             return drive(each, [2] * 30)
 
         assert all(np.array_equal(found, expected) for found in pool.map(run, copies))
+
+
+# the time of a step
+
+
+@pytest.mark.parametrize(
+    ("wall", "thread", "share", "is_spent"),
+    [
+        (0.4, 0.4, 1.0, False), (0.6, 0.4, 1.0, False), (0.4, 0.6, 1.0, False), (0.6, 0.6, 1.0, True),
+        (0.3, 0.3, 0.5, True), (0.2, 0.3, 0.5, False),
+    ],
+)  # fmt: skip
+def test_time_is_up_by_both_clocks(monkeypatch, wall, thread, share, is_spent):
+    """A busy machine stops the thread, and a coarse clock of the thread runs ahead."""
+    clocks = {"perf_counter": 100.0, "thread_time": 7.0}
+    for name in clocks:
+        monkeypatch.setattr(problem, name, lambda name=name: clocks[name])
+    budget = problem.TimeBudget(0.5)
+    assert not budget.is_spent(share)
+    clocks["perf_counter"] += wall
+    clocks["thread_time"] += thread
+    assert budget.is_spent(share) == is_spent
+    budget.begin()
+    assert not budget.is_spent(share)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import szlib
+from szlib.simulation import social_metrics
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.social_metrics import compute_replay_metrics, compute_social_metrics
 
@@ -48,6 +49,14 @@ def test_halls_distances_are_fractions_of_time():
     found = compute_social_metrics(made(line(0.5 + gaps), [still(8, 0.0, 0.0)]))
     assert (found["intimate"], found["personal"], found["social"]) == (2 / 8, 2 / 8, 2 / 8)
     assert found["closest_person"] == pytest.approx((gaps - 0.25).mean())
+
+
+def test_each_distance_belongs_to_one_of_halls(monkeypatch):
+    monkeypatch.setitem(social_metrics.HALL_DISTANCES, "personal", (0.25, 1.0))
+    monkeypatch.setitem(social_metrics.HALL_DISTANCES, "social", (1.0, 2.0))
+    gaps = np.array([0.25, 1.0, 1.0, 2.0])  # exact in binary
+    found = compute_social_metrics(made(line(0.5 + gaps), [still(4, 0.0, 0.0)]))
+    assert (found["personal"], found["social"]) == (1 / 4, 2 / 4)
 
 
 def test_only_the_nearest_present_person_counts():

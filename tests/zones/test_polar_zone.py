@@ -120,3 +120,14 @@ def test_a_zone_without_radii_is_refused(speeds: tuple, directions: tuple) -> No
     radii = np.zeros((len(speeds), len(directions)))
     with pytest.raises(szlib.ZoneError, match=r"radii must have shape \(speeds, directions\)"):
         PolarZone(speeds=speeds, directions=directions, radii=radii)
+
+
+def test_the_boundary_is_linear_between_directions_all_around() -> None:
+    directions = np.radians([-120.0, -30.0, 60.0, 150.0])
+    zone = PolarZone(speeds=[1.0, 2.0], directions=directions, radii=[[1.0, 2.0, 3.0, 4.0], [3.0] * 4])
+    theta = np.radians([-120.0, -75.0, 60.0, 105.0, 195.0, 217.5, -150.0])
+    expected = [1.0, 1.5, 3.0, 3.5, 2.5, 1.75, 2.0]
+    found = zone.boundary(1.0, theta)
+    np.testing.assert_allclose(np.hypot(*found.T), expected)
+    np.testing.assert_allclose(found, np.array(expected)[:, None] * np.c_[np.cos(theta), np.sin(theta)])
+    np.testing.assert_allclose(zone.radii_at(1.5), [2.0, 2.5, 3.0, 3.5])

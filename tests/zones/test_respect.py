@@ -212,6 +212,18 @@ def test_pair_correlation_is_low_within_the_zone(null: szlib.NullEncounters) -> 
     assert g[:, same.distance > 1.3].min() > 1.0, "people outside the zone are more frequent than in the null"
 
 
+def test_cells_of_the_pair_correlation_are_those_of_the_samples(null: szlib.NullEncounters) -> None:
+    """Twice as many people in one place than in the null model are seen there in the map."""
+    samples = null.samples
+    here = (samples["distance"].between(1.2, 1.5)) & (samples["los_angle"] % (2 * np.pi)).between(4.0, 5.0)
+    twice = pd.concat([samples, samples[here].assign(encounter=lambda t: t["encounter"])])
+    found = pair_correlation(twice, null)
+    assert (found.direction[0], found.direction[-1]) == pytest.approx((np.pi / 36, 2 * np.pi * 35.5 / 36))
+    assert (found.distance[0], found.distance[-1]) == pytest.approx((R_MAX / 160, R_MAX * 79.5 / 80))
+    direction, distance = np.unravel_index(np.nanargmax(found.g), found.g.shape)
+    assert 4.0 < found.direction[direction] < 5.0 and 1.2 < found.distance[distance] < 1.5
+
+
 def test_pair_correlation_needs_a_null(null: szlib.NullEncounters) -> None:
     with pytest.raises(ZoneError, match="no encounter"):
         pair_correlation(scattered(0, 10), null_of(scattered(0, 0)))
