@@ -69,3 +69,17 @@ def test_the_target_moves_and_turns_with_the_scene(side, walls):
     other = "left" if side == "right" else "right"
     passed = side if free[side] else other if free[other] else "none"
     assert np.sign(expected[1]) == {"right": -1, "left": 1, "none": 0}[passed]
+
+
+@pytest.mark.parametrize("turned", [0.0, pi / 2])
+@pytest.mark.parametrize(("more", "is_free"), [(-0.01, False), (0.01, True)])
+def test_a_side_is_free_if_the_robot_fits_between_the_zone_and_the_wall(turned, more, is_free):
+    """Beside the set h < 0 of an ellipse the robot's disc needs its radius and the wall's margin."""
+    settings, zone = szlib.MPCSettings(pass_side="right"), szlib.Ellipse((0.0, 0.0), (1.0, 0.6), turned)
+    person = place_zone(szlib.Person((0.0, 0.0), heading=pi), zone)
+    reach = 1.0 + settings.r_robot + settings.eps
+    widest = reach if turned else np.sqrt(reach**2 - 1.0**2 + 0.6**2)
+    y = -(widest + settings.r_robot + 0.07 + more)
+    target = find_target(ROBOT, (4.0, 0.0), [person], [(-50.0, y, 50.0, y, 0.07)], settings)
+    assert (target[1] < 0) == is_free
+    assert target[1] != 0, "otherwise it passes on the left"

@@ -199,6 +199,13 @@ def test_respect_without_samples_is_refused(null: szlib.NullEncounters) -> None:
         respect_radius(OccupancyHistogram.from_samples(data, r_max=1.5), null)
 
 
+def test_the_funnel_counts_far_samples(null: szlib.NullEncounters) -> None:
+    far = scattered(1, 900).assign(distance=lambda t: t["distance"] + R_MAX)
+    data = pd.concat([scattered(0, 300), far.assign(encounter=far["encounter"] + 300)])
+    *_, close = RespectEstimator.from_samples(data, r_max=R_MAX, null=null).funnel
+    assert (close["entered"], close["kept"], close["rejected"]) == (1200, 300, {"farther than 2.0 m": 900})
+
+
 # --- the map -----------------------------------------------------------------------------------------
 
 
