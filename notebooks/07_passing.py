@@ -119,7 +119,7 @@ record.figure(ax.figure, "tilt")
 symmetric, sides = tilts.loc["symmetric"], tilts["side"]
 record.check("the paper's robot passes a mirrored zone on the other side", both_ways, sides.to_dict())
 slowest = symmetric["slowest [m/s]"]
-record.check("it nearly stops before a symmetric zone", slowest < 0.2, slowest)
+record.check("the paper's robot nearly stops before a symmetric zone", slowest < 0.2, slowest)
 late = scenario.claims[1]
 record.claim(f"symmetric zone: {late.text}", *late.check(runs["symmetric"]))
 both_right = bool((sides[["as fitted", "mirrored"]] == "right").all())

@@ -237,12 +237,12 @@ def compare_chains(paper: Chain, ours: Chain, *, names: Iterable[str] = tuple(SC
 def describe_run(run: Run, claims: Mapping[str, tuple[bool, float]]) -> str:
     """Describe a `run` of a scenario: its numbers, and which of the `claims` hold, by their texts."""
     found = compute_metrics(run)
-    arrival = f"after {found['time_to_goal']:.1f} s" if run.success else "not in time"
+    arrival = f"reaches its goal after {found['time_to_goal']:.1f} s" if run.success else "does not arrive"
     held, failed = (
         [text for text, (holds, _) in claims.items() if holds == wanted] for wanted in (True, False)
     )
     parts = [
-        f"The robot reaches its goal {arrival}. Its least h is {found['min_h']:.2f} m, its least speed "
+        f"The robot {arrival}. Its least h is {found['min_h']:.2f} m, its least speed "
         f"{found['min_speed']:.2f} m/s, its side {found['passing_side']}.",
         f"Claims of the paper that hold: {' '.join(held) or 'none.'}",
         f"Claims that do not hold: {' '.join(failed) or 'none.'}",
