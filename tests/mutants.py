@@ -89,11 +89,12 @@ def find_places(module: str) -> list[Place]:
         if get_operator(name).arguments() or not (not replaced or any(replaced <= each for each in ALIKE)):
             continue
         operator = get_operator(name)()
-        spans = (span for node in nodes for span in operator.mutation_positions(node))
-        for occurrence, span in enumerate(spans):
-            if not any(first <= span[0] < last for first, last in left_alone):
+        found = [(node, span) for node in nodes for span in operator.mutation_positions(node)]
+        for occurrence, (node, span) in enumerate(found):
+            is_marker = node.parent and node.parent.type == "parameters"  # keyword-only from here on
+            if not is_marker and not any(first <= span[0] < last for first, last in left_alone):
                 changes[span].append((name, occurrence))
-    return [Place(module, span, tuple(found)) for span, found in sorted(changes.items())]
+    return [Place(module, span, tuple(each)) for span, each in sorted(changes.items())]
 
 
 def find_left_alone(tree: ast.AST) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
