@@ -83,3 +83,15 @@ def test_a_side_is_free_if_the_robot_fits_between_the_zone_and_the_wall(turned, 
     target = find_target(ROBOT, (4.0, 0.0), [person], [(-50.0, y, 50.0, y, 0.07)], settings)
     assert (target[1] < 0) == is_free
     assert target[1] != 0, "otherwise it passes on the left"
+
+
+@pytest.mark.parametrize("end", [-1.89, -1.91])
+@pytest.mark.parametrize("shift", [0.0, 0.5, -7.3])
+def test_a_wall_that_just_reaches_into_the_space_makes_the_side_not_free(end, shift):
+    """A wall 1 m long, end on; 1.4 m beside the person's centre the disc passes 0.5 m from it."""
+    settings = szlib.MPCSettings(pass_side="right")
+    zone = szlib.Ellipse((0.0, 0.0), (0.85, 0.85))
+    person = place_zone(szlib.Person((shift, shift), heading=pi), zone)
+    wall = (shift - 0.05, shift + end, shift - 0.05, shift + end - 1.0, 0.25)
+    target = find_target((shift - 3.0, shift), (shift + 4.0, shift), [person], [wall], settings)
+    assert (target[1] > shift) == (end == -1.89)

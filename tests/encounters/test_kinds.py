@@ -223,3 +223,9 @@ def test_few_shifted_pairs_are_companions(real_tracks: pd.DataFrame) -> None:
     kinds = find_encounters(alone).groupby("encounter")[["ref_id", "other_id", "kind"]].first()
     assert len(kinds) > 150
     assert (kinds["kind"] == COMPANIONS).mean() < 0.06
+
+
+def test_strangers_are_all_but_companions() -> None:
+    samples = pd.DataFrame({"encounter": range(len(KINDS)), "kind": list(KINDS)})
+    assert of_kind(samples, "strangers")["kind"].tolist() == [kind for kind in KINDS if kind != COMPANIONS]
+    assert of_kind(samples, COMPANIONS)["encounter"].tolist() == [KINDS.index(COMPANIONS)]

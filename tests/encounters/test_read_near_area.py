@@ -159,3 +159,14 @@ def test_unreadable_files_raise_as_in_read_tracks(tmp_path: Path) -> None:
         with pytest.raises(szlib.DataError) as theirs:
             read_raw(path)
         assert str(ours.value) == str(theirs.value)
+
+
+@pytest.mark.parametrize("duration", [0.2, 1.0, 3.0, 10.0])
+@pytest.mark.parametrize("max_gap", [0.2, 0.5, 3.0])
+def test_cells_reach_half_a_second_back_and_a_window_ahead(duration: float, max_gap: float) -> None:
+    """And one gap farther both ways, to interpolate."""
+    of = cells.Cells(szlib.ATC_SQUARE, duration, max_gap, 1e-3)
+    assert of.width > max_gap
+    for number, reach in ((of.before, 0.5), (of.after, max(duration, 0.5))):
+        needed = reach + max_gap + 0.1
+        assert (number - 1) * of.width - 1e-9 < needed <= number * of.width + 1e-9

@@ -141,7 +141,7 @@ def test_delays_have_their_range_over_scenarios(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(claims, "run_scenario", run_scenario)
     found = claims.measure_delay_by_size(zone, scales=(1.0, 1.5, 2.0), names=times)
     assert (found.effect, found.low, found.high, found.n) == (3.0, 1.0, 5.0, 3)
-    assert found.verdict == "supported"
+    assert (found.claim, found.verdict) == ("a zone 2.0 times as large makes the robot later", "supported")
     assert str(found) == "+3.00 [+1.00, +5.00] s (range over scenarios): supported"
     table = claims.tabulate_findings([found, finding(0.1, 0.3)], data="here")
     assert table["interval"].tolist() == ["range over scenarios", "95 % interval"]

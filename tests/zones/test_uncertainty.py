@@ -211,3 +211,21 @@ def test_an_axis_has_no_direction() -> None:
     found = estimate_uncertainty(estimator, SPEEDS, n_resamples=20, seed=0).intervals
     angle = found[found["quantity"] == "angle_deg"].iloc[0]
     assert (angle["low"], angle["high"]) == pytest.approx((91, 91))
+
+
+def test_an_encounter_that_only_turns_the_zone_has_no_influence() -> None:
+    class TurningAlone(Turning):
+        def refit(self, weights: np.ndarray, *given: object) -> np.ndarray:
+            """A tenth of a metre to the side for the first encounter, turned for every other one."""
+            found = np.tile([0.0, 0.0, 1.0, 0.7, 0.0], (len(weights), 1, 1))
+            found[..., 4] = 1.5 * (weights[:, 1:].min(axis=1) == 0)[:, None]
+            found[..., 1] = 0.1 * (weights[:, 0] == 0)[:, None]
+            return found
+
+        def find_influential(self, speeds: Sequence[float]) -> np.ndarray:
+            return np.array([2, 0])
+
+    encounters = pd.DataFrame({"encounter": range(10, 40)})
+    estimator = TurningAlone(encounters=encounters, parameters={}, funnel=[])
+    found = estimate_uncertainty(estimator, SPEEDS, n_resamples=5, seed=0).influence
+    assert found.to_dict("records") == [{"speed": 1.1, "encounter": 10, "metres": pytest.approx(0.1)}]
