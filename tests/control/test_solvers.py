@@ -306,3 +306,13 @@ def test_a_safe_end_is_the_terminal_velocity_with_every_barrier_held_until_then(
     parameters = np.zeros(12)
     parameters[6] = 0.2
     assert fallbacks._reaches_safe_end(plan, parameters) == is_safe
+
+
+def test_the_merit_of_a_plan_is_its_cost_and_the_price_of_its_violation():
+    controller = controller_of("sqp")
+    step = controller.step((-1.9, 0.0, 1.0, 0.0), GOAL, [FACING])
+    assert step.fallback == "relaxed"
+    solver = controller._pool.get(1, 0)
+    free, priced = solver._merit(0.0, 0.0), solver._merit(3.0, 0.0)
+    violation = solver._after[1]
+    assert violation > 1e-3 and priced == pytest.approx(free + 3 * violation)

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.optimize import approx_fprime
 
 import szlib
 from szlib.errors import ZoneError
+from szlib.zones import respect
 from szlib.zones.occupancy import OccupancyHistogram, pair_correlation
 from szlib.zones.respect import RespectEstimator, fit_respect, respect_radius
 
@@ -197,6 +199,23 @@ def test_respect_without_samples_is_refused(null: szlib.NullEncounters) -> None:
         fit_respect(data, null, speed=50.0)
     with pytest.raises(ZoneError, match="same r_max"):
         respect_radius(OccupancyHistogram.from_samples(data, r_max=1.5), null)
+
+
+def test_the_gradient_of_the_likelihood_is_that_of_its_value(
+    null: szlib.NullEncounters, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng, differences, real = np.random.default_rng(0), list[float](), respect.minimize
+
+    def check(cost: object, start: np.ndarray, **options: object) -> object:
+        for _ in range(3):
+            p = start + rng.normal(0, 0.1, start.size)
+            slope = approx_fprime(p, lambda q: cost(q)[0], 1e-6)
+            differences.append(np.abs(cost(p)[1] - slope).max() / np.abs(slope).max())
+        return real(cost, start, **options)
+
+    monkeypatch.setattr(respect, "minimize", check)
+    fit_respect(kept_out(scattered(1, 5_000), ZONE), null)
+    assert len(differences) > 3 and max(differences) < 1e-3
 
 
 def test_the_funnel_counts_far_samples(null: szlib.NullEncounters) -> None:
