@@ -242,3 +242,27 @@ def test_a_run_is_described_with_its_claims() -> None:
     arrived = claims.describe_run(szlib.simulate(scenario, szlib.MPCCBF(TILTED)), {"It waits.": (True, 2.0)})
     assert "goal after 10." in arrived and "its side right" in arrived
     assert arrived.endswith("Claims that do not hold: none.")
+
+
+def test_the_interval_of_a_rate_is_exact() -> None:
+    """Of 10 encounters seen, the mean is 4.795 to 18.39 (Garwood, Biometrika 28, 1936)."""
+    days = 10 / claims.PAPER_RATE * 8  # an eighth of the paper's rate
+    found = claims.measure_encounter_rate(10, days)
+    assert found.effect == pytest.approx(1 - 3)
+    assert found.low == pytest.approx(1 - 3 + np.log2(4.7954 / 10), abs=1e-4)
+    assert found.high == pytest.approx(1 - 3 + np.log2(18.3904 / 10), abs=1e-4)
+    none = claims.measure_encounter_rate(0, 1.0)
+    assert none.high == pytest.approx(1 - np.log2(claims.PAPER_RATE / 3.6889), abs=1e-4)
+    assert claims.measure_encounter_rate(round(claims.PAPER_RATE), 1.0).high == 1.0
+
+
+def test_runs_differ_in_their_side_their_claims_or_a_number() -> None:
+    row = dict.fromkeys(claims.RESOLUTION, 1.0) | {"passing_side": "left", "claims_held": 2}
+    assert not claims._differs(row, dict(row))
+    for other in ({"passing_side": "right"}, {"passing_side": "aft"}, {"claims_held": 1}, {"claims_held": 3}):
+        assert claims._differs(row, row | other)
+    for name, resolution in claims.RESOLUTION.items():
+        assert not claims._differs(row, row | {name: 1.0 + 0.9 * resolution})
+        assert claims._differs(row, row | {name: 1.0 + 1.1 * resolution})
+        assert claims._differs(row, row | {name: np.nan})
+        assert not claims._differs(row | {name: np.nan}, row | {name: np.nan})

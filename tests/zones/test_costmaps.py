@@ -127,3 +127,9 @@ def test_invalid_arguments_are_refused():
     ]:  # fmt: skip
         with pytest.raises(szlib.ZoneError, match="a grid"):
             szlib.Grid(origin, resolution, shape)
+
+
+def test_a_grid_may_have_one_row_or_one_cell() -> None:
+    for shape in ((1, 5), (5, 1), (1, 1)):
+        grid = szlib.Grid(origin=(0.0, 0.0), resolution=0.1, shape=shape)
+        assert grid.centers().shape == (*shape, 2)

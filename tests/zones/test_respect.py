@@ -269,3 +269,14 @@ def test_the_plaza_truth_comes_back(tmp_path: Path) -> None:
         assert found == pytest.approx(reach(settings.true_zone(speed), THETA), abs=0.08)
         assert found.mean() == pytest.approx(reach(settings.true_zone(speed), THETA).mean(), abs=0.03)
     assert szlib.null_test(samples, null).is_significant
+
+
+@pytest.mark.parametrize("speed_width", [None, 0.3])
+def test_zones_of_several_speeds_are_those_of_each(null: szlib.NullEncounters, speed_width: float) -> None:
+    data, speeds = kept_out(scattered(8, 5_000), ZONE), (0.8, 1.0, 1.2)
+    options = {} if speed_width is None else {"speed_width": speed_width}
+    estimator = RespectEstimator.from_samples(data, r_max=R_MAX, null=null, **options)
+    together = estimator.fit_shape(speeds)
+    for speed in speeds:
+        alone = estimator.fit_shape((speed,)).radii_at(speed)
+        np.testing.assert_allclose(together.radii_at(speed), alone)
