@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import DataError, SolverError
+from .errors import DataError, SolverError, SzlibError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,6 +18,14 @@ Array = NDArray[np.float64]  # an array of floats
 # well below the tolerance of the controller. Every map projection of the Earth stays below it.
 LARGEST = 1e8
 _DOUBLE = np.dtype(float)
+
+
+def require(
+    holds: object, name: str, value: object, expected: str, error: type[SzlibError] = DataError
+) -> None:
+    """Raise `error` unless a check of an argument `holds`: "NAME must be EXPECTED; got VALUE"."""
+    if not holds:
+        raise error(f"{name} must be {expected}; got {value!r}")
 
 
 def check_columns(table: pd.DataFrame, needed: Sequence[str]) -> None:

@@ -1,5 +1,7 @@
 """The errors of szlib. ``except SzlibError`` catches them all."""
 
+import warnings
+
 
 class SzlibError(Exception):
     """Base class of every error that szlib raises on purpose.
@@ -94,3 +96,8 @@ class DataWarning(UserWarning):
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("ignore", szlib.DataWarning)  # in a loop over many files
     """
+
+
+def warn(message: str, stacklevel: int = 2) -> None:
+    """Give a DataWarning at the line that called the caller, or further out with a higher `stacklevel`."""
+    warnings.warn(message, DataWarning, stacklevel=stacklevel + 1)

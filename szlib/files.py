@@ -14,14 +14,16 @@ import shutil
 import tempfile
 import time
 import uuid
+import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 from filelock import FileLock, Timeout
 
-from .errors import StorageError
+from .errors import DataError, StorageError, SzlibError
 
 MARKER = ".szlib"  # name of the file that marks a folder as szlib's
 _LOCK, _UNFINISHED, _TEMPORARY = ".szlib-lock", ".szlib-part-", "szlib-"
@@ -218,6 +220,23 @@ def file_content(file: Path) -> tuple[int, str]:
     with file.open("rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
         return stream.tell(), digest
+
+
+@contextmanager
+def reading(path: Path, what: str, expected: str, error: type[SzlibError] = DataError) -> Iterator[None]:
+    """Raise `error` if the block cannot read the file `path`.
+
+    Parameters
+    ----------
+    path : the file.
+    what : what it is read as, such as "as groups".
+    expected : what the file should be.
+    error : class of the error.
+    """
+    try:
+        yield
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, BadZipFile, zlib.error) as fault:
+        raise error(f"{printable(path)}: cannot be read {what} ({fault}); expected {expected}") from fault
 
 
 def printable(name: object) -> str:

@@ -119,10 +119,7 @@ def _barriers(s: MPCSettings, at: Any, people: Any, walls: Any) -> list[Any]:
     *ends, margin = wall = ca.vertsplit(ca.SX.sym("wall", 5))
     of_person, of_wall = barrier(distance, s.r_robot, s.eps), segment_formula(x, y, *ends)
     n, found = at.shape[1], [[ca.SX(0, at.shape[1])] for _ in range(6)]
-    for h, of, numbers in (
-        (of_person, person, people),
-        (barrier(of_wall, s.r_robot, margin), wall, walls),
-    ):
+    for h, of, numbers in ((of_person, person, people), (barrier(of_wall, s.r_robot, margin), wall, walls)):
         if count := numbers.shape[1]:
             values = _differentiated(h, x, y, time, of, s.dt, n).map(count)(ca.repmat(at, 1, count), numbers)
             for parts, value in zip(found, values, strict=True):

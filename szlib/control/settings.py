@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..checks import check_array
+from ..checks import check_array, require
 from ..errors import SolverError
 
+_require = partial(require, error=SolverError)
 TOLERANCE = 1e-6  # largest violation of a hard row, in its own unit, that still counts as satisfied
 Margin = Literal["euclidean", "paper"]
 Side = Literal["right", "left"]
@@ -156,8 +158,3 @@ class MPCSettings:
             if value == each.metadata.get("paper", object()):
                 badges[each.name] = "paper"
         return badges
-
-
-def _require(holds: bool | np.bool, name: str, value: Any, expected: str) -> None:
-    if not holds:
-        raise SolverError(f"{name} must be {expected}; got {value!r}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from ..checks import check_columns
-from ..errors import DataError, DataWarning
-from ..files import printable
+from ..errors import DataError, warn
+from ..files import printable, reading
 from ..tracks.clock import COLUMNS
 from .geometry import PAPER_SPACE, Area, Region, Square
 
@@ -145,11 +144,10 @@ def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, n_people: in
     (x0, y0), (x1, y1) = (corner + width * first).tolist(), (corner + width * end).tolist()
     found = Square((x0, x1), (y0, y1))
     if share < 1:
-        warnings.warn(
+        warn(
             f"in {1 - share:.0%} of the area found ({found}) nobody walked, perhaps for furniture, pillars "
-            "or walls: look at the map, and give a better area if you know one",
-            DataWarning, stacklevel=2,
-        )  # fmt: skip
+            "or walls: look at the map, and give a better area if you know one"
+        )
     return found
 
 
@@ -210,12 +208,8 @@ def _from_numbers(numbers: Any) -> Square:
 
 def _from_file(path: Path) -> Area:
     """The area in a file: well-known text, GeoJSON, or four numbers."""
-    try:
+    with reading(path, "as an area", EXPECTED.removeprefix("expected ")):
         text = path.read_text(encoding="utf-8-sig").strip()
-    except (OSError, ValueError) as error:
-        raise DataError(
-            f"{printable(path)}: is no area, and no file that can be read ({error}); {EXPECTED}"
-        ) from error
     if not text or not _is_area(text):
         raise DataError(f"{printable(path)}: begins with {printable(text[:40])!r}; {EXPECTED}")
     try:

@@ -29,13 +29,7 @@ from ..tracks import datasets, funnels
 from ..tracks.options import ReadOptions
 from ..tracks.recordings import find_day, name_recordings
 from .geometry import Area
-from .one_day import (
-    describe_source,
-    find_encounters_in_files,
-    load_day,
-    store_day,
-    with_area,
-)
+from .one_day import describe_source, find_encounters_in_files, load_day, store_day, with_area
 from .settings import EncounterSettings
 
 PURPOSE = "encounters by day"  # purpose of an extraction's folder, as its marker states it
@@ -218,8 +212,8 @@ def extract_day(
             samples = load_day(folder, day, source.result()) if is_stored else None
             if samples is None:
                 status = "done"
-                with warnings.catch_warnings():  # the table and the funnel count the rejected rows
-                    warnings.simplefilter("ignore", DataWarning)
+                # The table and the funnel count the rejected rows.
+                with warnings.catch_warnings(action="ignore", category=DataWarning):
                     paths = [Path(file) for file in files]
                     samples = find_encounters_in_files(paths, settings, options)
                 store_day(folder, day, samples, source.result())

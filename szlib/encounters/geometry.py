@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..checks import require
 from ..errors import DataError
 from ..tracks.formats.atc import ATC_AREA
 
@@ -41,10 +42,8 @@ class Square:
     y: tuple[float, float]
 
     def __post_init__(self) -> None:
-        if not (np.isfinite([*self.x, *self.y]).all() and self.x[0] < self.x[1] and self.y[0] < self.y[1]):
-            raise DataError(
-                f"a square needs finite x and y, each (lowest, highest); got x = {self.x}, y = {self.y}"
-            )
+        is_square = np.isfinite([*self.x, *self.y]).all() and self.x[0] < self.x[1] and self.y[0] < self.y[1]
+        require(is_square, "x and y of a square", (self.x, self.y), "finite, each (lowest, highest)")
 
     def __str__(self) -> str:
         return " ".join(repr(float(value)) for value in (*self.x, *self.y))
@@ -215,10 +214,8 @@ class AttentionalSpace:
     centred: bool = False
 
     def __post_init__(self) -> None:
-        if not (0 < self.length < np.inf and 0 < self.width < np.inf):
-            raise DataError(
-                f"an attentional space needs positive sides; got {self.length} m by {self.width} m"
-            )
+        for name, side in (("length", self.length), ("width", self.width)):
+            require(0 < side < np.inf, f"{name} of an attentional space", side, "positive [m]")
 
     @property
     def ahead(self) -> tuple[float, float]:

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
-from ..errors import DataError
+from ..checks import require
 from ..parallel import run_tasks
 from ..tracks import funnels
 from .areas import area_for
@@ -62,8 +62,7 @@ class NullEncounters:
 
     def one(self, shift: int) -> pd.DataFrame:
         """The samples of one `shift` (its number), to be treated like those of the data."""
-        if not 0 <= shift < self.shifts:
-            raise DataError(f"expected a shift from 0 to {self.shifts - 1}; got {shift}")
+        require(0 <= shift < self.shifts, "shift", shift, f"from 0 to {self.shifts - 1}")
         return self.samples[self.samples["shift"] == shift]
 
     def of_kind(self, kinds: str | Iterable[str] | None) -> NullEncounters:
@@ -117,8 +116,8 @@ def null_encounters(
     >>> list(null.encounters.columns)
     ['encounter', 'shift', 'kind', 'nearest']
     """
-    if not (shifts >= 1 and 0 < r_max < np.inf):
-        raise DataError(f"expected shifts >= 1 and r_max > 0 m; got {shifts} shifts, {r_max} m")
+    require(shifts >= 1, "shifts", shifts, "at least 1")
+    require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area)
     settings = replace(settings, area=area)
@@ -155,10 +154,9 @@ def _find_shifted(
         samples = find_encounters(shifted, settings=settings, kinds=kinds).assign(shift=k)
         groups = samples.groupby("encounter", sort=False)
         encounters = groups.agg(shift=("shift", "first"), kind=("kind", "first"), nearest=("distance", "min"))
-        close = samples[samples["distance"] <= r_max].copy()
-        far = {f"farther than {r_max} m": len(samples) - len(close)}
-        stage = funnels.stage("samples: close", len(samples), len(close), far)
-        found[k] = funnels.attach(close, [*funnels.get(samples), stage]), encounters.reset_index()
+        is_near = samples["distance"] <= r_max
+        close = funnels.select(samples, is_near, "samples: close", f"farther than {r_max} m")
+        found[k] = close, encounters.reset_index()
     return found
 
 

@@ -41,9 +41,7 @@ _VERSION = 6  # of the cached result of a day; a result of another version is co
 
 
 def find_encounters_in_files(
-    files: Sequence[Path],
-    settings: EncounterSettings,
-    options: ReadOptions,
+    files: Sequence[Path], settings: EncounterSettings, options: ReadOptions
 ) -> pd.DataFrame:
     """Find the encounters of the `files` of one day: the same as in ``szlib.read_tracks(files)``.
 
@@ -71,8 +69,8 @@ def with_area(
     area = _known_area(settings, files, options)
     if area is None:
         if tracks is None:
-            with warnings.catch_warnings():  # reading the day itself warns of rejected rows
-                warnings.simplefilter("ignore", DataWarning)
+            # Reading the day itself warns of rejected rows.
+            with warnings.catch_warnings(action="ignore", category=DataWarning):
                 tracks = read_tracks(files, options=options)
         area = walked_area(tracks)
     return replace(settings, area=area)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import require
 from ..errors import DataError
 from ..tracks.clock import TICKS_PER_SECOND
 from .areas import AUTO, as_area
@@ -45,7 +46,7 @@ class EncounterSettings:
     >>> szlib.EncounterSettings(duration=0.25)
     Traceback (most recent call last):
     ...
-    szlib.errors.DataError: duration must be a multiple of 0.1 s, the step of the clock; got 0.25 s
+    szlib.errors.DataError: duration must be a multiple of 0.1 s, the step of the clock; got 0.25
     """
 
     area: object = None
@@ -59,19 +60,13 @@ class EncounterSettings:
         automatic = isinstance(self.area, str) and self.area.strip() == AUTO
         if self.area is not None:
             object.__setattr__(self, "area", AUTO if automatic else as_area(self.area))
-        if not (
-            0 < self.duration < _LONGEST_WINDOW
-            and 0 <= self.min_distance < np.inf
-            and 0 < self.min_speed < np.inf
-        ):
-            raise DataError(
-                f"expected 0 < duration < {_LONGEST_WINDOW:g} s, min_distance >= 0 m and min_speed > 0 m/s; "
-                f"got {self.duration} s, {self.min_distance} m, {self.min_speed} m/s"
-            )
-        if abs(self.duration * TICKS_PER_SECOND - self.steps) > 1e-6:
-            raise DataError(
-                f"duration must be a multiple of 0.1 s, the step of the clock; got {self.duration} s"
-            )
+        duration = self.duration
+        expected = f"positive and shorter than {_LONGEST_WINDOW:g} s"
+        require(0 < duration < _LONGEST_WINDOW, "duration", duration, expected)
+        require(0 <= self.min_distance < np.inf, "min_distance", self.min_distance, "at least 0 m")
+        require(0 < self.min_speed < np.inf, "min_speed", self.min_speed, "positive [m/s]")
+        is_multiple = abs(duration * TICKS_PER_SECOND - self.steps) <= 1e-6
+        require(is_multiple, "duration", duration, "a multiple of 0.1 s, the step of the clock")
 
     @classmethod
     def paper(cls, area: object = None) -> EncounterSettings:

@@ -21,6 +21,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
+from ..checks import require
 from ..errors import DataError
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, compute_velocities
@@ -100,10 +101,8 @@ class ShiftableTracks:
         day_starts = np.flatnonzero(np.diff(rows.day, prepend=-1))
         first = np.minimum.reduceat(rows.tick, day_starts)
         period = np.maximum.reduceat(rows.tick, day_starts) - first + 2
-        table, day = (
-            tracks.iloc[rows.order].reset_index(drop=True),
-            rows.day[np.diff(rows.person, prepend=-1) > 0],
-        )
+        table = tracks.iloc[rows.order].reset_index(drop=True)
+        day = rows.day[np.diff(rows.person, prepend=-1) > 0]
         return cls(table, rows.person, rows.tick, day, first, period, _companions(rows))
 
     def near(self, area: Area, duration: float) -> ShiftableTracks:
@@ -120,8 +119,8 @@ class ShiftableTracks:
         `seed`, `minutes` and errors as in `time_shifted`.
         """
         low, high = (float(m) for m in minutes)
-        if not (1 / _MINUTE <= low <= high < np.inf):
-            raise DataError(f"minutes must be (shortest, longest), both positive; got {minutes}")
+        is_range = 1 / _MINUTE <= low <= high < np.inf
+        require(is_range, "minutes", minutes, "(shortest, longest), both positive")
         recorded = (self.period - 1) / _MINUTE
         if (short := recorded < low + high).any():
             lasts = float(recorded[short].min())

@@ -34,7 +34,6 @@ from .settings import (
     rotate_left,
     start_time,
     swept_length,
-    to_unit_disc,
     unit_vectors,
 )
 
@@ -265,7 +264,9 @@ def _is_possible(
 
 def _stays_outside(settings: PlazaSettings, points: Array, speed: Array) -> NDArray[np.bool_]:
     """Which paths (n, moments, 2) [m] stay outside the zones at speeds (n, moments) at all moments; (n,)."""
-    return np.asarray((np.linalg.norm(to_unit_disc(settings, points, speed), axis=-1) >= 1).all(axis=1))
+    center, semi_axes, angle = interpolate_zones(settings, speed)
+    mapped = rotate(points - center, -angle) / semi_axes  # the zones become the unit disc
+    return np.asarray((np.linalg.norm(mapped, axis=-1) >= 1).all(axis=1))
 
 
 def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.DataFrame:

@@ -7,7 +7,7 @@ from datetime import datetime, timedelta, timezone
 
 import numpy as np
 
-from ..checks import Array
+from ..checks import Array, require
 from ..encounters.geometry import ATC_SQUARE, AttentionalSpace, Square
 from ..errors import DataError, ZoneError
 from ..zones.ellipses import Ellipse
@@ -94,27 +94,19 @@ class PlazaSettings:
         (low, high), nearest, speed = self.speeds, self.intruder_distances, self.intruder_speeds
         shares, gaps = (self.standing, self.together, self.intruders), (self.short_gaps, self.long_gaps)
         for names, values in (("standing, together, intruders", shares), ("short_gaps, long_gaps", gaps)):
-            if not (min(values) >= 0 and sum(values) <= 1):
-                raise DataError(f"{names} must be shares, in sum at most 1; got {values}")
-        for valid, expected, got in (
-            (self.n_encounters >= 1, "n_encounters >= 1", self.n_encounters),
-            (0 <= self.clearance < np.inf, "clearance >= 0 m", self.clearance),
-            (0 <= self.noise < np.inf, "noise >= 0 m", self.noise),
-            (
-                MIN_WALKING_SPEED <= low < high <= self.max_speed < np.inf,
-                f"{MIN_WALKING_SPEED} <= lowest < highest of speeds <= max_speed [m/s]",
-                f"{self.speeds} and {self.max_speed}",
-            ),
-            (0 < nearest[0] <= nearest[1] < np.inf, "0 < smallest <= largest of intruder_distances", nearest),
-            (
-                0 < speed[0] <= speed[1] >= _MIN_INTRUDER_SPEED and speed[0] < 2 * self.max_speed,
-                f"0 < lowest <= highest of intruder_speeds, the lowest below {2 * self.max_speed} m/s, the "
-                f"highest at least {_MIN_INTRUDER_SPEED} m/s",
-                speed,
-            ),
-        ):
-            if not valid:
-                raise DataError(f"expected {expected}; got {got}")
+            require(min(values) >= 0 and sum(values) <= 1, names, values, "shares, in sum at most 1")
+        require(self.n_encounters >= 1, "n_encounters", self.n_encounters, "at least 1")
+        for name, metres in (("clearance", self.clearance), ("noise", self.noise)):
+            require(0 <= metres < np.inf, name, metres, "at least 0 m")
+        top = self.max_speed
+        is_range = MIN_WALKING_SPEED <= low < high <= top < np.inf
+        expected = f"(lowest, highest), from {MIN_WALKING_SPEED} m/s to max_speed = {top} m/s"
+        require(is_range, "speeds", self.speeds, expected)
+        is_range = 0 < nearest[0] <= nearest[1] < np.inf
+        require(is_range, "intruder_distances", nearest, "(smallest, largest), both positive [m]")
+        is_range = 0 < speed[0] <= speed[1] >= _MIN_INTRUDER_SPEED and speed[0] < 2 * top
+        expected = f"(lowest, highest), between 0 and {2 * top} m/s and at least {_MIN_INTRUDER_SPEED} m/s"
+        require(is_range, "intruder_speeds", speed, expected)
         needed = np.hypot(swept_length(high), SPACE.width) + 2 * MARGIN
         given = min(np.ptp(self.area.x), np.ptp(self.area.y))
         if given < needed:
@@ -147,12 +139,6 @@ def interpolate_zones(settings: PlazaSettings, speed: Array) -> tuple[Array, Arr
         for start, end in ((slow.center, fast.center), (slow.semi_axes, fast.semi_axes))
     )
     return center, semi_axes, slow.angle + share * turn
-
-
-def to_unit_disc(settings: PlazaSettings, points: Array, speed: Array) -> Array:
-    """Map `points` (..., 2) [m] so that the zones of `settings` at `speed` (...) become the unit disc."""
-    center, semi_axes, angle = interpolate_zones(settings, speed)
-    return rotate(points - center, -angle) / semi_axes
 
 
 def start_time(settings: PlazaSettings) -> float:

@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 from .. import memory
-from ..checks import check_columns, check_rows
+from ..checks import check_columns, check_rows, require
 from ..errors import DataError
 from . import funnels
 from .options import SHORTEST_GAP, Columns, ReadOptions
@@ -133,18 +133,11 @@ def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame
 
 def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
     """As `to_clock`, of rows that have been checked."""
-    person, t = _person_codes(raw), raw["t"].to_numpy(float)
-    if not is_sorted(person, t):
-        order = np.lexsort((t, person))
-        raw, person, t = raw.iloc[order], person[order], t[order]
-    same, step = person[1:] == person[:-1], np.diff(t)  # of each row but the first, after the one before
-    if (doubled := same & (step <= 0)).any():
-        at = int(np.flatnonzero(doubled)[0]) + 1
-        raise DataError(f"person {raw['id'].iloc[at]} has two rows at t = {t[at]} s; keep one of them")
+    order, t, same, step = _order_rows(raw, raw["t"].to_numpy(float))
+    raw = raw.iloc[order]
     if max_gap is None:
         max_gap = _usual_gap(step[same], raw.attrs.get("max_gap"))
-    if not max_gap > SHORTEST_GAP:
-        raise DataError(f"max_gap must be longer than the clock's 0.1 s; got {max_gap}")
+    require(max_gap > SHORTEST_GAP, "max_gap", max_gap, "longer than the clock's 0.1 s")
     within = np.r_[False, same & (step <= max_gap + _ROUNDING)]
     ticks = float(step.sum(where=within[1:])) * TICKS_PER_SECOND
     memory.require(ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows")
@@ -219,22 +212,26 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
     _check_rows(tracks, COLUMNS)
     t = tracks["t"].to_numpy(float)
     tick = nearest_tick(t)
-    off = ~(np.abs(t * TICKS_PER_SECOND - tick) < 1e-3)
-    if off.any():
-        value = t[np.flatnonzero(off)[0]]
-        raise DataError(
-            f"t = {value} s is not a multiple of 0.1 s; "
-            "bring the table to the clock with szlib.tracks.clock.to_clock"
-        )
-    person = _person_codes(tracks)
-    order = np.arange(len(person)) if is_sorted(person, tick) else np.lexsort((tick, person))
-    tick, person = tick[order], person[order]
-    same = person[1:] == person[:-1]
-    if (doubled := same & (tick[1:] == tick[:-1])).any():
-        row = order[int(np.flatnonzero(doubled)[0])]
-        raise DataError(f"person {tracks['id'].iloc[row]} has two rows at t = {t[row]} s; keep one of them")
-    piece = np.r_[0, np.cumsum(~(same & (np.diff(tick) == 1)))]
-    return order, tick, piece
+    expected = "t is not a multiple of 0.1 s; bring the table to the clock with szlib.tracks.clock.to_clock"
+    check_rows(tracks, np.abs(t * TICKS_PER_SECOND - tick) < 1e-3, ["t"], expected)
+    order, tick, same, step = _order_rows(tracks, tick)
+    piece = np.r_[0, np.cumsum(~(same & (step == 1)))]
+    return np.arange(len(t))[order], tick, piece
+
+
+def _order_rows(frame: pd.DataFrame, time: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray]:
+    """Order of rows by person and `time` (a slice where they are sorted), and the times in that order.
+
+    Then, of each row but the first: whether it has the same person as the row before, and the time between
+    them.  Raises DataError where a person has two rows at one time.
+    """
+    person = _person_codes(frame)
+    order = slice(None) if is_sorted(person, time) else np.lexsort((time, person))
+    person, time = person[order], time[order]
+    same, step = person[1:] == person[:-1], np.diff(time)
+    expected = "this person has two rows at this time; keep one of them"
+    check_rows(frame.iloc[order], np.r_[True, ~same | (step > 0)], ["id", "t"], expected)
+    return order, time, same, step
 
 
 def _check_rows(frame: pd.DataFrame, columns: Sequence[str]) -> None:

@@ -13,14 +13,13 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pooch
 
-from ..errors import DataError, DataWarning
+from ..errors import DataError, warn
 from ..files import printable
 
 SYNTHETIC = "synthetic"
@@ -194,8 +193,5 @@ def _expand(name: str | Path) -> list[Path]:
         )
     others = sum(not file.is_file() and not (path.is_dir() and file.is_dir()) for file in found)
     if others:
-        warnings.warn(
-            f"{printable(name)}: left out what is no regular file: {others} x folder or other", DataWarning,
-            stacklevel=4,
-        )  # fmt: skip
+        warn(f"{printable(name)}: left out what is no regular file: {others} x folder or other", 4)
     return files

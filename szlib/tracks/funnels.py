@@ -10,7 +10,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ..errors import SzlibError
 
@@ -60,6 +62,21 @@ def attach(frame: pd.DataFrame, stages: Sequence[Mapping[str, Any]]) -> pd.DataF
     """Attach `stages` to `frame` and return it; example at `get`."""
     frame.attrs[KEY] = [dict(s) for s in stages]
     return frame
+
+
+def select(frame: pd.DataFrame, is_kept: ArrayLike, name: str, reason: str) -> pd.DataFrame:
+    """The rows of a `frame` that are kept, with a further stage in its funnel.
+
+    Parameters
+    ----------
+    frame : any table.
+    is_kept : whether each row is kept, shape (n,).
+    name : of the stage.
+    reason : why the other rows are rejected.
+    """
+    kept = frame[np.asarray(is_kept)].copy()
+    rejected = {reason: len(frame) - len(kept)}
+    return attach(kept, [*get(frame), stage(name, len(frame), len(kept), rejected)])
 
 
 def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:

@@ -18,7 +18,6 @@ The short way: collect day, id, t [s], x, y [m] in any order and at any rate, co
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +25,9 @@ import numpy as np
 import pandas as pd
 from scipy.cluster.hierarchy import DisjointSet
 
-from ..errors import DataError, DataWarning
+from ..checks import check_rows
+from ..errors import DataError, warn
+from ..files import reading
 from . import funnels
 from .clock import COLUMNS, TICKS_PER_SECOND, clock_index, compute_velocities, nearest_tick
 
@@ -56,12 +57,11 @@ def check_tracks(tracks: pd.DataFrame) -> None:
     >>> check_tracks(to_clock(raw).iloc[::-1])
     Traceback (most recent call last):
     ...
-    szlib.errors.DataError: row 4 is out of order; expected rows sorted by day, id, t
+    szlib.errors.DataError: row 4: got {...}; this row is out of order; expected rows sorted by day, id, t
     """
     order = clock_index(tracks)[0]
-    if (order != np.arange(len(order))).any():
-        at = int(np.flatnonzero(order != np.arange(len(order)))[0])
-        raise DataError(f"row {tracks.index[at]} is out of order; expected rows sorted by day, id, t")
+    expected = "this row is out of order; expected rows sorted by day, id, t"
+    check_rows(tracks, order == np.arange(len(order)), ["day", "id", "t"], expected)
     if list(tracks.columns[: len(COLUMNS)]) != COLUMNS:
         raise DataError(f"columns are {list(tracks.columns)}; expected {COLUMNS} first, in this order")
     if not pd.api.types.is_integer_dtype(tracks["id"]):
@@ -77,16 +77,12 @@ def check_tracks(tracks: pd.DataFrame) -> None:
 def _check_velocities(tracks: pd.DataFrame) -> None:
     """Raise DataError where velocity is not the displacement over +-0.5 s within its piece."""
     expected = compute_velocities(tracks)
-    wrong = ~np.isclose(
-        tracks[["vx", "vy"]].to_numpy(float), expected, rtol=0, atol=_TOLERANCE, equal_nan=True
-    )
-    if wrong.any():
-        at = int(np.flatnonzero(wrong.any(axis=1))[0])
-        found = tracks[["day", "id", "t", "vx", "vy"]].iloc[at].to_dict()
-        raise DataError(
-            f"row {tracks.index[at]}: {found}, expected vx, vy = {expected[at].tolist()} from positions over "
-            "+-0.5 s; let szlib.tracks.clock.to_clock compute them, and never bridge a gap"
-        )
+    given = tracks[["vx", "vy"]].to_numpy(float)
+    is_right = np.isclose(given, expected, rtol=0, atol=_TOLERANCE, equal_nan=True).all(axis=1)
+    table = tracks.assign(expected_vx=expected[:, 0], expected_vy=expected[:, 1])
+    columns = ["day", "id", "t", "vx", "vy", "expected_vx", "expected_vy"]
+    advice = "let szlib.tracks.clock.to_clock compute velocities from positions, and never bridge a gap"
+    check_rows(table, is_right, columns, f"expected velocities over +-0.5 s; {advice}")
 
 
 def read_groups(path: str | Path) -> pd.DataFrame:
@@ -114,12 +110,8 @@ def read_groups(path: str | Path) -> pd.DataFrame:
     [[1, 2], [5, 3, 4]]
     """
     path = Path(path)
-    try:
+    with reading(path, "as groups", "ids, a group a line"):
         lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(
-            f"{path}: cannot be read as groups ({error}); expected ids, a group a line"
-        ) from error
     groups: DisjointSet = DisjointSet()
     joined = []
     for number, line in enumerate(lines, start=1):
@@ -136,11 +128,7 @@ def read_groups(path: str | Path) -> pd.DataFrame:
             groups.merge(people[0], person)
     if joined:
         where = ", ".join(map(str, joined))
-        warnings.warn(
-            f"{path.name}: joined to earlier groups that share people: line {where}",
-            DataWarning,
-            stacklevel=2,
-        )
+        warn(f"{path.name}: joined to earlier groups that share people: line {where}")
     ids = list(groups)
     table = pd.DataFrame({"group": pd.factorize(np.array([groups[person] for person in ids]))[0], "id": ids})
     return table.astype("int64").sort_values("group", kind="stable", ignore_index=True)

@@ -8,6 +8,7 @@ from zoneinfo import ZoneInfo
 
 import polars as pl
 
+from ..checks import require
 from ..errors import DataError
 
 # Which column holds t [s] or frame, id, x, y and day: its name, or the number of the field from 0.
@@ -66,15 +67,13 @@ class ReadOptions:
     tz: str = "Asia/Tokyo"
 
     def __post_init__(self) -> None:
-        if self.file_format is not None and self.file_format not in FORMAT_NAMES:
-            raise DataError(f"unknown file_format {self.file_format!r}; expected one of {list(FORMAT_NAMES)}")
-        if self.unit not in (None, *UNITS):
-            raise DataError(f"unit must be one of {list(UNITS)}; got {self.unit!r}")
+        rate, gap = self.frame_rate, self.max_gap
         lowest, highest = FRAME_RATES
-        if self.frame_rate is not None and not lowest <= self.frame_rate <= highest:
-            raise DataError(
-                f"frame_rate must be frames a second from {lowest:g} to {highest:g}; got {self.frame_rate}"
-            )
+        is_known = self.file_format in (None, *FORMAT_NAMES)
+        require(is_known, "file_format", self.file_format, f"one of {list(FORMAT_NAMES)}")
+        require(self.unit in (None, *UNITS), "unit", self.unit, f"one of {list(UNITS)}")
+        is_possible = rate is None or lowest <= rate <= highest
+        require(is_possible, "frame_rate", rate, f"frames a second from {lowest:g} to {highest:g}")
         if unknown := sorted(set(self.columns or ()) - set(COLUMN_NAMES)):
             raise DataError(f"columns: {unknown} are unknown; expected some of {list(COLUMN_NAMES)}")
         if {"t", "frame"} <= set(self.columns or ()):
@@ -83,8 +82,7 @@ class ReadOptions:
             raise DataError(
                 f"columns are for tidy tables; leave columns out, or file_format={self.file_format!r}"
             )
-        if self.max_gap is not None and not self.max_gap > SHORTEST_GAP:
-            raise DataError(f"max_gap must be longer than the clock's 0.1 s; got {self.max_gap}")
+        require(gap is None or gap > SHORTEST_GAP, "max_gap", gap, "longer than the clock's 0.1 s")
         try:
             ZoneInfo(self.tz)
             pl.select(pl.from_epoch(pl.lit(0)).dt.convert_time_zone(self.tz))

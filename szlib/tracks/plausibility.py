@@ -7,7 +7,6 @@ times, exchanged columns, degrees.  The error message suggests the first one in 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from itertools import permutations
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from ..errors import DataError, DataWarning
+from ..errors import DataError, warn
 from .formats import TrackFormat
 
 _MAX_SITE = 1000.0  # a wider site [m] means that millimetres were read as metres
@@ -120,7 +119,7 @@ def check_people(rows: pl.DataFrame, layout: TrackFormat, path: Path, *, is_unit
     fault = found.fault or "people are seen at irregular times"
     message = f"{path}: {fault}" + (f"; {advice}" if advice else "")
     if is_unit_given or (found.high_speed <= _FASTEST[1] and not advice):
-        warnings.warn(message, DataWarning, stacklevel=2)
+        warn(message)
     else:
         raise DataError(f"{message}; if people do move like that, pass unit=")
 

@@ -6,7 +6,6 @@ A file that cannot be used raises a DataError that names the file and the line.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ import numpy as np
 import pandas as pd
 import polars as pl
 
-from ..errors import DataError, DataWarning
+from ..errors import DataError, warn
 from . import funnels
 from .formats import TrackFormat, open_file
 from .formats.base import EXPECTED
@@ -187,4 +186,4 @@ def read_stage(
 def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
     counts = ", ".join(f"{count} x {reason}" for reason, count in reasons.items() if count)
     if counts:
-        warnings.warn(f"{where}: rejected rows: {counts}", DataWarning, stacklevel=2)
+        warn(f"{where}: rejected rows: {counts}")

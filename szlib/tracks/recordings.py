@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
@@ -11,7 +10,7 @@ from zoneinfo import ZoneInfo
 
 import polars as pl
 
-from ..errors import DataError, DataWarning
+from ..errors import DataError, warn
 from ..files import printable
 from .formats import TrackFormat, find_format
 from .formats.base import CALENDAR_BEGINS, decode_line, file_stem
@@ -78,10 +77,7 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
                 "people in both files are); read these files one by one, or correct them"
             )
         if n_apart:
-            warnings.warn(
-                f"{where}: {n_apart} people are in two places at once; read as two recordings", DataWarning,
-                stacklevel=2,
-            )  # fmt: skip
+            warn(f"{where}: {n_apart} people are in two places at once; read as two recordings")
             found[k] = files[k].with_day(pl.format("{} {}", pl.col("day").cast(pl.String), pl.lit(names[k])))
     return found
 

@@ -20,7 +20,6 @@ from __future__ import annotations
 import json
 import re
 import zipfile
-import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -29,6 +28,7 @@ import pandas as pd
 
 from ..checks import check_columns
 from ..errors import DataError
+from ..files import reading
 from . import funnels
 from .clock import to_clock
 from .options import ReadOptions
@@ -219,10 +219,8 @@ def _homography(path: Path, homography: str | Path | None) -> np.ndarray:
     if file is None:
         looked = " or ".join(map(str, places))
         raise DataError(f"{looked}: no such file; expected the homography of Grand Central, pass homography=")
-    try:
+    with reading(file, "as a homography", "homog, 3 x 3"):
         matrix = np.array(json.loads(file.read_text(encoding="utf-8"))["homog"], float)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DataError(f"{file}: cannot be read as a homography ({error}); expected homog, 3 x 3") from error
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
         raise DataError(f"{file}: homog has shape {matrix.shape}; expected 3 x 3 finite numbers")
     return matrix
@@ -230,15 +228,13 @@ def _homography(path: Path, homography: str | Path | None) -> np.ndarray:
 
 def _annotations(path: Path) -> dict[str, bytes]:
     """Content of each file of Grand Central, by name."""
-    try:
+    with reading(path, "as annotations", "Annotation.zip or its folder"):
         if path.is_dir():
             found = {file.name: file.read_bytes() for file in sorted(path.glob("*.txt"))}
         else:
             with zipfile.ZipFile(path) as packed:
                 names = sorted(name for name in packed.namelist() if name.endswith(".txt"))
                 found = {name.rsplit("/", 1)[-1]: packed.read(name) for name in names}
-    except (OSError, zipfile.BadZipFile, zlib.error) as error:
-        raise DataError(f"{path}: cannot be read ({error}); expected Annotation.zip or its folder") from error
     if not found:
         raise DataError(f"{path}: holds no file *.txt; expected Annotation.zip or the folder of its files")
     return found
@@ -246,10 +242,8 @@ def _annotations(path: Path) -> dict[str, bytes]:
 
 def _read_edinburgh_file(path: Path, frame_rate: float) -> tuple[pd.DataFrame, int]:
     """Detections of one file without repeated blobs, and the number of these."""
-    try:
+    with reading(path, "as text", "a file of Edinburgh's tracks"):
         tracks = _TRACK.findall(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: cannot be read ({error}); expected a file of Edinburgh's tracks") from error
     if not tracks:
         raise DataError(
             f"{path}: holds no track; expected lines like TRACK.R1=[[601 23 4471];[595 24 4472]];"
@@ -273,10 +267,8 @@ def _read_edinburgh_file(path: Path, frame_rate: float) -> tuple[pd.DataFrame, i
 
 def _read_magni_rows(path: Path) -> pd.DataFrame:
     """Rows of THOR-MAGNI as day, t, x, y, session, label, id."""
-    try:
+    with reading(path, "as CSV", "a file of THOR-MAGNI"):
         rows = pd.read_csv(path)
-    except (OSError, ValueError) as error:  # pandas' own errors are ValueErrors
-        raise DataError(f"{path}: cannot be read as CSV ({error}); expected a file of THOR-MAGNI") from error
     check_columns(rows, ["Time", "ag_id", "x", "y", "data_label"])
     times = np.unique(rows["Time"])
     session = np.searchsorted(times[1:][np.diff(times) < _SESSION], rows["Time"], side="right")

@@ -19,7 +19,7 @@ import numpy as np
 import shapely
 import traitlets
 
-from ..checks import Array, check_array
+from ..checks import Array, check_array, require
 from ..control.acceleration_polygon import find_admissible_controls
 from ..control.controller import advance
 from ..control.mpc import MPCCBF
@@ -83,8 +83,8 @@ class RobotOptions:
         ------
         SolverError : there is no zone of this estimator.
         """
-        if self.estimator not in zones:
-            raise SolverError(f"estimator must be one of {', '.join(zones)}; got {self.estimator!r}")
+        names = ", ".join(zones)
+        require(self.estimator in zones, "estimator", self.estimator, f"one of {names}", SolverError)
         return zones[self.estimator].scaled(self.size)
 
 

@@ -94,9 +94,7 @@ class Slice:
         normals, offsets = self._edges()
         theta = np.asarray(theta, float)
         along = np.cos(theta)[..., None] * normals[:, 0] + np.sin(theta)[..., None] * normals[:, 1]
-        return np.asarray(
-            np.min(np.where(along > 0, offsets / np.where(along > 0, along, 1.0), np.inf), axis=-1)
-        )
+        return _reach(along, offsets)
 
     def boundary(self, theta: ArrayLike) -> Array:
         """Boundary of the zone in the directions `theta` (...) [rad], in the person's frame, (..., 2) [m]."""
@@ -298,14 +296,22 @@ class HullEstimator(Estimator):
         return Estimator.leave_one_out(shell, speeds)
 
 
+def _reach(along: Array, offsets: Array) -> Array:
+    """Distance from the origin to the nearest edge, in directions.
+
+    `along` (..., edges) are the cosines of directions with the normals of edges, which are at `offsets`.
+    """
+    ahead = along > 0
+    return np.asarray(np.min(np.where(ahead, offsets / np.where(ahead, along, 1.0), np.inf), axis=-1))
+
+
 def _hull_reach(hull: ConvexHull, unit: Array, speeds: Sequence[float]) -> Array:
     """R' (s, k) of the hull at speeds along unit vectors (k, 2) [m]; NaN: undefined zone."""
-    along = hull.equations[:, :2] @ unit.T
+    along = (hull.equations[:, :2] @ unit.T).T
     v = hull.points[hull.vertices, 2]
     reach = np.full((len(speeds), len(unit)), np.nan)
     for i, speed in enumerate(speeds):
         offset = -(hull.equations[:, 3] + hull.equations[:, 2] * speed)
         if v.min() < speed < v.max() and (offset > 0).all():
-            with np.errstate(divide="ignore", invalid="ignore"):
-                reach[i] = np.min(np.where(along > 0, offset[:, None] / along, np.inf), axis=0)
+            reach[i] = _reach(along, offset)
     return reach

@@ -13,14 +13,13 @@ each is compared with those of a share of all others.
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import Array, check_columns, check_rows
-from ..errors import DataError, DataWarning
+from ..checks import Array, check_columns, check_rows, require
+from ..errors import DataError, warn
 from ..tracks import funnels
 
 R_MAX = 2.0
@@ -156,10 +155,7 @@ def is_outlier(
         places, place = np.unique(_features(nearest, r_max, speed_scale), axis=0, return_inverse=True)
         is_far = _find_far(places, n_neighbours)[place.ravel()]
         return np.asarray(is_far[encounter_numbers(samples)[0]])
-    if not 0 <= fraction <= 0.5:
-        raise DataError(
-            f"fraction must be within [0, 0.5], or None to judge whole encounters; got {fraction}"
-        )
+    require(0 <= fraction <= 0.5, "fraction", fraction, "within [0, 0.5], or None to judge whole encounters")
     if fraction == 0:
         return np.zeros(n_samples, bool)
     n_neighbours = N_NEIGHBOURS if n_neighbours is None else n_neighbours
@@ -195,24 +191,16 @@ def remove_outliers(
     >>> len(inliers) < len(samples)
     True
     """
-    if not 0 < r_max < np.inf:
-        raise DataError(f"r_max must be a positive distance in metres; got {r_max}")
+    require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
     check_columns(samples, ["los_angle", "distance"])
     check_rows(samples, samples["distance"].notna(), ["distance"], "expected a distance; drop the row")
-    close = samples[is_close(samples["distance"].to_numpy(float), r_max)]
+    near = is_close(samples["distance"].to_numpy(float), r_max)
+    close = funnels.select(samples, near, "samples: close", f"farther than {r_max} m")
     outlier = is_outlier(
         close, fraction=fraction, r_max=r_max, n_neighbours=n_neighbours, speed_scale=speed_scale
     )
-    inliers = close[~outlier].copy()
     reason = "outlier (LOF)" if fraction is not None else "of an outlying encounter (LOF)"
-    stages = [
-        *funnels.get(samples),
-        funnels.stage(
-            "samples: close", len(samples), len(close), {f"farther than {r_max} m": len(samples) - len(close)}
-        ),
-        funnels.stage("samples: inliers", len(close), len(inliers), {reason: int(outlier.sum())}),
-    ]
-    return funnels.attach(inliers, stages)
+    return funnels.select(close, ~outlier, "samples: inliers", reason)
 
 
 def _fit_factors(points: Array, n_neighbours: int, fraction: float | str = "auto") -> tuple[Array, float]:
@@ -238,11 +226,10 @@ def _find_far(places: Array, n_neighbours: int | None) -> NDArray[np.bool_]:
     is_far = np.zeros(len(places), bool)
     reach = np.hypot(*places[:, :2].T)
     if n_neighbours is None and len(places) <= N_NEIGHBOURS:
-        warnings.warn(
+        warn(
             f"{len(places)} encounters are too few to find outliers (LOF compares each with {N_NEIGHBOURS} "
             "others), so none is removed; add data, or pass a smaller n_neighbours",
-            DataWarning,
-            stacklevel=3,
+            3,
         )
         return is_far
     while True:
@@ -274,11 +261,10 @@ def _separate_copies(points: Array, n_neighbours: int) -> Array:
     copies = int(np.unique(points, axis=0, return_counts=True)[1].max())
     if copies <= n_neighbours // 2:
         return points
-    warnings.warn(
+    warn(
         f"up to {copies} samples coincide, so that LOF has no density to compare; "
         f"it compares them with {JITTER * 1e3:g} mm of noise (the samples do not change)",
-        DataWarning,
-        stacklevel=3,
+        3,
     )
     return points + np.random.default_rng(0).normal(0, JITTER, points.shape)
 
@@ -290,7 +276,7 @@ def _features(samples: pd.DataFrame, r_max: float, speed_scale: float | None) ->
         return points
     check_columns(samples, ["speed"])
     speed = samples["speed"].to_numpy(float)
-    if not 0 < speed_scale < np.inf:
-        raise DataError(f"speed_scale must be a positive number of m per m/s, or None; got {speed_scale}")
+    is_scale = 0 < speed_scale < np.inf
+    require(is_scale, "speed_scale", speed_scale, "a positive number of m per m/s, or None")
     check_rows(samples, np.isfinite(speed), ["speed"], "expected a finite speed; drop the row")
     return np.column_stack([points, speed_scale * speed])

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import Array, check_columns, check_rows
+from ..checks import Array, check_columns, check_rows, require
 from ..errors import ZoneError
 from ..tracks import funnels
 from .estimators import Estimator
@@ -159,8 +159,7 @@ class QuantileEstimator(Estimator):
     q: float
 
     def __post_init__(self) -> None:
-        if not 0 < self.q < 1:
-            raise ZoneError(f"q must be a share of encounters, 0 < q < 1; got {self.q}")
+        require(0 < self.q < 1, "q", self.q, "a share of encounters, 0 < q < 1", ZoneError)
 
     @classmethod
     def from_samples(cls, samples: pd.DataFrame, *, r_max: float, q: float = QUANTILE) -> QuantileEstimator:

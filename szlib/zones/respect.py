@@ -42,7 +42,7 @@ from scipy.optimize import minimize
 from scipy.special import expit, logit
 from threadpoolctl import ThreadpoolController
 
-from ..checks import Array
+from ..checks import Array, require
 from ..encounters.null_model import NullEncounters
 from ..errors import ZoneError
 from ..tracks import funnels
@@ -220,10 +220,10 @@ class RespectEstimator(Estimator):
             raise ZoneError(
                 f"r_max is {r_max} m, that of the null model {null.r_max} m; pass the same to both"
             )
-        if not speed_width > 0:
-            raise ZoneError(f"speed_width must be positive, inf for equal weights; got {speed_width} m/s")
-        close = samples[samples["distance"] < r_max]
-        far = {f"farther than {r_max} m": len(samples) - len(close)}
+        expected = "positive, inf for equal weights [m/s]"
+        require(speed_width > 0, "speed_width", speed_width, expected, ZoneError)
+        is_near = samples["distance"] < r_max
+        close = funnels.select(samples, is_near, "samples: close", f"farther than {r_max} m")
         histogram = OccupancyHistogram.from_samples(null.samples, r_max=r_max)
         counts = np.zeros((null.shifts, *histogram.counts.shape), np.float32)
         for k in null.samples["shift"].unique():
@@ -241,10 +241,7 @@ class RespectEstimator(Estimator):
                 "shifts": null.shifts,
                 "null": null.parameters,
             },
-            funnel=[
-                *funnels.get(samples),
-                funnels.stage("samples: close", len(samples), len(close), far),
-            ],
+            funnel=funnels.get(close),
         )
 
     def fit_shape(self, speeds: Sequence[float]) -> PolarZone:

@@ -21,7 +21,6 @@ this mix looked like respect in 17 of 100 simulated crowds; with separate kinds 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -32,7 +31,7 @@ from numpy.typing import NDArray
 from ..checks import check_columns
 from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
-from ..errors import DataWarning, ZoneError
+from ..errors import ZoneError, warn
 from .respect import respect_radius
 
 # Radii of the statistic [m]; the radius of the zone need not be among them.
@@ -188,9 +187,8 @@ def _warn_about_kinds(samples: pd.DataFrame, null: NullEncounters) -> None:
         expected = there * here.sum() / max(there.sum(), 1)
         for kind in expected.index[expected > _MIN_EXPECTED]:
             if here.get(kind, 0) == 0 and (here is data or kind != COMPANIONS):
-                warnings.warn(
+                warn(
                     f"{name} no encounter of the kind {kind!r}, {expected[kind]:.0f} were expected; select "
                     "the same kinds on both sides: szlib.of_kind(samples, kinds) and null.of_kind(kinds)",
-                    DataWarning,
-                    stacklevel=3,
+                    3,
                 )

@@ -70,8 +70,8 @@ def sensitivity(
         """One row: the zone of these samples at this speed."""
         count, sizes = int(samples["encounter"].nunique()), (np.nan, np.nan, np.nan)
         try:
-            with warnings.catch_warnings():  # the number of encounters is in the table
-                warnings.simplefilter("ignore", DataWarning)
+            # The number of encounters is in the table.
+            with warnings.catch_warnings(action="ignore", category=DataWarning):
                 zone = SocialZone.fit(samples, speeds=(at,), **{**usual_fit, **keywords})
             ellipse = zone.ellipses[at]
             sizes = (*ellipse.semi_axes, ellipse.area)

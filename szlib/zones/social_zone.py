@@ -13,7 +13,6 @@ which this number is sufficient.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -24,9 +23,9 @@ import numpy as np
 import pandas as pd
 
 from .. import __version__
-from ..checks import Array, check_columns
+from ..checks import Array, check_columns, require
 from ..encounters.null_model import NullEncounters
-from ..errors import DataWarning, ZoneError
+from ..errors import ZoneError, warn
 from .ellipses import Ellipse
 from .estimators import Estimator, ZoneShape
 from .hulls import HullEstimator, HullZone
@@ -109,8 +108,7 @@ class SocialZone:
             raise ZoneError(
                 f"a {type(self.shape).__name__} is not the shape of a zone of method {self.method!r}"
             )
-        if not 0 < self.r_max < np.inf:
-            raise ZoneError(f"r_max must be a positive distance in metres; got {self.r_max}")
+        require(0 < self.r_max < np.inf, "r_max", self.r_max, "a positive distance in metres", ZoneError)
 
     def __repr__(self) -> str:
         sizes = [f"{v:g}: {e.semi_axes[0]:.2f} x {e.semi_axes[1]:.2f}" for v, e in self.ellipses.items()]
@@ -208,7 +206,7 @@ class SocialZone:
         zone = cls(shape, float(r_max), ellipses, undefined, provenance, method, sides, uncertainty, test)
         problems = [*undefined.values(), *filter(None, map(zone.missing_data, ellipses))]
         if problems:
-            warnings.warn("; ".join(dict.fromkeys(problems)), DataWarning, stacklevel=2)
+            warn("; ".join(dict.fromkeys(problems)))
         return zone
 
     @property
@@ -232,7 +230,7 @@ class SocialZone:
         known = self.ellipses.get(float(speed))
         ellipse = known if known is not None else self.shape.ellipse(speed)
         if missing := self.missing_data(speed):
-            warnings.warn(missing, DataWarning, stacklevel=2)
+            warn(missing)
         return ellipse
 
     def adequate(self, speed: float) -> bool:
@@ -300,8 +298,7 @@ def _provenance(samples: pd.DataFrame, parameters: Mapping[str, Any], estimator:
 
 def _check_method(method: str, options: Iterable[str] = ()) -> None:
     """Raise ZoneError if the method is unknown, or does not have one of the options."""
-    if method not in METHODS:
-        raise ZoneError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
+    require(method in METHODS, "method", method, f"one of {', '.join(METHODS)}", ZoneError)
     for name in set(options).difference(METHODS[method][1]):
         known = "; ".join(
             f"{each!r} has {', '.join(names) or 'none'}" for each, (_, names) in METHODS.items()

@@ -32,8 +32,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from ..checks import Array
-from ..errors import DataError
+from ..checks import Array, require
 from .estimators import Estimator
 from .outliers import encounter_numbers
 from .polar import DIRECTIONS, ellipse_reach
@@ -155,10 +154,8 @@ def estimate_uncertainty(
     ------
     DataError : `n_resamples` is not a whole number of at least 2.
     """
-    if not (isinstance(n_resamples, int | np.integer) and n_resamples >= 2):
-        raise DataError(
-            f"n_resamples must be a whole number, 0 (no intervals) or at least 2; got {n_resamples}"
-        )
+    is_count = isinstance(n_resamples, int | np.integer) and n_resamples >= 2
+    require(is_count, "n_resamples", n_resamples, "a whole number, 0 (no intervals) or at least 2")
     rng = np.random.default_rng(seed)
     unit, member = resampling_units(estimator.encounters)
     n = int(member.max()) + 1

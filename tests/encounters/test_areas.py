@@ -114,7 +114,7 @@ WRONG = {
     "1 2 3": "expected",
     "5 1 0 8": "lowest, highest",
     "0 12 0 nan": "expected",
-    "no/such/file.wkt": "no file that can be read",
+    "no/such/file.wkt": "cannot be read as an area",
     "POLYGON ((0 0, 1 1": "no well-known text",
     "POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))": "cross itself",
     "POLYGON ((0 0, 4 0, 8 0, 0 0))": "no valid polygon",

@@ -423,15 +423,15 @@ def test_invalid_tables_raise() -> None:
 
 @pytest.mark.parametrize("x", [(1, 1), (2, 1), (0, np.nan), (-np.inf, 0)])
 def test_squares_without_an_inside_raise(x: tuple[float, float]) -> None:
-    with pytest.raises(szlib.DataError, match="a square needs finite x and y"):
+    with pytest.raises(szlib.DataError, match="x and y of a square must be finite"):
         Square(x=x, y=(0, 1))
-    with pytest.raises(szlib.DataError, match="a square needs finite x and y"):
+    with pytest.raises(szlib.DataError, match="x and y of a square must be finite"):
         Square(x=(0, 1), y=x)
 
 
 @pytest.mark.parametrize("sides", [(0, 4), (5, -1), (np.nan, 4), (5, np.inf)])
 def test_spaces_without_an_inside_raise(sides: tuple[float, float]) -> None:
-    with pytest.raises(szlib.DataError, match="an attentional space needs positive sides"):
+    with pytest.raises(szlib.DataError, match="of an attentional space must be positive"):
         AttentionalSpace(*sides)
 
 

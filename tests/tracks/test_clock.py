@@ -236,7 +236,7 @@ def test_the_same_id_on_two_days_is_two_people() -> None:
         (make_raw([0, 0.1], [0, np.inf]), "row 1: got .*'x': inf"),
         (make_raw([0, 0.1]).assign(day=[DAY, None]), "row 1: got .*expected a day"),
         (make_raw([0, 0.1]).assign(id=[np.nan, 1]), "row 0: got .*'id': nan"),
-        (make_raw([0, 0.1, 0.1]), "person 1 has two rows at t = 0.1 s; keep one of them"),
+        (make_raw([0, 0.1, 0.1]), "row 2: got .*'id': 1.*'t': 0.1.*two rows at this time; keep one of them"),
         (make_raw(np.arange(9) * 100.0), "100 s apart .*are times in seconds"),
         (make_raw([0, 1e9, 2e9]), "1e.09 s apart"),
     ],
@@ -260,8 +260,11 @@ def test_a_given_max_gap_is_used() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda d: d.assign(t=d["t"] + 0.03), r"t = 0.03 s is not a multiple of 0.1 s; .*to_clock"),
-        (lambda d: pd.concat([d, d.tail(1)]), r"person 2 has two rows at t = 4.0 s"),
+        (
+            lambda d: d.assign(t=d["t"] + 0.03),
+            "row 0: got {'t': 0.03}; t is not a multiple of 0.1 s; .*to_clock",
+        ),
+        (lambda d: pd.concat([d, d.tail(1)]), "got .*'id': 2.*'t': 4.0.*two rows at this time"),
         (lambda d: d.assign(x=np.nan), "row 0: got .*finite x, y"),
         (lambda d: d.drop(columns="vx"), r"columns \['vx'\] are missing"),
     ],

@@ -6,7 +6,6 @@ columns: displacement per frame against velocity.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
@@ -14,7 +13,7 @@ from typing import Self
 import numpy as np
 import polars as pl
 
-from ...errors import DataError, DataWarning
+from ...errors import DataError, warn
 from ..options import FRAME_RATES, ReadOptions
 from .base import TrackFormat, decode_first_line
 
@@ -61,15 +60,12 @@ def measure_frames(rows: pl.DataFrame, path: Path, given: float | None) -> tuple
             "frame_rate=15 (ETH) or 25 (hotel, zara, students), or what the video has"
         )
     if given is not None and estimated is not None and abs(given - estimated) > _SPREAD * estimated:
-        warnings.warn(
-            f"{path.name}: read at {rate:g} frames/s as given; its velocities suggest {estimated:.4g}",
-            DataWarning, stacklevel=2,
-        )  # fmt: skip
+        warn(f"{path.name}: read at {rate:g} frames/s as given; its velocities suggest {estimated:.4g}")
     elif given is None and rate not in _USUAL_RATES:
-        warnings.warn(
+        warn(
             f"{path.name}: its velocities suggest {rate:.4g} frames/s, EWAP files have 15 or 25; if that "
-            "is wrong, pass frame_rate", DataWarning, stacklevel=2,
-        )  # fmt: skip
+            "is wrong, pass frame_rate"
+        )
     frames = rows.select(pl.col("t").diff().over("id"))["t"].drop_nulls()
     interval = frames.filter(frames > 0).median()
     gap = _GAP * float(interval) / rate if isinstance(interval, float | int) else None
