@@ -23,7 +23,16 @@ _DOUBLE = np.dtype(float)
 def require(
     holds: object, name: str, value: object, expected: str, error: type[SzlibError] = DataError
 ) -> None:
-    """Raise `error` unless a check of an argument `holds`: "NAME must be EXPECTED; got VALUE"."""
+    """Raise `error` if the check of an argument does not hold: "`name` must be `expected`; got `value`".
+
+    Parameters
+    ----------
+    holds : whether the argument is valid.
+    name : of the argument.
+    value : of the argument.
+    expected : what it must be.
+    error : class of the error.
+    """
     if not holds:
         raise error(f"{name} must be {expected}; got {value!r}")
 

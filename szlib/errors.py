@@ -99,5 +99,5 @@ class DataWarning(UserWarning):
 
 
 def warn(message: str, stacklevel: int = 2) -> None:
-    """Give a DataWarning at the line that called the caller, or further out with a higher `stacklevel`."""
+    """Give a DataWarning with a `message`; `stacklevel` as in `warnings.warn`, counted from the caller."""
     warnings.warn(message, DataWarning, stacklevel=stacklevel + 1)

@@ -83,7 +83,7 @@ def test_null_model_without_encounters_is_empty() -> None:
 
 
 def test_invalid_arguments_raise(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
-    with pytest.raises(DataError, match="shifts >= 1"):
+    with pytest.raises(DataError, match="shifts must be at least 1"):
         szlib.null_encounters(tracks, shifts=0)
     with pytest.raises(DataError, match="too short"):
         szlib.null_encounters(tracks, progress=False, minutes=(1, 30))
