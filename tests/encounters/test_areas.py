@@ -305,6 +305,13 @@ def test_walked_area_ignores_queues_jumps_and_ids() -> None:
     )
 
 
+def test_walked_area_holds_the_space_and_three_seconds_of_walking() -> None:
+    """5 m and 3.6 m: a hall of 9.2 m has an area, one of 8 m has none."""
+    assert szlib.walked_area(make_hall(size=(9.2, 8))).x == (0.0, 9.5)
+    with pytest.raises(szlib.DataError, match="no area was found"):
+        szlib.walked_area(make_hall(size=(8, 7.9)))
+
+
 def test_walked_area_ignores_one_who_walks_just_outside() -> None:
     tracks = make_hall()
     for start in ((-0.4, 3.0), (4.0, -0.4), (12.2, 3.0), (4.0, 8.2)):
