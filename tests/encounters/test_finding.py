@@ -473,6 +473,14 @@ def test_paths_in_the_reference_frame(crowd: pd.DataFrame, known: pd.DataFrame) 
     assert (ref[following, 0] > 0).all()  # x points along the motion
 
 
+@pytest.mark.parametrize("column", SAMPLE_COLUMNS[:5])
+def test_paths_need_the_people_and_times_of_the_samples(
+    crowd: pd.DataFrame, known: pd.DataFrame, column: str
+) -> None:
+    with pytest.raises(szlib.DataError, match=rf"columns \['{column}'\] are missing"):
+        reference_frame(crowd, known.drop(columns=column))
+
+
 def test_paths_follow_the_order_of_the_samples(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
     expected = reference_frame(crowd, known)
     shuffled = known.sample(frac=1, random_state=2)
