@@ -39,13 +39,14 @@ from itertools import product
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from studies import feasibility, rollout_table
 
 import szlib
 from szlib.control.controller import advance
 from szlib.simulation.closed_loop import drive
-from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
+from szlib.simulation.scenarios.random_worlds import ONE_PERSON
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -60,7 +61,7 @@ n_jobs = 1
 
 # %%
 record = NotebookRecord("11_feasibility", globals())
-crowd = Worlds(people=(2, 4), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=0.3)
+crowd = feasibility.CROWD
 parameters(
     [
         ("gamma", gammas, MEASURED, "0.05 everywhere else in this workbook"),
@@ -78,26 +79,20 @@ parameters(
 # relaxed plan is applied.
 
 # %%
-cells, long = [], worlds > 3  # a bar where it takes long
-for gamma, N_h, a_max in product(gammas, horizons, limits):
-    settings = szlib.MPCSettings(gamma=gamma, N_h=N_h, a_max=a_max)
-    rows = szlib.rollouts(worlds, seed=seed, settings=settings, worlds=crowd, n_jobs=n_jobs, progress=long)
-    numbers = (rows["infeasible_steps"].mean(), rows["min_h"].min(), rows["unflagged_violations"].sum())
-    cells.append((gamma, N_h, a_max, worlds, *numbers))
-mine = pd.DataFrame(
-    cells, columns=["gamma", "N_h", "a_max", "worlds", "infeasible_steps", "min_h", "unflagged_violations"]
-)
+long = worlds > 3  # a bar where it takes long
+cells = product(gammas, horizons, limits)
+mine = feasibility.drive_cells(cells, worlds, seed=seed, n_jobs=n_jobs, progress=long).drop(columns="probe")
 record.table(mine, "11_feasibility")
 honest = (mine["unflagged_violations"] == 0).all()
 record.check("no step that called itself safe led to h < 0", honest, len(mine), always=True)
 mine.round(3)
 
 # %% [markdown]
-# The full map (`-p worlds=20` and `gammas=[0.05,0.1,0.2,0.4,0.8]`, `horizons=[1,2,4,8]`,
-# `limits=[0.5,1,2]`) is saved beside the notebooks:
+# The full map, of 20 worlds a cell (`python -m studies.feasibility 20`), is saved beside the notebooks. Of every
+# saved table one row, drawn by the seed, is computed again in each run: a quick part of it, the column `probe`.
 
 # %%
-full = read_table("11_feasibility")
+full = record.committed_table("11_feasibility", feasibility.recompute)
 shown = {"infeasible_steps": ("infeasible steps a world", 8.0), "min_h": ("smallest h [m]", -0.5)}
 fig, grid = plt.subplots(2, 3, figsize=(12, 6.5), layout="constrained")
 for column, (a_max, part) in enumerate(full.groupby("a_max")):
@@ -241,8 +236,8 @@ record.check("once there is a solution there always is one", start_only, 4 * wor
 # the notebooks; `python -m studies.rollout_table` makes it anew, from blocks of seeds far apart, with
 # 95 % Clopper-Pearson intervals (`low`, `high`). *Unflagged violations* are steps that called themselves safe
 # and led to $h < 0$, *unflagged overlaps* those that led the robot's disc into a wall or a body, by
-# Euclidean distance. "paper, margin = paper" is the paper's eps of 5 cm around every wall; all others give
-# each wall the margin that it requires (notebook 12).
+# Euclidean distance. "szlib" has the defaults; "margin = paper" has the paper's eps of 5 cm around every wall,
+# all others give each wall the margin that it requires (notebook 12).
 #
 # With one person the few infeasible steps are first ones: somebody who walks up at 0.5 m/s takes
 # 5 cm of $h$ in a step where the condition allows $\gamma h = 1.5$ cm, and a robot at rest cannot yet
@@ -251,19 +246,19 @@ record.check("once there is a solution there always is one", start_only, 4 * wor
 # $v / a_{max}$ to stop.
 
 # %%
-thousands = read_table("11_rollouts")
+thousands = record.committed_table("11_rollouts", rollout_table.recompute)
 flagged = (thousands["unflagged_violations"] == 0).all()
 record.check("no step with h < 0 that was not flagged before", flagged, always=True)
 apart = (thousands["unflagged_overlaps"].dropna() == 0).all()
 record.check("nor one into an overlap", apart, always=True)
 walls = thousands[thousands["set"] == "all"].set_index("formulation")["worlds overlap wall"]
-record.claim("no wall is touched with the margin it requires", walls["paper"] == 0, walls.to_dict())
-record.claim("nor with the paper's margin", walls["paper, margin = paper"] == 0, walls.to_dict())
+record.claim("no wall is touched with the margin it requires", walls["szlib"] == 0, walls.to_dict())
+record.claim("nor with the paper's margin", walls["margin = paper"] == 0, walls.to_dict())
 alone = thousands[thousands["set"] == "one person"].set_index("formulation")
 long = alone.loc[["whole horizon", "rest"], "min_h"]
 safe = long.min() >= -1e-6
 record.check("one person, long horizons: h >= 0 in every world", safe, long.to_dict(), always=True)
-lost = alone.filter(like="paper", axis=0)["share h < 0"]
+lost = alone.loc[["szlib", "gamma = 0.2", "gamma = 0.8"], "share h < 0"]
 record.claim("one person, N_h = 2: h >= 0 in every world, for any gamma", lost.max() == 0, lost.to_dict())
 record.key |= {"worlds driven": int(thousands["worlds"].sum())}
 thousands.set_index(["set", "formulation"]).T

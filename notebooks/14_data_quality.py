@@ -34,13 +34,14 @@ from itertools import cycle
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from studies import hours as hours_study
 
 import szlib
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels, quality
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters, read_table
+from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -170,7 +171,8 @@ days
 # notebooks; of the hour from 12 it holds a tenth of the people).
 
 # %%
-mall = read_table("14_hours")
+mall = record.committed_table("14_hours", hours_study.recompute, where="site == 'plaza'")
+mall = mall[mall["site"] == "ATC day"]
 figure, panels = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
 lines = zip(hours.groupby("day"), figures.pick_colours(days["day"]), cycle("os^Dv"), strict=False)
 for (day, rows), colour, marker in lines:

@@ -32,10 +32,11 @@ import warnings
 import matplotlib.pyplot as plt
 import pandas as pd
 from IPython.display import Markdown
+from studies import respect
 
 import szlib
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters, read_table
+from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -170,7 +171,7 @@ record.figure(fig, "test")
 # are due.
 
 # %%
-nobody = read_table("15_nobody")
+nobody = record.committed_table("15_nobody", respect.recompute_nobody)
 nobody["alarm"] = nobody["p_value"] <= 0.05
 alarms = nobody.groupby(["bunch", "kinds"])["alarm"].agg(["sum", "size"])
 every_kind = alarms.xs("all", level="kinds")
@@ -185,7 +186,7 @@ alarms.rename(columns={"sum": "false alarms", "size": "crowds"})
 # %% [markdown]
 # ## Three zones of the same people
 #
-# - **hull**: where (nearly) nobody ever was: the paper's;
+# - **paper**: where (nearly) nobody ever was: the paper's, to the letter;
 # - **quantile**: where all but 5 % of encounters keep out;
 # - **respect**: where people are half as often as by chance.
 #
@@ -209,7 +210,7 @@ rows = {}
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", szlib.DataWarning)  # the column adequate says it
     for name, people, model in (("everybody", samples, null), ("strangers", strangers, others)):
-        for method in ("hull", "quantile", "respect"):
+        for method in ("paper", "quantile", "respect"):
             rows[method, name] = zone_at(people, model, method)
 columns = ["a", "a_low", "a_high", "b", "center_x", "area", "influence", "adequate"]
 zones = pd.DataFrame(rows).T.reindex(columns=columns)
@@ -240,11 +241,11 @@ for (method, who), line in zones.dropna(subset="a").iterrows():
 # Grand Central, New York (`python -m studies.respect n-curve`):
 
 # %%
-curves = read_table("15_n_curve")
-curves = curves[curves["kinds"] == "strangers"]
+curves = record.committed_table("15_n_curve", respect.recompute_n_curve, where="site == 'plaza'")
+curves = curves[(curves["kinds"] == "strangers") & (curves["site"] != "plaza")]
 fig, panels = plt.subplots(1, 2, figsize=(11, 4), layout="constrained", sharey=True)
 shown = {
-    "hull_a": "hull: semi-major axis",
+    "hull_a": "the paper's zone: semi-major axis",
     "respect": "respect: radius",
     "null_respect": "respect, of the null model",
 }
@@ -253,7 +254,7 @@ for ax, (site, part) in zip(panels, curves.groupby("site"), strict=True):
 record.figure(fig, "n-curve")
 
 # %%
-sites = read_table("15_sites")
+sites = record.committed_table("15_sites", respect.recompute_sites, where="site == 'plaza'")
 sites = sites[(sites["min_distance"] == 1) & sites["kinds"].isin(["all", "strangers", "opposite, crossing"])]
 sites[
     [
@@ -278,7 +279,8 @@ sites[
 # (`python -m studies.respect changes`)
 
 # %%
-changes = read_table("15_changes")
+changes = record.committed_table("15_changes", respect.recompute_changes, where="site == 'plaza'")
+changes = changes[changes["site"] == "grand-central"]
 fig, ax = plt.subplots(figsize=(9, 4.5), layout="constrained")
 looks = zip((figures.GREY, figures.BLUE, figures.ORANGE), "os^", (-0.2, 0.0, 0.2), strict=True)
 for (who, part), (shade, marker, up) in zip(changes.groupby("kinds", sort=False), looks, strict=True):

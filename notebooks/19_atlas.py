@@ -138,7 +138,7 @@ by_gamma.style.format("{:.0%}", na_rep="").format_index("{:g}")
 #
 # ## An example of each
 #
-# Of each name the run that is nearest to the paper's settings.
+# Of each name the run that is nearest to gamma = 0.05, the paper's widths and pace, and the plaza's zone.
 
 # %%
 distance = (
@@ -173,7 +173,7 @@ Markdown(f"In the whole atlas it never *{'*, never *'.join(missing)}*." if missi
 # %% [markdown]
 # ## Yielding against efficiency
 #
-# The paper's sentence, with the zone at hand: how long the robot yields, and when it arrives, for zones of
+# That sentence of the paper, with the zone at hand: how long the robot yields, and when it arrives, for zones of
 # other sizes. Each point is a run, its number the size of the zone.
 
 # %%

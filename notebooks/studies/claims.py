@@ -147,7 +147,7 @@ VARIED: dict[str, Mapping[str, Sequence[float]]] = {
 """Options of each method that are varied, and their values besides the defaults."""
 
 
-def moved(name: str, methods: Iterable[str] = tuple(VARIED)) -> Iterator[pd.DataFrame]:
+def move_zone(name: str, methods: Iterable[str] = tuple(VARIED)) -> Iterator[pd.DataFrame]:
     """What moves the zone of a site, method by method."""
     load, square = SITES[name]
     tracks = load()
@@ -166,7 +166,7 @@ def main() -> None:
         if asked.study == "claims":
             table = pd.concat([part for name in asked.sites for part in of_site(name)])
         else:
-            table = pd.concat([part for name in ("ATC day", "plaza") for part in moved(name)])
+            table = pd.concat([part for name in ("ATC day", "plaza") for part in move_zone(name)])
     write_table(table, f"16_{asked.study}")
     print(table.to_string())
 
