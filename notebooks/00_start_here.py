@@ -61,9 +61,15 @@ record = NotebookRecord("00_start_here", globals())
 tasks = [task for sheet in SHEETS.values() for task in sheet]
 print(f"szlib {szlib.__version__}: {len(folders.list_notebooks())} notebooks, {len(tasks)} exercises")
 record.key["exercises"] = len(tasks)
-for sheet in SHEETS:
-    there = all((folders.NOTEBOOKS / part / f"{sheet}.py").exists() for part in ("exercises", "solutions"))
-    record.check(f"{sheet} and its solutions are there", there)
+ours, paper = szlib.MPCSettings(), szlib.MPCSettings.paper()
+for settings in (ours, paper):
+    numbers = (settings.dt, settings.N, settings.N_h, settings.v_max, settings.r_robot, settings.eps)
+    record.check(
+        "the table of parameters has the numbers of szlib", numbers == (0.1, 8, 2, 1, 0.5, 0.05), numbers
+    )
+assumed = (ours.gamma, ours.Q, ours.R, ours.P, ours.a_max, ours.pass_side)
+expected = (0.05, (10, 10, 1, 1), (1, 1), (100, 100, 10, 10), 1, "right")
+record.check("and those that the paper does not give", assumed == expected, assumed)
 
 # %% [markdown]
 # ## The map
@@ -192,7 +198,7 @@ for sheet in SHEETS:
 # | robot radius; margin $\epsilon$ | 0.5 m; 0.05 m, more at the ends of short walls ($r^2 / L$) | paper; measured |
 # | quantile q; encounters needed on each side | 5 %; 20 | assumed |
 # | companions; shifts of the null model | see notebook 15; 1 to 10 min | measured; assumed |
-# | gamma | 0.05 | measured |
+# | gamma | 0.05 | tuned on the four scenarios |
 # | Q; R; P | diag(10, 10, 1, 1); I; 10 Q | assumed |
 # | acceleration limit per axis | 1 m/s2 | assumed |
 # | side on which a head-on person is passed | right | assumed |

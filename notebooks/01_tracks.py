@@ -122,7 +122,6 @@ parameters(
 # %%
 inside = square.contains(people["x"], people["y"])
 print(f"{inside.mean():.1%} of all person-time is spent in the area of {square.area:.0f} m2")
-record.check("people walk through the area", inside.any(), int(inside.sum()), always=True)
 record.key["area [m2]"] = round(square.area, 1)
 ax = figures.plot_attentional_space(szlib.AttentionalSpace(), square)
 record.figure(ax.figure, "space")
@@ -136,12 +135,12 @@ record.figure(ax.figure, "space")
 # %%
 stages = funnels.get(people)
 lost = {reason: n for s in stages for reason, n in s["rejected"].items()}
-record.check(
-    "the funnel adds up",
-    all(s["entered"] == s["kept"] + sum(s["rejected"].values()) for s in stages),
-    lost or "no row set aside",
-    always=True,
-)
+print(lost or "no row set aside")
+if record.cache.is_synthetic:
+    lines = sum(len(file.read_text().splitlines()) for file in record.cache.files())
+    record.check(
+        "each line of the file entered the funnel", lines == stages[0]["entered"], lines, always=True
+    )
 funnels.table(stages).tail(5)
 
 # %% [markdown]
