@@ -127,6 +127,20 @@ strangers = szlib.of_kind(samples, "strangers")["encounter"].nunique()
 record.key["strangers"] = strangers
 kinds.to_frame("encounters")
 
+# %%
+walked = tracks.set_index(["day", "id", "t"])[["vx", "vy"]]
+own, theirs = (
+    walked.loc[pd.MultiIndex.from_frame(first[["day", name, "t"]])] for name in ("ref_id", "other_id")
+)
+towards = (own.to_numpy() * theirs.to_numpy()).sum(axis=1) < 0  # more than 90 deg between the velocities
+share = {kind: float(towards[first["kind"] == kind].mean()) for kind in ("opposite", "same direction")}
+apart = share["opposite"] > 0.95 and share["same direction"] < 0.05
+record.check(
+    "as the window opens, opposite pairs walk towards each other, others of one direction do not",
+    apart,
+    share,
+)
+
 # %% [markdown]
 # ## What they look like
 #
