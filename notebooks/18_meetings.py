@@ -142,8 +142,7 @@ formatted(table, "time_to_goal")
 #
 # Twelve variations of each meeting, in which everybody has the plaza's zone, rounded to a centimetre
 # (`python -m studies.meetings 12`). They are saved beside the notebooks, and shown from here on. "MPC-CBF"
-# has szlib's defaults, "MPC-CBF, paper" is the paper's controller to the letter, `MPCSettings.paper()`.
-# Intervals are 95 % bootstrap intervals over variations.
+# has szlib's defaults, not the paper's settings. Intervals are 95 % bootstrap intervals over variations.
 
 # %%
 quick = "metric in ['time_to_goal', 'path_efficiency', 'closest_person'] and first == first"
@@ -161,7 +160,7 @@ labels = {
     "personal": "personal space, share of time",
     "robot_on_person": "ran into somebody, times",
 }
-shown = full[full["controller"].isin([*CONTROLLERS, "MPC-CBF, bolder", "MPC-CBF, paper"])]
+shown = full[full["controller"].isin([*CONTROLLERS, "MPC-CBF, bolder"])]
 fig = figures.draw_interval_grid(shown, labels, rows="meeting", colour="controller")
 record.figure(fig, "controllers")
 

@@ -30,9 +30,8 @@ METHODS = {
     **{name: (name, szlib.MPCSettings()) for name in CONTROLLERS},
     "MPC-CBF, bolder": ("MPC-CBF", szlib.MPCSettings(gamma=0.2, N=24, N_h=24)),
     "MPC-CBF, N = 24 alone": ("MPC-CBF", szlib.MPCSettings(N=24)),
-    "MPC-CBF, paper": ("MPC-CBF", szlib.MPCSettings.paper()),
 }
-"""Controllers and their settings, by name: szlib's defaults, others, and the paper's to the letter."""
+"""Controllers and their settings, by name: szlib's defaults, and two changes of them."""
 
 
 def meet(
