@@ -43,7 +43,6 @@ data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
-fraction = 0.002  # as in notebook 03, of the paper's hull
 r_max = 2.0  # as in notebook 03 [m]
 q = 0.05  # share of encounters that may enter the quantile zone
 zone_speed = 1.1  # whose zone the robot keeps [m/s]
@@ -57,7 +56,7 @@ parameters(
         ("speeds", "0.5 to 1.5 m/s", ASSUMED, "what one day of data covers"),
         ("the robot's zone", f"that of {zone_speed:g} m/s", PAPER, "sec. 4: 1.1 m/s"),
         ("q", q, ASSUMED, "share of encounters that may enter the quantile zone"),
-        ("outlier fraction, r_max", f"{fraction:.1%}, {r_max:g} m", PAPER, "see notebook 03"),
+        ("outlier fraction, r_max", f"0.2 %, {r_max:g} m", PAPER, "see notebook 03"),
     ]
 )
 
@@ -71,8 +70,7 @@ parameters(
 # %%
 samples = record.cache.encounters()
 fit = record.cache.method.fit_options()  # r_max, q, speeds: what the robot's zone is fitted with
-hull = {"method": "hull", "fraction": fraction, "n_neighbours": 20}
-paper = szlib.SocialZone.fit(samples, r_max=r_max, speeds=fit["speeds"], **hull)
+paper = szlib.SocialZone.fit(samples, method="paper", r_max=r_max, speeds=fit["speeds"])
 shown = ["speed", "center_x", "a", "a_low", "a_high", "b", "area", "influence", "encounters", "adequate"]
 paper.table()[shown].round(2)
 
@@ -128,7 +126,7 @@ record.key |= {f"a{at}": kept.semi_axes[0], f"b{at}": kept.semi_axes[1], f"x{at}
 # %%
 rows = {}
 for who, kinds in (("everybody", None), ("strangers", "strangers")):
-    for method in ("hull", "quantile"):
+    for method in ("paper", "quantile"):
         people = szlib.of_kind(samples, kinds)
         options = {"q": q} if method == "quantile" else {}
         options |= {"r_max": r_max, "speeds": (zone_speed,), "n_resamples": 0}

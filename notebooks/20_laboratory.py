@@ -74,7 +74,7 @@ parameters(
 # %% [markdown]
 # ## The scene, and two robots
 #
-# A zone for each estimator: the quantile zone that notebook 05 kept, and the paper's hull. Robot A is as in
+# A zone for each estimator: the quantile zone that notebook 05 kept, and the hull. Robot A is as in
 # notebook 08; robot B is set by the parameters that end in `_b`.
 
 # %%

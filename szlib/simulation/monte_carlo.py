@@ -128,7 +128,7 @@ def rollouts(
 
 
 def make_mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = DEFAULT_ZONE) -> MPCCBF:
-    """The controller of the paper for a `scenario` with `settings`; `zone` is that of people who have
+    """The MPC-CBF controller for a `scenario` with `settings`; `zone` is that of people who have
     none.
     """
     return MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
