@@ -186,7 +186,7 @@ formatted(
 # notebooks.
 
 # %%
-quick = " and metric == 'path_efficiency' and first == first"  # of the trials that need no data
+quick = " and metric == 'path_efficiency' and first < 0.95"  # of the trials that need no data
 saved = record.committed_table("17_crowds", crowd_trials.recompute, where=f"crowd in {models}" + quick)
 reacting = saved[saved["crowd"].isin(simulated)]
 formatted(reacting, ["crowd", "sees", "controller"])
@@ -254,7 +254,10 @@ formatted(saved[~saved["crowd"].isin(simulated)], ["crowd", "controller"])
 # *to_who_kept* counts those who had kept theirs, from positions alone and by another formula.
 
 # %%
-again = {"recompute": crowd_trials.recompute_promises, "where": f"crowd in {models}"}
+again = {
+    "recompute": crowd_trials.recompute_promises,
+    "where": f"crowd in {models} and first_path_efficiency < 0.95",
+}
 promises = record.committed_table("17_safety_claims", **again)
 total = promises[
     ["trials", "steps", "claimed_safe_steps", "broken_steps", *MOTION_CHANGES, "unexplained", "to_who_kept"]

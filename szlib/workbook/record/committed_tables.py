@@ -17,8 +17,8 @@ from .. import folders
 
 TABLES = folders.NOTEBOOKS / "tables"
 """The folder of the committed tables."""
-RELATIVE, ABSOLUTE = 1e-3, 1e-4
-"""Differences that are due to the four digits of a table, relative to a number and absolute."""
+RELATIVE, ABSOLUTE = 5e-4, 5e-5
+"""Differences that are due to rounding to four digits, relative to a number and absolute."""
 
 
 def read_table(name: str) -> pd.DataFrame:
