@@ -49,7 +49,7 @@ data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
-worlds = 4  # worlds for each method; 100 for the table that is saved
+worlds = 4  # worlds for each method; 50 for the table that is saved
 n_jobs = 1
 
 # %%
@@ -134,7 +134,7 @@ readable(mine[mine["behaviour"] == "as expected"], "zone")
 # %% [markdown]
 # ## The full run
 #
-# 100 worlds in which everybody has the plaza's zone, rounded to a centimetre (`python -m studies.comparison 100`).
+# 50 worlds in which everybody has the plaza's zone, rounded to a centimetre (`python -m studies.comparison 50`).
 # They are saved beside the notebooks, and shown from here on. Four formulations: *paper* is the paper's to
 # the letter, `MPCSettings.paper()`; *szlib* has the defaults; *whole horizon* and *rest* change one of them.
 

@@ -1,6 +1,6 @@
 """Zones, formulations and surprises in the same worlds: the tables of notebook 13.
 
-    python -m studies.comparison 100    13_comparison.csv, 13_paired.csv   (worlds; an hour)
+    python -m studies.comparison 50    13_comparison.csv, 13_paired.csv   (worlds)
 
 Everybody has the zone `REFERENCE`, that of the plaza rounded to a centimetre.
 """
