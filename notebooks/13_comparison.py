@@ -141,7 +141,7 @@ readable(mine[mine["behaviour"] == "as expected"], "zone")
 # %%
 quick = "metric in ['path_length', 'jerk']"
 full = record.committed_table("13_comparison", comparison.recompute, where=quick)
-moved = quick + " and (first > 0.01 or first < -0.01)"
+moved = quick + " and (probe > 0.01 or probe < -0.01)"
 full_paired = record.committed_table("13_paired", comparison.recompute_paired, where=moved)
 expected = full[full["behaviour"] == "as expected"]
 record.key["worlds in the saved table"] = int(full["n"].max())
