@@ -1,7 +1,8 @@
 """Tables that are committed beside the notebooks: how each was made, and whether a row is still the same.
 
 The first line of such a CSV file is a comment, ``# {"command": ..., "seed": ..., "commit": ...}``: the
-command that made the table, its seed, and the commit of the code that it ran.
+command that made the table, its seed, and the commit of the code that it ran; and, if the column or the rows
+that are computed again were added later, the commit that computed them, as "probe".
 """
 
 from __future__ import annotations
