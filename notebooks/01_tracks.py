@@ -122,7 +122,7 @@ parameters(
 # %%
 inside = square.contains(people["x"], people["y"])
 print(f"{inside.mean():.1%} of all person-time is spent in the area of {square.area:.0f} m2")
-if record.cache.is_synthetic:
+if not area and isinstance(square, szlib.Square):
     (x0, x1), (y0, y1) = square.x, square.y
     cells = [np.arange(x0, x1 + 1e-9), np.arange(y0, y1 + 1e-9)]  # of 1 m
     used = np.histogram2d(people["x"], people["y"], bins=cells)[0] > 0
