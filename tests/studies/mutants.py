@@ -1,9 +1,9 @@
 """The share of mutants that the tests kill, estimated from a random sample.
 
-    python tests/mutants.py cover             find which tests reach which lines (once, half an hour)
-    python tests/mutants.py run 300           draw mutants, and run tests on each
-    python tests/mutants.py again tests/...   run these tests on the mutants that live, if not judged
-    python tests/mutants.py table             killed share by module, with Wilson's 95 % intervals
+    python tests/studies/mutants.py cover             find which tests reach which lines (once, half an hour)
+    python tests/studies/mutants.py run 300           draw mutants, and run tests on each
+    python tests/studies/mutants.py again tests/...   run these tests on the mutants that live, if not judged
+    python tests/studies/mutants.py table             killed share by module, with Wilson's 95 % intervals
 
 A mutant is the code with one small change (an operator, a number, a condition), made by cosmic-ray.  First a
 place is drawn, then one of the changes there; each module gives its share of all places.  Annotations,
@@ -45,7 +45,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 from scipy.stats import binomtest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 DRAWN = ["control", "encounters", "zones"]
 DRAWN += [f"simulation/{name}.py" for name in ("metrics", "social_metrics", "paper_claims")]
 ROOMS = [f"tests/{room}" for room in ("control", "encounters", "zones", "simulation", "plaza")]
