@@ -57,7 +57,7 @@ results = "../results"
 fraction = 0.002  # as in notebook 03
 r_max = 2.0  # as in notebook 03 [m]
 zone_speed = 1.1  # as in notebook 05 [m/s]
-resamples = 200  # for the intervals
+resamples = 100  # for the intervals
 
 # %%
 record = NotebookRecord("16_claims", globals())
@@ -330,7 +330,7 @@ record.figure(fig, "robot")
 # %%
 corridor, paper, ellipse = szlib.SCENARIOS["corridor"], szlib.MPCSettings.paper(), zone.ellipses[zone_speed]
 way = szlib.simulate(corridor, szlib.MPCCBF(ellipse, walls=corridor.walls))
-moments = [way.controller_inputs(t) for t in way.time[20:80]]
+moments = [way.controller_inputs(t) for t in way.time[30:55]]
 solve_times = {}
 for solver, N_h in product(("ipopt", "sqp"), range(1, paper.N + 1)):
     settings = replace(paper, solver=solver, N_h=N_h)

@@ -31,6 +31,8 @@ from .record.parameters import check_parameters
 PRODUCERS = ("02", "05")
 # Notebooks that read the records of all others. The others are independent of each other.
 SUMMARIES = ("16",)
+# Notebooks that take longest. They start first in their batch, so that no core waits for them at its end.
+LONGEST = ("15", "18")
 # Files of a run: its data and parameters, and its outcome.
 PARAMETERS, SUMMARY = "parameters.json", "summary.json"
 
@@ -139,7 +141,7 @@ def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:
     The notebooks of a batch can run at the same time.
     """
     batches: list[list[Path]] = [[] for _ in range(len(PRODUCERS) + 2)]
-    for script in scripts:
+    for script in sorted(scripts, key=lambda script: script.stem[:2] not in LONGEST):
         number = script.stem[:2]
         last = number in SUMMARIES
         batches[-1 if last else sum(number > producer for producer in PRODUCERS)].append(script)
