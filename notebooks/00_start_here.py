@@ -85,24 +85,25 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # | [6b - Build the controller yourself](06b_build_a_controller.ipynb) | What does it take to turn the barrier condition of notebook 06 into a robot that drives? | 25 min |
 # | [7 - Passing a person who stands](07_passing.ipynb) | A person stands in the way and looks at the robot. When does the robot begin to go around them, and what decides that? | 25 min |
 # | [8 - Meeting in a narrow corridor](08_corridor.ipynb) | A person walks towards the robot in a corridor. There is room for both, but not much. Who slows the robot down: the person, or the wall? | 15 min |
-# | [9 - Yielding by waiting](09_waiting.ipynb) | A passage is too narrow for two, and a person is in it. Nobody told the robot who goes first. Who decides, and what does waiting look like to a solver? | 15 min |
+# | [9 - Yielding by waiting](09_waiting.ipynb) | A passage is too narrow for two, and a person is in it. No rule says who goes first. Who decides, and what does waiting look like to a solver? | 15 min |
 # | [10 - Yielding by making room](10_making_room.ipynb) | This time the robot is *in* the passage when the person comes. It wants to go ahead. What makes it go back? | 20 min |
 # | [11 - Feasibility](11_feasibility.ipynb) | A hard constraint is a promise only while the problem has a solution. When does it lose it, what happens then, and can one have a promise that is kept for ever? | 20 min |
 # | [12 - The distances, audited](12_distances.ipynb) | The barriers use *approximate* distances to zones and walls, and a margin of 5 cm "since the approximated distance function contains some errors" (sec. 4). Where do they err, to which side, and is the margin enough? | 15 min |
 # | [13 - Against everything else](13_comparison.ipynb) | Is the fitted ellipse worth its trouble? | 15 min |
 # | [14 - Data quality](14_data_quality.ipynb) | Before anything is learned from a file of tracks: can it be trusted, and which days are unlike the others? | 15 min |
 # | [15 - Respect or emptiness?](15_respect.ipynb) | Around a walking person there is a place where nobody is. Do people keep out of it, or is it only rare that two of them are anywhere near each other? | 20 min |
-# | [16 - What is true?](16_claims.ipynb) | What does the paper claim, and what of it does the data at hand support? | 30 min |
+# | [16 - What is true?](16_claims.ipynb) | What does the paper claim, and what of it does the data support? | 30 min |
 # | [17 - Other people's crowds](17_crowds.ipynb) | So far everybody walked as this workbook made them walk. What becomes of the robot among people who walk by somebody else's model and react to it - and among people who were recorded, and would have walked like that whatever it does? | 25 min |
 # | [18 - Eleven meetings](18_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 15 min |
 # | [19 - A sensitivity atlas](19_atlas.ipynb) | Notebooks 08 to 10 show one corridor, one passage, one pace, one zone. What would the robot have done in others? | 15 min |
 # | [20 - The laboratory](20_laboratory.ipynb) | What does the robot do if *you* put the person somewhere else, move the goal, narrow the corridor, or change gamma while it drives? | 10 min |
+# | [21 - From sentence to verdict](21_sentences.ipynb) | Which sentences of the paper say something that can be checked, and does each of them hold? | 5 min |
 
 # %% [markdown]
 # ## Three routes
 #
 # - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [08](08_corridor.ipynb), [20](20_laboratory.ipynb): 1 h 05 min to read.
-# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [11](11_feasibility.ipynb), [16](16_claims.ipynb): 3 h 50 min to read.
+# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [11](11_feasibility.ipynb), [16](16_claims.ipynb), [21](21_sentences.ipynb): 3 h 55 min to read.
 # - **Six weeks: the course.** One exercise sheet a week; running and looking around come on top.
 #
 # | week | topic | notebooks | to read | sheet | to do |
@@ -112,7 +113,7 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # | 3 | From samples to a zone | [04](04_hull.ipynb), [05](05_zones.ipynb) | 25 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
 # | 4 | How sure? Respect or emptiness | [15](15_respect.ipynb), [16](16_claims.ipynb) | 50 min | [sheet 4](exercises/sheet4_certainty.ipynb) | 50 min |
 # | 5 | Barriers, and a controller of your own | [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [11](11_feasibility.ipynb), [12](12_distances.ipynb) | 1 h 10 min | [sheet 5](exercises/sheet5_barriers.ipynb) | 1 h 00 min |
-# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb), [19](19_atlas.ipynb), [20](20_laboratory.ipynb) | 2 h 35 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
+# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb), [19](19_atlas.ipynb), [20](20_laboratory.ipynb), [21](21_sentences.ipynb) | 2 h 40 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
 
 # %% [markdown]
 # **The exercises** are functions that you write. `exercises.check("velocity", velocity)` asks yours for cases

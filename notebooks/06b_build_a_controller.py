@@ -365,8 +365,8 @@ record.figure(fig, "corridor")
 # ## The same as szlib's?
 #
 # `szlib.MPCCBF` with `MPCSettings.paper()` and either of its solvers, asked in states along this run. Ours,
-# `MPCSettings()`, adds one thing to the problem of the paper: a rule for the side on which a person is passed who is
-# met head-on. It acts fully while the goal lies within `head_on_share` = 0.25 of the half-angle under which the robot
+# `MPCSettings()`, adds one thing to the problem of the paper: a rule for the side on which the robot passes a person
+# whom it meets head-on. It acts fully while the goal lies within `head_on_share` = 0.25 of the half-angle under which the robot
 # sees the person's zone, and fades out up to twice that share. In the paper's settings the share is 0. Both
 # IPOPTs go on to the last digits; the SQP stops where it expects no more than 1e-4 m/s² from going on.
 
@@ -414,7 +414,7 @@ record.key["largest difference of an acceleration [m/s²]"] = float(table.to_num
 # *The solver* is IPOPT in the paper and in `MPCSettings.paper()`; that of `MPCSettings()` is an SQP with the same
 # answers.
 #
-# Two things are not in the paper. A person who is met head-on can be passed on both sides at nearly the same cost:
+# Two things are not in the paper. Both ways around a person ahead cost nearly the same:
 # the smallest tilt of the zone decides, or the robot stops in front of a symmetric one. The rule of the side replaces
 # that, and acts while the goal lies within twice `head_on_share` of the half-angle of the zone; notebook 07 shows what
 # it changes. And where the program has no solution, a solver's guess may lead through a person: then it is solved

@@ -14,7 +14,7 @@
 # %% [markdown]
 # # 9 - Yielding by waiting
 #
-# **Question.** A passage is too narrow for two, and a person is in it. Nobody told the robot who goes first.
+# **Question.** A passage is too narrow for two, and a person is in it. No rule says who goes first.
 # Who decides, and what does waiting look like to a solver?
 #
 # **Expectation.** The paper: the robot waits outside until the person is through, then it goes.

@@ -14,7 +14,7 @@
 # %% [markdown]
 # # 16 - What is true?
 #
-# **Question.** What does the paper claim, and what of it does the data at hand support?
+# **Question.** What does the paper claim, and what of it does the data support?
 #
 # **Expectation.** A claim that rests on 92 days may be undecidable on one. So each becomes an effect with
 # its interval, and the verdict may be "not decidable".
@@ -45,7 +45,6 @@ from szlib.plaza.accuracy import true_kinds
 from szlib.simulation import paper_claims as claims
 from szlib.workbook import figures, paper_sentences
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
-from szlib.workbook.record.display import style_table
 from szlib.zones.outliers import is_outlier
 from szlib.zones.sensitivity import sensitivity
 
@@ -57,7 +56,7 @@ results = "../results"
 fraction = 0.002  # as in notebook 03
 r_max = 2.0  # as in notebook 03 [m]
 zone_speed = 1.1  # as in notebook 05 [m/s]
-resamples = 100  # for the intervals
+resamples = 200  # for the intervals
 
 # %%
 record = NotebookRecord("16_claims", globals())
@@ -123,7 +122,7 @@ ax.set_title(f"{(table['verdict'] == 'supported').sum()} of {len(table)} claims 
 record.figure(ax.figure, "claims")
 
 # %% [markdown]
-# ## The same on every data set at hand
+# ## The same on every data set
 #
 # The plaza, the real ATC day, Grand Central, THOR-MAGNI, and the ETH sequence
 # (`python -m studies.claims`). A site without enough people on every side decides nothing about
@@ -352,12 +351,11 @@ record.claim("each step with IPOPT takes less than 0.1 s", longest < 1000 * pape
 costs.rename_axis(index="N_h", columns="").round(2)
 
 # %% [markdown]
-# ## From sentence to verdict
+# ## Sentences that no other notebook decides
 #
-# Every sentence of the paper that says something checkable, with our code, the cell that shows it, and its verdict. Some
-# sentences have no notebook of their own, so the cells below decide them first: about the corridor without the person, about
-# gamma, the distance and wrong predictions, and about people at the ATC mall and at Grand Central. Sentences about fig. 6
-# are judged by the paper's zone and settings; ours are in notebooks 07 to 10 beside them.
+# Some sentences of the paper have no notebook of their own, so the cells below decide them: about the corridor without
+# the person, about gamma, the distance and wrong predictions, and about people at the ATC mall and at Grand Central.
+# Notebook 21 lists every sentence with its verdict.
 
 # %%
 free = replace(corridor, people=())
@@ -424,28 +422,6 @@ for name, site in {
 }.items():
     number = int(decided.get(site, 0))
     record.claim(name, number == 0, f"{number} decided")
-
-# %%
-sentences = paper_sentences.judge_sentences(record)
-record.table(sentences.drop(columns="unknown"), "16_sentences")
-unknown = [name for names in sentences["unknown"] for name in names]
-if record.cache.is_synthetic:
-    record.check("each check that a sentence names was made, where its notebook ran", not unknown, unknown)
-counts = sentences["verdict"].value_counts()
-record.key |= {f"sentences {verdict}": int(number) for verdict, number in counts.items()}
-counts.to_frame("sentences")
-
-# %%
-sentences["how, and numbers"] = sentences["how"] + "\n" + sentences["numbers"]
-cells = sentences["notebook"] + ": " + sentences["cell"].str.lstrip("# ")
-sentences["code; notebook: cell"] = sentences["code"] + "\n" + cells
-shown = ["place", "sentence", "verdict", "how, and numbers", "code; notebook: cell"]
-width = {"sentence": "20%", "verdict": "12%", "how, and numbers": "36%", "code; notebook: cell": "22%"}
-lines = {"selector": "td", "props": "white-space: pre-line; overflow-wrap: anywhere; vertical-align: top"}
-columns = {name: [{"selector": "", "props": f"width: {share}"}] for name, share in width.items()}
-style_table(sentences[shown]).set_table_styles([lines], overwrite=False).set_table_styles(
-    columns, overwrite=False
-)
 
 # %%
 day = saved[saved["method"] == "quantile"]

@@ -22,8 +22,9 @@
 # sooner.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [19 - A sensitivity atlas](19_atlas.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 3-4 · 10 min to read
+# [Start](00_start_here.ipynb) · before: [19 - A sensitivity atlas](19_atlas.ipynb) · next: [21 - From
+# sentence to verdict](21_sentences.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4 · 10 min to
+# read
 #
 # **Afterwards you can** try out a scene of your own, live, and hand its settings on.
 

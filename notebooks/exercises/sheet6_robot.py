@@ -23,7 +23,8 @@
 # do](../exercises/sheet6_robot.ipynb) · [solved](../solutions/sheet6_robot.ipynb) · 1 h 20 min · belongs to
 # [07](../07_passing.ipynb), [08](../08_corridor.ipynb), [09](../09_waiting.ipynb),
 # [10](../10_making_room.ipynb), [13](../13_comparison.ipynb), [17](../17_crowds.ipynb),
-# [18](../18_meetings.ipynb), [19](../19_atlas.ipynb), [20](../20_laboratory.ipynb)
+# [18](../18_meetings.ipynb), [19](../19_atlas.ipynb), [20](../20_laboratory.ipynb),
+# [21](../21_sentences.ipynb)
 
 # %%
 import matplotlib.pyplot as plt

@@ -54,6 +54,7 @@ GIVES: dict[str, tuple[str, str]] = {
     "18": ("sec. 4-5", "say in which meetings this controller is good, and in which it is bad."),
     "19": ("sec. 4-5", "predict from gamma, width, speed and zone what the robot will do."),
     "20": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
+    "21": ("all", "find each sentence of the paper with its code, its cell and its verdict."),
 }
 """By number of the notebook: the section of the paper, and what a reader can do after reading it."""
 
@@ -143,14 +144,17 @@ WEEKS: list[tuple[str, tuple[str, ...], str]] = [
     ("Barriers, and a controller of your own", ("06", "06b", "11", "12"), "sheet5_barriers"),
     (
         "The robot among people",
-        ("07", "08", "09", "10", "13", "17", "18", "19", "20"),
+        ("07", "08", "09", "10", "13", "17", "18", "19", "20", "21"),
         "sheet6_robot",
     ),
 ]
 """Topic, notebooks and exercise sheet of each of six weeks."""
 ROUTES: list[tuple[str, tuple[str, ...]]] = [
     ("An hour: the idea", ("02", "05", "06", "08", "20")),
-    ("A day: the method", ("01", "02", "03", "04", "05", "06", "06b", "07", "08", "09", "10", "11", "16")),
+    (
+        "A day: the method",
+        ("01", "02", "03", "04", "05", "06", "06b", "07", "08", "09", "10", "11", "16", "21"),
+    ),
 ]
 """Shorter routes, by number of the notebook."""
 

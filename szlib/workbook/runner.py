@@ -30,7 +30,7 @@ from .record.parameters import check_parameters
 # Notebooks whose results later ones need: the encounters and the zone.
 PRODUCERS = ("02", "05")
 # Notebooks that read the records of all others. The others are independent of each other.
-SUMMARIES = ("16",)
+SUMMARIES = ("21",)
 # Notebooks that take longest. They start first in their batch, so that no core waits for them at its end.
 LONGEST = ("15", "18")
 # Files of a run: its data and parameters, and its outcome.
