@@ -190,7 +190,8 @@ alarms.rename(columns={"sum": "false alarms", "size": "crowds"})
 # - **quantile**: where all but 5 % of encounters keep out;
 # - **respect**: where people are half as often as by chance.
 #
-# Each with its interval, from pairs of people drawn anew, for everybody and for strangers.
+# Each with its interval, from pairs of people drawn anew, for everybody and for strangers (on the plaza all are
+# strangers).
 
 
 # %%
@@ -206,10 +207,13 @@ def zone_at(people: pd.DataFrame, model: szlib.NullEncounters, method: str) -> p
     return zone.table().iloc[0]
 
 
+groups = {"everybody": (samples, null), "strangers": (strangers, others)}
+if len(strangers) == len(samples):
+    del groups["everybody"]  # the same people
 rows = {}
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", szlib.DataWarning)  # the column adequate says it
-    for name, people, model in (("everybody", samples, null), ("strangers", strangers, others)):
+    for name, (people, model) in groups.items():
         for method in ("paper", "quantile", "respect"):
             rows[method, name] = zone_at(people, model, method)
 columns = ["a", "a_low", "a_high", "b", "center_x", "area", "influence", "adequate"]
@@ -218,11 +222,10 @@ record.table(zones.rename_axis(["method", "who"]).reset_index(), "15_zones")
 zones
 
 # %%
-fig, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
-for at, (row, shade, marker) in enumerate(
-    zip(zones.index, [figures.RED, figures.BLUE, figures.GREEN] * 2, "os^" * 2, strict=True)
-):
-    line = zones.loc[row]
+fig, ax = plt.subplots(figsize=(7, 1.4 + 0.3 * len(zones)), layout="constrained")
+looks = {"paper": (figures.RED, "o"), "quantile": (figures.BLUE, "s"), "respect": (figures.GREEN, "^")}
+for at, ((method, _), line) in enumerate(zones.iterrows()):
+    shade, marker = looks[method]
     ax.hlines(at, line["a_low"], line["a_high"], color=shade, linewidth=2)
     ax.plot(line["a"], at, marker, color=shade, fillstyle="full" if line["adequate"] else "none")
 ax.set_yticks(range(len(zones)), [f"{method}, {who}" for method, who in zones.index])

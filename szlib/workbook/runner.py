@@ -32,7 +32,7 @@ PRODUCERS = ("02", "05")
 # Notebooks that read the records of all others. The others are independent of each other.
 SUMMARIES = ("21",)
 # Notebooks that take longest. They start first in their batch, so that no core waits for them at its end.
-LONGEST = ("15", "18")
+LONGEST = ("15", "16", "18")
 # Files of a run: its data and parameters, and its outcome.
 PARAMETERS, SUMMARY = "parameters.json", "summary.json"
 
