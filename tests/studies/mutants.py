@@ -287,7 +287,7 @@ def run(trials: Iterable[Trial], asked: argparse.Namespace) -> Iterator[dict[str
     with TemporaryDirectory() as top, ThreadPoolExecutor(asked.jobs) as pool:
         for k in range(asked.jobs):
             folder = Path(top) / f"copy{k}"
-            for name in ("szlib", "tests", "notebooks/tables", "notebooks/studies"):
+            for name in ("szlib", "tests", "notebooks/examples", "notebooks/tables", "notebooks/studies"):
                 shutil.copytree(ROOT / name, folder / name)
             shutil.copy2(ROOT / "pyproject.toml", folder)
             free.put(folder)
