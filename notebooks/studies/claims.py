@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.stats import t as student_t
 from studies.committed import write_table
 
 import szlib
@@ -37,6 +38,9 @@ RESAMPLES, FEW = 200, 2
 DELAYED_BY_SIZE = "a larger zone makes the robot later"
 HOURS_A_DAY = 11.0
 """That ATC is recorded (09:20 to 20:27 on the first day)."""
+LESS_CROWDED = "the area has fewer people per square metre than the other space walked on"
+WALKED = 3
+"""People who walked on each square metre that counts as space walked on."""
 
 
 def plaza() -> pd.DataFrame:
@@ -69,6 +73,7 @@ def of_site(name: str) -> Iterator[pd.DataFrame]:
     tracks = load()
     samples = szlib.find_encounters(tracks, settings=szlib.EncounterSettings.paper(square))
     plain = [claims.measure_passing_side(samples), lof(name, samples), as_many(name, samples, tracks)]
+    plain.append(less_crowded(name, tracks))
     yield claims.tabulate_findings(plain, data=name).assign(method="-", probe=[each.low for each in plain])
     for method in METHODS:
         for group, people in (("everybody", samples), ("strangers", szlib.of_kind(samples, "strangers"))):
@@ -107,6 +112,34 @@ def as_many(name: str, samples: pd.DataFrame, tracks: pd.DataFrame) -> claims.Fi
         return claims.Finding(claims.ENCOUNTER_RATE, np.nan, np.nan, np.nan, "doublings", 0)
     days = (tracks["t"].max() - tracks["t"].min()) / 3600 / HOURS_A_DAY
     return claims.measure_encounter_rate(samples["encounter"].nunique(), days)
+
+
+def less_crowded(name: str, tracks: pd.DataFrame) -> claims.Finding:
+    """Whether the area has a low density; undecided anywhere but in the paper's mall."""
+    if name != "ATC day":
+        return claims.Finding(LESS_CROWDED, np.nan, np.nan, np.nan, "doublings", 0)
+    return measure_density(tracks, SITES[name][1])
+
+
+def measure_density(tracks: pd.DataFrame, area: szlib.Square) -> claims.Finding:
+    """Doublings from the density of people in the `area` to that in the other space walked on.
+
+    Both are people per square metre, counted on cells of 1 m.  The effect is the mean over the hours of the
+    recording, the interval that of Student's t.
+    """
+    cells = np.floor(tracks[["x", "y"]]).rename(columns={"x": "i", "y": "j"})
+    cells["person"] = tracks.groupby(["day", "id"], observed=True).ngroup()
+    walked = cells.groupby(["i", "j"])["person"].nunique() >= WALKED
+    i, j = (walked[walked].index.get_level_values(name).to_numpy() for name in "ij")
+    inside = pd.Series(area.contains(i + 0.5, j + 0.5), index=walked[walked].index, name="inside")
+    place = cells.join(inside, on=["i", "j"], how="inner")["inside"]
+    hour = tracks.loc[place.index, ["day"]].assign(hour=tracks["t"] // 3600)
+    seen = place.groupby([hour["day"], hour["hour"]], observed=True).agg(["sum", "size"])
+    density = seen["sum"] / inside.sum(), (seen["size"] - seen["sum"]) / (~inside).sum()
+    doublings = np.log2(density[1] / density[0])
+    half = doublings.sem() * student_t.ppf((1 + claims.LEVEL) / 2, len(doublings) - 1)
+    mean = doublings.mean()
+    return claims.Finding(LESS_CROWDED, mean, mean - half, mean + half, "doublings", len(doublings))
 
 
 def later(zone: szlib.SocialZone) -> claims.Finding:

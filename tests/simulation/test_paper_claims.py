@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from studies.claims import measure_density
 
 import szlib
 from szlib.simulation import paper_claims as claims
@@ -50,6 +51,19 @@ def test_a_pair_counts_once() -> None:
     both = pd.concat([once, once.rename(columns={"ref_id": "other_id", "other_id": "ref_id"}).assign(
         encounter=once["encounter"] + 1000)])  # fmt: skip
     assert claims.measure_passing_side(both).n == claims.measure_passing_side(once).n == 40
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.25, "supported"), (1.0, "not"), (4.0, "contradicted")])
+def test_density_is_low_only_in_an_area_with_fewer_people_than_around_it(share: float, verdict: str) -> None:
+    rng, n = np.random.default_rng(0), 20_000
+    area = szlib.Square((2.0, 6.0), (2.0, 8.0))
+    x, y = rng.uniform(0, 10, (2, n))
+    inside = area.contains(x, y)
+    stays = rng.uniform(size=n) < np.where(inside, share, 1.0) / max(share, 1.0)
+    rows = {"day": "d", "id": rng.integers(500, size=n), "t": rng.uniform(0, 5 * 3600, n), "x": x, "y": y}
+    found = measure_density(pd.DataFrame(rows)[stays], area)
+    assert found.verdict.startswith(verdict)
+    assert found.n == 5 and found.effect == pytest.approx(-np.log2(share), abs=0.1)
 
 
 @pytest.mark.parametrize(
