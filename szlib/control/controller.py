@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from copy import deepcopy
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -103,6 +104,10 @@ class Controller:
     zone: Any = None
     walls: Any = None
     robot: Robot = DoubleIntegrator()
+
+    def __copy__(self) -> Self:
+        """A deep copy: two controllers cannot share a plan, or the people they remember."""
+        return deepcopy(self)
 
     def reset(self) -> None:
         """Forget the run before."""

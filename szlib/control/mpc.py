@@ -52,8 +52,9 @@ from .tracker import People, TrackedPeople, Tracker
 class MPCCBF(Controller):
     """Drives a double integrator to a goal, outside the social zones of people and away from walls.
 
-    A controller belongs to the thread that first calls `step`; give each thread its own, for instance a
-    `copy.deepcopy`. It can be pickled.
+    A controller belongs to the thread that first calls `step`; give each thread its own, for instance a copy.
+    A copy (`copy.copy`, `copy.deepcopy`, `pickle`) gives the same steps as its original, bit for bit, unless
+    a time limit ends a step.
 
     Parameters
     ----------

@@ -299,12 +299,12 @@ def test_walls_may_change_between_steps_and_a_copy_continues_identically():
     for _ in range(5):
         own = drive.robot.advance(own, drive.step(own, OPEN).control, 0.1)
     drive.set_walls([((2.0, -0.5), (2.0, 0.5), (3.0, 0.5))])
-    twins = [pickle.loads(pickle.dumps(drive)), copy.deepcopy(drive)]
+    twins = [pickle.loads(pickle.dumps(drive)), copy.deepcopy(drive), copy.copy(drive)]
     step = drive.step(own, OPEN)
     assert step.h == pytest.approx(szlib.MPCCBF(ZONE, walls=drive.walls).barriers(own[:2]))
     assert len(step.h) == 2
     for twin in twins:
-        assert twin.step(own, OPEN).control == pytest.approx(step.control, abs=1e-9)
+        assert np.array_equal(twin.step(own, OPEN).control, step.control)
     with ThreadPoolExecutor(1) as thread:  # built here, used there
         there = szlib.DifferentialDrive(ZONE, walls=drive.walls)
         assert thread.submit(there.step, np.zeros(3), OPEN).result().safe

@@ -94,9 +94,8 @@ class Sqp(ProblemSolver):
         self._multipliers[:], self._has_multipliers = multipliers, bool(multipliers.any())
 
     def reset(self) -> None:
-        """Forget every multiplier and active row."""
+        """Forget every multiplier."""
         self._multipliers[:], self._has_multipliers = 0, False
-        self._model.update(sense=self._sense)
 
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan from a `guess` and `parameters`, relaxed if rows stay violated; True if it converged."""
@@ -143,6 +142,7 @@ class Sqp(ProblemSolver):
     def _iterate(self, share: float) -> Outcome:
         """Improve `_inputs`, within this share of the budget; no price goes above the weight of slack."""
         price, rises, best, limit = 0.0, 0, (0.0, 0.0), self.settings.slack_weight
+        self._model.update(sense=self._sense)  # a copy has only the multipliers: forget which rows are active
         for _ in range(self.settings.max_iterations):
             if self.budget.is_spent(share):
                 return "timed out"
