@@ -58,8 +58,8 @@ hostile: $(INSTALLED)  ## every attack in full: commands, files, processes, cont
 dist: $(INSTALLED)  ## sdist and wheel; HOME_URL says where the README's pictures are served
 	$(BIN)/python .ci/dist.py "$(HOME_URL)"
 
-clean:  ## forget the environment and the results
-	$(PYTHON) -c "import shutil; [shutil.rmtree(p, ignore_errors=True) for p in ('$(VENV)', 'results')]"
+clean:  ## remove the environment and what `szlib run` wrote to results/; your own files and extracted days stay
+	$(PYTHON) .ci/clean.py
 
 $(INSTALLED): environment.lock pyproject.toml  ## uv, of the lock as well, installs it several times faster than pip
 	$(PYTHON) -m venv $(VENV)

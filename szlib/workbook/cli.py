@@ -41,7 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):  # print escapes where the terminal's encoding lacks a letter
         with suppress(*_BROKEN_STREAM):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    options = build_parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    options = build_parser().parse_args([_mark_number(argument) for argument in given])
     try:
         size = None if options.memory is None else memory.parse_size(options.memory)
         with _stop_on_signals(), memory.granted(size), warnings.catch_warnings():
@@ -233,6 +234,13 @@ def _parse_parameter(text: str) -> tuple[str, Any]:
         return name, value
     except (ValueError, RecursionError) as error:  # an integer with too many digits, or too many brackets
         raise DataError(f"parameter {name}: cannot be read ({error}); give a shorter value") from error
+
+
+def _mark_number(argument: str) -> str:
+    """Put a space before a negative number: argparse takes -1.85e1 for an option."""
+    with suppress(ValueError):
+        return f" {argument}" if argument.startswith("-") and float(argument) < 0 else argument
+    return argument
 
 
 def _job_count(text: str) -> int:

@@ -14,6 +14,7 @@ from typing import Any
 
 from ..errors import SzlibError
 from ..files import printable, write_file
+from .record.parameters import METHOD_DEFAULTS, read_defaults
 
 # Errors caused by data, disk or memory, not by the notebook.
 REFUSED = {
@@ -104,12 +105,13 @@ def run_cells(
                 copy.metadata.pop("papermill", None)  # times and paths of this machine
                 write_file(folder / f"{script.stem}.ipynb", nbformat.writes(copy))
 
-    logging.getLogger("papermill").setLevel(logging.ERROR)  # a notebook need not know every parameter
+    logging.getLogger("papermill").setLevel(logging.ERROR)  # those of the zone are in no notebook's own cell
+    known = METHOD_DEFAULTS.keys() | read_defaults(script).keys()
     papermill_engines.register(script.stem, KernelEngine)
     papermill.execute_notebook(
         jupytext.read(script),
         None,
-        parameters,
+        {name: value for name, value in parameters.items() if name in known},
         engine_name=script.stem,
         kernel_name="python3",
         language="python",

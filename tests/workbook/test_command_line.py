@@ -33,6 +33,11 @@ def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureF
     assert lines[-1][0] == "kept"
 
 
+def test_area_takes_negative_numbers_in_exponent_form(day: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(day), "--square", "-1.85e1", "2e1", "-.2E+2", "30."]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == "area -18.5 20.0 -20.0 30.0"
+
+
 def test_extract_prints_the_table(day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["extract", str(day), "--out", str(tmp_path / "out")]) == 0
     assert "1 done" in capsys.readouterr().out

@@ -10,10 +10,16 @@ from pathlib import Path
 import pytest
 
 import szlib
+from szlib.files import store_cached
 from szlib.workbook import folders, runner
 from szlib.workbook.cli import main
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
+PRODUCES = """
+import pandas as pd
+record.table(pd.DataFrame({"n": [1]}), "01_table")
+record.animation(b"GIF89a", "movie")
+"""
 CHECK = 'record.key = {"gamma": gamma}\nrecord.check("ok", True)'
 
 
@@ -117,3 +123,32 @@ with folder_lock({str(tmp_path / "out" / "mine")!r}):
         run("-p", "seed=1")  # another folder
         holder.kill()
     run()
+
+
+def test_clean_removes_what_a_run_wrote_and_nothing_else(workbook, tmp_path):
+    script = runpy.run_path(str(Path(__file__).parents[2] / ".ci" / "clean.py"))
+    (workbook / "01_one.py").write_text(
+        (workbook / "01_one.py").read_text().replace('record.check("ok", True)', PRODUCES)
+    )
+    run()
+    run("-p", "gamma=0.1")
+    results = tmp_path / "out"
+    for name in ("encounters.parquet", "zone.json", "area.txt", "plaza-0.csv"):
+        store_cached(results / "mine" / name, b"", {})
+    szlib.extract_days(tmp_path / "mine.csv", out=results / "days", progress=False)
+    own = [results / "thesis.txt", results / "mine" / "notes.csv", results / "mine" / "figures" / "mine.png"]
+    for file in own:
+        file.write_text("mine")
+    days = [file for file in (results / "days").iterdir() if file.name != ".szlib-lock"]
+    script["clean"](results)
+    left = {file for file in results.rglob("*") if file.is_file() and not file.name.startswith(".szlib")}
+    assert left == {*own, *(file for file in days if not file.name.startswith(".szlib"))}
+    assert not list(results.glob("mine-*"))
+    for file in own:
+        file.unlink()
+    for file in (results / "days").iterdir():
+        file.unlink()
+    (results / "days").rmdir()
+    (results / "mine" / "figures").rmdir()
+    script["clean"](results)
+    assert not results.exists()

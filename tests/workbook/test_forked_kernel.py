@@ -10,7 +10,7 @@ import nbformat
 import numpy as np
 import pytest
 from nbclient import NotebookClient
-from nbclient.exceptions import DeadKernelError
+from nbclient.exceptions import CellExecutionError, DeadKernelError
 from PIL import Image
 
 from szlib.workbook import forked_kernel
@@ -62,6 +62,14 @@ def test_recorded_figure_is_shown_smaller_and_once(tmp_path):
     assert small.width == round(large.width * 2 / 3)
     small, large = (np.asarray(each.convert("L").resize((60, 50)), float) for each in (small, large))
     assert np.abs(small - large).mean() < 2
+
+
+def test_notebook_refuses_a_parameter_that_papermill_sets_and_it_does_not_know(tmp_path):
+    own = f"data = 'synthetic'\ngamma = 0.05\nresults = {str(tmp_path / 'out')!r}"
+    record = "from szlib.workbook.record import NotebookRecord\nNotebookRecord('99_test', globals())"
+    execute(tmp_path, own, "# Parameters\ngamma = 0.1\nr_max = 1.5\n", record)
+    with pytest.raises(CellExecutionError, match="unknown parameter gama; the notebook knows data, gamma"):
+        execute(tmp_path, own, "# Parameters\ngama = 0.1\n", record)
 
 
 def test_kernel_can_be_interrupted_and_killed(tmp_path):

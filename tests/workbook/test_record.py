@@ -43,6 +43,16 @@ def test_checks_and_claims_are_recorded(record, capsys):
     assert "FAILED" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("unknown", [float("nan"), np.float32("nan"), np.array([np.nan]), pd.NaT])
+def test_nan_passes_no_check_and_supports_no_claim(record, unknown):
+    record.check("mean is small", unknown)
+    record.claim("mean is small", unknown)
+    assert [(c["passed"], c["result"]) for c in record.checks] == [
+        (False, "FAILED"),
+        (False, "not decidable here"),
+    ]
+
+
 def test_check_with_changed_parameters_is_an_observation(record, capsys):
     given = {"data": record.cache.data, "results": record.out.parents[1], "r_max": 1.5}
     other = NotebookRecord("01_test", given)

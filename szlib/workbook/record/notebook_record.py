@@ -23,7 +23,7 @@ from .. import folders
 from .committed_tables import find_differences, read_table
 from .data_cache import DataCache
 from .display import format_outputs, format_value, show_figure, style_table
-from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, ZoneMethod, read_defaults
+from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, ZoneMethod, check_injected, read_defaults
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,6 +48,10 @@ class NotebookRecord:
     out : the folder of its results: that of the run, or one in `results/lab` if executed by hand.
     key : key figures by name, for the summary of the run.
 
+    Raises
+    ------
+    DataError : papermill has set a parameter that is unknown to the notebook.
+
     Examples
     --------
     >>> from szlib.workbook.record import NotebookRecord
@@ -64,6 +68,7 @@ class NotebookRecord:
         self.checks: list[dict[str, Any]] = []
         self.figures: list[str] = []
         self.key: dict[str, Any] = {}
+        check_injected(variables.get("In", ()))
         script = folders.NOTEBOOKS / f"{name}.py"
         own_defaults = read_defaults(script) if script.exists() else {"area": "", "seed": 0}
         defaults = {**METHOD_DEFAULTS, **own_defaults}
@@ -91,16 +96,17 @@ class NotebookRecord:
         Parameters
         ----------
         what : the property that must hold, as a statement.
-        passed : whether it holds.
+        passed : whether it holds; NaN does not.
         value : the number, or the numbers, that decide it.
         always : whether it must hold with all parameters. Otherwise a check with `changed` parameters is an
             observation. A failed check fails the run after the notebook has finished.
         """
+        passed = _is_true(passed)
         if self.changed and not always:
             result = f"{'holds' if passed else 'does not hold'} {self._settings()}"
-            self._record("observation", what, bool(passed), value, result)
+            self._record("observation", what, passed, value, result)
         else:
-            self._record("check", what, bool(passed), value, "holds" if passed else "FAILED")
+            self._record("check", what, passed, value, "holds" if passed else "FAILED")
 
     def claim(self, what: str, supported: object, value: object = None) -> None:
         """Record whether the data supports a claim of the paper.
@@ -108,13 +114,13 @@ class NotebookRecord:
         Parameters
         ----------
         what : the claim, as a statement.
-        supported : whether the data supports it; None if the data cannot decide. If not, the run goes on.
+        supported : whether the data supports it; None or NaN if it cannot decide. If not, the run goes on.
         value : the number, or the numbers, that decide it.
         """
         result = "supported" if supported else "not supported here"
-        if supported is None:
+        if supported is None or supported != supported:
             result = "not decidable here"
-        self._record("claim", what, bool(supported), value, result)
+        self._record("claim", what, _is_true(supported), value, result)
 
     def figure(self, figure: Figure, name: str) -> None:
         """Save a `figure` in the results as NN_topic-`name`.png, and show it."""
@@ -181,6 +187,11 @@ class NotebookRecord:
     def _save_picture(self, content: bytes, name: str) -> None:
         write_file(self.out / "figures" / name, content, durable=False)
         self.figures.append(name)
+
+
+def _is_true(value: Any) -> bool:
+    """Whether a `value` is true; NaN, which `bool` takes for true, is not."""
+    return bool(value) and bool(value == value)
 
 
 def _to_plain(value: Any) -> Any:

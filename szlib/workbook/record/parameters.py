@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -138,6 +139,21 @@ def read_defaults(notebook: Path) -> dict[str, Any]:
         for node in ast.parse(body).body
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
     }
+
+
+def check_injected(cells: Sequence[str]) -> None:
+    """Raise DataError if papermill's cell among the executed `cells` sets an unknown parameter.
+
+    That cell begins with "# Parameters", and follows the cell of the notebook's own parameters.
+    """
+    for own, injected in pairwise(cells):
+        if injected.startswith("# Parameters\n"):
+            given, known = (set(re.findall(r"^(\w+) *=", cell, re.MULTILINE)) for cell in (injected, own))
+            if unknown := given - known - METHOD_DEFAULTS.keys():
+                raise DataError(
+                    f"unknown parameter {', '.join(sorted(unknown))}; "
+                    f"the notebook knows {', '.join(sorted(known))}"
+                )
 
 
 def _check_type(name: str, value: Any, default: Any) -> None:
