@@ -253,7 +253,7 @@ class DifferentialDrive(Controller):
         SolverError : as of `MPCCBF.step`.
         """
         began = perf_counter()
-        own = check_array("state", state, (5,) if np.size(state) == 5 else (3,)).tolist()
+        own = check_array("state", state, (5,) if np.asarray(state, object).size == 5 else (3,)).tolist()
         x, y, theta = own[:3]
         centre, lever = check_array("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
         if not self._command and min(self.barriers(centre), default=0.0) < 0:

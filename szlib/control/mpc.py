@@ -46,7 +46,7 @@ from .settings import MPCSettings
 from .solvers.fallbacks import solve_with_fallbacks
 from .solvers.solver_pool import SolverPool, active_rows, padded_parameters
 from .step import Step
-from .tracker import People, TrackedPeople, Tracker
+from .tracker import People, TrackedPeople, Tracker, check_time
 
 
 class MPCCBF(Controller):
@@ -236,9 +236,7 @@ class MPCCBF(Controller):
                     "stamps need `now`, the time of the robot's state by the same clock; got none"
                 )
             return self._now + self.settings.dt if self._moved else 0.0
-        if not np.isfinite(now):
-            raise SolverError(f"now must be a finite time [s]; got {now!r}")
-        return float(now)
+        return check_time(now)
 
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.

@@ -13,13 +13,13 @@ A sensor is noisy and late, and loses people. By the ids of people,
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from math import atan2, hypot, inf
+from math import atan2, hypot, inf, isfinite
 from typing import NamedTuple, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import LARGEST
+from ..checks import LARGEST, Array
 from ..errors import SolverError
 from .person import Person
 
@@ -100,12 +100,17 @@ class Tracker:
 
         Raises
         ------
-        SolverError : an argument has the wrong shape: an error of the program, not of a sensor.
+        SolverError : an argument has the wrong type or shape: an error of the program, not of a sensor.
         """
+        now = check_time(now)
         if ids is None and stamps is None and not self._last_seen and _have_no_ids(people):
             return TrackedPeople(tuple(people))
         rows = _split_rows(people)
-        names = [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
+        try:
+            names = [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
+            given = set(names)
+        except TypeError as error:
+            raise SolverError(f"ids must be a list of hashable values; got {ids!r:.200}") from error
         if len(names) != len(rows):
             raise SolverError(f"ids must be one for each of {len(rows)} people; got {len(names)}")
         times = _check_stamps(stamps, len(rows), now)
@@ -121,7 +126,6 @@ class Tracker:
             present.append(None if found is None else _move_forward(*found, now))
             rejected += not usable or present[-1] is None
             unknown += (not usable and last is None) or present[-1] is None
-        given = set(names)
         present += [_move_forward(*seen, now) for name, seen in self._last_seen.items() if name not in given]
         return TrackedPeople(tuple(person for person in present if person is not None), rejected, unknown)
 
@@ -170,14 +174,16 @@ def _have_no_ids(people: People) -> TypeGuard[Sequence[Person]]:
 
 def _split_rows(people: People) -> Sequence[Person | list[float]]:
     """People one by one: `Person`s, or (x, y, vx, vy), finite or not."""
-    if not isinstance(people, np.ndarray):
-        given = list(cast(Sequence[Person], people))
-        if all(isinstance(person, Person) for person in given):
-            return given
     try:
+        if not isinstance(people, np.ndarray):
+            given = list(cast(Sequence[Person], people))
+            if all(isinstance(person, Person) for person in given):
+                return given
         numbers = np.asarray(people, float)
-    except (TypeError, ValueError) as error:
-        raise SolverError(f"people must be Persons, or numbers of shape (n, 4); got {people!r}") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SolverError(
+            f"people must be Persons, or numbers of shape (n, 4); got {people!r:.200}"
+        ) from error
     if numbers.size and (numbers.ndim != 2 or numbers.shape[1] != 4):
         raise SolverError(f"people as an array must have shape (n, 4): x, y, vx, vy; got {numbers.shape}")
     return cast(list[list[float]], numbers.reshape(-1, 4).tolist())
@@ -187,7 +193,25 @@ def _check_stamps(stamps: ArrayLike | None, n: int, now: float) -> list[float]:
     """When each person was measured [s], finite or not."""
     if stamps is None:
         return [now] * n
-    times = np.asarray(stamps, float)
+    times = _as_floats("stamps", stamps)
     if times.shape not in ((), (n,)):
         raise SolverError(f"stamps must be one time, or one for each of {n} people; got shape {times.shape}")
     return cast(list[float], np.broadcast_to(times, n).tolist())
+
+
+def check_time(now: float) -> float:
+    """The time `now` [s] as a Python float; SolverError if it is not a finite number."""
+    if type(now) is float and isfinite(now):
+        return now
+    time = _as_floats("now", now)
+    if time.shape or not np.isfinite(time):
+        raise SolverError(f"now must be a finite time [s]; got {now!r}")
+    return float(time)
+
+
+def _as_floats(name: str, value: ArrayLike) -> Array:
+    """The numbers of an argument, finite or not."""
+    try:
+        return np.asarray(value, float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SolverError(f"{name} must be numbers [s]; got {value!r:.200}") from error

@@ -352,3 +352,9 @@ def test_the_robot_starts_in_its_direction_of_motion_or_at_the_given_heading():
 
 def test_by_default_the_robot_turns_as_fast_as_a_common_one():
     assert szlib.DifferentialDrive(ZONE).omega_max == 4.0
+
+
+@pytest.mark.parametrize("state", [[[1], [1, 2]], "x", None, [0.0] * 4])
+def test_a_state_of_another_shape_is_refused(state):
+    with pytest.raises(szlib.SolverError, match="state must"):
+        szlib.DifferentialDrive(ZONE, max_people=0).step(state, (4.0, 0.0))

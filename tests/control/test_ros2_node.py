@@ -1,178 +1,41 @@
 """The ROS 2 node of notebooks/examples, without ROS: stubs of rclpy and messages, a robot that obeys."""
 
-import importlib.util
-import sys
-from copy import deepcopy
-from math import cos, hypot, sin
-from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from math import hypot
 
+import helpers.ros_stubs as ros
 import numpy as np
 import pytest
+from helpers.ros_stubs import Node, goal, hear, odometry, people
 
 import szlib
 from szlib.control.differential_drive import Unicycle
 from szlib.control.distances import euclidean_to_ellipse
 from szlib.zones.polar import DIRECTIONS, PolarZone
 
-NODE = Path(__file__).parents[2] / "notebooks" / "examples" / "ros2_node.py"
 ZONE = szlib.Ellipse((0.1, 0.0), (0.9, 0.7), 0.0)
 GOAL = (5.0, 0.5)
 pytestmark = pytest.mark.filterwarnings("ignore::szlib.errors.DataWarning")  # a zone of nobody's data
 
 
-# --- ROS, as far as the node needs it -----------------------------------------------------------------
-
-
-def message(**fields):
-    """A class of messages whose fields begin with copies of these."""
-    return type("Message", (SimpleNamespace,), {"__init__": lambda self: vars(self).update(deepcopy(fields))})
-
-
-def xyz(**more):
-    return SimpleNamespace(x=0.0, y=0.0, z=0.0, **more)
-
-
-POSE = SimpleNamespace(position=xyz(), orientation=xyz(w=1.0))
-HEADER = SimpleNamespace(frame_id="", stamp=SimpleNamespace(sec=0, nanosec=0))
-Twist = message(linear=xyz(), angular=xyz())
-Odometry = message(
-    header=HEADER,
-    pose=SimpleNamespace(pose=POSE),
-    twist=SimpleNamespace(twist=SimpleNamespace(linear=xyz(), angular=xyz())),
-)
-PoseStamped = message(header=HEADER, pose=POSE)
-Walker = message(name="", position=xyz(), velocity=xyz(), reliability=0.0, tagnames=[], tags=[])
-People = message(header=HEADER, people=[])
-OccupancyGrid = message(
-    header=HEADER, info=SimpleNamespace(resolution=0.0, width=0, height=0, origin=POSE), data=[]
-)
-
-
-class Node:
-    """The part of rclpy.node.Node that the example uses, with the same arguments."""
-
-    given, now = {}, 1.75e9
-
-    def __init__(self, node_name):
-        self.subscribed, self.published, self.logged, self.every = {}, {}, [], {}
-
-    def declare_parameter(self, name, value):
-        self.logged += (
-            [] if type(self.given.get(name, value)) is type(value) else [f"{name} has another type"]
-        )
-
-    def get_parameter(self, name):
-        return SimpleNamespace(value=self.given.get(name, DEFAULTS()[name]))
-
-    def create_subscription(self, msg_type, topic, callback, qos_profile):
-        self.subscribed[topic] = (msg_type, callback)
-
-    def create_publisher(self, msg_type, topic, qos_profile):
-        def publish(what):
-            assert type(what) is msg_type
-            self.published.setdefault(topic, []).append(what)
-
-        return SimpleNamespace(publish=publish)
-
-    def create_timer(self, timer_period_sec, callback):
-        self.every[timer_period_sec] = callback
-
-    def get_clock(self):
-        return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(Node.now * 1e9)))
-
-    def get_logger(self):
-        def say(text, throttle_duration_sec=0.0):
-            self.logged.append(text)
-
-        return SimpleNamespace(warning=say, error=say)
-
-
-def DEFAULTS():
-    return sys.modules["ros2_node"].DEFAULTS
-
-
 @pytest.fixture
 def make(monkeypatch, tmp_path):
     """A node with these parameters."""
-    modules = {
-        "rclpy": {"init": None, "spin": None, "try_shutdown": None},
-        "rclpy.node": {"Node": Node},
-        "rclpy.executors": {"ExternalShutdownException": RuntimeError},
-        "geometry_msgs": {},
-        "geometry_msgs.msg": {"Twist": Twist, "PoseStamped": PoseStamped},
-        "nav_msgs": {},
-        "nav_msgs.msg": {"Odometry": Odometry, "OccupancyGrid": OccupancyGrid},
-        "people_msgs": {},
-        "people_msgs.msg": {"People": People},
-    }
-    for name, contents in modules.items():
-        module = ModuleType(name)
-        vars(module).update(contents)
-        monkeypatch.setitem(sys.modules, name, module)
-    spec = importlib.util.spec_from_file_location("ros2_node", NODE)
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "ros2_node", module)
-    spec.loader.exec_module(module)
     shape = PolarZone(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
     szlib.SocialZone(shape, 2.0, {1.1: ZONE}).save(tmp_path / "zone.json")
+    with ros.node_module() as module:
 
-    def node(**parameters):
-        monkeypatch.setattr(Node, "now", 1.75e9)
-        monkeypatch.setattr(Node, "given", {"zone": str(tmp_path / "zone.json"), "v_max": 1.0} | parameters)
-        return module.SocialDrive()
+        def node(**parameters):
+            given = {"zone": str(tmp_path / "zone.json"), "v_max": 1.0} | parameters
+            monkeypatch.setattr(Node, "given", given)
+            return module.SocialDrive()
 
-    return node
-
-
-# --- a world with one robot ---------------------------------------------------------------------------
-
-
-def stamped(what, frame="odom", late=0.0):
-    when = Node.now - late
-    what.header.frame_id, what.header.stamp.sec = frame, int(when)
-    what.header.stamp.nanosec = round((when - int(when)) * 1e9)
-    return what
-
-
-def odometry(own, **how):
-    at, what = own.tolist(), Odometry()
-    what.pose.pose.position.x, what.pose.pose.position.y = at[:2]
-    what.pose.pose.orientation.z, what.pose.pose.orientation.w = sin(at[2] / 2), cos(at[2] / 2)
-    what.twist.twist.linear.x, what.twist.twist.angular.z = at[3:]
-    return stamped(what, **how)
-
-
-def people(*walkers, **how):
-    what = People()
-    for name, (x, y, vx, vy) in walkers:
-        walker = Walker()
-        walker.name, walker.position.x, walker.position.y = name, x, y
-        walker.velocity.x, walker.velocity.y = vx, vy
-        what.people.append(walker)
-    return stamped(what, **how)
-
-
-def goal(x, y, **how):
-    what = PoseStamped()
-    what.pose.position.x, what.pose.position.y = x, y
-    return stamped(what, **how)
-
-
-def hear(node, topic, what):
-    msg_type, callback = node.subscribed[topic]
-    assert type(what) is msg_type
-    callback(what)
+        yield node
 
 
 def tick(node):
-    """The timer goes off; what is commanded."""
-    ((period, callback),) = node.every.items()
-    assert period == 0.1
-    callback()
-    twist = node.published["cmd_vel"][-1]
-    assert vars(twist.linear) | {"x": 0.0} == vars(xyz())  # two wheels move ahead and turn, nothing else
-    return np.array([twist.linear.x, twist.angular.z])
+    """The timer goes off every 0.1 s; what is commanded."""
+    assert list(node.every) == [0.1]
+    return np.array(ros.tick(node))
 
 
 def drive(node, walker, steps, silent=(), late=0.04):

@@ -270,3 +270,27 @@ def test_a_person_standing_on_the_goal_blocks_it_despite_noise():
         for _ in range(200)
     )
     assert not controller.step((-3, 0, 0, 0), GOAL, [[*GOAL, 0.1, 0.0]]).goal_blocked
+
+
+@pytest.mark.parametrize("ids", [[[]], [{}], 5, [np.zeros(2)]])
+def test_ids_that_have_no_hash_are_refused(ids):
+    with pytest.raises(szlib.SolverError, match="ids must be a list of hashable values"):
+        szlib.Tracker().see([[0.0, 0.0, 0.0, 0.0]], now=0.0, ids=ids)
+
+
+@pytest.mark.parametrize("now", [np.nan, np.inf, "x", None, [], [1.0], 10**400, np.zeros(2)])
+def test_now_that_is_no_finite_number_is_refused(now):
+    with pytest.raises(szlib.SolverError, match="now must be"):
+        szlib.Tracker().see([[0.0, 0.0, 0.0, 0.0]], now=now)
+
+
+@pytest.mark.parametrize("stamps", ["x", {}, [[1.0], []], 10**400])
+def test_stamps_that_are_no_numbers_are_refused(stamps):
+    with pytest.raises(szlib.SolverError, match="stamps must be"):
+        szlib.Tracker().see([[0.0, 0.0, 0.0, 0.0]], now=0.0, stamps=stamps)
+
+
+@pytest.mark.parametrize("people", [None, 5, "abcd", [[10**400] * 4], [[1.0], [1.0, 2.0]]])
+def test_people_that_are_no_rows_are_refused(people):
+    with pytest.raises(szlib.SolverError, match="people"):
+        szlib.Tracker().see(people, now=0.0)

@@ -7,7 +7,7 @@ overlaps are Euclidean.
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
@@ -25,6 +25,8 @@ STEPS = {False: 600, True: 50_000}
 A_SETTING = 100
 """Steps with the same settings, people and walls: to build a problem takes as long as some hundred steps."""
 WORLDS = {False: 12, True: 20_000}
+BETWEEN = np.array([0.25, 0.5, 0.75])
+"""Fractions of dt at which the robot is looked at between samples."""
 FIRST_WORLD = 77_000_000
 CRUEL = {False: 60, True: 3_000}
 
@@ -46,6 +48,23 @@ def paper_to_segment(p: Any, wall: Any) -> float:
     g = ((p[0] - a[0]) * (b[1] - a[1]) - (p[1] - a[1]) * (b[0] - a[0])) / length
     t = ((length / 2) ** 2 - np.sum((p - (a + b) / 2) ** 2)) / length
     return float(np.hypot(g, min(t, 0.0)))
+
+
+def foci(center: Any, heading: float, zone: szlib.Ellipse) -> Any:
+    """The two foci of a zone around a person at `center`, shape (2, 2)."""
+    c, s = np.cos(heading), np.sin(heading)
+    tilt, off = heading + zone.angle, np.sqrt(zone.semi_axes[0] ** 2 - zone.semi_axes[1] ** 2)
+    reach = off * np.array([np.cos(tilt), np.sin(tilt)])
+    return np.asarray(center) + np.array([[c, -s], [s, c]]) @ np.asarray(zone.center) + [reach, -reach]
+
+
+def dip(way: float, near: float) -> float:
+    """How far a distance may fall, within a chord of length `way`, below the line between its two ends.
+
+    The chord stays `near` or farther from the points whose mean distance it is.  That has a second derivative
+    of at most 1 / near along the chord, and changes by no more than the way.
+    """
+    return min(way / 2, way**2 / (8 * near) if near > 0 else np.inf)
 
 
 def to_zone(p: Any, center: Any, heading: float, zone: szlib.Ellipse) -> float:
@@ -87,6 +106,29 @@ class Judge:
         found += [to_segment(p, wall) for wall in self.walls]
         return np.array(found) - self.s.r_robot
 
+    def between(self, a: Any, b: Any, path: Any, times: Any, bow: float, dt: float) -> float:
+        """The least h of people and gap of walls on a `path` between two samples, above what is allowed [m].
+
+        Parameters
+        ----------
+        a, b : positions at two samples that are `dt` apart, where no h and no gap is negative.
+        path, times : positions between them, and when.
+        bow : distance by which the path leaves the straight line from a to b, at most [m].
+        """
+        least = np.inf
+        for i, person in enumerate(self.people):
+            move = dt * np.array(person.velocity)
+            chord, points = (a, b - move), foci(person.position, person.heading, person.zone)
+            near = min(to_segment(point, chord) if np.any(a != b - move) else 0.0 for point in points)
+            h = min(self.h(p, time)[i] for p, time in zip(path, times, strict=True))
+            least = min(least, h + dip(np.linalg.norm(b - move - a), near) + bow)
+        way = np.linalg.norm(b - a)
+        for wall in self.walls:
+            near = min(to_segment(a, wall), to_segment(b, wall)) - way / 2
+            gap = min(to_segment(p, wall) for p in path) - self.s.r_robot
+            least = min(least, gap + dip(way, near) + bow)
+        return float(least)
+
     def faults(self, state: Any, goal: Any, step: szlib.control.step.Step) -> Iterator[str]:
         """What is not as it should be."""
         s, x = self.s, step.predicted
@@ -126,6 +168,12 @@ class Judge:
         ]
         if any(standing) and not step.goal_blocked:
             yield "goal_blocked"
+
+
+def along(state: Any, control: Any, times: Any) -> Any:
+    """Positions of a double integrator at `times` after `state`, shape (n, 2)."""
+    times = np.asarray(times)[:, None]
+    return state[:2] + times * state[2:] + times**2 / 2 * control
 
 
 def same(one: Any, other: Any, scale: float = 1.0) -> bool:
@@ -228,6 +276,12 @@ def attack_worlds(seeds: range, tally: Counter[str], **parameters: Any) -> None:
         tally["broken: safe before an overlap"] += int(
             (said & (gaps[1:].min(axis=1, initial=1) < -1e-5)).sum()
         )
+        for k in np.flatnonzero(said):
+            near = replace(judge, people=[person.after(times[k]) for person in judge.people])
+            bow, moments = np.hypot(*u[k]) * dt**2 / 8, dt * BETWEEN
+            path = along(x[k], u[k], moments)
+            least = near.between(x[k, :2], x[k + 1, :2], path, moments, bow, dt)
+            tally["broken: unsafe between samples after a safe step"] += int(least < -1e-5)
         tally["broken: no motion"] += int(not same(x[1:], moved))
         tally["broken: out of bounds"] += bool((np.abs(u) > log.settings.a_max + NEAR).any())
         tally["broken: metrics"] += not (

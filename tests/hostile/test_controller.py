@@ -3,7 +3,9 @@
 from collections import Counter
 from dataclasses import replace
 
+import clocks
 import controller as hostile
+import drive
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ import szlib
 def test_every_step_is_as_reported(solver, steps):
     tally = Counter()
     hostile.attack_steps(steps, tally, seed=2, solver=solver)
-    assert {what: n for what, n in tally.items() if what.startswith("broken") and n} == {}
+    assert broken(tally) == {}
     assert tally["steps"] > 0.9 * steps and tally["steps safe"] and tally["steps relaxed"]
 
 
@@ -22,7 +24,7 @@ def test_every_step_is_as_reported(solver, steps):
 def test_every_world_is_as_reported_and_no_wall_is_touched(terminal):
     tally = Counter()
     hostile.attack_worlds(range(5), tally, settings=szlib.MPCSettings(terminal=terminal))
-    assert {what: n for what, n in tally.items() if what.startswith("broken") and n} == {}
+    assert broken(tally) == {}
     assert tally["worlds"] == 5 and tally["worlds with an overlap of a wall"] == 0
 
 
@@ -30,8 +32,55 @@ def test_every_world_is_as_reported_and_no_wall_is_touched(terminal):
 def test_steps_from_cruel_states_are_as_reported(solver):
     tally = Counter()
     hostile.attack_time(15 if solver == "sqp" else 5, tally, solver)
-    broken = {what: n for what, n in tally.items() if what.startswith("broken") and n}
-    assert set(broken) <= {"broken: took longer than two limits"}, "the time itself is for the long suite"
+    assert set(broken(tally)) <= {"broken: took longer than two limits"}, (
+        "the time itself is for the long suite"
+    )
+
+
+def broken(tally):
+    """What was broken, by its count."""
+    return {what: n for what, n in tally.items() if what.startswith("broken") and n}
+
+
+def test_any_clock_gives_a_step_or_an_error_of_szlib():
+    tally = Counter()
+    clocks.attack_arguments(200, tally, seed=1)
+    assert broken(tally) == {}
+    assert tally["steps with a random clock, safe"] and tally["random clocks refused"]
+
+
+@pytest.mark.parametrize(("name", "change"), clocks.CHANGES.items())
+def test_people_measured_late_are_where_the_step_says(name, change):
+    tally = Counter()
+    clocks.attack_loops(1, tally, name, **change)
+    assert broken(tally) == {} and tally[f"steps, {name}"] == clocks.TICKS
+
+
+def test_a_clock_that_is_not_consistent_is_found(monkeypatch):
+    see, tally = szlib.Tracker.see, Counter()
+    monkeypatch.setattr(
+        szlib.Tracker, "see", lambda self, people, *, now, ids, **_: see(self, people, now=now, ids=ids)
+    )
+    clocks.attack_loops(1, tally, "measured late")
+    assert broken(tally)
+
+
+def test_drives_and_nodes_are_as_reported():
+    tally = Counter()
+    drive.attack_drives(100, tally)
+    drive.attack_node(200, tally)
+    assert broken(tally) == {} and tally["steps of drives, safe"] and tally["ticks of nodes that move"]
+
+
+def test_judge_finds_a_zone_that_is_entered_between_samples():
+    person = szlib.Person((0.0, 0.0), heading=0.0, zone=szlib.Ellipse((0.0, 0.0), (0.5, 0.5)))
+    judge = hostile.Judge(szlib.MPCSettings(), [], [person])
+    radius = 0.5 + judge.s.r_robot + judge.s.eps
+    a, b = radius * np.array([[np.cos(turn), np.sin(turn)] for turn in (-0.1, 0.1)])
+    chord, times = np.array([a + share * (b - a) for share in hostile.BETWEEN]), 0.1 * hostile.BETWEEN
+    assert judge.h(chord[1]).min() < -1e-3
+    assert judge.between(a, b, chord, times, 0.0, 0.1) >= -1e-9
+    assert judge.between(a, b, 0.98 * chord, times, 0.0, 0.1) < -1e-3
 
 
 WALL = np.array([(-1.0, 3.0), (0.0, 3.0)])

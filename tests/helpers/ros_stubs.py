@@ -1,0 +1,148 @@
+"""ROS 2, as far as notebooks/examples/ros2_node.py needs it: stubs of rclpy and of messages."""
+
+import importlib.util
+import sys
+from contextlib import contextmanager
+from copy import deepcopy
+from math import cos, sin
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from unittest import mock
+
+NODE = Path(__file__).parents[2] / "notebooks" / "examples" / "ros2_node.py"
+START = 1.75e9
+
+
+def message(**fields):
+    """A class of messages whose fields begin with copies of these."""
+    return type("Message", (SimpleNamespace,), {"__init__": lambda self: vars(self).update(deepcopy(fields))})
+
+
+def xyz(**more):
+    return SimpleNamespace(x=0.0, y=0.0, z=0.0, **more)
+
+
+POSE = SimpleNamespace(position=xyz(), orientation=xyz(w=1.0))
+HEADER = SimpleNamespace(frame_id="", stamp=SimpleNamespace(sec=0, nanosec=0))
+Twist = message(linear=xyz(), angular=xyz())
+Odometry = message(
+    header=HEADER,
+    pose=SimpleNamespace(pose=POSE),
+    twist=SimpleNamespace(twist=SimpleNamespace(linear=xyz(), angular=xyz())),
+)
+PoseStamped = message(header=HEADER, pose=POSE)
+Walker = message(name="", position=xyz(), velocity=xyz(), reliability=0.0, tagnames=[], tags=[])
+People = message(header=HEADER, people=[])
+OccupancyGrid = message(
+    header=HEADER, info=SimpleNamespace(resolution=0.0, width=0, height=0, origin=POSE), data=[]
+)
+
+
+class Node:
+    """The part of rclpy.node.Node that the example uses, with the same arguments."""
+
+    given, now = {}, START
+
+    def __init__(self, node_name):
+        self.subscribed, self.published, self.logged, self.every = {}, {}, [], {}
+
+    def declare_parameter(self, name, value):
+        self.logged += (
+            [] if type(self.given.get(name, value)) is type(value) else [f"{name} has another type"]
+        )
+
+    def get_parameter(self, name):
+        return SimpleNamespace(value=self.given.get(name, sys.modules["ros2_node"].DEFAULTS[name]))
+
+    def create_subscription(self, msg_type, topic, callback, qos_profile):
+        self.subscribed[topic] = (msg_type, callback)
+
+    def create_publisher(self, msg_type, topic, qos_profile):
+        def publish(what):
+            assert type(what) is msg_type
+            self.published.setdefault(topic, []).append(what)
+
+        return SimpleNamespace(publish=publish)
+
+    def create_timer(self, timer_period_sec, callback):
+        self.every[timer_period_sec] = callback
+
+    def get_clock(self):
+        return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(Node.now * 1e9)))
+
+    def get_logger(self):
+        def say(text, throttle_duration_sec=0.0):
+            self.logged.append(text)
+
+        return SimpleNamespace(warning=say, error=say)
+
+
+@contextmanager
+def node_module():
+    """The module of the node, which finds these stubs in place of ROS."""
+    contents = {
+        "rclpy": {"init": None, "spin": None, "try_shutdown": None},
+        "rclpy.node": {"Node": Node},
+        "rclpy.executors": {"ExternalShutdownException": RuntimeError},
+        "geometry_msgs": {},
+        "geometry_msgs.msg": {"Twist": Twist, "PoseStamped": PoseStamped},
+        "nav_msgs": {},
+        "nav_msgs.msg": {"Odometry": Odometry, "OccupancyGrid": OccupancyGrid},
+        "people_msgs": {},
+        "people_msgs.msg": {"People": People},
+    }
+    modules = {name: ModuleType(name) for name in contents}
+    for name, content in contents.items():
+        vars(modules[name]).update(content)
+    spec = importlib.util.spec_from_file_location("ros2_node", NODE)
+    modules["ros2_node"] = module = importlib.util.module_from_spec(spec)
+    with mock.patch.dict(sys.modules, modules), mock.patch.multiple(Node, given={}, now=START):
+        spec.loader.exec_module(module)
+        yield module
+
+
+def stamped(what, frame="odom", late=0.0):
+    when = Node.now - late
+    what.header.frame_id, what.header.stamp.sec = frame, int(when)
+    what.header.stamp.nanosec = round((when - int(when)) * 1e9)
+    return what
+
+
+def odometry(own, **how):
+    at, what = own.tolist(), Odometry()
+    what.pose.pose.position.x, what.pose.pose.position.y = at[:2]
+    what.pose.pose.orientation.z, what.pose.pose.orientation.w = sin(at[2] / 2), cos(at[2] / 2)
+    what.twist.twist.linear.x, what.twist.twist.angular.z = at[3:]
+    return stamped(what, **how)
+
+
+def people(*walkers, **how):
+    what = People()
+    for name, (x, y, vx, vy) in walkers:
+        walker = Walker()
+        walker.name, walker.position.x, walker.position.y = name, x, y
+        walker.velocity.x, walker.velocity.y = vx, vy
+        what.people.append(walker)
+    return stamped(what, **how)
+
+
+def goal(x, y, **how):
+    what = PoseStamped()
+    what.pose.position.x, what.pose.position.y = x, y
+    return stamped(what, **how)
+
+
+def hear(node, topic, what):
+    """Deliver a message."""
+    msg_type, callback = node.subscribed[topic]
+    assert type(what) is msg_type
+    callback(what)
+
+
+def tick(node):
+    """Let the timer go off, and return what is commanded, (v, omega)."""
+    ((_, callback),) = node.every.items()
+    callback()
+    twist = node.published["cmd_vel"][-1]
+    assert vars(twist.linear) | {"x": 0.0} == vars(xyz())  # two wheels move ahead and turn, nothing else
+    return twist.linear.x, twist.angular.z
