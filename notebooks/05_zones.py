@@ -148,7 +148,7 @@ record.figure(ax.figure, "zones")
 # sensor noise, gaps, clock, conditions, outliers, zone - must find it again.
 
 # %%
-for name, found in (("quantile", zone), ("the paper's hull", paper)) if record.cache.is_synthetic else ():
+for name, found in (("quantile", zone), ("the paper's zone", paper)) if record.cache.is_synthetic else ():
     for v in (0.7, 0.9, 1.1, 1.3):
         one, true = found.ellipses[v], truth[v]
         off = np.abs([*np.subtract(one.center, true.center), *np.subtract(one.semi_axes, true.semi_axes)])

@@ -159,15 +159,15 @@ record.figure(fig, "margin")
 # %% [markdown]
 # ## The controller with enough margin
 #
-# `MPCSettings(margin="paper")` keeps the paper's eps around every wall; `margin="euclidean"`, the
-# default, gives each wall what it requires, $\max(\epsilon, r^2/L)$. A robot is sent to a goal 40 cm ahead
-# of the end of a wall of 1 m: 10 cm too near for its disc, yet $h \ge 0$ there by the paper's margin.
+# `MPCSettings.paper()` keeps the paper's eps around every wall (`margin="paper"`). `MPCSettings()` gives each wall
+# what it requires, $\max(\epsilon, r^2/L)$ (`margin="euclidean"`). A robot with the paper's settings is sent to a
+# goal 40 cm ahead of the end of a wall of 1 m: 10 cm too near for its disc, yet $h \ge 0$ there by that margin.
 
 # %%
 wall = np.array([[(0.0, -1.0), (0.0, 0.0)]])
 start, goal = np.array([-2.0, 3.0, 0.0, 0.0]), np.array([0.0, 0.4])
 scenario = szlib.Scenario("end", start, goal, walls=wall, title="To the end of a wall of 1 m")
-paper = szlib.MPCSettings(margin="paper")
+paper = szlib.MPCSettings.paper()
 log = drive(scenario, szlib.MPCCBF(zone, walls=wall, settings=paper), until_arrival=False)
 nearest, lowest = float(log.clearance.min()), float(log.h.min())
 print(f"eps {eps:.2f} m: min h {100 * lowest:+.1f} cm, true gap {100 * nearest:+.1f} cm")

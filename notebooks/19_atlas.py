@@ -209,7 +209,7 @@ near = corridor[(corridor["width"] == 4.6) & (corridor["pace"] == 0.5)].set_inde
 times = near["time_to_goal"]
 record.key["corridor: to the goal with gamma 0.03, 0.07 [s]"] = [float(times[g, 1.0]) for g in (0.03, 0.07)]
 Markdown(
-    "To the goal of the paper's corridor: gamma from 0.03 to 0.07 takes it from "
+    "To the goal of the corridor of the paper, with our settings: gamma from 0.03 to 0.07 takes it from "
     f"{times[0.03, 1.0]:.1f} to {times[0.07, 1.0]:.1f} s; "
     f"the zone from 1.25 to 0.75 times from {times[0.05, 1.25]:.1f} to {times[0.05, 0.75]:.1f} s."
 )

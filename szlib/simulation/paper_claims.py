@@ -175,7 +175,8 @@ def measure_delay_by_size(
 ) -> Finding:
     """A larger zone makes the robot later at its goal (sec. 4): mean and range over scenarios of the paper.
 
-    The runs are deterministic: the claim is supported if the robot is later in every scenario.
+    The robot has szlib's default settings. The runs are deterministic: the claim is supported if the robot is
+    later in every scenario.
 
     Parameters
     ----------
@@ -193,7 +194,7 @@ def measure_delay_by_size(
 
 
 def run_scenario(name: str, zone: Ellipse) -> dict[str, float]:
-    """Metrics of the paper's scenario of this `name` with a `zone`."""
+    """Metrics of the paper's scenario of this `name` with a `zone` and szlib's default settings."""
     scenario = replace(SCENARIOS[name], claims=())
     return simulate(scenario, MPCCBF(zone, walls=scenario.walls)).metrics()
 
