@@ -9,13 +9,18 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+import nbformat
 import pytest
 
 import szlib
 from szlib import files, memory
 from szlib.errors import MemoryLimitError, StorageError
+from szlib.simulation.log import SimulationLog
+from szlib.tracks.interop import read_groups
+from szlib.workbook.report import write_report
 
 PACKAGE = Path(szlib.__file__).parent
 WRITERS = {"write_text", "write_bytes", "touch"}
@@ -135,6 +140,53 @@ def test_a_cached_file_is_known_by_its_content_and_what_it_was_made_of(tmp_path:
     assert files.load_cached(file, {"seed": 2}) is None
     file.write_bytes(b"Content")
     assert files.load_cached(file, {"seed": 1}) is None, "damaged"
+
+
+NO_SMALL_FILES: dict[str, Callable[[Path], object]] = {
+    "it is no regular file": os.mkfifo,
+    "no regular file": lambda path: path.symlink_to("/dev/zero"),
+    "irectory": Path.mkdir,
+    "it is larger than 10 MB": lambda path: path.write_bytes(b" " * 10_000_001),
+}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs FIFOs")
+@pytest.mark.parametrize("reason", NO_SMALL_FILES)
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [
+        ("area.json", szlib.as_area),
+        ("zone.json", szlib.SocialZone.load),
+        ("groups.txt", read_groups),
+        ("run.json", SimulationLog.load),
+        ("summary.json", lambda path: write_report(path.parent)),
+        ("area.txt", lambda path: write_report(path.parent)),
+    ],
+)
+def test_what_is_no_small_regular_file_is_refused(
+    name: str, read: Callable[[Path], object], reason: str, tmp_path: Path
+) -> None:
+    NO_SMALL_FILES[reason](tmp_path / name)
+    nbformat.write(nbformat.v4.new_notebook(cells=[nbformat.v4.new_markdown_cell()]), tmp_path / "01_a.ipynb")
+    with pytest.raises(szlib.SzlibError, match=reason) as refused:
+        read(tmp_path / name)
+    assert str(tmp_path) in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", ["walk.csv", "walk.parquet"])
+def test_a_file_of_tracks_that_never_ends_is_refused(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(szlib.DataError, match="no regular file"):
+        szlib.read_tracks(tmp_path / name)
+
+
+def test_cached_files_that_never_end_are_not_read(tmp_path: Path) -> None:
+    files.store_cached(tmp_path / "a", b"content", 1)
+    for name in ("a", "a.json", files.MARKER):
+        (tmp_path / name).unlink(missing_ok=True)
+        (tmp_path / name).symlink_to("/dev/zero")
+        assert files.load_cached(tmp_path / "a", 1) is None
+        assert files.folder_purpose(tmp_path) is None
 
 
 def test_file_names_that_are_not_text_are_escaped() -> None:

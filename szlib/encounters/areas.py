@@ -11,7 +11,7 @@ import pandas as pd
 
 from ..checks import check_columns
 from ..errors import DataError, warn
-from ..files import printable, reading
+from ..files import printable, read_small, reading
 from ..tracks.clock import COLUMNS
 from .geometry import PAPER_SPACE, Area, Region, Square
 
@@ -209,7 +209,7 @@ def _from_numbers(numbers: Any) -> Square:
 def _from_file(path: Path) -> Area:
     """The area in a file: well-known text, GeoJSON, or four numbers."""
     with reading(path, "as an area", EXPECTED.removeprefix("expected ")):
-        text = path.read_text(encoding="utf-8-sig").strip()
+        text = read_small(path).decode("utf-8-sig").strip()
     if not text or not _is_area(text):
         raise DataError(f"{printable(path)}: begins with {printable(text[:40])!r}; {EXPECTED}")
     try:

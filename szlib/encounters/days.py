@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from contextvars import copy_context
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -23,13 +24,13 @@ import pandas as pd
 from tqdm import tqdm
 
 from ..errors import DataError, DataWarning, SzlibError
-from ..files import claim_folder, printable
+from ..files import claim_folder, printable, unchanged_files
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.options import ReadOptions
 from ..tracks.recordings import find_day, name_recordings
 from .geometry import Area
-from .one_day import describe_source, find_encounters_in_files, load_day, store_day, with_area
+from .one_day import describe_source, find_area, find_encounters_in_files, load_day, store_day
 from .settings import EncounterSettings
 
 PURPOSE = "encounters by day"  # purpose of an extraction's folder, as its marker states it
@@ -168,13 +169,14 @@ def extract_days(
     claim_folder(folder, PURPOSE, inputs=files)
     days = _group_by_day(files, options)
     included = [(day, of_day) for day, of_day in sorted(days.items()) if day not in excluded]
-    for _, of_day in included:
+    contents = {}
+    for day, of_day in included:
         with suppress(SzlibError):  # the first day with an area; computing a day that fails says why
-            settings = with_area(settings, [Path(file) for file in of_day], options)
+            settings, contents[day] = find_area(of_day, settings, options)
             break
     rows = [_row(day, of_day, status="excluded") for day, of_day in days.items() if day in excluded]
     tasks = [
-        joblib.delayed(extract_day)(day, of_day, str(folder.resolve()), settings, options)
+        joblib.delayed(extract_day)(day, of_day, str(folder.resolve()), settings, options, contents.get(day))
         for day, of_day in included
     ]
     with tqdm(total=len(tasks), unit="day", disable=not progress) as bar:
@@ -197,27 +199,37 @@ def _group_by_day(files: Sequence[Path], options: ReadOptions) -> dict[str, list
 
 
 def extract_day(
-    day: str, files: Sequence[str], out: str, settings: EncounterSettings, options: ReadOptions
+    day: str,
+    files: Sequence[str],
+    out: str,
+    settings: EncounterSettings,
+    options: ReadOptions,
+    contents: list[Any] | None = None,
 ) -> dict[str, Any]:
     """Compute one `day` from its `files`, or load it from the folder `out`; return its row of the table.
 
-    `settings` and `options` as in `extract_days`.  Days share nothing but `out`.
+    `settings` and `options` as in `extract_days`.  The files must begin on this day, and have the `contents`
+    in which the area was found, if they are given.  Days share nothing but `out`.
     """
     start = time.perf_counter()
-    row, folder = _row(day, files, status="failed"), Path(out)
+    row, folder, paths = _row(day, files, status="failed"), Path(out), [Path(file) for file in files]
     try:
-        with ThreadPoolExecutor(1) as thread:  # checksums are computed while the files are read
-            source = thread.submit(describe_source, files, settings, options)
+        # Checksums are computed while the files are read.
+        with unchanged_files(paths), ThreadPoolExecutor(1) as thread:
+            source = thread.submit(copy_context().run, describe_source, files, settings, options)
             is_stored, status = (folder / f"{day}.parquet").is_file(), "kept"
             samples = load_day(folder, day, source.result()) if is_stored else None
             if samples is None:
                 status = "done"
                 # The table and the funnel count the rejected rows.
                 with warnings.catch_warnings(action="ignore", category=DataWarning):
-                    paths = [Path(file) for file in files]
                     samples = find_encounters_in_files(paths, settings, options)
-                store_day(folder, day, samples, source.result())
-            row["source"] = source.result()
+            begins = {find_day(path, options) or day for path in paths}
+        if begins != {day} or contents not in (None, source.result()["files"]):
+            raise DataError(f"{paths[0]}: changed after its day or the area was found; extract the day again")
+        row["source"] = source.result()
+        if status == "done":
+            store_day(folder, day, samples, source.result())
         read = [stage for stage in funnels.get(samples) if stage["stage"].startswith("read ")]
         row |= {
             "status": status,

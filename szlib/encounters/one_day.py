@@ -13,7 +13,7 @@ import pandas as pd
 
 from .. import __version__
 from ..errors import DataError, DataWarning
-from ..files import file_content, load_cached, store_cached
+from ..files import file_content, load_cached, store_cached, unchanged_files
 from ..tracks import funnels
 from ..tracks.clock import read_tracks, to_clock
 from ..tracks.formats import find_format
@@ -45,11 +45,12 @@ def find_encounters_in_files(
 ) -> pd.DataFrame:
     """Find the encounters of the `files` of one day: the same as in ``szlib.read_tracks(files)``.
 
-    `settings` say what counts as an encounter, `options` how the files are read.  `contents` give the
-    content of each file, as `file_contents`; with them, the rows near the area are cached for the next call.
+    `settings` say what counts as an encounter, `options` how the files are read.  Raises DataError also where
+    a file changes meanwhile.
     """
-    area = _known_area(settings, files, options)
-    raw = read_near_area(files, area=area, duration=settings.duration, options=options)
+    with unchanged_files(files):
+        area = _known_area(settings, files, options)
+        raw = read_near_area(files, area=area, duration=settings.duration, options=options)
     tracks = to_clock(raw, max_gap=options.max_gap) if len(raw) else raw
     if len(tracks) == 0:
         return funnels.attach(no_samples(), funnels.get(tracks))
@@ -74,6 +75,20 @@ def with_area(
                 tracks = read_tracks(files, options=options)
         area = walked_area(tracks)
     return replace(settings, area=area)
+
+
+def find_area(
+    files: Sequence[str], settings: EncounterSettings, options: ReadOptions
+) -> tuple[EncounterSettings, list[Any] | None]:
+    """The `settings` with the area of `files`, and the contents of these if it was found in them.
+
+    The files are read as `options` say; for their contents see `describe_source`.
+    """
+    paths = [Path(file) for file in files]
+    with unchanged_files(paths):
+        is_known = _known_area(settings, paths, options) is not None
+        contents = None if is_known else describe_source(files, settings, options)["files"]
+        return with_area(settings, paths, options), contents
 
 
 def _known_area(settings: EncounterSettings, files: Sequence[Path], options: ReadOptions) -> Area | None:

@@ -17,7 +17,7 @@ from ..control.person import Person
 from ..control.settings import MPCSettings
 from ..control.step import status_of
 from ..errors import DataError
-from ..files import write_file
+from ..files import open_regular, read_small, write_file
 from ..zones.ellipses import Ellipse
 from .metrics import compute_metrics
 from .run import Run, nanmin
@@ -146,12 +146,13 @@ class SimulationLog(Run):
         """
         stem = Path(path).with_suffix("")
         try:
-            content = json.loads(stem.with_suffix(".json").read_text(encoding="utf-8"))
+            content = json.loads(read_small(stem.with_suffix(".json")))
             if (content["format"], content["version"]) != (_FORMAT, _VERSION):
                 raise ValueError(
                     f"format {content['format']} {content['version']}, expected {_FORMAT} {_VERSION}"
                 )
-            rows = pd.read_parquet(stem.with_suffix(".parquet"))
+            with open_regular(stem.with_suffix(".parquet")) as stream:
+                rows = pd.read_parquet(stream)
             arrays: dict[str, Any] = {name: np.array(rows[name].tolist()) for name in _ARRAYS}
             arrays |= {name: arrays[name].reshape(shape) for name, shape in content["shapes"].items()}
             zones = tuple(Ellipse(**zone) for zone in content["zones"])

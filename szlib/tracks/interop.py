@@ -27,7 +27,7 @@ from scipy.cluster.hierarchy import DisjointSet
 
 from ..checks import check_rows
 from ..errors import DataError, warn
-from ..files import reading
+from ..files import read_small, reading
 from . import funnels
 from .clock import COLUMNS, TICKS_PER_SECOND, clock_index, compute_velocities, nearest_tick
 
@@ -111,7 +111,7 @@ def read_groups(path: str | Path) -> pd.DataFrame:
     """
     path = Path(path)
     with reading(path, "as groups", "ids, a group a line"):
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = read_small(path).decode("utf-8").splitlines()
     groups: DisjointSet = DisjointSet()
     joined = []
     for number, line in enumerate(lines, start=1):

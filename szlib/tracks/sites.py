@@ -28,7 +28,7 @@ import pandas as pd
 
 from ..checks import check_columns
 from ..errors import DataError
-from ..files import reading
+from ..files import read_small, reading
 from . import funnels
 from .clock import to_clock
 from .options import ReadOptions
@@ -220,7 +220,7 @@ def _homography(path: Path, homography: str | Path | None) -> np.ndarray:
         looked = " or ".join(map(str, places))
         raise DataError(f"{looked}: no such file; expected the homography of Grand Central, pass homography=")
     with reading(file, "as a homography", "homog, 3 x 3"):
-        matrix = np.array(json.loads(file.read_text(encoding="utf-8"))["homog"], float)
+        matrix = np.array(json.loads(read_small(file))["homog"], float)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
         raise DataError(f"{file}: homog has shape {matrix.shape}; expected 3 x 3 finite numbers")
     return matrix

@@ -26,6 +26,7 @@ NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
 RESULTS = "../results"  # the default folder of all results, relative to the notebooks
 PURPOSE = "results of the workbook"  # the purpose that marks the folder of all results
 LAB = "lab"  # the folder, among all results, of notebooks that are executed by hand
+PARAMETERS = "parameters.json"  # file of a run: its data and parameters
 RUN_VARIABLE = "SZLIB_RUN"  # environment variable of a kernel: the results folder of the kernel's run
 
 

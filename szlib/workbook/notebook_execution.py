@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import time
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SzlibError
-from ..files import printable, write_file
+from ..files import printable, read_json_object, write_file
 from .record.parameters import METHOD_DEFAULTS, read_defaults
 
 # Errors caused by data, disk or memory, not by the notebook.
@@ -55,13 +54,10 @@ def execute_notebook(
         text = printable(" ".join(f"{name}: {getattr(error, 'evalue', error)}".split()))
         outcome = {"status": "refused" if is_refused else "error", "error": text}
     outcome["seconds"] = round(time.perf_counter() - start, 2)
-    try:
-        record = json.loads((results / "records" / f"{source.stem}.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        record = {}
-        if outcome["status"] == "done":
-            missing = "the notebook wrote no record; it must end with record.close()"
-            outcome |= {"status": "error", "error": missing}
+    record = read_json_object(results / "records" / f"{source.stem}.json")
+    if not record and outcome["status"] == "done":
+        missing = "the notebook wrote no record; it must end with record.close()"
+        outcome |= {"status": "error", "error": missing}
     return source.stem, outcome | {name: record.get(name, empty) for name, empty in EMPTY_RECORD.items()}
 
 

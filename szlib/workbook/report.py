@@ -24,7 +24,7 @@ from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 
 from ..control.settings import MPCSettings
 from ..errors import DataError, ZoneError
-from ..files import write_file
+from ..files import open_regular, read_small, reading, write_file
 from ..plaza.settings import PlazaSettings
 from ..simulation.scenario import Scenario
 from ..simulation.scenarios.paper import SCENARIOS
@@ -34,6 +34,7 @@ from . import folders
 from .record.display import format_value
 
 REPORT = "report.html"  # the file of the report, in the folder of a run
+_LARGEST_NOTEBOOK = 100_000_000  # of an executed notebook, with its animations [bytes]
 _STATIC = Path(__file__).parent / "static"
 _FILE_LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:|#|mailto:|data:)([^)\s]+)\)")
 
@@ -48,7 +49,7 @@ def write_report(home: Path) -> Path:
         raise DataError(f"{home}: holds no executed notebooks; `szlib run` makes them")
     try:
         front_page = _render_front_page(home, notebooks)
-    except (LookupError, TypeError, ValueError, AttributeError, TemplateError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, OSError, TemplateError) as error:
         raise DataError(
             f"{home}: the results are damaged or of another version of szlib ({error!r}); `szlib run` writes "
             "them again"
@@ -77,7 +78,7 @@ def write_report(home: Path) -> Path:
 
 def _read_notebook(file: Path) -> nbformat.NotebookNode:
     try:
-        return nbformat.read(file, as_version=4)
+        return nbformat.reads(read_small(file, _LARGEST_NOTEBOOK), as_version=4)
     except (OSError, ValueError, nbformat.reader.NotJSONError) as error:
         raise DataError(f"{file}: cannot be read as a notebook ({error}); run it again") from error
 
@@ -120,7 +121,8 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> str:
     is_synthetic, area = run.get("data") == datasets.SYNTHETIC, home / "area.txt"
     zone, samples, funnel = _show_zone(home, is_synthetic=is_synthetic), home / "encounters.parquet", ""
     if samples.exists():
-        stages = funnels.table(funnels.get(pd.read_parquet(samples)))
+        with open_regular(samples) as stream:
+            stages = funnels.table(funnels.get(pd.read_parquet(stream)))
         stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")  # each is named once
         funnel = _to_html(stages.assign(rows=stages["rows"].map("{:,}".format)))
     return pages.get_template("front_page.html.j2").render(
@@ -128,7 +130,7 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> str:
         outcomes=outcomes,
         checks=[c | {"notebook": name} for name, outcome in outcomes.items() for c in outcome["checks"]],
         run=run,
-        area=area.read_text(encoding="utf-8") if area.exists() else "",
+        area=read_small(area).decode("utf-8") if area.exists() else "",
         questions={name: _find_question(notebook) for name, notebook in notebooks.items()},
         funnel=funnel,
         zone=zone,
@@ -192,7 +194,8 @@ def _html_outputs(notebook: Any) -> Iterator[str]:
 
 def _read_json(file: Path) -> dict[str, Any]:
     """The object in a JSON file; empty if the file is missing."""
-    return dict(json.loads(file.read_text(encoding="utf-8"))) if file.exists() else {}
+    with reading(file, "as results", "an object of JSON, as `szlib run` writes it"):
+        return dict(json.loads(read_small(file))) if file.exists() else {}
 
 
 def _to_html(table: pd.DataFrame) -> str:

@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from .. import __version__, memory
 from ..errors import DataError
-from ..files import file_content, folder_lock, write_file
+from ..files import file_content, folder_lock, read_json_object, write_file
 from ..parallel import cluster, limit_jobs
 from ..tracks import datasets
 from . import folders
@@ -33,8 +33,7 @@ PRODUCERS = ("02", "05")
 SUMMARIES = ("21",)
 # Notebooks that take longest. They start first in their batch, so that no core waits for them at its end.
 LONGEST = ("15", "16", "18")
-# Files of a run: its data and parameters, and its outcome.
-PARAMETERS, SUMMARY = "parameters.json", "summary.json"
+SUMMARY = "summary.json"  # file of the outcome of a run
 
 
 def run(
@@ -173,7 +172,8 @@ def _start_summary(
     The source is version, content of the data, parameters. The other outcomes stay only if parameters.json
     equals it. Until the run is finished, the summary in the folder has not passed.
     """
-    before, outcomes = _read_json(home / PARAMETERS), _read_json(home / SUMMARY).get("notebooks", {})
+    before = read_json_object(home / folders.PARAMETERS)
+    outcomes = read_json_object(home / SUMMARY).get("notebooks", {})
     contents = [[file.name, *file_content(file)] for file in files]
     source = {"szlib": __version__, "data": datasets.label(data), "files": contents, "parameters": parameters}
     is_same = before == json.loads(json.dumps(source))
@@ -182,7 +182,7 @@ def _start_summary(
     if earlier:
         unfinished = {"passed": False, "unfinished": list(names), "notebooks": earlier}
         write_file(home / SUMMARY, json.dumps(unfinished, indent=1))
-    write_file(home / PARAMETERS, json.dumps(source, indent=1))
+    write_file(home / folders.PARAMETERS, json.dumps(source, indent=1))
     return source, earlier
 
 
@@ -217,12 +217,3 @@ def _count_passed(outcome: Mapping[str, Any], kind: str) -> str:
     """How many of a kind hold, of how many, such as "3/4"; "-" if there are none."""
     passed = [c["passed"] for c in outcome["checks"] if c["kind"] == kind]
     return f"{sum(passed)}/{len(passed)}" if passed else "-"
-
-
-def _read_json(file: Path) -> dict[str, Any]:
-    """The object in a JSON file; empty if the file is missing or damaged."""
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}

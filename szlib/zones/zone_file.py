@@ -16,7 +16,7 @@ import pandas as pd
 
 from .. import __version__
 from ..errors import SzlibError, ZoneError
-from ..files import reading, write_file
+from ..files import read_small, reading, write_file
 from .ellipses import Ellipse
 from .hulls import HullZone
 from .polar import PolarZone
@@ -87,7 +87,7 @@ def read_zone(path: Path, build: Callable[..., Zone]) -> Zone:
 def _read_content(path: Path) -> dict[str, Any]:
     """The content of the file, a zone of a known version."""
     with reading(path, "as a zone", "JSON written by SocialZone.save", ZoneError):
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_small(path))
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ZoneError(
             f'{path}: is JSON but no zone; expected "format": "{FORMAT}", as SocialZone.save writes it'

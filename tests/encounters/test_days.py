@@ -10,8 +10,12 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
+from typing import Any
 
 import joblib
 import pandas as pd
@@ -20,6 +24,7 @@ from helpers.faulty_disk import FaultyDisk
 
 import szlib
 from szlib.encounters import days as extraction
+from szlib.encounters import one_day
 from szlib.files import claim_folder
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
@@ -114,6 +119,95 @@ def test_finished_days_are_kept_and_changed_days_computed_again(days: list[Path]
     assert statuses() == ["done"] * 4
     record = json.loads((out / f"{DATES[0]}.parquet.json").read_text())
     assert record["made_of"]["parameters"]["min_speed"] == 0.4
+
+
+@contextmanager
+def other_folder(file: Path) -> Iterator[None]:
+    """Give the folder of `file` the name of its neighbour "other", and back; no file is touched."""
+    data, other, away = (file.parents[1] / name for name in ("data", "other", "away"))
+    for old, new in ((data, away), (other, data)):
+        old.rename(new)
+    yield
+    for old, new in ((data, other), (away, data)):
+        old.rename(new)
+
+
+@contextmanager
+def other_file(file: Path) -> Iterator[None]:
+    """Replace `file` by its namesake in the folder "other", and put it back."""
+    away, other = file.with_name("away"), file.parents[1] / "other" / file.name
+    os.link(file, away)
+    other.replace(file)
+    yield
+    os.link(file, other)
+    away.replace(file)
+
+
+@contextmanager
+def other_content(file: Path) -> Iterator[None]:
+    """Write the content of its namesake into `file`, then its own, with the old time of change."""
+    content, before = file.read_bytes(), file.stat()
+    file.write_bytes((file.parents[1] / "other" / file.name).read_bytes())
+    yield
+    file.write_bytes(content)
+    os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+@pytest.mark.parametrize("exchange", [other_folder, other_file, other_content])
+def test_rows_are_of_the_bytes_of_their_checksum(
+    exchange: Callable[[Path], AbstractContextManager[None]],
+    days: list[Path],
+    reference: dict[str, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The file is another one from the moment that its checksum is known until its rows are read."""
+    for name, day in (("data", days[0]), ("other", days[1])):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / days[0].name).write_bytes(day.read_bytes())
+    file, known = tmp_path / "data" / days[0].name, threading.Event()
+    describe, read = extraction.describe_source, one_day.read_near_area
+
+    def describe_first(*given: Any) -> dict[str, Any]:
+        try:
+            return describe(*given)
+        finally:
+            known.set()
+
+    def read_the_other(*given: Any, **options: Any) -> pd.DataFrame:
+        known.wait()
+        with exchange(file):
+            return read(*given, **options)
+
+    monkeypatch.setattr(extraction, "describe_source", describe_first)
+    monkeypatch.setattr(one_day, "read_near_area", read_the_other)
+    done = extract(file, tmp_path / "out")
+    stored = {name: content for name, content in contents(tmp_path / "out").items() if "parquet" in name}
+    if exchange is other_folder and Path("/proc/self/fd").exists():
+        assert stored == {name: reference[name] for name in stored} and len(stored) == 2
+    else:
+        assert "changed while it was read; try again" in done.failed["why"].item()
+        assert not stored, "nothing is kept of the day"
+
+
+def test_day_whose_file_changes_after_the_area_was_found_fails(
+    days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copies = [tmp_path / day.name for day in days[:2]]
+    for copy, day in zip(copies, days, strict=False):
+        copy.write_bytes(day.read_bytes())
+
+    def find_and_change(*given: Any) -> object:
+        settings = find_area(*given)
+        copies[0].write_bytes(copies[0].read_bytes() + copies[0].read_bytes().splitlines(keepends=True)[-1])
+        return settings
+
+    find_area = extraction.find_area
+    monkeypatch.setattr(extraction, "find_area", find_and_change)
+    monkeypatch.setattr(one_day, "walked_area", lambda _: szlib.ATC_SQUARE)
+    done = extract(copies, tmp_path / "out", area="auto")
+    assert list(done.table["status"]) == ["failed", "done"]
+    assert "changed after its day or the area was found" in done.failed["why"].item()
 
 
 def test_days_that_fail_do_not_stop_the_others(days: list[Path], tmp_path: Path) -> None:

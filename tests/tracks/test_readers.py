@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import random
 import warnings
 import zipfile
@@ -354,7 +355,7 @@ def test_missing_files_folders_and_locked_files_are_refused(
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr(os, "open", refuse)
     with pytest.raises(szlib.DataError, match=r"locked\.csv: cannot be opened .*Permission denied"):
         read_raw(path)
 

@@ -1,6 +1,7 @@
 """What a notebook records, and the data that it stores for later notebooks."""
 
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 from studies import committed
 
 import szlib
+from szlib.files import file_content
+from szlib.workbook import folders
 from szlib.workbook.record import (
     DataCache,
     NotebookRecord,
@@ -111,8 +114,50 @@ def test_encounters_are_cached_for_the_same_data_only(record, monkeypatch):
     NotebookRecord("02_test", other).cache.encounters()
     assert len(made) == 2
     record.cache.files()[0].write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n2,1,2,0\n")
-    record.cache.encounters()
+    with pytest.raises(szlib.DataError, match="has changed since it was first read; run again"):
+        record.cache.encounters()
+    NotebookRecord("02_test", other).cache.encounters()
     assert len(made) == 3
+
+
+def test_rows_of_a_file_that_is_replaced_and_put_back_are_not_stored(record, monkeypatch):
+    file, read = record.cache.files()[0], data_cache.read_tracks
+    content, before = file.read_bytes(), file.stat()
+
+    def read_another(files):
+        file.write_text("t,id,x,y\n0,1,0,0\n1,1,5,0\n")
+        try:
+            return read(files)
+        finally:
+            file.write_bytes(content)
+            os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+    monkeypatch.setattr(data_cache, "read_tracks", read_another)
+    with pytest.raises(szlib.DataError, match="changed while it was read"):
+        record.cache.encounters()
+    assert not list(record.out.glob("*.parquet"))
+
+
+def test_notebook_of_a_run_uses_the_data_with_which_the_run_began(record, monkeypatch):
+    content = [[file.name, *file_content(file)] for file in record.cache.files()]
+    (record.out / folders.PARAMETERS).write_text(json.dumps({"files": content}))
+    monkeypatch.setenv(folders.RUN_VARIABLE, str(record.out))
+    given = {"data": record.cache.data}
+    assert len(NotebookRecord("02_test", given).cache.tracks())
+    record.cache.files()[0].write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n2,1,2,0\n")
+    with pytest.raises(szlib.DataError, match=r"mine\.csv: has changed since it was first read"):
+        NotebookRecord("02_test", given).cache.tracks()
+
+
+def test_zone_of_other_data_is_not_loaded_if_it_replaces_the_file(record, monkeypatch):
+    shape = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
+    zone = szlib.SocialZone(shape, 2.0, {1.3: szlib.Ellipse((0, 0), (1, 1))})
+    monkeypatch.setattr(DataCache, "encounters", lambda self: None)
+    monkeypatch.setattr(data_cache.SocialZone, "fit", lambda *_, **__: zone)
+    stored, load = record.cache.zone(), szlib.SocialZone.load
+    other = replace(stored, r_max=1.0, provenance={"source": "other data"})
+    monkeypatch.setattr(data_cache.SocialZone, "load", lambda file: (other.save(file), load(file))[1])
+    assert record.cache.zone().r_max == 2.0
 
 
 def test_damaged_zone_is_fitted_again(record, monkeypatch, capsys):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ... import memory
 from ...errors import DataError, StorageError
-from ...files import printable, temporary_folder
+from ...files import printable, readable_path, temporary_folder, unchanged_files
 
 LONGEST_LINE = 100_000
 # Bytes that a row takes while its file is read as a whole (measured: 100 at 1 Hz, 126 tidy).
@@ -20,25 +20,23 @@ BYTES_PER_ROW = 130
 
 @contextmanager
 def unpacked(path: Path) -> Iterator[Path]:
-    """Give file `path` itself, or a temporary file with its content where it is gzipped.
+    """Give the `readable_path` of file `path`, or a temporary file with its content where it is gzipped.
 
-    Raises DataError where it is no regular file or cannot be opened, StorageError where there is no room.
+    Raises DataError where it is no regular file, cannot be opened or changes, StorageError where there is no
+    room.
     """
     if not path.is_file():
         raise DataError(f"{printable(path)}: {_describe_missing(path)}")
     if printable(path.name) != path.name:
         raise DataError(f"{printable(path)}: its name is no readable text (UTF-8); rename the file")
-    try:
-        is_packed = _is_packed(path)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be opened ({error})") from error
-    if not is_packed:
-        yield path
-        return
-    with temporary_folder() as folder:
-        unpacked = folder / "unpacked"
-        _unpack(path, unpacked)
-        yield unpacked
+    with unchanged_files([path]):
+        if not _is_packed(readable_path(path)):
+            yield readable_path(path)
+            return
+        with temporary_folder() as folder:
+            unpacked = folder / "unpacked"
+            _unpack(path, unpacked)
+            yield unpacked
 
 
 def _is_packed(path: Path) -> bool:
@@ -50,7 +48,7 @@ def _is_packed(path: Path) -> bool:
 def _unpack(path: Path, unpacked: Path) -> None:
     """Unpack a gzipped file; failure to read means damage, failure to write a lack of room."""
     try:
-        with gzip.open(path) as source, unpacked.open("wb") as target:
+        with gzip.open(readable_path(path)) as source, unpacked.open("wb") as target:
             shutil.copyfileobj(source, target, 1 << 22)
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise DataError(f"{path}: damaged .gz ({error}); fetch the file again") from error
@@ -84,7 +82,8 @@ def require_memory(plain: Path, path: Path) -> None:
 def read_first_line(path: Path) -> bytes:
     """The first line of file `path`, plain or .gz; empty where it cannot be read."""
     try:
-        with gzip.open(path) if _is_packed(path) else path.open("rb") as stream:
+        plain = readable_path(path)
+        with gzip.open(plain) if _is_packed(plain) else plain.open("rb") as stream:
             return stream.readline(LONGEST_LINE)
     except (OSError, EOFError, zlib.error):
         return b""

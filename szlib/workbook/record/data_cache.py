@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,8 @@ from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
 from ...encounters.one_day import require_encounters, with_area
 from ...encounters.settings import EncounterSettings
-from ...files import file_content, load_cached, store_cached, write_checksum
+from ...errors import DataError
+from ...files import file_content, load_cached, printable, store_cached, unchanged_files, write_checksum
 from ...plaza.generation import make_plaza
 from ...plaza.settings import PlazaSettings
 from ...tracks import datasets
@@ -43,6 +45,8 @@ class DataCache:
     area : where encounters are found, as for `szlib.as_area`; "auto"; or "" for the default of the data.
     seed : of the synthetic plaza.
     method : how encounters are found and the zone is fitted.
+    contents : name, size and checksum of each file of the data; empty: those of the first time that they are
+        read.  Files that then hold something else raise a DataError.
 
     Examples
     --------
@@ -60,6 +64,7 @@ class DataCache:
     area: str = ""
     seed: int = 0
     method: ZoneMethod = field(default_factory=ZoneMethod)
+    contents: list[list[Any]] = field(default_factory=list, repr=False)
 
     @property
     def is_synthetic(self) -> bool:
@@ -79,7 +84,8 @@ class DataCache:
 
     def tracks(self) -> pd.DataFrame:
         """The track table of the data set."""
-        return read_tracks(self.files())
+        with self._unchanged_data() as files:
+            return read_tracks(files)
 
     def find_area(self, tracks: pd.DataFrame | None = None) -> Area:
         """The area in which encounters are found: the one given, or the default of the data.
@@ -89,7 +95,8 @@ class DataCache:
         if content := load_cached(self._path("area.txt"), self._source()):
             return as_area(content.decode())
         settings = EncounterSettings(area=self.area or None)
-        area = as_area(with_area(settings, self.files(), ReadOptions(), tracks).area)
+        with self._unchanged_data() as files:
+            area = as_area(with_area(settings, files, ReadOptions(), tracks).area)
         store_cached(self._path("area.txt"), str(area).encode(), self._source())
         return area
 
@@ -115,8 +122,8 @@ class DataCache:
     def zone(self) -> SocialZone:
         """The zone that notebook 05 stored, or the same fitted now."""
         file = self._path("zone.json")
-        if load_cached(file, self._zone_source()) is not None:
-            return SocialZone.load(file)
+        if zone := _load(file, self._zone_source()):
+            return zone
         if file.exists():
             print("The zone is fitted again: zone.json was made from other data, or is damaged.")
         return self.store_zone(SocialZone.fit(self.encounters(), **self.method.fit_options()))
@@ -130,9 +137,8 @@ class DataCache:
         r_max, speed = self.method.r_max, self.method.zone_speed
         options: dict[str, Any] = {"method": "paper", "r_max": r_max, "speeds": [speed], "n_resamples": 0}
         file, source = self._path("paper_zone.json"), self._source() | {"fit": options}
-        if load_cached(file, source) is not None:
-            return SocialZone.load(file).ellipse(speed)
-        return _store(SocialZone.fit(self.encounters(), **options), file, source).ellipse(speed)
+        zone = _load(file, source) or _store(SocialZone.fit(self.encounters(), **options), file, source)
+        return zone.ellipse(speed)
 
     def store_zone(self, zone: SocialZone) -> SocialZone:
         """Store the `zone` for later notebooks, and return it with its source."""
@@ -144,9 +150,21 @@ class DataCache:
         folder.mkdir(parents=True, exist_ok=True)
         return folder / name
 
+    @contextmanager
+    def _unchanged_data(self) -> Iterator[list[Path]]:
+        """Give the files of the data; raise DataError if they change, or are not those of `contents`."""
+        files = self.files()
+        with unchanged_files(files):
+            found = [[file.name, *file_content(file)] for file in files]
+            self.contents.extend([] if self.contents else found)
+            if changed := [file for file, now in zip(files, found, strict=True) if now not in self.contents]:
+                raise DataError(f"{printable(changed[0])}: has changed since it was first read; run again")
+            yield files
+
     def _source(self) -> dict[str, Any]:
         """What encounters are made from: content of the files, parameters, version of szlib."""
-        files = [[file.name, *file_content(file)] for file in self.files()]
+        with self._unchanged_data():
+            files = self.contents
         source = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "area": self.area}
         source |= {"szlib": __version__, "parameters": self.method.encounter_settings().as_json()}
         return json.loads(json.dumps(source))  # type: ignore[no-any-return]
@@ -154,6 +172,12 @@ class DataCache:
     def _zone_source(self) -> dict[str, Any]:
         """What the zone is made from."""
         return self._source() | {"fit": self.method.fit_options()}
+
+
+def _load(file: Path, source: dict[str, Any]) -> SocialZone | None:
+    """The zone in a file, if it was made from `source` and is not damaged."""
+    zone = None if load_cached(file, source) is None else SocialZone.load(file)
+    return zone if zone and zone.provenance.get("source") == json.loads(json.dumps(source)) else None
 
 
 def _store(zone: SocialZone, file: Path, source: dict[str, Any]) -> SocialZone:

@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 from pandas.io.formats.style import Styler
 
-from ...files import claim_folder, write_file
+from ...files import claim_folder, read_json_object, write_file
 from .. import folders
 from .committed_tables import find_differences, read_table
 from .data_cache import DataCache
@@ -76,9 +76,10 @@ class NotebookRecord:
         self.changed = {n: v for n, v in changed.items() if n not in NEUTRAL}
         if self.changed:
             print(f"{self._settings()}: checks that assume the defaults are observations; text may not apply")
-        data = variables["data"]
+        data, contents = variables["data"], []
         if run := os.environ.get(folders.RUN_VARIABLE):
             self.out = Path(run)
+            contents = read_json_object(self.out / folders.PARAMETERS).get("files", [])
         else:
             results = folders.results_root(variables.get("results", folders.RESULTS))
             claim_folder(results, folders.PURPOSE)
@@ -87,7 +88,8 @@ class NotebookRecord:
         for part in ("records", "figures"):
             (self.out / part).mkdir(exist_ok=True)
         method, area = ZoneMethod.from_variables(variables), variables.get("area", "")
-        self.cache = DataCache(self.out, data, area=area, seed=variables.get("seed", 0), method=method)
+        seed = variables.get("seed", 0)
+        self.cache = DataCache(self.out, data, area, seed, method, contents)
         format_outputs()
 
     def check(self, what: str, passed: object, value: object = None, *, always: bool = False) -> None:
