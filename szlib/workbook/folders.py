@@ -24,7 +24,8 @@ from ..tracks import datasets
 # The folder of the notebooks, beside the package in the repository.
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
 RESULTS = "../results"  # the default folder of all results, relative to the notebooks
-PURPOSE = "results of the workbook"  # the purpose that marks the folder of all results
+RESULTS_OF = "results of "  # how the purpose of each folder of results begins
+PURPOSE = f"{RESULTS_OF}the workbook"  # the purpose that marks the folder of all results
 LAB = "lab"  # the folder, among all results, of notebooks that are executed by hand
 PARAMETERS = "parameters.json"  # file of a run: its data and parameters
 RUN_VARIABLE = "SZLIB_RUN"  # environment variable of a kernel: the results folder of the kernel's run
@@ -83,7 +84,7 @@ def claim_results(
     """
     source = absolute_data(data)
     inputs = [] if source in datasets.NAMES else datasets.find(source)
-    purpose = f"results of {source if isinstance(source, str) else ', '.join(source)}"
+    purpose = f"{RESULTS_OF}{source if isinstance(source, str) else ', '.join(source)}"
     if parameters:
         purpose += f" with {json.dumps(parameters, sort_keys=True)}"
     folder = Path(results) / datasets.label(data)

@@ -2,6 +2,9 @@
 
 nbconvert, with which Jupyter itself exports, makes the page. The template and the renderer of this module
 leave out scripts of other servers, draw formulas as MathML, fold the code, and describe every picture.
+
+A folder may come from anybody. So everything in it is reduced to harmless HTML, and the content security
+policy of the page lets no script run but the player of this package.
 """
 
 from __future__ import annotations
@@ -9,84 +12,146 @@ from __future__ import annotations
 import io
 import json
 import re
+import tomllib
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
+from html import escape
 from pathlib import Path
 from typing import Any
 
+import bleach  # type: ignore[import-untyped]
 import nbformat
 import pandas as pd
 from bs4 import BeautifulSoup
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, TemplateError
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 
 from ..control.settings import MPCSettings
-from ..errors import DataError, ZoneError
-from ..files import open_regular, read_small, reading, write_file
+from ..errors import DataError, SzlibError
+from ..files import MARKER, folder_purpose, open_regular, printable, read_small, write_file
 from ..plaza.settings import PlazaSettings
 from ..simulation.scenario import Scenario
 from ..simulation.scenarios.paper import SCENARIOS
 from ..tracks import datasets, funnels
 from ..zones.social_zone import SocialZone
 from . import folders
+from .figures.movies import read_scripts
 from .record.display import format_value
 
 REPORT = "report.html"  # the file of the report, in the folder of a run
 _LARGEST_NOTEBOOK = 100_000_000  # of an executed notebook, with its animations [bytes]
 _STATIC = Path(__file__).parent / "static"
+_HARMLESS = tomllib.loads((_STATIC / "harmless.toml").read_text(encoding="utf-8"))
+_OUTPUTS, _TAGS, _ATTRIBUTES = ({*_HARMLESS[name].split()} for name in ("outputs", "tags", "attributes"))
+_SCRIPT_OR_STYLE = re.compile(r"<(script|style)\b.*?</\1>", re.DOTALL)
+# The data of a player, and its name, in the script of `static/player.html`.
+_RUN = re.compile(r"(?m)^const run = (\{.*\});\nconst figures = .*\[data-run=(szlib-[0-9a-f]{8})\]")
 _FILE_LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:|#|mailto:|data:)([^)\s]+)\)")
 
 
 def write_report(home: Path) -> Path:
     """Write the report of the notebooks that were executed in the results folder `home`, and return its path.
 
-    Raises DataError if there are none, or if one cannot be read.
+    Raises DataError if the folder is not marked as results, holds no notebooks, or holds a damaged file.
     """
-    notebooks = {file.stem: _read_notebook(file) for file in sorted(home.glob("[0-9][0-9]*_*.ipynb"))}
-    if not notebooks:
-        raise DataError(f"{home}: holds no executed notebooks; `szlib run` makes them")
-    try:
-        front_page = _render_front_page(home, notebooks)
-    except (LookupError, TypeError, ValueError, AttributeError, OSError, TemplateError) as error:
-        raise DataError(
-            f"{home}: the results are damaged or of another version of szlib ({error!r}); `szlib run` writes "
-            "them again"
-        ) from error
-    output = nbformat.v4.new_output("display_data", {"text/html": front_page})
+    if not (folder_purpose(home) or "").startswith(folders.RESULTS_OF):
+        raise DataError(f"{printable(home / MARKER)}: does not mark results of szlib; `szlib run` makes them")
+    names = [file.stem for file in sorted(home.glob("[0-9][0-9]*_*.ipynb"))]
+    if not names:
+        raise DataError(f"{printable(home)}: holds no executed notebooks; `szlib run` makes them")
+    notebooks, runs = {}, dict[str, Any]()
+    for name in names:
+        with _reading(home / f"{name}.ipynb"):
+            notebooks[name] = _read_notebook(home / f"{name}.ipynb", names, runs)
+    output = nbformat.v4.new_output("display_data", {"text/html": _render_front_page(home, notebooks)})
     page = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("", outputs=[output])])
-    page.metadata["title"] = f"szlib: {home.name}"
-    page.metadata["language_info"] = {"name": "python", "pygments_lexer": "ipython3"}
+    data = json.dumps(runs, separators=(",", ":")).replace("<", "\\u003c")
+    script = f"(() => {{\n{read_scripts('scene', 'player', 'report')}\nplayAll({data});\n}})()"
+    checksum = b64encode(sha256(script.encode()).digest()).decode()
+    page.metadata = nbformat.from_dict({
+        "title": f"szlib: {home.name}", "script": script, "script_checksum": f"sha256-{checksum}",
+        "language_info": {"name": "python", "pygments_lexer": "ipython3"},
+    })  # fmt: skip
     for name, notebook in notebooks.items():
-        link = f'<a id="{name}"></a>[to the front page](#top)'
+        link = f'<a id="{escape(name)}"></a><p><a href="#top">to the front page</a></p>'
         page.cells += [nbformat.v4.new_markdown_cell(link), *notebook.cells]
     for i, cell in enumerate(page.cells):
         cell["id"] = f"cell-{i}"
-        if cell.cell_type == "markdown":
-            cell.source = _FILE_LINK.sub(lambda link: _local_link(link, notebooks), cell.source)
     exporter = HTMLExporter(
         extra_loaders=[FileSystemLoader(_STATIC)],
         template_file="report.html.j2",
         exclude_input_prompt=True,
         exclude_output_prompt=True,
     )
-    exporter.register_filter("markdown2html", _render_markdown)
+    exporter.register_filter("markdown2html", lambda html: html)  # `_read_notebook` has rendered it
+    exporter.register_filter("harmless", _remove_harmful)
     write_file(home / REPORT, exporter.from_notebook_node(page)[0])
     return home / REPORT
 
 
-def _read_notebook(file: Path) -> nbformat.NotebookNode:
+@contextmanager
+def _reading(file: Path) -> Iterator[None]:
+    """Raise DataError with the name of the `file` if the block cannot read it."""
     try:
-        return nbformat.reads(read_small(file, _LARGEST_NOTEBOOK), as_version=4)
-    except (OSError, ValueError, nbformat.reader.NotJSONError) as error:
-        raise DataError(f"{file}: cannot be read as a notebook ({error}); run it again") from error
+        yield
+    except SzlibError:
+        raise
+    except Exception as error:  # whatever another program wrote
+        raise DataError(
+            f"{printable(file)}: is damaged or of another version of szlib ({error!a:.200}); `szlib run` "
+            "writes it again"
+        ) from error
 
 
-def _local_link(link: re.Match[str], notebooks: Mapping[str, Any]) -> str:
+def _read_notebook(file: Path, names: Sequence[str], runs: dict[str, Any]) -> nbformat.NotebookNode:
+    """The notebook in a `file`, its texts as HTML.
+
+    Links to the notebooks `names` lead into the report. The runs that its players show are added to `runs`.
+    """
+    notebook = nbformat.reads(read_small(file, _LARGEST_NOTEBOOK), as_version=4)
+    nbformat.validate(notebook)
+    notebook.metadata["question"] = _find_question(notebook)
+    for cell in notebook.cells:
+        cell.metadata.clear()
+        if cell.cell_type == "markdown":
+            cell.source = _render_markdown(cell.source, names)
+        for output in cell.get("outputs", ()):
+            if "data" not in output:
+                continue
+            data = {kind: text for kind, text in output.data.items() if kind in _OUTPUTS} or {
+                "text/plain": ""
+            }
+            if "text/markdown" in data:
+                data["text/markdown"] = _render_markdown(data["text/markdown"], names)
+            if "text/html" in data:
+                runs |= {found[2]: json.loads(found[1]) for found in _RUN.finditer(data["text/html"])}
+                data["text/html"] = _SCRIPT_OR_STYLE.sub("", data["text/html"])
+            alt = output.metadata.get("image/png", {}).get("alt", "")
+            output.data, output.metadata = data, nbformat.from_dict({"image/png": {"alt": str(alt)}})
+    return notebook
+
+
+def _remove_harmful(html: str) -> str:
+    """The same HTML with harmless tags and attributes only: nothing in it can run, or ask another server."""
+    protocols = [*bleach.ALLOWED_PROTOCOLS, "data"]
+    return str(bleach.clean(html, tags=_TAGS, attributes=_is_harmless, protocols=protocols, strip=True))
+
+
+def _is_harmless(tag: str, name: str, value: str) -> bool:
+    """Whether the attribute `name` of a `tag` may have this `value`."""
+    if name == "src":
+        return tag == "img" and value.startswith("data:image/")
+    return name in _ATTRIBUTES or (name == "href" and not value.startswith("data:"))
+
+
+def _local_link(link: re.Match[str], names: Sequence[str]) -> str:
     """A link to a notebook inside the report; the text alone if the report does not hold that notebook."""
     name = Path(link[2]).stem
-    return f"[{link[1]}](#{name})" if name in notebooks else link[1]
+    return f"[{link[1]}](#{name})" if name in names else link[1]
 
 
 class _Renderer(IPythonRenderer):
@@ -105,38 +170,58 @@ class _Renderer(IPythonRenderer):
         return convert(body)
 
 
-def _render_markdown(source: str) -> str:
-    """Render a markdown cell with its pictures embedded."""
+def _render_markdown(source: str, names: Sequence[str]) -> str:
+    """Render markdown with its pictures embedded; links to the notebooks `names` lead into the report."""
     renderer = _Renderer(escape=False, path=str(folders.NOTEBOOKS), embed_images=True)
+    source = _FILE_LINK.sub(lambda link: _local_link(link, names), source)
     return MarkdownWithMath(renderer=renderer).render(source)
 
 
 def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> str:
     """The front page as HTML, made from the results in `home` and the executed `notebooks`."""
     pages = Environment(loader=FileSystemLoader(_STATIC), autoescape=True, undefined=StrictUndefined)
-    pages.filters["format_value"] = format_value
-    summary, run = _read_json(home / "summary.json"), _read_json(home / "parameters.json")
-    outcomes: dict[str, Any] = summary.get("notebooks", {})
     outputs = [(name, html) for name, notebook in notebooks.items() for html in _html_outputs(notebook)]
-    is_synthetic, area = run.get("data") == datasets.SYNTHETIC, home / "area.txt"
-    zone, samples, funnel = _show_zone(home, is_synthetic=is_synthetic), home / "encounters.parquet", ""
-    if samples.exists():
-        with open_regular(samples) as stream:
-            stages = funnels.table(funnels.get(pd.read_parquet(stream)))
-        stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")  # each is named once
-        funnel = _to_html(stages.assign(rows=stages["rows"].map("{:,}".format)))
+    area, samples, zone, funnel = home / "area.txt", home / "encounters.parquet", home / "zone.json", ""
+    with _reading(home / "parameters.json"):
+        run = _read_json(home / "parameters.json")
+        is_synthetic = run.get("data") == datasets.SYNTHETIC
+        files = [f"{name} ({size:,} bytes)" for name, size, *_ in run.get("files", ())]
+        changed = [f"{name} = {value}" for name, value in run.get("parameters", {}).items()]
+    with _reading(home / "summary.json"):
+        summary = _read_json(home / "summary.json")
+        outcomes = {name: _format_outcome(outcome) for name, outcome in summary.get("notebooks", {}).items()}
+    with _reading(samples):
+        if samples.exists():
+            with open_regular(samples) as stream:
+                stages = funnels.table(funnels.get(pd.read_parquet(stream, columns=[])))
+            stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")  # each is named once
+            funnel = _to_html(stages.assign(rows=stages["rows"].map("{:,}".format)))
+    with _reading(area):
+        area_text = read_small(area).decode("utf-8") if area.exists() else ""
+    with _reading(zone):
+        zone_texts = _show_zone(zone, is_synthetic=is_synthetic) if zone.exists() else {}
     return pages.get_template("front_page.html.j2").render(
         title="the synthetic plaza" if is_synthetic else summary.get("data", home.name),
         outcomes=outcomes,
         checks=[c | {"notebook": name} for name, outcome in outcomes.items() for c in outcome["checks"]],
-        run=run,
-        area=read_small(area).decode("utf-8") if area.exists() else "",
-        questions={name: _find_question(notebook) for name, notebook in notebooks.items()},
+        files=files,
+        changed=changed,
+        version=run.get("szlib", ""),
+        area=area_text,
+        questions={name: notebook.metadata["question"] for name, notebook in notebooks.items()},
         funnel=funnel,
-        zone=zone,
+        zone=zone_texts,
         players={scenario.title: _find_player(scenario, outputs) for scenario in SCENARIOS.values()},
         parameters=_list_parameters(outputs),
     )
+
+
+def _format_outcome(outcome: Mapping[str, Any]) -> dict[str, Any]:
+    """The outcome of a notebook as texts; an ordinary Python error where it is malformed."""
+    texts = {"status": str(outcome["status"]), "seconds": f"{outcome['seconds']:.0f}"}
+    names = ("kind", "name", "result", "passed")
+    checks = [{n: c[n] for n in names} | {"value": format_value(c["value"])} for c in outcome["checks"]]
+    return {**texts, "error": str(outcome.get("error", outcome["status"])), "checks": checks}
 
 
 def _find_question(notebook: Any) -> str:
@@ -145,16 +230,13 @@ def _find_question(notebook: Any) -> str:
     return " ".join(found[1].replace("*", "").split()) if found else ""
 
 
-def _show_zone(home: Path, *, is_synthetic: bool) -> dict[str, str]:
-    """The zone's method, table and picture; empty if there is no zone."""
+def _show_zone(file: Path, *, is_synthetic: bool) -> dict[str, str]:
+    """The method, table and picture of the zone in a `file`."""
     from matplotlib.figure import Figure
 
     from . import figures
 
-    try:
-        zone = SocialZone.load(home / "zone.json")
-    except (OSError, ZoneError):
-        return {}
+    zone = SocialZone.load(file)
     table = zone.table()
     bounds = [f"{name}{end}" for name in ("a", "b") for end in ("", "_low", "_high")]
     shown = [c for c in ("speed", "center_x", *bounds, "encounters", "adequate") if c in table]
@@ -194,8 +276,7 @@ def _html_outputs(notebook: Any) -> Iterator[str]:
 
 def _read_json(file: Path) -> dict[str, Any]:
     """The object in a JSON file; empty if the file is missing."""
-    with reading(file, "as results", "an object of JSON, as `szlib run` writes it"):
-        return dict(json.loads(read_small(file))) if file.exists() else {}
+    return dict(json.loads(read_small(file)).items()) if file.exists() else {}
 
 
 def _to_html(table: pd.DataFrame) -> str:

@@ -5,7 +5,9 @@ import subprocess
 import jupytext
 import nbformat
 import pytest
+from helpers.hostile_results import make_hostile_results
 
+from szlib.files import claim_folder
 from szlib.workbook.report import write_report
 
 MINUTES = 60_000
@@ -121,8 +123,7 @@ def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
     saved = opened.save()
     assert errors(saved) == []
     check_pair(opened.file, saved)
-    home = copy.parent / "run"
-    home.mkdir()
+    home = claim_folder(copy.parent / "run", "results of mine")
     nbformat.write(saved, home / "08_corridor.ipynb")
     page, messages = browser.new_page(), []
     page.on("console", lambda message: messages.append(message.text))
@@ -132,6 +133,19 @@ def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
     check_player(page)
     broken = page.evaluate("[...document.images].filter((i) => !i.complete || !i.naturalWidth).length")
     assert (messages, broken) == ([], 0)
+    page.close()
+
+
+def test_nothing_of_a_hostile_folder_runs_in_its_report(browser, tmp_path):
+    report, page, asked = write_report(make_hostile_results(tmp_path)), browser.new_page(), []
+    page.add_init_script("window.attack = () => { window.attacked = true; }")
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(report.as_uri())
+    page.evaluate("document.querySelectorAll('a, button, summary').forEach((each) => each.click())")
+    page.wait_for_timeout(200)
+    assert page.evaluate("window.attacked") is None
+    assert [url for url in asked if not url.startswith(("data:", report.as_uri()))] == []
+    assert page.url.partition("#")[0] == report.as_uri()
     page.close()
 
 

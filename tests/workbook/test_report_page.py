@@ -10,6 +10,7 @@ from bs4 import BeautifulSoup
 
 import szlib
 from szlib.errors import DataError
+from szlib.files import claim_folder
 from szlib.workbook.cli import main
 from szlib.workbook.record import PAPER, parameters
 from szlib.workbook.report import write_report
@@ -28,7 +29,7 @@ def movie():
 @pytest.fixture(scope="module")
 def page(tmp_path_factory, movie):
     """The report of one made-up notebook."""
-    home = tmp_path_factory.mktemp("run")
+    home = claim_folder(tmp_path_factory.mktemp("run"), "results of mine")
     table = parameters([("gamma", 0.05, PAPER, "sec. 4")]).to_html()
     output = nbformat.v4.new_output
     cells = [
@@ -99,9 +100,11 @@ def test_front_page_lists_checks_claims_and_parameters(page):
 
 
 def test_movie_is_on_the_front_page_and_in_its_notebook(page, movie):
-    assert len(page.select("figure.szlib-player")) == 2
-    script = page.select("figure.szlib-player + script")[0].text
-    run = json.loads(re.search(r"const run = (.*);\n", script)[1])
+    name = re.search("data-run=.(szlib-[0-9a-f]{8})", movie._repr_html_())[1]
+    assert [figure["data-run"] for figure in page.select("figure.szlib-player")] == [name, name]
+    assert len(page.select("figure.szlib-player img[src^='data:image/gif']")) == 2
+    (script,) = page.select("script")
+    run = json.loads(re.search(r"^playAll\((.*)\);$", script.text, re.MULTILINE)[1])[name]
     assert run == json.loads(json.dumps(movie.run))
     assert len(run["snapshots"]) == 11
     assert run["snapshots"][0]["robot"] == [-4, 0]
@@ -114,15 +117,17 @@ def test_code_is_folded(page):
 
 
 def test_report_without_notebooks_is_refused(tmp_path, capsys):
+    claim_folder(tmp_path, "results of mine")
     with pytest.raises(DataError, match="holds no executed notebooks; `szlib run` makes them"):
         write_report(tmp_path)
     assert main(["report", str(tmp_path)]) == 2
     (tmp_path / "01_one.ipynb").write_text("{")
     assert main(["report", str(tmp_path)]) == 2
-    assert "01_one.ipynb: cannot be read as a notebook" in capsys.readouterr().err
+    assert "01_one.ipynb: is damaged" in capsys.readouterr().err
 
 
 def test_results_of_another_version_are_refused_in_one_line(tmp_path, capsys):
+    claim_folder(tmp_path, "results of mine")
     nbformat.write(
         nbformat.v4.new_notebook(cells=[nbformat.v4.new_markdown_cell("# 1")]), tmp_path / "01_a.ipynb"
     )
@@ -131,11 +136,12 @@ def test_results_of_another_version_are_refused_in_one_line(tmp_path, capsys):
     samples.to_parquet(tmp_path / "encounters.parquet")
     assert main(["report", str(tmp_path)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "damaged or of another version of szlib (KeyError('rejected')); `szlib run` writes" in line
+    assert "encounters.parquet: is damaged or of another version of szlib (KeyError('rejected')); `sz" in line
 
 
 def test_pictures_of_the_notebooks_are_embedded(tmp_path):
     text = '![a zone](figures/zone.png)\n\n<img src="figures/making_room.gif" alt="a robot">'
+    claim_folder(tmp_path, "results of mine")
     cells = [nbformat.v4.new_markdown_cell(f"# 0 - Pictures\n\n{text}")]
     nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "00_pictures.ipynb")
     (tmp_path / "summary.json").write_text(json.dumps({"data": "mine", "passed": True, "notebooks": {}}))
