@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import inspect
 import re
 import subprocess
@@ -228,6 +229,12 @@ def test_every_promised_method_is_there(name: str) -> None:
 
 def test_every_scenario_is_there() -> None:
     assert set(szlib.SCENARIOS) == {"passing", "corridor", "waiting", "making_room"}
+
+
+def test_an_object_that_users_hold_cannot_be_changed() -> None:
+    held = [value for name in szlib.__all__ if dataclasses.is_dataclass(value := getattr(szlib, name))]
+    changeable = [value.__name__ for value in held if not value.__dataclass_params__.frozen]
+    assert len(held) > 20 and not changeable
 
 
 def test_the_errors_are_one_family() -> None:

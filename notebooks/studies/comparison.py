@@ -22,8 +22,8 @@ from szlib.simulation.comparisons import BEHAVIOURS, FORMULATIONS, WORLDS
 RIVAL = {"zone": "equal circle"}
 """The method against which zones are compared world by world."""
 OF_ZONE = replace(WORLDS, zone=REFERENCE)
-PROBE = 2
-"""The world that is driven again in each run of notebook 13: the zones differ there."""
+PROBE = 3
+"""The world that is driven again in each run of notebook 13: barriers bind there, and the zones differ."""
 
 
 def recompute(row: pd.Series) -> dict[str, float]:

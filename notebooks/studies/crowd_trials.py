@@ -63,7 +63,11 @@ SETTINGS = {
     "MPC-CBF, gamma 0.2": szlib.MPCSettings(gamma=0.2, N_h=8),
 }
 """szlib's defaults; plans that end at rest; barriers on the whole horizon that may be used up faster."""
+PROBE = 1
+"""The trial that is driven again in each run of notebook 17: barriers bind there."""
 BY = ("crowd", "sees", "controller")
+PROBED = ("claimed_safe_steps", "path_efficiency")
+"""Columns of the trial `PROBE` in the table of safety claims."""
 SCORES = ("reached", "time_to_goal", "path_efficiency", "intrusions", "time_intruding", "nearest")
 
 
@@ -152,26 +156,23 @@ def react(
     )
 
 
-def first_trial(row: pd.Series) -> pd.Series:
-    """The first trial of a row among people who react, without a time limit: the same on every machine."""
+def probe(row: pd.Series) -> pd.Series:
+    """The trial `PROBE` of a row among people who react, without a time limit: the same on every machine."""
     known = {name: (factory, settings) for name, factory, settings, _ in controllers(1, 1, 1, 1)}
     factory, settings = known[row["controller"]]
     settings = replace(settings, time_limit=np.inf)
-    return react(1, factories()[row["crowd"]], row["sees"], factory, settings).iloc[0]
+    return react(1, factories()[row["crowd"]], row["sees"], factory, settings, seed=PROBE).iloc[0]
 
 
 def recompute(row: pd.Series) -> dict[str, float]:
-    """The first trial of a row of the means, again."""
-    return {"first": first_trial(row)[row["metric"]]}
+    """The trial `PROBE` of a row of the means, again."""
+    return {"probe": probe(row)[row["metric"]]}
 
 
 def recompute_promises(row: pd.Series) -> dict[str, float]:
-    """The steps of the first trial that said they were safe, and its path, again."""
-    first = first_trial(row)
-    return {
-        "first_claimed_safe_steps": first["claimed_safe_steps"],
-        "first_path_efficiency": first["path_efficiency"],
-    }
+    """The steps of the trial `PROBE` that claimed to be safe, and its path, again."""
+    again = probe(row)
+    return {f"probe_{name}": again[name] for name in PROBED}
 
 
 def reacting(n: int, work: Path | None) -> Iterator[pd.DataFrame]:
@@ -234,10 +235,16 @@ def promises(rows: pd.DataFrame) -> pd.DataFrame:
         trials=("seed", "size"),
         **{name: (name, "sum") for name in sums},
         worst=("worst", "min"),
-        first_claimed_safe_steps=("claimed_safe_steps", "first"),
-        first_path_efficiency=("path_efficiency", "first"),
     )
-    return table.astype(dict.fromkeys(sums, int)).reset_index()
+    probes = of_mpc[of_mpc["seed"] == PROBE].set_index(list(BY))[list(PROBED)].add_prefix("probe_")
+    return table.astype(dict.fromkeys(sums, int)).join(probes).reset_index()
+
+
+def means(rows: pd.DataFrame) -> pd.DataFrame:
+    """Means of the scores over the trials of one controller, and the trial `PROBE`."""
+    table = summarise(rows, by=BY, metrics=SCORES).drop(columns="first")
+    one = rows.set_index("seed").reindex([PROBE]).iloc[0]
+    return table.assign(probe=[one[name] for name in table["metric"]])
 
 
 def main(n: int, work: Path | None) -> None:
@@ -245,9 +252,8 @@ def main(n: int, work: Path | None) -> None:
     for rows in chain(reacting(n, work), recorded(n, work)):
         parts.append(rows)
         print(*rows[list(BY)].iloc[0], len(rows), flush=True)
-    means = pd.concat([summarise(rows, by=BY, metrics=SCORES) for rows in parts], ignore_index=True)
     table = promises(pd.concat(parts, ignore_index=True))
-    write_table(means, "17_crowds")
+    write_table(pd.concat(map(means, parts), ignore_index=True), "17_crowds")
     write_table(table, "17_safety_claims")
     print(table.to_string())
 

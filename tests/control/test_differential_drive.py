@@ -166,6 +166,11 @@ def test_the_drive_reaches_its_goal_past_a_person_from_any_heading(heading):
     assert all(step.safe for step in steps)
 
 
+def test_every_step_is_safe_where_there_is_nobody_and_no_wall():
+    _, steps = loop(szlib.DifferentialDrive(ZONE, max_people=0), np.zeros(5), OPEN, steps=3)
+    assert all(step.safe for step in steps)
+
+
 def test_the_disc_stays_clear_between_samples_after_every_safe_step():
     """People and walls, by Euclidean distance, ten times within each step; positions by integration."""
     checked = 0

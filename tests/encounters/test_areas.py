@@ -284,6 +284,16 @@ def test_walked_area_reaches_the_walls_of_a_hall() -> None:
     assert samples.attrs["area"] == str(found)
 
 
+@pytest.mark.parametrize(("walkers", "end"), [(2, 12.0), (3, 20.0)])
+def test_walked_area_ends_where_fewer_than_three_people_walked(walkers: int, end: float) -> None:
+    lengths = [12.0] * 5 + [20.0] * walkers
+    rows = np.arange(0.25, 8.0, 0.5)
+    lanes = [(y, length) for y in rows for length in lengths]
+    walks = [make_walk((0.05, y), (1.0, 0.0), person=k, duration=x - 0.1) for k, (y, x) in enumerate(lanes)]
+    area = szlib.walked_area(make_tracks(*walks), cell=0.5)
+    assert area.x == pytest.approx((0.0, end), abs=0.5)
+
+
 def test_walked_area_excludes_a_pillar() -> None:
     tracks = make_hall(people=1500, pillar=(14, 9, 16, 11), size=(30, 20))
     found = szlib.walked_area(tracks)

@@ -44,6 +44,9 @@ def test_a_person_to_the_left_is_passed_on_the_right() -> None:
     even = claims.measure_passing_side(meetings(10, 10))
     assert even.effect == 0 and even.low == pytest.approx(-even.high)
     assert claims.measure_passing_side(meetings(3, 3).assign(kind="crossing")).n == 0
+    oblique = meetings(60, 20)  # the nearest approach a little to the side of straight ahead
+    oblique["los_angle"] = np.copysign(0.2, oblique["los_angle"])
+    assert claims.measure_passing_side(oblique).effect == claims.measure_passing_side(meetings(60, 20)).effect
 
 
 def test_a_pair_counts_once() -> None:
