@@ -20,6 +20,8 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
+from functools import cache
+from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any, BinaryIO
 from zipfile import BadZipFile
@@ -211,6 +213,14 @@ def temporary_folder() -> Iterator[Path]:
     finally:
         lock.release()
         shutil.rmtree(folder, ignore_errors=True)
+
+
+@cache
+def process_folder() -> Path:
+    """The `temporary_folder` of this process, removed when the process ends."""
+    stack = ExitStack()
+    Finalize(None, stack.close, exitpriority=-200)  # after multiprocessing has removed its own folder inside
+    return stack.enter_context(temporary_folder())
 
 
 def remove_abandoned_temporary() -> None:

@@ -7,18 +7,22 @@ On one machine pass ``n_jobs=2``. Inside ``joblib.parallel_config("dask")``, wit
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
+from multiprocessing import resource_tracker
 from typing import Any
 
 import joblib
+from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from . import memory
 from .errors import SzlibError
+from .files import process_folder
 
 _CONNECT_TIMEOUT = 10  # longest wait for the answer of a scheduler [s]
 _MAX_PER_CORE = 4  # more processes than this for each core slow each other down
@@ -44,11 +48,15 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
     jobs = None if n_jobs == 1 else n_jobs
     share = memory.limit() // max(1, joblib.effective_n_jobs(jobs))
     workers = joblib.Parallel(
-        n_jobs=jobs, return_as="generator_unordered", initializer=end_with, initargs=(parent,)
+        n_jobs=jobs,
+        return_as="generator_unordered",
+        temp_folder=None if jobs is None else process_folder(),
+        initializer=end_with,
+        initargs=(parent,),
     )
     guarded = [joblib.delayed(_run_in_share)(parent, share, task) for task in tasks]
     try:
-        with closing(workers(guarded)) as results:
+        with safe_path(), closing(_start(workers, guarded)) as results:
             for result in results:
                 done += 1
                 yield result
@@ -57,6 +65,38 @@ def run_tasks(tasks: Sequence[Any], *, n_jobs: int = 1) -> Iterator[Any]:
             f"a worker process was killed after {done} of {len(tasks)} tasks, perhaps for lack of memory "
             f"({' '.join(str(error).split())}); finished tasks are kept: run again with fewer processes"
         ) from error
+
+
+@contextmanager
+def safe_path() -> Iterator[None]:
+    """Start processes inside a with block that import nothing from the current folder."""
+    is_set = bool(os.environ.get("PYTHONSAFEPATH"))
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if not is_set:
+            os.environ.pop("PYTHONSAFEPATH", None)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Start threads and processes inside a with block that Ctrl-C does not reach, only this one."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    for tracker in (resource_tracker, loky_resource_tracker):
+        tracker.ensure_running()  # their start unblocks Ctrl-C again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _start(workers: joblib.Parallel, tasks: Sequence[Any]) -> Any:
+    with nullcontext() if workers.n_jobs in (1, None) else uninterrupted():
+        return workers(tasks)
 
 
 def limit_jobs(n_jobs: int, n_tasks: int) -> int:

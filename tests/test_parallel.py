@@ -26,11 +26,20 @@ def test_a_worker_whose_parent_ended_before_it_was_up_ends_as_well(parent: str, 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="finds processes in /proc")
 @pytest.mark.parametrize("delay", [0.05, 1.5])
 def test_no_worker_outlives_a_killed_parent(delay: float, tmp_path: Path) -> None:
-    """Killed while workers start, are up without a task, and are at work."""
-    word, program = f"{os.getpid()}-{delay}", tmp_path / "program.py"
+    """Killed while workers start, wait, and are at work; nothing is imported from the folder."""
+    word, program = f"{os.getpid()}-{delay}", tmp_path / "program" / "program.py"
+    program.parent.mkdir()
     program.write_text(PROGRAM)
+    (tmp_path / "downloads").mkdir()
+    for name in ("joblib", "types", "multiprocessing", "numpy", "psutil"):
+        (tmp_path / "downloads" / f"{name}.py").write_text(
+            f"open({str(tmp_path / 'imported')!r}, 'w').close()"
+        )
     parent = subprocess.Popen(
-        [sys.executable, str(program)], env=os.environ | {"CARRIED": word}, stdout=subprocess.PIPE
+        [sys.executable, str(program)],
+        env=os.environ | {"CARRIED": word},
+        cwd=tmp_path / "downloads",
+        stdout=subprocess.PIPE,
     )
     with parent:
         if parent.stdout is None or parent.stdout.readline() != b"begun\n":
@@ -41,6 +50,7 @@ def test_no_worker_outlives_a_killed_parent(delay: float, tmp_path: Path) -> Non
     while (left := _carriers(word)) and time.monotonic() < end:
         time.sleep(0.1)
     assert left == []
+    assert not (tmp_path / "imported").exists()
 
 
 def _carriers(word: str) -> list[str]:

@@ -26,12 +26,15 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from .. import __version__, memory
 from ..errors import DataError, DataWarning, SzlibError
 from ..files import printable
 
 # Packages of the extra `workbook`, which the commands `run` and `report` need.
 _WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbconvert", "papermill")
+_STOPPED = "stopped; finished results stay in their folder"
 # Errors of standard output or standard error that is full, closed or missing.
 _BROKEN_STREAM = (OSError, ValueError, AttributeError)
 
@@ -42,17 +45,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with suppress(*_BROKEN_STREAM):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     given = sys.argv[1:] if arguments is None else arguments
-    options = build_parser().parse_args([_mark_number(argument) for argument in given])
     try:
-        size = None if options.memory is None else memory.parse_size(options.memory)
-        with _stop_on_signals(), memory.granted(size), warnings.catch_warnings():
+        with _stop_on_signals(), warnings.catch_warnings():
+            options = build_parser().parse_args([_mark_number(argument) for argument in given])
+            size = None if options.memory is None else memory.parse_size(options.memory)
             warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
-            code = int(options.command(options))
+            with memory.granted(size):
+                code = int(options.command(options))
             if sys.stdout is not None:
                 sys.stdout.flush()
         return code
     except KeyboardInterrupt as stop:
-        _print_error("stopped; finished results stay in their folder")
+        _print_error(_STOPPED)
         return int(stop.args[0]) if stop.args else 130
     except Exception as error:
         if os.environ.get("SZLIB_TRACEBACK"):
@@ -252,20 +256,35 @@ def _job_count(text: str) -> int:
 
 @contextmanager
 def _stop_on_signals() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP stop the command as Ctrl-C does; a SIGHUP that is ignored stays ignored."""
+    """Let SIGTERM and SIGHUP stop the command as Ctrl-C does; a SIGHUP that is ignored stays ignored.
+
+    A second signal ends the command at once, with all its processes, and no other traceback is printed.
+    """
+    stopped: list[int] = []
 
     def stop(number: int, _frame: object) -> None:
         """Stop with the exit code of the signal."""
+        if stopped:
+            for process in psutil.Process().children(recursive=True):
+                with suppress(psutil.Error):
+                    process.kill()
+            with suppress(OSError):
+                os.write(2, f"szlib: {_STOPPED}\n".encode())
+            os._exit(128 + number)
+        stopped.append(number)
+        sys.unraisablehook, threading.excepthook = (lambda _: None), (lambda _: None)
         raise KeyboardInterrupt(128 + number)
 
     is_main = threading.current_thread() is threading.main_thread()
-    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if is_main and hasattr(signal, name)]
+    names = [name for name in ("SIGINT", "SIGTERM", "SIGHUP") if is_main and hasattr(signal, name)]
+    numbers = [getattr(signal, name) for name in names]
     before = {n: signal.signal(n, stop) for n in numbers if signal.getsignal(n) is not signal.SIG_IGN}
     try:
         yield
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            if not stopped:  # until the process has ended
+                signal.signal(number, handler)
 
 
 def _print_error(text: str) -> None:

@@ -7,16 +7,20 @@ forked kernel is a process of its own, as any kernel. On other systems kernels s
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import tempfile
 import threading
 from multiprocessing import current_process, get_context, parent_process
 from pathlib import Path
 from typing import Any
 
+from ipykernel.kernelspec import get_kernel_dict
+from jupyter_client.kernelspec import KernelSpec
 from jupyter_client.manager import AsyncKernelManager
 from jupyter_client.provisioning.local_provisioner import LocalProvisioner
 
-_INLINE = "module://matplotlib_inline.backend_inline"  # the backend that shows figures in a notebook
+INLINE = "module://matplotlib_inline.backend_inline"  # the backend that shows figures in a notebook
 _PRELOADED = [
     "ipykernel.kernelapp", "matplotlib.pyplot", "sklearn.neighbors", "pandas.io.formats.style",
     "szlib.workbook.figures.simulation", "szlib.workbook.figures.zones", "szlib.workbook.record",
@@ -25,12 +29,20 @@ _PRELOADED = [
 
 
 class ForkedKernelManager(AsyncKernelManager):
-    """Jupyter's manager of kernels, which forks them on Linux; `options` are those of Jupyter."""
+    """Jupyter's manager of kernels, which forks them on Linux; `options` are those of Jupyter.
+
+    The kernel is the one of this Python, whatever kernels are installed under its name ($JUPYTER_PATH).
+    """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         if sys.platform == "linux":
             self.provisioner = ForkingProvisioner(kernel_spec=self.kernel_spec, parent=self)
+
+    @property
+    def kernel_spec(self) -> KernelSpec:
+        """How this Python starts its kernel."""
+        return KernelSpec(**get_kernel_dict())
 
 
 class ForkingProvisioner(LocalProvisioner):
@@ -39,10 +51,10 @@ class ForkingProvisioner(LocalProvisioner):
     async def launch_kernel(self, cmd: list[str], **options: Any) -> Any:
         """Fork a kernel with the arguments of the command `cmd`, and return how to connect to it.
 
-        `options` hold its environment, env, and its folder, cwd. If the command is not this Python's, or
-        this process may have no children (a worker of Dask), the kernel is started as usual.
+        `options` hold its environment, env, and its folder, cwd. If this process may have no children (a
+        worker of Dask), the kernel is started as usual.
         """
-        if cmd[:3] != [sys.executable, "-m", "ipykernel_launcher"] or current_process().daemon:
+        if current_process().daemon:
             return await super().launch_kernel(cmd, **options)
         context = get_context("forkserver")
         context.set_forkserver_preload(_PRELOADED)
@@ -84,10 +96,13 @@ def _serve(arguments: list[str], environment: dict[str, str], folder: str) -> No
     from ipykernel.kernelapp import IPKernelApp
 
     os.setsid()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # Jupyter's own way to interrupt a cell
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
-    matplotlib.rcParams["backend"] = environment.get("MPLBACKEND") or _INLINE
+    tempfile.tempdir = None  # that of the environment
+    matplotlib.rcdefaults()  # no matplotlibrc of the folder in which the run began
+    matplotlib.rcParams["backend"] = environment.get("MPLBACKEND") or INLINE
     threading.Thread(target=_end_with_parent, daemon=True).start()
     IPKernelApp.launch_instance(arguments)
 

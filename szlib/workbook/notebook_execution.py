@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import closing
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 from ..errors import SzlibError
-from ..files import printable, read_json_object, write_file
+from ..files import printable, read_json_object, temporary_folder, write_file
 from .record.parameters import METHOD_DEFAULTS, read_defaults
 
 # Errors caused by data, disk or memory, not by the notebook.
@@ -23,6 +25,8 @@ REFUSED = {
 }  # fmt: skip
 # The clients of nbclient whose kernels run in this process.
 _CLIENTS: set[Any] = set()
+# The notebooks that import a package beside them, and so need their folder on the module path.
+NEEDS_FOLDER = re.compile(r"^from studies\b", re.MULTILINE)
 # The record of a notebook that wrote none.
 EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
 
@@ -76,7 +80,13 @@ def run_cells(
     from papermill.clientwrap import PapermillNotebookClient
     from papermill.engines import Engine, papermill_engines
 
-    from .forked_kernel import ForkedKernelManager
+    from .forked_kernel import INLINE, ForkedKernelManager
+
+    arguments = ["--log-level=CRITICAL"]  # no messages about the transport
+    if NEEDS_FOLDER.search(script.read_text(encoding="utf-8")):
+        add = f"import sys; sys.path.append({str(script.parent)!r})"
+        arguments.append(f"--InteractiveShellApp.exec_lines={add}")
+    own = {"MPLBACKEND": INLINE, "PYTHONSAFEPATH": "1"}
 
     class KernelEngine(Engine):
         """Papermill's own engine, but the kernel has an environment and the copy is written atomically."""
@@ -89,12 +99,14 @@ def run_cells(
                 kernel_name=kernel_name,
                 kernel_manager_class=ForkedKernelManager,
                 resources={"metadata": {"path": str(script.parent)}},
-                extra_arguments=["--log-level=CRITICAL"],  # no messages about the transport
+                extra_arguments=arguments,
             )
             _CLIENTS.add(client)
             try:
-                with closing(ensure_event_loop()):  # the loop of this thread, which Jupyter leaves open
-                    client.execute(env={**os.environ, **environment})
+                # the loop of this thread, which Jupyter leaves open
+                with closing(ensure_event_loop()), temporary_folder() as private:
+                    folders = {"TMPDIR": str(private), "IPYTHONDIR": str(private)}
+                    client.execute(env={**os.environ, **own, **folders, **environment})
             finally:
                 _CLIENTS.discard(client)
                 copy = deepcopy(nb_man.nb)
@@ -115,9 +127,14 @@ def run_cells(
     )
 
 
-def end_kernels() -> None:
-    """End the kernels of all notebooks that this process executes, and wait for the ends of the notebooks."""
-    while _CLIENTS:
+def end_kernels(executions: Sequence[Future[Any]]) -> None:
+    """End the kernels of all notebooks that this process executes, and wait for the ends of `executions`.
+
+    Those that have not started never do.
+    """
+    for each in executions:
+        each.cancel()
+    while not all(each.done() for each in executions):
         for client in list(_CLIENTS):
             if process := getattr(getattr(client.km, "provisioner", None), "process", None):
                 process.kill()

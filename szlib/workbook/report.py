@@ -83,6 +83,7 @@ def write_report(home: Path) -> Path:
         cell["id"] = f"cell-{i}"
     exporter = HTMLExporter(
         extra_loaders=[FileSystemLoader(_STATIC)],
+        extra_template_basedirs=[],  # not the current folder, which is the default
         template_file="report.html.j2",
         exclude_input_prompt=True,
         exclude_output_prompt=True,

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,8 @@ from tqdm import tqdm
 
 from .. import __version__, memory
 from ..errors import DataError
-from ..files import file_content, folder_lock, read_json_object, write_file
-from ..parallel import cluster, limit_jobs
+from ..files import file_content, folder_lock, process_folder, read_json_object, write_file
+from ..parallel import cluster, limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets
 from . import folders
 from .notebook_execution import EMPTY_RECORD, end_kernels, execute_notebook
@@ -34,6 +35,7 @@ SUMMARIES = ("21",)
 # Notebooks that take longest. They start first in their batch, so that no core waits for them at its end.
 LONGEST = ("15", "16", "18")
 SUMMARY = "summary.json"  # file of the outcome of a run
+_POLL = 0.5  # longest wait before Ctrl-C is noticed, whichever thread receives it [s]
 
 
 def run(
@@ -74,7 +76,7 @@ def run(
     given = check_parameters(parameters or {}, known)
     results, data = folders.results_root(out), folders.absolute_data(data)
     home = folders.claim_results(results, data, given)
-    with folder_lock(home):
+    with folder_lock(home), safe_path(), _private_temporary_files():
         files = DataCache(home, data, seed=given.get("seed", 0)).files()
         folders.remove_outputs(home, names)
         source, earlier = _start_summary(home, data, files, given, names)
@@ -87,6 +89,16 @@ def run(
 
             summary["report"] = str(write_report(home))
         return summary
+
+
+@contextmanager
+def _private_temporary_files() -> Iterator[None]:
+    """Create temporary files inside a with block, also those of Jupyter, in the folder of this process."""
+    before, tempfile.tempdir = tempfile.tempdir, str(process_folder())
+    try:
+        yield
+    finally:
+        tempfile.tempdir = before
 
 
 def choose_notebooks(only: Iterable[str]) -> list[Path]:
@@ -121,16 +133,21 @@ def _execute_all(
     not_started = {"status": "not started", "seconds": 0.0, **EMPTY_RECORD}
     outcomes = {script.stem: not_started for script in scripts}
     bar = tqdm(total=len(scripts), unit="notebook", desc=home.name)
-    with bar, cluster(scheduler) as client, _open_executor(client, jobs) as executor:
+    futures: list[Future[Any]] = []
+    with bar, cluster(scheduler) as client, _open_executor(client, jobs, futures) as executor:
         for batch in split_batches(scripts):
             if any(outcome["status"] == "refused" for outcome in outcomes.values()):
                 break  # the later notebooks need its result
             arguments = (dict(given), str(home), environment)
-            futures = [executor.submit(execute_notebook, str(script), *arguments) for script in batch]
-            for future in as_completed(futures):
-                name, outcomes[name] = future.result()
-                bar.update()
-                bar.set_postfix_str(f"{name} {outcomes[name]['status']}")
+            with uninterrupted():
+                futures[:] = [executor.submit(execute_notebook, str(script), *arguments) for script in batch]
+            running = set(futures)
+            while running:
+                done, running = wait(running, timeout=_POLL, return_when=FIRST_COMPLETED)
+                for future in done:
+                    name, outcomes[name] = future.result()
+                    bar.update()
+                    bar.set_postfix_str(f"{name} {outcomes[name]['status']}")
     return outcomes
 
 
@@ -148,15 +165,14 @@ def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:
 
 
 @contextmanager
-def _open_executor(client: Any, jobs: int) -> Iterator[Executor]:
-    """The workers of a Dask `client`, or threads that wait for kernels; an interruption ends the kernels."""
+def _open_executor(client: Any, jobs: int, futures: Sequence[Future[Any]]) -> Iterator[Executor]:
+    """The workers of a Dask `client`, or threads that wait for kernels; an interruption ends `futures`."""
     with client.get_executor(pure=False) if client else ThreadPoolExecutor(jobs) as executor:
         try:
             yield executor
         except BaseException:
             if not client:
-                executor.shutdown(wait=False, cancel_futures=True)
-                end_kernels()
+                end_kernels(futures)
             raise
 
 

@@ -187,6 +187,6 @@ def test_ctrl_c_exits_with_130(notebooks, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     notebooks(_01_one="")
-    monkeypatch.setattr(runner, "as_completed", interrupted)
+    monkeypatch.setattr(runner, "wait", interrupted)
     assert run() == 130
     assert "stopped" in capsys.readouterr().err
