@@ -6,10 +6,13 @@ process uses none of its imports: threads do not survive a fork.
 
 from __future__ import annotations
 
+import argparse
 import gzip
 import hashlib
+import json
 import os
 import random
+import re
 import signal
 import sys
 import tempfile
@@ -30,9 +33,9 @@ from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks.clock import read_tracks
 from szlib.workbook import folders
-from szlib.workbook.cli import main
+from szlib.workbook.cli import build_parser, main
 
-COUNT = {False: 15, True: 1000}
+COUNT = {False: 60, True: 1000}
 LONGEST = 60
 """Time limit of a command [s]."""
 NOTEBOOK = """# %% tags=["parameters"]
@@ -52,13 +55,30 @@ NAMES = ["day.csv", "two.csv", "packed.csv.gz", "tidy.parquet", "link.csv", "emp
          "damaged.csv.gz", "doubled.parquet", "latin\udce4.csv", "ünï.csv", "fifo", "folder", "folder/.", ".",
          "*.csv", "*", "a**b", "[", "nowhere.csv", "x" * 300, "", " ", "/dev/zero", "/dev/null",
          "/proc/self/mem", "loop", "day.csv/inside", "~", "-", "\n", "synthetic", "days"]  # fmt: skip
-PLACES = ["out", "out/deep/er", "folder", ".", "day.csv", "day.csv/x", "/proc/x", "/dev/null", "foreign",
-          "x" * 300, "", "latin\udce4", "days", "out\nline"]  # fmt: skip
+PLACES = ["out", "days", "latin\udce4", "out/deep/er", "folder", ".", "day.csv", "day.csv/x", "/proc/x",
+          "/dev/null", "foreign", "x" * 300, "", "out\nline"]  # fmt: skip
 VALUES = ["1", "abc", "null", "-1", "1e400", "NaN", "[1]", "[]", "{}", '"x"', "true", "0.1", "2",
           "9" * 5000, "[" * 5000, "__import__('os').system('touch pwned')", "", "[0.5, NaN]",
           "1e308", "\udce4"]  # fmt: skip
-NUMBERS = ["1", "2", "0", "-1", "100000", "9" * 30, "two", "²", "1.5", ""]
-SIZES = ["4GB", "300MB", "1", "0", "-1", "much", "1e9", "9" * 40, "1 KB", ""]
+NUMBERS = ["1", "2", "1", "0", "-1", "100000", "9" * 30, "two", "²", "1.5", ""]
+FLOATS = ["0", "9", "-1.85e1", "-3", "12", "1e3", "-.5", "+4", "1e400", "nan", "-inf", "x", "", "1_0"]
+SHAPES = ["area.json", "area.wkt", "area.json", "fifo", "/dev/zero", "/dev/stdin", "folder", "day.csv",
+          "huge.json", "loop", "nan.json", "deep.json", "crossed.wkt", "empty.csv", "binary.csv", "nowhere",
+          "", "x" * 300, "latin\udce4.csv"]  # fmt: skip
+FOLDERS = ["out/day", "results/day", "results/two", "out", "results/synthetic", "foreign", "folder",
+           "day.csv", "nowhere", "", "fifo", "x" * 300, "damaged", "notebooks"]  # fmt: skip
+ADDRESSES = ["nowhere", "", "tcp://256.0.0.1:1", "x" * 300, "tcp://", "\n", "ftp://a:b"]
+PARAMETERS = ["seed", "gamma", "gamma", "speeds", "data", "results", "area", "sed", "", "\udce4", "record"]
+POOLS = {
+    "out": PLACES, "area": FLOATS, "FILE": SHAPES, "folder": FOLDERS, "scheduler": ADDRESSES, "jobs": NUMBERS,
+    "only": ["01", "01_one", "01", "99", "", "../.."], "exclude": ["2000-01-02", "x", ""],
+}  # fmt: skip
+GOOD = 3
+"""So many at the beginning of each list of words are such as a user may mean."""
+OFTEN = {"out": 0.9, "data": 0.8, "parameter": 0.5, "memory": 0.1, "scheduler": 0.03, "open": 0.5}
+"""Shares of the command lines that have an option; of others 0.15."""
+SIZES = ["4GB", "700MB", "2e9", "1", "0", "-1", "much", "1e9", "9" * 40, "1 KB", ""]
+POOLS["memory"] = SIZES
 
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
@@ -90,40 +110,48 @@ def judge(code: int, printed: str) -> str:
         return "an exit code of its own" if code >= 0 else "it hangs, or a signal ended it"
     if "Traceback" in printed or "Exception ignored" in printed:
         return "a foreign traceback"
+    if re.search(r"^szlib: \w+(Error|Exception|Warning|Exit): ", printed, re.MULTILINE):
+        return "an error that is not of szlib"
     complaints = [text for text in printed.splitlines() if text.startswith(("szlib: ", "szlib "))]
     return "" if code != 2 or complaints else "it gives no reason"
 
 
 def draw(rng: random.Random) -> list[str]:
-    """One command line."""
-    command = rng.choices(["run", "inspect", "extract", "", "rnu", "--version"], [5, 6, 8, 0.3, 0.3, 0.3])[0]
-    line = [command] if command else []
-    if command == "inspect":
-        line.append(rng.choice(NAMES))
-    elif command == "extract":
-        line += rng.choices(NAMES, k=rng.choice([1, 1, 2, 3]))
-        line += ["--out", rng.choice(PLACES)]
-        if rng.random() < 0.2:
-            line += ["--exclude", rng.choice(["2000-01-02", "x", ""])]
-    elif command == "run":
-        line += [
-            "--data",
-            rng.choice(NAMES),
-            "--out",
-            rng.choice(PLACES[2:] if rng.random() < 0.97 else PLACES),
-        ]
-        if rng.random() < 0.7:
-            name = rng.choice(["seed", "gamma", "speeds", "data", "results", "sed", "", "\udce4"])
-            line += ["-p", f"{name}={rng.choice(VALUES)}"]
-        if rng.random() < 0.2:
-            line += ["--only", rng.choice(["01", "99", "", "../.."])]
-    if command in ("run", "extract") and rng.random() < 0.3:
-        line += ["--jobs", rng.choice(NUMBERS)]
-    if rng.random() < 0.2:
-        line += ["--memory", rng.choice(SIZES)]
+    """One command line, of any command and option that the parser knows."""
+    (verbs,) = [action for action in build_parser()._actions if isinstance(action.choices, dict)]
+    command = rng.choices(
+        [*verbs.choices, "", "rnu", "--version"], [*[6] * len(verbs.choices), 0.3, 0.3, 0.3]
+    )[0]
+    if command not in verbs.choices:
+        return [command] if command else []
+    line, options = [], []
+    for action in verbs.choices[command]._actions:
+        if action.option_strings and action.dest != "help" and rng.random() < OFTEN.get(action.dest, 0.15):
+            name = rng.choice(action.option_strings)
+            name = name[: rng.randrange(4, len(name) + 1)] if rng.random() < 0.05 else name
+            values = draw_values(action, rng)
+            together = len(values) == 1 and name.startswith("--") and rng.random() < 0.2
+            options += [[f"{name}={values[0]}"]] if together else [[name, *values]]
+        elif not action.option_strings and (action.required or rng.random() < 0.8):
+            line += draw_values(action, rng)
+    rng.shuffle(options)
+    line = [command, *line, *[word for option in options for word in option]]
     if rng.random() < 0.03:
-        line.insert(rng.randrange(len(line) + 1), rng.choice(["--nonsense", "--help", "--", "-p"]))
+        line.insert(rng.randrange(len(line) + 1), rng.choice(["--nonsense", "--help", "--", "-p", "-1"]))
     return line
+
+
+def draw_values(action: argparse.Action, rng: random.Random) -> list[str]:
+    """Words that follow an option or stand for an argument; now and then too many or too few."""
+    pool = POOLS.get(action.metavar if action.metavar == "FILE" else action.dest, NAMES)
+    count = {None: 1, "+": rng.choice([1, 1, 2, 3]), "*": rng.choice([0, 1, 2]), "?": 1}.get(
+        action.nargs, action.nargs
+    )
+    if action.nargs and rng.random() < 0.05:
+        count = max(0, count + rng.choice([-1, 1]))
+    if action.dest == "parameter":
+        return [f"{rng.choice(PARAMETERS)}={rng.choice(VALUES)}"]
+    return [rng.choice(pool[: GOOD if rng.random() < 0.85 else None]) for _ in range(count)]
 
 
 def furnish(place: Path) -> None:
@@ -148,18 +176,31 @@ def furnish(place: Path) -> None:
         (place / name).mkdir()
     (place / "folder" / "inner.csv").write_bytes((place / "two.csv").read_bytes())
     (place / "foreign" / "thesis.txt").write_text("not yours")
+    (place / "damaged").mkdir()
+    (place / "damaged" / "01_one.ipynb").write_text('{"cells": 5}')
+    square = [[0, 0], [9, 0], [9, 9], [0, 9], [0, 0]]
+    (place / "area.json").write_text(json.dumps({"type": "Polygon", "coordinates": [square]}))
+    (place / "area.wkt").write_text("POLYGON ((-20 -20, 20 -20, 20 20, -20 20, -20 -20))")
+    (place / "crossed.wkt").write_text("POLYGON ((0 0, 9 9, 9 0, 0 9, 0 0))")
+    (place / "nan.json").write_text('{"type": "Polygon", "coordinates": [[[0, 0], [NaN, 1], [1e999, 2]]]}')
+    (place / "deep.json").write_text("[" * 100_000)
+    (place / "huge.json").write_bytes(b" " * (11 << 20))
     (place / "notebooks" / "01_one.py").write_text(NOTEBOOK)
 
 
 def fingerprint(place: Path) -> dict[str, str]:
     """Everything that a command must leave as it is, and unfinished files, which it must not leave."""
-    ours = {"out", "days", "latin\udce4", "out\nline"}
+    ours = {"out", "days", "results", "latin\udce4", "out\nline"}
     found = {}
     for path in sorted(place.rglob("*")):
         top = path.relative_to(place).parts[0]
         if top in ours and not path.name.startswith(".szlib-part-"):
             continue
-        content = path.read_bytes() if path.is_file() else b""
+        stat = path.lstat()
+        known = (
+            f"{stat.st_size} {stat.st_mtime_ns} {stat.st_ino}".encode() if stat.st_size > 1 << 20 else None
+        )
+        content = known or (path.read_bytes() if path.is_file() else b"")
         found[str(path.relative_to(place))] = hashlib.sha256(content).hexdigest()
     return found
 
@@ -173,6 +214,8 @@ def execute(line: list[str], place: Path) -> tuple[int, str]:
         handle = os.open(".printed", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(handle, 1)
         os.dup2(handle, 2)
+        os.dup2(os.open("/dev/null", os.O_RDONLY), 0)
+        os.environ |= {"BROWSER": "true", "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "1s"}
         folders.NOTEBOOKS = place / "notebooks"
         sys.exit(main(line))
 
