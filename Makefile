@@ -52,7 +52,7 @@ audit: $(INSTALLED)  ## fail where a pinned version has a published vulnerabilit
 	    2> /dev/null || { echo "not audited: https://pypi.org/pypi cannot be reached; try again with a network"; exit 1; }
 	$(BIN)/pip-audit --requirement environment.lock --disable-pip --strict --progress-spinner off
 
-hostile: $(INSTALLED)  ## every attack in full: commands, files, processes, controller
+hostile: $(INSTALLED)  ## every attack in full, and their tally in tests/hostile/README.md
 	$(BIN)/python tests/hostile --long
 
 dist: $(INSTALLED)  ## sdist and wheel; HOME_URL says where the README's pictures are served

@@ -3,7 +3,7 @@
 Every module here that is not a test has a function `attack(long)`, which returns counts of what it tried
 and found.  Counts whose name begins with "broken" must be 0; otherwise the exit code is 1.  Several attacks
 run in one interpreter each, because some fork, which is not safe with threads.  The counts are printed and
-written to results/hostile.json.
+written to results/hostile.json; those of the long form also to README.md beside this file.
 """
 
 import importlib
@@ -11,11 +11,18 @@ import json
 import subprocess
 import sys
 import time
+from datetime import UTC, datetime
 from pathlib import Path
 
 HERE = Path(__file__).parent
 ATTACKS = sorted(f.stem for f in HERE.glob("*.py") if not f.stem.startswith(("_", "test_")))
 TALLY = Path("results/hostile.json")
+README = HERE / "README.md"
+INTRODUCTION = """# Hostile suite
+
+`make hostile` runs every attack in full and writes this file; `make test` runs a short form of each. What
+each attack does stands at the top of its module. Counts that begin with "broken" must be 0.
+"""
 
 
 def main() -> int:
@@ -26,7 +33,10 @@ def main() -> int:
         print(f"no attack is called {', '.join(unknown)}; there are {', '.join(ATTACKS)}", file=sys.stderr)
         return 2
     if len(names) == 1:
-        return _finish({names[0]: _attack(names[0], bool(long))})
+        tally = {names[0]: _attack(names[0], bool(long))}
+        if long:
+            write_readme(names[0], tally[names[0]])
+        return _finish(tally)
     tally: dict[str, dict[str, float]] = {}
     for name in names:
         TALLY.unlink(missing_ok=True)
@@ -44,6 +54,31 @@ def _attack(name: str, long: bool) -> dict[str, float]:
     tally["seconds"] = round(time.monotonic() - begun)
     print(f"\n{name}", *(f"  {what}: {count:g}" for what, count in tally.items()), sep="\n", flush=True)
     return tally
+
+
+def write_readme(name: str, tally: dict[str, float]) -> None:
+    """Replace the section of one attack, with the date, the commit and the counts."""
+    text = README.read_text(encoding="utf-8") if README.exists() else ""
+    found = {part.partition("\n")[0]: part for part in text.split("\n## ")[1:]}
+    rows = [f"| {what} | {count:g} |" for what, count in tally.items()]
+    when = f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}"
+    found[name] = "\n".join([name, "", when, "", "| what | count |", "|---|--:|", *rows, ""])
+    README.write_text(
+        "\n## ".join([INTRODUCTION, *(found[each] for each in sorted(found))]), encoding="utf-8"
+    )
+
+
+def commit() -> str:
+    """The short name of the commit, and whether szlib differs from it."""
+
+    def ask(*arguments: str) -> str:
+        done = subprocess.run(
+            ["git", "-C", str(HERE), *arguments], capture_output=True, text=True, check=False
+        )
+        return done.stdout.strip() if done.returncode == 0 else "unknown"
+
+    changed = ask("status", "--porcelain", "--", str(HERE.parents[1] / "szlib"))
+    return ask("rev-parse", "--short", "HEAD") + (" with changes" if changed else "")
 
 
 def _finish(tally: dict[str, dict[str, float]]) -> int:

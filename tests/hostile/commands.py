@@ -35,7 +35,7 @@ from szlib.tracks.clock import read_tracks
 from szlib.workbook import folders
 from szlib.workbook.cli import build_parser, main
 
-COUNT = {False: 60, True: 1000}
+COUNT = {False: 12, True: 1000}
 LONGEST = 60
 """Time limit of a command [s]."""
 NOTEBOOK = """# %% tags=["parameters"]
@@ -86,7 +86,7 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
     tally = Counter({"broken command lines": 0})
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        if _in_a_fork(lambda: furnish(place)):
+        if in_a_fork(lambda: furnish(place)):
             raise RuntimeError("the folder with everything could not be made")
         before = fingerprint(place)
         for number in range(COUNT[long]):
@@ -219,14 +219,14 @@ def execute(line: list[str], place: Path) -> tuple[int, str]:
         folders.NOTEBOOKS = place / "notebooks"
         sys.exit(main(line))
 
-    code = _in_a_fork(command)
+    code = in_a_fork(command)
     printed = place / ".printed"
     text = printed.read_bytes().decode("utf-8", errors="replace")
     printed.unlink()
     return code, text
 
 
-def _in_a_fork(work: Callable[[], None]) -> int:
+def in_a_fork(work: Callable[[], None]) -> int:
     child = os.fork()
     if child == 0:
         code = 0

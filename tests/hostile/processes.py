@@ -6,6 +6,7 @@ results, in the temporary folder, in the user's own folder and in shared memory 
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import shutil
@@ -44,10 +45,13 @@ results = "../results"
 
 # %%
 import time
+import matplotlib.pyplot as plt
 from szlib.workbook.record import NotebookRecord
 record = NotebookRecord("{name}", globals())
 record.check("somebody met", record.cache.encounters()["encounter"].nunique() > 0)
-time.sleep(1.5)
+plt.plot([seed, 2])
+plt.show()
+time.sleep({seconds})
 record.animation(b"GIF89a", "movie")
 record.close()
 """
@@ -68,8 +72,8 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
     return dict(tally)
 
 
-def furnish(place: Path, days: int = 4) -> dict[str, list[str]]:
-    """Make days, the fourth one packed, and two notebooks; return two commands without their `--out`."""
+def furnish(place: Path, days: int = 4, seconds: float = 1.5) -> dict[str, list[str]]:
+    """Make days, the fourth one packed, and two notebooks, which also sleep; return two commands."""
     for name in ("data", "tmp", "home", "bin"):
         (place / name).mkdir()
     for day in range(days):
@@ -79,7 +83,7 @@ def furnish(place: Path, days: int = 4) -> dict[str, list[str]]:
         subprocess.run(["gzip", str(place / "data" / "day3.csv")], check=True)
     (place / "notebooks").mkdir()
     for name in ("01_one", "06_two"):
-        (place / "notebooks" / f"{name}.py").write_text(NOTEBOOK.format(name=name))
+        (place / "notebooks" / f"{name}.py").write_text(NOTEBOOK.format(name=name, seconds=seconds))
     (place / "bin" / "program.py").write_text(PROGRAM.format(notebooks=str(place / "notebooks")))
     program = [sys.executable, str(place / "bin" / "program.py")]
     return {
@@ -171,7 +175,8 @@ def both(command: list[str], place: Path, reference: dict[str, bytes], tally: Co
 def environment(place: Path) -> dict[str, str]:
     """The environment of a command whose temporary files and own folder are in `place`."""
     own = {"TMPDIR": str(place / "tmp"), "HOME": str(place / "home"), "MPLCONFIGDIR": str(place / "home")}
-    return os.environ | own | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
+    usual = {name: value for name, value in os.environ.items() if name not in ("MPLBACKEND", "JUPYTER_PATH")}
+    return usual | own | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
 
 
 def everything_outside(place: Path) -> set[str]:
@@ -186,10 +191,18 @@ def start(command: list[str], place: Path) -> subprocess.Popen[bytes]:
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    """Finished files, without those that contain times; hidden ones are locks and unfinished files."""
+    """Finished files without times; of notebooks the figures. Hidden are locks and unfinished files."""
     return {
-        str(file.relative_to(out)): file.read_bytes()
+        str(file.relative_to(out)): figures(file) if file.suffix == ".ipynb" else file.read_bytes()
         for file in sorted(out.rglob("*"))
-        if file.is_file() and not file.name.startswith(".") and file.suffix != ".ipynb"
+        if file.is_file() and not file.name.startswith(".")
         and file.name not in ("summary.json", "report.html")
     }  # fmt: skip
+
+
+def figures(notebook: Path) -> bytes:
+    """The pictures that an executed notebook shows, one a line."""
+    shown = [output.get("data", {}).get("image/png", "")
+             for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+             for output in cell.get("outputs", [])]  # fmt: skip
+    return "\n".join(filter(None, shown)).encode()

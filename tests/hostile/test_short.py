@@ -10,7 +10,7 @@ import pytest
 import szlib
 
 
-@pytest.mark.parametrize("attack", ["commands", "damaged_tracks", "files", "races"])
+@pytest.mark.parametrize("attack", ["commands", "damaged_tracks", "files", "races", "terminal"])
 def test_attack_breaks_nothing(attack, tmp_path):
     done = subprocess.run(
         [sys.executable, str(Path(__file__).parent), attack],
