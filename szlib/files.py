@@ -34,6 +34,7 @@ MARKER = ".szlib"  # name of the file that marks a folder as szlib's
 _LOCK, _UNFINISHED, _TEMPORARY = ".szlib-lock", ".szlib-part-", "szlib-"
 _ABANDONED = 3600.0  # age at which an unfinished file is removed [s]: no write takes so long
 _TICK = 0.004  # two changes of a file within this time [s] can have the same time stamp (Linux)
+_JOINERS = "\u200c\u200d"  # zero-width letters of Persian, Hindi and emoji, which Python calls not printable
 # The files that `unchanged_files` keeps open, by path.
 _OPEN: ContextVar[Mapping[Path, BinaryIO]] = ContextVar("open")
 
@@ -345,4 +346,4 @@ def reading(path: Path, what: str, expected: str, error: type[SzlibError] = Data
 def printable(name: object) -> str:
     """The file name `name` as text for any file and any terminal: bytes that are not UTF-8 are escaped."""
     text = str(name).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
-    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+    return "".join(c if c.isprintable() or c in _JOINERS else ascii(c)[1:-1] for c in text)

@@ -37,7 +37,10 @@ class UsableBlocks:
     first_fault: tuple[int, str] | None = None
 
     def __iter__(self) -> Iterator[pl.DataFrame]:
-        columns, read = self.scan.select("ragged", *NUMBERS), 0  # line numbers of the scan take long
+        columns, read = (
+            self.scan.select("ragged", "exact_id", *NUMBERS),
+            0,
+        )  # line numbers of the scan take long
         for block in columns.collect_batches(chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming"):
             good, reasons, first = reject_rows(block.with_row_index("line", offset=read + 1), self.layout)
             read += block.height

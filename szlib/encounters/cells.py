@@ -107,7 +107,7 @@ class Cells:
 
 def select_near(cells: Cells, blocks: Iterable[pl.DataFrame]) -> Iterator[pl.DataFrame]:
     """Yield the rows of needed `cells` from `blocks` sorted by time; else raise UnsortedError."""
-    waiting = pl.DataFrame(schema=dict.fromkeys(NUMBERS, pl.Float64))
+    waiting = pl.DataFrame(schema=dict.fromkeys(NUMBERS, pl.Float64) | {"id": pl.Int64})
     decided = newest = np.iinfo(np.int64).min // 2
     for block in blocks:
         number = cells.number(block["t"].to_numpy())

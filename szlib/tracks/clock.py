@@ -254,8 +254,8 @@ def _usual_gap(intervals: np.ndarray, of_format: float | None) -> float:
     max_gap = of_format or float(np.clip(4 * usual, 0.5, _LONGEST_INTERVAL))
     if usual > max_gap:
         raise DataError(
-            f"a person's samples are {usual:.3g} s apart (median), expected at most {max_gap:g} s; "
-            "are times in seconds? if so, pass max_gap"
+            f"a person's samples are {usual:.3g} s apart (median), expected at most {max_gap:g} s; times "
+            "without a type count as seconds: divide milliseconds by 1000; if they are seconds, pass max_gap"
         )
     return max_gap
 

@@ -38,7 +38,8 @@ class ReadOptions:
         The funnel states the rate.  An unusual rate is a warning; an uncertain one is an error.
     columns : the column of a table, CSV or Parquet file that holds each quantity, such as {"frame": "Frame",
         "id": "ped", "x": "X", "y": "Y"}: a name, or the number of the field from 0 where the file has no
-        header.  Times are in column t [s] (in a DataFrame also as datetimes), or counted in column frame.
+        header.  Times are in column t [s] (in a DataFrame or Parquet file also as datetimes), or counted in
+        column frame.
     max_gap : a longer gap between two samples ends a track [s], more than 0.1; None takes the format's (ATC
         raw 0.5, ATC 1 Hz 1.6; EWAP 2.25 sampling intervals; tidy 4 of them, at least 0.5 and at most 5).
     tz : time zone whose calendar gives the day of a time stamp (ATC: Japan).

@@ -153,7 +153,9 @@ def check_unit(rows: pl.DataFrame, layout: TrackFormat, path: Path) -> None:
 
 def _convert(rows: pl.DataFrame, layout: TrackFormat) -> np.ndarray:
     """The first rows as t [s], id, x, y [m], shape (4, n)."""
-    first = rows.select("t", "id", "x", "y").head(_ROWS).to_numpy().astype(float).T
+    large = pl.col("id").abs().max() >= 2**53  # floats do not tell such ids apart
+    person = pl.when(large).then(pl.col("id").rank("dense")).otherwise("id")
+    first = rows.head(_ROWS).select("t", person, "x", "y").to_numpy().astype(float).T
     return np.asarray(first * np.array([[layout.seconds], [1.0], [layout.metres], [layout.metres]]))
 
 

@@ -102,9 +102,7 @@ def summarise_people(path: str | Path) -> pd.DataFrame:
 def _usable_rows(layout: TrackFormat, scan: pl.LazyFrame) -> pl.LazyFrame:
     """Usable rows: id, t [s], x, y [m], and what else the scan holds."""
     time, place = pl.col("t") * layout.seconds, pl.col("x", "y") * layout.metres
-    return scan.filter(layout.rejection_reason().is_null()).with_columns(
-        pl.col("id").cast(pl.Int64), time, place
-    )
+    return scan.filter(layout.rejection_reason().is_null()).with_columns(time, place, id="exact_id")
 
 
 def count_visits_by_hour(rows: pd.DataFrame, *, tz: str = "Asia/Tokyo") -> pd.DataFrame:

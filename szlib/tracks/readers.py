@@ -144,7 +144,7 @@ def reject_rows(
     bad = rows.filter(pl.col("reason").is_not_null())
     reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
     first = bad.select("line", "reason").row(0) if bad.height else None
-    return rows.filter(pl.col("reason").is_null()), reasons, first
+    return rows.filter(pl.col("reason").is_null()).with_columns(id="exact_id"), reasons, first
 
 
 def read_stage(

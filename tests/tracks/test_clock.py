@@ -237,7 +237,7 @@ def test_the_same_id_on_two_days_is_two_people() -> None:
         (make_raw([0, 0.1]).assign(day=[DAY, None]), "row 1: got .*expected a day"),
         (make_raw([0, 0.1]).assign(id=[np.nan, 1]), "row 0: got .*'id': nan"),
         (make_raw([0, 0.1, 0.1]), "row 2: got .*'id': 1.*'t': 0.1.*two rows at this time; keep one of them"),
-        (make_raw(np.arange(9) * 100.0), "100 s apart .*are times in seconds"),
+        (make_raw(np.arange(9) * 100.0), "100 s apart .*times without a type count as seconds"),
         (make_raw([0, 1e9, 2e9]), "1e.09 s apart"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import gzip
 import os
 import random
@@ -9,6 +10,7 @@ import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,6 +30,7 @@ from helpers.track_files import (
 from helpers.track_tables import real_data
 
 import szlib
+from szlib.encounters.near_rows import read_near_area
 from szlib.tracks import funnels
 from szlib.tracks.formats import FORMATS
 from szlib.tracks.readers import read_raw
@@ -332,13 +335,83 @@ def test_parquet_columns_of_wrong_type_are_refused(tmp_path: Path) -> None:
     rows = samples()
     for message, table in {
         "no column y": rows.drop(columns="y"),
-        "time not in seconds": rows.assign(t=pd.to_datetime(rows["t"], unit="s")),
+        "time not in seconds": rows.assign(t=[datetime.time(9, 30)] * len(rows)),
         "not a number": rows.assign(id="p" + rows["id"].astype(str)),
         "cannot be read as tidy": rows.assign(x=[[1.0, 2.0]] * len(rows)),
     }.items():
         table.to_parquet(tmp_path / "a.parquet")
         with pytest.raises(szlib.DataError, match=rf"a\.parquet.*{message}"):
             read_raw(tmp_path / "a.parquet")
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        lambda t: pd.to_datetime(t, unit="s", utc=True).dt.round("ms").dt.as_unit("ms"),
+        lambda t: pd.to_datetime(t, unit="s", utc=True).dt.tz_convert("Asia/Tokyo").dt.tz_localize(None),
+        lambda t: pd.to_timedelta(t, unit="s"),
+    ],
+    ids=["with a zone", "local", "duration"],
+)
+def test_parquet_times_with_a_type_are_read_in_seconds(
+    tmp_path: Path, times: Callable[[pd.Series], pd.Series]
+) -> None:
+    rows = samples(begin=BEGIN)
+    rows.assign(t=times(rows["t"])).to_parquet(tmp_path / "a.parquet")
+    read, expected = read_raw(tmp_path / "a.parquet"), read_raw(rows)
+    np.testing.assert_allclose(read["t"], expected["t"], rtol=0, atol=1e-6)
+    assert list(read["id"]) == list(expected["id"])
+
+
+LARGE_ID = 2**53
+LARGE = pd.DataFrame(
+    {"t": np.tile(BEGIN + 0.4 * np.arange(20), 2), "id": np.repeat([LARGE_ID, LARGE_ID + 1], 20)}
+)
+LARGE["x"], LARGE["y"] = 5 + 0.4 * np.tile(np.arange(20), 2), np.repeat([5.0, 9.0], 20)
+
+
+@pytest.mark.parametrize("name", [*WRITERS, "parquet", "table"])
+def test_people_whose_ids_are_too_large_for_floats_stay_two(tmp_path: Path, name: str) -> None:
+    source: Any = LARGE
+    if name == "parquet":
+        source.to_parquet(tmp_path / "a.parquet")
+        source = tmp_path / "a.parquet"
+    elif name != "table":
+        text = WRITERS[name](LARGE).replace("9.0071993e+15", "9007199254740992")  # EWAP
+        lines = text.splitlines(keepends=True)
+        lines[-20:] = [line.replace("9007199254740992", "9007199254740993") for line in lines[-20:]]
+        source = write(tmp_path / "a.csv", "".join(lines))
+    options = szlib.ReadOptions(frame_rate=15 if name == "ewap" else None)
+    assert set(read_raw(source, options=options)["id"]) == {LARGE_ID, LARGE_ID + 1}
+    tracks = szlib.read_tracks(source, options=options)
+    assert tracks.groupby("id")["y"].std().max() < 1e-9, "each walks straight ahead"
+
+
+def test_streamed_people_whose_ids_are_too_large_for_floats_stay_two(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", as_raw(LARGE.sort_values("t")))
+    near = read_near_area(path, area=szlib.Square((0, 20), (0, 20)), duration=3.0)
+    assert set(near["id"]) == {LARGE_ID, LARGE_ID + 1} and len(near) == 40
+
+
+@pytest.mark.parametrize("text", ["9007199254740993.0", "9007199254740992.0", "1e16", str(2**63), "-1e300"])
+def test_ids_that_are_not_exact_are_rejected_by_line(tmp_path: Path, text: str) -> None:
+    lines = [*GOOD, f"{BEGIN + 4},{text},5,5,1.2,0.1"]
+    frame, message = read_quietly(write(tmp_path / "a.csv", "\n".join(lines)))
+    assert message == "a.csv, first at line 9: rejected rows: 1 x id not a whole number"
+    assert len(frame) == 8
+    floats = LARGE.assign(id=LARGE["id"].astype(float))
+    floats.to_parquet(tmp_path / "a.parquet")
+    with pytest.raises(szlib.DataError, match="line 1: id not a whole number; 40 of 40 rows"):
+        read_raw(tmp_path / "a.parquet")
+
+
+@pytest.mark.parametrize("name", ["می\u200cدان.csv", "👩\u200d🔬.csv.gz"])
+def test_names_with_zero_width_joiners_are_text(tmp_path: Path, name: str) -> None:
+    content = as_raw(samples()).encode()
+    path = write(tmp_path / name, gzip.compress(content) if name.endswith("gz") else content)
+    assert len(read_raw(path)) == 60
+    done = szlib.extract_days(path, out=tmp_path / "out", progress=False)
+    assert list(done.table["status"]) == ["done"]
 
 
 def test_missing_files_folders_and_locked_files_are_refused(

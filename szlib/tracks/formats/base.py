@@ -116,14 +116,14 @@ class TrackFormat:
 
     def rejection_reason(self) -> pl.Expr:
         """Why a row is rejected; null where it is usable."""
-        numbers, person, place = ["t", "id", "x", "y"], pl.col("id"), (self.metres, _FARTHEST)
-        limit = {"t": (self.seconds, _LAST_SECOND), "id": (1.0, 2.0**53), "x": place, "y": place}
+        numbers, place = ["t", "id", "x", "y"], (self.metres, _FARTHEST)
+        limit = {"t": (self.seconds, _LAST_SECOND), "x": place, "y": place}
         beyond = {name: pl.col(name).abs() * unit > most for name, (unit, most) in limit.items()}
         reasons = {
             "missing or extra fields": pl.col("ragged"),
             "missing or not a number": pl.any_horizontal(pl.col(numbers).is_null()),
             "not finite": ~pl.all_horizontal(pl.col(numbers).is_finite()),
-            "id not a whole number": (person != person.floor()) | beyond["id"],
+            "id not a whole number": pl.col("exact_id").is_null(),
             "time not in seconds since 1970": beyond["t"],
             "position not on Earth": beyond["x"] | beyond["y"],
         }
@@ -143,14 +143,14 @@ class TrackFormat:
             good = good.with_columns(day=day)
         units = {"t": self.seconds, "x": self.metres, "y": self.metres}
         numbers = (pl.col(name) if unit == 1 else pl.col(name) * unit for name, unit in units.items())
-        return good.select("day", pl.col("id").cast(pl.Int64), *numbers)
+        return good.select("day", "id", *numbers)
 
     def scan(self, plain: Path) -> pl.LazyFrame:
         """Scan the lines of file `plain`."""
         return self._scan_blanks(plain) if self.separator == " " else self._scan_separated(plain)
 
     def _scan_separated(self, plain: Path) -> pl.LazyFrame:
-        numbers = {index for name, index in self.columns.items() if name != "day"}
+        numbers = {index for name, index in self.columns.items() if name not in ("day", "id")}
         fields = {f"f{i}": pl.Float64 if i in numbers else pl.String for i in range(self.n_fields)}
         scan = pl.scan_csv(
             plain, schema={**fields, "extra": pl.String}, has_header=False, skip_lines=int(self.has_header),
@@ -167,17 +167,17 @@ class TrackFormat:
             named["day"] = named["day"].str.strip_chars(' "')
         if self.start:
             named["t"] = named["t"] + self.start
-        return scan.select("line", ragged=ragged, **named)
+        return _with_exact_ids(scan.select("line", ragged=ragged, **named))
 
     def _scan_blanks(self, plain: Path) -> pl.LazyFrame:
         text = plain.read_bytes().decode("utf-8", errors="replace").removeprefix("\ufeff").removesuffix("\n")
         lines = pl.LazyFrame({"text": text.split("\n")[int(self.has_header) :]})
         parts = pl.col("text").str.extract_all(r"\S+")
         fields = {name: parts.list.get(i, null_on_oob=True) for name, i in self.columns.items()}
-        numbers = {n: f if n == "day" else f.cast(pl.Float64, strict=False) for n, f in fields.items()}
-        return lines.with_row_index("line", offset=1 + self.has_header).select(
-            "line", ragged=parts.list.len() != self.n_fields, **numbers
-        )
+        texts = ("day", "id")
+        numbers = {n: f if n in texts else f.cast(pl.Float64, strict=False) for n, f in fields.items()}
+        rows = lines.with_row_index("line", offset=1 + self.has_header)
+        return _with_exact_ids(rows.select("line", ragged=parts.list.len() != self.n_fields, **numbers))
 
 
 def decode_line(line: bytes) -> str:
@@ -207,8 +207,17 @@ def is_number(text: str) -> bool:
 def scan_table(rows: pl.DataFrame) -> pl.LazyFrame:
     """Scan table `rows` with columns t, id, x, y (, day) like a file; lines are counted from 1."""
     day = [pl.col("day").cast(pl.String)] if "day" in rows.columns else []
-    numbers = [pl.col(name).cast(pl.Float64, strict=False) for name in ("t", "id", "x", "y")]
-    return rows.lazy().select(*numbers, *day, ragged=pl.lit(False)).with_row_index("line", offset=1)
+    numbers = [pl.col(name).cast(pl.Float64, strict=False) for name in ("t", "x", "y")]
+    found = rows.lazy().select("id", *numbers, *day, ragged=pl.lit(False))
+    return _with_exact_ids(found.with_row_index("line", offset=1))
+
+
+def _with_exact_ids(scan: pl.LazyFrame) -> pl.LazyFrame:
+    """The `scan` with column id as floats, and exact_id: an integer, or null where id does not tell it."""
+    number, text = pl.col("id").cast(pl.Float64, strict=False), pl.col("id").cast(pl.Int64, strict=False)
+    whole = pl.when((number == number.floor()) & (number.abs() < 2.0**53)).then(number)
+    texts = scan.with_columns(pl.col("id").cast(pl.String).str.strip_chars_start())
+    return texts.with_columns(id=number, exact_id=pl.coalesce(text, whole.cast(pl.Int64, strict=False)))
 
 
 def file_stem(path: Path) -> str:

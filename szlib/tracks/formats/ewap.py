@@ -37,7 +37,7 @@ class _Ewap(TrackFormat):
         """As `TrackFormat.open`; the frame rate is the one given, or estimated from the velocities."""
         decode_first_line(head, path)
         rows = self.scan(plain).collect()
-        seconds, max_gap = measure_frames(rows, path, options.frame_rate)
+        seconds, max_gap = measure_frames(rows.with_columns(id="exact_id"), path, options.frame_rate)
         return replace(self, seconds=seconds, max_gap=max_gap), rows.lazy()
 
 
@@ -50,8 +50,8 @@ def measure_frames(rows: pl.DataFrame, path: Path, given: float | None) -> tuple
     `rows` of file `path` have id, t [frames], x, y, and vx, vy in the same unit of length a second.  `given`
     is the frame rate; None estimates it.  Raises DataError where the velocities give no rate.
     """
-    sane = pl.all_horizontal(pl.col("t", "id", "x", "y", "vx", "vy").abs() < _FARTHEST_NUMBER)
-    rows = rows.filter(sane).sort("id", "t")  # drops NaN as well
+    sane = pl.all_horizontal(pl.col("t", "x", "y", "vx", "vy").abs() < _FARTHEST_NUMBER)
+    rows = rows.filter(sane, pl.col("id").is_not_null()).sort("id", "t")  # drops NaN as well
     estimated, reason = estimate_frame_rate(rows)
     rate = estimated if given is None else float(given)
     if rate is None:

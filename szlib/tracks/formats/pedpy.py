@@ -74,7 +74,7 @@ class _PedPyFormat(TrackFormat):
             ) from error
         if not rate > 0:
             raise DataError(f"{path}: states {rate:g} frames/s; expected a positive number")
-        rows = pl.from_pandas(data.astype(float).rename(columns={"frame": "t"}), nan_to_null=False)
+        rows = pl.from_pandas(data.rename(columns={"frame": "t"}), nan_to_null=False)
         return replace(self, seconds=1 / rate), scan_table(rows)
 
 

@@ -105,7 +105,10 @@ class _TidyParquet(_TidyText):
             raise
         except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
             raise DataError(f"{path}: damaged Parquet ({error}); fetch or write the file again") from error
-        return found, scan_table(pl.from_arrow(named))  # type: ignore[arg-type]
+        rows = pl.DataFrame(named)
+        if isinstance(rows["t"].dtype, pl.Datetime | pl.Duration | pl.Date):
+            rows = rows.with_columns(t=pl.Series(_convert_times(rows["t"].to_pandas(), options.tz)))
+        return found, scan_table(rows)
 
 
 TIDY = _TidyText("tidy", has_header=True)

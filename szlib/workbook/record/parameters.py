@@ -16,6 +16,7 @@ from ...encounters.areas import AUTO, as_area
 from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
 from ...encounters.settings import EncounterSettings
 from ...errors import DataError, SolverError
+from ...files import printable
 from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
@@ -167,7 +168,7 @@ def _check_type(name: str, value: Any, default: Any) -> None:
 def _check_range(name: str, value: Any) -> None:
     if isinstance(value, float) and not math.isfinite(value):
         raise DataError(f"parameter {name}: expected a finite number; got {value!r}")
-    if isinstance(value, str) and not value.isprintable():
+    if isinstance(value, str) and printable(value) != value:
         raise DataError(f"parameter {name}: expected readable text; got {value!a:.80}")
     low, high = RANGES.get(name, (-math.inf, math.inf))
     if not isinstance(value, str) and not low <= value <= high:
