@@ -126,8 +126,9 @@ record.figure(ax.figure, "claims")
 #
 # The plaza, the real ATC day, Grand Central, THOR-MAGNI, and the ETH sequence
 # (`python -m studies.claims`). A site without enough people on every side decides nothing about
-# zones, and says so. "paper" is the paper's zone, "hull" the same with whole encounters as outliers. Brackets hold 95 % intervals; those of the robot's delay hold the range over the four
-# scenarios, because the runs are deterministic.
+# zones, and says so. What the paper says about its own square is asked at the ATC mall alone. "paper" is the
+# paper's zone, "hull" the same with whole encounters as outliers. Brackets hold 95 % intervals; those of the
+# robot's delay hold the range over the four scenarios, because the runs are deterministic.
 
 # %%
 of_plaza = "data == 'plaza' and effect == effect"
