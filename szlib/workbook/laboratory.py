@@ -19,7 +19,7 @@ import numpy as np
 import shapely
 import traitlets
 
-from ..checks import Array, check_array, require
+from ..checks import Array, check_array, check_number, require
 from ..control.acceleration_polygon import find_admissible_controls
 from ..control.controller import advance
 from ..control.mpc import MPCCBF
@@ -31,10 +31,16 @@ from ..simulation.scenario import Scenario
 from ..zones.ellipses import Ellipse
 from . import folders
 from .figures.movies import read_scripts, scene_layout, snapshot
+from .record.parameters import RANGES
 
 __all__ = ["Experiment", "LaboratoryWidget", "RobotOptions", "is_interactive", "make_scene", "show_sliders"]
 
 _MARGIN = 0.7  # around everything that can be dragged [m]
+_FARTHEST = 1e4  # largest coordinate [m]
+_MOST_WALLS = 50  # number of walls for which the solvers are built within a second
+_KINDS = ("decide", "step", "share")  # of the requests of the page
+# Lowest and highest options of a robot; with a longer horizon a solver takes seconds to build.
+_LIMITS = {"N_h": (1, 40), "a_max": (0.01, 100), "size": RANGES["size"]}
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,10 @@ class RobotOptions:
     size : factor by which the zone is scaled.
     estimator : name of the estimator whose zone the robot keeps.
 
+    Raises
+    ------
+    SolverError : N_h, a_max or size is out of range.
+
     Examples
     --------
     >>> from szlib.workbook import laboratory
@@ -61,6 +71,10 @@ class RobotOptions:
     a_max: float = 1.0
     size: float = 1.0
     estimator: str = "quantile"
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in _LIMITS.items():
+            _check_range(name, getattr(self, name), low, high)
 
     def settings(self) -> MPCSettings:
         """Settings of the controller.
@@ -149,7 +163,10 @@ class Experiment:
 
     def configure_robot(self, index: int, **options: Any) -> None:
         """Change `options` of the robot `index`: fields of `RobotOptions`."""
+        _check_range("the number of a robot", index, 0, len(self.robots) - 1)
         changed = replace(self.robots[index], **options)
+        self._controllers = [*self._controllers]  # `LaboratoryWidget.answer` keeps the lists before a change
+        self.robots = [*self.robots]
         self._controllers[index], self.robots[index] = self._make_controller(changed), changed
 
     def move(
@@ -173,17 +190,22 @@ class Experiment:
         ------
         SolverError : a position is invalid. Nothing has moved then.
         """
+        _check_range("the number of walls", 0 if walls is None else len(walls), 0, _MOST_WALLS)
         moved = self.people
         for i, place in (people or {}).items():
-            x, y = check_array("a person's position", place, (2,)).tolist()
+            _check_range("the number of a person", i, 0, len(moved) - 1)
+            x, y = _check_places("a person's position", place, (2,)).tolist()
             moved[i] = replace(moved[i], position=(x, y))
         start = moved if self._n_steps == 0 else list(self.scenario.people)
         if speed is not None:
+            _check_range("speed", speed, *RANGES["speed"])
             moved, start = ([_with_speed(person, speed) for person in group] for group in (moved, start))
         changed = replace(
             self.scenario,
-            goal=self.scenario.goal if goal is None else np.asarray(goal),
-            walls=self.scenario.walls if walls is None else np.reshape(walls, (-1, 2, 2)),
+            goal=self.scenario.goal if goal is None else _check_places("goal", goal, (2,)),
+            walls=self.scenario.walls
+            if walls is None
+            else _check_places("walls", np.reshape(walls, (-1, 4)), (..., 4)).reshape(-1, 2, 2),
             people=tuple(start),
         )
         if walls is not None:
@@ -248,6 +270,17 @@ def make_scene(
     segments = np.reshape(np.asarray(walls, float), (-1, 2, 2))
     state = np.array([*start, 0.0, 0.0])
     return Scenario("laboratory", state, np.asarray(goal, float), people, segments, title="The laboratory")
+
+
+def _check_range(name: str, value: Any, low: float, high: float) -> None:
+    require(low <= check_number(name, value) <= high, name, value, f"{low:g} to {high:g}", SolverError)
+
+
+def _check_places(name: str, value: Any, shape: tuple[Any, ...]) -> Array:
+    """`check_array`, within reach."""
+    places = check_array(name, value, shape)
+    _check_range(f"the largest coordinate of {name}", float(np.abs(places).max(initial=0.0)), 0, _FARTHEST)
+    return places
 
 
 def _with_speed(person: Person, speed: float) -> Person:
@@ -351,10 +384,12 @@ class LaboratoryWidget(anywidget.AnyWidget):
 
         Returns
         -------
-        The answer, with its `kind`: "snapshots", "cell", or "error" for an invalid change. After an error
-        nothing has changed.
+        The answer, with its `kind`: "snapshots", "cell", or "error" for an invalid change or a malformed
+        request. After an error nothing has changed.
         """
+        before, walls = {**vars(self.experiment)}, self.experiment.scenario.walls
         try:
+            require(request["kind"] in _KINDS, "the kind of a request", request["kind"], f"one of {_KINDS}")
             self._apply(request["changes"])
             if request["kind"] == "share":
                 return {"kind": "cell", "text": self.experiment.parameter_cell()}
@@ -364,8 +399,12 @@ class LaboratoryWidget(anywidget.AnyWidget):
             robots = zip(states, steps, zones, strict=True)
             snapshots = [_robot_snapshot(t, state, people, zone, step) for state, step, zone in robots]
             return {"kind": "snapshots", "snapshots": snapshots}
-        except SzlibError as error:
-            return {"kind": "error", "text": str(error), "layout": self._layout()}
+        except (SzlibError, LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+            vars(self.experiment).update(before)
+            for controller in self.experiment._controllers:
+                controller.set_walls(walls)
+            text = str(error) if isinstance(error, SzlibError) else f"the request is malformed: {error!r}"
+            return {"kind": "error", "text": text, "layout": self._layout()}
 
     def _apply(self, changes: Mapping[str, Any]) -> None:
         for index, options in changes.get("robots", {}).items():

@@ -79,6 +79,40 @@ def test_a_wall_without_length_gives_an_error_and_moves_nothing():
     assert widget.experiment.t == 0
 
 
+NAN = float("nan")
+MALFORMED_CHANGES = [
+    3, [], None, {"robots": 3}, {"robots": {"9": {"gamma": 0.1}}}, {"robots": {"-1": {"gamma": 0.1}}},
+    {"robots": {"a": {}}}, {"robots": {"0": 3}}, {"robots": {"0": {"nope": 1}}},
+    *({"robots": {"0": {"N_h": n}}} for n in (300, 41, 0, -3, 2.5, True, "x", None, [1], 10**400)),
+    *({"robots": {"0": {name: x}}} for name in ("gamma", "a_max", "size") for x in (NAN, 1e9, 0, -1, None)),
+    {"robots": {"0": {"estimator": []}}}, {"robots": {"0": {"gamma": 0.3}}, "goal": "x"},
+    {"robots": {"0": {"gamma": 0.3}, "1": {"gamma": 7}}, "walls": [[-6, 2, 7, 2]]},
+    {"people": 3}, {"people": {"9": [0, 0]}}, {"people": {"-1": [0, 0]}}, {"people": {"0": 3}},
+    {"people": {"0": [NAN, 0]}}, {"people": {"0": ["a", 0]}}, {"people": {"0": [1e6, 0]}},
+    {"walls": [[-6, 2, 7, 2]], "goal": [1]}, {"goal": []}, {"goal": [NAN, 0]}, {"goal": [1e300, 0]},
+    {"walls": 3}, {"walls": [[1, 2, 3]]}, {"walls": [["a", 1, 2, 3]]}, {"walls": [[0, 0, 1, 1e9]]},
+    {"walls": [[0, 0, 1, 1]] * 1000}, {"speed": "x"}, {"speed": NAN}, {"speed": 1e9}, {"speed": -1},
+]  # fmt: skip
+
+
+def test_a_malformed_message_gives_an_error_and_changes_nothing():
+    widget = laboratory.LaboratoryWidget(make_experiment())
+    experiment = widget.experiment
+    experiment.step()
+
+    def state():
+        scene, walls = experiment.scenario, [c.walls.tolist() for c in experiment._controllers]
+        return str([experiment.t, experiment.robots, experiment.states, experiment.people, scene.goal, walls])
+
+    before = state()
+    requests = [{"kind": "step", "changes": changes} for changes in MALFORMED_CHANGES]
+    requests += [None, 3, "x", [], {}, {"kind": "step"}, {"changes": {}}, {"kind": "x", "changes": {}}]
+    for request in [*requests, {"kind": [], "changes": {}}]:
+        assert widget.answer(request)["kind"] == "error", request
+        assert state() == before, request
+    assert widget.answer({"kind": "decide", "changes": {}})["kind"] == "snapshots"
+
+
 def test_the_page_gets_a_snapshot_of_each_robot():
     widget = laboratory.LaboratoryWidget(make_experiment())
     for k in range(3):
