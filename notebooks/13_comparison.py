@@ -134,7 +134,7 @@ readable(mine[mine["behaviour"] == "as expected"], "zone")
 # %% [markdown]
 # ## The full run
 #
-# 50 worlds in which everybody has the plaza's zone, rounded to a centimetre (`python -m studies.comparison 50`).
+# 100 worlds in which everybody has the plaza's zone, rounded to a centimetre (`python -m studies.comparison 100`).
 # They are saved beside the notebooks, and shown from here on. Four formulations: *paper* is the paper's to
 # the letter, `MPCSettings.paper()`; *szlib* has the defaults; *whole horizon* and *rest* change one of them.
 
