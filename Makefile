@@ -10,6 +10,8 @@ INSTALLED := $(VENV)/installed
 
 # Where Python is told to keep no bytecode, as in many containers, every process compiles every package anew.
 unexport PYTHONDONTWRITEBYTECODE
+# The notebooks show their figures in every verb, and their kernels are those of .venv.
+unexport MPLBACKEND JUPYTER_PATH
 
 .PHONY: run report docs test lab bench lock audit hostile notebooks dist clean
 

@@ -18,7 +18,7 @@ from typing import Any
 from tqdm import tqdm
 
 from .. import __version__, memory
-from ..errors import DataError
+from ..errors import DataError, SzlibError
 from ..files import file_content, folder_lock, process_folder, read_json_object, write_file
 from ..parallel import cluster, limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets
@@ -35,6 +35,8 @@ SUMMARIES = ("21",)
 # Notebooks that take longest. They start first in their batch, so that no core waits for them at its end.
 LONGEST = ("15", "16", "18")
 SUMMARY = "summary.json"  # file of the outcome of a run
+# Files that a process opens: a kernel, 70 to 90; this process for each kernel, about 15 (both measured).
+_FILES_OF_KERNEL, _FILES_OF_CLIENT = 96, 16
 _POLL = 0.5  # longest wait before Ctrl-C is noticed, whichever thread receives it [s]
 
 
@@ -69,9 +71,11 @@ def run(
     ------
     DataError : the data set, a notebook or a parameter is unknown, or a parameter is out of its range.
     StorageError : the results cannot be written, or another run writes to the same folder.
+    SzlibError : a process may open too few files.
     """
     scripts = choose_notebooks(only)
     names, jobs = [script.stem for script in scripts], max(limit_jobs(jobs, len(scripts)), 1)
+    _require_open_files(_FILES_OF_KERNEL + _FILES_OF_CLIENT * jobs)
     known = sorted({*scripts, *(s for s in folders.list_notebooks() if s.stem[:2] <= PRODUCERS[-1])})
     given = check_parameters(parameters or {}, known)
     results, data = folders.results_root(out), folders.absolute_data(data)
@@ -89,6 +93,22 @@ def run(
 
             summary["report"] = str(write_report(home))
         return summary
+
+
+def _require_open_files(n_files: int) -> None:
+    """Let this process and its kernels open `n_files`; SzlibError where the system does not allow it."""
+    try:
+        import resource
+    except ImportError:  # Windows has no such limit
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if 0 <= hard < n_files:  # negative: unlimited
+        raise SzlibError(
+            f"a process may open {hard} files on this machine, and a run needs {n_files}; raise the limit "
+            f"(ulimit -n {n_files}), or use fewer --jobs"
+        )
+    if 0 <= soft < n_files:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (n_files, hard))
 
 
 @contextmanager

@@ -10,6 +10,7 @@ import nbformat
 import pytest
 
 from szlib.workbook import report, runner
+from szlib.workbook.cli import main
 
 STALE = {"argv": ["/nowhere/python", "{connection_file}"], "display_name": "stale", "language": "python"}
 DRAW = """
@@ -68,6 +69,30 @@ def test_kernel_imports_nothing_from_its_folder_and_leaves_no_temporary_file(
     assert not Path(found["01_look"]["temporary"]).exists()
     assert os.environ["MPLBACKEND"] == "Agg" and "PYTHONSAFEPATH" not in os.environ
     assert not list((tmp_path / "temporary").glob("*.json"))
+
+
+@pytest.mark.parametrize(("limits", "raised"), [((64, -1), (112, -1)), ((256, 4096), None)])
+def test_too_low_a_limit_of_open_files_is_raised_where_the_system_allows_it(
+    notebooks, tmp_path, monkeypatch, limits, raised
+):
+    resource = pytest.importorskip("resource")
+    given = []
+    monkeypatch.setattr(resource, "getrlimit", lambda _: limits)
+    monkeypatch.setattr(resource, "setrlimit", lambda _, pair: given.append(pair))
+    monkeypatch.setattr(runner, "_execute_all", lambda *_: {})
+    notebooks(_01_one="")
+    runner.run("mine.csv", out=tmp_path / "out")
+    assert given == ([raised] if raised else [])
+
+
+def test_limit_of_open_files_is_named(notebooks, monkeypatch, capsys):
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (64, 64))
+    notebooks(_01_one="")
+    assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
+    assert (
+        "may open 64 files on this machine, and a run needs 112; raise the limit" in capsys.readouterr().err
+    )
 
 
 @pytest.mark.usefixtures("without_kernels")
