@@ -167,6 +167,7 @@ def test_what_is_no_small_regular_file_is_refused(
     name: str, read: Callable[[Path], object], reason: str, tmp_path: Path
 ) -> None:
     NO_SMALL_FILES[reason](tmp_path / name)
+    (tmp_path / files.MARKER).write_text("results of mine\n")
     nbformat.write(nbformat.v4.new_notebook(cells=[nbformat.v4.new_markdown_cell()]), tmp_path / "01_a.ipynb")
     with pytest.raises(szlib.SzlibError, match=reason) as refused:
         read(tmp_path / name)
