@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from helpers.random_states import ZONE, questions
 from hostile.controller import cruel_states
+from scipy.optimize import brentq
 
 import szlib
 from szlib.control import step_report as report
@@ -52,6 +53,14 @@ def test_every_claim_of_a_step_from_an_unsafe_state_is_verified(solver):
     for state, goal, people, walls in islice(cruel_states(6), 25 if solver == "sqp" else 4):
         step = szlib.MPCCBF(ZONE, walls=walls, settings=s, max_people=5).step(state, goal, people)
         assert step.verify().ok and "WRONG" not in step.explain()
+
+
+def test_a_robot_at_the_edge_of_a_barrier_is_safe_for_the_report_as_well():
+    controller = controller_of(walls=[[(-9.0, 0.0), (9.0, 0.0)]])
+    edge = brentq(lambda y: controller.step((0, y, 0, 0), (0, 5)).h[0], 0.2, 2.0, xtol=1e-14)
+    step = controller.step((0, edge, 0, 0), (0, 5))
+    assert abs(step.h[0]) < 1e-9 and step.safe
+    assert step.verify().ok and step.verify().safe
 
 
 def test_the_largest_numbers_are_checked_as_well():

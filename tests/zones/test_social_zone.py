@@ -578,6 +578,10 @@ def test_samples_without_encounter_give_a_zone_of_unknown_quality(samples: pd.Da
     assert (zone.side_counts, zone.uncertainty) == (None, None)
 
 
+def test_default_speeds_are_those_of_walking_people() -> None:
+    assert pytest.approx(np.arange(0.5, 1.6, 0.2)) == SPEEDS
+
+
 # --- the real day ------------------------------------------------------------------------------------
 
 
