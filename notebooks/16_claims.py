@@ -152,7 +152,8 @@ wide[list(dict.fromkeys(everywhere["data"]))]
 # `"paper"` is the hull with 0.2 % of the samples removed and 20 neighbours. It fails at the paper's own size: with 16,000 encounters and 0.25 %
 # intruders it is 16 to 25 cm off, with 2 % more than 60 cm, because LOF with 20 neighbours compares an intruder with their own
 # samples. By default whole encounters are judged instead (precision and recall 1.00 there; notebook 03). With 2 % intruders, 5 cm
-# of noise, or both, the quantile zone is within 3.8 cm, the hull within 4 and 11 cm, the paper's zone 60 cm off.
+# of noise, or both, the quantile zone is within 3.8 cm, the hull within 4 cm without the noise and within 11 cm with it. The
+# paper's zone is 9 cm off with the noise alone, and 49 to 60 cm with the intruders.
 #
 # Every zone has 95 % intervals from resampled pairs of people, the largest influence of one encounter, counts by side, and
 # `zone.adequate(speed)`. A zone with fewer than 20 encounters on some side gives a warning when it is used, and is drawn dashed.
