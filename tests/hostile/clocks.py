@@ -24,7 +24,7 @@ from tqdm import tqdm
 import szlib
 
 STEPS = {False: 600, True: 50_000}
-LOOPS = {False: 6, True: 600}
+LOOPS = {False: 6, True: 200}
 """Closed loops, each of up to `TICKS` steps."""
 TICKS = 60
 

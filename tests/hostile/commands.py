@@ -35,7 +35,7 @@ from szlib.tracks.clock import read_tracks
 from szlib.workbook import folders
 from szlib.workbook.cli import build_parser, main
 
-COUNT = {False: 12, True: 1000}
+COUNT = {False: 8, True: 1000}
 LONGEST = 60
 """Time limit of a command [s]."""
 NOTEBOOK = """# %% tags=["parameters"]
@@ -128,7 +128,8 @@ def draw(rng: random.Random) -> list[str]:
     for action in verbs.choices[command]._actions:
         if action.option_strings and action.dest != "help" and rng.random() < OFTEN.get(action.dest, 0.15):
             name = rng.choice(action.option_strings)
-            name = name[: rng.randrange(4, len(name) + 1)] if rng.random() < 0.05 else name
+            if name.startswith("--") and rng.random() < 0.05:
+                name = name[: rng.randrange(4, len(name) + 1)]
             values = draw_values(action, rng)
             together = len(values) == 1 and name.startswith("--") and rng.random() < 0.2
             options += [[f"{name}={values[0]}"]] if together else [[name, *values]]

@@ -72,12 +72,12 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
     return dict(tally)
 
 
-def furnish(place: Path, days: int = 4, seconds: float = 1.5) -> dict[str, list[str]]:
+def furnish(place: Path, days: int = 4, encounters: int = 150, seconds: float = 1.5) -> dict[str, list[str]]:
     """Make days, the fourth one packed, and two notebooks, which also sleep; return two commands."""
     for name in ("data", "tmp", "home", "bin"):
         (place / name).mkdir()
     for day in range(days):
-        settings = PlazaSettings(n_encounters=150, date=f"2012-11-{day + 1:02}")
+        settings = PlazaSettings(n_encounters=encounters, date=f"2012-11-{day + 1:02}")
         make_plaza(place / "data" / f"day{day}.csv", seed=day, settings=settings)
     if days > 3:
         subprocess.run(["gzip", str(place / "data" / "day3.csv")], check=True)

@@ -44,7 +44,7 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
     adopt_orphans()
     with tempfile.TemporaryDirectory() as folder:
         place, rng = Path(folder), random.Random(seed)
-        commands = furnish(place, days=4 if long else 1)
+        commands = furnish(place) if long else furnish(place, days=1)
         if not long:
             out, before = place / "extract-0", everything_outside(place)
             attempt("Ctrl-C twice", [*commands["extract"], "--out", str(out)], place, rng, 0.3, tally)

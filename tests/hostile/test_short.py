@@ -1,16 +1,25 @@
-"""The short forms of the attacks, each in an interpreter of its own; `make hostile` kills processes too."""
+"""The short forms of the attacks, each in an interpreter of its own, and tests of their judges.
+
+`make hostile` also kills processes and enters foreign environments, which tests/workbook does in short.
+"""
 
 import os
+import random
 import subprocess
 import sys
 from pathlib import Path
 
+import adversary
+import commands
 import pytest
 
 import szlib
+from szlib.workbook.cli import build_parser
+
+POLICY = '<meta http-equiv="Content-Security-Policy" content="{}">'
 
 
-@pytest.mark.parametrize("attack", ["commands", "damaged_tracks", "files", "races", "terminal"])
+@pytest.mark.parametrize("attack", ["commands", "damaged_tracks", "files", "races", "terminal", "adversary"])
 def test_attack_breaks_nothing(attack, tmp_path):
     done = subprocess.run(
         [sys.executable, str(Path(__file__).parent), attack],
@@ -18,3 +27,50 @@ def test_attack_breaks_nothing(attack, tmp_path):
         env=os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])},
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        "<p><script>pwned()</script></p>",
+        '<img src="x" onerror="pwned()">',
+        '<a href=" JavaScript:pwned()">link</a>',
+        POLICY.format("script-src 'unsafe-inline'") + "<script>pwned()</script>",
+        '<iframe srcdoc="text"></iframe>',
+    ],
+)
+def test_judge_finds_foreign_code_in_a_page(page, tmp_path):
+    (tmp_path / "report.html").write_text(page)
+    assert list(adversary.active(tmp_path / "report.html"))
+
+
+def test_judge_accepts_a_page_whose_policy_forbids_scripts(tmp_path):
+    page = POLICY.format("default-src 'none'") + "<script>pwned()</script><b>pwned()</b>"
+    (tmp_path / "report.html").write_text(page)
+    assert list(adversary.active(tmp_path / "report.html")) == []
+
+
+@pytest.mark.parametrize(
+    ("code", "printed", "fault"),
+    [
+        (0, "done", ""),
+        (2, "szlib: day.csv: no such file", ""),
+        (2, "szlib run: error: expected 4 arguments", ""),
+        (2, "szlib: KeyError: 'x'", "an error that is not of szlib"),
+        (2, "no", "it gives no reason"),
+        (-9, "", "it hangs, or a signal ended it"),
+        (1, "Traceback (most recent call last)", "a foreign traceback"),
+    ],
+)
+def test_judge_of_command_lines(code, printed, fault):
+    assert commands.judge(code, printed) == fault
+
+
+def test_every_command_and_option_is_drawn():
+    lines = [commands.draw(random.Random(seed)) for seed in range(400)]
+    words = {word.partition("=")[0] for line in lines for word in line}
+    (verbs,) = [action for action in build_parser()._actions if isinstance(action.choices, dict)]
+    options = {
+        name for verb in verbs.choices.values() for each in verb._actions for name in each.option_strings
+    }
+    assert {*verbs.choices, *options} - {"-h", "--help"} <= words
