@@ -45,7 +45,8 @@ class Extraction:
     ----------
     out : folder of the results.
     table : one row a day: day, status ("done" now, "kept" from before, "excluded", "failed"), files, rows
-        read, unusable rows among them, encounters, samples, seconds, and why a day failed.
+        read, unusable rows among them, encounters, samples, seconds, and why a day failed, or what is
+        implausible in it.
     exclude : days that were left out.
     sources : what the result of each finished day is made of: content, parameters and version.
     area : where encounters were searched, the same in every day; None where no day has an area.
@@ -237,6 +238,7 @@ def extract_day(
             "unusable": sum(stage["entered"] - stage["kept"] for stage in read),
             "encounters": int(samples["encounter"].nunique()),
             "samples": len(samples),
+            "why": "; ".join(funnels.warnings(funnels.get(samples))),
         }
     except SzlibError as error:
         row["why"] = printable(error)

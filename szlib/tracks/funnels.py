@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from ..errors import SzlibError
 
 KEY = "funnel"
+WARNING = "warning: "  # how the name of a stage begins that rejects nothing, but says what is implausible
 
 
 def stage(name: str, entered: int, kept: int, rejected: Mapping[str, int]) -> dict[str, Any]:
@@ -56,6 +57,18 @@ def get(frame: pd.DataFrame) -> list[dict[str, Any]]:
     {'not finite': 1}
     """
     return list(frame.attrs.get(KEY, []))
+
+
+def warnings(stages: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What is implausible in the rows of these `stages`, as texts.
+
+    Examples
+    --------
+    >>> from szlib.tracks import funnels
+    >>> funnels.warnings([funnels.stage("warning: nobody walks", 9, 9, {})])
+    ['nobody walks']
+    """
+    return [s["stage"].removeprefix(WARNING) for s in stages if s["stage"].startswith(WARNING)]
 
 
 def attach(frame: pd.DataFrame, stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:

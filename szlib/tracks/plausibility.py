@@ -21,8 +21,8 @@ from .formats import TrackFormat
 _MAX_SITE = 1000.0  # a wider site [m] means that millimetres were read as metres
 _MIN_SITE = 0.5  # a smaller site [m] means that metres were read as millimetres
 _FASTEST = (4.0, 6.0)  # greatest median and greatest 90 % quantile of the speed of people [m/s]
-# Smallest 90 % quantile of the speed of people [m/s]; the same where times are whole numbers (frames?).
-_SLOWEST, _SLOWEST_FRAMES = 0.1, 0.3
+_SLOWEST = 0.6  # smallest 90 % quantile of the speed of people [m/s]; less is usual only where they stand
+_SPRINT, _JUMP = 12.5, 100.0  # nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
 _LONGEST_STEP = 5.0  # longest time between two samples of a person [s]
 _MIN_STEPS, _ROWS = 20, 200_000  # number of steps that allows a judgement; number of rows that are looked at
 _REGULAR = 0.5  # greatest interquartile range of the sampling interval, over its median, of a regular clock
@@ -57,8 +57,9 @@ class Motion(NamedTuple):
         """Why people cannot move like this; empty where they can."""
         if self.median_speed > _FASTEST[0] or self.high_speed > _FASTEST[1]:
             return f"people move at {self.median_speed:.3g} m/s (median), expected 0 to {_FASTEST[0]:g}"
-        if self.high_speed < (_SLOWEST_FRAMES if self.has_whole_times and self.interval <= 1 else _SLOWEST):
-            return f"nobody walks: 90 % of the steps are slower than {self.high_speed:.2g} m/s"
+        if self.high_speed < _SLOWEST:
+            quantiles = f"the median of their speed is {self.median_speed:.2g} m/s, the 90 % quantile"
+            return f"nobody walks: {quantiles} {self.high_speed:.2g} m/s"
         return ""
 
     @property
@@ -66,7 +67,7 @@ class Motion(NamedTuple):
         """Whether people certainly walk, and are sampled regularly."""
         return (
             self.median_speed <= 3
-            and 0.3 <= self.high_speed <= _FASTEST[0]
+            and _SLOWEST <= self.high_speed <= _FASTEST[0]
             and self.irregularity <= _REGULAR
             and 0.005 <= self.interval <= _LONGEST_STEP
             and 1 <= self.width <= _MAX_SITE
@@ -118,10 +119,29 @@ def check_people(rows: pl.DataFrame, layout: TrackFormat, path: Path, *, is_unit
         return  # people may be seen at irregular times
     fault = found.fault or "people are seen at irregular times"
     message = f"{path}: {fault}" + (f"; {advice}" if advice else "")
-    if is_unit_given or (found.high_speed <= _FASTEST[1] and not advice):
+    if is_unit_given and advice:
         warn(message)
-    else:
-        raise DataError(f"{message}; if people do move like that, pass unit=")
+    elif not is_unit_given and (advice or found.high_speed > _FASTEST[1]):
+        advice = "" if advice else "; convert other units, such as pixels, to metres"
+        raise DataError(f"{message}{advice}; if people do move like that, pass unit=")
+
+
+def find_implausible(rows: pl.DataFrame) -> list[str]:
+    """What people cannot do in `rows` day, id, t [s], x, y [m], sorted by day, id and t, as texts."""
+    person = pl.struct("day", "id").rle_id()
+    first = rows.head(_ROWS).select("t", person.alias("id"), "x", "y").to_numpy().astype(float)
+    motion, n_jumps, fastest = measure_motion(first.T), 0, 0.0
+    step, moved = pl.col("t").diff(), (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt()
+    is_jump = (person.diff() == 0) & (moved > _JUMP + _SPRINT * step)
+    for block in rows.iter_slices(1 << 20):  # a table of the steps of a whole day would double its memory
+        speeds = block.select((moved / step).filter(is_jump)).to_series()
+        n_jumps, fastest = n_jumps + len(speeds), max([fastest, *speeds.top_k(1)])
+    texts = [motion.fault] if motion is not None and motion.fault else []
+    if n_jumps:
+        texts.append(
+            f"people jump {n_jumps:,} times, at up to {fastest:,.0f} m/s: positions or ids are wrong"
+        )
+    return texts
 
 
 def suggest_reading(rows: pl.DataFrame, layout: TrackFormat) -> str:
@@ -162,8 +182,12 @@ def _convert(rows: pl.DataFrame, layout: TrackFormat) -> np.ndarray:
 def _readings(rows: np.ndarray) -> Iterator[tuple[np.ndarray, str]]:
     """Other readings of rows (4, n), the likeliest first, each with its advice."""
     t, person, x, y = rows[:, np.isfinite(rows).all(axis=0)]
-    for unit, name, factor in (("mm", "millimetres", 1e-3), ("cm", "centimetres", 1e-2)):
-        yield np.array([t, person, x * factor, y * factor]), f"positions look like {name}: pass unit={unit!r}"
+    for name, factor, remedy in (
+        ("millimetres", 1e-3, "pass unit='mm'"),
+        ("centimetres", 1e-2, "pass unit='cm'"),
+        ("feet", 0.3048, "multiply them by 0.3048"),
+    ):
+        yield np.array([t, person, x * factor, y * factor]), f"positions look like {name}: {remedy}"
     yield np.array([t / 1000, person, x, y]), "times look like milliseconds: divide them by 1000"
     if (t % 1 == 0).all():
         advice = "pass columns={'frame': 't'} and frame_rate=, frames a second"

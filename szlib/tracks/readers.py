@@ -20,7 +20,7 @@ from .formats import TrackFormat, open_file
 from .formats.base import EXPECTED
 from .formats.tidy import is_table, open_table
 from .options import ReadOptions
-from .plausibility import check_people, check_unit, suggest_reading
+from .plausibility import check_people, check_unit, find_implausible, suggest_reading
 from .recordings import LoadedFile, separate_recordings
 
 
@@ -90,6 +90,9 @@ def merge(files: Sequence[LoadedFile], excluded: Sequence[str] = (), *, copy: bo
     frame.attrs["max_gap"] = max(gaps) if len(gaps) == len(files) else None
     reasons = {"excluded day": merged.height - wanted.height, **doubled}
     stages = [stage for file in files for stage in file.stages]
+    for text in find_implausible(rows):
+        warn(f"{', '.join(file.path.name for file in files[:3])}: {text}")
+        stages.append(funnels.stage(f"{funnels.WARNING}{text}", merged.height, merged.height, {}))
     return funnels.attach(frame, [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)])
 
 

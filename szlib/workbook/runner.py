@@ -15,13 +15,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from tqdm import tqdm
 
 from .. import __version__, memory
 from ..errors import DataError, SzlibError
 from ..files import file_content, folder_lock, process_folder, read_json_object, write_file
 from ..parallel import cluster, limit_jobs, safe_path, uninterrupted
-from ..tracks import datasets
+from ..tracks import datasets, funnels
 from . import folders
 from .notebook_execution import EMPTY_RECORD, end_kernels, execute_notebook
 from .record.data_cache import DataCache
@@ -86,6 +87,8 @@ def run(
         source, earlier = _start_summary(home, data, files, given, names)
         variables = given | {"data": data, "results": str(results)}
         outcomes = _execute_all(scripts, variables, home, jobs, scheduler)
+        if (samples := home / "encounters.parquet").exists():
+            source["warnings"] = funnels.warnings(funnels.get(pd.read_parquet(samples, columns=[])))
         summary, everything = (_summarise(source, each) for each in (outcomes, {**earlier, **outcomes}))
         write_file(home / SUMMARY, json.dumps(everything, indent=1))
         if any((home / f"{name}.ipynb").exists() for name in everything["notebooks"]):
@@ -245,6 +248,7 @@ def format_summary(summary: Mapping[str, Any]) -> str:
         ]
         if "error" in outcome:
             notes.append(f"{name}: {outcome['error']}")
+    notes += [f"data: {text}" for text in summary.get("warnings", ())]
     table = [f"{row[0]:<24} {row[1]:>7} {row[2]:>11} {row[3]:>9}  {row[4]}" for row in rows]
     return "\n".join([*table, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
 

@@ -14,12 +14,21 @@ from helpers.track_tables import make_tracks, make_walk, real_data
 import szlib
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
+from szlib.tracks import funnels
 from szlib.tracks.readers import read_raw
+from szlib.workbook.cli import main
+from szlib.workbook.runner import format_summary
 
 
 def table() -> pd.DataFrame:
     """Forty people, t in steps of 0.08 s."""
     return in_seconds(people(3, count=40))
+
+
+def walkers(speed: float) -> pd.DataFrame:
+    """Ten people who walk at about this speed [units of x a second]."""
+    walks = [make_walk((0, k), (speed * (0.9 + k / 50), 0), person=k, duration=20) for k in range(10)]
+    return make_tracks(*walks)[["t", "id", "x", "y"]]
 
 
 def frames() -> pd.DataFrame:
@@ -30,6 +39,7 @@ def frames() -> pd.DataFrame:
 SPOILED = {
     "millimetres: pass unit='mm'": lambda: table().assign(x=lambda t: t["x"] * 1e3, y=lambda t: t["y"] * 1e3),
     "centimetres: pass unit='cm'": lambda: table().assign(x=lambda t: t["x"] * 1e2, y=lambda t: t["y"] * 1e2),
+    "feet: multiply them by 0.3048": lambda: walkers(1.3 / 0.3048),
     "milliseconds: divide": lambda: table().assign(t=lambda t: t["t"] * 1e3),
     "milliseconds: divide them": lambda: table().assign(t=lambda t: (t["t"] + 1.7e9) * 1e3),
     "numbers of frames: pass": frames,
@@ -106,6 +116,40 @@ def test_an_implausible_given_unit_warns() -> None:
     spoiled = SPOILED["centimetres: pass unit='cm'"]()
     with pytest.warns(szlib.DataWarning, match="people move at"):
         assert len(read_raw(spoiled, options=szlib.ReadOptions(unit="m"))) == len(spoiled)
+
+
+def test_pixels_get_no_advice_that_makes_people_slow() -> None:
+    with pytest.raises(
+        szlib.DataError, match=r"people move at 3\d.* m/s .*; convert other units, such as pixels"
+    ):
+        read_raw(walkers(38.0))
+    with pytest.warns(szlib.DataWarning, match=r"the median of their speed is 0\.3\d m/s"):
+        read_raw(walkers(38.0), options=szlib.ReadOptions(unit="cm"))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "text"),
+    [
+        (
+            lambda rows: rows.assign(x=rows["x"].where(rows.index % 149 > 0, 1e5)),
+            "people jump ",
+        ),
+        (lambda rows: rows.assign(x=rows["x"] * 0.2), "nobody walks"),
+    ],
+)
+def test_what_is_implausible_is_shown_by_every_command(tmp_path, capsys, spoil, text) -> None:
+    spoil(walkers(1.3)).to_csv(tmp_path / "hall.csv", index=False)
+    area = ["--area", "0", "26", "-1", "10"]
+    assert main(["inspect", str(tmp_path / "hall.csv"), *area]) == 0
+    assert f"warning: {text}" in capsys.readouterr().out
+    for _ in ("done", "kept"):
+        assert main(["extract", str(tmp_path / "hall.csv"), "--out", str(tmp_path / "days"), *area]) == 0
+        assert text in capsys.readouterr().out
+    with pytest.warns(szlib.DataWarning, match=text):
+        stages = funnels.get(read_raw(tmp_path / "hall.csv"))
+    assert [warning for warning in funnels.warnings(stages) if text in warning]
+    summary = {"notebooks": {}, "passed": True, "warnings": funnels.warnings(stages)}
+    assert f"data: {text}" in format_summary(summary)
 
 
 def test_a_table_of_standing_people_warns() -> None:
