@@ -22,6 +22,7 @@ INTRODUCTION = """# Hostile suite
 
 `make hostile` runs every attack in full and writes this file; `make test` runs a short form of each. What
 each attack does stands at the top of its module. Counts that begin with "broken" must be 0.
+An attack that has no section was not run in full since it was last changed.
 """
 
 
