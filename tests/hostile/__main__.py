@@ -61,7 +61,8 @@ def write_readme(name: str, tally: dict[str, float]) -> None:
     """Replace the section of one attack, with the date, the commit and the counts."""
     text = README.read_text(encoding="utf-8") if README.exists() else ""
     found = {part.partition("\n")[0]: part for part in text.split("\n## ")[1:]}
-    rows = [f"| {what} | {count:g} |" for what, count in tally.items()]
+    total = sum(count for what, count in tally.items() if what.startswith("broken"))
+    rows = [f"| {what} | {count:g} |" for what, count in ({"broken, in all": total} | tally).items()]
     when = f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}"
     found[name] = "\n".join([name, "", when, "", "| what | count |", "|---|--:|", *rows, ""])
     README.write_text(
