@@ -46,6 +46,13 @@ def test_the_robot_passes_on_the_other_side_if_the_goal_lies_there():
     assert find_turn(2.01 * limit, settings) == pytest.approx(0)
 
 
+def test_a_person_who_walks_across_does_not_hide_one_ahead():
+    across = place_zone(szlib.Person((-1.0, -3.0), (0.0, 1.0)), CIRCLE)
+    s = szlib.MPCSettings(head_on_share=0.25)
+    alone = find_target(ROBOT, (5.0, 0.0), [STANDING], (), s)
+    assert find_target(ROBOT, (5.0, 0.0), [across, STANDING], (), s) == alone != (5.0, 0.0)
+
+
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("walls", [(), (-1.6,), (1.6,), (-2.2, 2.2), (-1.6, 1.6)])
 def test_the_target_moves_and_turns_with_the_scene(side, walls):

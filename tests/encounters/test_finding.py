@@ -511,3 +511,8 @@ def test_plain_loops_agree_on_the_real_day(real_tracks: pd.DataFrame) -> None:
     samples = find_encounters(here)
     assert samples["encounter"].nunique() >= 100
     assert_same_samples(samples, search(here, square=szlib.ATC_SQUARE))
+
+
+def test_the_papers_conditions_are_the_defaults() -> None:
+    assert szlib.EncounterSettings.paper() == szlib.EncounterSettings()
+    assert szlib.EncounterSettings.paper("0 12 0 8").area == szlib.Square((0, 12), (0, 8))

@@ -24,7 +24,7 @@ from szlib.tracks.readers import read_raw
 SETTINGS = [
     (szlib.ATC_SQUARE, 3.0, None),
     (szlib.Square(x=(-16, -10), y=(-8, 6)), 0.3, None),
-    (szlib.Square(x=(-16, -4), y=(-9, 4)), 1.0, 0.2),
+    (szlib.Square(x=(-16, -4), y=(1, 13)), 1.0, 0.2),
     (szlib.ATC_SQUARE, 2.0, 3.0),
 ]
 

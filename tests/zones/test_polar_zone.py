@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.zones.polar import DIRECTIONS, PolarZone, ellipse_reach, fill_gaps, fit_ellipses
+from szlib.zones.polar import DIRECTIONS, PolarZone, _parametric_reach, ellipse_reach, fill_gaps, fit_ellipses
 
 KNOWN = np.array(
     [
@@ -32,6 +32,15 @@ def test_the_reach_of_an_ellipse_ends_on_it() -> None:
         points = reach[:, None] * np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
         np.testing.assert_allclose(ellipse.level(points), 1, rtol=1e-12)
     assert np.isnan(ellipse_reach(np.array([2.0, 0.0, 1.0, 0.5, 0.0]))).all()  # the person is outside
+
+
+def test_the_slope_of_the_reach_is_that_of_small_changes() -> None:
+    parameters = np.array([[0.1, -0.2, 1.3, 0.2, 1.1], [0.0, 0.05, 0.9, -0.1, 1.6]])
+    unit = np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+    slope = _parametric_reach(parameters, unit)[1]
+    for k, small in enumerate(1e-6 * np.eye(5)):
+        ends = [_parametric_reach(parameters + sign * small, unit)[0] for sign in (1, -1)]
+        np.testing.assert_allclose(slope[..., k], (ends[0] - ends[1]) / 2e-6, rtol=1e-6, atol=1e-8)
 
 
 def test_fit_recovers_an_ellipse_from_its_radii() -> None:

@@ -135,6 +135,13 @@ def test_smoothing_stops_at_gaps_and_at_other_encounters(samples: pd.DataFrame) 
     np.testing.assert_array_equal(untimed[1], some["distance"])
 
 
+def test_smoothing_treats_past_and_future_alike() -> None:
+    path = passers(1, noise=0.05)
+    back = path.assign(t=-path["t"].to_numpy())
+    for forward, backward in zip(smooth_paths(path), smooth_paths(back), strict=True):
+        np.testing.assert_allclose(forward, backward, atol=1e-12)
+
+
 def test_smoothing_reduces_noise() -> None:
     still, noisy = passers(200), passers(200, noise=0.05)
     error = smooth_paths(noisy)[1] - still["distance"]
@@ -172,6 +179,11 @@ def test_encounters_are_numbered_in_order_of_appearance() -> None:
     assert number.tolist() == [0, 0, 1, 2]
     assert first.index.tolist() == [0, 2, 3]
     assert encounter_numbers(table.drop(columns="encounter"))[0].tolist() == [0, 1, 2, 3]
+
+
+def test_provenance_names_the_sector_in_degrees(samples: pd.DataFrame) -> None:
+    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), n_resamples=0)
+    assert zone.provenance["parameters"]["sector_deg"] == 35
 
 
 def test_radii_are_those_of_the_truth_within_a_sector() -> None:
