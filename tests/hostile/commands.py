@@ -35,7 +35,7 @@ from szlib.tracks.clock import read_tracks
 from szlib.workbook import folders
 from szlib.workbook.cli import build_parser, main
 
-COUNT = {False: 8, True: 1000}
+COUNT = {False: 3, True: 1000}
 LONGEST = 60
 """Time limit of a command [s]."""
 NOTEBOOK = """# %% tags=["parameters"]

@@ -34,7 +34,7 @@ from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.workbook.record import NotebookRecord, ZoneMethod
 
 DAMAGES = {False: 2, True: 300}
-JUMPS = {False: 2, True: 40}
+JUMPS = {False: 1, True: 40}
 
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:

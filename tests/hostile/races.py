@@ -30,7 +30,7 @@ from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.workbook.record.data_cache import DataCache
 
-TRIES = {False: 8, True: 2000}
+TRIES = {False: 4, True: 2000}
 LONGEST = 0.01
 """Longest time for which a file is another one, and between two such times [s]; the first begins later."""
 AREA = str(szlib.ATC_SQUARE)
