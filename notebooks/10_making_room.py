@@ -215,9 +215,9 @@ paces.style.format(precision=2).hide(axis="index")
 fig, ax = plt.subplots(figsize=(7, 3.4), layout="constrained")
 safe = paces["infeasible steps"] == 0
 ax.plot(paces["pace [m/s]"], paces["least h [m]"], "-", color=figures.GREY, linewidth=1)
-for some, marker, told in ((safe, "o", "every step has a plan"), (~safe, "X", "some steps have none")):
+for some, marker, label in ((safe, "o", "every step has a plan"), (~safe, "X", "some steps have none")):
     shown = paces[some]
-    ax.plot(shown["pace [m/s]"], shown["least h [m]"], marker, markersize=8, label=told)
+    ax.plot(shown["pace [m/s]"], shown["least h [m]"], marker, markersize=8, label=label)
 ax.axhline(0, color=figures.BLACK, linewidth=0.8)
 nearest = paces.loc[paces["least h [m]"].idxmin(), "pace [m/s]"]
 ax.set(

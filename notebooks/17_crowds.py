@@ -340,7 +340,7 @@ two_wheels.set_index(["set", "robot"])[shown].round(3)
 
 # %%
 plain, turning = (
-    two_wheels.query(f"set == 'all' and robot == '{name}'").iloc[0] for name in differential_table.TOLD
+    two_wheels.query(f"set == 'all' and robot == '{name}'").iloc[0] for name in differential_table.TABULATED
 )
 arrive = f"{turning['share arrived']:.1%} arrive ({plain['share arrived']:.1%} of the double integrator)"
 later = "{:.2f} s later ({:.2f} to {:.2f})".format(

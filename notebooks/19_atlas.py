@@ -159,8 +159,8 @@ fig, grid = plt.subplots(3, 2, figsize=(13, 13), layout="constrained")
 for ax, (name, log) in zip(grid.flat, logs.items(), strict=False):
     cell = examples[name]
     log.plot(every=3.0, ax=ax).get_legend().remove()
-    told = f"gamma {cell.gamma:g}, {cell.width:g} m, {cell.pace:g} m/s, zone x {cell.size:g}"
-    ax.set_title(f"{name}: {cell.scene}, {told}", fontsize=10)
+    settings_text = f"gamma {cell.gamma:g}, {cell.width:g} m, {cell.pace:g} m/s, zone x {cell.size:g}"
+    ax.set_title(f"{name}: {cell.scene}, {settings_text}", fontsize=10)
 for ax in grid.flat[len(logs) :]:
     ax.axis("off")
 figures.add_shared_legend([grid[0, 0]])

@@ -66,8 +66,8 @@ def slow(scenario: szlib.Scenario, settings: szlib.MPCSettings) -> Any:
 
 
 ROBOTS = {"double integrator": make_mpc_cbf, "8 rad/s": nimble, "4 rad/s": common, "2 rad/s": slow}
-TOLD = ["double integrator", "4 rad/s"]
-"""Those of the table; the others are there to ask for."""
+TABULATED = ["double integrator", "4 rad/s"]
+"""Robots of the table; the others run on request."""
 SETS = {"all": Worlds(), "one person": ONE_PERSON}
 
 
@@ -174,7 +174,7 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=2000, help="worlds of each set")
     parser.add_argument("--jobs", type=int, default=-1, help="processes")
     parser.add_argument("--out", default="../results/rollouts", help="where finished worlds are kept")
-    parser.add_argument("--robots", nargs="+", default=TOLD, choices=ROBOTS, help="which robots")
+    parser.add_argument("--robots", nargs="+", default=TABULATED, choices=ROBOTS, help="which robots")
     parser.add_argument("--sets", nargs="+", default=list(SETS), choices=SETS, help="which worlds")
     given = parser.parse_args()
     drive = partial(

@@ -24,7 +24,7 @@ from szlib.encounters.near_rows import read_near_area
 from szlib.tracks import funnels
 from szlib.tracks.readers import read_raw
 
-FILES = {False: 30, True: 20_000}
+FILES = {False: 60, True: 20_000}
 FIRST_SEED = 100_000
 TIME_LIMIT = 20
 """Seconds that reading a file may take."""
