@@ -12,6 +12,7 @@ import pandas as pd
 from ..checks import check_columns
 from ..errors import DataError, warn
 from ..files import printable, read_small, reading
+from ..tracks import funnels
 from ..tracks.clock import COLUMNS
 from .geometry import PAPER_SPACE, Area, Region, Square
 
@@ -136,9 +137,10 @@ def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, n_people: in
             break
     else:
         far = width * np.array(walked.shape)
+        implausible = "".join(f"{text}; " for text in funnels.warnings(funnels.get(tracks)))
         raise DataError(
-            f"no area was found: within the {far[0]:g} m x {far[1]:g} m of these tracks there is no "
-            f"rectangle of {_MIN_WIDTH:.1f} m x {_MIN_LENGTH:.1f} m in which {n_people} people walked on "
+            f"{implausible}no area was found: within the {far[0]:g} m x {far[1]:g} m of these tracks there "
+            f"is no rectangle of {_MIN_WIDTH:.1f} m x {_MIN_LENGTH:.1f} m in which {n_people} people walked on "
             f"nearly every cell of {width:g} m; use more data, or give the area yourself: {EXPECTED}"
         )
     (x0, y0), (x1, y1) = (corner + width * first).tolist(), (corner + width * end).tolist()

@@ -20,7 +20,8 @@ from .formats import TrackFormat
 
 _MAX_SITE = 1000.0  # a wider site [m] means that millimetres were read as metres
 _MIN_SITE = 0.5  # a smaller site [m] means that metres were read as millimetres
-_FASTEST = (4.0, 6.0)  # greatest median and greatest 90 % quantile of the speed of people [m/s]
+_FASTEST = (3.0, 6.0)  # greatest median and greatest 90 % quantile of the speed of people [m/s]
+_FAST_WALK = 4.0  # greatest 90 % quantile of the speed where people certainly walk [m/s]
 _SLOWEST = 0.6  # smallest 90 % quantile of the speed of people [m/s]; less is usual only where they stand
 _SPRINT, _JUMP = 12.5, 100.0  # nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
 _LONGEST_STEP = 5.0  # longest time between two samples of a person [s]
@@ -66,8 +67,8 @@ class Motion(NamedTuple):
     def is_walking(self) -> bool:
         """Whether people certainly walk, and are sampled regularly."""
         return (
-            self.median_speed <= 3
-            and _SLOWEST <= self.high_speed <= _FASTEST[0]
+            self.median_speed <= _FASTEST[0]
+            and _SLOWEST <= self.high_speed <= _FAST_WALK
             and self.irregularity <= _REGULAR
             and 0.005 <= self.interval <= _LONGEST_STEP
             and 1 <= self.width <= _MAX_SITE

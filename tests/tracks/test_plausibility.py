@@ -39,7 +39,7 @@ def frames() -> pd.DataFrame:
 SPOILED = {
     "millimetres: pass unit='mm'": lambda: table().assign(x=lambda t: t["x"] * 1e3, y=lambda t: t["y"] * 1e3),
     "centimetres: pass unit='cm'": lambda: table().assign(x=lambda t: t["x"] * 1e2, y=lambda t: t["y"] * 1e2),
-    "feet: multiply them by 0.3048": lambda: walkers(1.3 / 0.3048),
+    "feet: multiply them by 0.3048": lambda: walkers(1.0 / 0.3048),
     "milliseconds: divide": lambda: table().assign(t=lambda t: t["t"] * 1e3),
     "milliseconds: divide them": lambda: table().assign(t=lambda t: (t["t"] + 1.7e9) * 1e3),
     "numbers of frames: pass": frames,

@@ -77,3 +77,13 @@ def test_error_names_an_address_without_scheduler(monkeypatch: pytest.MonkeyPatc
         pass
     with parallel.cluster(None) as client:
         assert client is None
+
+
+def test_inspect_says_that_nobody_walks_where_it_finds_no_area(
+    day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tracks = szlib.read_tracks(day)[["t", "id", "x", "y"]]
+    tracks[["x", "y"]] *= 0.3
+    tracks.to_csv(tmp_path / "slow.csv", index=False)
+    assert main(["inspect", str(tmp_path / "slow.csv")]) == 2
+    assert "nobody walks: the median" in capsys.readouterr().err
