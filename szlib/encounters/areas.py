@@ -140,8 +140,8 @@ def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, n_people: in
         implausible = "".join(f"{text}; " for text in funnels.warnings(funnels.get(tracks)))
         raise DataError(
             f"{implausible}no area was found: within the {far[0]:g} m x {far[1]:g} m of these tracks there "
-            f"is no rectangle of {_MIN_WIDTH:.1f} m x {_MIN_LENGTH:.1f} m in which {n_people} people walked on "
-            f"nearly every cell of {width:g} m; use more data, or give the area yourself: {EXPECTED}"
+            f"is no rectangle of {_MIN_WIDTH:.1f} m x {_MIN_LENGTH:.1f} m in which {n_people} people walked "
+            f"on nearly every cell of {width:g} m; use more data, or give the area yourself: {EXPECTED}"
         )
     (x0, y0), (x1, y1) = (corner + width * first).tolist(), (corner + width * end).tolist()
     found = Square((x0, x1), (y0, y1))
