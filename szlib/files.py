@@ -182,15 +182,23 @@ def _remove_abandoned(folder: Path) -> None:
 def folder_lock(folder: str | Path) -> Iterator[None]:
     """Reserve a claimed `folder` for this process; the lock ends with the process.
 
-    Raises StorageError where another process has reserved it.
+    Raises StorageError where another process has reserved it, or where this one may not write.
     """
+    lock = FileLock(Path(folder) / f"{_LOCK}-run", timeout=0)
     try:
-        with FileLock(Path(folder) / f"{_LOCK}-run", timeout=0):
-            yield
+        lock.acquire()
     except Timeout as error:
         raise StorageError(
             f"{folder}: another process is writing there; wait until it ends, or choose another folder"
         ) from error
+    except OSError as error:
+        raise StorageError(
+            f"{folder}: cannot be written ({error.strerror or error}); choose another folder"
+        ) from error
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 @contextmanager

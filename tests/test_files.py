@@ -95,6 +95,14 @@ def test_one_process_at_a_time_holds_the_lock_of_a_folder(tmp_path: Path) -> Non
     assert subprocess.run([sys.executable, "-c", program]).returncode == 0, "the lock ends with the block"
 
 
+def test_a_folder_of_another_user_is_refused_by_name(tmp_path: Path) -> None:
+    folder = files.claim_folder(tmp_path / "results", "results")
+    (folder / ".szlib-lock-run").mkdir()  # the lock cannot be opened, whoever runs the test
+    refused = pytest.raises(StorageError, match=r"results: cannot be written .*; choose another folder")
+    with refused, files.folder_lock(folder):
+        pass
+
+
 def make_old(path: Path) -> None:
     os.utime(path, (time.time() - 1e5,) * 2)
 
