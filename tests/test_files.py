@@ -16,7 +16,7 @@ import nbformat
 import pytest
 
 import szlib
-from szlib import files, memory
+from szlib import files, input_files, memory
 from szlib.errors import MemoryLimitError, StorageError
 from szlib.simulation.log import SimulationLog
 from szlib.tracks.interop import read_groups
@@ -199,8 +199,8 @@ def test_cached_files_that_never_end_are_not_read(tmp_path: Path) -> None:
 
 
 def test_file_names_that_are_not_text_are_escaped() -> None:
-    assert files.printable("a\udce4\nb") == r"a\xe4\nb"
-    assert files.printable("Brščić.csv") == "Brščić.csv"
+    assert input_files.printable("a\udce4\nb") == r"a\xe4\nb"
+    assert input_files.printable("Brščić.csv") == "Brščić.csv"
 
 
 @pytest.mark.parametrize(

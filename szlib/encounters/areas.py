@@ -11,7 +11,7 @@ import pandas as pd
 
 from ..checks import check_columns
 from ..errors import DataError, warn
-from ..files import printable, read_small, reading
+from ..input_files import printable, read_small, reading
 from ..tracks import funnels
 from ..tracks.clock import COLUMNS
 from .geometry import PAPER_SPACE, Area, Region, Square

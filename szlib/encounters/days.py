@@ -24,7 +24,8 @@ import pandas as pd
 from tqdm import tqdm
 
 from ..errors import DataError, DataWarning, SzlibError
-from ..files import claim_folder, printable, unchanged_files
+from ..files import claim_folder
+from ..input_files import printable, unchanged_files
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.options import ReadOptions

@@ -13,7 +13,8 @@ import pandas as pd
 
 from .. import __version__
 from ..errors import DataError, DataWarning
-from ..files import file_content, load_cached, store_cached, unchanged_files
+from ..files import load_cached, store_cached
+from ..input_files import file_content, unchanged_files
 from ..tracks import funnels
 from ..tracks.clock import read_tracks, to_clock
 from ..tracks.formats import find_format

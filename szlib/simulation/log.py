@@ -17,7 +17,8 @@ from ..control.person import Person
 from ..control.settings import MPCSettings
 from ..control.step import status_of
 from ..errors import DataError
-from ..files import open_regular, read_small, write_file
+from ..files import write_file
+from ..input_files import open_regular, read_small
 from ..zones.ellipses import Ellipse
 from .metrics import compute_metrics
 from .run import Run, nanmin

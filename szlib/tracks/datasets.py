@@ -20,7 +20,7 @@ from pathlib import Path
 import pooch
 
 from ..errors import DataError, warn
-from ..files import printable
+from ..input_files import printable
 
 SYNTHETIC = "synthetic"
 # A folder that holds `atc-1hz/` or `atc-10-days/`, to be used instead of the network.

@@ -27,7 +27,7 @@ from scipy.cluster.hierarchy import DisjointSet
 
 from ..checks import check_rows
 from ..errors import DataError, warn
-from ..files import read_small, reading
+from ..input_files import read_small, reading
 from . import funnels
 from .clock import COLUMNS, TICKS_PER_SECOND, clock_index, compute_velocities, nearest_tick
 

@@ -11,7 +11,7 @@ from zoneinfo import ZoneInfo
 import polars as pl
 
 from ..errors import DataError, warn
-from ..files import printable
+from ..input_files import printable
 from .formats import TrackFormat, find_format
 from .formats.base import CALENDAR_BEGINS, decode_line, file_stem
 from .formats.unpack import read_first_line

@@ -28,7 +28,7 @@ import pandas as pd
 
 from ..checks import check_columns
 from ..errors import DataError
-from ..files import read_small, reading
+from ..input_files import read_small, reading
 from . import funnels
 from .clock import to_clock
 from .options import ReadOptions

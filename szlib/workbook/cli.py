@@ -30,7 +30,7 @@ import psutil
 
 from .. import __version__, memory
 from ..errors import DataError, DataWarning, SzlibError
-from ..files import printable
+from ..input_files import printable
 
 # Packages of the extra `workbook`, which the commands `run` and `report` need.
 _WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbconvert", "papermill")

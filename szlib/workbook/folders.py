@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DataError
-from ..files import claim_folder, folder_purpose, printable
+from ..files import claim_folder, folder_purpose
+from ..input_files import printable
 from ..tracks import datasets
 
 # The folder of the notebooks, beside the package in the repository.

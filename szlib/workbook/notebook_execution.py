@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SzlibError
-from ..files import printable, read_json_object, temporary_folder, write_file
+from ..files import temporary_folder, write_file
+from ..input_files import printable, read_json_object
 from .record.parameters import METHOD_DEFAULTS, read_defaults
 
 # Errors caused by data, disk or memory, not by the notebook.

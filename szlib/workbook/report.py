@@ -32,7 +32,8 @@ from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 
 from ..control.settings import MPCSettings
 from ..errors import DataError, SzlibError
-from ..files import MARKER, folder_purpose, open_regular, printable, read_small, write_file
+from ..files import MARKER, folder_purpose, write_file
+from ..input_files import open_regular, printable, read_small
 from ..plaza.settings import PlazaSettings
 from ..simulation.scenario import Scenario
 from ..simulation.scenarios.paper import SCENARIOS

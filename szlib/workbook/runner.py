@@ -20,7 +20,8 @@ from tqdm import tqdm
 
 from .. import __version__, memory
 from ..errors import DataError, SzlibError
-from ..files import file_content, folder_lock, process_folder, read_json_object, write_file
+from ..files import folder_lock, process_folder, write_file
+from ..input_files import file_content, read_json_object
 from ..parallel import cluster, limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets, funnels
 from . import folders

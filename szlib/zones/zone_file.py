@@ -16,7 +16,8 @@ import pandas as pd
 
 from .. import __version__
 from ..errors import SzlibError, ZoneError
-from ..files import read_small, reading, write_file
+from ..files import write_file
+from ..input_files import read_small, reading
 from .ellipses import Ellipse
 from .hulls import HullZone
 from .polar import PolarZone

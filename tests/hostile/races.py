@@ -25,7 +25,7 @@ from unittest import mock
 
 import szlib
 from szlib.errors import SzlibError
-from szlib.files import file_content
+from szlib.input_files import file_content
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.workbook.record.data_cache import DataCache

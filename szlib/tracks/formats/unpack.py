@@ -11,7 +11,8 @@ from pathlib import Path
 
 from ... import memory
 from ...errors import DataError, StorageError
-from ...files import printable, readable_path, temporary_folder, unchanged_files
+from ...files import temporary_folder
+from ...input_files import printable, readable_path, unchanged_files
 
 LONGEST_LINE = 100_000
 # Bytes that a row takes while its file is read as a whole (measured: 100 at 1 Hz, 126 tidy).

@@ -19,7 +19,8 @@ from ...encounters.geometry import Area
 from ...encounters.one_day import require_encounters, with_area
 from ...encounters.settings import EncounterSettings
 from ...errors import DataError
-from ...files import file_content, load_cached, printable, store_cached, unchanged_files, write_checksum
+from ...files import load_cached, store_cached, write_checksum
+from ...input_files import file_content, printable, unchanged_files
 from ...plaza.generation import make_plaza
 from ...plaza.settings import PlazaSettings
 from ...tracks import datasets

@@ -16,7 +16,7 @@ from ...encounters.areas import AUTO, as_area
 from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
 from ...encounters.settings import EncounterSettings
 from ...errors import DataError, SolverError
-from ...files import printable
+from ...input_files import printable
 from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
