@@ -35,8 +35,8 @@ PUBLIC = [
     "PairCorrelation", "Person", "PlazaSettings", "OccupancyHistogram", "Region", "Respect", "SCENARIOS",
     "Scenario", "SimulationLog", "SocialZone", "SolverError", "Square", "Step", "SzlibError", "Tracker",
     "ZoneError", "as_area", "draw_costmap", "ellipse_distance", "encounter_kinds", "extract_days",
-    "find_encounters", "fit_respect", "make_plaza", "minimum_enclosing_ellipse", "null_encounters",
-    "null_test", "of_kind", "pair_correlation", "read_tracks", "remove_outliers",
+    "find_encounters", "fit_respect", "impose_zone", "make_plaza", "minimum_enclosing_ellipse",
+    "null_encounters", "null_test", "of_kind", "pair_correlation", "read_tracks", "remove_outliers",
     "respect_radius", "rollouts", "segment_distance", "simulate", "time_shifted", "walked_area",
 ]  # fmt: skip
 PROMISED = [

@@ -75,6 +75,23 @@ def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame
     >>> list(paths.columns)
     ['encounter', 't', 'ref_x', 'ref_y', 'other_x', 'other_y']
     """
+    ref, oth = match_rows(tracks, samples)
+    opening = ref.groupby("encounter")["tick"].transform("idxmin").to_numpy()
+    x, y, vx, vy = (ref[name].to_numpy()[opening] for name in ("x", "y", "vx", "vy"))
+    cos, sin = np.cos(np.arctan2(vy, vx)), np.sin(np.arctan2(vy, vx))
+    out = {"encounter": samples["encounter"].to_numpy(), "t": samples["t"].to_numpy()}
+    for person, rows in (("ref", ref), ("other", oth)):
+        dx, dy = rows["x"].to_numpy() - x, rows["y"].to_numpy() - y
+        out |= {f"{person}_x": cos * dx + sin * dy, f"{person}_y": cos * dy - sin * dx}
+    return pd.DataFrame(out)
+
+
+def match_rows(tracks: pd.DataFrame, samples: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The rows of `tracks` of the reference pedestrian and of the other person, for each of `samples`.
+
+    Both tables have the columns encounter, tick, x, y [m], vx, vy [m/s], in the order of the samples.  Raises
+    DataError as `reference_frame`.
+    """
     check_columns(tracks, COLUMNS)
     check_columns(samples, SAMPLE_COLUMNS[:5])
     people = tracks[tracks["id"].isin(samples["ref_id"]) | tracks["id"].isin(samples["other_id"])]
@@ -91,11 +108,4 @@ def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame
     is_known = ref["x"].notna() & oth["x"].notna()
     expected = "this sample is not in these tracks; pass the tracks it was found in"
     check_rows(samples, is_known, SAMPLE_COLUMNS[:5], expected)
-    opening = ref.groupby("encounter")["tick"].transform("idxmin").to_numpy()
-    x, y, vx, vy = (ref[name].to_numpy()[opening] for name in ("x", "y", "vx", "vy"))
-    cos, sin = np.cos(np.arctan2(vy, vx)), np.sin(np.arctan2(vy, vx))
-    out = {"encounter": samples["encounter"].to_numpy(), "t": samples["t"].to_numpy()}
-    for person, rows in (("ref", ref), ("other", oth)):
-        dx, dy = rows["x"].to_numpy() - x, rows["y"].to_numpy() - y
-        out |= {f"{person}_x": cos * dx + sin * dy, f"{person}_y": cos * dy - sin * dx}
-    return pd.DataFrame(out)
+    return ref, oth

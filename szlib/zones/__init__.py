@@ -13,6 +13,7 @@ respect_significance  the test of the data against its null model
 uncertainty           encounters by side, and confidence intervals by resampling people
 zone_file             the JSON file of a social zone
 social_zone           `SocialZone`: all of it behind one name
+imposed_zone          a known zone on recorded paths, to test estimators with: `impose_zone`
 costmaps              zones around people as a costmap, for navigation stacks
 sensitivity           the zone with each parameter of the method varied alone
 """
@@ -21,6 +22,7 @@ from .costmaps import Grid, draw_costmap
 from .ellipses import BODY_RADIUS, Ellipse, circle_around
 from .enclosing_ellipse import minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
 from .hulls import HullZone, hull_vertices, slice_hull
+from .imposed_zone import PairedSamples, impose_zone
 from .occupancy import OccupancyHistogram, PairCorrelation, pair_correlation
 from .outliers import complementary_points, is_outlier, remove_outliers
 from .polar import PolarZone
@@ -31,8 +33,8 @@ from .uncertainty import count_by_side
 
 __all__ = [
     "BODY_RADIUS", "Ellipse", "Grid", "HullZone", "NullTest", "OccupancyHistogram", "PairCorrelation",
-    "PolarZone", "Respect", "SocialZone", "circle_around", "complementary_points", "count_by_side",
-    "draw_costmap", "fit_respect", "hull_vertices", "is_outlier", "minimum_enclosing_ellipse",
-    "minimum_enclosing_ellipse_of_curve", "null_test", "pair_correlation", "remove_outliers",
-    "respect_radius", "slice_hull",
+    "PairedSamples", "PolarZone", "Respect", "SocialZone", "circle_around", "complementary_points",
+    "count_by_side", "draw_costmap", "fit_respect", "hull_vertices", "impose_zone", "is_outlier",
+    "minimum_enclosing_ellipse", "minimum_enclosing_ellipse_of_curve", "null_test", "pair_correlation",
+    "remove_outliers", "respect_radius", "slice_hull",
 ]  # fmt: skip

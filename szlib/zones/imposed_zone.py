@@ -1,0 +1,141 @@
+"""A known zone on recorded paths: people who keep out of each other's zone, where nobody did.
+
+The paths are those of a `time_shifted` crowd, in which people meet by chance. Each person carries the same
+ellipse, turned with their motion. The pairs in which one person enters the other's ellipse are removed, but
+for a share of careless pairs. So the paths, speeds and density are those of the site, and the zone is known:
+an estimator must find it.
+
+A person slower than `WALKING` has no direction of motion, and so no zone at that moment. The other person's
+zone applies all the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ..checks import Array, require
+from ..encounters.finding import find_encounters
+from ..encounters.kinds import WALKING
+from ..encounters.samples import match_rows
+from ..encounters.settings import EncounterSettings
+from ..encounters.time_shift import MINUTES, time_shifted
+from ..errors import ZoneError
+from ..tracks import funnels
+from .ellipses import Ellipse
+
+
+def impose_zone(
+    tracks: pd.DataFrame,
+    ellipse: Ellipse,
+    *,
+    careless: float = 0.0,
+    seed: int | Sequence[int] = 0,
+    minutes: tuple[float, float] = MINUTES,
+    settings: EncounterSettings | None = None,
+    kinds: str | Iterable[str] | None = None,
+    **parameters: Any,
+) -> pd.DataFrame:
+    """Find the encounters of a time-shifted crowd in which people keep out of each other's zone.
+
+    Parameters
+    ----------
+    tracks : a track table as from `szlib.read_tracks` (left untouched).
+    ellipse : the zone of each person, in the person's frame: x along the motion, y to the left [m].
+    careless : share of the pairs of people who ignore the zone, 0 to 1.
+    seed : of the time shifts and of the careless pairs.
+    minutes : as in `szlib.time_shifted`.
+    settings, kinds, parameters : as in `szlib.find_encounters`.
+
+    Returns
+    -------
+    Samples as from `szlib.find_encounters`. All encounters of a pair are removed if, at any sample of one of
+    them, one person is inside the other's ellipse and the pair is not careless. The others keep their
+    numbers. The funnel counts the encounters that are removed.
+
+    Raises
+    ------
+    DataError : as `szlib.time_shifted` and `szlib.find_encounters`; or `careless` is no share.
+    ZoneError : `ellipse` is not an `Ellipse`.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=200))
+    >>> tracks, zone = szlib.read_tracks(plaza), szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+    >>> samples = szlib.impose_zone(tracks, zone, minutes=(1, 3), min_distance=0.5)
+    >>> bool(samples["distance"].min() > 0.6)
+    True
+    """
+    shifted = time_shifted(tracks, seed=seed, minutes=minutes)
+    samples = find_encounters(shifted, settings=settings, kinds=kinds, **parameters)
+    return PairedSamples.from_tracks(shifted, samples).impose(ellipse, careless=careless, seed=seed)
+
+
+@dataclass(frozen=True, eq=False)
+class PairedSamples:
+    """Samples of encounters in the frames of both people: many zones can be imposed on them quickly.
+
+    Attributes
+    ----------
+    samples : as from `szlib.find_encounters`, n rows.
+    pair : number of the pair of people of each sample, shape (n,), the same whoever is the reference.
+    points : position of the other person in the frame of the reference pedestrian, and of the reference
+        pedestrian in the frame of the other, shape (2, n, 2) [m]; NaN where a person stands.
+    """
+
+    samples: pd.DataFrame
+    pair: NDArray[np.intp]
+    points: Array
+
+    @classmethod
+    def from_tracks(cls, tracks: pd.DataFrame, samples: pd.DataFrame) -> PairedSamples:
+        """Prepare `samples` (or some of them) that were found in `tracks`.
+
+        Raises DataError if a column is missing, there is no track, or a sample is not in the tracks.
+        """
+        people = np.sort(samples[["ref_id", "other_id"]].to_numpy(), axis=1)
+        names = {"day": samples["day"].to_numpy(), "one": people[:, 0], "two": people[:, 1]}
+        pair = pd.DataFrame(names).groupby([*names], observed=True).ngroup()
+        points = np.empty((2, len(samples), 2))
+        if len(samples):
+            ref, other = match_rows(tracks, samples)
+            for k, (own, partner) in enumerate(((ref, other), (other, ref))):
+                vx, vy, dx, dy = (
+                    rows.to_numpy(float)
+                    for rows in (own["vx"], own["vy"], partner["x"] - own["x"], partner["y"] - own["y"])
+                )
+                speed = np.hypot(vx, vy)
+                speed[speed < WALKING] = np.nan
+                points[k] = np.column_stack([dx * vx + dy * vy, dy * vx - dx * vy]) / speed[:, None]
+        return cls(samples, np.asarray(pair, np.intp), points)
+
+    def pairs_inside(self, ellipse: Ellipse) -> NDArray[np.bool_]:
+        """Whether, at any sample of each pair, one person is inside the other's `ellipse`; (pairs,)."""
+        require(isinstance(ellipse, Ellipse), "ellipse", ellipse, "an Ellipse", ZoneError)
+        inside = np.zeros(int(self.pair.max(initial=-1)) + 1, bool)
+        inside[self.pair[(ellipse.level(self.points) < 1).any(axis=0)]] = True
+        return inside
+
+    def impose(
+        self, ellipse: Ellipse, *, careless: float = 0.0, seed: int | Sequence[int] = 0
+    ) -> pd.DataFrame:
+        """The samples without the pairs that enter the zone; result and errors as in `impose_zone`.
+
+        `careless` is the share of pairs that ignore the `ellipse`, drawn with `seed`: those of a smaller
+        share are among those of a larger one.
+        """
+        require(0 <= careless <= 1, "careless", careless, "a share of pairs, 0 to 1")
+        inside = self.pairs_inside(ellipse)
+        rng = np.random.default_rng([*np.atleast_1d(seed), 1])  # not the numbers of the time shifts
+        removed = inside & (rng.random(len(inside)) >= careless)
+        kept = self.samples[~removed[self.pair]].copy()
+        before, after = (table["encounter"].nunique() for table in (self.samples, kept))
+        reasons = {"one person enters the other's zone": before - after}
+        stage = funnels.stage("encounters: zone imposed", before, after, reasons)
+        return funnels.attach(kept, [*funnels.get(self.samples), stage])
