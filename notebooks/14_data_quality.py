@@ -41,6 +41,8 @@ import szlib
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
 from szlib.tracks import funnels, quality
+from szlib.tracks.formats import find_format
+from szlib.tracks.formats.base import CALENDAR_BEGINS
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 
@@ -75,7 +77,8 @@ if record.cache.is_synthetic:
         settings = PlazaSettings(n_encounters=encounters, standing=standing, date=date)
         files.append(make_plaza(file, seed=seed + day + 1, settings=settings))
 seconds = pd.concat([quality.summarise_seconds(file).assign(file=file.name) for file in files])
-print(f"{len(files)} files, {seconds['rows'].sum():,} rows, {len(seconds):,} person-seconds")
+zone = find_format(files[0], szlib.ReadOptions()).tz  # of the clock: that of the mall, or UTC
+print(f"{len(files)} files, {seconds['rows'].sum():,} rows, {len(seconds):,} person-seconds; clock: {zone}")
 
 # %% [markdown]
 # ## What the velocity column says
@@ -109,7 +112,7 @@ table = table.agg(
     median_length=("length", "median"),
 )
 for name in ("opens", "closes"):
-    local = pd.to_datetime(table[name], unit="s", utc=True).dt.tz_convert("Asia/Tokyo")
+    local = pd.to_datetime(table[name], unit="s", utc=True).dt.tz_convert(zone)
     table[name] = local.dt.strftime("%H:%M:%S")
 table
 
@@ -146,9 +149,12 @@ record.figure(ax.figure, "tracks")
 # stand beside the dates: a Sunday is no event.
 
 # %%
-hours = quality.count_visits_by_hour(seconds)
+has_dates = seconds["second"].min() > CALENDAR_BEGINS
+recordings = {"": seconds} if has_dates else dict(list(seconds.groupby("file")))
+counted = {name: quality.count_visits_by_hour(part, tz=zone) for name, part in recordings.items()}
+hours = pd.concat(part if has_dates else part.assign(day=name) for name, part in counted.items())
 days = hours.groupby("day", as_index=False).agg(visits=("visits", "sum"), standing=("standing", "mean"))
-names = pd.to_datetime(days["day"]).dt.strftime("%a %Y-%m-%d")
+names = pd.to_datetime(days["day"]).dt.strftime("%a %Y-%m-%d") if has_dates else days["day"]
 event = days["standing"] > 2 * days["standing"].median()
 size = (10, 0.5 * len(days) + 1.6)
 figure, panels = plt.subplots(1, 2, figsize=size, layout="constrained", sharey=True)
@@ -181,7 +187,7 @@ for (day, rows), colour, marker in lines:
         ax.plot(rows["hour"], rows[column], f"{marker}-", color=colour, label=day)
 for ax, title in zip(panels, ("visits", "standing"), strict=True):
     ax.plot(mall["hour"], mall[title], "o:", color=figures.GREY, label="ATC mall", zorder=0)
-    ax.set(xlabel="hour of the day", ylabel="people", xticks=range(9, 22), ylim=(0, None))
+    ax.set(xlabel="hour of the day", ylabel="people", ylim=(0, None))
 panels[0].set_title("Visits in the hour")
 panels[1].set_title("People who stand, mean")
 figures.add_shared_legend(panels)
@@ -193,7 +199,7 @@ record.figure(figure, "hours")
 # The same as `szlib inspect FILE` prints; over all days, each stage added up.
 
 # %%
-conditions = record.cache.method.encounter_settings()
+conditions = record.cache.method.encounter_settings(record.cache.find_area())
 extraction = szlib.extract_days(
     files, out=record.out / "days", exclude=exclude, progress=False, settings=conditions
 )

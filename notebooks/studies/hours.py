@@ -22,7 +22,7 @@ SMALL = szlib.PlazaSettings(n_encounters=150)
 def count_visits(files: Iterable[Path]) -> pd.DataFrame:
     """Visits and the mean number of people who stand, by the hour, of one day in these files."""
     seconds = pd.concat([quality.summarise_seconds(file) for file in files])
-    return quality.count_visits_by_hour(seconds)[["hour", "visits", "standing"]]
+    return quality.count_visits_by_hour(seconds, tz="Asia/Tokyo")[["hour", "visits", "standing"]]
 
 
 def of_plaza() -> pd.DataFrame:

@@ -42,7 +42,8 @@ class ReadOptions:
         column frame.
     max_gap : a longer gap between two samples ends a track [s], more than 0.1; None takes the format's (ATC
         raw 0.5, ATC 1 Hz 1.6; EWAP 2.25 sampling intervals; tidy 4 of them, at least 0.5 and at most 5).
-    tz : time zone whose calendar gives the day of a time stamp (ATC: Japan).
+    tz : time zone whose calendar gives the day of a time stamp, and of times without a zone; None takes the
+        format's (ATC: Asia/Tokyo; others: UTC).
 
     Raises
     ------
@@ -65,7 +66,7 @@ class ReadOptions:
     frame_rate: float | None = None
     columns: Columns | None = None
     max_gap: float | None = None
-    tz: str = "Asia/Tokyo"
+    tz: str | None = None
 
     def __post_init__(self) -> None:
         rate, gap = self.frame_rate, self.max_gap
@@ -85,7 +86,8 @@ class ReadOptions:
             )
         require(gap is None or gap > SHORTEST_GAP, "max_gap", gap, "longer than the clock's 0.1 s")
         try:
-            ZoneInfo(self.tz)
-            pl.select(pl.from_epoch(pl.lit(0)).dt.convert_time_zone(self.tz))
+            zone = "UTC" if self.tz is None else self.tz
+            ZoneInfo(zone)
+            pl.select(pl.from_epoch(pl.lit(0)).dt.convert_time_zone(zone))
         except (KeyError, ValueError, OSError, pl.exceptions.PolarsError) as error:
             raise DataError(f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'") from error

@@ -105,7 +105,7 @@ def _usable_rows(layout: TrackFormat, scan: pl.LazyFrame) -> pl.LazyFrame:
     return scan.filter(layout.rejection_reason().is_null()).with_columns(time, place, id="exact_id")
 
 
-def count_visits_by_hour(rows: pd.DataFrame, *, tz: str = "Asia/Tokyo") -> pd.DataFrame:
+def count_visits_by_hour(rows: pd.DataFrame, *, tz: str = "UTC") -> pd.DataFrame:
     """Count visits and standing people in each hour.
 
     Parameters
@@ -122,7 +122,7 @@ def count_visits_by_hour(rows: pd.DataFrame, *, tz: str = "Asia/Tokyo") -> pd.Da
     >>> import pandas as pd
     >>> from szlib.tracks import count_visits_by_hour
     >>> rows = pd.DataFrame({"id": [1, 1, 2], "second": [0.0, 1.0, 1.0], "moved": [0.0, 0.0, 1.3]})
-    >>> count_visits_by_hour(rows, tz="UTC")
+    >>> count_visits_by_hour(rows)
               day  hour  visits  standing
     0  1970-01-01     0       2       1.0
     """

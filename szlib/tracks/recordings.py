@@ -123,10 +123,11 @@ def find_day(path: Path, options: ReadOptions) -> str | None:
     """The calendar day on which file `path`, read with `options`, begins; None where its format has none."""
     first = decode_line(read_first_line(path))
     try:
-        time = find_format(path, options).first_time(path, first)
+        layout = find_format(path, options)
+        time = layout.first_time(path, first)
         if time is None or not time >= CALENDAR_BEGINS:
             return None
-        return datetime.fromtimestamp(time, ZoneInfo(options.tz)).strftime("%Y-%m-%d")
+        return datetime.fromtimestamp(time, ZoneInfo(options.tz or layout.tz)).strftime("%Y-%m-%d")
     except (ValueError, OverflowError, OSError):  # a damaged first row
         return None
 

@@ -42,7 +42,7 @@ def test_seconds_have_sensor_speed_and_displacement(day: Path) -> None:
 
 
 def test_visits_and_standing_people_are_counted_by_hour(day: Path) -> None:
-    table = quality.count_visits_by_hour(quality.summarise_seconds(day))
+    table = quality.count_visits_by_hour(quality.summarise_seconds(day), tz="Asia/Tokyo")
     assert table[["day", "hour", "visits"]].to_numpy().tolist() == [
         ["2012-10-24", 10, 1],
         ["2012-10-24", 11, 1],

@@ -135,12 +135,15 @@ def test_files_of_one_day_are_merged(tmp_path: Path) -> None:
     assert [s["entered"] for s in funnels.get(together)] == [30, 30, 30, 90]
 
 
-def test_the_day_is_the_date_in_tokyo(tmp_path: Path) -> None:
+def test_the_day_of_the_mall_is_the_date_in_tokyo_of_others_in_utc(tmp_path: Path) -> None:
     midnight = pd.Timestamp("2012-10-25", tz="Asia/Tokyo").timestamp()
     path = write(tmp_path / "atc-20200101.csv", as_1hz(samples(people=1, count=4, begin=midnight - 0.8)))
     frame = read_raw(path)
     assert frame["day"].astype(str).tolist() == ["2012-10-24"] * 2 + ["2012-10-25"] * 2
     assert set(read_raw(path, options=szlib.ReadOptions(tz="UTC"))["day"]) == {"2012-10-24"}
+    table = write(tmp_path / "hall.csv", as_tidy(samples(people=1, count=4, begin=midnight - 0.8)))
+    assert set(read_raw(table)["day"]) == {"2012-10-24"}
+    assert read_raw(table, options=szlib.ReadOptions(tz="Asia/Tokyo"))["day"].nunique() == 2
     with pytest.raises(szlib.DataError, match="unknown time zone 'Mars/Olympus'"):
         read_raw(path, options=szlib.ReadOptions(tz="Mars/Olympus"))
 
@@ -358,7 +361,8 @@ def test_parquet_times_with_a_type_are_read_in_seconds(
 ) -> None:
     rows = samples(begin=BEGIN)
     rows.assign(t=times(rows["t"])).to_parquet(tmp_path / "a.parquet")
-    read, expected = read_raw(tmp_path / "a.parquet"), read_raw(rows)
+    japan = szlib.ReadOptions(tz="Asia/Tokyo")
+    read, expected = read_raw(tmp_path / "a.parquet", options=japan), read_raw(rows)
     np.testing.assert_allclose(read["t"], expected["t"], rtol=0, atol=1e-6)
     assert list(read["id"]) == list(expected["id"])
 

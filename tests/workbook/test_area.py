@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import partial
 
+import jupytext
 import pandas as pd
 import pytest
 import shapely
@@ -12,6 +13,7 @@ from helpers.track_tables import make_crowd, make_hall, make_tracks, make_walk
 
 import szlib
 from szlib.encounters.one_day import require_encounters
+from szlib.workbook import folders
 from szlib.workbook.cli import main
 from szlib.workbook.record import NotebookRecord
 
@@ -108,6 +110,24 @@ def test_given_area_is_used(hall, tmp_path):
     assert record_of(tmp_path, hall, area=HALL.buffer(1).wkt).cache.find_area() == szlib.as_area(
         HALL.buffer(1)
     )
+
+
+def test_data_quality_is_of_the_area_and_the_clock_of_the_run(tmp_path, monkeypatch):
+    """Notebook 14 counts the funnel in the area of the run, and hours by the clock of the file."""
+    file, notebook = tmp_path / "few.csv", folders.NOTEBOOKS / "14_data_quality.py"
+    rows = make_hall(people=20)[["t", "id", "x", "y"]]
+    rows.assign(t=rows["t"] + pd.Timestamp("2024-05-07 13:00").timestamp()).to_csv(file, index=False)
+    variables = {}
+    needed = ("import szlib", "seed =", "NotebookRecord(", "files =", "count_visits", "extract_days")
+    monkeypatch.chdir(notebook.parent)
+    for cell in jupytext.read(notebook).cells:
+        if cell.cell_type == "code" and any(word in cell.source for word in needed):
+            exec(cell.source, variables)
+        if "parameters" in cell.metadata.get("tags", []):
+            variables |= {"data": [str(file)], "area": "0 11 0 7", "results": str(tmp_path / "out")}
+    assert str(variables["extraction"].area) == "0.0 11.0 0.0 7.0"
+    assert len(variables["extraction"].failed) == 0
+    assert variables["hours"]["hour"].tolist() == [13]
 
 
 # --- where nobody met --------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from zoneinfo import ZoneInfo
 
 from .base import TrackFormat
 
-_DAY, _JAPAN = 86_400.0, ZoneInfo("Asia/Tokyo")
+_DAY, _JAPAN = 86_400.0, "Asia/Tokyo"
 # Central square of the mall, (lowest, highest) x and y [m] (assumed; free of pillars, walls and queues).
 ATC_AREA = ((-18.5, -7.5), (-10.0, 8.0))
 _COLUMNS = {"t": 0, "id": 1, "x": 2, "y": 3}
@@ -19,6 +19,7 @@ _COLUMNS = {"t": 0, "id": 1, "x": 2, "y": 3}
 class _AtcRaw(TrackFormat):
     """Rows of 8 numbers: time [s], id, x, y, z [mm], speed [mm/s], two angles."""
 
+    tz = _JAPAN
     area = ATC_AREA
     is_streamed = True
     speed_field = (5, 1e-3)
@@ -42,11 +43,11 @@ class _Atc1Hz(_AtcRaw):
         The ATC days of LaCE-LHMP, ``MMDD.csv`` of 2012, may count from the start of the day, in Japan.
         """
         try:
-            day = datetime.strptime(f"2012{path.name.split('.')[0]}", "%Y%m%d").replace(tzinfo=_JAPAN)
+            day = datetime.strptime(f"2012{path.name.split('.')[0]}", "%Y%m%d")
             since = float(first.split(self.separator)[self.columns["t"]])
         except ValueError:  # named otherwise, or the first row is damaged
             return 0.0
-        return day.timestamp() if 0 <= since < _DAY else 0.0
+        return day.replace(tzinfo=ZoneInfo(_JAPAN)).timestamp() if 0 <= since < _DAY else 0.0
 
 
 ATC_RAW = _AtcRaw("atc-raw", n_fields=8, columns=_COLUMNS, metres=1e-3, max_gap=0.5)

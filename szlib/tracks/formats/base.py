@@ -43,6 +43,7 @@ class TrackFormat:
 
     Each class sets, for all its files:
 
+    tz : time zone of its calendar, unless `ReadOptions` give one.
     area : area in which encounters are looked for unless another is given: (lowest, highest) x and y [m].
     is_ambiguous : whether a file in other units or with other columns can look the same; speeds are checked.
     is_streamed : whether files are too large to be read as a whole.
@@ -62,6 +63,7 @@ class TrackFormat:
     has_header: bool = False
     start: float = 0.0
 
+    tz: ClassVar[str] = "UTC"
     area: ClassVar[tuple[tuple[float, float], tuple[float, float]] | None] = None
     is_ambiguous: ClassVar[bool] = False
     is_streamed: ClassVar[bool] = False
@@ -131,15 +133,16 @@ class TrackFormat:
             reasons["no day"] = pl.col("day").is_null()
         return pl.coalesce(pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons.items())
 
-    def to_metres(self, good: pl.DataFrame, path: Path, tz: str) -> pl.DataFrame:
+    def to_metres(self, good: pl.DataFrame, path: Path, tz: str | None) -> pl.DataFrame:
         """Convert the `good` rows of file `path` to day, id, t [s], x, y [m].
 
-        The day is the date in time zone `tz`, or the file's name where its clock does not count from 1970.
+        The day is the date in time zone `tz` (None: the format's), or the file's name where its clock does
+        not count from 1970.
         """
         if "day" not in good.columns:
             last = good["t"].max()
             is_named = self.is_sequence or (isinstance(last, float) and last * self.seconds < CALENDAR_BEGINS)
-            day = pl.lit(file_stem(path)) if is_named else _find_days(good["t"], tz)
+            day = pl.lit(file_stem(path)) if is_named else _find_days(good["t"], tz or self.tz)
             good = good.with_columns(day=day)
         units = {"t": self.seconds, "x": self.metres, "y": self.metres}
         numbers = (pl.col(name) if unit == 1 else pl.col(name) * unit for name, unit in units.items())

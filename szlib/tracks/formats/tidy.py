@@ -107,7 +107,8 @@ class _TidyParquet(_TidyText):
             raise DataError(f"{path}: damaged Parquet ({error}); fetch or write the file again") from error
         rows = pl.DataFrame(named)
         if isinstance(rows["t"].dtype, pl.Datetime | pl.Duration | pl.Date):
-            rows = rows.with_columns(t=pl.Series(_convert_times(rows["t"].to_pandas(), options.tz)))
+            times = _convert_times(rows["t"].to_pandas(), options.tz or self.tz)
+            rows = rows.with_columns(t=pl.Series(times))
         return found, scan_table(rows)
 
 
@@ -136,7 +137,7 @@ def open_table(source: Any, where: Path, options: ReadOptions) -> tuple[TrackFor
     shown = f"{where}: a table of {', '.join(names[:12])}"
     found = TIDY.with_columns(names, options, shown)
     rows = {name: source.iloc[:, at] for name, at in found.columns.items()}
-    rows["t"] = _convert_times(rows["t"], options.tz)
+    rows["t"] = _convert_times(rows["t"], options.tz or found.tz)
     rows |= {name: pd.to_numeric(rows[name], errors="coerce") for name in ("t", "id", "x", "y")}
     if "day" in rows:
         rows["day"] = rows["day"].astype("string")
