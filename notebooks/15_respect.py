@@ -53,7 +53,7 @@ parameters(
     [
         (
             "shift of each person",
-            "1 to 10 min, either way",
+            "1 to 10 min, either way; less in a recording of less than 11 min",
             ASSUMED,
             "longer than a meeting, shorter than the day's changes",
         ),

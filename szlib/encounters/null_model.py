@@ -24,7 +24,7 @@ from .finding import find_encounters
 from .geometry import ATC_SQUARE
 from .kinds import of_kind
 from .settings import EncounterSettings
-from .time_shift import MINUTES, ShiftableTracks
+from .time_shift import ShiftableTracks
 
 CLOSE = 2.0  # samples farther away [m] do not belong to a zone (paper: r_max)
 
@@ -76,7 +76,7 @@ def null_encounters(
     *,
     shifts: int = 100,
     seed: int = 0,
-    minutes: tuple[float, float] = MINUTES,
+    minutes: tuple[float, float] | None = None,
     r_max: float = CLOSE,
     settings: EncounterSettings | None = None,
     kinds: str | Iterable[str] | None = None,
@@ -133,7 +133,9 @@ def null_encounters(
         for part in run_tasks([joblib.delayed(find)(batch) for batch in batches], n_jobs=n_jobs):
             found |= part
             bar.update(len(part))
-    made_by = {"shifts": shifts, "seed": seed, "minutes": list(minutes), "companions": companions}
+    by_day = people.minutes_by_day(minutes)
+    of_all = [float(by_day[:, 0].min()), float(by_day[:, 1].max())]
+    made_by = {"shifts": shifts, "seed": seed, "minutes": of_all, "companions": companions}
     parameters = {**made_by, "kinds": kinds, **settings.as_json()}
     return NullEncounters(*_concatenate(found), shifts, float(r_max), parameters)
 
@@ -141,7 +143,7 @@ def null_encounters(
 def _find_shifted(
     people: ShiftableTracks,
     seed: int,
-    minutes: tuple[float, float],
+    minutes: tuple[float, float] | None,
     r_max: float,
     settings: EncounterSettings,
     kinds: str | Iterable[str] | None,

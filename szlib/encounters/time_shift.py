@@ -30,7 +30,8 @@ from .kinds import NEAR, TOGETHER
 from .near_rows import is_near
 from .occupants import TrackRows
 
-# Shortest and longest shift [min]: longer than a meeting, shorter than the day's ups and downs (assumed).
+# Shortest and longest shift [min]: longer than a meeting, shorter than the day's ups and downs (assumed).  A
+# recording shorter than their sum has both in proportion: 0.55 and 5.5 min in 6 min.
 MINUTES = (1.0, 10.0)
 # Smallest difference between the shifts of companions [s] (assumed: some 10 m of walking).
 COMPANION_SEPARATION = 10.0
@@ -40,7 +41,7 @@ _ATTEMPTS = 1000  # number of times that shifts of companions are drawn again wh
 
 
 def time_shifted(
-    tracks: pd.DataFrame, *, seed: int | Sequence[int] = 0, minutes: tuple[float, float] = MINUTES
+    tracks: pd.DataFrame, *, seed: int | Sequence[int] = 0, minutes: tuple[float, float] | None = None
 ) -> pd.DataFrame:
     """Move each person in time by an amount of their own: paths and density stay, interaction is removed.
 
@@ -49,6 +50,7 @@ def time_shifted(
     tracks : a track table as from `szlib.read_tracks` (any row order, left untouched).
     seed : of the random shifts.
     minutes : shortest and longest shift [min], forward or backward; every tick in between is equally likely.
+        None takes 1 and 10 min, and in a recording shorter than 11 min both in proportion.
 
     Returns
     -------
@@ -58,14 +60,14 @@ def time_shifted(
     Raises
     ------
     DataError : as `szlib.find_encounters`; or `minutes` has no meaning, is too long for a recording, or too
-        narrow to separate companions.
+        narrow to separate companions; or a recording is shorter than 1.8 min and `minutes` is None.
 
     Examples
     --------
     >>> import numpy as np, pandas as pd, szlib
     >>> t = np.arange(0, 600, 0.1).round(1)
     >>> walk = pd.DataFrame({"day": "a", "id": 1, "t": t, "x": 0.1 * t, "y": 0.0, "vx": 0.1, "vy": 0.0})
-    >>> moved = szlib.time_shifted(walk, seed=1, minutes=(1, 3))
+    >>> moved = szlib.time_shifted(walk, seed=1)
     >>> len(walk) - len(moved) <= 1
     True
     """
@@ -113,30 +115,41 @@ class ShiftableTracks:
         table = funnels.attach(self.table[near].reset_index(drop=True), [stage])
         return replace(self, table=table, person=self.person[near], tick=self.tick[near])
 
-    def draw_shifts(self, seed: int | Sequence[int], minutes: tuple[float, float]) -> np.ndarray:
+    def minutes_by_day(self, minutes: tuple[float, float] | None) -> np.ndarray:
+        """Shortest and longest shift of each day [min], (n, 2); `minutes` and errors as in `time_shifted`."""
+        low, high = (float(m) for m in minutes or MINUTES)
+        is_range = 1 / _MINUTE <= low <= high < np.inf
+        require(is_range, "minutes", minutes, "(shortest, longest), both positive")
+        recorded = (self.period - 1) / _MINUTE
+        share, lasts = np.minimum(recorded / (low + high), 1), float(recorded.min())
+        if minutes is not None and lasts < low + high:
+            raise DataError(
+                f"a day was recorded for {lasts:.1f} min, too short for shifts of up to {high:g} min: "
+                f"around its circle they come back to less than {low:g} min; leave minutes out"
+            )
+        if minutes is None and low * share.min() < COMPANION_SEPARATION / 60:
+            raise DataError(
+                f"a day was recorded for {lasts:.1f} min, too short for a null model, which moves people by "
+                f"{COMPANION_SEPARATION:g} s and more; leave out recordings shorter than 2 min"
+            )
+        return np.outer(share, (low, high))
+
+    def draw_shifts(self, seed: int | Sequence[int], minutes: tuple[float, float] | None) -> np.ndarray:
         """Draw a shift for each person [ticks]; companions are separated.
 
         `seed`, `minutes` and errors as in `time_shifted`.
         """
-        low, high = (float(m) for m in minutes)
-        is_range = 1 / _MINUTE <= low <= high < np.inf
-        require(is_range, "minutes", minutes, "(shortest, longest), both positive")
-        recorded = (self.period - 1) / _MINUTE
-        if (short := recorded < low + high).any():
-            lasts = float(recorded[short].min())
-            raise DataError(
-                f"a day was recorded for {lasts:.1f} min, too short for shifts of up to {high:g} min: "
-                f"around its circle they come back to less than {low:g} min; pass shorter ones, such as "
-                f"minutes=({lasts / 20:.2g}, {lasts / 3:.2g})"
-            )
+        by_day = self.minutes_by_day(minutes)
+        low, high = minutes or MINUTES
+        share = (by_day[:, 1] / high)[self.day]
         rng = np.random.default_rng(seed)
 
-        def draw(n_people: int) -> np.ndarray:
-            """Shifts of `n_people`, earlier or later by `minutes` [ticks]."""
-            ticks = rng.integers(round(low * _MINUTE), round(high * _MINUTE), n_people, endpoint=True)
-            return np.asarray(ticks * rng.choice([-1, 1], n_people))
+        def draw(people: np.ndarray) -> np.ndarray:
+            """Shifts of `people`, earlier or later [ticks]."""
+            ticks = rng.integers(round(low * _MINUTE), round(high * _MINUTE), len(people), endpoint=True)
+            return np.asarray(np.rint(ticks * share[people]).astype(int) * rng.choice([-1, 1], len(people)))
 
-        shift = draw(len(self.day))
+        shift = draw(np.arange(len(self.day)))
         one, other = self.companions.T
         around = self.period[self.day[one]]
         for _ in range(_ATTEMPTS):
@@ -145,10 +158,12 @@ class ShiftableTracks:
             if not similar.any():
                 return shift
             redrawn = np.unique(other[similar])
-            shift[redrawn] = draw(len(redrawn))
+            shift[redrawn] = draw(redrawn)
+        shortest, longest = by_day[:, 0].min(), by_day[:, 1].max()
         raise DataError(
-            f"with shifts of {low:g} to {high:g} min, {int(similar.sum())} pairs of companions could not be "
-            f"separated by {COMPANION_SEPARATION:g} s; pass a wider range of minutes"
+            f"with shifts of {shortest:.2g} to {longest:.2g} min, {int(similar.sum())} pairs of companions "
+            f"could not be separated by {COMPANION_SEPARATION:g} s; "
+            + ("use a longer recording" if minutes is None else "leave minutes out, for a wider range")
         )
 
     def shift(self, shift: np.ndarray) -> pd.DataFrame:

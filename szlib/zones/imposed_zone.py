@@ -24,7 +24,7 @@ from ..encounters.finding import find_encounters
 from ..encounters.kinds import WALKING
 from ..encounters.samples import match_rows
 from ..encounters.settings import EncounterSettings
-from ..encounters.time_shift import MINUTES, time_shifted
+from ..encounters.time_shift import time_shifted
 from ..errors import ZoneError
 from ..tracks import funnels
 from .ellipses import Ellipse
@@ -36,7 +36,7 @@ def impose_zone(
     *,
     careless: float = 0.0,
     seed: int | Sequence[int] = 0,
-    minutes: tuple[float, float] = MINUTES,
+    minutes: tuple[float, float] | None = None,
     settings: EncounterSettings | None = None,
     kinds: str | Iterable[str] | None = None,
     **parameters: Any,

@@ -170,10 +170,42 @@ def test_passing_people_are_no_companions() -> None:
 # --- errors ------------------------------------------------------------------------------------------
 
 
-def test_short_recording_error_suggests_minutes(tracks: pd.DataFrame) -> None:
-    with pytest.raises(DataError, match=r"recorded for 20.0 min.*pass shorter ones, such as minutes=\(1, 6"):
-        szlib.time_shifted(tracks, minutes=(1, 25))
-    check_tracks(szlib.time_shifted(tracks, minutes=(1.0, 6.7)))
+def test_advice_of_the_error_about_a_short_recording_works(tracks: pd.DataFrame) -> None:
+    for lasts, given in ((20, (1, 25)), (6, (1.0, 10.0)), (2, (0.5, 1.9))):
+        short = tracks[tracks["t"] < tracks["t"].min() + 60 * lasts]
+        with pytest.raises(DataError, match=r"too short for shifts of up to .*; leave minutes out"):
+            szlib.time_shifted(short, minutes=given)
+        check_tracks(szlib.time_shifted(short))
+    too_short = tracks[tracks["t"] < tracks["t"].min() + 90]
+    with pytest.raises(DataError, match=r"recorded for 1.5 min.*leave out recordings shorter than 2 min"):
+        szlib.time_shifted(pd.concat([tracks, too_short.assign(day="another")]))
+
+
+@pytest.mark.parametrize("lasts", [2.0, 6.0, 10.9, 11.1, 15.0])
+def test_shifts_are_in_proportion_in_recordings_shorter_than_eleven_minutes(lasts: float) -> None:
+    """A long day beside a short one keeps its shifts, those of the default range."""
+    long, short = (
+        noninteracting_crowd(seed=k, people=200, minutes=m).assign(day=name)
+        for k, (name, m) in enumerate({"long": 20, "short": 20}.items())
+    )
+    short = short[short["t"] < short["t"].min() + 60 * lasts]
+    crowd = ShiftableTracks.from_tracks(make_tracks(long, short))
+    crowd = ShiftableTracks(**{**crowd.__dict__, "companions": crowd.companions[:0]})
+    minutes = np.abs(crowd.draw_shifts(3, None)) / 600
+    share = min(1.0, lasts / 11)
+    for day, part in ((0, 1.0), (1, share)):
+        drawn = minutes[crowd.day == day]
+        assert part - 0.02 <= drawn.min() < 3 * part
+        assert 8 * part < drawn.max() <= 10 * part
+    if lasts > 11:
+        np.testing.assert_array_equal(crowd.draw_shifts(3, None), crowd.draw_shifts(3, (1, 10)))
+
+
+def test_null_model_of_six_minutes_needs_no_minutes(tracks: pd.DataFrame) -> None:
+    short = tracks[tracks["t"] < tracks["t"].min() + 360]
+    null = szlib.null_encounters(short, shifts=2, progress=False)
+    assert null.parameters["minutes"] == pytest.approx([6 / 11, 60 / 11], abs=0.01)
+    assert set(null.encounters["shift"]) == {0, 1}
 
 
 @pytest.mark.parametrize("minutes", [(0, 5), (5, 1), (-5, -1), (1, np.inf), (np.nan, 5)])
@@ -185,8 +217,9 @@ def test_invalid_minutes_raise(tracks: pd.DataFrame, minutes: tuple[float, float
 def test_range_too_narrow_to_separate_companions_raises() -> None:
     three = [make_walk((-18, 0.7 * k), (1, 0), person=k, duration=10) for k in range(3)]
     tracks = make_tracks(*three, all_day())
-    with pytest.raises(DataError, match="wider range of minutes"):
+    with pytest.raises(DataError, match="leave minutes out, for a wider range"):
         szlib.time_shifted(tracks, minutes=(2, 2))
+    check_tracks(szlib.time_shifted(tracks))
 
 
 def test_the_real_day_keeps_its_hours(real_tracks: pd.DataFrame) -> None:
