@@ -28,8 +28,10 @@ from .settings import (
     MARGIN,
     MIN_WALKING_SPEED,
     SPACE,
+    WINDOW,
     PlazaSettings,
     interpolate_zones,
+    lead_time,
     rotate,
     rotate_left,
     start_time,
@@ -43,14 +45,15 @@ KINDS = ("overtaking", "head-on", "crossing", "together", "standing", "intruder"
 FIRST_ID, ID_STEP = 9_190_600, 100
 
 _VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")  # of staged encounters, each with x and y
-_TRACKED = 3.4  # a pair is tracked for the window of 3 s, wherever the ticks of the clock fall [s]
 _PAUSE = 1.0  # between a pair's end and the start of the next [s]
-_TIME_TO_CLOSEST = (0.5, 2.5)  # from a pair's start until the two are closest [s]
+_TIME_TO_CLOSEST = (0.5, 2.5)  # from the start of the window until the two are closest [s]
 _DRIFT = 0.25  # greatest relative speed of people who walk together [m/s]
 _MAX_CURVATURE = 1.2  # of a path in the walker's frame [1/m]
-_MOMENTS = np.linspace(0, _TRACKED, 52)  # at which a path is checked [s]
+_CHECKS = 15  # of a path in a second
 _MAX_ROUNDS = 5000  # of draws
 _SHIFT, _NEW_BEARING = 0.001, 200  # each draw is 1 mm farther out; a new bearing after so many draws
+# After so many draws the mean clearance grows as well: companions with small zones walk too near otherwise.
+_GROWS_AFTER = 1000
 _FRAMES = (33, 50)  # time between frames, (shortest, longest) [ms]
 _SHORT_GAP, _LONG_GAP = (0.1, 0.4), (0.6, 1.0)  # a gap of 0.5 s ends a track [s]
 _HEIGHT = (1.5, 1.8)  # of people [m]
@@ -122,7 +125,7 @@ def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) ->
     low, high = np.transpose([settings.area.x, settings.area.y])
     middle = rng.uniform(low + half + MARGIN, high - half - MARGIN)
     walker = middle + (speed * before - swept / 2)[:, None] * ahead
-    start = start_time(settings) + np.arange(n) * (_TRACKED + _PAUSE)
+    start = start_time(settings) + np.arange(n) * (settings.tracked + _PAUSE)
     offset, other_v, swerve = np.moveaxis(rotate(motion, heading[:, None]), 1, 0)
     apart = np.abs(np.arctan2(motion[:, 1, 1], motion[:, 1, 0]))
     kind = np.where(
@@ -132,7 +135,8 @@ def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) ->
     columns = {
         name + axis: v[:, k] for name, v in zip(_VECTORS, vectors, strict=True) for k, axis in enumerate("xy")
     }
-    return pd.DataFrame({"kind": kind, "start": start, "closest": start + before, **columns})
+    closest = start + lead_time(settings) + before
+    return pd.DataFrame({"kind": kind, "start": start, "closest": closest, **columns})
 
 
 def positions(staged: pd.DataFrame, t: Array) -> tuple[Array, Array]:
@@ -156,12 +160,12 @@ def positions(staged: pd.DataFrame, t: Array) -> tuple[Array, Array]:
     (20, 2, 2)
     """
     since = (np.asarray(t, float) - staged["closest"].to_numpy())[:, None]
-    until = np.minimum(since, 0.0)
+    swerved, deviation = _swerve(since)
     walker, other, walker_v, other_v, swerve = (
         staged[[name + "x", name + "y"]].to_numpy() for name in _VECTORS
     )
-    position = [walker + walker_v * since, other + other_v * since + swerve * until**2 / 2]
-    return np.stack(position, axis=1), np.stack([walker_v, other_v + swerve * until], axis=1)
+    position = [walker + walker_v * since, other + other_v * since + swerve * deviation]
+    return np.stack(position, axis=1), np.stack([walker_v, other_v + swerve * swerved], axis=1)
 
 
 def _draw_encounters(
@@ -185,7 +189,8 @@ def _draw_encounters(
         is_last = number % _NEW_BEARING == _NEW_BEARING - 1
         redrawn = pending if is_last else pending[plan[pending] != "passing"]
         bearing[redrawn] = rng.uniform(-np.pi, np.pi, len(redrawn))
-        clear[redrawn] = rng.exponential(settings.clearance, len(redrawn))
+        mean = settings.clearance + _SHIFT * max(0, number - _GROWS_AFTER)
+        clear[redrawn] = rng.exponential(mean, len(redrawn))
         before[pending] = rng.uniform(*_TIME_TO_CLOSEST, len(pending))
         drawn = (plan[pending], speed[pending], bearing[pending], clear[pending])
         motion[pending] = _draw(rng, settings, *drawn, bend=number % 2 * _MAX_CURVATURE)
@@ -195,8 +200,9 @@ def _draw_encounters(
             return plan, speed, before, motion
         clear[pending] += _SHIFT
     raise ZoneError(
-        f"{len(pending)} of {n} pairs find no path around each other's zones; the zones must leave space in "
-        f"the attentional space of {SPACE.length} m by {SPACE.width} m; make the zones smaller"
+        f"{len(pending)} of {n} pairs find no path around each other's zones (first: {plan[pending[0]]}, at "
+        f"{speed[pending[0]]:.2f} m/s); the zones must leave space in the attentional space of "
+        f"{SPACE.length} m by {SPACE.width} m; make the zones smaller"
     )
 
 
@@ -240,13 +246,15 @@ def _is_possible(
     settings: PlazaSettings, plan: NDArray[np.str_], speed: Array, before: Array, motion: Array
 ) -> NDArray[np.bool_]:
     """Which motions start ahead of the walker, have walking speeds, and stay outside both zones."""
-    since = (_MOMENTS - before[:, None])[..., None]
-    until = np.minimum(since, 0.0)
+    lead = lead_time(settings)
+    moments = np.linspace(-lead, WINDOW + lead, 1 + round(_CHECKS * settings.tracked))
+    since = (np.append(moments, 0.0) - before[:, None])[..., None]
+    swerved, deviation = _swerve(since)
     offset, velocity, swerve = (motion[:, None, k] for k in range(3))
     passing = velocity - speed[:, None, None] * [1.0, 0.0]
-    position = offset + passing * since + swerve * until**2 / 2
-    velocity = velocity + swerve * until
-    x, y = position[:, 0].T
+    position = offset + passing * since + swerve * deviation
+    velocity = velocity + swerve * swerved
+    x, y = position[:, -1].T
     is_in_view = (x >= MARGIN) & (x <= SPACE.length - MARGIN) & (np.abs(y) <= SPACE.width / 2 - MARGIN)
     pace = np.linalg.norm(velocity, axis=-1)
     is_standing, is_respectful = plan == "standing", plan != "intruder"
@@ -262,6 +270,15 @@ def _is_possible(
     return np.asarray(possible)
 
 
+def _swerve(since: Array) -> tuple[Array, Array]:
+    """Change of velocity [s] and position [s2] by a swerve of 1 m/s2, at a time `since` the closest [s].
+
+    A path bends until the two are closest; it is straight before the time in which a window can begin.
+    """
+    bent = np.clip(since, -_TIME_TO_CLOSEST[1], 0.0)
+    return bent, bent * since - bent**2 / 2
+
+
 def _stays_outside(settings: PlazaSettings, points: Array, speed: Array) -> NDArray[np.bool_]:
     """Which paths (n, moments, 2) [m] stay outside the zones at speeds (n, moments) at all moments; (n,)."""
     center, semi_axes, angle = interpolate_zones(settings, speed)
@@ -273,12 +290,11 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     """The recording of the sensor: the columns of an ATC file, two rows for each frame, without the gaps."""
     rng = np.random.default_rng([seed, 1])
     n, start = len(staged), staged["start"].to_numpy()
-    ms = rng.integers(
-        _FRAMES[0], _FRAMES[1], int((start[-1] - start[0] + _TRACKED) * 1000 / _FRAMES[0]) + 1, endpoint=True
-    )
+    lasts = start[-1] - start[0] + settings.tracked
+    ms = rng.integers(*_FRAMES, int(lasts * 1000 / _FRAMES[0]) + 1, endpoint=True)
     frames = start[0] + np.cumsum(ms) / 1000
     pair = np.searchsorted(start, frames, side="right") - 1
-    pair, frames = (array[frames <= start[pair] + _TRACKED] for array in (pair, frames))
+    pair, frames = (array[frames <= start[pair] + settings.tracked] for array in (pair, frames))
     position, velocity = positions(staged.iloc[pair], frames)
     measured = position + rng.normal(0, settings.noise, position.shape)
     sensor_velocity = velocity + rng.normal(0, _VELOCITY_NOISE, velocity.shape)
@@ -288,7 +304,7 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     kind = rng.choice(3, (n, 2), p=[short, long, 1 - short - long])
     length = np.stack([rng.uniform(*_SHORT_GAP, (n, 2)), rng.uniform(*_LONG_GAP, (n, 2)), np.zeros((n, 2))])
     length = np.take_along_axis(length, kind[None], axis=0)[0]
-    gap_start = start[:, None] + rng.uniform(0, _TRACKED - length)
+    gap_start = start[:, None] + rng.uniform(0, settings.tracked - length)
     is_recorded = ~((frames[:, None] > gap_start[pair]) & (frames[:, None] < (gap_start + length)[pair]))
     speed = np.linalg.norm(sensor_velocity, axis=-1)
     metres = {"x": measured[..., 0], "y": measured[..., 1], "z": height, "velocity": speed}
