@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
+import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 ADOPT_ORPHANS = 36
 """PR_SET_CHILD_SUBREAPER of prctl(2)."""
+LOOK = 0.2
+"""Interval at which the descendants of a command are noted [s]."""
+NOTED: set[int] = set()
+"""The number of every process that `descendants` has found."""
 
 
 def adopt_orphans() -> None:
@@ -31,7 +38,27 @@ def descendants() -> dict[int, str]:
     found: dict[int, str] = {}
     while more := {n for n, parent in parents.items() if parent in {os.getpid(), *found}} - set(found):
         found |= {number: commands[number] for number in more}
+    NOTED.update(found)
     return found
+
+
+def wait_and_note(process: subprocess.Popen[bytes], seconds: float = float("inf")) -> int | None:
+    """Note the descendants until a process ends, and return its exit code; None after some time [s]."""
+    end = time.monotonic() + seconds
+    while (code := process.poll()) is None and (left := end - time.monotonic()) > 0:
+        descendants()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=min(LOOK, left))
+    return code
+
+
+def named_after_noted(folder: Path) -> set[str]:
+    """Files whose name holds the number of a noted process, as those of joblib in shared memory do.
+
+    Files of other programs, which run on the same machine, have other numbers.
+    """
+    number = re.compile("(?<=[-_])[0-9]+(?=[-_])")
+    return {str(path) for path in folder.glob("*") if {*map(int, number.findall(path.name))} & NOTED}
 
 
 def users_of(place: Path) -> list[str]:

@@ -1,7 +1,8 @@
 """Commands killed at random moments, and two commands in one folder: the same files, and nothing left.
 
 What is left is found by the process table, by open files, and by comparing folders before and after: in the
-results, in the temporary folder, in the user's own folder and in shared memory (Linux).
+results, in the temporary folder, in the user's own folder and in shared memory (Linux). There, a file counts
+if its name holds the number of a process of the command.
 """
 
 from __future__ import annotations
@@ -18,7 +19,14 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from helpers.process_table import adopt_orphans, descendants, everything_in, wait_for_end
+from helpers.process_table import (
+    adopt_orphans,
+    descendants,
+    everything_in,
+    named_after_noted,
+    wait_and_note,
+    wait_for_end,
+)
 
 import szlib
 from szlib.plaza.generation import make_plaza
@@ -35,7 +43,8 @@ from szlib.workbook import folders
 from szlib.workbook.cli import main
 if __name__ == "__main__":
     folders.NOTEBOOKS = Path({notebooks!r})
-    print("ready", flush=True)
+    if sys.stdout and sys.stdout.isatty():
+        print("ready", flush=True)
     sys.exit(main())
 """
 NOTEBOOK = """# %% tags=["parameters"]
@@ -95,7 +104,7 @@ def furnish(place: Path, days: int = 4, encounters: int = 150, seconds: float = 
 def make_reference(name: str, command: list[str], place: Path) -> dict[str, bytes]:
     """The finished files of a command that nobody disturbs."""
     out = place / f"{name}-reference"
-    start([*command, "--out", str(out)], place).wait()
+    wait_and_note(start([*command, "--out", str(out)], place))
     reference = contents(out)
     if not reference:
         raise RuntimeError(f"{name}: the reference could not be made: {(place / 'printed.txt').read_text()}")
@@ -112,14 +121,12 @@ def kill(
     while struck < kills:
         begun = time.monotonic()
         process = start([*command, "--out", str(out)], place)
-        try:
-            process.wait(timeout=rng.uniform(0.5, longest))
+        if wait_and_note(process, rng.uniform(0.5, longest)) is not None:
             longest = max(1.5, time.monotonic() - begun)
             continue
-        except subprocess.TimeoutExpired:
-            number = rng.choice([signal.SIGKILL, signal.SIGKILL, signal.SIGTERM])
-            process.send_signal(number)
-            code = process.wait()
+        number = rng.choice([signal.SIGKILL, signal.SIGKILL, signal.SIGTERM])
+        process.send_signal(number)
+        code = process.wait()
         struck += 1
         tally[f"{name}: {signal.Signals(number).name}"] += 1
         if number == signal.SIGTERM and code not in (143, -15):
@@ -148,7 +155,7 @@ def finish(
 ) -> None:  # fmt: skip
     """Let the command finish: the results are those of an undisturbed one, and nothing else is left."""
     out = Path(command[-1])
-    start(command, place).wait()
+    wait_and_note(start(command, place))
     same_bytes = contents(out) == reference
     tally["broken: other bytes"] += not same_bytes
     tally["resumed to identical bytes"] += same_bytes
@@ -165,7 +172,7 @@ def both(command: list[str], place: Path, reference: dict[str, bytes], tally: Co
     """Start two processes at once in one folder."""
     out = place / "both"
     pair = [start([*command, "--out", str(out)], place) for _ in range(2)]
-    codes = [process.wait() for process in pair]
+    codes = [wait_and_note(process) for process in pair]
     if codes != [0, 0] or contents(out) != reference:
         print(f"two at once: exit codes {codes}", file=sys.stderr)
         tally["broken: other bytes"] += 1
@@ -180,8 +187,8 @@ def environment(place: Path) -> dict[str, str]:
 
 
 def everything_outside(place: Path) -> set[str]:
-    """Every file where temporary ones may be."""
-    return everything_in(place / "tmp", place / "home", SHARED_MEMORY)
+    """Every file where temporary ones may be, in shared memory those of the processes that were noted."""
+    return everything_in(place / "tmp", place / "home") | named_after_noted(SHARED_MEMORY)
 
 
 def start(command: list[str], place: Path) -> subprocess.Popen[bytes]:

@@ -21,7 +21,7 @@ from collections import Counter
 from pathlib import Path
 from select import select
 
-from helpers.process_table import adopt_orphans, wait_for_end
+from helpers.process_table import adopt_orphans, descendants, wait_for_end
 from processes import GRACE, environment, everything_outside, finish, furnish, judge_end, make_reference
 
 TRIALS = 50
@@ -84,6 +84,7 @@ def stop(
     os.close(slave)
     printed = read(master, 120.0, until=b"ready")
     printed += read(master, rng.uniform(0.0, longest))
+    descendants()
     if "twice" in action:
         os.write(master, b"\x03")
         printed += read(master, rng.choice([0.0, 0.1, rng.uniform(0, 1)]))

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import adversary
 import commands
+import processes
 import pytest
+from helpers import process_table
 
 import szlib
 from szlib.workbook.cli import build_parser
@@ -64,6 +66,16 @@ def test_judge_accepts_a_page_whose_policy_forbids_scripts(tmp_path):
 )
 def test_judge_of_command_lines(code, printed, fault):
     assert commands.judge(code, printed) == fault
+
+
+def test_only_what_a_command_left_in_shared_memory_counts(tmp_path, monkeypatch):
+    (tmp_path / "tmp").mkdir()
+    (tmp_path / "sem.loky-1-another").touch()
+    monkeypatch.setattr(processes, "SHARED_MEMORY", tmp_path)
+    leave = "import os, time; open(f'sem.loky-{os.getpid()}-own', 'w'); time.sleep(0.5)"
+    command = subprocess.Popen([sys.executable, "-c", leave], cwd=tmp_path)
+    assert process_table.wait_and_note(command) == 0
+    assert processes.everything_outside(tmp_path) == {str(tmp_path / f"sem.loky-{command.pid}-own")}
 
 
 def test_every_command_and_option_is_drawn():
