@@ -199,11 +199,14 @@ def temporary_folder() -> Iterator[Path]:
     """A temporary folder, removed at the end; a later call removes it where this process is killed.
 
     A lock in the folder says that its process lives, also if that runs in another container.
-    Raises StorageError where there is no room for it.
+    Raises StorageError where there is no room for it, or the umask forbids its use.
     """
     remove_abandoned_temporary()
     try:
         folder = Path(tempfile.mkdtemp(prefix=_TEMPORARY))
+        if folder.stat().st_mode & 0o700 != 0o700:
+            folder.rmdir()
+            raise StorageError("new files may not be used by their owner (umask); call umask 022 first")
         lock = FileLock(folder / _LOCK)
         lock.acquire()
     except OSError as error:

@@ -85,7 +85,8 @@ def unchanged_files(paths: Iterable[Path]) -> Iterator[None]:
 def readable_path(path: Path) -> Path:
     """The path at which `unchanged_files` keeps file `path` open, whatever has replaced it; else `path`.
 
-    Systems without /proc have no such path; there `unchanged_files` only finds out that a file was replaced.
+    Systems without /proc have no such path. There `unchanged_files` finds a file that was replaced, but not a
+    folder that was exchanged for another one and put back while its files were read.
     """
     stream = _OPEN.get({}).get(path)
     place = Path(f"/proc/self/fd/{stream.fileno()}") if stream else path

@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_point, check_vector
+from ..checks import Array, check_point, check_vector, require
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse, circle_around
 from .barriers import read_walls
@@ -47,6 +47,8 @@ from .solvers.fallbacks import solve_with_fallbacks
 from .solvers.solver_pool import SolverPool, active_rows, padded_parameters
 from .step import Step
 from .tracker import People, TrackedPeople, Tracker, check_time
+
+_MOST_PEOPLE = 1000  # greatest number for which solvers are prepared: those for 10,000 take 1.5 GB of memory
 
 
 class MPCCBF(Controller):
@@ -63,9 +65,9 @@ class MPCCBF(Controller):
     walls : segments, shape (n, 2, 2): end points [m]; or anything else that `read_walls` accepts. The
         attribute `walls` holds their segments.
     settings : every other parameter.
-    max_people : number of people to prepare solvers for. None: 8, and more in the background as soon as half
-        of this number is present. For more people than are prepared the solver is built within the step,
-        which no time limit covers; the log "szlib" says so (level INFO).
+    max_people : number of people to prepare solvers for, at most 1000. None: 8, and more in the background as
+        soon as half of this number is present. For more people than are prepared the solver is built within
+        the step, which no time limit covers; the log "szlib" says so (level INFO).
     tracker : remembers people by their ids; default: `Tracker()`.
 
     Raises
@@ -100,8 +102,9 @@ class MPCCBF(Controller):
     ) -> None:
         self.settings = settings or MPCSettings()
         self.zone = as_ellipse(zone, self.settings.zone_speed)
-        if max_people is not None and not (isinstance(max_people, int) and max_people >= 0):
-            raise SolverError(f"max_people must be a whole number >= 0, or None; got {max_people!r}")
+        is_number = max_people is None or (isinstance(max_people, int) and 0 <= max_people <= _MOST_PEOPLE)
+        expected = f"a whole number from 0 to {_MOST_PEOPLE}, or None"
+        require(is_number, "max_people", max_people, expected, SolverError)
         self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
         self._take_walls(walls)
         self._pool = SolverPool(self.settings, max_people, len(self.walls))

@@ -9,5 +9,5 @@ laboratory    a scene that can be dragged and set while it runs
 runner        execution of all notebooks, with a summary
 notebook_execution, forked_kernel  execution of one notebook; kernels that start at once
 report        a run as one HTML file
-cli           `szlib run | report | inspect | extract`
+cli, console  `szlib run | report | inspect | extract`
 """

@@ -11,9 +11,11 @@ from __future__ import annotations
 
 # A command imports what it needs when it starts, so that --version, --help and a typing error answer at once.
 import argparse
+import errno
 import inspect
 import json
 import os
+import re
 import signal
 import sys
 import threading
@@ -35,14 +37,17 @@ from ..input_files import printable
 # Packages of the extra `workbook`, which the commands `run` and `report` need.
 _WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbconvert", "papermill")
 _STOPPED = "stopped; finished results stay in their folder"
-# Errors of standard output or standard error that is full, closed or missing.
-_BROKEN_STREAM = (OSError, ValueError, AttributeError)
+# Errors of standard output or standard error that is full or closed.
+_BROKEN_STREAM = (OSError, ValueError)
+# Numbers of errors of writing; those of files, not of streams, have a file name.
+_UNWRITABLE = (errno.EBADF, errno.EFBIG, errno.EIO, errno.ENOSPC, errno.EPIPE)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that `arguments` name (default: those of the process) and return its exit code."""
+    _open_missing_streams()
     for stream in (sys.stdout, sys.stderr):  # print escapes where the terminal's encoding lacks a letter
-        with suppress(*_BROKEN_STREAM):
+        with suppress(*_BROKEN_STREAM, AttributeError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     given = sys.argv[1:] if arguments is None else arguments
     try:
@@ -52,8 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
             with memory.granted(size):
                 code = int(options.command(options))
-            if sys.stdout is not None:
-                sys.stdout.flush()
+            sys.stdout.flush()
         return code
     except KeyboardInterrupt as stop:
         _print_error(_STOPPED)
@@ -61,8 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if os.environ.get("SZLIB_TRACEBACK"):
             traceback.print_exc()
-        is_expected = isinstance(error, SzlibError | OSError) and str(error)
-        _print_error(str(error) if is_expected else f"{type(error).__name__}: {error}")
+        _print_error(_describe(error))
         return 2
 
 
@@ -241,9 +244,10 @@ def _parse_parameter(text: str) -> tuple[str, Any]:
 
 
 def _mark_number(argument: str) -> str:
-    """Put a space before a negative number: argparse takes -1.85e1 for an option."""
+    """Put a space before a negative number such as -1.85e1, an option to argparse; -1 is none."""
     with suppress(ValueError):
-        return f" {argument}" if argument.startswith("-") and float(argument) < 0 else argument
+        is_option = argument.startswith("-") and not re.fullmatch(r"-\d+|-\d*\.\d+", argument, re.ASCII)
+        return f" {argument}" if is_option and float(argument) < 0 else argument
     return argument
 
 
@@ -285,6 +289,25 @@ def _stop_on_signals() -> Iterator[None]:
         for number, handler in before.items():
             if not stopped:  # until the process has ended
                 signal.signal(number, handler)
+
+
+def _open_missing_streams() -> None:
+    """Open the null device as each standard stream that is closed; otherwise another file gets its number."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            null = os.open(os.devnull, os.O_RDWR)
+            os.set_inheritable(null, True)
+            setattr(sys, name, os.fdopen(null, mode, encoding="utf-8"))
+
+
+def _describe(error: Exception) -> str:
+    """One line about an error that ends the command."""
+    if isinstance(error, MemoryError) or "failed to map segment" in str(error):  # the latter of a library
+        return f"this process has no more memory ({error}); raise its limit (ulimit -v), or free memory"
+    if isinstance(error, OSError) and error.errno in _UNWRITABLE and not error.filename:
+        return f"standard output cannot be written ({error.strerror}); make room, or name another file"
+    is_expected = isinstance(error, SzlibError | OSError) and str(error)
+    return str(error) if is_expected else f"{type(error).__name__}: {error}"
 
 
 def _print_error(text: str) -> None:

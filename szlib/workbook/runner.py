@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
@@ -39,6 +40,7 @@ LONGEST = ("15", "16", "18")
 SUMMARY = "summary.json"  # file of the outcome of a run
 # Files that a process opens: a kernel, 70 to 90; this process for each kernel, about 15 (both measured).
 _FILES_OF_KERNEL, _FILES_OF_CLIENT = 96, 16
+_ADDRESSES = 2 * 10**9  # memory, mostly unused, that the imports of a process reserve (measured) [bytes]
 _POLL = 0.5  # longest wait before Ctrl-C is noticed, whichever thread receives it [s]
 
 
@@ -73,11 +75,12 @@ def run(
     ------
     DataError : the data set, a notebook or a parameter is unknown, or a parameter is out of its range.
     StorageError : the results cannot be written, or another run writes to the same folder.
-    SzlibError : a process may open too few files.
+    SzlibError : a process may open too few files or use too little memory, or 127.0.0.1 is not reached.
     """
     scripts = choose_notebooks(only)
     names, jobs = [script.stem for script in scripts], max(limit_jobs(jobs, len(scripts)), 1)
-    _require_open_files(_FILES_OF_KERNEL + _FILES_OF_CLIENT * jobs)
+    _require_limits(_FILES_OF_KERNEL + _FILES_OF_CLIENT * jobs)
+    _require_loopback()
     known = sorted({*scripts, *(s for s in folders.list_notebooks() if s.stem[:2] <= PRODUCERS[-1])})
     given = check_parameters(parameters or {}, known)
     results, data = folders.results_root(out), folders.absolute_data(data)
@@ -99,8 +102,8 @@ def run(
         return summary
 
 
-def _require_open_files(n_files: int) -> None:
-    """Let this process and its kernels open `n_files`; SzlibError where the system does not allow it."""
+def _require_limits(n_files: int) -> None:
+    """Let this process and its kernels open `n_files`; SzlibError where the system does not allow a run."""
     try:
         import resource
     except ImportError:  # Windows has no such limit
@@ -113,6 +116,23 @@ def _require_open_files(n_files: int) -> None:
         )
     if 0 <= soft < n_files:
         resource.setrlimit(resource.RLIMIT_NOFILE, (n_files, hard))
+    if 0 <= (size := resource.getrlimit(resource.RLIMIT_AS)[0]) < _ADDRESSES:
+        raise SzlibError(
+            f"a process may use {size / 1e9:.1f} GB of memory on this machine (ulimit -v), and a run needs "
+            f"{_ADDRESSES / 1e9:.1f} GB; raise the limit"
+        )
+
+
+def _require_loopback() -> None:
+    """Raise SzlibError where no process can be reached over 127.0.0.1, as kernels are."""
+    try:
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            socket.create_connection(server.getsockname(), timeout=10).close()
+    except OSError as error:
+        raise SzlibError(
+            f"127.0.0.1 cannot be reached ({error.strerror or error}), and notebooks are executed over it; "
+            "bring up the network interface lo (ip link set lo up)"
+        ) from error
 
 
 @contextmanager

@@ -265,8 +265,9 @@ def test_terminal_person_keeps_plans_feasible_although_the_person_walks(solver, 
 def test_an_invalid_terminal_condition_raises_an_error():
     with pytest.raises(szlib.SolverError, match="open space; got 1 walls"):
         controller_of("sqp", [((0, 5), (1, 5))], terminal="person")
-    with pytest.raises(szlib.SolverError, match="max_people must be"):
-        szlib.MPCCBF(ZONE, max_people=-1)
+    for number in (-1, 1001, 10**400, 2.0):
+        with pytest.raises(szlib.SolverError, match="max_people must be a whole number from 0 to 1000"):
+            szlib.MPCCBF(ZONE, max_people=number)
     assert szlib.MPCSettings(terminal="rest").N_h == 8
 
 

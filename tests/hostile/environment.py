@@ -47,9 +47,9 @@ PLACES: list[tuple[str, dict[str, str], str, str]] = [
     ("little memory", {}, "ulimit -v 1500000;", REFUSED),
     ("no right to write", {}, "umask 777;", REFUSED),
     ("no standard input", {}, "exec 0<&-;", SAME),
-    ("no standard output", {}, "exec 1>&-;", REFUSED),
+    ("no standard output", {}, "exec 1>&-;", SAME),
     ("full standard output", {}, "exec 1>/dev/full;", REFUSED),
-    ("no standard error", {}, "exec 2>&-;", REFUSED),
+    ("no standard error", {}, "exec 2>&-;", SAME),
     ("folder that is gone", {}, "mkdir gone; cd gone; rmdir ../gone;", REFUSED),
     ("processes of their own", {}, "unshare --pid --fork --mount-proc", SAME),
     (
@@ -124,11 +124,12 @@ def enter(
 
 
 def is_allowed(before: str, shell: list[str], settings: dict[str, str], place: Path) -> bool:
-    """Whether this machine has the tool, and lets it start Python."""
+    """Whether this machine has the tool, and lets it start Python, which starts itself again."""
     tool = before.partition(" ")[0]
     if tool not in ("unshare", "setpriv", "taskset"):
         return True
-    trial = [*shell, sys.executable, "-c", ""]
+    again = "import subprocess, sys; sys.exit(subprocess.call([sys.executable, '-c', '']))"
+    trial = [*shell, sys.executable, "-c", again]
     return subprocess.run(trial, env=settings, cwd=place, capture_output=True, check=False).returncode == 0
 
 
@@ -153,4 +154,4 @@ def judge(
         return "it must not make a difference" if expected == SAME else "an exit code of its own"
     if re.search(r"^szlib: \w+(Error|Exception): ", text, re.MULTILINE):
         return "an error that is not of szlib"
-    return "" if "standard" in name or re.search("^szlib: ", text, re.MULTILINE) else "no sentence"
+    return "" if re.search("^szlib: ", text, re.MULTILINE) else "no sentence"

@@ -36,6 +36,13 @@ ACTIONS = {
     "SIGKILL to the group": (-signal.SIGKILL,),
 }
 """What is done, and the exit codes with which the command may end then; 0 if it was finished before."""
+IMPORTS = 30
+"""Number of times that Ctrl-C is typed while a command imports what it needs."""
+IMPORTING = """
+from szlib.workbook.console import main
+print("ready", flush=True)
+raise SystemExit(main())
+"""
 
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
@@ -51,6 +58,9 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
             left = wait_for_end(place, GRACE) or sorted(everything_outside(place) - before)
             tally["broken: processes left"] += len(left)
             return dict(tally)
+        for _ in range(IMPORTS):
+            command = [sys.executable, "-c", IMPORTING, "inspect", str(place / "data" / "day0.csv")]
+            attempt("Ctrl-C while it imports", command, place, rng, 1.5, tally)
         for name, command in commands.items():
             reference = make_reference(name, command, place)
             before = everything_outside(place)
@@ -113,7 +123,7 @@ def stop(
     text = printed.decode(errors="replace")
     if "Traceback" in text or "Exception ignored" in text:
         return f"a foreign traceback: {text[-2000:]}"
-    if code not in (0, *ACTIONS[action]):
+    if code not in (0, *ACTIONS.get(action, (130, -signal.SIGINT))):
         return f"exit code {code} after {time.monotonic() - begun:.0f} s: {text[-500:]}"
     return "" if code != 130 or "szlib: stopped" in text else f"it says nothing: {text[-500:]}"
 

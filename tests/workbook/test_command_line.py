@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -36,6 +40,32 @@ def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureF
 def test_area_takes_negative_numbers_in_exponent_form(day: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["inspect", str(day), "--square", "-1.85e1", "2e1", "-.2E+2", "30."]) == 0
     assert capsys.readouterr().out.splitlines()[0] == "area -18.5 20.0 -20.0 30.0"
+
+
+def test_file_may_be_called_like_a_number(
+    day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "-1").write_bytes(day.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    assert main(["inspect", "-1"]) == 0
+    assert "read -1" in capsys.readouterr().out
+
+
+def test_ctrl_c_while_the_command_is_imported_shows_no_traceback() -> None:
+    program = """
+import os, signal, sys
+class Interrupt:
+    def find_spec(self, name, *_):
+        if name == "szlib.workbook.cli":
+            os.kill(os.getpid(), signal.SIGINT)
+from szlib.workbook.console import main
+sys.meta_path.insert(0, Interrupt())
+main()"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True,
+        env=os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])},
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, b"")
 
 
 def test_extract_prints_the_table(day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

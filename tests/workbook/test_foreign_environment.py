@@ -1,7 +1,11 @@
 """A run decides about its kernels, figures and module path, whatever environment and folder hold."""
 
+import errno
 import json
 import os
+import re
+import socket
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -9,7 +13,9 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from szlib.workbook import report, runner
+import szlib
+from szlib import files
+from szlib.workbook import cli, report, runner
 from szlib.workbook.cli import main
 
 STALE = {"argv": ["/nowhere/python", "{connection_file}"], "display_name": "stale", "language": "python"}
@@ -77,7 +83,9 @@ def test_too_low_a_limit_of_open_files_is_raised_where_the_system_allows_it(
 ):
     resource = pytest.importorskip("resource")
     given = []
-    monkeypatch.setattr(resource, "getrlimit", lambda _: limits)
+    monkeypatch.setattr(
+        resource, "getrlimit", lambda what: limits if what == resource.RLIMIT_NOFILE else (-1, -1)
+    )
     monkeypatch.setattr(resource, "setrlimit", lambda _, pair: given.append(pair))
     monkeypatch.setattr(runner, "_execute_all", lambda *_: {})
     notebooks(_01_one="")
@@ -93,6 +101,66 @@ def test_limit_of_open_files_is_named(notebooks, monkeypatch, capsys):
     assert (
         "may open 64 files on this machine, and a run needs 112; raise the limit" in capsys.readouterr().err
     )
+
+
+def test_limit_of_memory_is_named(notebooks, monkeypatch, capsys):
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (1_500_000_000, -1))
+    notebooks(_01_one="")
+    assert main(["run", "--data", "mine.csv", "--out", "out"]) == 2
+    assert "may use 1.5 GB of memory on this machine (ulimit -v), and a run needs 2.0 GB" in (
+        capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError(), ImportError("ft2font.so: failed to map segment from shared object")]
+)
+def test_memory_that_is_used_up_is_named(error, monkeypatch, capsys):
+    def fail(_):
+        raise error
+
+    monkeypatch.setattr(cli, "_inspect", fail)
+    assert main(["inspect", "day.csv"]) == 2
+    assert "szlib: this process has no more memory" in capsys.readouterr().err
+
+
+def test_run_is_refused_at_once_where_kernels_cannot_be_reached(notebooks, tmp_path, monkeypatch, capsys):
+    def fail(*_, **__):
+        raise OSError(errno.ENETUNREACH, "Network is unreachable")
+
+    monkeypatch.setattr(socket, "create_connection", fail)
+    notebooks(_01_one="")
+    assert main(["run", "--data", "mine.csv", "--out", "out"]) == 2
+    assert "127.0.0.1 cannot be reached (Network is unreachable)" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_umask_that_forbids_everything_is_named(notebooks, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    files.process_folder.cache_clear()
+    notebooks(_01_one="")
+    before = os.umask(0o777)
+    try:
+        assert main(["run", "--data", "mine.csv", "--out", "out"]) == 2
+    finally:
+        os.umask(before)
+    assert re.search("umask|out: cannot be made", capsys.readouterr().err)
+    assert not list(tmp_path.glob("szlib-*"))
+
+
+def test_streams_that_are_closed_are_open_for_the_command_and_its_processes():
+    child = "import sys; sys.exit(None in (sys.stdin, sys.stdout, sys.stderr))"
+    program = f"""
+import subprocess, sys
+from szlib.workbook import cli
+cli._run = lambda _: print("table") or subprocess.call([sys.executable, "-c", {child!r}])
+sys.exit(cli.main(["run"]))"""
+    done = subprocess.run(
+        ["sh", "-c", 'exec "$@" 0<&- 1>&- 2>&-', "sh", sys.executable, "-c", program],
+        env=os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])},
+    )
+    assert done.returncode == 0
 
 
 @pytest.mark.usefixtures("without_kernels")

@@ -245,7 +245,9 @@ def test_full_or_ascii_standard_output_gives_one_line(tmp_path, monkeypatch):
         done = command("inspect", str(tmp_path / "plätze.csv"), stdout=full)
         _, printed = done.communicate()
     assert done.returncode == 2
-    assert printed.splitlines() == ["szlib: [Errno 28] No space left on device"]
+    assert printed.splitlines() == [
+        "szlib: standard output cannot be written (No space left on device); make room, or name another file"
+    ]
     printed = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(printed, encoding="ascii"))
     assert main(["inspect", str(tmp_path / "plätze.csv")]) == 0
