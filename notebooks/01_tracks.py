@@ -108,7 +108,8 @@ record.key |= {
 # The paper names "the rectangular central square" without coordinates (fig. 1). In the mall the
 # largest rectangle without pillars, walls or queues is x from -18.5 to -7.5 m, y from -10 to 8 m,
 # the plaza's as well. Any other data has, unless one is given, the largest rectangle in which
-# people walked everywhere: three people at least on each spot of 0.5 m. Look at the map before
+# people walked everywhere: three people at least on each spot of 0.5 m. In small rooms and
+# with few people it is the outline of the place where people were seen. Look at the map before
 # you trust it: a pillar or a shelf may stand where nobody walked.
 
 # %%
@@ -118,6 +119,19 @@ record.figure(ax.figure, "map")
 parameters(
     [("area", str(square), ASSUMED, record.cache.area or "the data's own; see --square, --polygon, --auto")]
 )
+
+# %% [markdown]
+# What `auto` finds in these tracks. It never reaches outside where people were seen.
+
+# %%
+try:
+    found = szlib.walked_area(people)
+    ax = figures.plot_map(people, found)
+    ax.set_title(f"auto: {found.area:.0f} m$^2$")
+    record.figure(ax.figure, "auto")
+    print(found.reason)
+except szlib.DataError as error:
+    print(error)
 
 # %%
 inside = square.contains(people["x"], people["y"])

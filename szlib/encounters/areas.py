@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from scipy.ndimage import distance_transform_edt
 
 from ..checks import check_columns
 from ..errors import DataError, warn
 from ..input_files import printable, read_small, reading
 from ..tracks import funnels
 from ..tracks.clock import COLUMNS
-from .geometry import PAPER_SPACE, Area, Region, Square
+from .geometry import PAPER_SPACE, Area, AttentionalSpace, Region, Square
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -32,14 +34,15 @@ _CELL, _PEOPLE = 0.5, 3
 # a cell is empty by chance (measured on plazas of 100 to 2,600 encounters).
 _SPARSE, _WIDEST = 4 * _PEOPLE, 2.0
 _WALKING = 0.4  # a slower person [m/s] stands, queues or sits (paper: 0.4 for a reference pedestrian)
-# The attentional space cannot turn in a narrower rectangle [m].
-_MIN_WIDTH = float(np.hypot(PAPER_SPACE.length, PAPER_SPACE.width))
-_MIN_LENGTH = PAPER_SPACE.length + 3 * 1.2  # the space, and 3 s of walking behind it [m]
-# Where no rectangle is wide enough, a cell where nobody walked costs as much as this number of other cells
-# is worth (measured on THOR-MAGNI, a laboratory with furniture, and ETH, an entrance: 16 % and 8 %).
-_LOSS = 2.0
+_BEHIND = 3 * 1.2  # 3 s of walking [m], for which a rectangle is longer than the attentional space
+# A rectangle that is narrower than this number of lengths of the space, and smaller than this share of the
+# place, wastes encounters (assumed; measured on small rooms and oblique views).
+_WIDE, _MAIN = 2.0, 2 / 3
 _MOST_CELLS = 400  # largest number of cells along an axis; cells grow with the site
 _OUTLYING = 1e-3  # share of positions on either side that does not belong to the site: trackers jump
+# A spot can be seen unless a disc of this radius [m] in which nobody was seen covers it (assumed: as wide as
+# gaps that few people leave).  Each cell has so many parts along each axis, for which that is decided.
+_EMPTY, _PARTS = 2.0, 5
 
 
 def as_area(area: object) -> Area:
@@ -85,19 +88,30 @@ def as_area(area: object) -> Area:
     raise DataError(f"{type(area).__name__} is no area; {EXPECTED}, a Square, a Shapely polygon or PedPy's")
 
 
-def area_for(tracks: pd.DataFrame, area: object) -> Area:
-    """Convert `area` as `as_area` does; "auto" stands for the `walked_area` of the `tracks`."""
-    return walked_area(tracks) if isinstance(area, str) and area.strip() == AUTO else as_area(area)
+def area_for(tracks: pd.DataFrame, area: object, space: AttentionalSpace = PAPER_SPACE) -> Area:
+    """Convert `area` as `as_area` does; "auto" stands for the `walked_area` of the `tracks` for a `space`."""
+    is_auto = isinstance(area, str) and area.strip() == AUTO
+    return walked_area(tracks, space=space) if is_auto else as_area(area)
 
 
-def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, n_people: int = _PEOPLE) -> Square:
-    """Find the largest rectangle along the axes in which people walked everywhere.
+def walked_area(
+    tracks: pd.DataFrame,
+    *,
+    cell: float | None = None,
+    n_people: int = _PEOPLE,
+    space: AttentionalSpace = PAPER_SPACE,
+) -> Area:
+    """Find the largest rectangle along the axes in which people walked everywhere, or the place's outline.
 
     Everywhere means: on each square cell at least `n_people` different people walked, at 0.4 m/s or faster.
-    The rectangle is so wide and long that the attentional space can turn in it.  If there is none, the area
-    may hold places where nobody walked (furniture, pillars, walls).  Each of them counts against the area,
-    and a DataWarning states their share: look at the map (`szlib.workbook.figures.plot_map`) before you use
-    the area.
+    The attentional space can turn in the rectangle.  Where few people walked, or such a rectangle is missing,
+    or narrow and a small part of the place (small rooms, corridors, oblique views), the area is the outline
+    of the place where people were seen.  It may hold spots where nobody walked (furniture, pillars), of
+    which a DataWarning states the share if many people walked: look at the map
+    (`szlib.workbook.figures.plot_map`).
+
+    The area never reaches outside where people can be seen: where people were seen, and in gaps between
+    them that are narrower than 4 m.
 
     Parameters
     ----------
@@ -105,21 +119,22 @@ def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, n_people: in
     cell : width of a cell [m]; None takes 0.5, or more where few people walked.  It grows with sites wider
         than 200 m.
     n_people : number of people who must have walked on each cell.
+    space : the attentional space that must fit in.
 
     Returns
     -------
-    The rectangle.
+    The area; its `reason` says what was taken, and why.
 
     Raises
     ------
-    DataError : there is no such rectangle, or the table lacks a column.
+    DataError : nobody walks, people were seen on lines only, or the table lacks a column.
 
     Examples
     --------
     >>> import szlib
     >>> plaza = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
-    >>> isinstance(szlib.walked_area(szlib.read_tracks(plaza)), szlib.Square)
-    True
+    >>> szlib.walked_area(szlib.read_tracks(plaza)).reason
+    'the outline of the place where people were seen, as few people walked'
     """
     check_columns(tracks, COLUMNS)
     if not ((cell is None or 0.05 <= cell < np.inf) and n_people >= 1):
@@ -127,30 +142,74 @@ def walked_area(tracks: pd.DataFrame, *, cell: float | None = None, n_people: in
     walks = tracks[np.hypot(*tracks[["vx", "vy"]].to_numpy(float).T) >= _WALKING]
     if len(walks) == 0:
         raise DataError(f"nobody walks at {_WALKING} m/s or faster in these tracks: no area can be found")
-    count, corner, width = _count_people(walks, cell or _CELL)
-    while cell is None and np.median(count[count > 0]) <= _SPARSE and 2 * width <= _WIDEST:
-        count, corner, width = _count_people(walks, 2 * width)
-    walked, side = count >= n_people, int(np.ceil(_MIN_WIDTH / width))
-    for loss in (np.inf, _LOSS):
-        first, end, share = _largest_rectangle(walked, side, loss)
-        if width * (end - first).max() >= _MIN_LENGTH:
-            break
-    else:
-        far = width * np.array(walked.shape)
+    count, corner, fine = _count_people(walks, cell or _CELL)
+    seen = _find_seen_parts(tracks, corner, fine, count.shape)
+    middle, lowest, width = corner[:, None, None] + fine * (np.indices(count.shape) + 0.5), corner, fine
+    while (is_sparse := cell is None and np.median(count[count > 0]) <= _SPARSE) and 2 * width <= _WIDEST:
+        count, lowest, width = _count_people(walks, 2 * width)
+    walked = (count >= n_people)[tuple(((middle - lowest[:, None, None]) // width).astype(int))]
+    first, end = _largest_rectangle(walked, int(np.ceil(np.hypot(space.length, space.width) / fine)))
+    first, end = _trim(seen, _PARTS * first, _PARTS * end)
+    part, sides = fine / _PARTS, fine / _PARTS * (end - first)
+    is_main = sides.min() >= _WIDE * space.length or sides.prod() >= _MAIN * part**2 * seen.sum()
+    if not is_sparse and is_main and sides.max() >= space.length + _BEHIND:
+        (x0, x1), (y0, y1) = (corner + part * np.stack([first, end])).round(6).T.tolist()
+        everywhere = f"on each cell of {width:g} m at least {n_people} people walked"
+        return Square((x0, x1), (y0, y1), f"the largest rectangle in which {everywhere}")
+    outline = _outline(seen, corner, part, space)
+    if outline.is_empty:
         implausible = "".join(f"{text}; " for text in funnels.warnings(funnels.get(tracks)))
         raise DataError(
-            f"{implausible}no area was found: within the {far[0]:g} m x {far[1]:g} m of these tracks there "
-            f"is no rectangle of {_MIN_WIDTH:.1f} m x {_MIN_LENGTH:.1f} m in which {n_people} people walked "
-            f"on nearly every cell of {width:g} m; use more data, or give the area yourself: {EXPECTED}"
+            f"{implausible}no area was found: people were seen in no place as wide as the attentional "
+            f"space, {space.width:g} m x {space.length:g} m; use more data, pass a smaller space, or give "
+            f"the area yourself: {EXPECTED}"
         )
-    (x0, y0), (x1, y1) = (corner + width * first).tolist(), (corner + width * end).tolist()
-    found = Square((x0, x1), (y0, y1))
-    if share < 1:
+    middles = seen[_PARTS // 2 :: _PARTS, _PARTS // 2 :: _PARTS]
+    if not is_sparse and (share := 1 - walked[middles].mean()) > 0:
         warn(
-            f"in {1 - share:.0%} of the area found ({found}) nobody walked, perhaps for furniture, pillars "
-            "or walls: look at the map, and give a better area if you know one"
+            f"in {share:.0%} of the area found ({outline.area:.0f} m2) fewer than {n_people} people walked, "
+            "perhaps for furniture, pillars or walls: look at the map, and give a better area if you know one"
         )
-    return found
+    why = "few people walked" if is_sparse else "there is no large rectangle in which people walked"
+    return replace(_from_shape(outline), reason=f"the outline of the place where people were seen, as {why}")
+
+
+def _find_seen_parts(
+    tracks: pd.DataFrame, corner: np.ndarray, cell: float, shape: tuple[int, ...]
+) -> np.ndarray:
+    """Whether people can be seen on each part of the cells, of which `_PARTS` x `_PARTS` make one."""
+    size, empty = _PARTS * np.array(shape), int(_EMPTY * _PARTS / cell)
+    place = ((tracks[["x", "y"]].to_numpy(float) - corner) // (cell / _PARTS)).astype(np.int64)
+    place = place[((place >= 0) & (place < size)).all(axis=1)]
+    parts = np.zeros(size + 2 * empty + 2, bool)
+    parts[tuple(place.T + empty + 1)] = True
+    covered = distance_transform_edt(~parts) <= empty
+    closed = distance_transform_edt(covered) > empty
+    return np.asarray(closed[empty + 1 : -empty - 1, empty + 1 : -empty - 1])
+
+
+def _trim(seen: np.ndarray, first: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rectangle from `first` to `end` without the lines of its border that are `seen` least."""
+    first, end = first.copy(), end.copy()
+    while not (inside := seen[first[0] : end[0], first[1] : end[1]]).all():
+        lines = [(inside[0], first, 0, 1), (inside[:, 0], first, 1, 1)]
+        lines += [(inside[-1], end, 0, -1), (inside[:, -1], end, 1, -1)]
+        _, border, axis, step = min(lines, key=lambda line: line[0].mean())
+        border[axis] += step
+    return first, end
+
+
+def _outline(seen: np.ndarray, corner: np.ndarray, part: float, space: AttentionalSpace) -> BaseGeometry:
+    """The outline of `seen` parts, without strips narrower than 1 m and pieces narrower than the space."""
+    import shapely
+
+    ends = np.diff(np.pad(seen, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    (column, low), high = np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
+    whole, strip = shapely.union_all(shapely.box(column, low, column + 1, high)), 0.5 / part
+    wide = whole.buffer(-strip, join_style="mitre").buffer(strip, join_style="mitre").intersection(whole)
+    shapes = shapely.transform(shapely.get_parts(wide.simplify(1)), lambda points: corner + part * points)
+    has_room = ~shapely.is_empty(shapely.buffer(shapes, -space.width / 2))
+    return shapely.set_precision(shapely.union_all(shapes[has_room]), 0.01)
 
 
 def _count_people(walks: pd.DataFrame, cell: float) -> tuple[np.ndarray, np.ndarray, float]:
@@ -170,16 +229,16 @@ def _count_people(walks: pd.DataFrame, cell: float) -> tuple[np.ndarray, np.ndar
     return count.reshape(shape), first * cell, cell
 
 
-def _largest_rectangle(walked: np.ndarray, side: int, loss: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """The rectangle with the most cells walked on, minus `loss` for each other cell; at least `side` wide.
+def _largest_rectangle(walked: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """The largest rectangle of cells walked on that is at least `side` wide.
 
-    Returns its first cell and its end, each (2,), and the share walked on; all 0 where there is none.
+    Returns its first cell and its end, each (2,); all 0 where there is none.
     """
-    best, found = 0.0, (np.zeros(2, int), np.zeros(2, int), 0.0)
+    best, found = 0.0, (np.zeros(2, int), np.zeros(2, int))
     if min(walked.shape) < side:
         return found
     total = np.zeros((walked.shape[0] + 1, walked.shape[1] + 1))
-    total[1:, 1:] = np.where(walked, 1.0, -min(loss, walked.size)).cumsum(axis=0).cumsum(axis=1)
+    total[1:, 1:] = np.where(walked, 1.0, -walked.size).cumsum(axis=0).cumsum(axis=1)
     for top in range(walked.shape[0] - side + 1):
         strips = total[top + side :] - total[top]  # by last row: sums over columns from the first
         least = np.minimum.accumulate(strips[:, :-side], axis=1)
@@ -188,8 +247,7 @@ def _largest_rectangle(walked: np.ndarray, side: int, loss: float) -> tuple[np.n
         if gain[row, column] > best:
             best = gain[row, column]
             left = int(np.argmax(strips[row] == least[row, column]))
-            first, end = np.array([top, left]), np.array([top + side + int(row), int(column) + side])
-            found = first, end, float(walked[first[0] : end[0], first[1] : end[1]].mean())
+            found = np.array([top, left]), np.array([top + side + int(row), int(column) + side])
     return found
 
 

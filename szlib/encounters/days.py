@@ -114,7 +114,8 @@ class Extraction:
         shown = self.table.to_string(index=False, float_format="{:.1f}".format)
         statuses = self.table["status"].value_counts().sort_index()
         counts = ", ".join(f"{n} {status}" for status, n in statuses.items())
-        return f"{shown}\n{counts}" + (f"; area: {self.area}" if self.area else "")
+        area = f"; area: {self.area} {self.area.reason}".rstrip() if self.area else ""
+        return f"{shown}\n{counts}{area}"
 
 
 def extract_days(

@@ -53,7 +53,8 @@ def find_encounters(
     One row a sample: encounter (number), day, ref_id, other_id, t [s], los_angle [rad] (bearing of
     the other person in the reference pedestrian's frame, in (-pi, pi]), distance [m], speed of the
     reference pedestrian [m/s], kind (category, see `szlib.encounters.kinds`).  Empty if there is no
-    encounter.  ``.attrs["funnel"]`` counts, by reason, the ticks that open no encounter.
+    encounter.  ``.attrs["funnel"]`` counts, by reason, the ticks that open no encounter; ``"area"`` and
+    ``"area_reason"`` say which area was searched, and why where it was found.
 
     Raises
     ------
@@ -73,7 +74,7 @@ def find_encounters(
     """
     settings = (settings or EncounterSettings()).with_parameters(parameters)
     rows = TrackRows.from_tracks(tracks)
-    area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area)
+    area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area, settings.space)
     openings = _find_openings(rows, area, settings)
     chosen, reasons = _find_windows(rows, openings, settings)
     ref, other = openings.rows[chosen], openings.other[openings.rows[chosen]]
@@ -82,7 +83,7 @@ def find_encounters(
     counts = area.grown(REACH).contains(rows.x, rows.y)
     kind = kinds_of_pairs(rows.person[ref], rows.person[other], rows, counts)
     samples["kind"] = kind.repeat(settings.steps + 1)
-    samples.attrs["area"] = str(area)
+    samples.attrs |= {"area": str(area), "area_reason": area.reason}
     n_rows, n_openings, opening = len(rows), len(openings.rows), "encounters: ticks that open a window"
     stages = [
         funnels.stage(opening, n_rows, n_openings, openings.reasons),

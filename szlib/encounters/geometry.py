@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ class Square:
     Parameters
     ----------
     x, y : extent along each axis, (lowest, highest) [m].
+    reason : why `szlib.walked_area` took it, a sentence; empty for a square that was given.
 
     Raises
     ------
@@ -40,6 +41,7 @@ class Square:
 
     x: tuple[float, float]
     y: tuple[float, float]
+    reason: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
         is_square = np.isfinite([*self.x, *self.y]).all() and self.x[0] < self.x[1] and self.y[0] < self.y[1]
@@ -86,6 +88,7 @@ class Region:
     ----------
     wkt : the polygon in metres as well-known text, such as "POLYGON ((0 0, 12 0, 12 8, 0 0))".
         `szlib.as_area` makes it from Shapely's polygons, PedPy's areas and files.
+    reason : as for a `Square`.
 
     Raises
     ------
@@ -100,6 +103,7 @@ class Region:
     """
 
     wkt: str
+    reason: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
         _ = self.polygon

@@ -119,7 +119,7 @@ def null_encounters(
     require(shifts >= 1, "shifts", shifts, "at least 1")
     require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
     settings = (settings or EncounterSettings()).with_parameters(parameters)
-    area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area)
+    area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area, settings.space)
     settings = replace(settings, area=area)
     kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
     everyone = ShiftableTracks.from_tracks(tracks)

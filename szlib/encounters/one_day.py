@@ -74,7 +74,7 @@ def with_area(
             # Reading the day itself warns of rejected rows.
             with warnings.catch_warnings(action="ignore", category=DataWarning):
                 tracks = read_tracks(files, options=options)
-        area = walked_area(tracks)
+        area = walked_area(tracks, space=settings.space)
     return replace(settings, area=area)
 
 

@@ -204,6 +204,8 @@ def _inspect(options: argparse.Namespace) -> int:
         samples = find_encounters_in_files(files, EncounterSettings(area=options.area), ReadOptions())
     if "area" in samples.attrs:
         print(f"area {samples.attrs['area']}")
+        if samples.attrs["area_reason"]:
+            print(f"area found: {samples.attrs['area_reason']}")
     print(funnels.text(funnels.get(samples)))
     return 0
 

@@ -92,7 +92,9 @@ def run(
         variables = given | {"data": data, "results": str(results)}
         outcomes = _execute_all(scripts, variables, home, jobs, scheduler)
         if (samples := home / "encounters.parquet").exists():
-            source["warnings"] = funnels.warnings(funnels.get(pd.read_parquet(samples, columns=[])))
+            table = pd.read_parquet(samples, columns=[])
+            source["warnings"] = funnels.warnings(funnels.get(table))
+            source["area"] = "{area} {area_reason}".format_map(table.attrs).strip()
         summary, everything = (_summarise(source, each) for each in (outcomes, {**earlier, **outcomes}))
         write_file(home / SUMMARY, json.dumps(everything, indent=1))
         if any((home / f"{name}.ipynb").exists() for name in everything["notebooks"]):
@@ -270,6 +272,7 @@ def format_summary(summary: Mapping[str, Any]) -> str:
         if "error" in outcome:
             notes.append(f"{name}: {outcome['error']}")
     notes += [f"data: {text}" for text in summary.get("warnings", ())]
+    notes += [f"area: {summary['area']}"] if "area" in summary else []
     table = [f"{row[0]:<24} {row[1]:>7} {row[2]:>11} {row[3]:>9}  {row[4]}" for row in rows]
     return "\n".join([*table, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
 

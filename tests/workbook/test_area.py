@@ -54,6 +54,22 @@ def test_area_of_other_data_is_the_walked_area(hall, capsys):
         assert found == szlib.walked_area(szlib.read_tracks(hall))
 
 
+def test_commands_say_which_area_was_found_and_why(tmp_path, capsys):
+    few, rectangle = tmp_path / "few.csv", tmp_path / "many.csv"
+    make_hall(people=40)[["t", "id", "x", "y"]].to_csv(few, index=False)
+    make_hall()[["t", "id", "x", "y"]].to_csv(rectangle, index=False)
+    why = {few: "the outline of the place where people were seen, as few people walked"}
+    why[rectangle] = "the largest rectangle in which on each cell of 0.5 m at least 3 people walked"
+    for file, reason in why.items():
+        assert main(["inspect", str(file)]) == 0
+        assert f"area found: {reason}\n" in capsys.readouterr().out
+        assert main(["extract", str(file), "--out", str(tmp_path / file.stem)]) == 0
+        assert reason in capsys.readouterr().out
+        record = record_of(tmp_path, file)
+        assert {record.cache.find_area().reason for _ in range(2)} == {reason}, "found, then from the cache"
+        assert record.cache.encounters().attrs["area_reason"] == reason
+
+
 def test_extract_records_the_area(hall, tmp_path, capsys):
     assert main(["extract", str(hall), "--out", str(tmp_path / "days"), "--square", "0", "12", "0", "8"]) == 0
     assert "area: 0.0 12.0 0.0 8.0" in capsys.readouterr().out
@@ -99,7 +115,7 @@ def test_plaza_has_the_square_of_the_mall(tmp_path, monkeypatch):
 def test_area_is_found_once_and_cached(hall, tmp_path, monkeypatch):
     record = record_of(tmp_path, hall)
     found = record.cache.find_area(record.cache.tracks())
-    assert str(found) == (record.out / "area.txt").read_text()
+    assert f"{found}\n{found.reason}" == (record.out / "area.txt").read_text()
     monkeypatch.setattr("szlib.encounters.one_day.walked_area", None)
     assert record_of(tmp_path, hall).cache.find_area() == found
     assert record.cache.encounters().attrs["area"] == str(found)

@@ -17,7 +17,6 @@ from ...encounters.areas import as_area
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
 from ...encounters.one_day import require_encounters, with_area
-from ...encounters.settings import EncounterSettings
 from ...errors import DataError
 from ...files import load_cached, store_cached, write_checksum
 from ...input_files import file_content, printable, unchanged_files
@@ -94,11 +93,12 @@ class DataCache:
         `tracks`, the table of the data, saves reading the files again where the area depends on them.
         """
         if content := load_cached(self._path("area.txt"), self._source()):
-            return as_area(content.decode())
-        settings = EncounterSettings(area=self.area or None)
+            text, _, reason = content.decode().partition("\n")
+            return replace(as_area(text), reason=reason)
+        settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
             area = as_area(with_area(settings, files, ReadOptions(), tracks).area)
-        store_cached(self._path("area.txt"), str(area).encode(), self._source())
+        store_cached(self._path("area.txt"), f"{area}\n{area.reason}".encode(), self._source())
         return area
 
     def encounters(self) -> pd.DataFrame:
