@@ -3,7 +3,7 @@
 The *attentional space* is a rectangle ahead of the reference pedestrian that turns with them.  Over
 a window of 3 s (31 ticks of 0.1 s):
 
-1. the space stays inside the area (in any convex area: its four corners do);
+1. the space stays inside the area (in any convex area: its four corners do), unless walls bound the area;
 2. one other person is inside the space when the window opens, and no third person enters it;
 3. at the opening that person is at least 1 m away;
 4. the reference pedestrian walks at 0.4 m/s or more throughout.
@@ -46,7 +46,7 @@ def find_encounters(
     kinds : None keeps all (paper); "strangers" all but companions; else one or several of
         `szlib.encounters.KINDS`.  Encounters keep the numbers that they have among all.
     parameters : single values in place of those of `settings`: area (or square, its older name), space,
-        duration [s], min_distance [m], min_speed [m/s], throughout.  See `szlib.EncounterSettings`.
+        duration [s], min_distance [m], min_speed [m/s], throughout, walls.  See `szlib.EncounterSettings`.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def _find_openings(rows: TrackRows, area: Area, settings: EncounterSettings) -> 
     ahead, side = settings.space.corners.T[..., None]
     corners = rows.x[at] + ahead * cos - side * sin, rows.y[at] + ahead * sin + side * cos
     space_inside = inside.copy()
-    space_inside[at] = area.covers(*corners)
+    space_inside[at] = settings.walls or area.covers(*corners)
     ready = space_inside & (rows.speed >= settings.min_speed)
     people, other = find_occupants(rows, at, ready, settings.space)
     one, partner = people == 1, other[people == 1]

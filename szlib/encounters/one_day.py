@@ -19,13 +19,16 @@ from ..tracks import funnels
 from ..tracks.clock import read_tracks, to_clock
 from ..tracks.formats import find_format
 from ..tracks.options import ReadOptions
-from .areas import AUTO, walked_area
+from .areas import AUTO, as_area, walked_area
 from .finding import find_encounters
 from .geometry import Area, Region, Square
-from .near_rows import read_near_area
+from .near_rows import read_near_area, select_near_rows
 from .samples import no_samples
 from .settings import EncounterSettings
 
+# With fewer encounters, what relaxing a condition would give is stated (assumed: in 22 of the ETH
+# sequence no zone is found).
+FEW_ENCOUNTERS = 60
 # Advice by a word of the condition that rejected everything.
 _ADVICE = {
     "corner": 'the space ahead of a person, 4 m x 5 m, has no room there: give a larger area, or "auto"',
@@ -101,9 +104,36 @@ def _known_area(settings: EncounterSettings, files: Sequence[Path], options: Rea
     return Square(*known) if known else None
 
 
-def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
+def relax_conditions(samples: pd.DataFrame, tracks: pd.DataFrame, settings: EncounterSettings) -> str:
+    """What relaxing one condition of an encounter would give, where few are found: a sentence.
+
+    `samples` were found in the `tracks` with the `settings`.  The first condition named costs most.
+    """
+    count, area = samples["encounter"].nunique(), as_area(samples.attrs["area"])
+    settings, near = replace(settings, area=area), select_near_rows(tracks, area, settings.duration)
+    space, half = settings.space, max(settings.steps // 2 / 10, 0.1)
+    small = replace(space, width=round(space.width / 2, 1), length=round(0.6 * space.length, 1))
+    name = f"an attentional space of {small.width:g} m x {small.length:g} m (space_width, space_length)"
+    relaxed: dict[str, dict[str, Any]] = {
+        name: {"space": small},
+        "a space that may reach beyond the outline, if this is a wall (walls)": {"walls": True},
+        f"windows of {half:g} s (duration)": {"duration": half},
+        "any distance at the opening (min_distance)": {"min_distance": 0.0},
+        f"people of {settings.min_speed / 2:g} m/s (min_speed)": {"min_speed": settings.min_speed / 2},
+    }
+    found = [
+        (find_encounters(near, settings=replace(settings, **change))["encounter"].nunique(), name)
+        for name, change in relaxed.items()
+        if len(near)
+    ]
+    more = "; ".join(f"{name}: {n:,} encounters" for n, name in sorted(found, reverse=True) if n > count)
+    given = f"one condition relaxed gives more: {more}" if more else "no single condition relaxed gives more"
+    return f"{count} encounters are few; {given}"
+
+
+def require_encounters(samples: pd.DataFrame, advice: str = "") -> pd.DataFrame:
     """Return the `samples` if there are any; else raise DataError: the stage that rejected everything, why,
-    and what to do."""
+    and what to do, with the `advice` of `relax_conditions`."""
     if len(samples):
         return samples
     stages = [stage for stage in funnels.get(samples) if stage["entered"]]
@@ -112,10 +142,11 @@ def require_encounters(samples: pd.DataFrame) -> pd.DataFrame:
         raise DataError("the table of samples is empty, and has no funnel that says why")
     rows = ", ".join(f"{count:,} {reason}" for reason, count in emptied["rejected"].items())
     last = list(emptied["rejected"])[-1]
-    advice = next((text for words, text in _ADVICE.items() if words in last), _ADVICE["somebody else"])
+    usual = next((text for words, text in _ADVICE.items() if words in last), _ADVICE["somebody else"])
     raise DataError(
         f"there is no encounter in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
-        f"({emptied['stage']}) none is left: {rows}.  The last condition: {last}; {advice}"
+        f"({emptied['stage']}) none is left: {rows}.  The last condition: {last}; {usual}"
+        + (f"; {advice}" if advice else "")
     )
 
 

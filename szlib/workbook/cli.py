@@ -84,6 +84,7 @@ def build_parser() -> argparse.ArgumentParser:
     area.add_argument("--area", "--square", nargs=4, type=float, metavar=rectangle, help=text["area"])
     area.add_argument("--polygon", dest="area", metavar="FILE", help=text["polygon"])
     area.add_argument("--auto", dest="area", action="store_const", const="auto", help=text["auto"])
+    data.add_argument("--walls", action="store_true", help=text["walls"])
     data.add_argument("--memory", metavar="SIZE", help=text["memory"])
     cluster.add_argument("--scheduler", metavar="ADDRESS", help=text["scheduler"])
 
@@ -150,6 +151,8 @@ def _run(options: argparse.Namespace) -> int:
     parameters = dict(_parse_parameter(text) for text in options.parameter)
     if options.area:
         parameters["area"] = options.area
+    if options.walls:
+        parameters["walls"] = True
     _require_workbook_packages()
     from . import folders
     from .runner import format_summary, run
@@ -190,9 +193,10 @@ def _report(options: argparse.Namespace) -> int:
 
 def _inspect(options: argparse.Namespace) -> int:
     """Print the funnel of a file, from its rows to its encounters."""
-    from ..encounters.one_day import find_encounters_in_files
+    from ..encounters.one_day import FEW_ENCOUNTERS, find_encounters_in_files, relax_conditions
     from ..encounters.settings import EncounterSettings
     from ..tracks import datasets, funnels
+    from ..tracks.clock import read_tracks
     from ..tracks.options import ReadOptions
 
     files = datasets.find([options.file])
@@ -200,13 +204,18 @@ def _inspect(options: argparse.Namespace) -> int:
         raise DataError(
             f"{options.file}: stands for {len(files)} files; expected one file; inspect each by itself"
         )
+    advice, settings = "", EncounterSettings(area=options.area, walls=options.walls)
     with warnings.catch_warnings(action="ignore", category=DataWarning):  # the table shows the same counts
-        samples = find_encounters_in_files(files, EncounterSettings(area=options.area), ReadOptions())
+        samples = find_encounters_in_files(files, settings, ReadOptions())
+        if "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS:
+            advice = relax_conditions(samples, read_tracks(files), settings)
     if "area" in samples.attrs:
         print(f"area {samples.attrs['area']}")
         if samples.attrs["area_reason"]:
             print(f"area found: {samples.attrs['area_reason']}")
     print(funnels.text(funnels.get(samples)))
+    if advice:
+        print(advice)
     return 0
 
 
@@ -217,8 +226,9 @@ def _extract(options: argparse.Namespace) -> int:
 
     with cluster(options.scheduler):
         extraction = extract_days(
-            options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude, area=options.area
-        )
+            options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude,
+            area=options.area, walls=options.walls,
+        )  # fmt: skip
     print(extraction)
     return 1 if len(extraction.failed) else 0
 

@@ -93,7 +93,8 @@ def run(
         outcomes = _execute_all(scripts, variables, home, jobs, scheduler)
         if (samples := home / "encounters.parquet").exists():
             table = pd.read_parquet(samples, columns=[])
-            source["warnings"] = funnels.warnings(funnels.get(table))
+            advice = table.attrs.get("advice")
+            source["warnings"] = funnels.warnings(funnels.get(table)) + ([advice] if advice else [])
             source["area"] = "{area} {area_reason}".format_map(table.attrs).strip()
         summary, everything = (_summarise(source, each) for each in (outcomes, {**earlier, **outcomes}))
         write_file(home / SUMMARY, json.dumps(everything, indent=1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import partial
 
 import jupytext
@@ -175,6 +176,38 @@ def test_error_names_the_condition_that_rejected_the_last_rows(reason):
         require_encounters(samples)
     assert f"The last condition: {reason}" in str(error.value).replace("a corner", "corner")
     assert str(square) in str(error.value)
+
+
+def test_advice_about_few_encounters_gives_the_numbers_that_following_it_gives(tmp_path, capsys):
+    file = tmp_path / "room.csv"
+    make_hall(size=(7, 6))[["t", "id", "x", "y"]].to_csv(file, index=False)
+    with pytest.raises(szlib.DataError, match="there is no encounter in the area") as error:
+        record_of(tmp_path, file).cache.encounters()
+    assert main(["inspect", str(file)]) == 0
+    advice = capsys.readouterr().out.splitlines()[-1]
+    assert str(error.value).endswith(advice)
+    asked = {
+        r"2 m x 3 m \(space_width, space_length\)": {"space_width": 2.0, "space_length": 3.0},
+        r"\(walls\)": {"walls": True},
+    }
+    for condition, followed in asked.items():
+        count = int(re.search(condition + r": (\d+) encounters", advice)[1])
+        cache = record_of(
+            tmp_path, file, area=str(szlib.walked_area(szlib.read_tracks(file))), **followed
+        ).cache
+        assert cache.encounters()["encounter"].nunique() == count > 0
+    assert main(["inspect", "--walls", str(file)]) == 0
+    assert "encounters are few" not in capsys.readouterr().out.splitlines()[-1]
+
+
+def test_space_reaches_beyond_an_outline_that_is_a_wall():
+    """A person outside the area is no reference pedestrian."""
+    walks = make_walk((1, 1), (1.0, 0), duration=6), make_walk((9, 1), (-1.0, 0), person=2, duration=6)
+    outside = make_walk((1, -5), (1.0, 0), person=3), make_walk((4, -5), (1.0, 0), person=4)
+    tracks = make_tracks(*walks, *outside)
+    assert len(szlib.find_encounters(tracks, area="0 10 0 2")) == 0
+    samples = szlib.find_encounters(tracks, area="0 10 0 2", walls=True)
+    assert set(samples["ref_id"]) == {1, 2}
 
 
 def test_samples_with_encounters_pass_unchanged():

@@ -27,8 +27,9 @@ def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureF
     spoilt = day.with_name("spoilt.csv")
     spoilt.write_text(day.read_text() + "1,2\n")
     assert main(["inspect", str(spoilt)]) == 0
-    area, *lines = (line.split() for line in capsys.readouterr().out.splitlines())
+    area, *lines, advice = (line.split() for line in capsys.readouterr().out.splitlines())
     assert area == ["area", *str(ATC_SQUARE).split()]
+    assert advice[1:4] == ["encounters", "are", "few;"]
     counts = [int(line[-1].replace(",", "")) for line in lines]
     assert lines[0][:3] == ["read", "spoilt.csv", "entered"]
     assert counts[0] == len(spoilt.read_text().splitlines())

@@ -16,7 +16,7 @@ from ... import __version__
 from ...encounters.areas import as_area
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
-from ...encounters.one_day import require_encounters, with_area
+from ...encounters.one_day import FEW_ENCOUNTERS, relax_conditions, require_encounters, with_area
 from ...errors import DataError
 from ...files import load_cached, store_cached, write_checksum
 from ...input_files import file_content, printable, unchanged_files
@@ -112,9 +112,13 @@ class DataCache:
     def store_encounters(self, samples: pd.DataFrame) -> pd.DataFrame:
         """Store the `samples` of encounters for later notebooks, and return them.
 
-        Raises DataError, which names the condition that rejected the last rows, if there are none.
+        Raises DataError, which names the condition that rejected the last rows, if there are none.  If there
+        are few, ``.attrs["advice"]`` says what relaxing a condition would give.
         """
-        require_encounters(samples)
+        advice = ""
+        if samples["encounter"].nunique() < FEW_ENCOUNTERS and "area" in samples.attrs:
+            advice = relax_conditions(samples, self.tracks(), self.method.encounter_settings())
+        require_encounters(samples, advice).attrs["advice"] = advice
         content = io.BytesIO()
         samples.to_parquet(content)
         store_cached(self._path("encounters.parquet"), content.getvalue(), self._source())
