@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from bs4 import BeautifulSoup
-from commands import execute, in_a_fork, judge
+from commands import execute, import_slow_modules, in_a_fork, judge
 from processes import contents, environment, furnish, make_reference
 
 REPORTS = 1000
@@ -118,6 +118,7 @@ def attack_reports(count: int, place: Path, rng: random.Random, tally: Counter[s
     home = place / "results" / "day"
     if in_a_fork(lambda: write_genuine(genuine)):
         raise RuntimeError("the report of genuine results could not be written")
+    import_slow_modules()
     for _ in range(count):
         shutil.rmtree(home, ignore_errors=True)
         shutil.copytree(genuine, home)
