@@ -71,6 +71,8 @@ def run_cells(
 ) -> None:
     """Run the cells of a notebook by papermill, and write the executed copy also if a cell fails.
 
+    A run that is stopped writes no copy, because it would be unfinished.
+
     `script`, `parameters`, `folder` and `environment` are those of `execute_notebook`.
     Raises the error of papermill for a cell that fails, or of nbclient for a kernel that ends.
     """
@@ -109,10 +111,11 @@ def run_cells(
                     folders = {"TMPDIR": str(private), "IPYTHONDIR": str(private)}
                     client.execute(env={**os.environ, **own, **folders, **environment})
             finally:
-                _CLIENTS.discard(client)
                 copy = deepcopy(nb_man.nb)
                 copy.metadata.pop("papermill", None)  # times and paths of this machine
-                write_file(folder / f"{script.stem}.ipynb", nbformat.writes(copy))
+                if client in _CLIENTS:  # nobody has stopped the run
+                    _CLIENTS.discard(client)
+                    write_file(folder / f"{script.stem}.ipynb", nbformat.writes(copy))
 
     logging.getLogger("papermill").setLevel(logging.ERROR)  # those of the zone are in no notebook's own cell
     known = METHOD_DEFAULTS.keys() | read_defaults(script).keys()
@@ -138,5 +141,6 @@ def end_kernels(executions: Sequence[Future[Any]]) -> None:
     while not all(each.done() for each in executions):
         for client in list(_CLIENTS):
             if process := getattr(getattr(client.km, "provisioner", None), "process", None):
+                _CLIENTS.discard(client)
                 process.kill()
         time.sleep(0.1)

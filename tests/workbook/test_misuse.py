@@ -297,6 +297,7 @@ time.sleep(120)"""
     assert not Path(f"/proc/{kernel}").exists()
     assert not list(tmp_path.glob("*.json")), "the kernel's connection file"
     assert not (tmp_path / "out" / "mine" / "summary.json").exists()
+    assert not list(tmp_path.rglob("*.ipynb")), "an unfinished copy"
 
 
 def test_run_recovers_from_a_full_disk_at_any_write(notebooks, tmp_path, monkeypatch, capsys):
