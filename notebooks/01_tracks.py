@@ -36,6 +36,7 @@
 import numpy as np
 
 import szlib
+from szlib.encounters.areas import area_for
 from szlib.tracks import clock, funnels, readers
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
@@ -113,6 +114,8 @@ record.key |= {
 # you trust it: a pillar or a shelf may stand where nobody walked.
 
 # %%
+if people["day"].nunique() > 1:
+    people = record.cache.tracks()  # recordings of several places stand side by side
 square = record.cache.find_area(people)
 ax = figures.plot_map(people, square)
 record.figure(ax.figure, "map")
@@ -125,7 +128,7 @@ parameters(
 
 # %%
 try:
-    found = szlib.walked_area(people)
+    found = area_for(people, "auto")
     ax = figures.plot_map(people, found)
     ax.set_title(f"auto: {found.area:.0f} m$^2$")
     record.figure(ax.figure, "auto")

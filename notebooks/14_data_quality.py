@@ -199,7 +199,8 @@ record.figure(figure, "hours")
 # The same as `szlib inspect FILE` prints; over all days, each stage added up.
 
 # %%
-conditions = record.cache.method.encounter_settings(record.cache.find_area())
+own = not has_dates and len(files) > 1 and area in ("", "auto")  # each recording its own area
+conditions = record.cache.method.encounter_settings("auto" if own else record.cache.find_area())
 extraction = szlib.extract_days(
     files, out=record.out / "days", exclude=exclude, progress=False, settings=conditions
 )

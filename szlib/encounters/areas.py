@@ -39,6 +39,7 @@ _BEHIND = 3 * 1.2  # 3 s of walking [m], for which a rectangle is longer than th
 # place, wastes encounters (assumed; measured on small rooms and oblique views).
 _WIDE, _MAIN = 2.0, 2 / 3
 _MOST_CELLS = 400  # largest number of cells along an axis; cells grow with the site
+_APART = 50.0  # least distance of recordings that are placed side by side [m]
 _OUTLYING = 1e-3  # share of positions on either side that does not belong to the site: trackers jump
 # A spot can be seen unless a disc of this radius [m] in which nobody was seen covers it (assumed: as wide as
 # gaps that few people leave).  Each cell has so many parts along each axis, for which that is decided.
@@ -90,8 +91,47 @@ def as_area(area: object) -> Area:
 
 def area_for(tracks: pd.DataFrame, area: object, space: AttentionalSpace = PAPER_SPACE) -> Area:
     """Convert `area` as `as_area` does; "auto" stands for the `walked_area` of the `tracks` for a `space`."""
-    is_auto = isinstance(area, str) and area.strip() == AUTO
-    return walked_area(tracks, space=space) if is_auto else as_area(area)
+    if not (isinstance(area, str) and area.strip() == AUTO):
+        return as_area(area)
+    places = _find_places(tracks)
+    if len(set(places.values())) < 2:
+        return walked_area(tracks, space=space)
+    import shapely
+
+    groups = tracks.groupby(tracks["day"].astype(str).map(places))
+    found = {name: walked_area(part, space=space) for name, part in groups}
+    shapes = [a.polygon if isinstance(a, Region) else shapely.Polygon(*a.outlines) for a in found.values()]
+    reasons = "; ".join(f"{name or 'days'}: {each.reason}" for name, each in found.items())
+    return replace(
+        _from_shape(shapely.union_all(shapes)), reason=f"for each recording, side by side along x: {reasons}"
+    )
+
+
+def place_apart(tracks: pd.DataFrame) -> pd.DataFrame:
+    """Move recordings without a calendar apart along x, so that each can have an area of its own.
+
+    Days of a calendar stay where they are: they are of one place.  Without recordings of different places
+    the table itself is returned.
+    """
+    places = _find_places(tracks)
+    if len(set(places.values())) < 2:
+        return tracks
+    place = tracks["day"].astype(str).map(places)
+    offsets, end = {}, None
+    for name, (low, high) in tracks.groupby(place)["x"].agg(["min", "max"]).iterrows():
+        offsets[name] = 0 if end is None else int(np.ceil(end + _APART) - np.floor(low))
+        end = high + offsets[name]
+    return tracks.assign(x=tracks["x"] + place.map(offsets))
+
+
+def has_calendar(day: object) -> bool:
+    """Whether a `day` is a date, not the name of a recording."""
+    return re.match(r"\d{4}-\d\d-\d\d", str(day)) is not None
+
+
+def _find_places(tracks: pd.DataFrame) -> dict[str, str]:
+    """The name of the place of each day: that of a recording; empty for days of a calendar."""
+    return {str(day): "" if has_calendar(day) else str(day) for day in tracks["day"].unique()}
 
 
 def walked_area(

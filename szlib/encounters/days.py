@@ -30,6 +30,7 @@ from ..parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.options import ReadOptions
 from ..tracks.recordings import find_day, name_recordings
+from .areas import has_calendar
 from .geometry import Area
 from .one_day import describe_source, find_area, find_encounters_in_files, load_day, store_day
 from .settings import EncounterSettings
@@ -50,7 +51,8 @@ class Extraction:
         implausible in it.
     exclude : days that were left out.
     sources : what the result of each finished day is made of: content, parameters and version.
-    area : where encounters were searched, the same in every day; None where no day has an area.
+    area : where encounters were searched, the same in every day; None where each recording has its own, or
+        no day has one.
 
     Examples
     --------
@@ -138,7 +140,8 @@ def extract_days(
         its folder, where two files have the same name).
     out : folder for the results only; made if it is missing.
     settings : what counts as an encounter; None takes the paper's.  With area None the files of the ATC mall
-        have `ATC_SQUARE`; others have "auto": the `szlib.walked_area` of the first day, the same for all.
+        have `ATC_SQUARE`; others have "auto": the `szlib.walked_area` of the first day, the
+        same for all days of a calendar; recordings without a calendar have each their own.
     options : how files are read.
     n_jobs : number of processes; -1 takes all cores, or all workers of ``joblib.parallel_config("dask")``.
     exclude : days "YYYY-MM-DD" to leave out, as event days were in the paper (sec. 2); they are not read.
@@ -172,14 +175,22 @@ def extract_days(
     claim_folder(folder, PURPOSE, inputs=files)
     days = _group_by_day(files, options)
     included = [(day, of_day) for day, of_day in sorted(days.items()) if day not in excluded]
-    contents = {}
-    for day, of_day in included:
+    given, contents = settings, {}
+    shared = [each for each in included if has_calendar(each[0]) or len(included) == 1]
+    for day, of_day in shared:
         with suppress(SzlibError):  # the first day with an area; computing a day that fails says why
             settings, contents[day] = find_area(of_day, settings, options)
             break
     rows = [_row(day, of_day, status="excluded") for day, of_day in days.items() if day in excluded]
     tasks = [
-        joblib.delayed(extract_day)(day, of_day, str(folder.resolve()), settings, options, contents.get(day))
+        joblib.delayed(extract_day)(
+            day,
+            of_day,
+            str(folder.resolve()),
+            settings if (day, of_day) in shared else given,
+            options,
+            contents.get(day),
+        )
         for day, of_day in included
     ]
     with tqdm(total=len(tasks), unit="day", disable=not progress) as bar:
@@ -189,7 +200,8 @@ def extract_days(
             bar.set_postfix_str(f"{row['day']} {row['status']}")
     sources = {row["day"]: row.pop("source") for row in rows}
     table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
-    area = settings.area if isinstance(settings.area, Area) else None
+    is_one = shared == included or given.area == settings.area
+    area = settings.area if is_one and isinstance(settings.area, Area) else None
     return Extraction(folder, table, excluded, sources, area)
 
 

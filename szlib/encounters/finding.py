@@ -22,7 +22,8 @@ import numpy as np
 import pandas as pd
 
 from ..tracks import funnels
-from .areas import area_for
+from ..tracks.clock import clock_index
+from .areas import AUTO, area_for, place_apart
 from .geometry import ATC_SQUARE, Area
 from .kinds import REACH, kinds_of_pairs, of_kind
 from .occupants import TrackRows, find_occupants, occupant_changes
@@ -73,8 +74,8 @@ def find_encounters(
     (2, 62, 'opposite')
     """
     settings = (settings or EncounterSettings()).with_parameters(parameters)
+    tracks, area = find_place(tracks, settings)
     rows = TrackRows.from_tracks(tracks)
-    area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area, settings.space)
     openings = _find_openings(rows, area, settings)
     chosen, reasons = _find_windows(rows, openings, settings)
     ref, other = openings.rows[chosen], openings.other[openings.rows[chosen]]
@@ -90,6 +91,17 @@ def find_encounters(
         funnels.stage("encounters: windows", n_openings, len(chosen), reasons),
     ]
     return of_kind(funnels.attach(samples, [*funnels.get(tracks), *stages]), kinds)
+
+
+def find_place(tracks: pd.DataFrame, settings: EncounterSettings) -> tuple[pd.DataFrame, Area]:
+    """The `tracks`, and the area in which the `settings` find encounters.
+
+    With "auto" recordings without a calendar get each their own area, and are placed side by side.
+    """
+    if settings.area == AUTO:
+        clock_index(tracks)  # raises DataError for a table that is no track table
+        tracks = place_apart(tracks)
+    return tracks, area_for(tracks, ATC_SQUARE if settings.area is None else settings.area, settings.space)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,9 +19,7 @@ from tqdm import tqdm
 from ..checks import require
 from ..parallel import run_tasks
 from ..tracks import funnels
-from .areas import area_for
-from .finding import find_encounters
-from .geometry import ATC_SQUARE
+from .finding import find_encounters, find_place
 from .kinds import of_kind
 from .settings import EncounterSettings
 from .time_shift import ShiftableTracks
@@ -119,7 +117,7 @@ def null_encounters(
     require(shifts >= 1, "shifts", shifts, "at least 1")
     require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
     settings = (settings or EncounterSettings()).with_parameters(parameters)
-    area = area_for(tracks, ATC_SQUARE if settings.area is None else settings.area, settings.space)
+    tracks, area = find_place(tracks, settings)
     settings = replace(settings, area=area)
     kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
     everyone = ShiftableTracks.from_tracks(tracks)

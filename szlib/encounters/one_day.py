@@ -19,7 +19,7 @@ from ..tracks import funnels
 from ..tracks.clock import read_tracks, to_clock
 from ..tracks.formats import find_format
 from ..tracks.options import ReadOptions
-from .areas import AUTO, as_area, walked_area
+from .areas import AUTO, area_for, as_area, place_apart
 from .finding import find_encounters
 from .geometry import Area, Region, Square
 from .near_rows import read_near_area, select_near_rows
@@ -53,7 +53,7 @@ def find_encounters_in_files(
     a file changes meanwhile.
     """
     with unchanged_files(files):
-        area = _known_area(settings, files, options)
+        area = known_area(settings, files, options)
         raw = read_near_area(files, area=area, duration=settings.duration, options=options)
     tracks = to_clock(raw, max_gap=options.max_gap) if len(raw) else raw
     if len(tracks) == 0:
@@ -71,13 +71,13 @@ def with_area(
 
     The files are read as `options` say, unless their `tracks` are given.
     """
-    area = _known_area(settings, files, options)
+    area = known_area(settings, files, options)
     if area is None:
         if tracks is None:
             # Reading the day itself warns of rejected rows.
             with warnings.catch_warnings(action="ignore", category=DataWarning):
                 tracks = read_tracks(files, options=options)
-        area = walked_area(tracks, space=settings.space)
+        area = area_for(place_apart(tracks), AUTO, settings.space)
     return replace(settings, area=area)
 
 
@@ -90,12 +90,12 @@ def find_area(
     """
     paths = [Path(file) for file in files]
     with unchanged_files(paths):
-        is_known = _known_area(settings, paths, options) is not None
+        is_known = known_area(settings, paths, options) is not None
         contents = None if is_known else describe_source(files, settings, options)["files"]
         return with_area(settings, paths, options), contents
 
 
-def _known_area(settings: EncounterSettings, files: Sequence[Path], options: ReadOptions) -> Area | None:
+def known_area(settings: EncounterSettings, files: Sequence[Path], options: ReadOptions) -> Area | None:
     """The area of the settings, or that of the ATC mall; None where it must be found."""
     if isinstance(settings.area, Square | Region):
         return settings.area

@@ -19,10 +19,11 @@ from hypothesis import given, strategies
 from matplotlib.path import Path as Outline
 
 import szlib
-from szlib.encounters.areas import _largest_rectangle, area_for
+from szlib.encounters.areas import _largest_rectangle, area_for, place_apart
 from szlib.encounters.finding import find_encounters
 from szlib.encounters.geometry import Region, Square
 from szlib.encounters.null_model import null_encounters
+from szlib.workbook.record import DataCache
 
 ATC_POLYGON = shapely.box(-18.5, -10, -7.5, 8)
 HALL = shapely.Polygon([(0, 0), (12, 0), (12, 8), (0, 8)])
@@ -389,3 +390,61 @@ def test_walked_area_of_the_mall_is_its_open_square(real_tracks: pd.DataFrame) -
     found = szlib.walked_area(real_tracks)
     for ours, theirs in zip((*found.x, *found.y), (*by_eye.x, *by_eye.y), strict=True):
         assert abs(ours - theirs) <= 0.5
+
+
+# --- several recordings ------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def rooms() -> dict[str, pd.DataFrame]:
+    """Three rooms, each in a frame of its own."""
+    sizes = {"a": (12, 8), "b": (15, 13), "c": (9, 11)}
+    return {name: make_hall(size=size).assign(day=name) for name, size in sizes.items()}
+
+
+def by_day(samples: pd.DataFrame) -> dict[str, int]:
+    return samples.groupby(samples["day"].astype(str))["encounter"].nunique().to_dict()
+
+
+def test_recordings_without_a_calendar_have_each_their_own_area(rooms: dict[str, pd.DataFrame]) -> None:
+    alone = {name: by_day(find_encounters(room, area="auto"))[name] for name, room in rooms.items()}
+    together = find_encounters(pd.concat(rooms.values()), area="auto")
+    assert by_day(together) == alone
+    assert together.attrs["area_reason"].count("the largest rectangle") == 3
+    null = null_encounters(pd.concat(rooms.values()), shifts=2, progress=False, area="auto")
+    assert len(null.encounters) > 0
+    assert szlib.as_area(null.parameters["area"]) == szlib.as_area(together.attrs["area"])
+
+
+def test_days_of_a_calendar_share_an_area(rooms: dict[str, pd.DataFrame]) -> None:
+    days = [room.assign(day=f"2024-05-0{k}") for k, room in enumerate(rooms.values(), start=1)]
+    assert find_encounters(pd.concat(days), area="auto").attrs["area"] == str(
+        szlib.walked_area(pd.concat(days))
+    )
+
+
+def test_recordings_are_placed_apart_once_and_one_place_stays(rooms: dict[str, pd.DataFrame]) -> None:
+    apart = place_apart(pd.concat(rooms.values(), ignore_index=True))
+    pd.testing.assert_frame_equal(place_apart(apart), apart)
+    spans = apart.groupby("day")["x"].agg(["min", "max"]).to_numpy()
+    assert (spans[1:, 0] - spans[:-1, 1] >= 50).all()
+    assert place_apart(rooms["a"]) is rooms["a"]
+
+
+def test_extraction_and_notebooks_find_the_encounters_of_each_recording(
+    rooms: dict[str, pd.DataFrame], tmp_path: Path
+) -> None:
+    files = [tmp_path / f"{name}.csv" for name in rooms]
+    for file, room in zip(files, rooms.values(), strict=True):
+        room[["t", "id", "x", "y"]].to_csv(file, index=False)
+    days = szlib.extract_days(files, out=tmp_path / "days", progress=False)
+    alone = {
+        file.stem: by_day(find_encounters(szlib.read_tracks(file), area="auto"))[file.stem] for file in files
+    }
+    assert days.table.set_index("day")["encounters"].to_dict() == alone == by_day(days.samples())
+    assert days.area is None
+    cache = DataCache(tmp_path / "results", list(map(str, files)))
+    assert by_day(cache.encounters()) == alone
+    assert by_day(find_encounters(cache.tracks(), area=cache.find_area())) == alone
+    given = DataCache(tmp_path / "given", list(map(str, files)), area="0 9 0 8")
+    assert given.tracks()["x"].max() < 16

@@ -204,7 +204,7 @@ def test_day_whose_file_changes_after_the_area_was_found_fails(
 
     find_area = extraction.find_area
     monkeypatch.setattr(extraction, "find_area", find_and_change)
-    monkeypatch.setattr(one_day, "walked_area", lambda _, **__: szlib.ATC_SQUARE)
+    monkeypatch.setattr("szlib.encounters.areas.walked_area", lambda _, **__: szlib.ATC_SQUARE)
     done = extract(copies, tmp_path / "out", area="auto")
     assert list(done.table["status"]) == ["failed", "done"]
     assert "changed after its day or the area was found" in done.failed["why"].item()

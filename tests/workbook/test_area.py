@@ -117,7 +117,7 @@ def test_area_is_found_once_and_cached(hall, tmp_path, monkeypatch):
     record = record_of(tmp_path, hall)
     found = record.cache.find_area(record.cache.tracks())
     assert f"{found}\n{found.reason}" == (record.out / "area.txt").read_text()
-    monkeypatch.setattr("szlib.encounters.one_day.walked_area", None)
+    monkeypatch.setattr("szlib.encounters.areas.walked_area", None)
     assert record_of(tmp_path, hall).cache.find_area() == found
     assert record.cache.encounters().attrs["area"] == str(found)
 

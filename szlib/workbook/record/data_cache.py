@@ -13,10 +13,16 @@ from typing import Any
 import pandas as pd
 
 from ... import __version__
-from ...encounters.areas import as_area
+from ...encounters.areas import as_area, place_apart
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
-from ...encounters.one_day import FEW_ENCOUNTERS, relax_conditions, require_encounters, with_area
+from ...encounters.one_day import (
+    FEW_ENCOUNTERS,
+    known_area,
+    relax_conditions,
+    require_encounters,
+    with_area,
+)
 from ...errors import DataError
 from ...files import load_cached, store_cached, write_checksum
 from ...input_files import file_content, printable, unchanged_files
@@ -83,9 +89,11 @@ class DataCache:
         return [file]
 
     def tracks(self) -> pd.DataFrame:
-        """The track table of the data set."""
+        """The track table of the data set; recordings that have each their own area stand side by side."""
+        settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
-            return read_tracks(files)
+            tracks = read_tracks(files)
+            return tracks if known_area(settings, files, ReadOptions()) else place_apart(tracks)
 
     def find_area(self, tracks: pd.DataFrame | None = None) -> Area:
         """The area in which encounters are found: the one given, or the default of the data.
