@@ -110,8 +110,8 @@ def area_for(tracks: pd.DataFrame, area: object, space: AttentionalSpace = PAPER
 def place_apart(tracks: pd.DataFrame) -> pd.DataFrame:
     """Move recordings without a calendar apart along x, so that each can have an area of its own.
 
-    Days of a calendar stay where they are: they are of one place.  Without recordings of different places
-    the table itself is returned.
+    Days of a calendar stay where they are: they are of one place.  Where `tracks` are of one place, they are
+    returned themselves.
     """
     places = _find_places(tracks)
     if len(set(places.values())) < 2:

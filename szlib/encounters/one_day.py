@@ -96,7 +96,10 @@ def find_area(
 
 
 def known_area(settings: EncounterSettings, files: Sequence[Path], options: ReadOptions) -> Area | None:
-    """The area of the settings, or that of the ATC mall; None where it must be found."""
+    """The area of the `settings`, or that of the ATC mall; None where it must be found.
+
+    The mall's `files` are recognised as `options` say.
+    """
     if isinstance(settings.area, Square | Region):
         return settings.area
     areas = {find_format(file, options).area for file in files}
