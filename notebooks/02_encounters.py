@@ -52,7 +52,7 @@ space_length = 5.0
 duration = 3.0  # of a window [s]
 min_distance = 1.0  # of the other person when it opens [m]
 min_speed = 0.4  # of the reference pedestrian [m/s]
-walls = False  # True: the outline of the area is a wall, and the space may reach beyond it
+has_walls = False  # True: the outline of the area is a wall, and the space may reach beyond it
 examples = 100  # paths drawn
 
 # %%
@@ -68,7 +68,7 @@ parameters(
         ("speed of who is met", f">= {min_speed:g} m/s", PAPER, "a direction of motion is needed"),
         (
             "space beyond the area",
-            "allowed" if walls else "not allowed",
+            "allowed" if has_walls else "not allowed",
             ASSUMED,
             "unless the outline is a wall",
         ),

@@ -247,7 +247,8 @@ record.claim("and its axes as well", worst <= 0.05, f"{worst:.3f} m")
 
 # %%
 tracks = record.cache.tracks()
-moved = sensitivity(tracks, area=record.cache.find_area(tracks), speed=zone_speed)
+space = {"area": record.cache.find_area(tracks), "has_walls": record.cache.method.has_walls}
+moved = sensitivity(tracks, **space, speed=zone_speed)
 record.table(moved, "16_sensitivity")
 most = moved.iloc[1:].assign(change=lambda t: (t["area"] / moved["area"].iloc[0] - 1).abs())
 strongest = most.loc[most["change"].idxmax()]

@@ -47,7 +47,7 @@ def find_encounters(
     kinds : None keeps all (paper); "strangers" all but companions; else one or several of
         `szlib.encounters.KINDS`.  Encounters keep the numbers that they have among all.
     parameters : single values in place of those of `settings`: area (or square, its older name), space,
-        duration [s], min_distance [m], min_speed [m/s], throughout, walls.  See `szlib.EncounterSettings`.
+        duration [s], min_distance [m], min_speed [m/s], throughout, has_walls: `szlib.EncounterSettings`.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def _find_openings(rows: TrackRows, area: Area, settings: EncounterSettings) -> 
     ahead, side = settings.space.corners.T[..., None]
     corners = rows.x[at] + ahead * cos - side * sin, rows.y[at] + ahead * sin + side * cos
     space_inside = inside.copy()
-    space_inside[at] = settings.walls or area.covers(*corners)
+    space_inside[at] = settings.has_walls or area.covers(*corners)
     ready = space_inside & (rows.speed >= settings.min_speed)
     people, other = find_occupants(rows, at, ready, settings.space)
     one, partner = people == 1, other[people == 1]

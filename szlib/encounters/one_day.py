@@ -119,7 +119,7 @@ def relax_conditions(samples: pd.DataFrame, tracks: pd.DataFrame, settings: Enco
     name = f"an attentional space of {small.width:g} m x {small.length:g} m (space_width, space_length)"
     relaxed: dict[str, dict[str, Any]] = {
         name: {"space": small},
-        "a space that may reach beyond the outline, if this is a wall (walls)": {"walls": True},
+        "a space that may reach beyond the outline, if this is a wall (has_walls)": {"has_walls": True},
         f"windows of {half:g} s (duration)": {"duration": half},
         "any distance at the opening (min_distance)": {"min_distance": 0.0},
         f"people of {settings.min_speed / 2:g} m/s (min_speed)": {"min_speed": settings.min_speed / 2},

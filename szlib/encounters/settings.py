@@ -33,8 +33,8 @@ class EncounterSettings:
     min_speed : of the reference pedestrian, throughout the window [m/s] (paper: 0.4).
     throughout : also require that the other person stays inside the space for the whole window.
         That reading of the paper never sees two people pass each other (assumed: False).
-    walls : whether the outline of the area is a wall, behind which nobody walks: the attentional space may
-        reach beyond it (assumed: False).
+    has_walls : whether the outline of the area is a wall, behind which nobody walks: the attentional space
+        may reach beyond it (assumed: False).
 
     Raises
     ------
@@ -58,7 +58,7 @@ class EncounterSettings:
     min_distance: float = 1.0
     min_speed: float = 0.4
     throughout: bool = False
-    walls: bool = False
+    has_walls: bool = False
 
     def __post_init__(self) -> None:
         automatic = isinstance(self.area, str) and self.area.strip() == AUTO

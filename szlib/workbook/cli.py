@@ -152,7 +152,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.area:
         parameters["area"] = options.area
     if options.walls:
-        parameters["walls"] = True
+        parameters["has_walls"] = True
     _require_workbook_packages()
     from . import folders
     from .runner import format_summary, run
@@ -204,7 +204,7 @@ def _inspect(options: argparse.Namespace) -> int:
         raise DataError(
             f"{options.file}: stands for {len(files)} files; expected one file; inspect each by itself"
         )
-    advice, settings = "", EncounterSettings(area=options.area, walls=options.walls)
+    advice, settings = "", EncounterSettings(area=options.area, has_walls=options.walls)
     with warnings.catch_warnings(action="ignore", category=DataWarning):  # the table shows the same counts
         samples = find_encounters_in_files(files, settings, ReadOptions())
         if "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS:
@@ -227,7 +227,7 @@ def _extract(options: argparse.Namespace) -> int:
     with cluster(options.scheduler):
         extraction = extract_days(
             options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude,
-            area=options.area, walls=options.walls,
+            area=options.area, has_walls=options.walls,
         )  # fmt: skip
     print(extraction)
     return 1 if len(extraction.failed) else 0

@@ -39,6 +39,7 @@ def sensitivity(
     tracks: pd.DataFrame,
     *,
     area: Area,
+    has_walls: bool = False,
     speed: float = 1.1,
     method: str = "paper",
     fit: Mapping[str, Sequence[Any]] = FIT,
@@ -47,7 +48,7 @@ def sensitivity(
 
     Parameters
     ----------
-    tracks, area : as for `szlib.find_encounters`.
+    tracks, area, has_walls : as for `szlib.find_encounters`.
     speed : speed of the zone [m/s].
     method : of every fit, as for `szlib.SocialZone.fit`.
     fit : options of `SocialZone.fit` to vary, and their values. `SEARCH` are those of the search.
@@ -82,13 +83,13 @@ def sensitivity(
         rows.append((parameter, text, count, *sizes))
 
     tracks = select_near_rows(tracks, area, max(SEARCH["duration"]))  # searched many times
-    usual = find_encounters(tracks, area=area)
+    usual = find_encounters(tracks, area=area, has_walls=has_walls)
     add("default", "", usual)
     for name, values in SEARCH.items():
         for value in values:
-            add(name, value, find_encounters(tracks, area=area, **{name: value}))
+            add(name, value, find_encounters(tracks, area=area, has_walls=has_walls, **{name: value}))
     smaller = area.grown(-NARROWER)
-    add("area", f"{NARROWER:g} m narrower", find_encounters(tracks, area=smaller))
+    add("area", f"{NARROWER:g} m narrower", find_encounters(tracks, area=smaller, has_walls=has_walls))
     for name, values in fit.items():
         for value in values:
             add(name, value, usual, **{name: value})

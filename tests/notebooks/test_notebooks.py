@@ -71,6 +71,10 @@ class TestEach:
         assert len(text) < 1_048_576
         assert not re.search(r"/(home|root|work|Users)/|[A-Z]:\\\\Users", text)
 
+    def test_parameters_of_the_method_mean_the_same_everywhere(self, source):
+        own = {name: value for name, value in read_defaults(source).items() if name in METHOD_DEFAULTS}
+        assert own == {name: METHOD_DEFAULTS[name] for name in own}
+
     def test_notebook_has_question_expectation_and_meaning(self, source):
         all_cells = cells(source)
         assert all_cells[0].cell_type == "markdown"

@@ -188,7 +188,7 @@ def test_advice_about_few_encounters_gives_the_numbers_that_following_it_gives(t
     assert str(error.value).endswith(advice)
     asked = {
         r"2 m x 3 m \(space_width, space_length\)": {"space_width": 2.0, "space_length": 3.0},
-        r"\(walls\)": {"walls": True},
+        r"\(has_walls\)": {"has_walls": True},
     }
     for condition, followed in asked.items():
         count = int(re.search(condition + r": (\d+) encounters", advice)[1])
@@ -206,7 +206,7 @@ def test_space_reaches_beyond_an_outline_that_is_a_wall():
     outside = make_walk((1, -5), (1.0, 0), person=3), make_walk((4, -5), (1.0, 0), person=4)
     tracks = make_tracks(*walks, *outside)
     assert len(szlib.find_encounters(tracks, area="0 10 0 2")) == 0
-    samples = szlib.find_encounters(tracks, area="0 10 0 2", walls=True)
+    samples = szlib.find_encounters(tracks, area="0 10 0 2", has_walls=True)
     assert set(samples["ref_id"]) == {1, 2}
 
 

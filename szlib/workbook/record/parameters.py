@@ -46,7 +46,7 @@ class ZoneMethod:
     ----------
     space_width, space_length : size of the attentional space [m] (notebook 02).
     duration, min_distance, min_speed : conditions of an encounter [s, m, m/s] (notebook 02).
-    walls : whether the attentional space may reach beyond the area, whose outline is a wall (notebook 02).
+    has_walls : whether the outline of the area is a wall, beyond which the space may reach (notebook 02).
     r_max : distance up to which samples count [m] (notebook 03).
     q : fraction of encounters that may enter the quantile zone (notebook 05).
     zone_speed : walking speed whose zone the robot keeps out of [m/s] (notebook 05).
@@ -63,7 +63,7 @@ class ZoneMethod:
     duration: float = EncounterSettings.duration
     min_distance: float = EncounterSettings.min_distance
     min_speed: float = EncounterSettings.min_speed
-    walls: bool = EncounterSettings.walls
+    has_walls: bool = EncounterSettings.has_walls
     r_max: float = R_MAX
     q: float = QUANTILE
     zone_speed: float = MPCSettings.zone_speed
@@ -81,7 +81,7 @@ class ZoneMethod:
             duration=self.duration,
             min_distance=self.min_distance,
             min_speed=self.min_speed,
-            walls=self.walls,
+            has_walls=self.has_walls,
         )
 
     def fit_options(self) -> dict[str, Any]:
