@@ -116,9 +116,9 @@ def relax_conditions(samples: pd.DataFrame, tracks: pd.DataFrame, settings: Enco
     settings, near = replace(settings, area=area), select_near_rows(tracks, area, settings.duration)
     space, half = settings.space, max(settings.steps // 2 / 10, 0.1)
     small = replace(space, width=round(space.width / 2, 1), length=round(0.6 * space.length, 1))
-    name = f"an attentional space of {small.width:g} m x {small.length:g} m (space_width, space_length)"
+    size = f"{small.width:g} m x {small.length:g} m"
     relaxed: dict[str, dict[str, Any]] = {
-        name: {"space": small},
+        f"an attentional space of {size} (space_width, space_length)": {"space": small},
         "a space that may reach beyond the outline, if this is a wall (has_walls)": {"has_walls": True},
         f"windows of {half:g} s (duration)": {"duration": half},
         "any distance at the opening (min_distance)": {"min_distance": 0.0},
@@ -130,8 +130,7 @@ def relax_conditions(samples: pd.DataFrame, tracks: pd.DataFrame, settings: Enco
         if len(near)
     ]
     more = "; ".join(f"{name}: {n:,} encounters" for n, name in sorted(found, reverse=True) if n > count)
-    given = f"one condition relaxed gives more: {more}" if more else "no single condition relaxed gives more"
-    return f"{count} encounters are few; {given}"
+    return f"{count} encounters are few; one condition relaxed gives {f'more: {more}' if more else 'no more'}"
 
 
 def require_encounters(samples: pd.DataFrame, advice: str = "") -> pd.DataFrame:

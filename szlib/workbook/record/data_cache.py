@@ -13,16 +13,10 @@ from typing import Any
 import pandas as pd
 
 from ... import __version__
+from ...encounters import one_day
 from ...encounters.areas import as_area, place_apart
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
-from ...encounters.one_day import (
-    FEW_ENCOUNTERS,
-    known_area,
-    relax_conditions,
-    require_encounters,
-    with_area,
-)
 from ...errors import DataError
 from ...files import load_cached, store_cached, write_checksum
 from ...input_files import file_content, printable, unchanged_files
@@ -93,7 +87,7 @@ class DataCache:
         settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
             tracks = read_tracks(files)
-            return tracks if known_area(settings, files, ReadOptions()) else place_apart(tracks)
+            return tracks if one_day.known_area(settings, files, ReadOptions()) else place_apart(tracks)
 
     def find_area(self, tracks: pd.DataFrame | None = None) -> Area:
         """The area in which encounters are found: the one given, or the default of the data.
@@ -105,7 +99,7 @@ class DataCache:
             return replace(as_area(text), reason=reason)
         settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
-            area = as_area(with_area(settings, files, ReadOptions(), tracks).area)
+            area = as_area(one_day.with_area(settings, files, ReadOptions(), tracks).area)
         store_cached(self._path("area.txt"), f"{area}\n{area.reason}".encode(), self._source())
         return area
 
@@ -124,9 +118,9 @@ class DataCache:
         are few, ``.attrs["advice"]`` says what relaxing a condition would give.
         """
         advice = ""
-        if samples["encounter"].nunique() < FEW_ENCOUNTERS and "area" in samples.attrs:
-            advice = relax_conditions(samples, self.tracks(), self.method.encounter_settings())
-        require_encounters(samples, advice).attrs["advice"] = advice
+        if samples["encounter"].nunique() < one_day.FEW_ENCOUNTERS and "area" in samples.attrs:
+            advice = one_day.relax_conditions(samples, self.tracks(), self.method.encounter_settings())
+        one_day.require_encounters(samples, advice).attrs["advice"] = advice
         content = io.BytesIO()
         samples.to_parquet(content)
         store_cached(self._path("encounters.parquet"), content.getvalue(), self._source())
