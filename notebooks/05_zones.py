@@ -108,11 +108,14 @@ if len(ellipse.support) > 3:
 #
 # The hull is set by the nearest people ever seen, so it shrinks with every day of data (notebook 15). The
 # *quantile zone*, szlib's default, is where all but a share `q` of encounters (5 %) keep out, direction by
-# direction, and an ellipse fitted to that. This one is kept for the robot.
+# direction, and an ellipse fitted to that. This one is kept for the robot. Any method finds a zone, also where
+# nobody respects anybody. So the zone is tested against people who ignore each other (notebook 15), and its
+# *verdict* says whether it can be used.
 
 # %%
-zone = record.cache.store_zone(szlib.SocialZone.fit(samples, **fit))
-zone.table()[shown].round(2)
+zone = record.cache.fit_zone()
+print(f"{zone_speed:g} m/s: {zone.verdict(zone_speed).sentence}")
+zone.table()[[*shown, "verdict"]].round(2)
 
 # %%
 ax = figures.plot_zone(zone, zone_speed, truth=truth.get(zone_speed))

@@ -84,7 +84,11 @@ def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
     for name in ("all", "opposite, crossing"):
         data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
         test = szlib.null_test(data, against)
-        result = {"p_value": test.p_value, "encounters": test.n_encounters, "radius": test.radius}
+        result = {
+            "p_value": test.p_value,
+            "encounters": test.n_encounters,
+            "radius": szlib.respect_radius(data, against),
+        }
         rows.append({"bunch": bunch, "kinds": name, "seed": seed, "shifts": null.shifts} | result)
     return rows
 
@@ -151,7 +155,10 @@ def describe_site(data: pd.DataFrame, null: szlib.NullEncounters, resamples: int
     test = szlib.null_test(data, null)
     bodies = szlib.null_test(data, null, excluded_below=0.5)
     fit = szlib.fit_respect(data, null)
-    radii = [np.r_[test.radius, fit.radii(theta)], *resampled(data, null, theta, resamples)]
+    radii = [
+        np.r_[szlib.respect_radius(data, null), fit.radii(theta)],
+        *resampled(data, null, theta, resamples),
+    ]
     low, high = np.percentile(radii[1:], [2.5, 97.5], axis=0)
     row = {"encounters": data["encounter"].nunique(), "within_2m": test.n_encounters}
     row |= {"null_encounters": len(null.encounters) / null.shifts, "shifts": null.shifts}

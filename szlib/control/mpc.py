@@ -29,12 +29,13 @@ from collections.abc import Hashable, Iterable, Sequence
 from threading import get_ident
 from time import perf_counter
 from typing import Any
+from warnings import catch_warnings
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import Array, check_point, check_vector, require
-from ..errors import SolverError
+from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import Ellipse, circle_around
 from .barriers import read_walls
 from .controller import Controller
@@ -75,6 +76,10 @@ class MPCCBF(Controller):
     SolverError : a wall is not finite or has no length, or settings and walls do not fit.
     ZoneError : `zone` is no zone.
 
+    Warns
+    -----
+    DataWarning : `zone` was fitted, and its verdict at `settings.zone_speed` is not "usable".
+
     Examples
     --------
     >>> import szlib
@@ -101,7 +106,11 @@ class MPCCBF(Controller):
         tracker: Tracker | None = None,
     ) -> None:
         self.settings = settings or MPCSettings()
-        self.zone = as_ellipse(zone, self.settings.zone_speed)
+        speed = self.settings.zone_speed
+        if hasattr(zone, "verdict") and (verdict := zone.verdict(speed)) != "usable":
+            warn(f"the zone at {speed:g} m/s should not be relied on: {verdict.sentence}")
+        with catch_warnings(action="ignore", category=DataWarning):  # the verdict states the same
+            self.zone = as_ellipse(zone, speed)
         is_number = max_people is None or (isinstance(max_people, int) and 0 <= max_people <= _MOST_PEOPLE)
         expected = f"a whole number from 0 to {_MOST_PEOPLE}, or None"
         require(is_number, "max_people", max_people, expected, SolverError)

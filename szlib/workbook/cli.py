@@ -168,6 +168,8 @@ def _run(options: argparse.Namespace) -> int:
     print(format_summary(summary))
     if "report" in summary:
         print(f"report: {printable(os.path.relpath(summary['report']))}")
+    if summary.get("verdict"):
+        print(summary["verdict"])
     refused = {name: n["error"] for name, n in summary["notebooks"].items() if n["status"] == "refused"}
     if refused:
         error = next(iter(refused.values()))

@@ -209,6 +209,7 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> str:
         files=files,
         changed=changed,
         version=run.get("szlib", ""),
+        verdict=str(summary.get("verdict", "")),
         area=area_text,
         questions={name: notebook.metadata["question"] for name, notebook in notebooks.items()},
         funnel=funnel,
@@ -241,7 +242,7 @@ def _show_zone(file: Path, *, is_synthetic: bool) -> dict[str, str]:
     zone = SocialZone.load(file)
     table = zone.table()
     bounds = [f"{name}{end}" for name in ("a", "b") for end in ("", "_low", "_high")]
-    shown = [c for c in ("speed", "center_x", *bounds, "encounters", "adequate") if c in table]
+    shown = [c for c in ("speed", "center_x", *bounds, "encounters", "adequate", "verdict") if c in table]
     texts = {"method": zone.method, "table": _to_html(table[shown].round(2)), "picture": ""}
     speed = MPCSettings().zone_speed
     if speed in zone.ellipses:

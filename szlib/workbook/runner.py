@@ -25,11 +25,12 @@ from ..files import folder_lock, process_folder, write_file
 from ..input_files import file_content, read_json_object
 from ..parallel import cluster, limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets, funnels
+from ..zones.social_zone import SocialZone
 from . import folders
 from .notebook_execution import EMPTY_RECORD, end_kernels, execute_notebook
 from .record.data_cache import DataCache
 from .record.display import format_value
-from .record.parameters import check_parameters
+from .record.parameters import METHOD_DEFAULTS, check_parameters
 
 # Notebooks whose results later ones need: the encounters and the zone.
 PRODUCERS = ("02", "05")
@@ -96,6 +97,8 @@ def run(
             advice = table.attrs.get("advice")
             source["warnings"] = funnels.warnings(funnels.get(table)) + ([advice] if advice else [])
             source["area"] = "{area} {area_reason}".format_map(table.attrs).strip()
+        if (zone := home / "zone.json").exists():
+            source["verdict"] = _judge(zone, source["files"], given)
         summary, everything = (_summarise(source, each) for each in (outcomes, {**earlier, **outcomes}))
         write_file(home / SUMMARY, json.dumps(everything, indent=1))
         if any((home / f"{name}.ipynb").exists() for name in everything["notebooks"]):
@@ -103,6 +106,15 @@ def run(
 
             summary["report"] = str(write_report(home))
         return summary
+
+
+def _judge(file: Path, contents: Sequence[Any], parameters: Mapping[str, Any]) -> str:
+    """The verdict on the zone in a `file`; "" if the zone was made from data other than `contents`."""
+    zone = SocialZone.load(file)
+    if zone.provenance.get("source", {}).get("files") != json.loads(json.dumps(contents)):
+        return ""
+    speed = float(parameters.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
+    return f"zone at {speed:g} m/s: {zone.verdict(speed).sentence}"
 
 
 def _require_limits(n_files: int) -> None:

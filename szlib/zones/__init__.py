@@ -9,8 +9,10 @@ hulls                 the zone outside the convex hull over (x', y', speed): est
 quantile              the zone that all but a share of encounters stay outside: estimator "quantile"
 occupancy             histograms of where people were, and the map of the pair correlation
 respect               the zone where people are half as frequent as in the null model: estimator "respect"
+respect_profile       its radius from nearest approaches, all directions pooled, with an interval
 respect_significance  the test of the data against its null model
 uncertainty           encounters by side, and confidence intervals by resampling people
+verdict               whether a zone can be used, and why not
 zone_file             the JSON file of a social zone
 social_zone           `SocialZone`: all of it behind one name
 imposed_zone          a known zone on recorded paths, to test estimators with: `impose_zone`
@@ -27,14 +29,15 @@ from .occupancy import OccupancyHistogram, PairCorrelation, pair_correlation
 from .outliers import complementary_points, is_outlier, remove_outliers
 from .polar import PolarZone
 from .respect import Respect, fit_respect, respect_radius
+from .respect_profile import RespectRadius
 from .respect_significance import NullTest, null_test
 from .social_zone import SocialZone
 from .uncertainty import count_by_side
 
 __all__ = [
     "BODY_RADIUS", "Ellipse", "Grid", "HullZone", "NullTest", "OccupancyHistogram", "PairCorrelation",
-    "PairedSamples", "PolarZone", "Respect", "SocialZone", "circle_around", "complementary_points",
-    "count_by_side", "draw_costmap", "fit_respect", "hull_vertices", "impose_zone", "is_outlier",
-    "minimum_enclosing_ellipse", "minimum_enclosing_ellipse_of_curve", "null_test", "pair_correlation",
-    "remove_outliers", "respect_radius", "slice_hull",
+    "PairedSamples", "PolarZone", "Respect", "RespectRadius", "SocialZone", "circle_around",
+    "complementary_points", "count_by_side", "draw_costmap", "fit_respect", "hull_vertices",
+    "impose_zone", "is_outlier", "minimum_enclosing_ellipse", "minimum_enclosing_ellipse_of_curve",
+    "null_test", "pair_correlation", "remove_outliers", "respect_radius", "slice_hull",
 ]  # fmt: skip

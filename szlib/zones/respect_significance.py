@@ -21,18 +21,16 @@ this mix looked like respect in 17 of 100 simulated crowds; with separate kinds 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import check_columns
 from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
-from ..errors import ZoneError, warn
-from .respect import respect_radius
+from ..errors import warn
+from .respect_profile import Approaches, RespectRadius, fit_radius
 
 # Radii of the statistic [m]; the radius of the zone need not be among them.
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
@@ -51,13 +49,14 @@ class NullTest:
     p_value : of the one-sided test (see the top of this module).
     statistic, null_statistics : of the data, and of each shift.
     n_encounters : of the data, within r_max.
-    radius : of the respect zone of the data, all directions pooled [m].
+    respect : the radius of the respect zone of the data, all directions pooled.
     excluded_below : encounters nearer than this were left out [m].
 
     Examples
     --------
     >>> import szlib
-    >>> result = szlib.NullTest(0.25, 0.4, (0.1, 0.6, 0.2), n_encounters=50, radius=0.0)
+    >>> radius = szlib.RespectRadius(0.0, 0.0, 0.3, careless=0.1, careless_high=0.2)
+    >>> result = szlib.NullTest(0.25, 0.4, (0.1, 0.6, 0.2), n_encounters=50, respect=radius)
     >>> result.is_significant
     False
     >>> print(result)
@@ -68,7 +67,7 @@ class NullTest:
     statistic: float
     null_statistics: tuple[float, ...] = field(repr=False)
     n_encounters: int
-    radius: float
+    respect: RespectRadius
     excluded_below: float = 0.0
 
     @property
@@ -118,42 +117,18 @@ def null_test(samples: pd.DataFrame, null: NullEncounters, *, excluded_below: fl
     >>> test.p_value >= 0.25  # the smallest possible value with 3 shifts
     True
     """
-    check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
     _warn_about_kinds(samples, null)
-    nearest = samples.groupby("encounter", observed=True)["distance"].min().to_numpy(float)
-    of_null = null.encounters["nearest"].to_numpy(float)
-    counted = [(each >= excluded_below) & (each < null.r_max) for each in (nearest, of_null)]
-    if not all(each.any() for each in counted):
-        raise ZoneError(
-            f"{counted[0].sum()} encounters of the data and {counted[1].sum()} of the null model came within "
-            f"{excluded_below:g} to {null.r_max:g} m: nothing to test; add data, or use more shifts"
-        )
-    shift = np.r_[np.zeros(counted[0].sum(), int), 1 + null.encounters["shift"].to_numpy()[counted[1]]]
-    near = np.r_[nearest[counted[0]], of_null[counted[1]]][:, None] < RADII
-    kind = _kinds(samples, null, counted)
-    statistics = _find_deficits(shift, near, kind, 1 + null.shifts)
+    found = Approaches.of(samples, null, excluded_below=excluded_below)
+    near = found.nearest[:, None] < RADII
+    statistics = _find_deficits(found.shift, near, found.kind, 1 + null.shifts)
     return NullTest(
         p_value=float((1 + (statistics[1:] >= statistics[0]).sum()) / (1 + null.shifts)),
         statistic=float(statistics[0]),
         null_statistics=tuple(map(float, statistics[1:])),
-        n_encounters=int(counted[0].sum()),
-        radius=respect_radius(samples, null),
+        n_encounters=int((found.shift == 0).sum()),
+        respect=fit_radius(found),
         excluded_below=float(excluded_below),
     )
-
-
-def _kinds(
-    samples: pd.DataFrame, null: NullEncounters, counted: Sequence[NDArray[np.bool_]]
-) -> NDArray[np.intp]:
-    """Number of the kind of each counted encounter, first of the data, then of the null; all 0 if unknown."""
-    if not ("kind" in samples and "kind" in null.encounters):
-        return np.zeros(sum(int(each.sum()) for each in counted), int)
-    of_data = samples.groupby("encounter", observed=True)["kind"].first()
-    both = zip((of_data, null.encounters["kind"]), counted, strict=True)
-    return pd.factorize(
-        np.concatenate([each.to_numpy(object)[is_counted] for each, is_counted in both]),
-        use_na_sentinel=False,
-    )[0]
 
 
 def _find_deficits(

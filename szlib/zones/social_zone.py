@@ -14,6 +14,7 @@ which this number is sufficient.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -25,7 +26,7 @@ import pandas as pd
 from .. import __version__
 from ..checks import Array, check_columns, require
 from ..encounters.null_model import NullEncounters
-from ..errors import ZoneError, warn
+from ..errors import DataError, ZoneError, warn
 from .ellipses import Ellipse
 from .estimators import Estimator, ZoneShape
 from .hulls import HullEstimator, HullZone
@@ -41,6 +42,7 @@ from .uncertainty import (
     describe_missing_sides,
     estimate_uncertainty,
 )
+from .verdict import Verdict, describe_missing_encounters, judge
 from .zone_file import read_zone, write_zone
 
 if TYPE_CHECKING:
@@ -48,6 +50,8 @@ if TYPE_CHECKING:
 
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Default speeds of the reference pedestrian [m/s] (assumed; the paper shows a range)."""
+
+_NULL_DRAWS, _MAX_DRAWN = 5, 1000  # zones fitted to the null model, and largest number of encounters of each
 
 _PAPER = partial(HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_NEIGHBOURS)
 # The methods of `SocialZone.fit`: the estimator, and its options.
@@ -74,6 +78,8 @@ class SocialZone:
     side_counts : encounters by speed and side (see `szlib.zones.count_by_side`); None: unknown.
     uncertainty : intervals; None: unknown.
     null_test : the test against the null model; None: not tested.
+    null_radii : mean radius by speed of the zone that the same method gives people who ignore each other, the
+        largest of several draws from the null model [m]; empty: not tested.
 
     Raises
     ------
@@ -101,6 +107,7 @@ class SocialZone:
     side_counts: pd.DataFrame | None = None
     uncertainty: Uncertainty | None = None
     null_test: NullTest | None = None
+    null_radii: dict[float, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check_method(self.method)
@@ -119,7 +126,8 @@ class SocialZone:
                 f"SocialZone: method {self.method!r}, people within {self.r_max:g} m",
                 f"semi-axes at each speed [m/s: m]: {', '.join(sizes) or 'none'}",
                 f"undefined at [m/s]: {', '.join(f'{speed:g}' for speed in self.undefined) or 'none'}",
-                f"enough encounters on every side at [m/s]: {', '.join(adequate) or 'none'}",
+                f"enough encounters at [m/s]: {', '.join(adequate) or 'none'}",
+                f"verdict: {self._describe_verdicts()}",
                 f"intervals: {intervals}",
             ]
         )
@@ -164,7 +172,7 @@ class SocialZone:
 
         Warns
         -----
-        DataWarning : names the speeds without a zone (`undefined`) or with too few encounters.
+        DataWarning : names the speeds without a zone (`undefined`), and sides with too few encounters.
 
         Examples
         --------
@@ -182,7 +190,8 @@ class SocialZone:
             raise ZoneError("no speed has a zone: `speeds` is empty")
         if method == "respect":
             options["null"] = null
-        estimator = METHODS[method][0](samples, r_max=r_max, **options)
+        build = partial(METHODS[method][0], r_max=r_max, **options)
+        estimator = build(samples)
         shape = estimator.fit_shape(fitted_speeds)
         ellipses, undefined = {}, {}
         for speed in fitted_speeds:
@@ -197,13 +206,18 @@ class SocialZone:
                 "choose a speed near that, or add data"
             )
         provenance = _provenance(samples, {"method": method, "r_max": float(r_max)}, estimator)
-        test = None if null is None else null_test(samples, null)
+        test, null_radii = None, {}
+        if null is not None:
+            test = null_test(samples, null)
+            null_radii = _fit_null_radii(build, null, len(estimator.encounters), list(ellipses), seed)
         sides = uncertainty = None
         if "encounter" in samples:
             sides = count_by_side(samples, fitted_speeds, r_max=r_max)
         if "encounter" in samples and n_resamples:
             uncertainty = estimate_uncertainty(estimator, list(ellipses), n_resamples=n_resamples, seed=seed)
-        zone = cls(shape, float(r_max), ellipses, undefined, provenance, method, sides, uncertainty, test)
+        zone = cls(
+            shape, float(r_max), ellipses, undefined, provenance, method, sides, uncertainty, test, null_radii
+        )
         problems = [*undefined.values(), *filter(None, map(zone.missing_data, ellipses))]
         if problems:
             warn("; ".join(dict.fromkeys(problems)))
@@ -224,7 +238,7 @@ class SocialZone:
     def ellipse(self, speed: float) -> Ellipse:
         """The ellipse at any `speed` [m/s] in the range of the data.
 
-        A DataWarning says what is missing if the speed is not `adequate`. Raises ZoneError, with the speed,
+        A DataWarning names the sides that lack encounters. Raises ZoneError, with the speed,
         the range and the missing directions, if the zone is undefined.
         """
         known = self.ellipses.get(float(speed))
@@ -234,11 +248,38 @@ class SocialZone:
         return ellipse
 
     def adequate(self, speed: float) -> bool:
-        """Whether every side has enough encounters to rely on the zone at a `speed` [m/s]."""
-        return not self.missing_data(speed)
+        """Whether there are enough encounters, and on every side, to rely on the zone at a `speed` [m/s]."""
+        return not (describe_missing_encounters(self.provenance) or self.missing_data(speed))
+
+    def verdict(self, speed: float) -> Verdict:
+        """Whether the zone can be used at a `speed` [m/s]: "usable", "undecided" or "no respect shown".
+
+        The attribute `reasons` holds the reasons as plain sentences. A zone is usable if the data shows
+        respect against the null model, is enough on each side and plausible, and if the zone is clearly
+        larger than that of people who ignore each other, with few careless encounters and sound intervals.
+
+        Examples
+        --------
+        >>> import szlib
+        >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=600))
+        >>> samples = szlib.find_encounters(szlib.read_tracks(path))
+        >>> zone = szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=0)
+        >>> zone.verdict(1.1)
+        'undecided'
+        >>> zone.verdict(1.1).reasons[0]
+        'no null model: fit the zone with null=szlib.null_encounters(tracks)'
+        """
+        return judge(self, float(speed))
+
+    def _describe_verdicts(self) -> str:
+        """The verdicts at all fitted speeds."""
+        by_verdict: dict[str, list[str]] = {}
+        for speed in self.ellipses:
+            by_verdict.setdefault(str(self.verdict(speed)), []).append(f"{speed:g}")
+        return "; ".join(f"{verdict} at {', '.join(speeds)} m/s" for verdict, speeds in by_verdict.items())
 
     def missing_data(self, speed: float) -> str:
-        """Describe the data that is missing to rely on the zone at a `speed` [m/s]; "" if none is."""
+        """Describe the sides that lack encounters at a `speed` [m/s]; "" if none does."""
         if self.side_counts is None:
             return (
                 "the quality of the zone is unknown: encounters were not counted by side (an older file, or "
@@ -251,7 +292,7 @@ class SocialZone:
 
         Columns: speed [m/s]; center_x, center_y, a, b [m], angle_deg [deg], area [m2], each with _low and
         _high (its interval, NaN if there is none); influence: the greatest change if one encounter is left
-        out [m]; encounters within r_max at that speed; adequate.
+        out [m]; encounters within r_max at that speed; adequate; verdict.
         """
         rows = [
             (v, *e.center, *e.semi_axes, np.degrees(e.angle), e.area)
@@ -267,7 +308,8 @@ class SocialZone:
             table["influence"] = self.uncertainty.influence.set_index("speed")["metres"]
         if self.side_counts is not None:
             table["encounters"] = self.side_counts.set_index("speed")["encounters"]
-        return table.assign(adequate=[self.adequate(v) for v in table.index]).reset_index()
+        verdicts = [str(self.verdict(v)) for v in table.index]
+        return table.assign(adequate=[self.adequate(v) for v in table.index], verdict=verdicts).reset_index()
 
     def plot(self, speed: float | None = None, *, ax: Axes | None = None) -> Axes:
         """Plot the zone at a `speed` [m/s] with its interval, or all ellipses (None), into the axes `ax`."""
@@ -277,7 +319,7 @@ class SocialZone:
 
     def save(self, path: str | Path) -> None:
         """Write the zone as JSON to the file `path`, as a whole or not at all."""
-        write_zone(Path(path), vars(self))
+        write_zone(Path(path), vars(self), {v: self.verdict(v) for v in self.ellipses})
 
     @classmethod
     def load(cls, path: str | Path) -> SocialZone:
@@ -291,9 +333,40 @@ def _provenance(samples: pd.DataFrame, parameters: Mapping[str, Any], estimator:
         "szlib": __version__,
         "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
         "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
+        "hours": _recorded_hours(samples),
         "parameters": {**parameters, **estimator.parameters},
         "funnel": estimator.funnel,
     }
+
+
+def _recorded_hours(samples: pd.DataFrame) -> float | None:
+    """Time from the first to the last of `samples`, summed over the days [h]; None without times."""
+    if "t" not in samples or samples.empty:
+        return None
+    days = samples["day"] if "day" in samples else np.zeros(len(samples))
+    return float(samples["t"].groupby(days, observed=True).agg(np.ptp).sum() / 3600)
+
+
+def _fit_null_radii(
+    build: Callable[[pd.DataFrame], Estimator],
+    null: NullEncounters,
+    n_encounters: int,
+    speeds: list[float],
+    seed: int,
+) -> dict[float, float]:
+    """Largest mean radius by speed of zones fitted to draws of as many encounters of the null model [m].
+
+    NaN where no draw has a zone. At most `_MAX_DRAWN` are drawn: fewer encounters have larger zones.
+    """
+    rng, known = np.random.default_rng(seed), null.samples["encounter"].unique()
+    size, radii = min(n_encounters, len(known), _MAX_DRAWN), np.full((_NULL_DRAWS, len(speeds)), np.nan)
+    for row in radii:
+        drawn = null.samples["encounter"].isin(rng.choice(known, size, replace=False))
+        with suppress(ZoneError, DataError):  # no zone: stays NaN
+            estimator = build(null.samples[drawn])
+            ellipses = estimator.refit(np.ones((1, len(estimator.encounters))), speeds)
+            row[:] = np.sqrt(ellipses[0, :, 2] * ellipses[0, :, 3])
+    return dict(zip(speeds, np.fmax.reduce(radii, axis=0).tolist(), strict=True))
 
 
 def _check_method(method: str, options: Iterable[str] = ()) -> None:

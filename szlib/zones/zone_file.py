@@ -21,12 +21,14 @@ from ..input_files import read_small, reading
 from .ellipses import Ellipse
 from .hulls import HullZone
 from .polar import PolarZone
+from .respect_profile import RespectRadius
 from .respect_significance import NullTest
 from .uncertainty import Uncertainty
+from .verdict import Verdict
 
 Zone = TypeVar("Zone")
 
-FORMAT, VERSION = "szlib.SocialZone", 2
+FORMAT, VERSION = "szlib.SocialZone", 3
 UNITS = "m, s, rad; frame of the reference pedestrian: x ahead, y to the left"
 
 # Keys in the file of attributes that have another name.
@@ -35,8 +37,12 @@ _KEYS = {
 }  # fmt: skip
 
 
-def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
-    """Write the `fields` of a `SocialZone` to `path`; raises ZoneError if this is impossible."""
+def write_zone(path: Path, fields: Mapping[str, Any], verdicts: Mapping[float, Verdict]) -> None:
+    """Write the `fields` of a `SocialZone`, and its `verdicts` by speed, to `path`.
+
+    The verdicts are for other programs: when the file is read, they are made again. Raises ZoneError if the
+    file cannot be written.
+    """
     shape = fields["shape"]
     content = {
         "format": FORMAT,
@@ -53,6 +59,10 @@ def write_zone(path: Path, fields: Mapping[str, Any]) -> None:
         "seen": fields["side_counts"],
         "uncertainty": fields["uncertainty"],
         "null_test": fields["null_test"],
+        "null_radii": [
+            {"speed": v, "radius": r if np.isfinite(r) else None} for v, r in fields["null_radii"].items()
+        ],
+        "verdicts": [{"speed": v, "verdict": each, "reasons": each.reasons} for v, each in verdicts.items()],
         "radii": shape if isinstance(shape, PolarZone) else None,
         "hull_vertices": shape.vertices if isinstance(shape, HullZone) else None,
     }
@@ -110,7 +120,8 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         uncertainty = Uncertainty(**{**uncertainty, **tables})
     if null_test is not None:
         statistics = tuple(map(float, null_test["null_statistics"]))
-        null_test = NullTest(**{**null_test, "null_statistics": statistics})
+        respect = RespectRadius(**null_test["respect"])
+        null_test = NullTest(**{**null_test, "null_statistics": statistics, "respect": respect})
     return {
         "shape": HullZone(np.array(content["hull_vertices"], float), r_max)
         if content["radii"] is None
@@ -125,6 +136,10 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "side_counts": None if side_counts is None else _table(side_counts),
         "uncertainty": uncertainty,
         "null_test": null_test,
+        "null_radii": {
+            float(each["speed"]): np.nan if each["radius"] is None else float(each["radius"])
+            for each in content["null_radii"]
+        },
     }
 
 
@@ -149,7 +164,7 @@ def _to_json(value: Any) -> Any:
     """JSON values of a table, array or group of fields; NaN is null and infinity "Infinity"."""
     if isinstance(value, pd.DataFrame):
         return {name: column.to_numpy() for name, column in value.items()}
-    if isinstance(value, Uncertainty | NullTest | PolarZone):
+    if isinstance(value, Uncertainty | NullTest | RespectRadius | PolarZone):
         return {_KEYS.get(name, name): each for name, each in vars(value).items()}
     if not isinstance(value, np.ndarray):
         raise TypeError(f"{type(value).__name__} is no JSON value")

@@ -149,14 +149,18 @@ def fit_few(samples):
         )
 
 
-def test_only_an_inadequate_zone_is_dashed(zone, samples):
-    for known, line in ((zone, "-"), (fit_few(samples), "--")):
+def test_only_a_usable_zone_is_solid(zone, samples, monkeypatch):
+    usable = szlib.SocialZone(**vars(zone))
+    monkeypatch.setattr(
+        szlib.SocialZone, "verdict", lambda self, speed: "usable" if self is usable else "undecided"
+    )
+    for known, line in ((usable, "-"), (fit_few(samples), "--")):
         ellipse = figures.plot_zone(known, 1.1).lines[known.method != "hull"]
         assert ellipse.get_linestyle() == line
         ax = figures.plot_zones(known)
         assert [each.get_linestyle() for each in ax.lines[:2]] == [line] * 2
         labels = [text.get_text() for text in ax.get_legend().get_texts()]
-        assert all(("not adequate" in label) == (line == "--") for label in labels)
+        assert all(("undecided" in label) == (line == "--") for label in labels)
 
 
 def test_the_band_is_drawn_exactly_where_an_interval_is_known(zone, samples):

@@ -91,7 +91,7 @@ def test_attraction_is_no_respect(tmp_path: Path) -> None:
     null = szlib.null_encounters(tracks, shifts=39, minutes=(1, 6), progress=False)
     test = null_test(szlib.find_encounters(tracks), null)
     assert test.p_value > 0.5
-    assert test.radius == 0
+    assert test.respect.radius == 0
     assert not test.is_significant
 
 
@@ -104,7 +104,7 @@ def test_people_who_keep_away_show_respect() -> None:
     assert test.p_value == 1 / (1 + SHIFTS)
     assert test.statistic > max(test.null_statistics)
     assert test.is_significant
-    assert test.radius == pytest.approx(0.5, abs=0.15)
+    assert test.respect.radius == pytest.approx(0.5, abs=0.15)
     assert "respect: p = 0.025 (39 shifts" in str(test)
 
 
@@ -128,7 +128,7 @@ def test_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.Data
         data, model = szlib.of_kind(real_samples, kinds), null.of_kind(kinds)
         test = null_test(data, model, excluded_below=0.5)
         assert test.p_value == pytest.approx(1 / 21)
-        assert 0.78 < test.radius < 1.27  # 0.98 m (0.78-1.27) for strangers
+        assert 0.78 < test.respect.radius < 1.27  # 0.98 m (0.78-1.27) for strangers
 
 
 # --- the object, and errors --------------------------------------------------------------------------

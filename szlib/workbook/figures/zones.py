@@ -129,7 +129,7 @@ def plot_zone(
 ) -> Axes:
     """Plot a zone's boundary at one speed, its ellipse and the ellipse's interval.
 
-    The ellipse is dashed where the zone is not adequate.
+    The title states the verdict on the zone. The ellipse is dashed unless it is usable.
 
     Parameters
     ----------
@@ -147,18 +147,24 @@ def plot_zone(
     >>> samples["distance"], samples["speed"] = rng.uniform(0.9, 2.5, n), rng.uniform(0.4, 1.6, n)
     >>> zone = szlib.SocialZone.fit(samples, method="hull", speeds=(1.1,), n_resamples=0)
     >>> figures.plot_zone(zone, 1.1).get_title()
-    'Minimum social zone at 1.1 m/s'
+    'Minimum social zone at 1.1 m/s: undecided'
     """
     ax = get_axes(ax, size=(5, 4.5))
     with warnings.catch_warnings(action="ignore", category=DataWarning):  # dashed, and said in the title
         ellipse = zone.ellipse(speed)
-    boundary, adequate, is_hull = zone.boundary(speed), zone.adequate(speed), zone.method in ("hull", "paper")
+    boundary, verdict, is_hull = zone.boundary(speed), zone.verdict(speed), zone.method in ("hull", "paper")
     if is_hull:
         ax.fill(*boundary.T, facecolor=GREY, alpha=0.4, label="zone: r_max - R'")
     else:
         ax.plot(*boundary.T, color=GREY, linewidth=1.5, label=f"radius by direction ({zone.method})")
     name = "smallest enclosing ellipse" if is_hull else "fitted ellipse"
-    ax.plot(*ellipse.curve().T, color=BLUE, linewidth=2, linestyle="-" if adequate else "--", label=name)
+    ax.plot(
+        *ellipse.curve().T,
+        color=BLUE,
+        linewidth=2,
+        linestyle="-" if verdict == "usable" else "--",
+        label=name,
+    )
     _draw_interval(ax, zone, speed, color=ORANGE, alpha=0.35, label="its 95 % interval")
     if ellipse.support is not None:
         ax.plot(*ellipse.support.T, "o", color=BLUE, label=f"its {len(ellipse.support)} support points")
@@ -166,8 +172,7 @@ def plot_zone(
         ax.plot(*truth.curve().T, ":", color=RED, linewidth=2, label="truth")
     draw_person(ax, 0, 0, 0, color=BLACK, markersize=10)
     add_legend_below(ax, gap=0.15)
-    warning = "" if adequate else "\nnot adequate: too few people on some side"
-    return label_metres(ax, f"Minimum social zone at {speed:g} m/s{warning}", person=True)
+    return label_metres(ax, f"Minimum social zone at {speed:g} m/s: {verdict}", person=True)
 
 
 def plot_zones(zones: FittedZone | Mapping[float, Ellipse], *, ax: Axes | None = None) -> Axes:
@@ -176,7 +181,7 @@ def plot_zones(zones: FittedZone | Mapping[float, Ellipse], *, ax: Axes | None =
     Parameters
     ----------
     zones : a fitted zone, or ellipses by walking speed [m/s]. A fitted zone is drawn with its intervals; a
-        dashed ellipse is not adequate.
+        dashed ellipse is not usable, and the legend states the verdict.
     ax : axes to draw on; None makes new ones.
 
     Examples
@@ -196,10 +201,9 @@ def plot_zones(zones: FittedZone | Mapping[float, Ellipse], *, ax: Axes | None =
     ):
         label, curve = f"{speed:g} m/s", ellipse.curve()
         if zone:
-            if zone.adequate(speed):
-                line = "-"
-            else:
-                line, label = "--", f"{label} (not adequate)"
+            verdict = zone.verdict(speed)
+            line = "-" if verdict == "usable" else "--"
+            label = label if verdict == "usable" else f"{label} ({verdict})"
             _draw_interval(ax, zone, speed, color=colour, alpha=0.15)
         ax.plot(*curve.T, color=colour, linestyle=line, linewidth=2, label=label)
         at = curve[round(angle / (2 * np.pi) * (len(curve) - 1))]

@@ -17,6 +17,7 @@ from ...encounters import one_day
 from ...encounters.areas import as_area, place_apart
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
+from ...encounters.null_model import NullEncounters, null_encounters
 from ...errors import DataError
 from ...files import load_cached, store_cached, write_checksum
 from ...input_files import file_content, printable, unchanged_files
@@ -28,6 +29,8 @@ from ...tracks.options import ReadOptions
 from ...zones.ellipses import Ellipse
 from ...zones.social_zone import SocialZone
 from .parameters import ZoneMethod
+
+NULL_SHIFTS = 39  # time-shifted copies of the data that the zone is tested against (assumed)
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,25 @@ class DataCache:
             return zone
         if file.exists():
             print("The zone is fitted again: zone.json was made from other data, or is damaged.")
-        return self.store_zone(SocialZone.fit(self.encounters(), **self.method.fit_options()))
+        return self.fit_zone()
+
+    def fit_zone(self) -> SocialZone:
+        """Fit the zone, test it against the null model, and store it for later notebooks."""
+        return self.store_zone(
+            SocialZone.fit(self.encounters(), null=self.null_model(), **self.method.fit_options())
+        )
+
+    def null_model(self) -> NullEncounters | None:
+        """The null model of the data; None, and a message, where the data is too short for one."""
+        tracks = self.tracks()
+        settings = self.method.encounter_settings(self.find_area(tracks))
+        try:
+            return null_encounters(
+                tracks, settings=settings, shifts=NULL_SHIFTS, r_max=self.method.r_max, progress=False
+            )
+        except DataError as error:
+            print(f"The zone is not tested against a null model: {error}")
+            return None
 
     def ellipse(self) -> Ellipse:
         """The ellipse that the robot keeps out of: the zone at `zone_speed`, in the person's frame."""

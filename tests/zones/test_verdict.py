@@ -1,0 +1,199 @@
+"""The verdict: respect, nobody's respect and too little data are told apart, with reasons."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from studies.noninteracting_crowd import noninteracting_crowd
+
+import szlib
+from szlib.zones.respect_profile import Approaches, fit_radius
+from szlib.zones.verdict import describe_missing_encounters
+
+SHIFTS, SPEED = 39, 1.1
+
+
+def walkers(seed: int, n: int, *, core: float = 0.0, careless: float = 0.0) -> pd.DataFrame:
+    """Straight paths past a person, as evenly near as chance has it; within `core` only the careless."""
+    rng = np.random.default_rng(seed)
+    tries = 4 * n
+    nearest, heading = rng.uniform(0, 3, tries), rng.uniform(-np.pi, np.pi, tries)
+    kept = np.flatnonzero((nearest > core) | (rng.random(tries) < careless))[:n]
+    along, t = np.linspace(-2, 2, 31), np.arange(31) / 10
+    path = (along + 1j * nearest[kept, None]) * np.exp(1j * heading[kept, None])
+    table = pd.DataFrame({"encounter": np.repeat(np.arange(n), 31), "day": "a"})
+    table["ref_id"], table["other_id"] = 2 * table["encounter"], 2 * table["encounter"] + 1
+    table["t"] = (np.arange(n)[:, None] * 20.0 + t).ravel().round(1)
+    return table.assign(
+        los_angle=np.angle(path).ravel(), distance=np.abs(path).ravel(), speed=SPEED, kind="crossing"
+    )
+
+
+@cache
+def null() -> szlib.NullEncounters:
+    samples = walkers(99, SHIFTS * 100)
+    samples["shift"] = samples["encounter"] % SHIFTS
+    first = samples.groupby("encounter")
+    encounters = pd.DataFrame({"shift": first["shift"].first(), "nearest": first["distance"].min()})
+    near = samples[samples["distance"] < 2]
+    return szlib.NullEncounters(near, encounters.reset_index().assign(kind="crossing"), SHIFTS, 2.0)
+
+
+@pytest.mark.filterwarnings("ignore:at 1.1 m/s fewer than 20")
+def fit(samples: pd.DataFrame, **options: Any) -> szlib.SocialZone:
+    return szlib.SocialZone.fit(samples, **{"speeds": [SPEED], "null": null(), "n_resamples": 60} | options)
+
+
+@pytest.fixture(scope="module")
+def careful() -> szlib.SocialZone:
+    return fit(walkers(1, 1500, core=0.8))
+
+
+# --- the three verdicts ------------------------------------------------------------------------------
+
+
+def test_careful_people_in_number_are_usable(careful: szlib.SocialZone) -> None:
+    verdict = careful.verdict(SPEED)
+    assert verdict == "usable", verdict.sentence
+    assert "respect: p = " in verdict.sentence
+    assert careful.adequate(SPEED)
+
+
+@pytest.mark.parametrize("method", ["quantile", "hull", "respect"])
+def test_people_who_ignore_each_other_show_no_respect(method: str) -> None:
+    verdict = fit_quietly(walkers(2, 1500), method=method).verdict(SPEED)
+    assert verdict == "no respect shown"
+    assert "as near as people who ignore each other" in verdict.reasons[0]
+
+
+def fit_quietly(samples: pd.DataFrame, **options: Any) -> szlib.SocialZone:
+    """As `fit`; a method may find no zone at all, which is as good an answer."""
+    try:
+        return fit(samples, **options)
+    except szlib.ZoneError:
+        return replace(fit(samples), method="quantile")
+
+
+def test_few_strangers_are_undecided_and_told_the_hours() -> None:
+    few = fit(walkers(3, 151, core=0.8))
+    assert few.verdict(SPEED) == "undecided"
+    hours = (151 - 1) * 20 / 3600
+    more = f"{(600 / 151 - 1) * hours:.2g} more hours"
+    assert f"151 encounters were found, 600 are needed: {more}" in few.verdict(SPEED).reasons[0]
+    assert not few.adequate(SPEED)
+
+
+def test_without_a_null_model_nothing_is_decided() -> None:
+    zone = fit(walkers(1, 1500, core=0.8), null=None)
+    assert zone.verdict(SPEED) == "undecided"
+    assert any("null_encounters(tracks)" in reason for reason in zone.verdict(SPEED).reasons)
+
+
+# --- each condition alone ----------------------------------------------------------------------------
+
+
+def test_careless_share_above_q_is_noticed() -> None:
+    """The quantile collapses there."""
+    zone = fit(walkers(4, 1500, core=1.0, careless=0.3))
+    assert zone.null_test.is_significant
+    assert zone.verdict(SPEED) == "undecided"
+    assert any("careless people" in reason for reason in zone.verdict(SPEED).reasons)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"uncertainty": None}, "the interval of the semi-axis a cannot be given"),
+        ({"null_radii": {SPEED: 1.5}}, "a zone with a mean radius of 1.50 m, and this one is not clearly"),
+        ({"null_radii": {SPEED: np.nan}}, "not clearly larger"),
+        ({"side_counts": None}, "encounters were not counted by side"),
+    ],
+)
+def test_every_condition_is_needed(careful: szlib.SocialZone, change: dict[str, Any], reason: str) -> None:
+    verdict = replace(careful, **change).verdict(SPEED)
+    assert verdict == "undecided"
+    assert any(reason in each for each in verdict.reasons)
+
+
+def test_implausible_data_are_undecided(careful: szlib.SocialZone) -> None:
+    text = "people move at 4.18 m/s: feet?"
+    funnel = [{"stage": f"warning: {text}", "entered": 1, "kept": 1, "rejected": {}}]
+    implausible = replace(careful, provenance=careful.provenance | {"funnel": funnel})
+    assert implausible.verdict(SPEED) == "undecided"
+    assert text in implausible.verdict(SPEED).reasons
+
+
+def test_speed_without_data_is_undecided(careful: szlib.SocialZone) -> None:
+    assert careful.verdict(1.6) == "undecided"
+    assert "at 1.6 m/s no encounters were counted" in careful.verdict(1.6).sentence
+
+
+def test_missing_encounters_need_no_times() -> None:
+    assert describe_missing_encounters({"encounters": 300, "hours": None}).endswith("600 are needed")
+    assert describe_missing_encounters({"encounters": 600, "hours": 1.0}) == ""
+
+
+# --- where it is shown -------------------------------------------------------------------------------
+
+
+def test_verdict_is_saved_and_made_again(careful: szlib.SocialZone, tmp_path: Any) -> None:
+    careful.save(tmp_path / "zone.json")
+    loaded = szlib.SocialZone.load(tmp_path / "zone.json")
+    assert loaded.verdict(SPEED).sentence == careful.verdict(SPEED).sentence
+    assert '"usable"' in (tmp_path / "zone.json").read_text(encoding="utf-8")
+
+
+def test_controller_warns_unless_usable(careful: szlib.SocialZone) -> None:
+    szlib.MPCCBF(careful)
+    with pytest.warns(szlib.DataWarning, match=r"at 1\.1 m/s should not be relied on: no respect shown"):
+        szlib.MPCCBF(fit(walkers(2, 1500)))
+
+
+# --- the radius that it rests on ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("core", [0.5, 0.8, 1.0])
+def test_core_is_found_and_held(core: float) -> None:
+    radii = [fit_radius(Approaches.of(walkers(k, 400, core=core, careless=0.05), null())) for k in range(30)]
+    assert np.mean([each.radius for each in radii]) == pytest.approx(core, abs=0.03)
+    held = np.mean([each.low <= core <= each.high for each in radii])
+    assert held >= 0.83  # 90 % or more are expected; fewer than 25 of 30: 1 %
+
+
+def test_radius_does_not_shrink_as_encounters_are_added() -> None:
+    small = [
+        fit_radius(Approaches.of(walkers(k, 150, core=0.8, careless=0.05), null())).radius for k in range(20)
+    ]
+    many = fit_radius(Approaches.of(walkers(7, 8000, core=0.8, careless=0.05), null())).radius
+    assert np.mean(small) == pytest.approx(many, abs=0.04)
+
+
+def test_mix_of_kinds_does_not_matter() -> None:
+    """One kind comes nearer by chance, and is rarer in the data."""
+    far = null().encounters.assign(kind="opposite", nearest=lambda d: 1.2 + d["nearest"] / 4)
+    mixed = replace(null(), encounters=pd.concat([null().encounters, far]))
+    crossing = walkers(8, 300)
+    crossing = crossing.assign(encounter=crossing["encounter"] + 10_000)
+    opposite = walkers(9, 900).assign(kind="opposite")
+    opposite["distance"] = np.hypot(opposite["distance"], 1.2)
+    crossing_only = fit_radius(Approaches.of(crossing, null()))
+    both = fit_radius(Approaches.of(pd.concat([crossing, opposite]), mixed))
+    assert crossing_only.low == 0
+    assert both.low == 0
+
+
+def test_cores_in_simulated_crowds_are_found() -> None:
+    tracks = noninteracting_crowd(seed=5, people=1500, minutes=30)
+    samples = szlib.find_encounters(tracks)
+    against = szlib.null_encounters(tracks, shifts=19, progress=False)
+    paired = szlib.zones.PairedSamples.from_tracks(tracks, samples)
+    kept = paired.impose(szlib.Ellipse((0, 0), (0.8, 0.8)), careless=0.05, seed=1)
+    test = szlib.null_test(kept, against)
+    assert test.is_significant
+    assert test.respect.low <= 0.8 <= test.respect.high
+    assert not szlib.null_test(samples, against).is_significant
