@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 
 import pytest
 
@@ -36,6 +37,28 @@ def test_run_records_checks_claims_and_key_figures(notebooks, tmp_path, capsys):
     assert "not supported here" in printed
     assert "all checks hold" in printed
     assert "report.html" in printed and (tmp_path / "out" / "mine" / "report.html").exists()
+
+
+ZONE = """
+import numpy as np, pandas as pd, szlib
+n, rng = 3000, np.random.default_rng(0)
+samples = pd.DataFrame({"encounter": np.arange(n), "los_angle": rng.uniform(-3.1, 3.1, n), "speed": 1.1})
+zone = szlib.SocialZone.fit(samples.assign(distance=rng.uniform(0.9, 2.5, n)), speeds=[1.1], n_resamples=0)
+record.cache.store_zone(zone)
+"""
+
+
+@pytest.mark.usefixtures("without_kernels")
+def test_verdict_on_the_zone_ends_the_run_and_begins_the_report(notebooks, tmp_path, capsys):
+    notebooks(_05_zone=ZONE)
+    assert run() == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("zone at 1.1 m/s: undecided: no null model: ")
+    page = (tmp_path / "out" / "mine" / "report.html").read_text(encoding="utf-8")
+    assert re.search(
+        r"<h1[^>]*>Results for mine.*?</h1>\s*<p><strong>zone at 1.1 m/s: undecided", page, re.DOTALL
+    )
+    assert last == summary(tmp_path)["verdict"]
 
 
 @pytest.mark.usefixtures("without_kernels")
