@@ -15,8 +15,10 @@ model. The mix of kinds does not matter, because p is conditional on the kind.
 The likelihood is computed for *all* R, f and w of a fine grid, so the best one is not missed and needs no
 start. The interval holds every R with 2 (log L_max - max over f and w of log L) below 3.84, the 95 % quantile
 of chi square with one degree of freedom, times 1 + n/m for n encounters of the data and m of the null model.
-It is meant to contain the true radius: on 135 simulated crowds that keep a hard core of 0.5, 0.8 or 1.0 m,
-5 % of them careless, it did in 97 %, and the bias was 2 cm where 60 encounters came within 2 m.
+It is meant to contain the true radius. On 180 simulated crowds (single people, pairs, bunches, a rush hour)
+that keep a hard core of 0.5, 0.8 or 1.0 m, 5 % of them careless, it did in 96 %. Where 60 encounters came
+within 2 m, the radius was 2 to 4 cm too large. At Grand Central it is 0.57 to 0.60 m for 150 to 7,354
+encounters.
 """
 
 from __future__ import annotations
