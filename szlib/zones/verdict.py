@@ -56,7 +56,8 @@ def judge(zone: FittedZone, speed: float) -> Verdict:
     """Judge a `zone` at a `speed` of the reference pedestrian [m/s]."""
     test = zone.null_test
     if test is not None and not test.is_significant and test.n_encounters >= MIN_TESTED:
-        return Verdict(NO_RESPECT, [f"people came as near as people who ignore each other would ({test})"])
+        compared = f"p = {test.p_value:.3g} ({test.n_shifts} shifts, {test.n_encounters} encounters)"
+        return Verdict(NO_RESPECT, [f"people came as near as people who ignore each other would: {compared}"])
     reasons = [*_missing_data(zone, speed), *_null_model(zone, speed), *_intervals(zone, speed)]
     return Verdict(UNDECIDED, reasons) if reasons else Verdict(USABLE, [f"{test}"])
 

@@ -117,7 +117,7 @@ def kill(
 ) -> None:  # fmt: skip
     """Kill the first process of a command, mostly by SIGKILL, and at last let the command finish."""
     out, longest, struck = place / f"{name}-killed", 6.0, 0
-    before = everything_outside(place)
+    before = everything_before(place)
     while struck < kills:
         begun = time.monotonic()
         process = start([*command, "--out", str(out)], place)
@@ -189,6 +189,11 @@ def environment(place: Path) -> dict[str, str]:
 def everything_outside(place: Path) -> set[str]:
     """Every file where temporary ones may be, in shared memory those of the processes that were noted."""
     return everything_in(place / "tmp", place / "home") | named_after_noted(SHARED_MEMORY)
+
+
+def everything_before(place: Path) -> set[str]:
+    """Every file that an attacked command cannot have left; numbers of processes recur in shared memory."""
+    return everything_outside(place) | {str(file) for file in SHARED_MEMORY.glob("*")}
 
 
 def start(command: list[str], place: Path) -> subprocess.Popen[bytes]:

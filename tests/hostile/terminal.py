@@ -22,7 +22,16 @@ from pathlib import Path
 from select import select
 
 from helpers.process_table import adopt_orphans, descendants, wait_for_end
-from processes import GRACE, environment, everything_outside, finish, furnish, judge_end, make_reference
+from processes import (
+    GRACE,
+    environment,
+    everything_before,
+    everything_outside,
+    finish,
+    furnish,
+    judge_end,
+    make_reference,
+)
 
 TRIALS = 50
 LONGEST = 60.0
@@ -53,7 +62,7 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
         place, rng = Path(folder), random.Random(seed)
         commands = furnish(place) if long else furnish(place, days=1)
         if not long:
-            out, before = place / "extract-0", everything_outside(place)
+            out, before = place / "extract-0", everything_before(place)
             attempt("Ctrl-C twice", [*commands["extract"], "--out", str(out)], place, rng, 0.3, tally)
             left = wait_for_end(place, GRACE) or sorted(everything_outside(place) - before)
             tally["broken: processes left"] += len(left)
@@ -63,7 +72,7 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
             attempt("Ctrl-C while it imports", command, place, rng, 1.5, tally)
         for name, command in commands.items():
             reference = make_reference(name, command, place)
-            before = everything_outside(place)
+            before = everything_before(place)
             for trial in range(TRIALS):
                 action, full = rng.choice(list(ACTIONS)), [*command, "--out", str(place / f"{name}-{trial}")]
                 attempt(action, full, place, rng, 5.0, tally)
