@@ -256,7 +256,7 @@ def test_full_or_ascii_standard_output_gives_one_line(tmp_path, monkeypatch):
 
 def test_sigterm_stops_extract_with_exit_code_143(tmp_path):
     days = [make_plaza(tmp_path / f"d{k}.csv", settings=PlazaSettings(n_encounters=300, date=f"2000-01-0{k}"))
-            for k in range(1, 6)]  # fmt: skip
+            for k in range(1, 10)]  # fmt: skip
     done = command("extract", *map(str, days), "--out", str(tmp_path / "out"))
     while not list(tmp_path.glob("out/*.json")) and done.poll() is None:
         time.sleep(0.01)
