@@ -108,9 +108,8 @@ if len(ellipse.support) > 3:
 #
 # The hull is set by the nearest people ever seen, so it shrinks with every day of data (notebook 15). The
 # *quantile zone*, szlib's default, is where all but a share `q` of encounters (5 %) keep out, direction by
-# direction, and an ellipse fitted to that. This one is kept for the robot. Any method finds a zone, also where
-# nobody respects anybody. So the zone is tested against people who ignore each other (notebook 15), and its
-# *verdict* says whether it can be used.
+# direction, and an ellipse fitted to that. This one is kept for the robot. Any method finds a zone, also among
+# people who ignore each other. So the zone is tested against these (notebook 15), and its *verdict* says whether it can be used.
 
 # %%
 zone = record.cache.fit_zone()

@@ -25,10 +25,9 @@ from ..files import folder_lock, process_folder, write_file
 from ..input_files import file_content, read_json_object
 from ..parallel import cluster, limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets, funnels
-from ..zones.social_zone import SocialZone
 from . import folders
 from .notebook_execution import EMPTY_RECORD, end_kernels, execute_notebook
-from .record.data_cache import DataCache
+from .record.data_cache import DataCache, read_stored_zone
 from .record.display import format_value
 from .record.parameters import METHOD_DEFAULTS, check_parameters
 
@@ -89,6 +88,8 @@ def run(
     with folder_lock(home), safe_path(), _private_temporary_files():
         files = DataCache(home, data, seed=given.get("seed", 0)).files()
         folders.remove_outputs(home, names)
+        if read_stored_zone(home / "zone.json") is None:  # missing, damaged or of another version
+            (home / "zone.json").unlink(missing_ok=True)
         source, earlier = _start_summary(home, data, files, given, names)
         variables = given | {"data": data, "results": str(results)}
         outcomes = _execute_all(scripts, variables, home, jobs, scheduler)
@@ -109,9 +110,9 @@ def run(
 
 
 def _judge(file: Path, contents: Sequence[Any], parameters: Mapping[str, Any]) -> str:
-    """The verdict on the zone in a `file`; "" if the zone was made from data other than `contents`."""
-    zone = SocialZone.load(file)
-    if zone.provenance.get("source", {}).get("files") != json.loads(json.dumps(contents)):
+    """The verdict on the zone in a `file`; "" if there is none that was made from data of `contents`."""
+    zone = read_stored_zone(file)
+    if not zone or zone.provenance.get("source", {}).get("files") != json.loads(json.dumps(contents)):
         return ""
     speed = float(parameters.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
     return f"zone at {speed:g} m/s: {zone.verdict(speed).sentence}"

@@ -41,9 +41,8 @@ from .outliers import nearest_approaches
 # encounters.
 _SOFTNESS = (0.033, 0.06, 0.1, 0.18, 0.3)
 _IGNORING = (0.0, *expit(np.linspace(-6, 4, 30)).tolist())  # f; with a half and more there is no zone
-_STEP = 0.01  # of R [m]
 _FARTHEST = 0.8  # largest R, in r_max: beyond it people at a distance are hardly seen
-_BIN = 0.025  # width of the bins of r [m]
+_N_RADII, _N_BINS = 160, 80  # values of R up to there, and bins of r up to r_max
 _LEVEL = 0.95
 
 
@@ -121,22 +120,22 @@ class RespectRadius:
 
 def fit_radius(approaches: Approaches) -> RespectRadius:
     """Fit the radius to `approaches` (see the top of this module)."""
-    n_bins = round(approaches.r_max / _BIN)
-    r = (np.arange(n_bins) + 0.5) * approaches.r_max / n_bins
-    is_seen = r > approaches.nearest.min() - _BIN
-    strata = list(_histograms(approaches, n_bins))
+    width = approaches.r_max / _N_BINS
+    r = (np.arange(_N_BINS) + 0.5) * width
+    is_seen = r > approaches.nearest.min() - width
+    strata = list(_histograms(approaches))
     n, m = (sum(float(each[side].sum()) for each in strata) for side in (0, 1))
     if not n:
         raise ZoneError(
             "no kind of encounter is in the data and in its null model as well: nothing to compare"
         )
-    radii = np.arange(0.0, _FARTHEST * approaches.r_max, _STEP)
+    radii = np.arange(_N_RADII) / _N_RADII * _FARTHEST * approaches.r_max
     edge = expit((r - radii[:, None, None, None]) / np.array(_SOFTNESS)[:, None, None])
     share = np.array(_IGNORING)[:, None]
     g = share + (1 - share) * edge  # by R, w, f and r
     likelihood, careless = np.zeros(g.shape[:-1]), np.zeros(g.shape[:-1])
     for real, null in strata:
-        expected = (null + 1e-3 * m / n_bins) * is_seen
+        expected = (null + 1e-3 * m / _N_BINS) * is_seen
         total = g @ expected
         likelihood += np.log(g) @ real - real.sum() * np.log(total / expected.sum())
         careless += share[:, 0] * ((1 - edge) @ expected) / total * real.sum() / n
@@ -152,13 +151,13 @@ def fit_radius(approaches: Approaches) -> RespectRadius:
     )
 
 
-def _histograms(approaches: Approaches, n_bins: int) -> Iterable[tuple[Array, Array]]:
+def _histograms(approaches: Approaches) -> Iterable[tuple[Array, Array]]:
     """Histograms of data and null model over the distance, for each kind that both have."""
-    bins = np.minimum(approaches.nearest / approaches.r_max * n_bins, n_bins - 1).astype(int)
+    bins = np.minimum(approaches.nearest / approaches.r_max * _N_BINS, _N_BINS - 1).astype(int)
     for kind in np.unique(approaches.kind):
         is_kind = approaches.kind == kind
         real, null = (
-            np.bincount(bins[is_kind & side], minlength=n_bins).astype(float)
+            np.bincount(bins[is_kind & side], minlength=_N_BINS).astype(float)
             for side in (approaches.shift == 0, approaches.shift > 0)
         )
         if real.any() and null.any():

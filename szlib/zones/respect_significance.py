@@ -21,6 +21,8 @@ this mix looked like respect in 17 of 100 simulated crowds; with separate kinds 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,12 +31,14 @@ from numpy.typing import NDArray
 
 from ..encounters.kinds import COMPANIONS
 from ..encounters.null_model import NullEncounters
-from ..errors import warn
+from ..errors import DataError, ZoneError, warn
+from .estimators import Estimator
 from .respect_profile import Approaches, RespectRadius, fit_radius
 
 # Radii of the statistic [m]; the radius of the zone need not be among them.
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
 SIGNIFICANCE_LEVEL = 0.05
+_NULL_DRAWS, _MAX_DRAWN = 5, 1000  # zones fitted to the null model, and most encounters of each
 
 # A kind that is expected more often than this and is missing was filtered out on one side only.
 _MIN_EXPECTED = 30
@@ -129,6 +133,38 @@ def null_test(samples: pd.DataFrame, null: NullEncounters, *, excluded_below: fl
         respect=fit_radius(found),
         excluded_below=float(excluded_below),
     )
+
+
+def fit_null_radii(
+    build: Callable[[pd.DataFrame], Estimator],
+    null: NullEncounters,
+    n_encounters: int,
+    speeds: list[float],
+    seed: int,
+) -> dict[float, float]:
+    """Find the mean radius of the zone that an estimator gives people who ignore each other.
+
+    Parameters
+    ----------
+    build : makes the estimator from samples.
+    null : the null model, of which encounters are drawn.
+    n_encounters : number of encounters of the data. At most 1,000 are drawn: fewer have larger zones.
+    speeds : speeds of the zones [m/s].
+    seed : of the draws.
+
+    Returns
+    -------
+    By speed, the largest of several draws [m]; NaN where none has a zone.
+    """
+    rng, known = np.random.default_rng(seed), null.samples["encounter"].unique()
+    size, radii = min(n_encounters, len(known), _MAX_DRAWN), np.full((_NULL_DRAWS, len(speeds)), np.nan)
+    for row in radii:
+        drawn = null.samples["encounter"].isin(rng.choice(known, size, replace=False))
+        with suppress(ZoneError, DataError):  # no zone: stays NaN
+            estimator = build(null.samples[drawn])
+            ellipses = estimator.refit(np.ones((1, len(estimator.encounters))), speeds)
+            row[:] = np.sqrt(ellipses[0, :, 2] * ellipses[0, :, 3])
+    return dict(zip(speeds, np.fmax.reduce(radii, axis=0).tolist(), strict=True))
 
 
 def _find_deficits(

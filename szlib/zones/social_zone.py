@@ -14,7 +14,6 @@ which this number is sufficient.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -26,14 +25,14 @@ import pandas as pd
 from .. import __version__
 from ..checks import Array, check_columns, require
 from ..encounters.null_model import NullEncounters
-from ..errors import DataError, ZoneError, warn
+from ..errors import ZoneError, warn
 from .ellipses import Ellipse
 from .estimators import Estimator, ZoneShape
 from .hulls import HullEstimator, HullZone
 from .outliers import FRACTION, N_NEIGHBOURS, R_MAX, encounter_numbers
 from .quantile import QuantileEstimator
 from .respect import RespectEstimator
-from .respect_significance import NullTest, null_test
+from .respect_significance import NullTest, fit_null_radii, null_test
 from .uncertainty import (
     N_RESAMPLES,
     QUANTITIES,
@@ -51,7 +50,6 @@ if TYPE_CHECKING:
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Default speeds of the reference pedestrian [m/s] (assumed; the paper shows a range)."""
 
-_NULL_DRAWS, _MAX_DRAWN = 5, 1000  # zones fitted to the null model, and largest number of encounters of each
 
 _PAPER = partial(HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_NEIGHBOURS)
 # The methods of `SocialZone.fit`: the estimator, and its options.
@@ -208,8 +206,11 @@ class SocialZone:
         provenance = _provenance(samples, {"method": method, "r_max": float(r_max)}, estimator)
         test, null_radii = None, {}
         if null is not None:
+            require(
+                r_max <= null.r_max, "r_max", r_max, f"at most the null model's {null.r_max} m", ZoneError
+            )
             test = null_test(samples, null)
-            null_radii = _fit_null_radii(build, null, len(estimator.encounters), list(ellipses), seed)
+            null_radii = fit_null_radii(build, null, len(estimator.encounters), list(ellipses), seed)
         sides = uncertainty = None
         if "encounter" in samples:
             sides = count_by_side(samples, fitted_speeds, r_max=r_max)
@@ -345,28 +346,6 @@ def _recorded_hours(samples: pd.DataFrame) -> float | None:
         return None
     days = samples["day"] if "day" in samples else np.zeros(len(samples))
     return float(samples["t"].groupby(days, observed=True).agg(np.ptp).sum() / 3600)
-
-
-def _fit_null_radii(
-    build: Callable[[pd.DataFrame], Estimator],
-    null: NullEncounters,
-    n_encounters: int,
-    speeds: list[float],
-    seed: int,
-) -> dict[float, float]:
-    """Largest mean radius by speed of zones fitted to draws of as many encounters of the null model [m].
-
-    NaN where no draw has a zone. At most `_MAX_DRAWN` are drawn: fewer encounters have larger zones.
-    """
-    rng, known = np.random.default_rng(seed), null.samples["encounter"].unique()
-    size, radii = min(n_encounters, len(known), _MAX_DRAWN), np.full((_NULL_DRAWS, len(speeds)), np.nan)
-    for row in radii:
-        drawn = null.samples["encounter"].isin(rng.choice(known, size, replace=False))
-        with suppress(ZoneError, DataError):  # no zone: stays NaN
-            estimator = build(null.samples[drawn])
-            ellipses = estimator.refit(np.ones((1, len(estimator.encounters))), speeds)
-            row[:] = np.sqrt(ellipses[0, :, 2] * ellipses[0, :, 3])
-    return dict(zip(speeds, np.fmax.reduce(radii, axis=0).tolist(), strict=True))
 
 
 def _check_method(method: str, options: Iterable[str] = ()) -> None:

@@ -7,8 +7,10 @@ import re
 import pytest
 
 from szlib.errors import DataError
+from szlib.files import write_checksum
 from szlib.workbook import cli, runner
 from szlib.workbook.cli import main
+from szlib.workbook.record.data_cache import _load
 from szlib.workbook.record.parameters import check_parameters
 
 DONE = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
@@ -59,6 +61,21 @@ def test_verdict_on_the_zone_ends_the_run_and_begins_the_report(notebooks, tmp_p
         r"<h1[^>]*>Results for mine.*?</h1>\s*<p><strong>zone at 1.1 m/s: undecided", page, re.DOTALL
     )
     assert last == summary(tmp_path)["verdict"]
+
+
+@pytest.mark.usefixtures("without_kernels")
+def test_stored_zone_of_another_version_is_no_obstacle(notebooks, tmp_path, capsys):
+    notebooks(_05_zone=ZONE, _07_other="")
+    assert run("--only", "05") == 0
+    file = tmp_path / "out" / "mine" / "zone.json"
+    older = file.read_text().replace('"version": 3', '"version": 2')
+    file.write_text(older)
+    capsys.readouterr()
+    assert run("--only", "07") == 0
+    assert "zone at" not in capsys.readouterr().out
+    source = json.loads(older)["provenance"]["source"]
+    write_checksum(file, older.encode(), source)  # whole, but written by an older szlib
+    assert _load(file, source) is None
 
 
 @pytest.mark.usefixtures("without_kernels")

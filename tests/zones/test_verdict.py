@@ -138,6 +138,11 @@ def test_missing_encounters_need_no_times() -> None:
     assert describe_missing_encounters({"encounters": 600, "hours": 1.0}) == ""
 
 
+def test_null_model_must_reach_as_far_as_the_zone() -> None:
+    with pytest.raises(szlib.ZoneError, match=r"r_max must be at most the null model's 2\.0 m; got 2\.5"):
+        fit(walkers(1, 50), r_max=2.5)
+
+
 # --- where it is shown -------------------------------------------------------------------------------
 
 

@@ -18,7 +18,7 @@ from ...encounters.areas import as_area, place_apart
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
 from ...encounters.null_model import NullEncounters, null_encounters
-from ...errors import DataError
+from ...errors import DataError, ZoneError
 from ...files import load_cached, store_cached, write_checksum
 from ...input_files import file_content, printable, unchanged_files
 from ...plaza.generation import make_plaza
@@ -202,9 +202,17 @@ class DataCache:
         return self._source() | {"fit": self.method.fit_options()}
 
 
+def read_stored_zone(file: Path) -> SocialZone | None:
+    """The zone in a `file`; None if it is damaged or of another version: it is fitted again when needed."""
+    try:
+        return SocialZone.load(file)
+    except ZoneError:
+        return None
+
+
 def _load(file: Path, source: dict[str, Any]) -> SocialZone | None:
     """The zone in a file, if it was made from `source` and is not damaged."""
-    zone = None if load_cached(file, source) is None else SocialZone.load(file)
+    zone = None if load_cached(file, source) is None else read_stored_zone(file)
     return zone if zone and zone.provenance.get("source") == json.loads(json.dumps(source)) else None
 
 
