@@ -316,9 +316,16 @@ def kill_and_resume(days: list[Path], out: Path, reference: dict[str, bytes], ki
                 assert contents(out)[name] == reference[name], "a record that is there is whole"
         if rng.random() < 0.3 and finished:
             (out / rng.choice(sorted(finished))).unlink()
-    extract(days, out, n_jobs=2)
-    assert contents(out) == reference, "and nothing unfinished is left"
+    assert contents_after_an_hour(days, out) == reference, "and nothing unfinished is left"
     return struck
+
+
+def contents_after_an_hour(days: list[Path], out: Path) -> dict[str, bytes]:
+    """The files of a folder, extracted again when the unfinished files of killed processes are old."""
+    for unfinished in out.glob(".szlib-part-*"):
+        os.utime(unfinished, (0, 0))
+    extract(days, out, n_jobs=2)
+    return contents(out)
 
 
 def test_killed_runs_resume_to_the_same_result(
@@ -369,7 +376,7 @@ def test_dask_cluster_that_loses_a_worker_gives_the_same_result(
     )  # fmt: skip
     assert done.stdout.split()[0] == "False", "the worker is gone"
     assert set(done.stdout.split()[1:]) <= {"done", "kept"}
-    assert contents(out) == reference
+    assert contents_after_an_hour(days, out) == reference
 
 
 def test_another_backend_of_joblib_gives_the_same_result(
