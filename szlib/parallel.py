@@ -85,10 +85,11 @@ def uninterrupted() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    for tracker in (resource_tracker, loky_resource_tracker):
-        tracker.ensure_running()  # their start unblocks Ctrl-C again
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
     try:
+        for tracker in (resource_tracker, loky_resource_tracker):
+            tracker.ensure_running()  # outlives a closed terminal, to clean up; its start unblocks Ctrl-C
+        signal.pthread_sigmask(signal.SIG_SETMASK, before | {signal.SIGINT})
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,9 +1,11 @@
 """Processes end with the one that started them, whenever it is killed."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -63,3 +65,27 @@ def _carriers(word: str) -> list[str]:
         except OSError:
             continue
     return found
+
+
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="finds semaphores in /dev/shm")
+def test_a_closed_terminal_leaves_no_semaphores(tmp_path: Path) -> None:
+    """Every process of the group gets SIGHUP; the process that removes the semaphores must outlive it."""
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    parent = subprocess.Popen([sys.executable, str(program)], start_new_session=True)
+
+    def semaphores() -> list[Path]:
+        return list(Path("/dev/shm").glob(f"sem.loky-{parent.pid}-*"))
+
+    assert wait_until(semaphores)
+    time.sleep(0.2)
+    os.killpg(parent.pid, signal.SIGHUP)
+    assert parent.wait() == -signal.SIGHUP
+    assert wait_until(lambda: not semaphores())
+
+
+def wait_until(condition: Callable[[], object], seconds: float = 60.0) -> bool:
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    return bool(condition())

@@ -37,14 +37,17 @@ TRIALS = 50
 LONGEST = 60.0
 """Time limit of a command that was stopped [s]."""
 ACTIONS = {
-    "Ctrl-C": (130,),
+    "Ctrl-C": (130, -signal.SIGINT),
     "Ctrl-C twice": (130, -signal.SIGINT),
-    "Ctrl-Z, then Ctrl-C": (130,),
+    "Ctrl-Z, then Ctrl-C": (130, -signal.SIGINT),
     "terminal closed": (129, -signal.SIGHUP),
     "SIGTERM to the group": (143, -signal.SIGTERM),
     "SIGKILL to the group": (-signal.SIGKILL,),
 }
-"""What is done, and the exit codes with which the command may end then; 0 if it was finished before."""
+"""What is done, and the exit codes with which the command may end then; 0 if it was finished before.
+
+-SIGINT, which a shell shows as 130 too, is the end in the last moments of the interpreter.
+"""
 IMPORTS = 30
 """Number of times that Ctrl-C is typed while a command imports what it needs."""
 IMPORTING = """
