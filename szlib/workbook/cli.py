@@ -276,21 +276,28 @@ def _job_count(text: str) -> int:
 def _stop_on_signals() -> Iterator[None]:
     """Let SIGTERM and SIGHUP stop the command as Ctrl-C does; a SIGHUP that is ignored stays ignored.
 
-    A second signal ends the command at once, with all its processes, and no other traceback is printed.
+    A second signal ends the command at once, with all its processes, and no other traceback is printed. So
+    does a first one where Python drops exceptions (in callbacks of weak references, which imports have).
+    Whatever goes wrong while the command stops, such as a closed terminal, the exit code is the signal's.
     """
     stopped: list[int] = []
 
+    def end() -> None:
+        """End this process and all that it started."""
+        for process in psutil.Process().children(recursive=True):
+            with suppress(psutil.Error):
+                process.kill()
+        with suppress(OSError):
+            os.write(2, f"szlib: {_STOPPED}\n".encode())
+        os._exit(128 + stopped[-1])
+
     def stop(number: int, _frame: object) -> None:
         """Stop with the exit code of the signal."""
-        if stopped:
-            for process in psutil.Process().children(recursive=True):
-                with suppress(psutil.Error):
-                    process.kill()
-            with suppress(OSError):
-                os.write(2, f"szlib: {_STOPPED}\n".encode())
-            os._exit(128 + number)
         stopped.append(number)
-        sys.unraisablehook, threading.excepthook = (lambda _: None), (lambda _: None)
+        if len(stopped) > 1:
+            end()
+        sys.unraisablehook = lambda lost: end() if lost.exc_type is KeyboardInterrupt else None
+        threading.excepthook = lambda _: None
         raise KeyboardInterrupt(128 + number)
 
     is_main = threading.current_thread() is threading.main_thread()
@@ -299,6 +306,10 @@ def _stop_on_signals() -> Iterator[None]:
     before = {n: signal.signal(n, stop) for n in numbers if signal.getsignal(n) is not signal.SIG_IGN}
     try:
         yield
+    except Exception as error:
+        if stopped:
+            raise KeyboardInterrupt(128 + stopped[0]) from error
+        raise
     finally:
         for number, handler in before.items():
             if not stopped:  # until the process has ended

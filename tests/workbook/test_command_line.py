@@ -69,6 +69,38 @@ main()"""
     assert (done.returncode, done.stderr) == (-signal.SIGINT, b"")
 
 
+@pytest.mark.parametrize(
+    "work",
+    [
+        # A signal in a callback, which imports have: Python drops the exception, and the command goes on.
+        """
+class Closing:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGHUP)
+def work(_):
+    Closing()
+    time.sleep(20)""",
+        # A library that makes another exception of it, or a closed terminal that cannot be written any more.
+        """
+def work(_):
+    try:
+        os.kill(os.getpid(), signal.SIGHUP)
+    finally:
+        raise OSError(errno.EIO, "Input/output error")""",
+    ],
+)
+def test_stopped_command_ends_with_the_code_of_the_signal(work: str) -> None:
+    program = f"import errno, os, signal, time\nfrom szlib.workbook import cli{work}\ncli._inspect = work\n"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{program}raise SystemExit(cli.main(['inspect', 'x']))"],
+        capture_output=True, text=True, timeout=15,
+        env=os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])},
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (
+        129, "szlib: stopped; finished results stay in their folder\n",
+    )  # fmt: skip
+
+
 def test_extract_prints_the_table(day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["extract", str(day), "--out", str(tmp_path / "out")]) == 0
     assert "1 done" in capsys.readouterr().out
