@@ -142,11 +142,11 @@ own, theirs = (
 towards = (own.to_numpy() * theirs.to_numpy()).sum(axis=1) < 0  # more than 90 deg between the velocities
 share = {kind: float(towards[first["kind"] == kind].mean()) for kind in ("opposite", "same direction")}
 apart = share["opposite"] > 0.95 and share["same direction"] < 0.05
-record.check(
-    "as the window opens, opposite pairs walk towards each other, others of one direction do not",
-    apart,
-    share,
-)
+what = "as the window opens, opposite pairs walk towards each other, others of one direction do not"
+if kinds.reindex(list(share)).min() >= 20:  # among fewer, one exception is more than 5 %
+    record.check(what, apart, share)
+else:
+    record.claim(what, None, share)
 
 # %% [markdown]
 # ## What they look like

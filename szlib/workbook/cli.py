@@ -141,7 +141,8 @@ def _run(options: argparse.Namespace) -> int:
     data:
       The data set atc-1hz is one real day of the ATC mall (31 MB). It is downloaded once and verified. If
       $SZLIB_DATA_DIR names a folder that holds atc-1hz/, no network is used.
-      A run stops if no encounters are left. The message names the condition that rejected the last rows.
+      A run stops if no encounters are left. The message names the condition that rejected the last rows. With
+      too few for a zone, notebooks that need one end early as "undecided", which fails no run.
 
     examples:
       szlib run --data atc-1hz

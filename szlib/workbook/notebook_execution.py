@@ -16,6 +16,7 @@ from typing import Any
 from ..errors import SzlibError
 from ..files import temporary_folder, write_file
 from ..input_files import printable, read_json_object
+from .record.data_cache import describe_missing_data
 from .record.parameters import METHOD_DEFAULTS, read_defaults
 
 # Errors caused by data, disk or memory, not by the notebook.
@@ -58,9 +59,11 @@ def execute_notebook(
         is_refused = name in REFUSED or isinstance(error, SzlibError | OSError | MemoryError)
         text = printable(" ".join(f"{name}: {getattr(error, 'evalue', error)}".split()))
         outcome = {"status": "refused" if is_refused else "error", "error": text}
+        if name == "ZoneError" and describe_missing_data(results / "encounters.parquet"):
+            outcome = {"status": "undecided", "error": f"not decidable on this data: {text}"}
     outcome["seconds"] = round(time.perf_counter() - start, 2)
     record = read_json_object(results / "records" / f"{source.stem}.json")
-    if not record and outcome["status"] == "done":
+    if not record.get("closed") and outcome["status"] == "done":
         missing = "the notebook wrote no record; it must end with record.close()"
         outcome |= {"status": "error", "error": missing}
     return source.stem, outcome | {name: record.get(name, empty) for name, empty in EMPTY_RECORD.items()}

@@ -27,7 +27,7 @@ from ..parallel import cluster, limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets, funnels
 from . import folders
 from .notebook_execution import EMPTY_RECORD, end_kernels, execute_notebook
-from .record.data_cache import DataCache, read_stored_zone
+from .record.data_cache import DataCache, describe_missing_data, read_stored_zone
 from .record.display import format_value
 from .record.parameters import METHOD_DEFAULTS, check_parameters
 
@@ -66,10 +66,11 @@ def run(
 
     Returns
     -------
-    The summary: passed; notebooks, for each one its status ("done"; "error": a cell failed; "refused": data,
-    disk or memory do not allow it; "not started": an earlier one was refused), seconds, checks and key
-    figures; and the path of the report. The same, with notebooks of earlier runs on the same data,
-    parameters and version, is in ``summary.json``.
+    The summary: passed; notebooks, for each one its status ("done"; "undecided": it ended early, with too few
+    encounters for a zone; "error": a cell failed; "refused": data, disk or memory do not allow it;
+    "not started": an earlier one was refused), seconds, checks and key figures; the path of the report; the
+    verdict. The same, with notebooks of earlier runs on the same data, parameters and version, is in
+    ``summary.json``.
 
     Raises
     ------
@@ -93,13 +94,17 @@ def run(
         source, earlier = _start_summary(home, data, files, given, names)
         variables = given | {"data": data, "results": str(results)}
         outcomes = _execute_all(scripts, variables, home, jobs, scheduler)
+        verdict = _judge(zone, source["files"], given) if (zone := home / "zone.json").exists() else ""
         if (samples := home / "encounters.parquet").exists():
             table = pd.read_parquet(samples, columns=[])
-            advice = table.attrs.get("advice")
-            source["warnings"] = funnels.warnings(funnels.get(table)) + ([advice] if advice else [])
+            source["warnings"] = funnels.warnings(funnels.get(table))
             source["area"] = "{area} {area_reason}".format_map(table.attrs).strip()
-        if (zone := home / "zone.json").exists():
-            source["verdict"] = _judge(zone, source["files"], given)
+            if not verdict and any(outcome["status"] == "undecided" for outcome in outcomes.values()):
+                verdict = f"undecided: {describe_missing_data(samples)}"
+            if advice := table.attrs.get("advice"):
+                source["warnings"] += [] if verdict else [advice]
+                verdict = f"{verdict}; {advice.partition('; ')[2]}" if verdict else ""
+        source |= {"verdict": verdict} if verdict else {}
         summary, everything = (_summarise(source, each) for each in (outcomes, {**earlier, **outcomes}))
         write_file(home / SUMMARY, json.dumps(everything, indent=1))
         if any((home / f"{name}.ipynb").exists() for name in everything["notebooks"]):
@@ -268,8 +273,9 @@ def _summarise(source: Mapping[str, Any], notebooks: Mapping[str, Any]) -> dict[
 
 
 def has_passed(outcome: Mapping[str, Any]) -> bool:
-    """Whether a notebook with this `outcome` has finished, and none of its checks failed."""
-    return outcome["status"] == "done" and all(c["passed"] for c in outcome["checks"] if c["kind"] == "check")
+    """Whether a notebook with this `outcome` has finished or is undecided, and none of its checks failed."""
+    is_over = outcome["status"] in ("done", "undecided")
+    return is_over and all(c["passed"] for c in outcome["checks"] if c["kind"] == "check")
 
 
 def format_summary(summary: Mapping[str, Any]) -> str:
@@ -283,8 +289,10 @@ def format_summary(summary: Mapping[str, Any]) -> str:
         notes += [
             f"{name}: {c['name']}: {c['result']} ({c['value']})" for c in outcome["checks"] if not c["passed"]
         ]
-        if "error" in outcome:
+        if "error" in outcome and outcome["status"] != "undecided":
             notes.append(f"{name}: {outcome['error']}")
+    undecided = [name for name, n in summary["notebooks"].items() if n["status"] == "undecided"]
+    notes += [f"not decidable on this data, see the report: {', '.join(undecided)}"] if undecided else []
     notes += [f"data: {text}" for text in summary.get("warnings", ())]
     notes += [f"area: {summary['area']}"] if "area" in summary else []
     table = [f"{row[0]:<24} {row[1]:>7} {row[2]:>11} {row[3]:>9}  {row[4]}" for row in rows]

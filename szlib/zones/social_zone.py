@@ -334,13 +334,13 @@ def _provenance(samples: pd.DataFrame, parameters: Mapping[str, Any], estimator:
         "szlib": __version__,
         "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
         "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
-        "hours": _recorded_hours(samples),
+        "hours": recorded_hours(samples),
         "parameters": {**parameters, **estimator.parameters},
         "funnel": estimator.funnel,
     }
 
 
-def _recorded_hours(samples: pd.DataFrame) -> float | None:
+def recorded_hours(samples: pd.DataFrame) -> float | None:
     """Time from the first to the last of `samples`, summed over the days [h]; None without times."""
     if "t" not in samples or samples.empty:
         return None

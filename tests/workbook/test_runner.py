@@ -8,6 +8,8 @@ import pytest
 
 from szlib.errors import DataError
 from szlib.files import write_checksum
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import PlazaSettings
 from szlib.workbook import cli, runner
 from szlib.workbook.cli import main
 from szlib.workbook.record.data_cache import _load
@@ -61,6 +63,51 @@ def test_verdict_on_the_zone_ends_the_run_and_begins_the_report(notebooks, tmp_p
         r"<h1[^>]*>Results for mine.*?</h1>\s*<p><strong>zone at 1.1 m/s: undecided", page, re.DOTALL
     )
     assert last == summary(tmp_path)["verdict"]
+
+
+FEW = {
+    "_02_few": 'record.check("some met", record.cache.encounters()["encounter"].nunique() == 4, always=True)',
+    "_04_hull": """
+record.check("before", {before})
+szlib = __import__("szlib")
+szlib.SocialZone.fit(record.cache.encounters(), method="paper", speeds=[1.6])
+record.check("after", False)""",
+    "_07_other": 'record.check("later", True)',
+}
+
+
+@pytest.mark.usefixtures("without_kernels")
+@pytest.mark.parametrize("before", [True, False])
+def test_too_few_encounters_for_a_zone_end_in_a_verdict(notebooks, tmp_path, capsys, before):
+    """The notebook that needs a zone ends early; its checks until then count, and later notebooks run."""
+    notebooks(**{name: code.replace("{before}", str(before)) for name, code in FEW.items()})
+    make_plaza(tmp_path / "mine.csv", settings=PlazaSettings(n_encounters=4))
+    assert run() == (0 if before else 1)
+    found = summary(tmp_path)
+    states = {name: notebook["status"] for name, notebook in found["notebooks"].items()}
+    assert states == {"02_few": "done", "04_hull": "undecided", "07_other": "done"}
+    assert [(c["name"], c["passed"]) for c in found["notebooks"]["04_hull"]["checks"]] == [("before", before)]
+    lines = capsys.readouterr().out.splitlines()
+    assert re.match(
+        r"undecided: 4 encounters were found, 600 are needed: .* more hours of recording at this rate; one "
+        r"condition relaxed gives ", lines[-1]
+    )  # fmt: skip
+    assert "not decidable on this data, see the report: 04_hull" in lines
+    assert ("all checks hold" in lines) == before
+    page = (tmp_path / "out" / "mine" / "report.html").read_text(encoding="utf-8")
+    assert "04_hull: not decidable on this data: ZoneError: " in page
+
+
+@pytest.mark.usefixtures("without_kernels")
+@pytest.mark.parametrize("raised", ["szlib.errors.ZoneError", "szlib.errors.DataError"])
+def test_errors_of_other_causes_are_not_undecided(notebooks, tmp_path, raised, capsys):
+    """An error about the data, and one about a zone where no encounters were stored, refuse the notebook."""
+    make = "import szlib\n" + ("record.cache.encounters()\n" if "Data" in raised else "")
+    notebooks(_02_wrong=f"{make}raise {raised}('wrong')")
+    make_plaza(tmp_path / "mine.csv", settings=PlazaSettings(n_encounters=4))
+    assert run() == 2
+    assert summary(tmp_path)["notebooks"]["02_wrong"]["status"] == "refused"
+    assert "wrong" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("without_kernels")

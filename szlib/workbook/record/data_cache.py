@@ -27,7 +27,8 @@ from ...tracks import datasets
 from ...tracks.clock import read_tracks
 from ...tracks.options import ReadOptions
 from ...zones.ellipses import Ellipse
-from ...zones.social_zone import SocialZone
+from ...zones.social_zone import SocialZone, recorded_hours
+from ...zones.verdict import describe_missing_encounters
 from .parameters import ZoneMethod
 
 NULL_SHIFTS = 39  # time-shifted copies of the data that the zone is tested against (assumed)
@@ -200,6 +201,15 @@ class DataCache:
     def _zone_source(self) -> dict[str, Any]:
         """What the zone is made from."""
         return self._source() | {"fit": self.method.fit_options()}
+
+
+def describe_missing_data(file: Path) -> str:
+    """What the stored encounters in a `file` lack for a zone; "" if nothing, or without a file."""
+    if not file.exists():
+        return ""
+    samples = pd.read_parquet(file, columns=["day", "t", "encounter"])
+    n_encounters = samples["encounter"].nunique()
+    return describe_missing_encounters({"encounters": n_encounters, "hours": recorded_hours(samples)})
 
 
 def read_stored_zone(file: Path) -> SocialZone | None:

@@ -167,14 +167,7 @@ class NotebookRecord:
 
     def close(self) -> Styler:
         """Write the record for the summary of the run, and return a table of its checks and claims."""
-        record = {
-            "notebook": self.name,
-            "checks": self.checks,
-            "key_figures": self.key,
-            "figures": self.figures,
-        }
-        text = json.dumps(record, indent=1, default=_to_plain)
-        write_file(self.out / "records" / f"{self.name}.json", text)
+        self._store(closed=True)
         rows = [(c["kind"], c["name"], c["result"], format_value(c["value"])) for c in self.checks]
         return style_table(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
 
@@ -186,6 +179,19 @@ class NotebookRecord:
         value = _to_plain(value)
         self.checks.append({"kind": kind, "name": name, "passed": passed, "value": value, "result": result})
         print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({format_value(value)})"))
+        self._store(closed=False)
+
+    def _store(self, *, closed: bool) -> None:
+        """Write the record; a notebook that ends early leaves the checks that it made."""
+        record = {
+            "notebook": self.name,
+            "closed": closed,
+            "checks": self.checks,
+            "key_figures": self.key,
+            "figures": self.figures,
+        }
+        text = json.dumps(record, indent=1, default=_to_plain)
+        write_file(self.out / "records" / f"{self.name}.json", text, durable=closed)
 
     def _save_picture(self, content: bytes, name: str) -> None:
         write_file(self.out / "figures" / name, content, durable=False)
