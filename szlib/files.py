@@ -203,7 +203,7 @@ def temporary_folder() -> Iterator[Path]:
     """
     remove_abandoned_temporary()
     try:
-        folder = Path(tempfile.mkdtemp(prefix=_TEMPORARY))
+        folder = Path(tempfile.mkdtemp(prefix=f"{_TEMPORARY}{os.getpid()}-"))
         if folder.stat().st_mode & 0o700 != 0o700:
             folder.rmdir()
             raise StorageError("new files may not be used by their owner (umask); call umask 022 first")
@@ -235,3 +235,12 @@ def remove_abandoned_temporary() -> None:
             if (folder / _LOCK).is_file() and not folder.is_symlink():
                 with FileLock(folder / _LOCK, timeout=0):
                     shutil.rmtree(folder, ignore_errors=True)
+                _remove_semaphores(folder.name.split("-")[1])
+
+
+def _remove_semaphores(number: str) -> None:
+    """Remove the semaphores that joblib left in shared memory when the process `number` was killed."""
+    if number.isdecimal() and Path("/proc/self").exists() and not Path("/proc", number).exists():
+        for semaphore in Path("/dev/shm").glob(f"sem.loky-{number}-*"):
+            with suppress(OSError):
+                semaphore.unlink()

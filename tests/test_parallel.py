@@ -84,6 +84,24 @@ def test_a_closed_terminal_leaves_no_semaphores(tmp_path: Path) -> None:
     assert wait_until(lambda: not semaphores())
 
 
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="finds semaphores in /dev/shm")
+def test_the_next_run_removes_the_semaphores_of_a_group_that_was_killed(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    place = os.environ | {"TMPDIR": str(tmp_path)}
+    parent = subprocess.Popen([sys.executable, str(program)], start_new_session=True, env=place)
+
+    def semaphores() -> list[Path]:
+        return list(Path("/dev/shm").glob(f"sem.loky-{parent.pid}-*"))
+
+    assert wait_until(semaphores)
+    os.killpg(parent.pid, signal.SIGKILL)
+    parent.wait()
+    remove = "from szlib.files import remove_abandoned_temporary as remove; remove()"
+    subprocess.run([sys.executable, "-c", remove], env=place, check=True)
+    assert not semaphores()
+
+
 def wait_until(condition: Callable[[], object], seconds: float = 60.0) -> bool:
     end = time.monotonic() + seconds
     while not condition() and time.monotonic() < end:
