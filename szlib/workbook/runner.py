@@ -296,7 +296,8 @@ def format_summary(summary: Mapping[str, Any]) -> str:
     notes += [f"data: {text}" for text in summary.get("warnings", ())]
     notes += [f"area: {summary['area']}"] if "area" in summary else []
     table = [f"{row[0]:<24} {row[1]:>7} {row[2]:>11} {row[3]:>9}  {row[4]}" for row in rows]
-    return "\n".join([*table, *notes, "all checks hold" if summary["passed"] else "NOT ALL CHECKS HOLD"])
+    end = f"all checks {'that were made ' if undecided else ''}hold"
+    return "\n".join([*table, *notes, end if summary["passed"] else "NOT ALL CHECKS HOLD"])
 
 
 def _count_passed(outcome: Mapping[str, Any], kind: str) -> str:

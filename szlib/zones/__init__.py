@@ -17,6 +17,7 @@ zone_file             the JSON file of a social zone
 social_zone           `SocialZone`: all of it behind one name
 imposed_zone          a known zone on recorded paths, to test estimators with: `impose_zone`
 costmaps              zones around people as a costmap, for navigation stacks
+pooling               a quantity of the zones of several sites, pooled: `pool`
 sensitivity           the zone with each parameter of the method varied alone
 """
 
@@ -28,6 +29,7 @@ from .imposed_zone import PairedSamples, impose_zone
 from .occupancy import OccupancyHistogram, PairCorrelation, pair_correlation
 from .outliers import complementary_points, is_outlier, remove_outliers
 from .polar import PolarZone
+from .pooling import Pooled, pool
 from .respect import Respect, fit_respect, respect_radius
 from .respect_profile import RespectRadius
 from .respect_significance import NullTest, null_test
@@ -36,8 +38,8 @@ from .uncertainty import count_by_side
 
 __all__ = [
     "BODY_RADIUS", "Ellipse", "Grid", "HullZone", "NullTest", "OccupancyHistogram", "PairCorrelation",
-    "PairedSamples", "PolarZone", "Respect", "RespectRadius", "SocialZone", "circle_around",
+    "PairedSamples", "PolarZone", "Pooled", "Respect", "RespectRadius", "SocialZone", "circle_around",
     "complementary_points", "count_by_side", "draw_costmap", "fit_respect", "hull_vertices",
     "impose_zone", "is_outlier", "minimum_enclosing_ellipse", "minimum_enclosing_ellipse_of_curve",
-    "null_test", "pair_correlation", "remove_outliers", "respect_radius", "slice_hull",
+    "null_test", "pair_correlation", "pool", "remove_outliers", "respect_radius", "slice_hull",
 ]  # fmt: skip

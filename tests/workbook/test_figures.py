@@ -290,6 +290,28 @@ def test_claims_differ_by_more_than_colour():
     assert [label.get_text() for label in ax.get_yticklabels()] == list("abc")
 
 
+def test_a_forest_plot_has_a_row_for_each_site_the_mean_and_a_new_site():
+    sites = {
+        "hall": (0.9, 0.8, 1.0),
+        "mall": (1.2, 1.0, 1.4),
+        "lab": (0.6, 0.5, 0.7),
+        "yard": (1.0, 0.7, 1.4),
+    }
+    pooled = szlib.pool(sites)
+    ax = figures.plot_forest(pooled)
+    labels = [label.get_text() for label in ax.get_yticklabels()]
+    assert [label.partition(":")[0] for label in labels] == [*sites, "mean", "a new site"]
+    assert labels[1] == "mall: 1.20 (1.00 to 1.40)"
+    assert ax.get_xlabel().startswith("radius of the zone [m]") and ax.get_xscale() == "log"
+    diamond = ax.patches[0].get_xy()[:, 0]
+    assert (diamond.min(), diamond.max()) == (pooled.low, pooled.high)
+    assert ax.lines[-1].get_xdata().tolist() == [pooled.new_low, pooled.new_high]
+    few = figures.plot_forest(
+        szlib.pool({name: sites[name] for name in ("hall", "mall")}, quantity="center_x")
+    )
+    assert len(few.get_yticklabels()) == 3 and few.get_xscale() == "linear"
+
+
 def test_an_interval_grid_has_a_panel_for_each_metric_and_one_legend():
     rows = [(w, c, m, 0.5, 0.4, 0.6) for w in ("a", "b") for c in ("x", "y") for m in ("s", "t", "u", "v")]
     table = pd.DataFrame(rows, columns=["crowd", "who", "metric", "mean", "low", "high"])

@@ -9,12 +9,13 @@ zones        outliers, the hull, zones by speed, the pair correlation
 control      distances and barriers, and the accelerations that a step allows
 simulation   runs of the robot, and their animations
 movies       runs as players in a browser
-comparisons  many runs or fits: sweeps, strategies, intervals, claims
+comparisons  many runs or fits: sweeps, strategies, intervals, claims, sites
 """
 
 from .comparisons import (
     draw_interval_grid,
     plot_claims,
+    plot_forest,
     plot_safety_claims,
     plot_sensitivity,
     plot_strategies,

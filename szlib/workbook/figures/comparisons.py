@@ -1,4 +1,4 @@
-"""Figures of many runs or fits: sweeps, maps of strategies, intervals, claims, safety claims."""
+"""Figures of many runs, fits or sites: sweeps, strategies, intervals, claims, safety claims, forest plots."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from ...simulation.safety_claims import MOTION_CHANGES
+from ...zones.pooling import POSITIVE, UNITS, Pooled
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, add_legend_below, add_shared_legend, get_axes
 
 # Colour and hatching of each kind of safety violation.
@@ -237,6 +239,46 @@ def plot_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
         ax.plot([], [], marker, color=colour, label="not decidable" if name == "not" else name)
     ax.set(xlabel="against the paper < 0 < as the paper says (each scaled to its interval)", xlim=(-1.1, 1.1))
     add_legend_below(ax, gap=0.6 / (0.45 * len(table) + 0.4), ncols=3)  # 0.6 inch below the axes
+    return ax
+
+
+def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
+    """Plot the value of each site with its interval, their mean, and what to expect at a new site.
+
+    Parameters
+    ----------
+    pooled : result of `szlib.pool`. The mean is a diamond as wide as its interval, and the prediction
+        interval of a new site a line below it; it may leave the axes where few sites are known.
+    ax : axes to draw on; None makes new ones.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from szlib.workbook import figures
+    >>> ax = figures.plot_forest(szlib.pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4)}))
+    """
+    n, sites = pooled.n_sites, pooled.table.set_index("site")[["value", "low", "high"]]
+    sites.loc["mean"] = [pooled.mean, pooled.low, pooled.high]
+    labels = [
+        f"{name}: {value:.2f} ({low:.2f} to {high:.2f})" for name, value, low, high in sites.itertuples()
+    ]
+    ax = get_axes(ax, size=(7.5, 0.35 * n + 1.9))
+    if pooled.quantity in POSITIVE:
+        ax.set_xscale("log")
+        ax.xaxis.set(major_locator=LogLocator(subs=(1, 2, 5)), major_formatter="{x:g}")
+        ax.minorticks_off()
+    ax.hlines(range(n), sites["low"][:-1], sites["high"][:-1], color=BLACK, linewidth=1.5)
+    ax.scatter(sites["value"][:-1], range(n), 25 + 150 * pooled.table["weight"], color=BLACK, marker="s")
+    ax.fill([pooled.low, pooled.mean, pooled.high, pooled.mean], n + np.array([0, -0.3, 0, 0.3]), color=BLUE)
+    ax.axvline(pooled.mean, color=GREY, linestyle="--", linewidth=1)
+    ax.margins(x=0.4)
+    ax.set_xlim(ax.get_xlim())  # also where the next interval is wider
+    if np.isfinite(pooled.new_high):
+        ax.plot([pooled.new_low, pooled.new_high], [n + 1, n + 1], "-|", color=ORANGE, linewidth=3, ms=12)
+        labels.append(f"a new site: {pooled.new_low:.2f} to {pooled.new_high:.2f}")
+    ax.set_yticks(range(len(labels)), labels)
+    text = f"{pooled.quantity} of the zone [{UNITS[pooled.quantity]}], with 95 % intervals"
+    ax.set(xlabel=text, ylim=(len(labels) - 0.4, -0.6))
     return ax
 
 

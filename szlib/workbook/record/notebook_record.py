@@ -183,13 +183,8 @@ class NotebookRecord:
 
     def _store(self, *, closed: bool) -> None:
         """Write the record; a notebook that ends early leaves the checks that it made."""
-        record = {
-            "notebook": self.name,
-            "closed": closed,
-            "checks": self.checks,
-            "key_figures": self.key,
-            "figures": self.figures,
-        }
+        record = {"notebook": self.name, "closed": closed, "checks": self.checks}
+        record |= {"key_figures": self.key, "figures": self.figures}
         text = json.dumps(record, indent=1, default=_to_plain)
         write_file(self.out / "records" / f"{self.name}.json", text, durable=closed)
 
