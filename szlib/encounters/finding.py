@@ -53,9 +53,10 @@ def find_encounters(
     -------
     One row a sample: encounter (number), day, ref_id, other_id, t [s], los_angle [rad] (bearing of
     the other person in the reference pedestrian's frame, in (-pi, pi]), distance [m], speed of the
-    reference pedestrian [m/s], kind (category, see `szlib.encounters.kinds`).  Empty if there is no
-    encounter.  ``.attrs["funnel"]`` counts, by reason, the ticks that open no encounter; ``"area"`` and
-    ``"area_reason"`` say which area was searched, and why where it was found.
+    reference pedestrian [m/s], other_los_angle and other_speed (the same with the two people exchanged), kind
+    (category, see `szlib.encounters.kinds`).  Empty if there is no encounter.  ``.attrs["funnel"]`` counts,
+    by reason, the ticks that open no encounter; ``"area"`` and ``"area_reason"`` say which area was searched,
+    and why where it was found.
 
     Raises
     ------

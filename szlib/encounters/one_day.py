@@ -41,7 +41,7 @@ _ADVICE = {
     "nearer": "people came into view late: pass a smaller min_distance",
     "somebody else": "more data, or other conditions (szlib.find_encounters)",
 }
-_VERSION = 7  # of the cached result of a day; a result of another version is computed again
+_VERSION = 8  # of the cached result of a day; a result of another version is computed again
 
 
 def find_encounters_in_files(

@@ -12,7 +12,10 @@ from ..tracks.clock import COLUMNS, TICKS_PER_SECOND, nearest_tick
 from .geometry import wrap_angle
 from .kinds import KINDS
 
-SAMPLE_COLUMNS = ["encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed"]
+SAMPLE_COLUMNS = [
+    "encounter", "day", "ref_id", "other_id", "t", "los_angle", "distance", "speed", "other_los_angle",
+    "other_speed",
+]  # fmt: skip
 """Columns of a table of samples; the column kind follows them."""
 
 
@@ -25,6 +28,7 @@ def sample_windows(
     of_other = tracks.iloc[order[(other[:, None] + window).ravel()]].reset_index(drop=True)
     dx, dy = of_other["x"] - of_ref["x"], of_other["y"] - of_ref["y"]
     bearing = np.arctan2(dy, dx) - np.arctan2(of_ref["vy"], of_ref["vx"])
+    from_other = np.arctan2(-dy, -dx) - np.arctan2(of_other["vy"], of_other["vx"])
     return pd.DataFrame(
         {
             "encounter": np.repeat(np.arange(len(ref)), steps + 1),
@@ -35,6 +39,8 @@ def sample_windows(
             "los_angle": wrap_angle(np.asarray(bearing)),
             "distance": np.hypot(dx, dy),
             "speed": np.hypot(of_ref["vx"], of_ref["vy"]),
+            "other_los_angle": wrap_angle(np.asarray(from_other)),
+            "other_speed": np.hypot(of_other["vx"], of_other["vy"]),
         }
     )
 

@@ -7,8 +7,8 @@ estimators            what all estimators and shapes of zones have in common
 polar                 a zone given as a radius in each direction, and the ellipse fitted to it
 hulls                 the zone outside the convex hull over (x', y', speed): estimator "hull"
 quantile              the zone that all but a share of encounters stay outside: estimator "quantile"
-occupancy             histograms of where people were, and the map of the pair correlation
-respect               the zone where people are half as frequent as in the null model: estimator "respect"
+occupancy             the map of the pair correlation
+respect               the ellipse that careful people keep out of, by the null model: estimator "respect"
 respect_profile       its radius from nearest approaches, all directions pooled, with an interval
 respect_significance  the test of the data against its null model
 uncertainty           encounters by side, and confidence intervals by resampling people
@@ -26,20 +26,19 @@ from .ellipses import BODY_RADIUS, Ellipse, circle_around
 from .enclosing_ellipse import minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
 from .hulls import HullZone, hull_vertices, slice_hull
 from .imposed_zone import PairedSamples, impose_zone
-from .occupancy import OccupancyHistogram, PairCorrelation, pair_correlation
+from .occupancy import PairCorrelation, pair_correlation
 from .outliers import complementary_points, is_outlier, remove_outliers
 from .polar import PolarZone
 from .pooling import Pooled, pool
-from .respect import Respect, fit_respect, respect_radius
 from .respect_profile import RespectRadius
 from .respect_significance import NullTest, null_test
 from .social_zone import SocialZone
 from .uncertainty import count_by_side
 
 __all__ = [
-    "BODY_RADIUS", "Ellipse", "Grid", "HullZone", "NullTest", "OccupancyHistogram", "PairCorrelation",
-    "PairedSamples", "PolarZone", "Pooled", "Respect", "RespectRadius", "SocialZone", "circle_around",
-    "complementary_points", "count_by_side", "draw_costmap", "fit_respect", "hull_vertices",
+    "BODY_RADIUS", "Ellipse", "Grid", "HullZone", "NullTest", "PairCorrelation",
+    "PairedSamples", "PolarZone", "Pooled", "RespectRadius", "SocialZone", "circle_around",
+    "complementary_points", "count_by_side", "draw_costmap", "hull_vertices",
     "impose_zone", "is_outlier", "minimum_enclosing_ellipse", "minimum_enclosing_ellipse_of_curve",
-    "null_test", "pair_correlation", "pool", "remove_outliers", "respect_radius", "slice_hull",
+    "null_test", "pair_correlation", "pool", "remove_outliers", "slice_hull",
 ]  # fmt: skip

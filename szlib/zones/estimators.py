@@ -65,6 +65,10 @@ class Estimator(ABC):
         Ellipses (k, s, 5): centre, semi-axes [m] and angle [rad]; NaN where there is no zone.
         """
 
+    def draw_posterior(self, n: int, speeds: Sequence[float], rng: np.random.Generator) -> Array | None:
+        """Draw `n` ellipses at `speeds` from the posterior, as those of `refit`; None: has no posterior."""
+        return None
+
     @abstractmethod
     def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
         """Row numbers of the encounters that determine the zones at `speeds` [m/s] most."""

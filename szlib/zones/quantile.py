@@ -85,13 +85,15 @@ class Approaches:
         return encounters, np.minimum.reduce([np.roll(distances, turn, axis=1) for turn in turns])
 
 
-def smooth_paths(samples: pd.DataFrame) -> tuple[Array, Array]:
+def smooth_paths(samples: pd.DataFrame, column: str = "los_angle") -> tuple[Array, Array]:
     """Line-of-sight angle [rad] and distance [m] of `samples` (n,) along smoothed paths, in the same order.
+
+    The angle is that of a `column`: los_angle, or other_los_angle.
 
     Local polynomials of degree 2 over +-`SMOOTHING` (Savitzky & Golay, 1964) smooth each encounter, but not
     across a gap in time. Straight and evenly curved paths do not change. Without a column `t`, no path does.
     """
-    angle, distance = samples["los_angle"].to_numpy(float), samples["distance"].to_numpy(float)
+    angle, distance = samples[column].to_numpy(float), samples["distance"].to_numpy(float)
     if "t" not in samples:
         return angle, distance
     number, t = encounter_numbers(samples)[0], samples["t"].to_numpy(float)

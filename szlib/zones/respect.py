@@ -1,316 +1,319 @@
-"""The respect zone: the area where people are half as frequent as if they ignored each other.
+"""The respect zone: the ellipse that careful people keep out of, against people who ignore each other.
 
-Let R be the number of samples of the data, and N that of the null model (`szlib.null_encounters`), at
-distance r and direction theta in the frame of the reference pedestrian. Up to a factor, the pair correlation
-is
+Both people of an encounter carry the same ellipse, turned with their motion. Let h be the smallest signed
+distance of either person to the other's ellipse during the encounter. Each encounter counts once. Among
+people who ignore each other, encounters of the kind k have values of h with the frequencies of the null model
+(`szlib.null_encounters`). Respect changes these by a factor g(h):
 
-    g(r, theta) = R(r, theta) / N(r, theta)
+    p(h | k) = N_k(h) g(h) / (mean of g over the null model's encounters of kind k)
+    g(h) = f + (1 - f) (1 + A exp(-max(h, 0) / c)) / (1 + exp(-h / w))
 
-The contour g = 1/2 bounds the zone. Places that are empty for other reasons are empty in N as in R, so only
-respect remains. g is fitted, not binned, because a contour of bins depends on the bins and on chance:
+f is the share of careless people among those who would enter, and w the softness of the edge. A and c
+describe people who step aside: they are then seen just outside. The mix of kinds does not matter, because p
+is conditional on the kind. Both people's whole paths count, so that the centre is identified too: a fit of
+one person's view cannot tell how far a zone reaches ahead from how far it reaches behind.
 
-    g(r, theta) = c(theta) [f + (1 - f) s((r - rho(theta)) / w)],      s(z) = 1 / (1 + exp(-z))
-    rho(theta) = q0 / sqrt(1 + q1 cos theta + q2 sin theta + q3 cos 2 theta + q4 sin 2 theta)
+The ellipse has a centre, a semi-axis along the motion and one across, and a shear. Centre and the logarithms
+of the semi-axes are linear in the speed of the person who carries it. Weak priors hold the changes with speed
+(standard deviation 0.15 for each m/s), the sideways centre (0.15 m), the shear (0.15) and the logarithm of
+the ratio of the semi-axes (0.4).
 
-rho is exactly an ellipse around the person, or nearly an ellipse off the centre. c is the plateau far out, f
-the share of people who ignore others (intruders, companions), and w the softness of the edge. The fit
-maximises the likelihood of each sample's distance, given its direction:
+The zone is the maximum of the posterior density. Its intervals are posterior ones, of the likelihood to the
+power 1 / (1 + n/m) for n encounters of the data and m of the null model, because both are random. They are
+meant to contain the true zone.
 
-    p(r | theta) = N(r, theta) g(r, theta) / sum over r of N g
-
-so c cancels: the number of encounters and their mix of directions do not matter, only the distances in each
-direction. The contour is where g = c / 2. It does not depend on the number of encounters, because no
-parameter is an extreme. It is 0 if people do not keep away: f is 1/2 or more, or there is no edge.
-
-Few people do not determine the shape, so a penalty of 30 (q1^2 + ... + q4^2) on the log likelihood prefers
-circles. It is negligible for tens of thousands of samples. (Measured on 72 encounters of Grand Central,
-drawn 30 times: the radius ahead scatters by 0.20 m about 0.86 m, without the penalty by 0.31 m; all 4,176
-give 0.86 m.)
+Measured on zones imposed on real paths (`szlib.impose_zone`); see notebook 15.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
+from itertools import product
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import expit, logit
+from scipy.special import expit
 from threadpoolctl import ThreadpoolController
 
-from ..checks import Array, require
+from ..checks import Array, check_columns, check_rows
+from ..encounters.kinds import WALKING
 from ..encounters.null_model import NullEncounters
 from ..errors import ZoneError
 from ..tracks import funnels
 from .estimators import Estimator
-from .occupancy import OccupancyHistogram
 from .outliers import encounter_numbers
-from .polar import DIRECTIONS, PolarZone, fit_ellipses
+from .polar import DIRECTIONS, PolarZone, ellipse_reach
+from .quantile import smooth_paths
 
-SPEED_WIDTH = 0.2  # standard deviation of the Gaussian weight of samples at other speeds [m/s]
+REFERENCE_SPEED = 1.1  # at which the parameters describe the ellipse [m/s]
+_SPEED_BOUNDS = (0.3, 2.0)  # slower and faster people carry the ellipse of these speeds [m/s]
+_VIEWS = (("los_angle", "speed"), ("other_los_angle", "other_speed"))
 
-_N_WAVES = 4  # cos theta, sin theta, cos 2 theta, sin 2 theta
-_MIN_SUM = 0.1  # of the sum under the root: no direction reaches farther than 3 q0
-_PENALTY = 30.0  # weight of q1^2 + .. + q4^2, in samples
-_STARTS = (0.15, 0.35, 0.55, 0.75)  # of rho, in r_max: the likelihood may have several peaks
-_SOFTNESS_BOUNDS = (0.005, 0.15)  # of w, in r_max
-_LOGIT_BOUND = 6.0  # of |logit f|
-_MAX_LEFT_OUT = 20  # encounters that are left out one by one
+# Parameter: lowest and highest value, mean and standard deviation of its prior.
+_PARAMETERS = {
+    "centre ahead [m]": (-0.5, 0.5, 0.0, np.inf),
+    "its change with speed": (-0.5, 0.5, 0.0, 0.15),
+    "centre to the left [m]": (-0.3, 0.3, 0.0, 0.15),
+    "log semi-axis along": (np.log(0.1), np.log(1.9), 0.0, np.inf),
+    "its change with speed ": (-0.6, 0.6, 0.0, 0.15),
+    "log semi-axis across": (np.log(0.1), np.log(1.9), 0.0, np.inf),
+    "its change with speed  ": (-0.6, 0.6, 0.0, 0.15),
+    "shear": (-0.6, 0.6, 0.0, 0.15),
+    "logit f": (-6.0, 1.5, 0.0, np.inf),
+    "log w [m]": (np.log(0.015), np.log(0.3), 0.0, np.inf),
+    "log A": (-5.0, 8.0, -3.0, 2.0),
+    "log c [m]": (np.log(0.08), np.log(0.6), 0.0, np.inf),
+}
+_LOW, _HIGH, _MEAN, _SPREAD = np.array(list(_PARAMETERS.values())).T
+_ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
+_FIRST_STEPS = np.array([0.05, 0.05, 0.02, 0.06, 0.06, 0.03, 0.05, 0.05, 0.3, 0.3, 0.7, 0.3])
+_MIN_EVIDENCE = 20.0  # twice the log likelihood ratio of a zone against none: the 1 % level of 8 parameters
+_NULL_DRAWN = (4000, 8000)  # encounters drawn from the null model, at least and at most; else two for each
+_NULL_PER_ENCOUNTER = 2  # of the data
+_BANK, _BANK_SEED = 24, 0  # ellipses that say which samples may be the nearest
+_RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
+_STARTS, _START_GAP = 3, 0.15  # number of best circles tried, and the least difference of their radii [m]
+_STEPS, _BURN_IN, _ADAPT, _ACCEPTED = 6000, 2000, 250, 0.25  # of the Metropolis chain
+_MAX_LEFT_OUT = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Respect:
-    """The fitted pair correlation g (see the top of this module).
+class PairPaths:
+    """Where each person of each encounter was in the other's frame: the samples that may be the nearest.
 
     Parameters
     ----------
-    edge : q0 [m] and q1 to q4 of rho(theta); q0 alone if all directions are pooled.
-    softness : w [m].
-    ignoring_share : f, the share of people who ignore others.
-    r_max : largest distance of the samples, and largest radius of the zone [m].
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import szlib
-    >>> szlib.Respect(edge=np.array([0.8]), softness=0.1, ignoring_share=0.0, r_max=2.0).radii(0.0).item()
-    0.8
+    x, y : position in the frame of the person who carries the ellipse, shape (n,) [m].
+    speed : of that person, relative to `REFERENCE_SPEED`, shape (n,) [m/s].
+    encounter : row of the encounter of each sample, ascending, shape (n,).
+    first : first sample of each encounter, shape (k,).
+    kind : of each encounter, shape (k,).
+    encounters : one row for each encounter.
     """
 
-    edge: Array
-    softness: float
-    ignoring_share: float
-    r_max: float
-
-    def radii(self, theta: ArrayLike) -> Array:
-        """Distance at which g is half of its plateau, in the directions `theta` (...) [rad], same shape [m].
-
-        It is 0 where people do not keep away, and at most `r_max`.
-        """
-        theta = np.asarray(theta, float)
-        if self.ignoring_share >= 0.5:
-            return np.zeros(theta.shape)
-        half = self.softness * logit((0.5 - self.ignoring_share) / (1 - self.ignoring_share))
-        rho, _ = _edge(_waves(theta, len(self.edge)), self.edge)
-        return np.asarray(np.clip(rho + half, 0.0, self.r_max))
-
-
-def fit_respect(
-    samples: pd.DataFrame | OccupancyHistogram,
-    null: NullEncounters | OccupancyHistogram,
-    *,
-    speed: float | None = None,
-    speed_width: float = SPEED_WIDTH,
-    pool_directions: bool = False,
-) -> Respect:
-    """Fit the pair correlation g to data and its null model.
-
-    Parameters
-    ----------
-    samples : as from `szlib.find_encounters`, or an `OccupancyHistogram` (of weighted samples).
-    null : the null model of the same tracks, with the same parameters and kinds; its `r_max` applies.
-    speed : give samples a weight by their distance from this speed of the reference pedestrian [m/s]; None:
-        equal weights.
-    speed_width : standard deviation of this weight [m/s].
-    pool_directions : whether to treat all directions as one.
-
-    Raises
-    ------
-    ZoneError : there is no sample, or no null, within r_max (at about this speed).
-
-    Examples
-    --------
-    >>> import szlib
-    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
-    >>> tracks = szlib.read_tracks(path)
-    >>> null = szlib.null_encounters(tracks, shifts=3, minutes=(0.5, 2.0), progress=False)
-    >>> respect = szlib.fit_respect(szlib.find_encounters(tracks), null)
-    >>> respect.radii([0.0, 3.14]).shape  # ahead and behind
-    (2,)
-    """
-    against, data = null, samples
-    if isinstance(against, NullEncounters):
-        against = OccupancyHistogram.from_samples(against.samples, r_max=against.r_max)
-    if isinstance(data, pd.DataFrame):
-        data = OccupancyHistogram.from_samples(data, r_max=against.r_max)
-    if data.r_max != against.r_max:
-        raise ZoneError(f"data within {data.r_max} m, null within {against.r_max} m; expected the same r_max")
-    real, model = (each.weighted_sum(speed, speed_width) for each in (data, against))
-    if not (real.sum() > 0 and model.sum() > 0):
-        where = f"within {against.r_max:g} m" + ("" if speed is None else f" at about {speed:g} m/s")
-        raise ZoneError(
-            f"{real.sum():g} samples of the data and {model.sum():g} of the null model {where}: nothing to "
-            "compare; add data, use more shifts, or choose another speed"
-        )
-    if pool_directions:
-        real, model = real.sum(axis=0, keepdims=True), model.sum(axis=0, keepdims=True)
-    return _fit(real, model, against.r_max)
-
-
-def respect_radius(
-    samples: pd.DataFrame | OccupancyHistogram, null: NullEncounters | OccupancyHistogram
-) -> float:
-    """Compute the radius of the respect zone, all directions and speeds pooled [m].
-
-    Parameters
-    ----------
-    samples, null : as in `fit_respect`; so are the errors.
-
-    Examples
-    --------
-    >>> import szlib
-    >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=100))
-    >>> tracks = szlib.read_tracks(path)
-    >>> null = szlib.null_encounters(tracks, shifts=3, minutes=(0.5, 2.0), progress=False)
-    >>> szlib.respect_radius(szlib.find_encounters(tracks), null) < null.r_max
-    True
-    """
-    return float(fit_respect(samples, null, pool_directions=True).radii(0.0))
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class RespectEstimator(Estimator):
-    """The estimator of the respect zone at several speeds.
-
-    Parameters
-    ----------
-    samples : within r_max of the null model.
-    number : row in `encounters` of each sample, shape (n,).
-    null : histogram of the null model.
-    counts_by_shift : histogram of each shift of the null model, (shifts, speeds, directions, distances).
-    speed_width : standard deviation of the weight of other speeds [m/s]; inf: equal weights.
-    encounters, parameters, funnel : see `Estimator`.
-    """
-
-    samples: pd.DataFrame
-    number: NDArray[np.intp]
-    null: OccupancyHistogram
-    counts_by_shift: NDArray[np.float32]
-    speed_width: float
+    x: Array
+    y: Array
+    speed: Array
+    encounter: NDArray[np.intp]
+    first: NDArray[np.intp]
+    kind: NDArray[np.object_]
+    encounters: pd.DataFrame
 
     @classmethod
-    def from_samples(
-        cls,
-        samples: pd.DataFrame,
-        *,
-        r_max: float,
-        null: NullEncounters | None = None,
-        speed_width: float = SPEED_WIDTH,
-    ) -> RespectEstimator:
-        """Prepare samples and their null model.
+    def from_samples(cls, samples: pd.DataFrame) -> PairPaths:
+        """Prepare `samples` as from `szlib.find_encounters`.
 
-        Parameters
-        ----------
-        samples : as from `szlib.find_encounters`.
-        r_max : distance within which people count [m]; that of the null model.
-        null : the null model.
-        speed_width : standard deviation of the weight of other speeds [m/s]; inf: equal weights.
-
-        Raises
-        ------
-        ZoneError : there is no null model, its `r_max` differs, or `speed_width` is not positive.
+        Raises DataError if a column is missing or a value is not finite.
         """
-        if null is None:
-            raise ZoneError('method="respect" needs a null model; pass null=szlib.null_encounters(tracks)')
-        if null.r_max != r_max:
-            raise ZoneError(
-                f"r_max is {r_max} m, that of the null model {null.r_max} m; pass the same to both"
-            )
-        expected = "positive, inf for equal weights [m/s]"
-        require(speed_width > 0, "speed_width", speed_width, expected, ZoneError)
-        is_near = samples["distance"] < r_max
-        close = funnels.select(samples, is_near, "samples: close", f"farther than {r_max} m")
-        histogram = OccupancyHistogram.from_samples(null.samples, r_max=r_max)
-        counts = np.zeros((null.shifts, *histogram.counts.shape), np.float32)
-        for k in null.samples["shift"].unique():
-            counts[k] = OccupancyHistogram.from_samples(null.one(k), r_max=r_max).counts
-        number, encounters = encounter_numbers(close)
+        columns = ["distance", *_VIEWS[0]]
+        check_columns(samples, ["encounter", *columns, *_VIEWS[1]])
+        is_finite = np.isfinite(samples[columns].to_numpy(float)).all(axis=1)
+        check_rows(samples, is_finite, columns, "expected finite numbers")
+        number, encounters = encounter_numbers(samples)
+        points, speeds, rows = [], [], []
+        for angle, own_speed in _VIEWS:
+            theta, r = smooth_paths(samples, angle)
+            own, path = samples[own_speed].to_numpy(float), r * np.exp(1j * theta)
+            # A person who stands has no direction of motion, and one of unknown velocity has none either.
+            has_zone = np.isfinite(path) & (own >= (WALKING if own_speed == "other_speed" else 0.0))
+            points.append(path[has_zone])
+            speeds.append(np.clip(own[has_zone], *_SPEED_BOUNDS) - REFERENCE_SPEED)
+            rows.append(number[has_zone])
+        z, speed, row = map(np.concatenate, (points, speeds, rows))
+        order = np.argsort(row, kind="stable")
+        z, speed, row = z[order], speed[order], row[order]
+        first = np.flatnonzero(np.diff(row, prepend=-1))
+        may_be_nearest = np.zeros(len(row), bool)
+        for p in _bank():
+            level = _level(z.real, z.imag, speed, p)[0]
+            may_be_nearest |= level == np.minimum.reduceat(level, first)[row]
+        kept = row[may_be_nearest]
+        names = encounters["kind"].to_numpy(object) if "kind" in encounters else np.full(len(encounters), "")
         return cls(
-            samples=close,
-            number=number,
-            null=histogram,
-            counts_by_shift=counts,
-            speed_width=float(speed_width),
+            x=z.real[may_be_nearest],
+            y=z.imag[may_be_nearest],
+            speed=speed[may_be_nearest],
+            encounter=kept,
+            first=np.flatnonzero(np.diff(kept, prepend=-1)),
+            kind=names,
             encounters=encounters,
-            parameters={
-                "speed_width": None if np.isinf(speed_width) else float(speed_width),
-                "shifts": null.shifts,
-                "null": null.parameters,
-            },
-            funnel=funnels.get(close),
         )
 
-    def fit_shape(self, speeds: Sequence[float]) -> PolarZone:
-        """Fit the radii at `speeds`, ascending [m/s]."""
-        return PolarZone(np.array(speeds), DIRECTIONS, self._fit_radii(None, speeds, self.null))
+    def distances(self, p: Array, *, gradient: bool = False) -> tuple[Array, Array]:
+        """h of each encounter for the parameters `p`, shape (k,) [m].
 
-    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
-        """Fit ellipses to encounters with `weights` at `speeds`; `rng` resamples the shifts."""
-        radii = np.full((len(weights), len(speeds), len(DIRECTIONS)), np.nan)
-        for row, weight in zip(radii, weights, strict=True):
-            null = self.null if rng is None else self._resample_null(rng)
-            with suppress(ZoneError):
-                row[:] = self._fit_radii(weight[self.number], speeds, null)
-        return fit_ellipses(radii.reshape(-1, len(DIRECTIONS))).reshape(len(weights), len(speeds), 5)
-
-    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
-        """Row numbers of the encounters with the nearest approaches, whatever the `speeds`."""
-        nearest = np.full(len(self.encounters), np.inf)
-        np.minimum.at(nearest, self.number, self.samples["distance"].to_numpy(float))
-        return np.argsort(nearest, kind="stable")[:_MAX_LEFT_OUT]
-
-    def _resample_null(self, rng: np.random.Generator) -> OccupancyHistogram:
-        """The null model of as many shifts, drawn with replacement."""
-        n_shifts = len(self.counts_by_shift)
-        drawn = rng.multinomial(n_shifts, np.full(n_shifts, 1 / n_shifts))
-        counts = np.tensordot(drawn.astype(float), self.counts_by_shift, axes=1)
-        return OccupancyHistogram(counts, self.null.r_max)
-
-    def _fit_radii(self, weights: Array | None, speeds: Sequence[float], null: OccupancyHistogram) -> Array:
-        """Radii (s, 72) [m] for weights (n,) of the samples and a null model."""
-        data = OccupancyHistogram.from_samples(self.samples, r_max=self.null.r_max, weights=weights)
-        distinct = speeds[:1] if np.isinf(self.speed_width) else speeds
-        fits = [fit_respect(data, null, speed=v, speed_width=self.speed_width) for v in distinct]
-        return np.broadcast_to([fit.radii(DIRECTIONS) for fit in fits], (len(speeds), len(DIRECTIONS)))
+        With `gradient` also its derivatives by the first eight parameters, shape (k, 8); else an empty array.
+        """
+        level, u, v, log_a, log_b = _level(self.x, self.y, self.speed, p)
+        least = level == np.minimum.reduceat(level, self.first)[self.encounter]
+        at = np.flatnonzero(least)
+        at = at[np.flatnonzero(np.diff(self.encounter[at], prepend=-1))]  # the first of equal ones
+        r, scale = np.sqrt(level[at]), np.exp((log_a[at] + log_b[at]) / 2)
+        h = (r - 1) * scale
+        if not gradient:
+            return h, np.empty(0)
+        u, v, speed, log_a, log_b = u[at], v[at], self.speed[at], log_a[at], log_b[at]
+        k = scale / np.maximum(r, 1e-9)
+        by_y = k * v * np.exp(-log_b)
+        by_x = k * u * np.exp(-log_a) - by_y * p[7]
+        by_a, by_b = h / 2 - k * u * u, h / 2 - k * v * v
+        shear = -by_y * u * np.exp(log_a)
+        slopes = (-by_x, -by_x * speed, -by_y, by_a, by_a * speed, by_b, by_b * speed, shear)
+        return h, np.stack(slopes, axis=1)
 
 
-def _fit(real: Array, null: Array, r_max: float) -> Respect:
-    """Maximise the likelihood of the distances, given the directions; both (directions, distances)."""
-    directions, distances = real.shape
-    theta = (np.arange(directions) + 0.5) * 2 * np.pi / directions
-    r = (np.arange(distances) + 0.5) * r_max / distances
-    size = 1 + (_N_WAVES if directions > 1 else 0)
-    waves = _waves(theta, size)
-    model = null + null.sum(axis=0) / null.sum()  # a pseudo-sample in every direction
-    model /= model.sum(axis=1, keepdims=True)
-    n_in_direction, n = real.sum(axis=1), real.sum()
+def _level(x: Array, y: Array, speed: Array, p: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """The squared norm of points in which the ellipse of `p` is the unit circle, and what it is made of."""
+    log_a, log_b = p[3] + p[4] * speed, p[5] + p[6] * speed
+    ahead = x - p[0] - p[1] * speed
+    u, v = ahead * np.exp(-log_a), (y - p[2] - p[7] * ahead) * np.exp(-log_b)
+    return u * u + v * v, u, v, log_a, log_b
 
-    def cost(p: Array) -> tuple[float, Array]:
-        """Negative log likelihood for each sample, with the penalty, and its gradient by p."""
-        (rho, by_q), w, f = _edge(waves, p[:size]), np.exp(p[size]), expit(p[size + 1])
-        z = (r - rho[:, None]) / w
-        s = (1 + np.tanh(z / 2)) / 2  # several times as fast as expit
-        g = f + (1 - f) * s
-        total = np.einsum("ij,ij->i", model, g)
-        by_g = (n_in_direction / total)[:, None] * model - real / g
-        by_s = by_g * (1 - s)
-        by_z = by_s * s * (1 - f)
-        gradient = [by_q.T @ -by_z.sum(axis=1) / w, [-np.vdot(by_z, z)], [by_s.sum() * f * (1 - f)]]
-        gradient[0][1:] += 2 * _PENALTY * p[1:size]
-        likelihood = np.vdot(real, np.log(g)) - n_in_direction @ np.log(total)
-        return float(_PENALTY * (p[1:size] ** 2).sum() - likelihood) / n, np.concatenate(gradient) / n
 
-    bounds = [(-r_max / 4, 5 * r_max / 4)] + [(-1.0, 1.0)] * (size - 1)
-    bounds += [tuple(np.log(np.multiply(_SOFTNESS_BOUNDS, r_max))), (-_LOGIT_BOUND, _LOGIT_BOUND)]
-    starts = [np.r_[share * r_max, np.zeros(size - 1), np.log(0.05 * r_max), -4.0] for share in _STARTS]
-    with _threads().limit(limits=1):  # many small products: on several threads they take ten times as long
-        tries = [minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds) for start in starts]
-    p = min(tries, key=lambda found: float(found.fun)).x
-    return Respect(np.asarray(p[:size]), float(np.exp(p[size])), float(expit(p[size + 1])), r_max)
+@cache
+def _bank() -> list[Array]:
+    """Parameters of ellipses of all forms."""
+    rng, bank = np.random.default_rng(_BANK_SEED), []
+    for _ in range(_BANK):
+        p = np.zeros(len(_PARAMETERS))
+        p[0], p[2], p[7] = rng.uniform(-0.25, 0.25), rng.uniform(-0.1, 0.1), rng.uniform(-0.3, 0.3)
+        p[3], p[5] = rng.uniform(np.log(0.35), np.log(1.5)), rng.uniform(np.log(0.35), np.log(1.3))
+        bank.append(p)
+    return bank
+
+
+def _factor(h: Array, p: Array) -> Array:
+    """g(h), shape (k,)."""
+    f, (w, excess, reach) = expit(p[8]), np.exp(p[9:])
+    return np.asarray(f + (1 - f) * expit(h / w) * (1 + excess * np.exp(-np.maximum(h, 0) / reach)))
+
+
+def _factor_and_slopes(h: Array, p: Array) -> tuple[Array, Array, Array]:
+    """g(h) (k,), its derivative by h (k,), and by the last four parameters (k, 4)."""
+    f, (w, excess, reach) = expit(p[8]), np.exp(p[9:])
+    s, outside = expit(h / w), np.maximum(h, 0) / reach
+    near = excess * np.exp(-outside)
+    g, out = f + (1 - f) * s * (1 + near), (1 - f) * s
+    by_h = out * ((1 - s) / w * (1 + near) - near / reach * (h > 0))
+    by_f, by_w = f * (1 - f) * (1 - s * (1 + near)), -out * (1 - s) * (1 + near) * h / w
+    return g, by_h, np.stack([by_f, by_w, out * near, out * near * outside], axis=1)
+
+
+def _minus_log_prior(p: Array) -> tuple[float, Array]:
+    """Minus the logarithm of the prior density, up to a constant, and its gradient."""
+    deviation, elongation = (p - _MEAN) / _SPREAD, (p[3] - p[5]) / _ELONGATION
+    gradient = deviation / _SPREAD
+    gradient[3] += elongation / _ELONGATION
+    gradient[5] -= elongation / _ELONGATION
+    return float((deviation**2).sum() + elongation**2) / 2, gradient
+
+
+@dataclass(frozen=True, eq=False)
+class _Likelihood:
+    """The likelihood of weighted encounters of the data, given those of the null model.
+
+    `kinds` holds, for each kind of encounter, whether each of the data and of the null model is of it.
+    """
+
+    data: PairPaths
+    null: PairPaths
+    weights: Array
+    kinds: list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]
+
+    @classmethod
+    def of(cls, data: PairPaths, null: PairPaths, weights: Array | None = None) -> _Likelihood:
+        weights = np.ones(len(data.kind)) if weights is None else weights
+        known = [(data.kind == kind, null.kind == kind) for kind in np.unique(data.kind)]
+        known = [(of_data, of_null) for of_data, of_null in known if of_null.any()]
+        return cls(data, null, weights * np.any([of_data for of_data, _ in known], axis=0), known)
+
+    @property
+    def power(self) -> float:
+        """The power of the likelihood in the posterior, since the null model is random as well."""
+        return float(1 / (1 + self.weights.sum() / len(self.null.kind)))
+
+    def log_ratios(self, p: Array) -> Array:
+        """Log likelihood of each encounter against no zone, shape (k,)."""
+        g, against = (_factor(each.distances(p)[0], p) for each in (self.data, self.null))
+        out = np.log(g)
+        for of_data, of_null in self.kinds:
+            out[of_data] -= np.log(against[of_null].mean())
+        return np.asarray(self.weights * out)
+
+    def log_posterior(self, p: Array) -> float:
+        """The logarithm of the posterior density, up to a constant."""
+        if (p < _LOW).any() or (p > _HIGH).any():
+            return -np.inf
+        return float(self.power * self.log_ratios(p).sum() - _minus_log_prior(p)[0])
+
+    def cost(self, p: Array) -> tuple[float, Array]:
+        """Minus the log likelihood with the priors, and its gradient."""
+        (h, slope), (h_null, slope_null) = (
+            each.distances(p, gradient=True) for each in (self.data, self.null)
+        )
+        (g, by_h, by_p), (g_null, by_h_null, by_p_null) = (
+            _factor_and_slopes(each, p) for each in (h, h_null)
+        )
+        per, per_null, value = self.weights / g, np.zeros(len(g_null)), self.weights @ np.log(g)
+        for of_data, of_null in self.kinds:
+            n, total = self.weights[of_data].sum(), g_null[of_null].sum()
+            value -= n * np.log(total / of_null.sum())
+            per_null[of_null] = n / total
+        by_ellipse = (per_null * by_h_null) @ slope_null - (per * by_h) @ slope
+        gradient = np.concatenate([by_ellipse, per_null @ by_p_null - per @ by_p])
+        prior, by_prior = _minus_log_prior(p)
+        return prior - float(value), gradient + by_prior
+
+    def maximise(self, starts: Sequence[Array]) -> Array:
+        """The best parameters found from several `starts`."""
+        bounds = list(zip(_LOW, _HIGH, strict=True))
+        with _threads().limit(limits=1):  # several threads take ten times as long for small products
+            tries = [minimize(self.cost, p, jac=True, method="L-BFGS-B", bounds=bounds) for p in starts]
+        return np.asarray(min(tries, key=lambda found: float(found.fun)).x)
+
+    def starts(self) -> list[Array]:
+        """The best circles of a grid of radii, edges and shares."""
+        circle = np.zeros(len(_PARAMETERS))
+        circle[11] = np.log(0.12)
+        near = [each.distances(circle)[0] + 1 for each in (self.data, self.null)]  # the nearest approaches
+        found = []
+        for radius, f, w, excess in product(_RADII.tolist(), (-3, -1), np.log([0.05, 0.15]), (-2, 2, 5)):
+            p = circle.copy()
+            p[3], p[5], p[8:11] = np.log(1.1 * radius), np.log(0.9 * radius), (f, w, excess)
+            g, against = (_factor(each - radius, p) for each in near)
+            value = self.weights @ np.log(g) - _minus_log_prior(p)[0]
+            for of_data, of_null in self.kinds:
+                value -= self.weights[of_data].sum() * np.log(against[of_null].mean())
+            found.append((float(value), radius, p))
+        best: list[tuple[float, float, Array]] = []
+        for each in sorted(found, key=lambda found: -found[0]):
+            if all(abs(each[1] - other[1]) > _START_GAP for other in best):
+                best.append(each)
+        return [p for _, _, p in best[:_STARTS]]
+
+    def draw(self, start: Array, rng: np.random.Generator) -> Array:
+        """Draw parameters from the posterior (adaptive Metropolis; Haario et al., Bernoulli 7, 2001).
+
+        The steps have the covariance of the second half of the chain so far.
+        """
+        size = len(start)
+        p = np.clip(start, _LOW + 1e-3, _HIGH - 1e-3)
+        value, chain = self.log_posterior(p), np.empty((_STEPS, size))
+        root, scale, accepted = np.diag(_FIRST_STEPS), 0.5, 0
+        for k in range(_STEPS):
+            if k and k % _ADAPT == 0:
+                root = np.linalg.cholesky(np.cov(chain[k // 2 : k].T) + 1e-7 * np.eye(size))
+                scale, accepted = scale * np.exp(2 * (accepted / _ADAPT - _ACCEPTED)), 0
+            proposed = p + scale * 2.38 / np.sqrt(size) * root @ rng.normal(size=size)
+            there = self.log_posterior(proposed)
+            if np.log(rng.random()) < there - value:
+                p, value, accepted = proposed, there, accepted + 1
+            chain[k] = p
+        return chain[_BURN_IN:]
 
 
 @cache
@@ -319,16 +322,136 @@ def _threads() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _waves(theta: Array, size: int) -> Array:
-    """Factors of the coefficients of rho at `theta` (...), shape (..., size); 0 for the first."""
-    turns = [wave(k * theta) for k in range(1, (size - 1) // 2 + 1) for wave in (np.cos, np.sin)]
-    return np.stack([np.zeros_like(theta), *turns], axis=-1)
+def _ellipses(parameters: Array, speeds: Sequence[float]) -> Array:
+    """Ellipses (k, s, 5), as those of `fit_ellipses`, for parameters (k, 12) at `speeds` (s,) [m/s]."""
+    p = np.asarray(parameters)[:, None, :]
+    speed = np.clip(np.asarray(speeds, float), *_SPEED_BOUNDS) - REFERENCE_SPEED
+    along, across = np.exp(-p[..., 3] - p[..., 4] * speed), np.exp(-p[..., 5] - p[..., 6] * speed)
+    shear = -p[..., 7] * across
+    form = np.stack([along**2 + shear**2, shear * across, shear * across, across**2], axis=-1)
+    values, vectors = np.linalg.eigh(form.reshape(*along.shape, 2, 2))
+    major = vectors[..., 0]
+    angle = np.pi / 2 - (np.pi / 2 - np.arctan2(major[..., 1], major[..., 0])) % np.pi
+    centre = p[..., 0] + p[..., 1] * speed, np.broadcast_to(p[..., 2], along.shape)
+    return np.stack([*centre, values[..., 0] ** -0.5, values[..., 1] ** -0.5, angle], axis=-1)
 
 
-def _edge(waves: Array, q: Array) -> tuple[Array, Array]:
-    """rho (...) [m] for waves (..., len(q)), and its derivatives by q (..., len(q))."""
-    total = 1 + waves[..., 1:] @ q[1:]
-    shape = np.maximum(total, _MIN_SUM) ** -0.5
-    by_q = np.where(total > _MIN_SUM, -q[0] / 2 * shape**3, 0.0)[..., None] * waves
-    by_q[..., 0] = shape
-    return q[0] * shape, by_q
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RespectEstimator(Estimator):
+    """The estimator of the respect zone, one fit for all speeds.
+
+    Parameters
+    ----------
+    data, null : of the data, and of encounters drawn from the null model.
+    encounters, parameters, funnel : see `Estimator`.
+    """
+
+    data: PairPaths
+    null: PairPaths
+
+    @classmethod
+    def from_samples(
+        cls, samples: pd.DataFrame, *, r_max: float, null: NullEncounters | None = None
+    ) -> RespectEstimator:
+        """Prepare samples and their null model.
+
+        Parameters
+        ----------
+        samples : as from `szlib.find_encounters`.
+        r_max : distance within which people count [m]; that of the null model.
+        null : the null model of the same tracks, with the same parameters and kinds.
+
+        Raises
+        ------
+        DataError : the samples lack a column.
+        ZoneError : there is no null model, its `r_max` differs, or nothing can be compared.
+        """
+        if null is None:
+            raise ZoneError('method="respect" needs a null model; pass null=szlib.null_encounters(tracks)')
+        if null.r_max != r_max:
+            raise ZoneError(
+                f"r_max is {r_max} m, that of the null model {null.r_max} m; pass the same to both"
+            )
+        is_far = samples["distance"] >= r_max
+        close = funnels.select(samples, ~is_far, "samples: close", f"farther than {r_max} m")
+        against = null.samples[null.samples["distance"] < r_max]
+        known, n = against["encounter"].unique(), close["encounter"].nunique()
+        size = int(np.clip(_NULL_PER_ENCOUNTER * n, *_NULL_DRAWN))
+        if len(known) > size:
+            drawn = np.random.default_rng(0).choice(known, size, replace=False)
+            against = against[against["encounter"].isin(drawn)]
+        if not (n and len(known)):
+            raise ZoneError(
+                f"{n} encounters of the data and {len(known)} of the null model came within {r_max:g} m: "
+                "nothing to compare; add data, or use more shifts"
+            )
+        data, model = PairPaths.from_samples(close), PairPaths.from_samples(against)
+        if not set(data.kind) & set(model.kind):
+            raise ZoneError(
+                "no kind of encounter is in the data and in its null model as well: nothing to compare"
+            )
+        return cls(
+            data=data,
+            null=model,
+            encounters=data.encounters,
+            parameters={"null_encounters": len(known), "null": null.parameters},
+            funnel=funnels.get(close),
+        )
+
+    @classmethod
+    def where_better(
+        cls, samples: pd.DataFrame, *, r_max: float, null: NullEncounters | None
+    ) -> RespectEstimator | None:
+        """The estimator where it is better than the quantile, else None.
+
+        The null model must hold twice as many encounters as the data, and the zone must fit better than none.
+        Parameters as in `from_samples`; `samples` need not hold the other person's view.
+        """
+        if null is None or null.r_max != r_max or not {*_VIEWS[1]} <= {*samples} & {*null.samples}:
+            return None
+        try:
+            estimator = cls.from_samples(samples, r_max=r_max, null=null)
+            enough = _NULL_PER_ENCOUNTER * len(estimator.data.kind)
+            is_large = estimator.parameters["null_encounters"] >= enough
+            return estimator if is_large and len(estimator.best) else None
+        except ZoneError:  # nothing to compare, or no respect
+            return None
+
+    @cached_property
+    def best(self) -> Array:
+        """The parameters of the zone; raises ZoneError if no zone fits better than none."""
+        likelihood = _Likelihood.of(self.data, self.null)
+        best = likelihood.maximise(likelihood.starts())
+        evidence = 2 * likelihood.power * likelihood.log_ratios(best).sum()
+        if evidence < _MIN_EVIDENCE:
+            raise ZoneError(
+                "no respect zone: people who ignore each other explain the data nearly as well (twice "
+                f"the log likelihood ratio is {evidence:.1f}, at least {_MIN_EVIDENCE:g} expected); add data"
+            )
+        return best
+
+    @cached_property
+    def draws(self) -> Array:
+        """Parameters drawn from the posterior, shape (k, 12)."""
+        with _threads().limit(limits=1):
+            return _Likelihood.of(self.data, self.null).draw(self.best, np.random.default_rng(0))
+
+    def fit_shape(self, speeds: Sequence[float]) -> PolarZone:
+        """Fit the ellipses, and give their radii at `speeds`, ascending [m/s]."""
+        radii = ellipse_reach(_ellipses(self.best[None], speeds)[0])
+        if np.isnan(radii).any():
+            raise ZoneError("the respect zone does not contain its person; add data")
+        return PolarZone(np.array(speeds), DIRECTIONS, radii)
+
+    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
+        """Fit ellipses to encounters with `weights` at `speeds`, from the fit of all; `rng` is not used."""
+        fits = [_Likelihood.of(self.data, self.null, w).maximise([self.best]) for w in weights]
+        return _ellipses(np.array(fits), speeds)
+
+    def draw_posterior(self, n: int, speeds: Sequence[float], rng: np.random.Generator) -> Array:
+        """Draw `n` ellipses from the posterior, shape (n, s, 5)."""
+        return _ellipses(self.draws[rng.integers(len(self.draws), size=n)], speeds)
+
+    def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
+        """Row numbers of the encounters deepest inside the zone, whatever the `speeds`."""
+        return np.argsort(self.data.distances(self.best)[0], kind="stable")[:_MAX_LEFT_OUT]

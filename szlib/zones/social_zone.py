@@ -57,7 +57,7 @@ METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
     "quantile": (QuantileEstimator.from_samples, ("q",)),
     "paper": (_PAPER, ()),
     "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours", "speed_scale")),
-    "respect": (RespectEstimator.from_samples, ("speed_width",)),
+    "respect": (RespectEstimator.from_samples, ()),
 }
 
 
@@ -135,7 +135,7 @@ class SocialZone:
         cls,
         samples: pd.DataFrame,
         *,
-        method: str = "quantile",
+        method: str | None = None,
         r_max: float = R_MAX,
         speeds: Iterable[float] = SPEEDS,
         null: NullEncounters | None = None,
@@ -152,16 +152,18 @@ class SocialZone:
         method : "quantile", "paper", "hull" or "respect". "paper" is the paper's method to the letter: LOF
             over samples with 20 neighbours removes 0.2 %, then hull, slices, ellipses. "hull" differs in one
             step: it judges whole encounters and removes as many as are outliers. Both zones shrink as the
-            data grows; the quantile does not.
+            data grows; the others do not. None: "respect" if the null model holds at least twice as many
+            encounters within r_max as the data and shows respect, else "quantile".
         r_max : distance within which people count [m].
         speeds : speeds of the zones [m/s].
         null : the null model, from `szlib.null_encounters`. "respect" needs it; with any method, the data is
             tested against it (`null_test`).
-        n_resamples : number of zones estimated again for the intervals; 0: no intervals.
+        n_resamples : number of zones estimated again, or drawn from the posterior, for the intervals; 0: no
+            intervals.
         seed : of the resampling.
-        options : options of the method. "quantile": `q`, the share of encounters that may enter (0.05).
-            "hull": `fraction`, `n_neighbours` and `speed_scale` as in `szlib.remove_outliers`. "respect":
-            `speed_width`, the range over which speeds are pooled (0.2) [m/s]; inf: all speeds. "paper": none.
+        options : options of the method. "quantile": `q`, the share of encounters that may enter (0.05), used
+            with None too where the quantile is taken. "hull": `fraction`, `n_neighbours` and `speed_scale` as
+            in `szlib.remove_outliers`. "paper", "respect": none.
 
         Raises
         ------
@@ -181,15 +183,17 @@ class SocialZone:
         >>> zone.method, list(zone.ellipses)
         ('paper', [1.1])
         """
-        _check_method(method, options)
+        _check_method(method or "quantile", options)
         check_columns(samples, ["los_angle", "distance", "speed"])
         fitted_speeds = sorted({float(speed) for speed in speeds})
         if not fitted_speeds:
             raise ZoneError("no speed has a zone: `speeds` is empty")
+        better = RespectEstimator.where_better(samples, r_max=r_max, null=null) if method is None else None
+        method = method or ("quantile" if better is None else "respect")
         if method == "respect":
-            options["null"] = null
+            options = {"null": null}
         build = partial(METHODS[method][0], r_max=r_max, **options)
-        estimator = build(samples)
+        estimator: Estimator = better or build(samples)
         shape = estimator.fit_shape(fitted_speeds)
         ellipses, undefined = {}, {}
         for speed in fitted_speeds:
@@ -210,7 +214,11 @@ class SocialZone:
                 r_max <= null.r_max, "r_max", r_max, f"at most the null model's {null.r_max} m", ZoneError
             )
             test = null_test(samples, null)
-            null_radii = fit_null_radii(build, null, len(estimator.encounters), list(ellipses), seed)
+            null_radii = (
+                dict.fromkeys(ellipses, 0.0)  # it is the difference from the null model
+                if method == "respect"
+                else fit_null_radii(build, null, len(estimator.encounters), list(ellipses), seed)
+            )
         sides = uncertainty = None
         if "encounter" in samples:
             sides = count_by_side(samples, fitted_speeds, r_max=r_max)

@@ -18,8 +18,10 @@ are. Those of the quantile contain it in 90 to 98 % of 400 plazas of 600 pairs, 
 (notebook 16); for 300 pairs in 91 %, for 150 in 81 %. They contain the true edge of the plaza's zones less
 often, the semi-axes in 33 to 87 %: the limit lies up to 2 cm outside of it, depending on people's clearance,
 which cannot be observed. The centre lies up to 3 cm behind, because both people's zones mix. The limit of a
-hull is the true edge. Its intervals contain it in 91 to 100 % of 200 centred plazas, those of the respect
-zone in 40 to 100 % of 20.
+hull is the true edge. Its intervals contain it in 91 to 100 % of 200 centred plazas.
+
+The respect zone has a posterior distribution, and its intervals are the middle 95 % of that. They are meant
+to contain the *truth*, not the limit (see `szlib.zones.respect`).
 """
 
 from __future__ import annotations
@@ -159,7 +161,11 @@ def estimate_uncertainty(
     rng = np.random.default_rng(seed)
     unit, member = resampling_units(estimator.encounters)
     n = int(member.max()) + 1
-    if estimator.is_extreme:
+    factor, resampled = 0.0, estimator.draw_posterior(n_resamples, speeds, rng)
+    is_posterior = resampled is not None
+    if is_posterior:
+        description = f"posterior: {n_resamples} draws"
+    elif estimator.is_extreme:
         size = max(1, round(SUBSAMPLE * n))
         drawn = (np.argsort(rng.random((n_resamples, n)), axis=1) < size).astype(int)
         ratio = (size / n) ** RATE
@@ -169,16 +175,17 @@ def estimate_uncertainty(
         )
     else:
         drawn = rng.multinomial(n, np.full(n, 1 / n), size=n_resamples)
-        factor, description = 0.0, f"bootstrap: {n} of {n} {unit}, bias-corrected percentiles"
+        description = f"bootstrap: {n} of {n} {unit}, bias-corrected percentiles"
     ellipses = estimator.refit(np.ones((1, len(member))), speeds)
-    resampled = estimator.refit(drawn[:, member].astype(float), speeds, rng)
+    if resampled is None:
+        resampled = estimator.refit(drawn[:, member].astype(float), speeds, rng)
     reach = ellipse_reach(ellipses)
     values = _quantities(ellipses)
     differences = _quantities(resampled) - values
     angle = QUANTITIES.index("angle_deg")
     differences[..., angle] = (differences[..., angle] + 90) % 180 - 90
-    intervals = _interval(values, differences, factor)
-    bands = np.maximum(_interval(reach, ellipse_reach(resampled) - reach, factor), 0)
+    intervals = _interval(values, differences, factor, not is_posterior)
+    bands = np.maximum(_interval(reach, ellipse_reach(resampled) - reach, factor, not is_posterior), 0)
     return Uncertainty(
         LEVEL,
         int(n_resamples),
@@ -205,19 +212,21 @@ def _quantities(ellipses: Array) -> Array:
     return np.stack([m, n, a, b, np.degrees(angle), np.pi * a * b], axis=-1)
 
 
-def _interval(values: Array, differences: Array, factor: float) -> Array:
+def _interval(values: Array, differences: Array, factor: float, corrects: bool = True) -> Array:
     """Low and high (2, s, k) around values (1, s, k), from the differences (r, s, k) of the resamples.
 
-    With `factor` 0 the ends are bias-corrected percentiles. Otherwise the quantiles of the differences, times
-    `factor`, are subtracted.
+    With `factor` 0 the ends are percentiles: bias-corrected if `corrects`, else moved outwards to the value
+    where it is outside. Otherwise the quantiles of the differences, times `factor`, are subtracted.
     """
     has_interval = np.isnan(differences).mean(axis=0) <= _MAX_FAILED
     tails, ends = np.full((2, *has_interval.shape), np.nan), np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     for at in zip(*np.nonzero(has_interval), strict=True):
         known = differences[:, *at][~np.isnan(differences[:, *at])]
         below = np.mean(known < 0) + np.mean(known == 0) / 2
-        bias = 0.0 if factor else np.clip(norm.ppf(below), -_MAX_BIAS, _MAX_BIAS)
+        bias = 0.0 if factor or not corrects else np.clip(norm.ppf(below), -_MAX_BIAS, _MAX_BIAS)
         tails[:, *at] = np.quantile(known, norm.cdf(2 * bias + norm.ppf(ends)))
+    if not corrects:
+        tails = np.stack([np.minimum(tails[0], 0), np.maximum(tails[1], 0)])
     return np.asarray(values - factor * tails[::-1] if factor else values + tails)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -97,7 +98,8 @@ def bench_respect() -> dict[str, float]:
     for n in TIMES:
         rows = longer(tracks, n)
         of[n] = szlib.find_encounters(rows), shifted(rows, 5)
-    seconds = measuring.grow({n: lambda pair=pair: szlib.fit_respect(*pair) for n, pair in of.items()})
+    fit = partial(szlib.SocialZone.fit, method="respect", speeds=SPEEDS, n_resamples=0)
+    seconds = measuring.grow({n: lambda pair=pair: fit(pair[0], null=pair[1]) for n, pair in of.items()})
     return summarise({n: len(samples) for n, (samples, _) in of.items()}, seconds)
 
 

@@ -117,8 +117,11 @@ def search(
             for tick in window:
                 person, met = scene[day, tick][ref], scene[day, tick][other]
                 ahead, left = in_frame(person, met)
-                distance, speed = math.dist(person[:2], met[:2]), math.hypot(person[2], person[3])
-                found.append((number, day, ref, other, tick / 10, math.atan2(left, ahead), distance, speed))
+                distance, angle = math.dist(person[:2], met[:2]), math.atan2(left, ahead)
+                speed, other_speed = (math.hypot(each[2], each[3]) for each in (person, met))
+                other_angle = math.atan2(*in_frame(met, person)[::-1])
+                sample = (tick / 10, angle, distance, speed, other_angle, other_speed)
+                found.append((number, day, ref, other, *sample))
             free, number = window[-1] + 1, number + 1
     return pd.DataFrame(found, columns=SAMPLE_COLUMNS).astype(dict.fromkeys(SAMPLE_COLUMNS[4:], float))
 

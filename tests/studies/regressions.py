@@ -22,7 +22,11 @@ BARRIER = "control/barriers.py", "return h_next - (1 - gamma) * h", "return h_ne
 HULL = "zones/hulls.py", "(self.r_max - self.reach(theta))", "(self.r_max - 0.95 * self.reach(theta))"
 PATHS = "zones/quantile.py", "_DEGREE = 2  #", "_DEGREE = 1  #"
 LEVEL = "zones/uncertainty.py", "LEVEL = 0.95  #", "LEVEL = 0.8  #"
-RESPECT = "zones/respect.py", "np.clip(rho + half,", "np.clip(0.9 * rho + half,"
+RESPECT = (
+    "zones/respect_profile.py",
+    "radius=round(float(radius.flat[best]), 2)",
+    "radius=0.9 * float(radius.flat[best])",
+)
 STANDING = "tracks/quality.py", "\nSTANDING = 0.1\n", "\nSTANDING = 0.2\n"
 DEFAULT = {"03": HULL, "14": STANDING, "15": RESPECT, "16": PATHS}
 """The regression for the tables of a notebook; that of the others is `BARRIER`."""

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from helpers.passers import TRUTH, passers, wanderers
+from helpers.passers import passers, wanderers
+from helpers.passing_pairs import null_of, passing_pairs, respecting
 
 import szlib
 from szlib.tracks import funnels
@@ -470,9 +471,10 @@ def made_null(n: int = 3000, *, r_max: float = 2.0) -> szlib.NullEncounters:
 
 
 def test_respect_zone_is_found_and_saved_with_its_test(tmp_path: Path) -> None:
-    people = passers(600)
-    zone = SocialZone.fit(people, method="respect", null=made_null(), speeds=(1.1,), n_resamples=4)
-    assert_same_ellipse(zone.ellipse(1.1), szlib.Ellipse(TRUTH[:2], TRUTH[2:4], TRUTH[4]), 0.12)
+    people = respecting(passing_pairs(1200, 1), szlib.Ellipse((0.0, 0.0), (0.8, 0.7)), careless=0.05)
+    null = null_of(passing_pairs(2500, 0))
+    zone = SocialZone.fit(people, null=null, speeds=(1.1,), n_resamples=4)
+    assert (zone.method, zone.null_radii) == ("respect", {1.1: 0.0})
     assert zone.null_test.is_significant
     row = zone.table().iloc[0]
     assert row["a_low"] < row["a_high"]
@@ -480,9 +482,6 @@ def test_respect_zone_is_found_and_saved_with_its_test(tmp_path: Path) -> None:
     loaded = SocialZone.load(tmp_path / "zone.json")
     assert (loaded.ellipses, loaded.null_test) == (zone.ellipses, zone.null_test)
     assert loaded.provenance == zone.provenance
-    alike = fit(people, method="respect", null=made_null(), speeds=(1.0, 1.2), speed_width=np.inf)
-    np.testing.assert_array_equal(alike.shape.radii[0], alike.shape.radii[1])
-    assert alike.provenance["parameters"]["speed_width"] is None
 
 
 def test_any_zone_can_be_tested_against_a_null(samples: pd.DataFrame) -> None:
@@ -496,7 +495,6 @@ def test_any_zone_can_be_tested_against_a_null(samples: pd.DataFrame) -> None:
     [
         ({}, r"needs a null model; pass null=szlib\.null_encounters"),
         ({"null": made_null(20), "r_max": 1.5}, r"r_max is 1\.5 m, that of the null model 2\.0 m"),
-        ({"null": made_null(20), "speed_width": 0.0}, "speed_width must be positive, inf for equal"),
     ],
 )
 def test_respect_without_valid_null_is_refused(options: dict, message: str) -> None:

@@ -64,7 +64,7 @@ def test_careful_people_in_number_are_usable(careful: szlib.SocialZone) -> None:
     assert careful.adequate(SPEED)
 
 
-@pytest.mark.parametrize("method", ["quantile", "hull", "respect"])
+@pytest.mark.parametrize("method", ["quantile", "hull"])
 def test_people_who_ignore_each_other_show_no_respect(method: str) -> None:
     verdict = fit_quietly(walkers(2, 1500), method=method).verdict(SPEED)
     assert verdict == "no respect shown"
