@@ -76,7 +76,8 @@ def pair_correlation(samples: pd.DataFrame, null: NullEncounters) -> PairCorrela
     )
     g = np.divide(real, model, out=np.full(real.shape, np.nan), where=model > 0)
     turn = (np.arange(_N_DIRECTIONS) + 0.5) / _N_DIRECTIONS
-    return PairCorrelation((np.arange(_N_DISTANCES) + 0.5) * cell[1], 2 * np.pi * turn, np.asarray(g, np.float64))
+    distance: Array = (np.arange(_N_DISTANCES) + 0.5) / _N_DISTANCES * null.r_max
+    return PairCorrelation(distance, 2 * np.pi * turn, g)
 
 
 def _count(samples: pd.DataFrame, r_max: float) -> Array:
