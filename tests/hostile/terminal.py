@@ -21,10 +21,9 @@ from collections import Counter
 from pathlib import Path
 from select import select
 
-from helpers.process_table import adopt_orphans, descendants, named_after_noted, wait_for_end
+from helpers.process_table import adopt_orphans, descendants, wait_for_end
 from processes import (
     GRACE,
-    SHARED_MEMORY,
     environment,
     everything_before,
     everything_outside,
@@ -80,8 +79,6 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
             for trial in range(TRIALS):
                 action, full = rng.choice(list(ACTIONS)), [*command, "--out", str(place / f"{name}-{trial}")]
                 attempt(action, full, place, rng, 5.0, tally)
-                if action == "SIGKILL to the group":
-                    tally["semaphores left by SIGKILL to the group"] += remove_semaphores(before)
                 what = f"{name}, trial {trial}, {action}"
                 judge_end(what, Path(full[-1]), place, reference, tally)
                 finish(what, full, place, reference, before, tally)
@@ -141,17 +138,6 @@ def stop(
     if code not in (0, *ACTIONS.get(action, (130, -signal.SIGINT))):
         return f"exit code {code} after {time.monotonic() - begun:.0f} s: {text[-500:]}"
     return "" if code != 130 or "szlib: stopped" in text else f"it says nothing: {text[-500:]}"
-
-
-def remove_semaphores(before: set[str]) -> int:
-    """Remove the semaphores of joblib that a command left, and count them.
-
-    Another process of the group removes them; if it is killed as well, nobody is left to do so.
-    """
-    left = [path for path in map(Path, named_after_noted(SHARED_MEMORY) - before) if "loky" in path.name]
-    for path in left:
-        path.unlink()
-    return len(left)
 
 
 def take_terminal() -> None:
