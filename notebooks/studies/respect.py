@@ -15,7 +15,10 @@ import argparse
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -30,6 +33,8 @@ from szlib.parallel import run_tasks
 from szlib.tracks.clock import to_clock
 from szlib.tracks.sites import GRAND_CENTRAL_RATE, read_grand_central
 
+Encounters = tuple[pd.DataFrame, szlib.NullEncounters]
+"""Samples of a site and its null model."""
 GRAND_CENTRAL = szlib.Square(x=(10.0, 40.0), y=(10.0, 50.0))
 """The hall without its walls (measured)."""
 SETS = {
@@ -41,10 +46,12 @@ SETS = {
     "same direction": "same direction",
 }
 SPEED = 1.1
-"""Speed of the hull's zone [m/s]."""
+"""Speed of the zones [m/s]."""
 PLAZA_KINDS = ("all", "strangers")
 """Those of a small plaza: it has few others."""
-RESAMPLES, DRAWS = 100, 30
+DIRECTIONS = {"ahead": 0.0, "left": 90.0, "behind": -180.0, "right": -90.0}
+"""Directions in which the reach of the respect zone is given [deg]."""
+POSTERIOR_DRAWS, DRAWS = 400, 30
 HULLS = 100_000
 """Samples of the null model whose hulls are found, at most: LOF is slow."""
 SIZES = (36, 72, 150, 300, 600, 1200, 2400, 4800)
@@ -57,7 +64,7 @@ def main() -> None:
     parser.add_argument("--sites", nargs="+", default=["atc-1hz", "grand-central", "plaza"])
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument(
-        "--cache", type=Path, default=Path("../results/null"), help="where null models are kept"
+        "--cache", type=Path, default=Path("../results/null"), help="where null models are stored"
     )
     asked = parser.parse_args()
     study = {"nobody": nobody, "sites": sites, "n-curve": n_curve, "changes": changes}[asked.study]
@@ -84,11 +91,8 @@ def one_crowd(seed: int, bunch: int) -> list[dict[str, object]]:
     for name in ("all", "opposite, crossing"):
         data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
         test = szlib.null_test(data, against)
-        result = {
-            "p_value": test.p_value,
-            "encounters": test.n_encounters,
-            "radius": szlib.respect_radius(data, against),
-        }
+        result = {"p_value": test.p_value, "encounters": test.n_encounters}
+        result |= {"radius": test.respect.radius, "radius_low": test.respect.low}
         rows.append({"bunch": bunch, "kinds": name, "seed": seed, "shifts": null.shifts} | result)
     return rows
 
@@ -117,108 +121,124 @@ def load(site: str) -> tuple[pd.DataFrame, szlib.Square, int]:
     return read_grand_central(root / "gc" / "Annotation.zip"), GRAND_CENTRAL, 20
 
 
-def data_and_null(
-    site: str, min_distance: float, asked: argparse.Namespace
-) -> tuple[pd.DataFrame, szlib.NullEncounters]:
-    """Samples of a site and its null model, kept between studies."""
-    kept = asked.cache / f"{site}-{min_distance:g}.joblib"
-    if not kept.exists():
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        joblib.dump(find_both(site, min_distance, asked.jobs), kept)
-    return joblib.load(kept)
+def stored(asked: argparse.Namespace, name: str, find: Callable[[], Encounters]) -> Encounters:
+    """Samples of a site and its null model, stored between studies."""
+    file = asked.cache / f"{name}.joblib"
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        joblib.dump(find(), file)
+    return joblib.load(file)
 
 
-def find_both(site: str, min_distance: float, n_jobs: int = 1) -> tuple[pd.DataFrame, szlib.NullEncounters]:
+def data_and_null(site: str, asked: argparse.Namespace) -> Encounters:
+    """Samples of a site and its null model, stored between studies."""
+    return stored(asked, site, partial(find_both, site, asked.jobs))
+
+
+def find_both(site: str, n_jobs: int = 1) -> Encounters:
     """Samples of a site and its null model."""
     tracks, square, shifts = load(site)
-    found = {"square": square, "min_distance": min_distance}
-    samples = szlib.find_encounters(tracks, **found)
-    return samples, szlib.null_encounters(tracks, shifts=shifts, n_jobs=n_jobs, progress=False, **found)
+    samples = szlib.find_encounters(tracks, square=square)
+    null = szlib.null_encounters(tracks, shifts=shifts, square=square, n_jobs=n_jobs, progress=False)
+    return samples, null
 
 
 def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
-    """One row a site, a min_distance, a set of kinds; intervals from resampled pairs of people."""
-    for site, min_distance, (name, kinds) in product(asked.sites, (1.0, 0.0), SETS.items()):
-        samples, null = data_and_null(site, min_distance, asked)
-        data, against = szlib.of_kind(samples, kinds), null.of_kind(kinds)
+    """One row a site, a set of kinds."""
+    for site, (name, kinds) in product(asked.sites, SETS.items()):
         if site == "plaza" and name not in PLAZA_KINDS:
             continue
-        row = {"site": site, "min_distance": min_distance, "kinds": name}
-        row |= describe_site(data, against, 5 if site == "plaza" else RESAMPLES)
+        samples, null = data_and_null(site, asked)
+        data, against = szlib.of_kind(samples, kinds), null.of_kind(kinds)
+        row = {"site": site, "min_distance": szlib.EncounterSettings().min_distance, "kinds": name}
+        row |= describe_site(data, against) | describe_reach(data, against)
         print(row, file=sys.stderr, flush=True)
         yield row
 
 
-def describe_site(data: pd.DataFrame, null: szlib.NullEncounters, resamples: int) -> dict[str, float]:
-    """Numbers of encounters, radii with intervals, p-values and sizes of hulls of one set of kinds."""
-    theta = np.radians([0.0, 90.0, 180.0, 270.0])
+def describe_site(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, float]:
+    """Numbers of encounters, radii, p-values and sizes of hulls of one set of kinds."""
     test = szlib.null_test(data, null)
     bodies = szlib.null_test(data, null, excluded_below=0.5)
-    fit = szlib.fit_respect(data, null)
-    radii = [
-        np.r_[szlib.respect_radius(data, null), fit.radii(theta)],
-        *resampled(data, null, theta, resamples),
-    ]
-    low, high = np.percentile(radii[1:], [2.5, 97.5], axis=0)
-    row = {"encounters": data["encounter"].nunique(), "within_2m": test.n_encounters}
-    row |= {"null_encounters": len(null.encounters) / null.shifts, "shifts": null.shifts}
-    for i, where in enumerate(("radius", "ahead", "left", "behind", "right")):
-        row |= {where: radii[0][i], f"{where}_low": low[i], f"{where}_high": high[i]}
-    row |= {"null_radius_high": np.nanpercentile(null_radii(null), 97.5)}
-    row |= {"softness": fit.softness, "ignoring_share": fit.ignoring_share}
-    row |= {"p_value": test.p_value, "p_value_beyond_0.5m": bodies.p_value}
     few = max(1, min(null.shifts, HULLS * null.shifts // max(len(null.samples), 1)))
     hulls = [hull_a(null.one(k)) for k in range(few)]
-    return row | {
+    return {
+        "encounters": data["encounter"].nunique(),
+        "within_2m": test.n_encounters,
+        "null_encounters": len(null.encounters) / null.shifts,
+        "shifts": null.shifts,
+        **describe_radius(test, "radius"),
+        "careless": test.respect.careless,
+        "careless_high": test.respect.careless_high,
+        "null_radius_high": np.nanpercentile(null_radii(null), 97.5),
+        "p_value": test.p_value,
+        "p_value_beyond_0.5m": bodies.p_value,
         "hull_a": hull_a(data),
         "null_hull_a": np.nanmedian(hulls) if np.isfinite(hulls).any() else np.nan,
     }
 
 
+def describe_radius(test: szlib.NullTest, name: str) -> dict[str, float]:
+    """The radius of the respect zone and its interval [m]."""
+    found = test.respect
+    return {name: found.radius, f"{name}_low": found.low, f"{name}_high": found.high}
+
+
+def describe_reach(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, float]:
+    """Reach of the respect zone in four directions, with its interval [m]; NaN if there is no zone."""
+    row = {f"{where}{end}": np.nan for where in DIRECTIONS for end in ("", "_low", "_high")}
+    options = {"r_max": null.r_max, "speeds": (SPEED,), "n_resamples": POSTERIOR_DRAWS}
+    try:
+        zone = fit_quietly(data, method="respect", null=null, **options)
+    except szlib.ZoneError:
+        return row
+    bands = zone.uncertainty.bands
+    for where, degrees in DIRECTIONS.items():
+        theta = np.radians(degrees)
+        band = bands.iloc[(bands["direction"] - theta).abs().argmin()]
+        row[where] = float(np.hypot(*zone.shape.boundary(SPEED, theta)))
+        row |= {f"{where}_low": band["low"], f"{where}_high": band["high"]}
+    return row
+
+
+def fit_quietly(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
+    """Fit a zone without the warning about sides that lack encounters."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", szlib.DataWarning)
+        return szlib.SocialZone.fit(samples, **options)
+
+
 def null_radii(null: szlib.NullEncounters) -> list[float]:
     """Radius of the respect zone of each shift against all others [m]; NaN if there is nothing to compare."""
-    total = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
-    radii = []
-    for shift in range(null.shifts):
-        own = szlib.OccupancyHistogram.from_samples(null.one(shift), r_max=null.r_max)
-        rest = szlib.OccupancyHistogram(total.counts - own.counts, null.r_max)
-        is_known = own.counts.any() and rest.counts.any()
-        radii.append(szlib.respect_radius(own, rest) if is_known else np.nan)
-    return radii
+    return [radius(null.one(shift), other_shifts(null, shift)) for shift in range(null.shifts)]
+
+
+def other_shifts(null: szlib.NullEncounters, shift: int) -> szlib.NullEncounters:
+    """The null model without one shift; only its encounters, which are all that `null_test` looks at."""
+    others = null.encounters[null.encounters["shift"] != shift]
+    renumbered = others.assign(shift=others["shift"] - (others["shift"] > shift))
+    return replace(null, samples=null.samples.iloc[:0], encounters=renumbered, shifts=null.shifts - 1)
+
+
+def radius(data: pd.DataFrame, null: szlib.NullEncounters) -> float:
+    """Radius of the respect zone [m]; NaN if there is nothing to compare."""
+    try:
+        return szlib.null_test(data, null).respect.radius
+    except (szlib.ZoneError, szlib.DataError):
+        return np.nan
 
 
 def recompute_sites(row: pd.Series) -> dict[str, float]:
-    """A row of the plaza, again."""
-    samples, null = find_both("plaza", row["min_distance"])
+    """A row of the plaza, again, without the reach in four directions."""
+    samples, null = find_both("plaza")
     kinds = SETS[row["kinds"]]
-    return describe_site(szlib.of_kind(samples, kinds), null.of_kind(kinds), 5)
-
-
-def resampled(
-    samples: pd.DataFrame, null: szlib.NullEncounters, theta: np.ndarray, resamples: int
-) -> Iterator[np.ndarray]:
-    """Radius of all bearings, and radii in directions theta, of resampled pairs of people."""
-    pair = pairs(samples)
-    against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
-    rng = np.random.default_rng(0)
-    for _ in range(resamples):
-        drawn = np.bincount(rng.integers(pair.max() + 1, size=pair.max() + 1), minlength=pair.max() + 1)
-        data = szlib.OccupancyHistogram.from_samples(samples, r_max=null.r_max, weights=drawn[pair])
-        if data.counts.any():
-            yield np.r_[szlib.respect_radius(data, against), szlib.fit_respect(data, against).radii(theta)]
-
-
-def pairs(samples: pd.DataFrame) -> np.ndarray:
-    """Number of the pair of people, whoever is the reference, of each sample."""
-    people = samples[["ref_id", "other_id"]].to_numpy()
-    keys = pd.DataFrame(np.sort(people, axis=1)).assign(day=samples["day"].astype(str).to_numpy())
-    return keys.groupby([0, 1, "day"], sort=False).ngroup().to_numpy()
+    return describe_site(szlib.of_kind(samples, kinds), null.of_kind(kinds))
 
 
 def hull_a(samples: pd.DataFrame) -> float:
     """Semi-major axis of the paper's zone at 1.1 m/s [m]; NaN where it is undefined."""
     try:
-        zone = szlib.SocialZone.fit(samples, method="paper", speeds=(SPEED,), n_resamples=0)
+        zone = fit_quietly(samples, method="paper", speeds=(SPEED,), n_resamples=0)
         return zone.ellipses[SPEED].semi_axes[0]
     except szlib.SzlibError:
         return np.nan
@@ -228,16 +248,14 @@ def hull_a(samples: pd.DataFrame) -> float:
 
 
 def n_curve(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
-    """One row a site, a set of kinds, a number of encounters drawn without replacement."""
-    for site, name in product(asked.sites, ("all", "strangers", "opposite, crossing")):
-        samples, null = data_and_null(site, 1.0, asked)
-        data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
+    """One row a site, a number of encounters of strangers drawn without replacement."""
+    for site in asked.sites:
+        samples, null = data_and_null(site, asked)
+        data, against = szlib.of_kind(samples, "strangers"), null.of_kind("strangers")
         total = data["encounter"].nunique()
-        if site == "plaza" and name not in PLAZA_KINDS:
-            continue
         for n in sorted({*(size for size in SIZES if size < total), total}):
             times = 1 if n == total else 3 if site == "plaza" else DRAWS
-            row = {"site": site, "kinds": name, "encounters": n, "draws": times}
+            row = {"site": site, "kinds": "strangers", "encounters": n, "draws": times}
             row |= describe_draws(data, against, n, times)
             print(row, file=sys.stderr, flush=True)
             yield row
@@ -245,8 +263,7 @@ def n_curve(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
 
 def describe_draws(data: pd.DataFrame, null: szlib.NullEncounters, n: int, times: int) -> dict[str, float]:
     """Mean and interval of what `draws` gives."""
-    against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
-    drawn = pd.DataFrame(draws(data, null, against, n, times))
+    drawn = pd.DataFrame(draws(data, null, n, times))
     row: dict[str, float] = {}
     for column in drawn:
         row[column] = drawn[column].mean()
@@ -257,15 +274,12 @@ def describe_draws(data: pd.DataFrame, null: szlib.NullEncounters, n: int, times
 
 def recompute_n_curve(row: pd.Series) -> dict[str, float]:
     """A row of the plaza, again."""
-    samples, null = find_both("plaza", 1.0)
-    kinds = SETS[row["kinds"]]
-    n, times = int(row["encounters"]), int(row["draws"])
-    return describe_draws(szlib.of_kind(samples, kinds), null.of_kind(kinds), n, times)
+    samples, null = find_both("plaza")
+    strangers, others = szlib.of_kind(samples, row["kinds"]), null.of_kind(row["kinds"])
+    return describe_draws(strangers, others, int(row["encounters"]), int(row["draws"]))
 
 
-def draws(
-    data: pd.DataFrame, null: szlib.NullEncounters, against: szlib.OccupancyHistogram, n: int, times: int
-) -> Iterator[dict[str, float]]:
+def draws(data: pd.DataFrame, null: szlib.NullEncounters, n: int, times: int) -> Iterator[dict[str, float]]:
     """Hull and respect radius of n encounters of the data, and of n of one shift of the null model."""
     rng = np.random.default_rng(n)
     numbers = data["encounter"].unique()
@@ -275,12 +289,10 @@ def draws(
         own = null.encounters.loc[null.encounters["shift"] == shift, "encounter"].to_numpy()
         model = null.one(shift)
         chosen = model[model["encounter"].isin(rng.choice(own, min(n, len(own)), replace=False))]
-        whole = szlib.OccupancyHistogram.from_samples(model, r_max=null.r_max)
-        rest = szlib.OccupancyHistogram(against.counts - whole.counts, null.r_max)
         yield {
             "hull_a": hull_a(part),
-            "respect": szlib.respect_radius(part, against),
-            "null_respect": szlib.respect_radius(chosen, rest) if len(chosen) else np.nan,
+            "respect": radius(part, null),
+            "null_respect": radius(chosen, other_shifts(null, shift)),
         }
 
 
@@ -305,52 +317,38 @@ FEW = 5
 
 
 def changes(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
-    """One row a change, a set of kinds: the fitted radius, its interval, and where bins of g cross 1/2."""
+    """One row a change, a set of kinds: the radius and its interval."""
     cases = [("grand-central", change) for change in CHANGES] + [("plaza", "nothing")]
-    for site, change in cases:
-        how = CHANGES[change]
-        found = changed(asked, **how) if how else data_and_null(site, 1.0, asked)
-        for name, kinds in KINDS_OF.items():
-            data, null = szlib.of_kind(found[0], kinds), found[1].of_kind(kinds)
-            if site == "plaza" and name not in PLAZA_KINDS:
-                continue
-            row = {"site": site, "change": change, "kinds": name, "shifts": null.shifts}
-            row |= describe_radii(data, null, 5 if site == "plaza" else RESAMPLES)
-            print(row, file=sys.stderr, flush=True)
-            yield row
+    for (site, change), (name, kinds) in product(cases, KINDS_OF.items()):
+        if site == "plaza" and name not in PLAZA_KINDS:
+            continue
+        if change == "nothing":
+            samples, null = data_and_null(site, asked)
+        else:
+            find = partial(changed, asked.jobs, **CHANGES[change])
+            samples, null = stored(asked, f"{site}, {change}", find)
+        row = {"site": site, "change": change, "kinds": name, "shifts": null.shifts}
+        row |= describe_change(szlib.of_kind(samples, kinds), null.of_kind(kinds))
+        print(row, file=sys.stderr, flush=True)
+        yield row
 
 
-def describe_radii(data: pd.DataFrame, null: szlib.NullEncounters, resamples: int) -> dict[str, float]:
-    """The radius fitted and in bins, with intervals, of one set of kinds."""
-    data = data[data["distance"] < null.r_max]
-    against = szlib.OccupancyHistogram.from_samples(null.samples, r_max=null.r_max)
-    pair = pairs(data)
-    rng, drawn = np.random.default_rng(0), [np.ones(len(data))]
-    drawn += [
-        rng.multinomial(pair.max() + 1, np.full(pair.max() + 1, 1 / (pair.max() + 1)))[pair]
-        for _ in range(resamples)
-    ]
-    weighted = [
-        szlib.OccupancyHistogram.from_samples(data, r_max=null.r_max, weights=weights) for weights in drawn
-    ]
-    row: dict[str, float] = {"encounters": data["encounter"].nunique()}
-    for how_measured, radius in (("fitted", szlib.respect_radius), ("binned", half_in_bins)):
-        radii = [radius(each, against) for each in weighted]
-        low, high = np.percentile(radii[1:], [2.5, 97.5])
-        row |= {how_measured: radii[0], f"{how_measured}_low": low, f"{how_measured}_high": high}
-    return row
+def describe_change(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, float]:
+    """Number of encounters within 2 m, radius and interval of one set of kinds."""
+    test = szlib.null_test(data, null)
+    return {"encounters": test.n_encounters, **describe_radius(test, "radius")}
 
 
 def recompute_changes(row: pd.Series) -> dict[str, float]:
     """A row of the plaza, again."""
-    samples, null = find_both("plaza", 1.0)
+    samples, null = find_both("plaza")
     kinds = KINDS_OF[row["kinds"]]
-    return describe_radii(szlib.of_kind(samples, kinds), null.of_kind(kinds), 5)
+    return describe_change(szlib.of_kind(samples, kinds), null.of_kind(kinds))
 
 
 def changed(
-    asked: argparse.Namespace, *, scale: float = 1.0, rate: float = GRAND_CENTRAL_RATE, **how: object
-) -> tuple[pd.DataFrame, szlib.NullEncounters]:
+    n_jobs: int, *, scale: float = 1.0, rate: float = GRAND_CENTRAL_RATE, **how: object
+) -> Encounters:
     """Samples and null model of Grand Central with one thing changed."""
     tracks, square, _ = load("grand-central")
     if scale != 1 or rate != GRAND_CENTRAL_RATE:
@@ -364,21 +362,8 @@ def changed(
     square = how.pop("square", square)
     samples = szlib.find_encounters(tracks, square=square)
     return samples, szlib.null_encounters(
-        tracks, shifts=FEW, square=square, n_jobs=asked.jobs, progress=False, **how
+        tracks, shifts=FEW, square=square, n_jobs=n_jobs, progress=False, **how
     )
-
-
-def half_in_bins(data: szlib.OccupancyHistogram, null: szlib.OccupancyHistogram) -> float:
-    """Where g in bins of 0.1 m, all bearings, is 1/2 of that beyond 1.2 m, seen from there [m]; plain."""
-    real, model = (each.counts.sum(axis=(0, 1)).reshape(20, -1).sum(axis=1) for each in (data, null))
-    middle = (np.arange(20) + 0.5) * data.r_max / 20
-    far = middle > 1.2
-    g = real / model * model[far].sum() / real[far].sum()
-    inside = np.flatnonzero(g < 0.5)
-    if not len(inside):
-        return 0.0
-    k = int(inside[inside < np.argmax(far)][-1])
-    return float(np.interp(0.5, g[k : k + 2], middle[k : k + 2]))
 
 
 if __name__ == "__main__":
