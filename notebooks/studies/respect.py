@@ -18,8 +18,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
-from itertools import product
+from functools import cache, partial
 from pathlib import Path
 
 import joblib
@@ -105,6 +104,7 @@ def recompute_nobody(row: pd.Series) -> dict[str, object]:
 # --- real sites --------------------------------------------------------------------------------------
 
 
+@cache
 def load(site: str) -> tuple[pd.DataFrame, szlib.Square, int]:
     """Tracks, square and number of shifts of a site."""
     if site == "plaza":
@@ -135,6 +135,7 @@ def data_and_null(site: str, asked: argparse.Namespace) -> Encounters:
     return stored(asked, site, partial(find_both, site, asked.jobs))
 
 
+@cache
 def find_both(site: str, n_jobs: int = 1) -> Encounters:
     """Samples of a site and its null model."""
     tracks, square, shifts = load(site)
@@ -145,15 +146,14 @@ def find_both(site: str, n_jobs: int = 1) -> Encounters:
 
 def sites(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
     """One row a site, a set of kinds."""
-    for site, (name, kinds) in product(asked.sites, SETS.items()):
-        if site == "plaza" and name not in PLAZA_KINDS:
-            continue
+    for site in asked.sites:
         samples, null = data_and_null(site, asked)
-        data, against = szlib.of_kind(samples, kinds), null.of_kind(kinds)
-        row = {"site": site, "min_distance": szlib.EncounterSettings().min_distance, "kinds": name}
-        row |= describe_site(data, against) | describe_reach(data, against)
-        print(row, file=sys.stderr, flush=True)
-        yield row
+        for name in PLAZA_KINDS if site == "plaza" else SETS:
+            data, against = szlib.of_kind(samples, SETS[name]), null.of_kind(SETS[name])
+            row = {"site": site, "min_distance": szlib.EncounterSettings().min_distance, "kinds": name}
+            row |= describe_site(data, against) | describe_reach(data, against)
+            print(row, file=sys.stderr, flush=True)
+            yield row
 
 
 def describe_site(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, float]:
@@ -319,18 +319,18 @@ FEW = 5
 def changes(asked: argparse.Namespace) -> Iterator[dict[str, object]]:
     """One row a change, a set of kinds: the radius and its interval."""
     cases = [("grand-central", change) for change in CHANGES] + [("plaza", "nothing")]
-    for (site, change), (name, kinds) in product(cases, KINDS_OF.items()):
-        if site == "plaza" and name not in PLAZA_KINDS:
-            continue
+    for site, change in cases:
         if change == "nothing":
             samples, null = data_and_null(site, asked)
         else:
             find = partial(changed, asked.jobs, **CHANGES[change])
             samples, null = stored(asked, f"{site}, {change}", find)
-        row = {"site": site, "change": change, "kinds": name, "shifts": null.shifts}
-        row |= describe_change(szlib.of_kind(samples, kinds), null.of_kind(kinds))
-        print(row, file=sys.stderr, flush=True)
-        yield row
+        for name in PLAZA_KINDS if site == "plaza" else KINDS_OF:
+            row = {"site": site, "change": change, "kinds": name, "shifts": null.shifts}
+            kinds = KINDS_OF[name]
+            row |= describe_change(szlib.of_kind(samples, kinds), null.of_kind(kinds))
+            print(row, file=sys.stderr, flush=True)
+            yield row
 
 
 def describe_change(data: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, float]:
