@@ -19,10 +19,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..checks import Array, require
+from ..checks import Array, check_columns, require
 from ..encounters.finding import find_encounters
 from ..encounters.kinds import WALKING
-from ..encounters.samples import match_rows
+from ..encounters.samples import SAMPLE_COLUMNS
 from ..encounters.settings import EncounterSettings
 from ..encounters.time_shift import time_shifted
 from ..errors import ZoneError
@@ -74,7 +74,7 @@ def impose_zone(
     """
     shifted = time_shifted(tracks, seed=seed, minutes=minutes)
     samples = find_encounters(shifted, settings=settings, kinds=kinds, **parameters)
-    return PairedSamples.from_tracks(shifted, samples).impose(ellipse, careless=careless, seed=seed)
+    return PairedSamples.from_samples(samples).impose(ellipse, careless=careless, seed=seed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,25 +94,18 @@ class PairedSamples:
     points: Array
 
     @classmethod
-    def from_tracks(cls, tracks: pd.DataFrame, samples: pd.DataFrame) -> PairedSamples:
-        """Prepare `samples` (or some of them) that were found in `tracks`.
-
-        Raises DataError if a column is missing, there is no track, or a sample is not in the tracks.
-        """
+    def from_samples(cls, samples: pd.DataFrame) -> PairedSamples:
+        """Prepare `samples` as from `szlib.find_encounters`; raises DataError if a column is missing."""
+        if len(samples):
+            check_columns(samples, SAMPLE_COLUMNS)
         people = np.sort(samples[["ref_id", "other_id"]].to_numpy(), axis=1)
         names = {"day": samples["day"].to_numpy(), "one": people[:, 0], "two": people[:, 1]}
         pair = pd.DataFrame(names).groupby([*names], observed=True).ngroup()
-        points = np.empty((2, len(samples), 2))
-        if len(samples):
-            ref, other = match_rows(tracks, samples)
-            for k, (own, partner) in enumerate(((ref, other), (other, ref))):
-                vx, vy, dx, dy = (
-                    rows.to_numpy(float)
-                    for rows in (own["vx"], own["vy"], partner["x"] - own["x"], partner["y"] - own["y"])
-                )
-                speed = np.hypot(vx, vy)
-                speed[speed < WALKING] = np.nan
-                points[k] = np.column_stack([dx * vx + dy * vy, dy * vx - dx * vy]) / speed[:, None]
+        views = [
+            samples["distance"] * np.exp(1j * samples[angle].where(samples[speed] >= WALKING))
+            for angle, speed in (("los_angle", "speed"), ("other_los_angle", "other_speed"))
+        ]
+        points = np.array([np.column_stack([np.real(view), np.imag(view)]) for view in views])
         return cls(samples, np.asarray(pair, np.intp), points)
 
     def pairs_inside(self, ellipse: Ellipse) -> NDArray[np.bool_]:

@@ -25,7 +25,7 @@ def tracks() -> pd.DataFrame:
 @pytest.fixture(scope="module")
 def paired(tracks: pd.DataFrame) -> PairedSamples:
     shifted = szlib.time_shifted(tracks, seed=2, minutes=MINUTES)
-    return PairedSamples.from_tracks(shifted, szlib.find_encounters(shifted, settings=SETTINGS))
+    return PairedSamples.from_samples(szlib.find_encounters(shifted, settings=SETTINGS))
 
 
 def pairs_of(samples: pd.DataFrame) -> pd.Series:
@@ -122,7 +122,7 @@ def test_a_standing_person_has_no_zone_but_is_kept_out_of_others() -> None:
     tracks = make_tracks(walk, stand)
     samples = szlib.find_encounters(tracks)
     assert set(samples["other_id"]) == {2}
-    paired = PairedSamples.from_tracks(tracks, samples)
+    paired = PairedSamples.from_samples(samples)
     assert np.isnan(paired.points[1]).all()
     assert len(paired.impose(szlib.Ellipse((0.0, 0.0), (0.8, 0.8)))) == 0
     assert len(paired.impose(szlib.Ellipse((0.0, 0.0), (0.8, 0.4)))) == len(samples)
