@@ -14,8 +14,8 @@ is conditional on the kind. Both people's whole paths count, so that the centre 
 one person's view cannot tell how far a zone reaches ahead from how far it reaches behind.
 
 The ellipse has a centre, a semi-axis along the motion and one across, and a shear. Centre and the logarithms
-of the semi-axes are linear in the speed of the person who carries it. Weak priors hold the changes with speed
-(standard deviation 0.15 for each m/s), the sideways centre (0.15 m), the shear (0.15) and the logarithm of
+of the semi-axes are linear in the speed of the person who carries it. Weak priors hold the semi-axes
+(0.8 m, a standard deviation of 0.5 of the logarithm), their changes with speed (0.15 for each m/s), the sideways centre (0.15 m), the shear (0.15) and the logarithm of
 the ratio of the semi-axes (0.4).
 
 The zone is the maximum of the posterior density. Its intervals are posterior ones, of the likelihood to the
@@ -58,9 +58,9 @@ _PARAMETERS = {
     "centre ahead [m]": (-0.5, 0.5, 0.0, np.inf),
     "its change with speed": (-0.5, 0.5, 0.0, 0.15),
     "centre to the left [m]": (-0.3, 0.3, 0.0, 0.15),
-    "log semi-axis along": (np.log(0.1), np.log(1.9), 0.0, np.inf),
+    "log semi-axis along [m]": (np.log(0.1), np.log(1.9), np.log(0.8), 0.5),
     "its change with speed ": (-0.6, 0.6, 0.0, 0.15),
-    "log semi-axis across": (np.log(0.1), np.log(1.9), 0.0, np.inf),
+    "log semi-axis across [m]": (np.log(0.1), np.log(1.9), np.log(0.8), 0.5),
     "its change with speed  ": (-0.6, 0.6, 0.0, 0.15),
     "shear": (-0.6, 0.6, 0.0, 0.15),
     "logit f": (-6.0, 1.5, 0.0, np.inf),
