@@ -14,9 +14,9 @@ is conditional on the kind. Both people's whole paths count, so that the centre 
 one person's view cannot tell how far a zone reaches ahead from how far it reaches behind.
 
 The ellipse has a centre, a semi-axis along the motion and one across, and a shear. Centre and the logarithms
-of the semi-axes are linear in the speed of the person who carries it. Weak priors hold the semi-axes
-(0.8 m, a standard deviation of 0.5 of the logarithm), their changes with speed (0.15 for each m/s), the sideways centre (0.15 m), the shear (0.15) and the logarithm of
-the ratio of the semi-axes (0.4).
+of the semi-axes are linear in the speed of the person who carries it. Weak priors hold the semi-axes (0.8 m,
+with a standard deviation of 0.5 of the logarithm) and the logarithm of their ratio (0.4), the changes with
+speed (0.15 for each m/s), the sideways centre (0.15 m) and the shear (0.15).
 
 The zone is the maximum of the posterior density. Its intervals are posterior ones, of the likelihood to the
 power 1 / (1 + n/m) for n encounters of the data and m of the null model, because both are random. They are
