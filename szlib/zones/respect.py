@@ -73,7 +73,7 @@ _PARAMETERS = {
 _LOW, _HIGH, _MEAN, _SPREAD = np.array(list(_PARAMETERS.values())).T
 _ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
 _FIRST_STEPS = np.array([0.05, 0.05, 0.02, 0.06, 0.06, 0.03, 0.05, 0.05, 0.3, 0.3, 0.7, 0.3])
-# Kinds of encounter that are compared.  People of one stream walk in the same direction, near each other or in
+# Kinds of encounter that are compared.  People of one stream walk in the same direction, side by side or in
 # a row, for other reasons than respect, which a shift in time removes as well.
 _KINDS = ("opposite", "crossing", "standing")
 _MIN_EVIDENCE = 20.0  # twice the log likelihood ratio of a zone against none: the 1 % level of 8 parameters
