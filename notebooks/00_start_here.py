@@ -146,13 +146,13 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # | line-of-sight angle | LOS: where the other person is, seen from the reference pedestrian | [02](02_encounters.ipynb) |
 # | LOF | local outlier factor: how isolated a sample is, compared with its neighbours | [03](03_outliers.ipynb) |
 # | MPC | model predictive control: plan some steps ahead, take the first, plan again | [06b](06b_build_a_controller.ipynb) |
-# | null model | the same people, each moved in time, so that nobody minds anybody | [15](15_respect.ipynb) |
+# | null model | the same people, each moved in time, so that they ignore each other | [15](15_respect.ipynb) |
 # | ORCA | a model of walking: each of two people takes half of what keeps them apart | [17](17_crowds.ipynb) |
 # | plaza | synthetic people whose zone is known, to prove the method on | [01](01_tracks.ipynb) |
 # | precision, recall | of what was removed, the share that should be; of what should be, the share that was | [03](03_outliers.ipynb) |
 # | quantile zone | what all but a share q of encounters keep out of | [05](05_zones.ipynb) |
 # | reference pedestrian | the one of two people from whom the other is looked at | [02](02_encounters.ipynb) |
-# | respect zone | where people were half as often as by chance | [15](15_respect.ipynb) |
+# | respect zone | the ellipse that careful people keep out of, compared with people who ignore each other | [15](15_respect.ipynb) |
 # | slack | by how much a row is violated | [06b](06b_build_a_controller.ipynb) |
 # | social force | people who are pushed by others and by walls, and drawn to their goal | [17](17_crowds.ipynb) |
 # | SQP | sequential quadratic programming: solve quadratic problems in a row, each around the last answer | [06b](06b_build_a_controller.ipynb) |

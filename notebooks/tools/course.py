@@ -109,7 +109,7 @@ GLOSSARY: dict[str, Word] = {
         "local outlier factor: how isolated a sample is, compared with its neighbours", r"\bLOF\b", new=False
     ),
     "MPC": Word("model predictive control: plan some steps ahead, take the first, plan again", r"\bMPC\b"),
-    "null model": Word("the same people, each moved in time, so that nobody minds anybody", new=False),
+    "null model": Word("the same people, each moved in time, so that they ignore each other", new=False),
     "ORCA": Word(
         "a model of walking: each of two people takes half of what keeps them apart", r"\b(ORCA|orca)\b"
     ),
@@ -121,7 +121,9 @@ GLOSSARY: dict[str, Word] = {
     ),
     "quantile zone": Word("what all but a share q of encounters keep out of", new=False),
     "reference pedestrian": Word("the one of two people from whom the other is looked at"),
-    "respect zone": Word("where people were half as often as by chance", new=False),
+    "respect zone": Word(
+        "the ellipse that careful people keep out of, compared with people who ignore each other", new=False
+    ),
     "fallback": Word(
         "which of the controller's ways to a control was taken: hard, relaxed, shifted, braking"
     ),
