@@ -247,11 +247,14 @@ alarms.rename(columns={"alarms": "false alarms", "zones": "intervals without 0"}
 # For the respect zone, both people of an encounter carry the same ellipse, each turned with its own motion.
 # What counts is how near either of them comes to the other's ellipse, or how deep into it. With the nearest
 # approach replaced by this distance, it is the equation above; centre and semi-axes may change with speed.
+# People who walk in the same direction are left out: they stay together for other reasons than respect, which a
+# shift in time removes as well.
 #
 # Each zone has its interval, for everybody and for strangers (on the plaza all are strangers). Those of the
 # first two come from pairs of people drawn anew, and are meant to contain the zone that the same method gives
 # for all people there are. Those of the respect zone come from its posterior distribution, and are meant to
-# contain the true zone.
+# contain the true zone. They need a null model with at least twice as many encounters as the data. On the plaza
+# it has fewer, as people hardly ever meet there by chance.
 
 
 # %%
