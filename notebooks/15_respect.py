@@ -338,12 +338,12 @@ sites[
 ].round(3)
 
 # %% [markdown]
-# The respect zone of the same people at 1.1 m/s: how far it reaches in four directions [m], with intervals. Few
+# The respect zone of strangers at 1.1 m/s: how far it reaches in four directions [m], with intervals. Few
 # straight paths touch a zone ahead and behind, so its reach is less certain there than to the sides. The
 # strangers of the ATC day are too few to determine it.
 
 # %%
-reach = sites.set_index(["site", "kinds"])
+reach = sites[sites["kinds"] != "all"].set_index(["site", "kinds"])
 pd.DataFrame(
     {
         where: reach.apply(
