@@ -2,16 +2,14 @@
 
     python -m studies.zones coverage quantile 200 centred default   16_coverage.csv    (plazas)
     python -m studies.zones coverage hull 200 centred               16_coverage_hull.csv
-    python -m studies.zones coverage respect 20 centred             16_coverage_respect.csv
     python -m studies.zones levels 3                                16_levels.csv      (plazas a case)
     python -m studies.zones estimators 3                            16_estimators.csv  (plazas a case)
     python -m studies.zones sizes 8                                 16_sizes.csv       (plazas pooled)
     python -m studies.zones subsets 20                              16_subsets.csv     (subsets of a size)
-    python -m studies.zones two_sided 3                             16_two_sided.csv   (plazas a truth)
 
 They go to notebooks/tables.  Coverage: share of the 95 % intervals, from 600 pairs, that hold the truth of
 the plaza, and the limit: what the quantile gives for the people of all these plazas together (a hull has no
-limit: it shrinks; respect is held against the truth alone, at one speed).  Subsets are of the ATC day in
+limit: it shrinks).  Subsets are of the ATC day in
 $SZLIB_DATA_DIR, and of a plaza.
 
 Each function `recompute_...` computes a row again.  Where that would take long, it computes the column
@@ -29,14 +27,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import least_squares
 from studies.claims import SITES
 from studies.committed import write_table
 
 import szlib
 from szlib.plaza.settings import PlazaSettings
 from szlib.zones.ellipses import Ellipse
-from szlib.zones.quantile import smooth_paths
 from szlib.zones.uncertainty import QUANTITIES
 
 SPEEDS = (0.7, 0.9, 1.1, 1.3)
@@ -92,12 +88,8 @@ def zone_with_intervals(
     seed: int, truth: str, method: str, pairs: int = 600, **options: Any
 ) -> tuple[szlib.SocialZone, pd.DataFrame, PlazaSettings]:
     """The zone of one plaza with its intervals; its samples and settings."""
-    samples, tracks, known = people(seed, n_encounters=pairs, **TRUTHS[truth])
-    speeds = SPEEDS
-    if method == "respect":
-        null = szlib.null_encounters(tracks, shifts=20 if pairs > SMALL else 5, seed=seed, progress=False)
-        speeds, options = (1.1,), {"n_resamples": 40, "null": null} | options
-    return szlib.SocialZone.fit(samples, speeds=speeds, method=method, **options), samples, known
+    samples, _, known = people(seed, n_encounters=pairs, **TRUTHS[truth])
+    return szlib.SocialZone.fit(samples, speeds=SPEEDS, method=method, **options), samples, known
 
 
 def half_widths(intervals: pd.DataFrame) -> pd.Series:
@@ -255,135 +247,7 @@ def recompute_subsets(row: pd.Series) -> dict[str, float]:
     return fit_subsets(samples, row["share"], int(row["draws"]), row["method"])
 
 
-# --- both sides at once ------------------------------------------------------------------------------
-#
-# A pair is kept apart by both zones.  One zone for everybody, each turned with its person's own heading:
-# ten numbers (centre and root of the form, linear in speed).  The gap of a pair is the smallest, over time
-# and over both people, distance of the one to the other's zone.  The zone sought is the one into which, in
-# every direction and speed band in which pairs are nearest to a zone at all, a share q of pairs enter.
-
-SHIFTED = {0.1: (0.68, 0.78), 0.2: (0.74, 0.84), -0.1: (0.68, 0.78)}
-"""Centre ahead [m], and the semi-axes across at 0.5 and 1.5 m/s [m] (+0.2 m: rounder, else not convex)."""
-FITS = ("one-sided", "two-sided, from the middle", "two-sided, from the other side")
-_Q, _SECTOR, _ROUNDS, _DAMPED = 0.05, np.radians(10), 40, 0.3
-_BANDS, _AROUND = (0.6, 0.8, 1.0, 1.2, 1.4), np.radians(np.arange(-180, 180, 10))
-_TOUCHED = 0.4  # of the pairs in the fullest sector: directions with fewer are not touched
-
-
-def two_sided(plazas: int) -> pd.DataFrame:
-    """What one- and two-sided fits make of a zone shifted ahead, from two starts."""
-    rows = []
-    for ahead in SHIFTED:
-        for seed in range(plazas):
-            for fit in FITS:
-                row = {"ahead": ahead, "seed": seed, "fit": fit}
-                rows.append(row | fit_shifted(ahead, seed, fit) | probe_of_shifted(ahead, seed, fit))
-                print(rows[-1], file=sys.stderr, flush=True)
-    return pd.DataFrame(rows)
-
-
-def fit_shifted(ahead: float, seed: int, fit: str, rounds: int = _ROUNDS, **more: Any) -> dict[str, float]:
-    """What a fit finds of a zone shifted ahead: where, errors of the axes [m], and the mean gap [m]."""
-    slow, fast = SHIFTED[ahead]
-    zones = {"slow_zone": Ellipse((ahead, 0), (0.88, slow)), "fast_zone": Ellipse((ahead, 0), (1.0, fast))}
-    samples, tracks, known = people(seed, **zones, **more)
-    if fit == "one-sided":
-        zone = szlib.SocialZone.fit(samples, method="quantile", speeds=SPEEDS, n_resamples=0)
-        ellipses, gap = zone.ellipses, np.nan
-    else:
-        start = -ahead if fit == "two-sided, from the other side" else 0.0
-        ellipses, gap = _two_sided_fit(*_both_sides(samples, tracks), start, rounds)
-    found = np.array([quantities(ellipses[v])[:4] for v in SPEEDS])
-    away = found - [quantities(known.true_zone(v))[:4] for v in SPEEDS]
-    return {
-        "found_ahead": found[:, 0].mean(),
-        "error_a": away[:, 2].mean(),
-        "largest_error": np.abs(away).max(),
-        "mean_gap": gap,
-    }
-
-
-def probe_of_shifted(ahead: float, seed: int, fit: str) -> dict[str, float]:
-    """What one round finds of a small plaza: where the zone is [m]."""
-    found = fit_shifted(ahead, seed, fit, rounds=1, n_encounters=2 * SMALL)
-    return {"probe": found["found_ahead"]}
-
-
-def recompute_two_sided(row: pd.Series) -> dict[str, float]:
-    return probe_of_shifted(row["ahead"], int(row["seed"]), row["fit"])
-
-
-def _both_sides(samples: pd.DataFrame, tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Points (x, y, speed) (n, 3) in the frames of both people of each pair, and where pairs start (k,)."""
-    where = tracks[["day", "id", "t", "x", "y", "vx", "vy"]]
-    me = where.add_suffix("_me").rename(columns={"day_me": "day", "id_me": "ref_id", "t_me": "t"})
-    you = where.add_suffix("_you").rename(columns={"day_you": "day", "id_you": "other_id", "t_you": "t"})
-    both = samples.merge(me, on=["day", "ref_id", "t"]).merge(you, on=["day", "other_id", "t"])
-    bearing = np.arctan2(both["y_me"] - both["y_you"], both["x_me"] - both["x_you"])
-    mirrored = both.assign(
-        los_angle=bearing - np.arctan2(both["vy_you"], both["vx_you"]),
-        speed=np.hypot(both["vx_you"], both["vy_you"]),
-    )
-    pair = both.groupby(
-        [both[["ref_id", "other_id"]].min(axis=1), both[["ref_id", "other_id"]].max(axis=1)]
-    ).ngroup()
-    sides = []
-    for side in (both, mirrored):
-        angle, distance = smooth_paths(side)
-        use = (distance <= 2.0) & (side["speed"].to_numpy() >= 0.4)
-        points = [distance * np.cos(angle), distance * np.sin(angle), side["speed"], pair]
-        sides.append(np.column_stack(points)[use])
-    rows = np.vstack(sides)
-    rows = rows[np.argsort(rows[:, 3], kind="stable")]
-    return rows[:, :3], np.flatnonzero(np.append(True, np.diff(rows[:, 3]) != 0))
-
-
-def _gap(p: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Distances (n,) [m] of points (x, y, speed) to the ellipse of their speed, to first order."""
-    m, n, a, b, c = (p[:5] + p[5:] * (points[:, 2:] - 1.0)).T
-    dx, dy = points[:, 0] - m, points[:, 1] - n
-    ux, uy = a * dx + b * dy, b * dx + c * dy
-    level = np.hypot(ux, uy)
-    steepness = np.hypot(a * ux + b * uy, b * ux + c * uy)
-    return (level - 1) * level / np.maximum(steepness, 1e-12)
-
-
-def _two_sided_fit(
-    points: np.ndarray, starts: np.ndarray, shift: float, rounds: int = _ROUNDS
-) -> tuple[dict[float, Ellipse], float]:
-    """Ellipses by speed, and the mean gap [m]: of two zones that as many enter, the truer leaves less."""
-    p = np.array([shift, 0, 1 / 0.95, 0, 1 / 0.75, 0, 0, 0, 0, 0])
-    pair = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(points))))
-    for _ in range(rounds):
-        gap = _gap(p, points)
-        least = np.minimum.reduceat(gap, starts)
-        nearest = np.flatnonzero(gap == least[pair])
-        nearest = nearest[np.unique(pair[nearest], return_index=True)[1]]
-        bearing, speed = np.arctan2(points[nearest, 1], points[nearest, 0]), points[nearest, 2]
-        near = np.abs((bearing - _AROUND[:, None] + np.pi) % (2 * np.pi) - np.pi) <= _SECTOR
-        targets = []
-        for v in _BANDS:
-            here = near & (np.abs(speed - v) <= 0.2)
-            count = here.sum(axis=1)
-            for k in np.flatnonzero(count >= max(20, _TOUCHED * count.max())):
-                unit = np.array([np.cos(_AROUND[k]), np.sin(_AROUND[k])])
-                ray = np.column_stack([np.linspace(0, 2, 2001)[:, None] * unit, np.full(2001, v)])
-                edge = np.interp(0, _gap(p, ray)[200:], np.linspace(0, 2, 2001)[200:])
-                targets.append([*(edge + np.quantile(least[here[k]], _Q)) * unit, v])
-        at = np.array(targets)
-        p = p + _DAMPED * (least_squares(lambda z, at=at: _gap(z, at), p).x - p)
-    gap = np.minimum.reduceat(_gap(p, points), starts).mean()
-    return {v: _ellipse(p[:5] + p[5:] * (v - 1.0)) for v in SPEEDS}, float(gap)
-
-
-def _ellipse(row: np.ndarray) -> Ellipse:
-    values, vectors = np.linalg.eigh(row[[2, 3, 3, 4]].reshape(2, 2))
-    axes = 1 / np.abs(values)
-    major = vectors[:, int(np.argmax(axes))]
-    return Ellipse(tuple(row[:2]), (axes.max(), axes.min()), np.arctan2(major[1], major[0]))
-
-
-STUDIES = (coverage, levels, estimators, sizes, subsets, two_sided)
+STUDIES = (coverage, levels, estimators, sizes, subsets)
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", szlib.DataWarning)

@@ -31,7 +31,7 @@ STANDING = "tracks/quality.py", "\nSTANDING = 0.1\n", "\nSTANDING = 0.2\n"
 DEFAULT = {"03": HULL, "14": STANDING, "15": RESPECT, "16": PATHS}
 """The regression for the tables of a notebook; that of the others is `BARRIER`."""
 OWN = dict.fromkeys(("16_estimators", "16_sensitivity", "16_subsets"), HULL)
-OWN |= dict.fromkeys(("16_coverage", "16_coverage_hull", "16_coverage_respect"), LEVEL)
+OWN |= dict.fromkeys(("16_coverage", "16_coverage_hull", "16_imposed"), LEVEL)
 CHECKS = {"19_atlas": "with the same least h, to a millimetre"}
 """The check of a table, if its row is not computed again by `NotebookRecord.committed_table`."""
 RUN = "import sys; from szlib.workbook.cli import main; sys.exit(main(sys.argv[1:]))"
