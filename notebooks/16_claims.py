@@ -150,8 +150,8 @@ wide[list(dict.fromkeys(everywhere["data"]))]
 # | `"hull"` | nobody ever was | within 4 cm, 2,600 to 21,000 encounters, up to 2 % intruders | shrinks: 1.25 m with 36 strangers there, 0.35 m with 7,354 |
 # | `"respect"` | careful people keep out, compared with people who ignore each other | needs a null model: see below | stable: an edge, no extreme |
 #
-# Without `method`, the respect zone is taken where the null model has at least twice as many encounters as the
-# data and shows respect, else the quantile zone: on the plaza the latter, because few of its people would meet by chance.
+# Without `method`, the respect zone is taken where the data has 150 encounters, the null model twice as many, and they
+# show respect; else the quantile zone: on the plaza the latter, because few of its people would meet by chance.
 #
 # `"paper"` is the hull with 0.2 % of the samples removed and 20 neighbours. It fails at the paper's own size: with 16,000 encounters and 0.25 %
 # intruders it is 16 to 25 cm off, with 2 % more than 60 cm, because LOF with 20 neighbours compares an intruder with their own

@@ -46,6 +46,7 @@ from .zones import (
     NullTest,
     PairCorrelation,
     Pooled,
+    ReferenceZone,
     RespectRadius,
     SocialZone,
     draw_costmap,
@@ -54,6 +55,7 @@ from .zones import (
     null_test,
     pair_correlation,
     pool,
+    reference_zone,
     remove_outliers,
 )
 
@@ -79,6 +81,7 @@ __all__ = [
     "PlazaSettings",
     "Pooled",
     "ReadOptions",
+    "ReferenceZone",
     "Region",
     "RespectRadius",
     "Scenario",
@@ -116,6 +119,7 @@ __all__ = [
     "plaza",
     "pool",
     "read_tracks",
+    "reference_zone",
     "remove_outliers",
     "rollouts",
     "segment_distance",

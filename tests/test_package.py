@@ -32,12 +32,13 @@ PUBLIC = [
     "ATC_SQUARE", "AttentionalSpace", "DataError", "DataWarning", "DifferentialDrive", "Ellipse",
     "EncounterSettings", "ReadOptions",
     "Extraction", "Grid", "MEETINGS", "MPCCBF", "MPCSettings", "NullEncounters", "NullTest",
-    "PairCorrelation", "Person", "PlazaSettings", "Pooled", "Region",
+    "PairCorrelation", "Person", "PlazaSettings", "Pooled", "ReferenceZone", "Region",
     "SCENARIOS",
     "Scenario", "SimulationLog", "SocialZone", "SolverError", "Square", "Step", "SzlibError", "Tracker",
     "ZoneError", "as_area", "draw_costmap", "ellipse_distance", "encounter_kinds", "extract_days",
     "find_encounters", "impose_zone", "make_plaza", "minimum_enclosing_ellipse",
-    "null_encounters", "null_test", "of_kind", "pair_correlation", "pool", "read_tracks", "remove_outliers",
+    "null_encounters", "null_test", "of_kind", "pair_correlation", "pool", "read_tracks", "reference_zone",
+    "remove_outliers",
     "rollouts", "segment_distance", "simulate", "time_shifted", "walked_area",
 ]  # fmt: skip
 PROMISED = [

@@ -18,6 +18,7 @@ social_zone           `SocialZone`: all of it behind one name
 imposed_zone          a known zone on recorded paths, to test estimators with: `impose_zone`
 costmaps              zones around people as a costmap, for navigation stacks
 pooling               a quantity of the zones of several sites, pooled: `pool`
+reference_zones       zones of real people that szlib ships: `reference_zone`
 sensitivity           the zone with each parameter of the method varied alone
 """
 
@@ -30,6 +31,7 @@ from .occupancy import PairCorrelation, pair_correlation
 from .outliers import complementary_points, is_outlier, remove_outliers
 from .polar import PolarZone
 from .pooling import Pooled, pool
+from .reference_zones import ReferenceZone, reference_zone
 from .respect_profile import RespectRadius
 from .respect_significance import NullTest, null_test
 from .social_zone import SocialZone
@@ -37,8 +39,8 @@ from .uncertainty import count_by_side
 
 __all__ = [
     "BODY_RADIUS", "Ellipse", "Grid", "HullZone", "NullTest", "PairCorrelation",
-    "PairedSamples", "PolarZone", "Pooled", "RespectRadius", "SocialZone", "circle_around",
+    "PairedSamples", "PolarZone", "Pooled", "ReferenceZone", "RespectRadius", "SocialZone", "circle_around",
     "complementary_points", "count_by_side", "draw_costmap", "hull_vertices",
     "impose_zone", "is_outlier", "minimum_enclosing_ellipse", "minimum_enclosing_ellipse_of_curve",
-    "null_test", "pair_correlation", "pool", "remove_outliers", "slice_hull",
+    "null_test", "pair_correlation", "pool", "reference_zone", "remove_outliers", "slice_hull",
 ]  # fmt: skip

@@ -79,6 +79,7 @@ _KINDS = ("opposite", "crossing", "standing")
 _MIN_EVIDENCE = 20.0  # twice the log likelihood ratio of a zone against none: the 1 % level of 8 parameters
 _NULL_DRAWN = (4000, 8000)  # encounters drawn from the null model, at least and at most; else two for each
 _NULL_PER_ENCOUNTER = 2  # of the data
+_MIN_ENCOUNTERS = 150  # of the data within r_max: with fewer the zone reaches as far as nobody was seen
 _BANK, _BANK_SEED = 24, 0  # ellipses that say which samples may be the nearest
 _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
 _STARTS, _START_GAP = 3, 0.15  # number of best circles tried, and the least difference of their radii [m]
@@ -410,15 +411,16 @@ class RespectEstimator(Estimator):
     ) -> RespectEstimator | None:
         """The estimator where it is better than the quantile, else None.
 
-        The null model must hold twice as many encounters as the data, and the zone must fit better than none.
-        Parameters as in `from_samples`; `samples` need not hold the other person's view.
+        Within r_max, the data must hold 150 encounters of the kinds compared, and the null model twice as
+        many as the data. The zone must fit better than none. Parameters as in `from_samples`; `samples` need
+        not hold the other person's view.
         """
         if null is None or null.r_max != r_max or not {*_VIEWS[1]} <= {*samples} & {*null.samples}:
             return None
         try:
             estimator = cls.from_samples(samples, r_max=r_max, null=null)
-            enough = _NULL_PER_ENCOUNTER * len(estimator.data.kind)
-            is_large = estimator.parameters["null_encounters"] >= enough
+            n, n_null = len(estimator.data.kind), estimator.parameters["null_encounters"]
+            is_large = n >= _MIN_ENCOUNTERS and n_null >= _NULL_PER_ENCOUNTER * n
             return estimator if is_large and len(estimator.best) else None
         except ZoneError:  # nothing to compare, or no respect
             return None

@@ -152,8 +152,8 @@ class SocialZone:
         method : "quantile", "paper", "hull" or "respect". "paper" is the paper's method to the letter: LOF
             over samples with 20 neighbours removes 0.2 %, then hull, slices, ellipses. "hull" differs in one
             step: it judges whole encounters and removes as many as are outliers. Both zones shrink as the
-            data grows; the others do not. None: "respect" if the null model holds at least twice as many
-            encounters within r_max as the data and shows respect, else "quantile".
+            data grows; the others do not. None: "respect" if, within r_max, the data holds 150
+            encounters and the null model twice as many, and they show respect, else "quantile".
         r_max : distance within which people count [m].
         speeds : speeds of the zones [m/s].
         null : the null model, from `szlib.null_encounters`. "respect" needs it; with any method, the data is

@@ -220,6 +220,7 @@ def test_intervals_are_those_of_the_posterior(estimator: RespectEstimator) -> No
 # --- the default, and what is refused ----------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore:at 1.1 m/s fewer than 20")
 def test_the_default_is_the_quantile_where_the_null_model_is_small_or_shows_no_respect(
     data: pd.DataFrame, null: szlib.NullEncounters
 ) -> None:
@@ -230,6 +231,7 @@ def test_the_default_is_the_quantile_where_the_null_model_is_small_or_shows_no_r
     assert method(data, null_of(null.samples[null.samples["encounter"] < 1500])) == "quantile"
     assert method(passing_pairs(300, 60), null) == "quantile"
     assert method(data.drop(columns="other_speed"), null) == "quantile"
+    assert method(data[data["encounter"] < 200], null) == "quantile"
 
 
 def test_what_cannot_be_compared_is_refused(data: pd.DataFrame, null: szlib.NullEncounters) -> None:

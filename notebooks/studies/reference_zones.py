@@ -1,0 +1,115 @@
+"""The zones that szlib ships, from the real data: szlib/zones/reference_zones.json.
+
+python -m studies.reference_zones
+
+The data is looked for in $SZLIB_DATA_DIR (atc-1hz/ and gc/).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from studies.respect import data_and_null
+
+import szlib
+from szlib.files import write_file
+from szlib.zones.reference_zones import FILE
+
+SPEED = 1.1
+SOURCES = {
+    "atc-strangers": (
+        "atc-1hz",
+        "a day (2012-10-24) of the ATC mall in Osaka at 1 Hz, strangers",
+        "D. Brscic, T. Kanda, T. Ikeda, T. Miyashita: Person tracking in large public spaces using 3-D range "
+        "sensors. IEEE Trans. Human-Machine Systems 43(6), 2013",
+    ),
+    "grand-central-strangers": (
+        "grand-central",
+        "a video of the hall of Grand Central Station in New York, strangers",
+        "S. Yi, H. Li, X. Wang: Understanding pedestrian behaviors from stationary crowd groups. CVPR 2015",
+    ),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--cache", type=Path, default=Path("../results/null"))
+    asked = parser.parse_args()
+    zones = {name: fit(asked, site) for name, (site, _, _) in SOURCES.items()}
+    entries = {name: describe(name, zone) for name, zone in zones.items()}
+    entries["pooled-strangers"] = describe_pooled(zones)
+    entries["hall"] = {
+        "ellipse": {"center": [0.0, 0.0], "semi_axes": [1.2, 1.2], "angle": 0.0},
+        "intervals": {},
+        "n_encounters": 0,
+        "method": "far end of the personal distance",
+        "verdict": "undecided",
+        "reasons": ["it was not estimated from tracks"],
+        "source": "observations of middle-class adults in the north-east of the United States",
+        "cite": "E. T. Hall: The hidden dimension. Doubleday, 1966",
+    }
+    write_file(FILE, json.dumps(entries, indent=1) + "\n")
+    print(FILE.read_text(encoding="utf-8"))
+
+
+def fit(asked: argparse.Namespace, site: str) -> szlib.SocialZone:
+    """The zone of the strangers of a site."""
+    samples, null = data_and_null(site, asked)
+    strangers, model = szlib.of_kind(samples, "strangers"), null.of_kind("strangers")
+    with warnings.catch_warnings(action="ignore", category=szlib.DataWarning):  # the verdict says it
+        return szlib.SocialZone.fit(strangers, null=model, speeds=(0.9, SPEED, 1.3))
+
+
+def describe(name: str, zone: szlib.SocialZone) -> dict[str, Any]:
+    """The entry of a fitted zone: its ellipse, or the circle of respect where too few encounters give no ellipse."""
+    verdict, respect = zone.verdict(SPEED), zone.null_test.respect
+    if zone.method == "respect":
+        ellipse, method = zone.ellipses[SPEED], "respect"
+        row = zone.table().set_index("speed").loc[SPEED]
+        ends = {key: [row[f"{key}_low"], row[f"{key}_high"]] for key in ("a", "b", "center_x", "area")}
+        ends["radius"] = [np.sqrt(end / np.pi) for end in ends.pop("area")]
+    else:
+        ellipse = szlib.Ellipse((0.0, 0.0), (respect.radius, respect.radius))
+        method, ends = "radius of respect, all directions pooled", {"radius": [respect.low, respect.high]}
+    _, source, cite = SOURCES[name]
+    return {
+        "ellipse": {
+            "center": [round(value, 3) for value in ellipse.center],
+            "semi_axes": [round(value, 3) for value in ellipse.semi_axes],
+            "angle": round(ellipse.angle, 3),
+        },
+        "intervals": {key: [round(float(end), 3) for end in pair] for key, pair in sorted(ends.items())},
+        "n_encounters": int(zone.provenance["encounters"]),
+        "method": method,
+        "verdict": str(verdict),
+        "reasons": list(verdict.reasons),
+        "source": source,
+        "cite": cite,
+    }
+
+
+def describe_pooled(zones: dict[str, szlib.SocialZone]) -> dict[str, Any]:
+    """The entry of the circle with the mean radius of respect of all sites."""
+    radii = {name: zone.null_test.respect for name, zone in zones.items()}
+    pooled = szlib.pool({name: (each.radius, each.low, each.high) for name, each in radii.items()})
+    radius = round(pooled.mean, 3)
+    return {
+        "ellipse": {"center": [0.0, 0.0], "semi_axes": [radius, radius], "angle": 0.0},
+        "intervals": {"radius": [round(pooled.low, 3), round(pooled.high, 3)]},
+        "n_encounters": sum(int(zone.provenance["encounters"]) for zone in zones.values()),
+        "method": f"radius of respect, mean of {pooled.n_sites} sites, random effects",
+        "verdict": "undecided",
+        "reasons": [f"{pooled.n_sites} sites do not tell what to expect at a new one: {pooled}"],
+        "source": "; ".join(source for _, source, _ in SOURCES.values()),
+        "cite": "; ".join(cite for _, _, cite in SOURCES.values()),
+    }
+
+
+if __name__ == "__main__":
+    main()
