@@ -10,21 +10,22 @@ people who ignore each other, encounters of the kind k have values of h with the
 
 f is the share of careless people among those who would enter, and w the softness of the edge. A and c
 describe people who step aside: they are then seen just outside. The mix of kinds does not matter, because p
-is conditional on the kind. People who walk in the same direction are left out: on plazas with a known zone
-they alone moved the centre by 15 cm, because a shift in time also separates people who keep together. Both
-people's whole paths count, so that the centre is identified too: a fit of one person's view cannot tell how
-far a zone reaches ahead from how far it reaches behind.
+is conditional on the kind. Only people who come towards each other or cross are compared: on plazas with a
+known zone, those who walk in the same direction alone moved the centre by 15 cm, because a shift in time also
+separates people who keep together.
 
 The ellipse has a centre, a semi-axis along the motion and one across, and a shear. Centre and the logarithms
 of the semi-axes are linear in the speed of the person who carries it. Weak priors hold the semi-axes (0.8 m,
 with a standard deviation of 0.5 of the logarithm) and the logarithm of their ratio (0.4), the changes with
-speed (0.15 for each m/s), the sideways centre (0.15 m) and the shear (0.15).
+speed (0.15 for each m/s), and the shear (0.15). That of the centre (0, 0.15 m) matters: how far a zone
+reaches ahead is known well; how far it reaches behind, no pair tells if it reaches farther ahead, because a
+person behind me has me ahead. So the zone is as long behind as the data allows.
 
 The zone is the maximum of the posterior density. Its intervals are posterior ones, of the likelihood to the
 power 1 / (1 + n/m) for n encounters of the data and m of the null model, because both are random. They are
 meant to contain the true zone.
 
-Measured on zones imposed on real paths (`szlib.impose_zone`); see notebook 15.
+Measured on zones imposed on real paths (`szlib.impose_zone`): notebook 16.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ _VIEWS = (("los_angle", "speed"), ("other_los_angle", "other_speed"))
 
 # Parameter: lowest and highest value, mean and standard deviation of its prior.
 _PARAMETERS = {
-    "centre ahead [m]": (-0.5, 0.5, 0.0, np.inf),
+    "centre ahead [m]": (-0.5, 0.5, 0.0, 0.15),
     "its change with speed": (-0.5, 0.5, 0.0, 0.15),
     "centre to the left [m]": (-0.3, 0.3, 0.0, 0.15),
     "log semi-axis along [m]": (np.log(0.1), np.log(1.9), np.log(0.8), 0.5),
@@ -74,8 +75,8 @@ _LOW, _HIGH, _MEAN, _SPREAD = np.array(list(_PARAMETERS.values())).T
 _ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
 _FIRST_STEPS = np.array([0.05, 0.05, 0.02, 0.06, 0.06, 0.03, 0.05, 0.05, 0.3, 0.3, 0.7, 0.3])
 # Kinds of encounter that are compared.  People of one stream walk in the same direction, side by side or in
-# a row, for other reasons than respect, which a shift in time removes as well.
-_KINDS = ("opposite", "crossing", "standing")
+# a row, for other reasons than respect, which a shift in time removes as well. Who stands has no heading.
+_KINDS = ("opposite", "crossing")
 _MIN_EVIDENCE = 20.0  # twice the log likelihood ratio of a zone against none: the 1 % level of 8 parameters
 _NULL_DRAWN = (4000, 8000)  # encounters drawn from the null model, at least and at most; else two for each
 _NULL_PER_ENCOUNTER = 2  # of the data

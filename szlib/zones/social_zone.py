@@ -5,7 +5,7 @@
 quantile  all but a share q of the encounters stay outside; does not shrink as the data grows
 paper     (nearly) no person was ever inside: outliers, hull, slices, smallest ellipses (paper, sec. 2)
 hull      the same, but whole encounters are outliers, as many as there are (ours)
-respect   people are half as frequent inside as if they ignored each other
+respect   careful people keep out, compared with people who ignore each other
 
 It also estimates how certain the zone is: intervals, the number of encounters on each side, and the speeds at
 which this number is sufficient.
