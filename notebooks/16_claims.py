@@ -224,7 +224,7 @@ levels = levels.set_index(["clearance", "q"])[["a", "b"]]
 # Plazas are walked by our own rules. Real paths are not, but their truth is unknown. So a truth is imposed: of a
 # time-shifted crowd, in which nobody minds anybody, the pairs are removed in which one person enters the other's
 # ellipse, but for a share of careless pairs (`szlib.impose_zone`). What is left keeps a known zone on real paths.
-# What do the two estimators find there, and does the 95 % interval hold the *truth*? (`python -m studies.imposed 8`)
+# What do the two estimators find there, and does the 95 % interval hold the *truth*? (`python -m studies.imposed 6`)
 
 # %%
 imposed = record.committed_table("16_imposed", imposed_study.recompute, where="site == 'plaza'")

@@ -1,6 +1,6 @@
 """Zones imposed on recorded paths: how near estimates come, and how often their intervals hold the truth.
 
-python -m studies.imposed 20     16_imposed.csv
+python -m studies.imposed 6      16_imposed.csv
 
 Takes the number of draws of each case.  The table goes to notebooks/tables.  The real data is looked for in
 $SZLIB_DATA_DIR (atc-1hz/ and gc/).  The people of a time-shifted crowd get a known zone
