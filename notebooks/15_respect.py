@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [14 - Data quality](14_data_quality.ipynb) · next: [16 - What is
-# true?](16_claims.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 20 min to read
+# true?](16_claims.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 30 min to read
 #
 # **Afterwards you can** tell respect from emptiness by a null model.
 

@@ -244,17 +244,28 @@ record.check(
 by_estimator.unstack().round(2)
 
 # %%
-fig, panels = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
 looks = {"respect": (figures.GREEN, "^-"), "quantile": (figures.BLUE, "s--")}
-for ax, quantity in zip(panels, ("a", "b"), strict=True):
-    of_one = imposed[(imposed["quantity"] == quantity) & (imposed["site"] == "grand-central")]
-    for method, (shade, mark) in looks.items():
-        line = of_one[of_one["method"] == method].groupby("encounters")[["bias", "held"]].mean()
-        ax.plot(line.index, 100 * line["bias"], mark, color=shade, label=method)
-    ax.axhline(0, color=figures.GREY, linewidth=1)
-    ax.set(xscale="log", xlabel="encounters", ylabel=f"mean error of {quantity} [cm]")
+fig, panels = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
+of_site = errors[errors["site"] == "grand-central"].assign(error=lambda t: 100 * t["error"])
+for method, part in of_site.groupby("method"):
+    shade, mark = looks[method]
+    of_b, of_all = part[part["quantity"] == "b"], part.assign(held=100 * part["held"])
+    for ax, line in zip(
+        panels, (of_b.groupby("encounters")["error"], of_all.groupby("encounters")["held"]), strict=True
+    ):
+        ax.plot(line.mean(), mark, color=shade, label=method)
+panels[1].axhspan(90, 98, color=figures.GREY, alpha=0.3, label="as it should be")
+sizes = sorted(of_site["encounters"].unique())
+for ax, name in zip(
+    panels, ("error of the semi-axis b [cm]", "intervals that hold the truth [%]"), strict=True
+):
+    ax.set(xscale="log", xlabel="encounters", ylabel=name, ylim=(0, None))
+    ax.set_xticks(sizes, [f"{n:,}" for n in sizes])
+    ax.minorticks_off()
     ax.legend()
-fig.suptitle("A known zone on the paths of Grand Central: the respect zone is nearer to it")
+fig.suptitle(
+    "A known zone on the paths of Grand Central: the respect zone and its intervals come nearer to it"
+)
 record.figure(fig, "imposed")
 
 # %% [markdown]
@@ -268,6 +279,9 @@ radii = read_table("15_sites").query("kinds == 'strangers' and site != 'plaza'")
 sites = {name: tuple(row) for name, row in radii[["radius", "radius_low", "radius_high"]].iterrows()}
 pooled = szlib.pool(sites)
 ax = figures.plot_forest(pooled)
+ax.set_xlim(0.25, 4.0)
+ax.set_xticks([0.25, 0.5, 1.0, 2.0, 4.0], ["0.25", "0.5", "1", "2", "4"])
+ax.set_title("Two sites differ by more than their intervals")
 record.figure(ax.figure, "forest")
 print(pooled)
 

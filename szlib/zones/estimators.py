@@ -66,7 +66,7 @@ class Estimator(ABC):
         """
 
     def draw_posterior(self, n: int, speeds: Sequence[float], rng: np.random.Generator) -> Array | None:
-        """Draw `n` ellipses at `speeds` from the posterior, as those of `refit`; None: has no posterior."""
+        """Draw `n` ellipses at `speeds` with `rng` from the posterior, as in `refit`; None: it has none."""
         return None
 
     @abstractmethod

@@ -223,7 +223,11 @@ def _minus_log_prior(p: Array) -> tuple[float, Array]:
 class _Likelihood:
     """The likelihood of weighted encounters of the data, given those of the null model.
 
-    `kinds` holds, for each kind of encounter, whether each of the data and of the null model is of it.
+    Parameters
+    ----------
+    data, null : the encounters.
+    weights : of the encounters of the data, shape (k,).
+    kinds : for each kind of encounter, whether each of the data and of the null model is of it.
     """
 
     data: PairPaths
@@ -233,6 +237,7 @@ class _Likelihood:
 
     @classmethod
     def of(cls, data: PairPaths, null: PairPaths, weights: Array | None = None) -> _Likelihood:
+        """Compare the kinds that both have; `weights` None: equal weights."""
         weights = np.ones(len(data.kind)) if weights is None else weights
         return cls(
             data, null, weights, [(data.kind == kind, null.kind == kind) for kind in np.unique(data.kind)]
@@ -413,8 +418,8 @@ class RespectEstimator(Estimator):
         """The estimator where it is better than the quantile, else None.
 
         Within r_max, the data must hold 150 encounters of the kinds compared, and the null model twice as
-        many as the data. The zone must fit better than none. Parameters as in `from_samples`; `samples` need
-        not hold the other person's view.
+        many as the data. The zone must fit better than none. `samples`, `r_max` and `null` are as in
+        `from_samples`; the samples need not hold the other person's view.
         """
         if null is None or null.r_max != r_max or not {*_VIEWS[1]} <= {*samples} & {*null.samples}:
             return None
@@ -458,7 +463,7 @@ class RespectEstimator(Estimator):
         return _ellipses(np.array(fits), speeds)
 
     def draw_posterior(self, n: int, speeds: Sequence[float], rng: np.random.Generator) -> Array:
-        """Draw `n` ellipses from the posterior, shape (n, s, 5)."""
+        """Draw `n` ellipses at `speeds` (s,) [m/s] with `rng` from the posterior, shape (n, s, 5)."""
         return _ellipses(self.draws[rng.integers(len(self.draws), size=n)], speeds)
 
     def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
