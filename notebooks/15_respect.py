@@ -157,7 +157,7 @@ record.key["respect radius, strangers [m]"] = radius
 #
 # - $R$ is the **radius of the respect zone**: there, careful people are half as frequent as by chance;
 # - $w$ is the softness of the edge;
-# - $f$ is the share of careless people: those who enter although someone is there.
+# - $f$ is the share of careless people, who enter the zones of others.
 #
 # `szlib.null_test(samples, null).respect` tries all $R$, $w$ and $f$ of a fine grid. The interval holds every $R$
 # that explains the data nearly as well as the best one (95 %).
@@ -195,9 +195,9 @@ record.figure(fig, "nearest")
 # ## Is it respect at all?
 #
 # If people ignored each other, the data would be just one more shifted day. Its rank among the null models
-# is then a p-value, whatever is measured. What is measured: do too few of those who come near come very
-# near? Each kind of encounter is compared with the same kind, because shifts in time also change who meets
-# whom: people who come in a bunch walk the same way, without any respect.
+# is then a p-value, for any statistic. Ours asks: of the people who come near, do too few come very near?
+# Each kind of encounter is compared with the same kind, because shifts in time also change the mix of kinds:
+# people who arrive in a group walk in the same direction, for other reasons than respect.
 
 # %%
 for name, test in tests.items():

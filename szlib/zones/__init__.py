@@ -9,6 +9,7 @@ hulls                 the zone outside the convex hull over (x', y', speed): est
 quantile              the zone that all but a share of encounters stay outside: estimator "quantile"
 occupancy             the map of the pair correlation
 respect               the ellipse that careful people keep out of, by the null model: estimator "respect"
+respect_likelihood    its likelihood, and the posterior of its parameters
 respect_profile       its radius from nearest approaches, all directions pooled, with an interval
 respect_significance  the test of the data against its null model
 uncertainty           encounters by side, and confidence intervals by resampling people

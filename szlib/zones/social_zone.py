@@ -188,7 +188,9 @@ class SocialZone:
         fitted_speeds = sorted({float(speed) for speed in speeds})
         if not fitted_speeds:
             raise ZoneError("no speed has a zone: `speeds` is empty")
-        better = RespectEstimator.where_better(samples, r_max=r_max, null=null) if method is None else None
+        better = None
+        if method is None:
+            better = RespectEstimator.where_better(samples, fitted_speeds, r_max=r_max, null=null)
         method = method or ("quantile" if better is None else "respect")
         if method == "respect":
             options = {"null": null}

@@ -11,8 +11,9 @@ from scipy.special import expit
 
 import szlib
 from szlib.encounters.kinds import WALKING
-from szlib.zones import respect
-from szlib.zones.respect import PairPaths, RespectEstimator
+from szlib.zones import respect_likelihood
+from szlib.zones.respect import RespectEstimator
+from szlib.zones.respect_likelihood import Likelihood, PairPaths
 from szlib.zones.uncertainty import estimate_uncertainty
 
 ZONE = szlib.Ellipse((0.1, 0.0), (0.95, 0.7))
@@ -24,7 +25,7 @@ def prepare(samples: pd.DataFrame, null: szlib.NullEncounters) -> RespectEstimat
 
 def fitted(samples: pd.DataFrame, null: szlib.NullEncounters, speed: float = 1.1) -> np.ndarray:
     """Centre, semi-axes and angle."""
-    return respect._ellipses(prepare(samples, null).best[None], [speed])[0, 0]
+    return respect_likelihood.zone_ellipses(prepare(samples, null).best[None], [speed])[0, 0]
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +49,7 @@ def estimator(data: pd.DataFrame, null: szlib.NullEncounters) -> RespectEstimato
 
 
 def random_parameters(seed: int) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(0.7 * respect._LOW, 0.7 * respect._HIGH)
+    return np.random.default_rng(seed).uniform(0.7 * respect_likelihood._LOW, 0.7 * respect_likelihood._HIGH)
 
 
 # --- truth -------------------------------------------------------------------------------------------
@@ -103,14 +104,14 @@ def test_a_mirror_image_has_the_mirrored_zone(
         return samples.assign(**{name: -samples[name] for name in ("los_angle", "other_los_angle")})
 
     found = fitted(mirror(data), null_of(mirror(null.samples)))
-    expected = respect._ellipses(estimator.best[None], [1.1])[0, 0]
+    expected = respect_likelihood.zone_ellipses(estimator.best[None], [1.1])[0, 0]
     assert found == pytest.approx(expected * [1, -1, 1, 1, -1], abs=0.02)
 
 
 def test_the_order_of_rows_does_not_matter(
     data: pd.DataFrame, null: szlib.NullEncounters, estimator: RespectEstimator
 ) -> None:
-    expected = respect._ellipses(estimator.best[None], [1.1])[0, 0]
+    expected = respect_likelihood.zone_ellipses(estimator.best[None], [1.1])[0, 0]
     found = fitted(data.sample(frac=1, random_state=0), null)
     assert found == pytest.approx(expected, abs=0.005), "to the accuracy of the optimiser"
 
@@ -121,8 +122,8 @@ def test_a_weight_of_two_is_an_encounter_twice(data: pd.DataFrame, null: szlib.N
     twice = PairPaths.from_samples(pd.concat([few, few.assign(encounter=few["encounter"] + 10_000)]))
     model = PairPaths.from_samples(null.samples)
     p = random_parameters(3)
-    weighted = respect._Likelihood.of(once, model, np.full(len(once.kind), 2.0)).cost(p)
-    repeated = respect._Likelihood.of(twice, model).cost(p)
+    weighted = Likelihood.of(once, model, np.full(len(once.kind), 2.0)).cost(p)
+    repeated = Likelihood.of(twice, model).cost(p)
     assert weighted[0] == pytest.approx(repeated[0])
     assert weighted[1] == pytest.approx(repeated[1])
 
@@ -168,7 +169,7 @@ def test_distances_are_those_of_a_loop_over_all_samples(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_the_gradient_is_that_of_finite_differences(seed: int, estimator: RespectEstimator) -> None:
     weights = np.random.default_rng(seed).random(len(estimator.data.kind))
-    likelihood = respect._Likelihood.of(estimator.data, estimator.null, weights)
+    likelihood = Likelihood.of(estimator.data, estimator.null, weights)
     p = random_parameters(seed)
     expected = approx_fprime(p, lambda q: likelihood.cost(q)[0], 1e-7)
     assert likelihood.cost(p)[1] == pytest.approx(expected, abs=2e-2, rel=1e-3)
@@ -185,13 +186,13 @@ def test_the_likelihood_is_that_of_the_formula(estimator: RespectEstimator) -> N
     for kind in ("opposite", "crossing"):
         mean = np.mean([g(x) for x in h_null[estimator.null.kind == kind]])
         total += sum(np.log(g(x) / mean) for x in h[estimator.data.kind == kind])
-    likelihood = respect._Likelihood.of(estimator.data, estimator.null)
+    likelihood = Likelihood.of(estimator.data, estimator.null)
     assert likelihood.log_ratios(p).sum() == pytest.approx(total)
 
 
 def test_the_posterior_has_the_curvature_of_its_density(estimator: RespectEstimator) -> None:
     """Of well determined parameters the standard deviation is that of the Gaussian with this curvature."""
-    likelihood = respect._Likelihood.of(estimator.data, estimator.null)
+    likelihood = Likelihood.of(estimator.data, estimator.null)
     names, step = [3, 5], 0.02
 
     def value(q: np.ndarray) -> float:
@@ -233,6 +234,17 @@ def test_the_default_is_the_quantile_where_the_null_model_is_small_or_shows_no_r
     assert method(passing_pairs(300, 60), null) == "quantile"
     assert method(data.drop(columns="other_speed"), null) == "quantile"
     assert method(data[data["encounter"] < 200], null) == "quantile"
+
+
+def test_a_zone_that_does_not_contain_its_person_is_no_default(
+    data: pd.DataFrame, null: szlib.NullEncounters, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shifted = np.zeros(12)
+    shifted[[0, 3, 5]] = 0.5, np.log(0.4), np.log(0.4)
+    monkeypatch.setattr(RespectEstimator, "best", shifted)
+    with pytest.raises(szlib.ZoneError, match="does not contain its person"):
+        szlib.SocialZone.fit(data, method="respect", null=null, speeds=(1.1,), n_resamples=0)
+    assert szlib.SocialZone.fit(data, null=null, speeds=(1.1,), n_resamples=0).method == "quantile"
 
 
 def test_what_cannot_be_compared_is_refused(data: pd.DataFrame, null: szlib.NullEncounters) -> None:

@@ -1,0 +1,309 @@
+"""The likelihood of the respect zone, and the posterior of its parameters: the formulas are in `respect`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import expit
+from threadpoolctl import ThreadpoolController
+
+from ..checks import Array, check_columns, check_rows
+from ..encounters.kinds import WALKING
+from .outliers import encounter_numbers
+from .quantile import smooth_paths
+
+REFERENCE_SPEED = 1.1  # at which the parameters describe the ellipse [m/s]
+_SPEED_BOUNDS = (0.3, 2.0)  # slower and faster people carry the ellipse of these speeds [m/s]
+# Columns of the samples: direction of the other person, and speed, of each of the two people.
+VIEWS = (("los_angle", "speed"), ("other_los_angle", "other_speed"))
+
+# Parameter: lowest and highest value, mean and standard deviation of its prior.
+_PARAMETERS = {
+    "centre ahead [m]": (-0.5, 0.5, 0.0, 0.15),
+    "its change with speed": (-0.5, 0.5, 0.0, 0.15),
+    "centre to the left [m]": (-0.3, 0.3, 0.0, 0.15),
+    "log semi-axis along [m]": (np.log(0.1), np.log(1.9), np.log(0.8), 0.5),
+    "its change with speed ": (-0.6, 0.6, 0.0, 0.15),
+    "log semi-axis across [m]": (np.log(0.1), np.log(1.9), np.log(0.8), 0.5),
+    "its change with speed  ": (-0.6, 0.6, 0.0, 0.15),
+    "shear": (-0.6, 0.6, 0.0, 0.15),
+    "logit f": (-6.0, 1.5, 0.0, np.inf),
+    "log w [m]": (np.log(0.015), np.log(0.3), 0.0, np.inf),
+    "log A": (-5.0, 8.0, -3.0, 2.0),
+    "log c [m]": (np.log(0.08), np.log(0.6), 0.0, np.inf),
+}
+_LOW, _HIGH, _MEAN, _SPREAD = np.array(list(_PARAMETERS.values())).T
+_ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
+_FIRST_STEPS = np.array([0.05, 0.05, 0.02, 0.06, 0.06, 0.03, 0.05, 0.05, 0.3, 0.3, 0.7, 0.3])
+_BANK, _BANK_SEED = 24, 0  # ellipses that say which samples may be the nearest
+_RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
+_STARTS, _START_GAP = 3, 0.15  # number of best circles tried, and the least difference of their radii [m]
+_STEPS, _BURN_IN, _ADAPT, _ACCEPTED = 6000, 2000, 250, 0.25  # of the Metropolis chain
+
+
+@dataclass(frozen=True, eq=False)
+class PairPaths:
+    """Where each person of each encounter was in the other's frame: the samples that may be the nearest.
+
+    Parameters
+    ----------
+    x, y : position in the frame of the person who carries the ellipse, shape (n,) [m].
+    speed : of that person, relative to `REFERENCE_SPEED`, shape (n,) [m/s].
+    encounter : row of the encounter of each sample, ascending, shape (n,).
+    first : first sample of each encounter, shape (k,).
+    kind : of each encounter, shape (k,).
+    encounters : one row for each encounter.
+    """
+
+    x: Array
+    y: Array
+    speed: Array
+    encounter: NDArray[np.intp]
+    first: NDArray[np.intp]
+    kind: NDArray[np.object_]
+    encounters: pd.DataFrame
+
+    @classmethod
+    def from_samples(cls, samples: pd.DataFrame) -> PairPaths:
+        """Prepare `samples` as from `szlib.find_encounters`.
+
+        Raises DataError if a column is missing or a value is not finite.
+        """
+        columns = ["distance", *VIEWS[0]]
+        check_columns(samples, ["encounter", *columns, *VIEWS[1]])
+        is_finite = np.isfinite(samples[columns].to_numpy(float)).all(axis=1)
+        check_rows(samples, is_finite, columns, "expected finite numbers")
+        number, encounters = encounter_numbers(samples)
+        points, speeds, rows = [], [], []
+        for angle, own_speed in VIEWS:
+            theta, r = smooth_paths(samples, angle)
+            own, path = samples[own_speed].to_numpy(float), r * np.exp(1j * theta)
+            # A person who stands has no direction of motion, and one of unknown velocity has none either.
+            has_zone = np.isfinite(path) & (own >= (WALKING if own_speed == "other_speed" else 0.0))
+            points.append(path[has_zone])
+            speeds.append(np.clip(own[has_zone], *_SPEED_BOUNDS) - REFERENCE_SPEED)
+            rows.append(number[has_zone])
+        z, speed, row = map(np.concatenate, (points, speeds, rows))
+        order = np.argsort(row, kind="stable")
+        z, speed, row = z[order], speed[order], row[order]
+        first = np.flatnonzero(np.diff(row, prepend=-1))
+        may_be_nearest = np.zeros(len(row), bool)
+        for p in _bank():
+            level = _level(z.real, z.imag, speed, p)[0]
+            may_be_nearest |= level == np.minimum.reduceat(level, first)[row]
+        kept = row[may_be_nearest]
+        names = encounters["kind"].to_numpy(object) if "kind" in encounters else np.full(len(encounters), "")
+        return cls(
+            x=z.real[may_be_nearest],
+            y=z.imag[may_be_nearest],
+            speed=speed[may_be_nearest],
+            encounter=kept,
+            first=np.flatnonzero(np.diff(kept, prepend=-1)),
+            kind=names,
+            encounters=encounters,
+        )
+
+    def distances(self, p: Array, *, gradient: bool = False) -> tuple[Array, Array]:
+        """h of each encounter for the parameters `p`, shape (k,) [m].
+
+        With `gradient` also its derivatives by the first eight parameters, shape (k, 8); else an empty array.
+        """
+        level, u, v, log_a, log_b = _level(self.x, self.y, self.speed, p)
+        least = level == np.minimum.reduceat(level, self.first)[self.encounter]
+        at = np.flatnonzero(least)
+        at = at[np.flatnonzero(np.diff(self.encounter[at], prepend=-1))]  # the first of equal ones
+        r, scale = np.sqrt(level[at]), np.exp((log_a[at] + log_b[at]) / 2)
+        h = (r - 1) * scale
+        if not gradient:
+            return h, np.empty(0)
+        u, v, speed, log_a, log_b = u[at], v[at], self.speed[at], log_a[at], log_b[at]
+        k = scale / np.maximum(r, 1e-9)
+        by_y = k * v * np.exp(-log_b)
+        by_x = k * u * np.exp(-log_a) - by_y * p[7]
+        by_a, by_b = h / 2 - k * u * u, h / 2 - k * v * v
+        shear = -by_y * u * np.exp(log_a)
+        slopes = (-by_x, -by_x * speed, -by_y, by_a, by_a * speed, by_b, by_b * speed, shear)
+        return h, np.stack(slopes, axis=1)
+
+
+def _level(x: Array, y: Array, speed: Array, p: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """The squared norm of points in which the ellipse of `p` is the unit circle, and what it is made of."""
+    log_a, log_b = p[3] + p[4] * speed, p[5] + p[6] * speed
+    ahead = x - p[0] - p[1] * speed
+    u, v = ahead * np.exp(-log_a), (y - p[2] - p[7] * ahead) * np.exp(-log_b)
+    return u * u + v * v, u, v, log_a, log_b
+
+
+@cache
+def _bank() -> list[Array]:
+    """Parameters of ellipses of all forms."""
+    rng, bank = np.random.default_rng(_BANK_SEED), []
+    for _ in range(_BANK):
+        p = np.zeros(len(_PARAMETERS))
+        p[0], p[2], p[7] = rng.uniform(-0.25, 0.25), rng.uniform(-0.1, 0.1), rng.uniform(-0.3, 0.3)
+        p[3], p[5] = rng.uniform(np.log(0.35), np.log(1.5)), rng.uniform(np.log(0.35), np.log(1.3))
+        bank.append(p)
+    return bank
+
+
+def _factor(h: Array, p: Array) -> Array:
+    """g(h), shape (k,)."""
+    f, (w, excess, reach) = expit(p[8]), np.exp(p[9:])
+    return np.asarray(f + (1 - f) * expit(h / w) * (1 + excess * np.exp(-np.maximum(h, 0) / reach)))
+
+
+def _factor_and_slopes(h: Array, p: Array) -> tuple[Array, Array, Array]:
+    """g(h) (k,), its derivative by h (k,), and by the last four parameters (k, 4)."""
+    f, (w, excess, reach) = expit(p[8]), np.exp(p[9:])
+    s, outside = expit(h / w), np.maximum(h, 0) / reach
+    near = excess * np.exp(-outside)
+    g, out = f + (1 - f) * s * (1 + near), (1 - f) * s
+    by_h = out * ((1 - s) / w * (1 + near) - near / reach * (h > 0))
+    by_f, by_w = f * (1 - f) * (1 - s * (1 + near)), -out * (1 - s) * (1 + near) * h / w
+    return g, by_h, np.stack([by_f, by_w, out * near, out * near * outside], axis=1)
+
+
+def _minus_log_prior(p: Array) -> tuple[float, Array]:
+    """Minus the logarithm of the prior density, up to a constant, and its gradient."""
+    deviation, elongation = (p - _MEAN) / _SPREAD, (p[3] - p[5]) / _ELONGATION
+    gradient = deviation / _SPREAD
+    gradient[3] += elongation / _ELONGATION
+    gradient[5] -= elongation / _ELONGATION
+    return float((deviation**2).sum() + elongation**2) / 2, gradient
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """The likelihood of weighted encounters of the data, given those of the null model.
+
+    Parameters
+    ----------
+    data, null : the encounters.
+    weights : of the encounters of the data, shape (k,).
+    kinds : for each kind of encounter, whether each of the data and of the null model is of it.
+    """
+
+    data: PairPaths
+    null: PairPaths
+    weights: Array
+    kinds: list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]
+
+    @classmethod
+    def of(cls, data: PairPaths, null: PairPaths, weights: Array | None = None) -> Likelihood:
+        """Compare the kinds of `data` with those of `null`; `weights` None: equal weights."""
+        weights = np.ones(len(data.kind)) if weights is None else weights
+        return cls(
+            data, null, weights, [(data.kind == kind, null.kind == kind) for kind in np.unique(data.kind)]
+        )
+
+    @property
+    def power(self) -> float:
+        """The power of the likelihood in the posterior, since the null model is random as well."""
+        return float(1 / (1 + self.weights.sum() / len(self.null.kind)))
+
+    def log_ratios(self, p: Array) -> Array:
+        """Log likelihood ratio of the parameters `p` against no zone, of each encounter, shape (k,)."""
+        g, against = (_factor(each.distances(p)[0], p) for each in (self.data, self.null))
+        out = np.log(g)
+        for of_data, of_null in self.kinds:
+            out[of_data] -= np.log(against[of_null].mean())
+        return np.asarray(self.weights * out)
+
+    def log_posterior(self, p: Array) -> float:
+        """The logarithm of the posterior density of the parameters `p`, up to a constant."""
+        if (p < _LOW).any() or (p > _HIGH).any():
+            return -np.inf
+        return float(self.power * self.log_ratios(p).sum() - _minus_log_prior(p)[0])
+
+    def cost(self, p: Array) -> tuple[float, Array]:
+        """Minus the log likelihood of the parameters `p` with the priors, and its gradient."""
+        (h, slope), (h_null, slope_null) = (
+            each.distances(p, gradient=True) for each in (self.data, self.null)
+        )
+        (g, by_h, by_p), (g_null, by_h_null, by_p_null) = (
+            _factor_and_slopes(each, p) for each in (h, h_null)
+        )
+        per, per_null, value = self.weights / g, np.zeros(len(g_null)), self.weights @ np.log(g)
+        for of_data, of_null in self.kinds:
+            n, total = self.weights[of_data].sum(), g_null[of_null].sum()
+            value -= n * np.log(total / of_null.sum())
+            per_null[of_null] = n / total
+        by_ellipse = (per_null * by_h_null) @ slope_null - (per * by_h) @ slope
+        gradient = np.concatenate([by_ellipse, per_null @ by_p_null - per @ by_p])
+        prior, by_prior = _minus_log_prior(p)
+        return prior - float(value), gradient + by_prior
+
+    def maximise(self, starts: Sequence[Array]) -> Array:
+        """The best parameters found from several `starts`."""
+        bounds = list(zip(_LOW, _HIGH, strict=True))
+        with threads().limit(limits=1):  # several threads take ten times as long for small products
+            tries = [minimize(self.cost, p, jac=True, method="L-BFGS-B", bounds=bounds) for p in starts]
+        return np.asarray(min(tries, key=lambda found: float(found.fun)).x)
+
+    def starts(self) -> list[Array]:
+        """The best circles of a grid of radii, edges and shares."""
+        circle = np.zeros(len(_PARAMETERS))
+        circle[11] = np.log(0.12)
+        near = [each.distances(circle)[0] + 1 for each in (self.data, self.null)]  # the nearest approaches
+        found = []
+        for radius, f, w, excess in product(_RADII.tolist(), (-3, -1), np.log([0.05, 0.15]), (-2, 2, 5)):
+            p = circle.copy()
+            p[3], p[5], p[8:11] = np.log(1.1 * radius), np.log(0.9 * radius), (f, w, excess)
+            g, against = (_factor(each - radius, p) for each in near)
+            value = self.weights @ np.log(g) - _minus_log_prior(p)[0]
+            for of_data, of_null in self.kinds:
+                value -= self.weights[of_data].sum() * np.log(against[of_null].mean())
+            found.append((float(value), radius, p))
+        best: list[tuple[float, float, Array]] = []
+        for each in sorted(found, key=lambda found: -found[0]):
+            if all(abs(each[1] - other[1]) > _START_GAP for other in best):
+                best.append(each)
+        return [p for _, _, p in best[:_STARTS]]
+
+    def draw(self, start: Array, rng: np.random.Generator) -> Array:
+        """Draw parameters from the posterior (adaptive Metropolis; Haario et al., Bernoulli 7, 2001).
+
+        The chain begins at `start` and is random by `rng`. The steps have the covariance of the second half
+        of the chain so far.
+        """
+        size = len(start)
+        p = np.clip(start, _LOW + 1e-3, _HIGH - 1e-3)
+        value, chain = self.log_posterior(p), np.empty((_STEPS, size))
+        root, scale, accepted = np.diag(_FIRST_STEPS), 0.5, 0
+        for k in range(_STEPS):
+            if k and k % _ADAPT == 0:
+                root = np.linalg.cholesky(np.cov(chain[k // 2 : k].T) + 1e-7 * np.eye(size))
+                scale, accepted = scale * np.exp(2 * (accepted / _ADAPT - _ACCEPTED)), 0
+            proposed = p + scale * 2.38 / np.sqrt(size) * root @ rng.normal(size=size)
+            there = self.log_posterior(proposed)
+            if np.log(rng.random()) < there - value:
+                p, value, accepted = proposed, there, accepted + 1
+            chain[k] = p
+        return chain[_BURN_IN:]
+
+
+@cache
+def threads() -> ThreadpoolController:
+    """The threads of the loaded libraries; cached, because finding them takes as long as one fit."""
+    return ThreadpoolController()
+
+
+def zone_ellipses(parameters: Array, speeds: Sequence[float]) -> Array:
+    """Ellipses (k, s, 5), as those of `fit_ellipses`, for `parameters` (k, 12) at `speeds` (s,) [m/s]."""
+    p = np.asarray(parameters)[:, None, :]
+    speed = np.clip(np.asarray(speeds, float), *_SPEED_BOUNDS) - REFERENCE_SPEED
+    along, across = np.exp(-p[..., 3] - p[..., 4] * speed), np.exp(-p[..., 5] - p[..., 6] * speed)
+    shear = -p[..., 7] * across
+    form = np.stack([along**2 + shear**2, shear * across, shear * across, across**2], axis=-1)
+    values, vectors = np.linalg.eigh(form.reshape(*along.shape, 2, 2))
+    major = vectors[..., 0]
+    angle = np.pi / 2 - (np.pi / 2 - np.arctan2(major[..., 1], major[..., 0])) % np.pi
+    centre = p[..., 0] + p[..., 1] * speed, np.broadcast_to(p[..., 2], along.shape)
+    return np.stack([*centre, values[..., 0] ** -0.5, values[..., 1] ** -0.5, angle], axis=-1)
