@@ -7,6 +7,7 @@ person                a person as the controller sees them: `Person`
 tracker               people from one measurement to the next: `Tracker`
 head_on               on which side the robot passes a person whom it meets head-on
 controller            the base class of controllers, and the robots that they drive: `Controller`
+routes                the shortest way around walls: `find_route`
 scene                 what a step is asked
 step_report           a step checked again by formulas of its own: `StepReport`
 step                  what the controller decided: `Step`
@@ -30,6 +31,7 @@ from .distances import (
 )
 from .mpc import MPCCBF
 from .person import Person
+from .routes import find_route
 from .scene import Scene
 from .settings import MPCSettings
 from .step import FALLBACKS, Step

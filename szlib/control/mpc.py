@@ -26,6 +26,7 @@ h(x_{N+1}, N+1) = h(x_N, N), and the problem is recursively feasible although th
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
+from math import dist
 from threading import get_ident
 from time import perf_counter
 from typing import Any
@@ -34,7 +35,7 @@ from warnings import catch_warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_point, check_vector, require
+from ..checks import Array, check_array, check_point, check_vector, require
 from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import Ellipse, circle_around
 from .barriers import read_walls
@@ -42,6 +43,7 @@ from .controller import Controller
 from .distances import walls_with_margins
 from .head_on import find_target
 from .person import Person, SpeedZone, as_ellipse, place_zone
+from .routes import Point, RoutePlanner, find_boxes
 from .scene import Scene
 from .settings import MPCSettings
 from .solvers.fallbacks import solve_with_fallbacks
@@ -124,6 +126,7 @@ class MPCCBF(Controller):
         if self.settings.terminal == "person" and len(segments):
             raise SolverError(f"terminal='person' is for open space; got {len(segments)} walls; use 'rest'")
         self.walls, self._wall_rows = segments, walls_with_margins(segments, self.settings)
+        self._planner: RoutePlanner | None = None
 
     def set_walls(self, walls: Any) -> None:
         """Replace the walls, from the next step on.
@@ -155,6 +158,8 @@ class MPCCBF(Controller):
         self._moved, self._n_people = False, 0
         self.tracker.reset()
         self._pool.reset()
+        if self._planner:
+            self._planner.reset()
 
     def step(
         self,
@@ -165,6 +170,7 @@ class MPCCBF(Controller):
         ids: Iterable[Hashable] | None = None,
         stamps: ArrayLike | None = None,
         now: float | None = None,
+        route: ArrayLike | None = None,
     ) -> Step:
         """Decide the acceleration for the next `dt`.
 
@@ -186,6 +192,10 @@ class MPCCBF(Controller):
             `Person`s. See `Tracker`.
         stamps : when they were measured, one time for each or one for all [s]; default: now.
         now : time, by the same clock [s]; default: `dt` after the last step.
+        route : a way to the goal from a global planner, corners, shape (m, 2) [m]. The plan heads for its
+            farthest point in sight, at most `settings.lookahead` ahead of where the route passes the robot;
+            the people and walls on it are avoided as always. Default: a route of its own (`find_route`) if
+            `settings.lookahead` is finite, else none.
 
         Raises
         ------
@@ -200,11 +210,12 @@ class MPCCBF(Controller):
         self._now = self._clock(now, stamps)
         tracked = self.tracker.see(people, now=self._now, ids=ids, stamps=stamps)
         scene = self._scene(x, towards, tracked)
+        ahead, way_length = self._look_ahead((x[0], x[1]), towards, route)
         first, self._moved, self._n_people = not self._moved, True, len(scene.zones)
         solver = self._pool.get(self._n_people, len(self.walls))
         self._pool.budget.begin()
         size = solver.evaluate.size
-        parameters = self._parameters(x, scene, size)
+        parameters = self._parameters(x, ahead, scene, size)
         fallback, plan, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
         self._change = np.zeros(plan.inputs.size) if first else plan.inputs - self._plan
         self._plan, rows = plan.inputs, active_rows(self._n_people, len(self.walls), size)
@@ -220,7 +231,19 @@ class MPCCBF(Controller):
             solve_time=perf_counter() - began,
             timed_out=timed_out,
             scene=scene,
+            way_length=way_length,
         )
+
+    def _look_ahead(self, at: Point, goal: Point, route: ArrayLike | None) -> tuple[Point, float]:
+        """The point of the route that attracts the plan, and the length of the way to the `goal` [m]."""
+        s = self.settings
+        if route is None and s.lookahead == np.inf:
+            return goal, dist(at, goal)
+        if self._planner is None:
+            self._planner = RoutePlanner(self.walls, find_boxes(self._wall_rows, s.r_robot))
+        if route is None:
+            return self._planner.aim(at, goal, s.lookahead)
+        return self._planner.follow(check_array("route", route, (..., 2)), at, goal, s.lookahead)
 
     def _scene(self, state: Sequence[float], goal: tuple[float, float], tracked: TrackedPeople) -> Scene:
         """What the step is asked, with the zone of every person."""
@@ -228,13 +251,13 @@ class MPCCBF(Controller):
         placed = [place_zone(person, zone) for person, zone in zip(tracked.people, zones, strict=True)]
         return Scene(tuple(state), goal, tracked, zones, placed, self._wall_rows, self.settings)
 
-    def _parameters(self, x: list[float], scene: Scene, size: tuple[int, int]) -> Array:
+    def _parameters(self, x: list[float], ahead: Point, scene: Scene, size: tuple[int, int]) -> Array:
         """Parameters of the problem of this size: state, target, terminal velocity, people and walls."""
         if scene.tracked.unknown:
             time = max(abs(x[2]), abs(x[3])) / self.settings.a_max
             target = x[0] + x[2] * time / 2, x[1] + x[3] * time / 2  # where full braking ends
         else:
-            target = find_target((x[0], x[1]), scene.goal, scene.zones, self._wall_rows, self.settings)
+            target = find_target((x[0], x[1]), ahead, scene.zones, self._wall_rows, self.settings)
         end_velocity = scene.zones[0][5:] if scene.terminal == "person" else (0.0, 0.0)
         return np.array(
             [*x, *target, *end_velocity, *padded_parameters(x, scene.zones, self._wall_rows, size)]

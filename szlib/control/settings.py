@@ -45,6 +45,8 @@ class MPCSettings:
     v_max : largest Euclidean speed [m/s]. The paper gives 1 m/s, and does not say that it is the Euclidean
         speed (assumed).
     r_robot : radius of the robot [m].
+    lookahead : the plan heads for the point of the route that lies at most this far ahead [m]: see
+        `szlib.control.routes`. `inf`, as in the paper: there is no route, and the plan heads for the goal.
     eps : margin for the error of the approximate distances [m].
     margin : around walls. "euclidean": what each wall requires so that the robot does not touch it, and at
         least eps (see `wall_margin`). "paper": eps, which allows overlaps with the ends of walls shorter
@@ -88,6 +90,7 @@ class MPCSettings:
     P: tuple[float, float, float, float] = _setting("assumed", (100.0, 100.0, 10.0, 10.0))
     a_max: float = _setting("assumed", 1.0)
     v_max: float = _setting("paper", 1.0)
+    lookahead: float = _setting("paper", np.inf)
     r_robot: float = _setting("paper", 0.5)
     eps: float = _setting("paper", 0.05)
     margin: Margin = _setting("measured", "euclidean", paper="paper")  # noqa: RUF009
@@ -123,8 +126,9 @@ class MPCSettings:
         for name, literal in choices.items():
             given, allowed = getattr(self, name), get_args(literal)
             _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
-        positive = isinstance(self.time_limit, int | float | np.number) and self.time_limit > 0
-        _require(positive, "time_limit", self.time_limit, "a positive number of seconds, or inf")
+        for name, unit in (("time_limit", "seconds"), ("lookahead", "metres")):
+            is_positive = isinstance(value := getattr(self, name), int | float | np.number) and value > 0
+            _require(is_positive, name, value, f"a positive number of {unit}, or inf")
         if self.terminal != "none":
             object.__setattr__(self, "N_h", self.N)
         _require(0 <= self.head_on_share <= 0.5, "head_on_share", self.head_on_share, "in [0, 0.5]")

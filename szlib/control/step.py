@@ -39,12 +39,13 @@ class Step:
     residual : h_{k+1} - (1-gamma) h_k, people before walls, shape (people + walls, N_h) [m].
     h : barriers in the state itself, people before walls, shape (people + walls,) [m]. Where one is
         negative, the robot already is where it should not be, and the plan leads out again.
-    target : point that attracts the plan: the goal, except where the robot meets a person head-on, shape
-        (2,) [m].
+    target : point that attracts the plan, shape (2,) [m]: the goal, or the point ahead on the route, except
+        where the robot meets a person head-on.
     cost : cost of the plan, without any penalty.
     solve_time : wall-clock time of the whole step [s].
     timed_out : True if a solver was stopped or skipped because time was up (`MPCSettings.time_limit`).
     scene : what the step was asked.
+    way_length : length of the way to the goal [m]: of the route, else straight; inf if no route was found.
 
     Examples
     --------
@@ -71,6 +72,7 @@ class Step:
     solve_time: float
     timed_out: bool
     scene: Scene
+    way_length: float = 0.0
 
     @property
     def status(self) -> Status:
@@ -156,6 +158,8 @@ class Step:
             )
         if self.goal_blocked:
             lines.append(f"  the goal {scene.goal} cannot be reached: h < 0 there; the robot waits beside it")
+        if self.way_length == np.inf:
+            lines.append("  walls leave no way to the goal; the plan heads straight for it")
         if self.rejected:
             lines.append(
                 f"  {self.rejected} measurements of people were rejected; {self.unknown} are unknown"
