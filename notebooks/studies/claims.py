@@ -4,6 +4,8 @@ python -m studies.claims claims        16_claims.csv        effect, interval, ve
                                                                     (of delays: the range over scenarios)
 python -m studies.claims sensitivity   16_sensitivity.csv   the real day, each parameter varied alone
 
+A claim about the shape of the zone is a difference from the null model (`paper_claims.measure_shape`); the
+quantile zone of the data, and that of the null model, are shown beside it as a contrast.
 They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/, magni/, eth/).
 """
 
@@ -11,17 +13,18 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from scipy.stats import t as student_t
 from studies.committed import write_table
+from studies.respect import stored
 
 import szlib
 from szlib.plaza.accuracy import true_kinds
@@ -31,8 +34,13 @@ from szlib.zones.outliers import is_outlier
 from szlib.zones.sensitivity import FIT, sensitivity
 
 DATA = Path(os.environ.get("SZLIB_DATA_DIR", "."))
-METHODS = ("paper", "hull", "quantile")
-"""The paper's zone to the letter; the same hull with whole encounters as outliers; the default."""
+KIND = "strangers"
+SPEED = 1.1
+STORED = {"ATC day": "atc-1hz", "Grand Central": "grand-central"}
+"""Null models that `studies.respect` stored."""
+SHIFTS = 39
+"""Shifts of the other null models."""
+ONE_SITE = "a mean needs two sites"
 RESAMPLES, FEW = 200, 2
 """Resamples for the intervals, and of those that are computed again in each run of notebook 16 (`probe`)."""
 DELAYED_BY_SIZE = "a larger zone makes the robot later"
@@ -67,32 +75,76 @@ SITES: dict[str, tuple[Callable[[], pd.DataFrame], szlib.Square]] = {
 """Tracks and the open square of each site (the squares of the last three: measured, where people walked)."""
 
 
-def of_site(name: str) -> Iterator[pd.DataFrame]:
-    """The findings of a site, method by method; `probe` is the low end of an interval of few resamples."""
-    load, square = SITES[name]
-    tracks = load()
-    samples = szlib.find_encounters(tracks, settings=szlib.EncounterSettings.paper(square))
+def of_site(name: str, asked: argparse.Namespace) -> Iterator[pd.DataFrame]:
+    """The findings of a site, method by method; `probe` is what a run of notebook 16 computes again of `low`."""
+    tracks = SITES[name][0]()
+    samples, null = stored(asked, STORED.get(name, name), partial(find_both, name))
     plain = [claims.measure_passing_side(samples), lof(name, samples), as_many(name, samples, tracks)]
     plain.append(less_crowded(name, tracks))
     yield claims.tabulate_findings(plain, data=name).assign(method="-", probe=[each.low for each in plain])
-    for method in METHODS:
-        for group, people in (("everybody", samples), ("strangers", szlib.of_kind(samples, "strangers"))):
-            found, few = (of_zone(people, method, resamples) for resamples in (RESAMPLES, FEW))
-            table = claims.tabulate_findings(found.values(), data=name)
-            yield table.assign(method=f"{method}, {group}", probe=[each.low for each in few.values()])
+    strangers, model = szlib.of_kind(samples, KIND), null.of_kind(KIND)
+    shape = claims.measure_shape(strangers, model)
+    yield claims.tabulate_findings(shape, data=name).assign(
+        method=f"respect, {KIND}", probe=[each.low for each in shape]
+    )
+    delay, method = later(strangers, model)
+    table = claims.tabulate_findings([delay], data=name)
+    yield table.assign(method=f"{method}, {KIND}", probe=delay.low)
+    for method, people in contrast(strangers, model).items():
+        found, few = (of_quantile(people, resamples) for resamples in (RESAMPLES, FEW))
+        table = claims.tabulate_findings(found.values(), data=name)
+        yield table.assign(method=method, probe=[each.low for each in few.values()])
+
+
+def find_both(name: str) -> tuple[pd.DataFrame, szlib.NullEncounters]:
+    """Samples of a site and its null model."""
+    load, square = SITES[name]
+    tracks = load()
+    samples = szlib.find_encounters(tracks, square=square)
+    return samples, szlib.null_encounters(tracks, shifts=SHIFTS, square=square, progress=False)
+
+
+def contrast(strangers: pd.DataFrame, null: szlib.NullEncounters) -> dict[str, pd.DataFrame]:
+    """The people whose quantile zones are compared: the data, and as many encounters of the null model."""
+    known = null.samples["encounter"].unique()
+    size = min(strangers["encounter"].nunique(), len(known))
+    drawn = null.samples["encounter"].isin(np.random.default_rng(0).choice(known, size, replace=False))
+    return {f"quantile, {KIND}": strangers, "quantile, null model": null.samples[drawn]}
+
+
+def pool_sites(table: pd.DataFrame) -> pd.DataFrame:
+    """The mean over the real sites of each claim about the shape, where two or more give it."""
+    is_shape = (table["method"] == f"respect, {KIND}") & table["claim"].isin(CLAIMS)
+    shape = table[is_shape & (table["data"] != "plaza")]
+    rows = []
+    for claim, part in shape.groupby("claim", sort=False):
+        known = part.dropna(subset=["effect"]).set_index("data")[["effect", "low", "high"]]
+        found = claims.Finding(
+            claim, np.nan, np.nan, np.nan, part["unit"].iloc[0], len(known), reason=ONE_SITE
+        )
+        if len(known) > 1:  # differences are pooled as they are, like centres
+            pooled = szlib.pool(dict(zip(known.index, known.to_numpy(), strict=True)), quantity="center_x")
+            found = replace(found, effect=pooled.mean, low=pooled.low, high=pooled.high, reason="")
+        rows.append(found)
+    return claims.tabulate_findings(rows, data="mean of sites").assign(
+        method=f"respect, {KIND}", probe=np.nan
+    )
 
 
 def recompute(row: pd.Series) -> dict[str, float]:
     """Effect, number and probe of a row of the plaza, again."""
-    tracks = plaza()
-    samples = szlib.find_encounters(tracks, settings=szlib.EncounterSettings.paper(szlib.ATC_SQUARE))
+    samples, null = find_both("plaza")
+    strangers, model = szlib.of_kind(samples, KIND), null.of_kind(KIND)
     if row["method"] == "-":
         all_found = [claims.measure_passing_side(samples), lof("plaza", samples)]
-        found = {each.claim: each for each in all_found}[row["claim"]]
+    elif row["claim"] == DELAYED_BY_SIZE:
+        all_found = [later(strangers, model)[0]]
+    elif row["method"].startswith("respect"):
+        all_found = claims.measure_shape(strangers, model)
     else:
-        method, group = row["method"].split(", ")
-        people = samples if group == "everybody" else szlib.of_kind(samples, group)
-        found = of_zone(people, method, FEW, (row["claim"],))[row["claim"]]
+        people = contrast(strangers, model)[row["method"]]
+        all_found = of_quantile(people, FEW, (row["claim"],)).values()
+    found = {each.claim: each for each in all_found}[row["claim"]]
     return {"effect": found.effect, "n": found.n, "probe": found.low}
 
 
@@ -142,34 +194,41 @@ def measure_density(tracks: pd.DataFrame, area: szlib.Square) -> claims.Finding:
     return claims.Finding(LESS_CROWDED, mean, mean - half, mean + half, "doublings", len(doublings))
 
 
-def later(zone: szlib.SocialZone) -> claims.Finding:
-    """What a larger zone costs the robot, with the zone of this site."""
-    found = claims.measure_delay_by_size(zone.ellipses[1.1])
-    return replace(found, claim=DELAYED_BY_SIZE, adequate=zone.adequate(1.1))
+def later(strangers: pd.DataFrame, null: szlib.NullEncounters) -> tuple[claims.Finding, str]:
+    """What a larger zone costs the robot, with the zone of this site, and the method of that zone."""
+    try:
+        zone = szlib.SocialZone.fit(strangers, null=null, speeds=(SPEED,), n_resamples=0)
+    except szlib.SzlibError as error:
+        return undecided(DELAYED_BY_SIZE, strangers, error), "quantile"
+    found = claims.measure_delay_by_size(zone.ellipses[SPEED])
+    return replace(found, claim=DELAYED_BY_SIZE, adequate=zone.adequate(SPEED)), zone.method
+
+
+def undecided(claim: str, people: pd.DataFrame, error: szlib.SzlibError) -> claims.Finding:
+    """A claim about a zone that there is not, because of an `error`."""
+    n = people["encounter"].nunique()
+    return claims.Finding(claim, np.nan, np.nan, np.nan, "", n, False, reason=str(error))
 
 
 CLAIMS: dict[str, tuple[Callable[[szlib.SocialZone], claims.Finding], tuple[float, ...]]] = {
-    claims.LARGER_AHEAD: (claims.measure_reach_ahead, (1.1,)),
+    claims.LARGER_AHEAD: (claims.measure_reach_ahead, (SPEED,)),
     claims.GROWS_WITH_SPEED: (claims.measure_growth_with_speed, (0.7, 1.3)),
-    DELAYED_BY_SIZE: (later, (1.1,)),
 }
-"""Each claim about a zone: how it is measured, and the speeds of the zone [m/s]."""
+"""Each claim about the shape of a zone: how it is measured, and the speeds of the zone [m/s]."""
 
 
-def of_zone(
-    people: pd.DataFrame, method: str, resamples: int, asked: Iterable[str] = tuple(CLAIMS)
+def of_quantile(
+    people: pd.DataFrame, resamples: int, asked: Iterable[str] = tuple(CLAIMS)
 ) -> dict[str, claims.Finding]:
-    """The claims about a zone; undecided where there is no zone, or too few people on some side."""
+    """The claims about the quantile zone; undecided where there is none, or too few people on some side."""
     found = {}
     for claim in asked:
         measure, speeds = CLAIMS[claim]
         try:
-            zone = szlib.SocialZone.fit(people, method=method, speeds=speeds, n_resamples=resamples)
+            zone = szlib.SocialZone.fit(people, method="quantile", speeds=speeds, n_resamples=resamples)
             found[claim] = measure(zone)
         except szlib.SzlibError as error:
-            print(f"{method}: {error}", file=sys.stderr)
-            n = people["encounter"].nunique()
-            found[claim] = claims.Finding(claim, np.nan, np.nan, np.nan, "", n, adequate=False)
+            found[claim] = undecided(claim, people, error)
     return found
 
 
@@ -193,11 +252,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("study", choices=["claims", "sensitivity"])
     parser.add_argument("--sites", nargs="+", default=list(SITES))
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--cache", type=Path, default=Path("../results/null"), help="of null models")
     asked = parser.parse_args()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)  # the tables say what is not adequate
         if asked.study == "claims":
-            table = pd.concat([part for name in asked.sites for part in of_site(name)])
+            table = pd.concat([part for name in asked.sites for part in of_site(name, asked)])
+            table = pd.concat([table, pool_sites(table)])
         else:
             table = pd.concat([part for name in ("ATC day", "plaza") for part in move_zone(name)])
     write_table(table, f"16_{asked.study}")

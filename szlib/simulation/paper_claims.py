@@ -3,6 +3,10 @@
 An effect above 0 supports the claim.  Where the interval contains 0, the data decide nothing.  The interval
 is a 95 % interval, but for the delay of the robot: its runs are deterministic, so it is the range over the
 scenarios.
+
+Any zone has a shape, also that of people who ignore each other: at Grand Central the quantile zone of a
+time-shifted crowd reaches farther ahead than behind.  So a claim about the shape is decided by
+`measure_shape`, which compares with the null model.
 """
 
 from __future__ import annotations
@@ -20,8 +24,12 @@ from ..checks import check_columns
 from ..control.mpc import MPCCBF
 from ..control.settings import MPCSettings
 from ..encounters.kinds import OPPOSITE
+from ..encounters.null_model import NullEncounters
 from ..errors import DataError, ZoneError
 from ..zones.ellipses import Ellipse
+from ..zones.outliers import R_MAX
+from ..zones.respect import MIN_COMPARED, RespectEstimator
+from ..zones.respect_likelihood import zone_ellipses
 from ..zones.social_zone import SocialZone
 from .closed_loop import simulate
 from .metrics import compute_metrics
@@ -57,6 +65,7 @@ class Finding:
     n : number of encounters, pairs, days or runs.
     adequate : False if there are too few people on some side; then nothing is decided.
     interval : what `low` and `high` are: `CONFIDENCE` or `RANGE`.
+    reason : why nothing can be decided; "": the interval says it.
 
     Examples
     --------
@@ -74,15 +83,16 @@ class Finding:
     n: int
     adequate: bool = True
     interval: str = CONFIDENCE
+    reason: str = ""
 
     @property
     def verdict(self) -> str:
-        """ "supported", "contradicted", or "not decidable" with n."""
+        """ "supported", "contradicted", or "not decidable" with n, and the reason."""
         if self.adequate and self.low > 0:
             return "supported"
         if self.adequate and self.high < 0:
             return "contradicted"
-        return f"not decidable with n = {self.n:,}"
+        return f"not decidable with n = {self.n:,}" + (f": {self.reason}" if self.reason else "")
 
     def __str__(self) -> str:
         return format_finding(self._row())
@@ -100,8 +110,10 @@ def tabulate_findings(findings: Iterable[Finding], *, data: str) -> pd.DataFrame
 def format_finding(row: Mapping[str, Any] | pd.Series[Any]) -> str:
     """A `row` of `tabulate_findings` in few words: effect [low, high] unit: verdict.
 
-    An interval that is not a 95 % interval is named after the unit.
+    An interval that is not a 95 % interval is named after the unit.  Without an effect: the verdict.
     """
+    if np.isnan(row["effect"]):
+        return str(row["verdict"])
     name = "" if row["interval"] == CONFIDENCE else f" ({row['interval']})"
     numbers = f"{row['effect']:+.2f} [{row['low']:+.2f}, {row['high']:+.2f}] {row['unit']}"
     return f"{numbers}{name}: {row['verdict']}"
@@ -129,6 +141,52 @@ def measure_growth_with_speed(zone: SocialZone, *, slow: float = 0.7, fast: floa
     up = sqrt((high - area) ** 2 + (other - other_low) ** 2)
     n, adequate = min(_count_encounters(zone, v) for v in (slow, fast)), all(map(zone.adequate, (slow, fast)))
     return Finding(GROWS_WITH_SPEED, effect, effect - down, effect + up, "m2", n, adequate)
+
+
+def measure_shape(
+    samples: pd.DataFrame,
+    null: NullEncounters | None,
+    *,
+    r_max: float = R_MAX,
+    speed: float = 1.1,
+    slow: float = 0.7,
+    fast: float = 1.3,
+) -> list[Finding]:
+    """The zone reaches farther ahead than behind, and grows with speed: differences from the null model.
+
+    Both come from the posterior of the respect zone (`szlib.zones.respect`), which compares people with those
+    of the null model.  Effects and intervals are as in `measure_reach_ahead` and `measure_growth_with_speed`.
+    With fewer than `MIN_COMPARED` encounters within r_max, the interval would be that of the prior.
+
+    Parameters
+    ----------
+    samples, null, r_max : as in `szlib.SocialZone.fit`.
+    speed : at which the reach ahead and behind are compared [m/s].
+    slow, fast : speeds at which the areas are compared [m/s].
+    """
+    claims, n = {LARGER_AHEAD: "m", GROWS_WITH_SPEED: "m2"}, 0
+    try:
+        estimator = RespectEstimator.from_samples(samples, r_max=r_max, null=null)
+        n = len(estimator.data.kind)
+        if n < MIN_COMPARED:
+            raise ZoneError(
+                f"{MIN_COMPARED} encounters of people who cross or come towards each other needed"
+            )
+        ellipses = zone_ellipses(np.vstack([estimator.best, estimator.draws]), (slow, speed, fast))
+    except ZoneError as error:
+        return [
+            Finding(each, np.nan, np.nan, np.nan, unit, n, False, reason=str(error))
+            for each, unit in claims.items()
+        ]
+    areas = np.pi * ellipses[..., 2] * ellipses[..., 3]
+    effects = np.stack([2 * ellipses[:, 1, 0], areas[:, 2] - areas[:, 0]])
+    lows, highs = np.quantile(effects[:, 1:], [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=1)
+    return [
+        Finding(each, best, min(low, best), max(high, best), unit, n)
+        for (each, unit), best, low, high in zip(
+            claims.items(), *map(np.ndarray.tolist, (effects[:, 0], lows, highs)), strict=True
+        )
+    ]
 
 
 def measure_passing_side(samples: pd.DataFrame) -> Finding:

@@ -52,7 +52,9 @@ _KINDS = ("opposite", "crossing")
 _MIN_EVIDENCE = 20.0  # twice the log likelihood ratio of a zone against none: the 1 % level of 8 parameters
 _NULL_DRAWN = (4000, 8000)  # encounters drawn from the null model, at least and at most; else two for each
 _NULL_PER_ENCOUNTER = 2  # of the data
-_MIN_ENCOUNTERS = 150  # of the data within r_max: with fewer the zone reaches as far as nobody was seen
+MIN_COMPARED = (
+    150  # encounters of the data within r_max: with fewer the zone reaches as far as nobody was seen
+)
 _MAX_LEFT_OUT = 5
 
 
@@ -134,7 +136,7 @@ class RespectEstimator(Estimator):
         try:
             estimator = cls.from_samples(samples, r_max=r_max, null=null)
             n, n_null = len(estimator.data.kind), estimator.parameters["null_encounters"]
-            is_large = n >= _MIN_ENCOUNTERS and n_null >= _NULL_PER_ENCOUNTER * n
+            is_large = n >= MIN_COMPARED and n_null >= _NULL_PER_ENCOUNTER * n
             return estimator if is_large and estimator.fit_shape(speeds) else None
         except ZoneError:  # nothing to compare, no respect, or no zone around the person
             return None

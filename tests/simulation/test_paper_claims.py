@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from helpers.passing_pairs import null_of, passing_pairs, respecting
 from studies.claims import measure_density
 
 import szlib
 from szlib.simulation import paper_claims as claims
+from szlib.zones import respect_likelihood
 from szlib.zones.sensitivity import sensitivity
 
 
@@ -147,6 +149,34 @@ def test_zones_without_people_on_some_side_decide_nothing(plaza: pd.DataFrame) -
     assert not zone.adequate(1.1)
     for found in (claims.measure_reach_ahead(zone), claims.measure_growth_with_speed(zone)):
         assert found.verdict.startswith("not decidable")
+
+
+def test_a_shape_is_a_difference_from_the_null_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(respect_likelihood, "_STEPS", 600)
+    monkeypatch.setattr(respect_likelihood, "_BURN_IN", 200)
+    crowd, null = passing_pairs(1000, 1), null_of(passing_pairs(2000, 0))
+    people = respecting(crowd, szlib.Ellipse((0.0, 0.0), (0.9, 0.7)), careless=0.05)
+    ahead, growth = claims.measure_shape(people, null)
+    assert (ahead.claim, growth.claim) == (claims.LARGER_AHEAD, claims.GROWS_WITH_SPEED)
+    assert ahead.low < 0 < ahead.high and ahead.low <= ahead.effect <= ahead.high and ahead.n > 600
+    assert growth.low <= growth.effect <= growth.high and growth.effect < 0.2 and growth.reason == ""
+    larger = 0.4 + 0.4 * crowd[["speed", "other_speed"]].max(axis=1)
+    entered = crowd["encounter"][crowd["distance"] < larger].unique()
+    _, grown = claims.measure_shape(crowd[~crowd["encounter"].isin(entered)], null)
+    assert grown.verdict == "supported" and grown.effect > 0.2
+
+
+def test_a_shape_that_cannot_be_given_has_a_reason() -> None:
+    crowd, null = passing_pairs(400, 1), null_of(passing_pairs(1000, 0))
+    few = crowd[crowd["encounter"].isin(crowd["encounter"].unique()[:100])]
+    for people, model, reason in (
+        (crowd, null, "no respect zone: people who ignore each other explain the data nearly as well"),
+        (few, null, "150 encounters of people who cross or come towards each other needed"),
+        (crowd, None, 'method="respect" needs a null model'),
+    ):
+        for found in claims.measure_shape(people, model):
+            assert np.isnan(found.effect) and not found.adequate and reason in found.verdict
+            assert claims.format_finding(claims.tabulate_findings([found], data="").iloc[0]) == found.verdict
 
 
 def test_delays_have_their_range_over_scenarios(monkeypatch: pytest.MonkeyPatch) -> None:

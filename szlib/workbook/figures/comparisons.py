@@ -234,7 +234,7 @@ def plot_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     ax.axvline(0, color=BLACK, linewidth=1)
     names = table["claim"] + (" (" + table["method"] + ")" if "method" in table else "")
     ax.set_yticks(range(len(table)), list(names), fontsize=8)
-    ax.invert_yaxis()
+    ax.set_ylim(len(table) - 0.5, -0.5)  # also rows without an effect
     for name, (colour, marker) in styles.items():
         ax.plot([], [], marker, color=colour, label="not decidable" if name == "not" else name)
     ax.set(xlabel="against the paper < 0 < as the paper says (each scaled to its interval)", xlim=(-1.1, 1.1))
