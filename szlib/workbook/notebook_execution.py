@@ -11,6 +11,7 @@ from concurrent.futures import Future
 from contextlib import closing
 from copy import deepcopy
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 from ..errors import SzlibError
@@ -27,6 +28,10 @@ REFUSED = {
 }  # fmt: skip
 # The clients of nbclient whose kernels run in this process.
 _CLIENTS: set[Any] = set()
+# Set while the run is being stopped.
+_STOPPING = Event()
+# A signal that ends a kernel and the run reaches the run within this time [s].
+_SIGNAL_DELAY = 0.5
 # The notebooks that import a package beside them, and so need their folder on the module path.
 NEEDS_FOLDER = re.compile(r"^from studies\b", re.MULTILINE)
 # The record of a notebook that wrote none.
@@ -83,6 +88,7 @@ def run_cells(
     import nbformat
     import papermill
     from jupyter_core.utils import ensure_event_loop
+    from nbclient.exceptions import DeadKernelError
     from papermill.clientwrap import PapermillNotebookClient
     from papermill.engines import Engine, papermill_engines
 
@@ -113,6 +119,10 @@ def run_cells(
                 with closing(ensure_event_loop()), temporary_folder() as private:
                     folders = {"TMPDIR": str(private), "IPYTHONDIR": str(private)}
                     client.execute(env={**os.environ, **own, **folders, **environment})
+            except DeadKernelError:
+                if _STOPPING.wait(_SIGNAL_DELAY):
+                    _CLIENTS.discard(client)
+                raise
             finally:
                 copy = deepcopy(nb_man.nb)
                 copy.metadata.pop("papermill", None)  # times and paths of this machine
@@ -139,6 +149,7 @@ def end_kernels(executions: Sequence[Future[Any]]) -> None:
 
     Those that have not started never do.
     """
+    _STOPPING.set()
     for each in executions:
         each.cancel()
     while not all(each.done() for each in executions):
@@ -147,3 +158,4 @@ def end_kernels(executions: Sequence[Future[Any]]) -> None:
                 _CLIENTS.discard(client)
                 process.kill()
         time.sleep(0.1)
+    _STOPPING.clear()

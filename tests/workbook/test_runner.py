@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -10,7 +12,7 @@ from szlib.errors import DataError
 from szlib.files import write_checksum
 from szlib.plaza.generation import make_plaza
 from szlib.plaza.settings import PlazaSettings
-from szlib.workbook import cli, runner
+from szlib.workbook import cli, notebook_execution, runner
 from szlib.workbook.cli import main
 from szlib.workbook.record.data_cache import _load
 from szlib.workbook.record.parameters import check_parameters
@@ -277,3 +279,29 @@ def test_ctrl_c_exits_with_130(notebooks, monkeypatch, capsys):
     monkeypatch.setattr(runner, "wait", interrupted)
     assert run() == 130
     assert "stopped" in capsys.readouterr().err
+
+
+KILLS_ITS_KERNEL = """# %% tags=["parameters"]
+seed = 0
+
+# %%
+import os, signal
+os.kill(os.getpid(), signal.SIGTERM)
+"""
+
+
+@pytest.mark.parametrize("stopped", [True, False])
+def test_a_signal_that_ends_a_kernel_and_the_run_leaves_no_unfinished_copy(tmp_path, monkeypatch, stopped):
+    script, folder = tmp_path / "01_one.py", tmp_path / "out"
+    script.write_text(KILLS_ITS_KERNEL)
+    folder.mkdir()
+    monkeypatch.setattr(notebook_execution, "_SIGNAL_DELAY", 20.0 if stopped else 0.01)
+    with ThreadPoolExecutor(1) as executor:
+        execution = executor.submit(notebook_execution.execute_notebook, str(script), {}, str(folder), {})
+        while stopped and not notebook_execution._CLIENTS:
+            time.sleep(0.05)
+        if stopped:
+            time.sleep(1.0)  # the signal ends the kernel first
+            notebook_execution.end_kernels([execution])
+        assert execution.result()[1]["status"] == "refused"
+    assert (folder / "01_one.ipynb").exists() != stopped
