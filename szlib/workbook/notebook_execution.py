@@ -88,7 +88,6 @@ def run_cells(
     import nbformat
     import papermill
     from jupyter_core.utils import ensure_event_loop
-    from nbclient.exceptions import DeadKernelError
     from papermill.clientwrap import PapermillNotebookClient
     from papermill.engines import Engine, papermill_engines
 
@@ -119,7 +118,7 @@ def run_cells(
                 with closing(ensure_event_loop()), temporary_folder() as private:
                     folders = {"TMPDIR": str(private), "IPYTHONDIR": str(private)}
                     client.execute(env={**os.environ, **own, **folders, **environment})
-            except DeadKernelError:
+            except RuntimeError:  # the kernel has ended
                 if _STOPPING.wait(_SIGNAL_DELAY):
                     _CLIENTS.discard(client)
                 raise

@@ -282,10 +282,11 @@ def test_ctrl_c_exits_with_130(notebooks, monkeypatch, capsys):
 
 
 KILLS_ITS_KERNEL = """# %% tags=["parameters"]
-seed = 0
+file = ""
 
 # %%
-import os, signal
+import os, pathlib, signal
+pathlib.Path(file).touch()
 os.kill(os.getpid(), signal.SIGTERM)
 """
 
@@ -297,11 +298,12 @@ def test_a_signal_that_ends_a_kernel_and_the_run_leaves_no_unfinished_copy(tmp_p
     folder.mkdir()
     monkeypatch.setattr(notebook_execution, "_SIGNAL_DELAY", 20.0 if stopped else 0.01)
     with ThreadPoolExecutor(1) as executor:
-        execution = executor.submit(notebook_execution.execute_notebook, str(script), {}, str(folder), {})
-        while stopped and not notebook_execution._CLIENTS:
+        given = {"file": str(tmp_path / "begun")}
+        execution = executor.submit(notebook_execution.execute_notebook, str(script), given, str(folder), {})
+        while stopped and not (tmp_path / "begun").exists():
             time.sleep(0.05)
         if stopped:
-            time.sleep(1.0)  # the signal ends the kernel first
+            time.sleep(0.5)  # the signal ends the kernel first
             notebook_execution.end_kernels([execution])
         assert execution.result()[1]["status"] == "refused"
     assert (folder / "01_one.ipynb").exists() != stopped
