@@ -44,8 +44,8 @@ follow with dv/dt = (acceleration of p along e) + L omega^2, so by up to V^2 / L
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from math import asin, atan2, cos, hypot, pi, sin, tan
+from dataclasses import dataclass, replace
+from math import asin, atan2, cos, hypot, inf, pi, sin, tan
 from time import perf_counter
 from typing import Any
 
@@ -60,8 +60,11 @@ from .controller import Controller
 from .distances import walls_with_margins
 from .mpc import MPCCBF
 from .person import Person, SpeedZone, place_zone
+from .scene import Scene
 from .settings import TOLERANCE, MPCSettings
 from .step import Fallback, Step
+from .step_clock import StepClock
+from .step_report import StepReport, verify_disc
 from .tracker import People, Tracker
 
 
@@ -105,7 +108,7 @@ class Unicycle:
         return np.array([x, y, (theta + 2 * half + pi) % (2 * pi) - pi, v, omega])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DriveStep:
     """What a differential drive does next, and how far it can be relied upon.
 
@@ -115,10 +118,12 @@ class DriveStep:
     predicted : (x, y, vx, vy) of the disc's centre now and along the plan, shape (N+1, 4) [m, m/s].
     h : barriers of the disc now, people before walls, shape (people + walls,) [m].
     safe : as `Step.safe`, for the disc: no person is unknown, the plan satisfies the hard problem, and the
-        disc has h >= 0 and overlaps no body and no wall, neither now nor dt later, if people keep their
+        disc has h >= 0 now and dt later, and overlaps no body and no wall until then, if people keep their
         velocity.
+    heading : of the robot now [rad].
+    scene : what the step was asked, for the disc.
     point : the step of the point ahead of the axle, a `Step`.
-    fallback, slack, residual : of that step: see `Step`.
+    fallback, slack, residual, stuck, clock : of that step: see `Step`.
     solve_time : wall-clock time of the whole step [s].
     """
 
@@ -126,11 +131,29 @@ class DriveStep:
     predicted: Array
     h: Array
     safe: bool
-    point: Step = field(repr=False)
+    heading: float
+    scene: Scene
+    point: Step
     fallback: Fallback
     slack: float
-    residual: Array = field(repr=False)
+    residual: Array
+    stuck: float
+    clock: str
     solve_time: float
+
+    def verify(self) -> StepReport:
+        """Check this step again, the point and the disc, by formulas of their own: see `Step.verify`."""
+        return verify_disc(self.scene, self.heading, self)
+
+    def __repr__(self) -> str:
+        (v, omega), safe = self.control.tolist(), "safe" if self.safe else "not safe"
+        h = min(self.h.tolist(), default=inf)
+        return f"DriveStep({self.fallback}, {safe}, v={v:.3g} m/s, omega={omega:.3g} rad/s, min h={h:.3g} m)"
+
+    def explain(self) -> str:
+        """Explain the step in sentences, after it is verified, as `Step.explain` does for the point."""
+        faults = [f"\n  WRONG: {fault}" for fault in self.verify().faults if "disc" in fault]
+        return f"{self!r}{''.join(faults)}\nThe point ahead of the axle: {self.point.explain()}"
 
 
 class _Point(MPCCBF):
@@ -225,7 +248,7 @@ class DifferentialDrive(Controller):
     def reset(self) -> None:
         """Forget the last plan and command, and all people."""
         self._point.reset()
-        self._command: list[float] = []
+        self._command, self._clock = list[float](), StepClock(self.settings.dt)
         self._planned_velocity = [0.0, 0.0]
 
     def step(
@@ -237,6 +260,7 @@ class DifferentialDrive(Controller):
         ids: Iterable[Hashable] | None = None,
         stamps: ArrayLike | None = None,
         now: float | None = None,
+        state_age: float = 0.0,
     ) -> DriveStep:
         """Decide the (v, omega) to hold for the next `dt`.
 
@@ -246,7 +270,7 @@ class DifferentialDrive(Controller):
             The plan begins at the planned velocity of the point. If the robot was stopped or pushed,
             and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega).
         goal : (x, y) of the disc's centre [m].
-        people, ids, stamps, now : as of `MPCCBF.step`.
+        people, ids, stamps, now, state_age : as of `MPCCBF.step`.
 
         Raises
         ------
@@ -254,29 +278,35 @@ class DifferentialDrive(Controller):
         """
         began = perf_counter()
         own = check_array("state", state, (5,) if np.asarray(state, object).size == 5 else (3,)).tolist()
-        x, y, theta = own[:3]
+        self._clock.tick(now, stamps)
+        old = np.array([*own[:3], *(own[3:] or self._command or (0.0, 0.0))])
+        own = self._clock.bring_forward(self.robot, old, state_age, old[3:])
+        x, y, theta, *speeds = own.tolist()
         centre, lever = check_array("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
         if not self._command and min(self.barriers(centre), default=0.0) < 0:
             raise SolverError(
                 f"the goal {centre.tolist()} cannot be reached: it lies too close to a wall; choose one at "
                 f"least {self.goal_clearance:.2f} m away from all walls"
             )
-        start = (*(own[:2] + lever).tolist(), *self._velocity(theta, own[3:]))
+        start = (*(own[:2] + lever).tolist(), *self._velocity(theta, *speeds))
         point = self._point.step(start, centre + lever, people, ids=ids, stamps=stamps, now=now)
         states, controls = self._follow(own, point.predicted[1:, :2])
         self._command, self._planned_velocity = controls[0].tolist(), point.predicted[1, 2:].tolist()
         scene, dt = point.scene._replace(settings=self.settings, walls=self._wall_rows), self.settings.dt
-        h, (x1, y1) = scene.h(x, y), states[1][:2].tolist()
-        smallest = min(h + scene.h(x1, y1, dt) + scene.gaps(x, y) + scene.gaps(x1, y1, dt), default=0.0)
+        scene = scene._replace(state=tuple(states[0].tolist()), goal=tuple(centre.tolist()))
+        self._clock.hold(controls[0])
+        h, (x1, y1), (v, omega) = scene.h(x, y), states[1][:2].tolist(), self._command
+        gap = scene.smallest_gap((x, y), (x1, y1), abs(v * omega))
+        smallest = min([*h, *scene.h(x1, y1, dt), gap])
         return DriveStep(
             control=controls[0],
             predicted=np.array(states),
             h=np.array(h),
             safe=point.feasible and not point.unknown and smallest >= -TOLERANCE,
+            heading=theta,
+            scene=scene,
             point=point,
-            fallback=point.fallback,
-            slack=point.slack,
-            residual=point.residual,
+            **{name: getattr(point, name) for name in ("fallback", "slack", "residual", "stuck", "clock")},
             solve_time=perf_counter() - began,
         )
 
@@ -286,20 +316,18 @@ class DifferentialDrive(Controller):
         zones = [place_zone(person, self._point.zone_of(person)) for person in people]
         return np.array(compute_h(x, y, zones, self._wall_rows, r_robot=s.r_robot, eps=s.eps))
 
-    def _velocity(self, theta: float, given: list[float]) -> list[float]:
+    def _velocity(self, theta: float, v: float, omega: float) -> list[float]:
         """Velocity of the point: as planned, unless the robot does not follow its command."""
-        command = self._command or [0.0, 0.0]
-        v, omega = given or command
-        deviation = hypot(v - command[0], self.ahead * (omega - command[1]))
-        if self._command and deviation <= self.settings.a_max * self.settings.dt:
-            return self._planned_velocity
+        if self._command:
+            deviation = hypot(v - self._command[0], self.ahead * (omega - self._command[1]))
+            if deviation <= self.settings.a_max * self.settings.dt:
+                return self._planned_velocity
         c, s, sideways = cos(theta), sin(theta), self.ahead * omega
         return [v * c - sideways * s, v * s + sideways * c]
 
-    def _follow(self, own: list[float], points: Array) -> tuple[list[Array], list[Array]]:
+    def _follow(self, own: Array, points: Array) -> tuple[list[Array], list[Array]]:
         """States of the disc, and the commands that bring the point to `points`, shape (N, 2)."""
-        dt, at = self.settings.dt, np.array([*own[:3], *(own[3:] or self._command or [0.0, 0.0])])
-        states, controls = [self.robot.body(at)], []
+        dt, at, states, controls = self.settings.dt, own, [self.robot.body(own)], list[Array]()
         for px, py in points.tolist():
             x, y, theta = at[:3].tolist()
             c, s = cos(theta), sin(theta)

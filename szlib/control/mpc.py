@@ -49,7 +49,8 @@ from .settings import MPCSettings
 from .solvers.fallbacks import solve_with_fallbacks
 from .solvers.solver_pool import SolverPool, active_rows, padded_parameters
 from .step import Step
-from .tracker import People, TrackedPeople, Tracker, check_time
+from .step_clock import StepClock
+from .tracker import People, TrackedPeople, Tracker
 
 _MOST_PEOPLE = 1000  # greatest number for which solvers are prepared: those for 10,000 take 1.5 GB of memory
 
@@ -154,8 +155,8 @@ class MPCCBF(Controller):
 
     def reset(self) -> None:
         """Forget the last plan and all people, so that the next step depends on no earlier one."""
-        self._plan, self._change, self._now = *np.zeros((2, 2 * self.settings.N)), 0.0
-        self._moved, self._n_people = False, 0
+        self._plan, self._change = np.zeros((2, 2 * self.settings.N))
+        self._clock, self._n_people = StepClock(self.settings.dt), 0
         self.tracker.reset()
         self._pool.reset()
         if self._planner:
@@ -171,6 +172,7 @@ class MPCCBF(Controller):
         stamps: ArrayLike | None = None,
         now: float | None = None,
         route: ArrayLike | None = None,
+        state_age: float = 0.0,
     ) -> Step:
         """Decide the acceleration for the next `dt`.
 
@@ -182,6 +184,10 @@ class MPCCBF(Controller):
         (`Step.unknown`), no plan can be proved safe, but a robot at rest hits nobody. So the step is not
         `safe`, and the target is the point where full braking ends, instead of the goal. The robot still
         keeps out of all known zones, and away from walls.
+
+        Latency: give the true times of measurement. `stamps` bring people to `now`; `state_age` brings the
+        robot there, by the controls commanded since. If a control takes effect late, by d seconds, let `now`
+        be the time at which it does, and add d to `state_age`. `Step.clock` says if the times do not fit.
 
         Parameters
         ----------
@@ -196,6 +202,7 @@ class MPCCBF(Controller):
             farthest point in sight, at most `settings.lookahead` ahead of where the route passes the robot;
             the people and walls on it are avoided as always. Default: a route of its own (`find_route`) if
             `settings.lookahead` is finite, else none.
+        state_age : time from the measurement of `state` to `now`, at most 1 s [s].
 
         Raises
         ------
@@ -205,20 +212,24 @@ class MPCCBF(Controller):
         began = perf_counter()
         self._check_thread()
         x, towards = check_vector("state", state, 4), check_point("goal", goal)
-        if not self._moved:
+        clock, first = self._clock, not self._clock.has_begun
+        if first:
             self._check_goal(towards)
-        self._now = self._clock(now, stamps)
-        tracked = self.tracker.see(people, now=self._now, ids=ids, stamps=stamps)
+        clock.tick(now, stamps)
+        x = clock.bring_forward(self.robot, np.array(x), state_age, np.zeros(2)).tolist()
+        tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
         scene = self._scene(x, towards, tracked)
         ahead, way_length = self._look_ahead((x[0], x[1]), towards, route)
-        first, self._moved, self._n_people = not self._moved, True, len(scene.zones)
+        remaining = way_length if way_length < np.inf else dist(x[:2], towards)
+        self._n_people = len(scene.zones)
         solver = self._pool.get(self._n_people, len(self.walls))
-        self._pool.budget.begin()
+        self._pool.budget.begin(perf_counter() - began)
         size = solver.evaluate.size
         parameters = self._parameters(x, ahead, scene, size)
         fallback, plan, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
         self._change = np.zeros(plan.inputs.size) if first else plan.inputs - self._plan
         self._plan, rows = plan.inputs, active_rows(self._n_people, len(self.walls), size)
+        clock.hold(self._plan[:2])
         return Step(
             control=self._plan[:2].copy(),
             predicted=plan.states,
@@ -232,6 +243,8 @@ class MPCCBF(Controller):
             timed_out=timed_out,
             scene=scene,
             way_length=way_length,
+            stuck=clock.time_without_progress(remaining, towards),
+            clock=clock.describe(stamps, self.tracker.memory),
         )
 
     def _look_ahead(self, at: Point, goal: Point, route: ArrayLike | None) -> tuple[Point, float]:
@@ -262,16 +275,6 @@ class MPCCBF(Controller):
         return np.array(
             [*x, *target, *end_velocity, *padded_parameters(x, scene.zones, self._wall_rows, size)]
         )
-
-    def _clock(self, now: float | None, stamps: ArrayLike | None) -> float:
-        """The time of this step [s]: as given, or `dt` after the last."""
-        if now is None:
-            if stamps is not None:
-                raise SolverError(
-                    "stamps need `now`, the time of the robot's state by the same clock; got none"
-                )
-            return self._now + self.settings.dt if self._moved else 0.0
-        return check_time(now)
 
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.

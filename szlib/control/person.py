@@ -25,14 +25,20 @@ class SpeedZone(Protocol):
 
 
 def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
-    """Ellipse of `zone` at a walking `speed` [m/s]; ZoneError if it is none or reaches beyond `LARGEST`."""
+    """Ellipse of `zone` at a walking `speed` [m/s].
+
+    ZoneError if it is none, reaches beyond `LARGEST`, or does not contain the person's position. It may be
+    smaller than a body, as a measured zone may be: `Step.safe` keeps the robot off bodies besides.
+    """
     if not isinstance(zone, Ellipse):
         if not hasattr(zone, "ellipse"):
             raise ZoneError(f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}")
         zone = zone.ellipse(speed)
-    (m, n), (a, _) = zone.center, zone.semi_axes
-    if not max(abs(m), abs(n), a) <= LARGEST:
+    xa, ya, xb, yb, a = zone.foci_and_axis
+    if not max(abs(xa), abs(ya), abs(xb), abs(yb), a) <= LARGEST:
         raise ZoneError(f"a zone must lie within {LARGEST:g} m of its person; got {zone}")
+    if hypot(xa, ya) + hypot(xb, yb) > 2 * a * (1 + 1e-9):
+        raise ZoneError(f"a zone must contain its person, who is at (0, 0) of its frame; got {zone}")
     return zone
 
 
@@ -54,7 +60,7 @@ class Person:
     ------
     SolverError : a number cannot be used (give measurements to `MPCCBF.step` as an array), or a heading is
         both given and unknown.
-    ZoneError : the zone reaches beyond `LARGEST`.
+    ZoneError : the zone reaches beyond `LARGEST`, or does not contain the person.
 
     Examples
     --------

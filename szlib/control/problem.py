@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import inf
 from threading import RLock
 from time import perf_counter, thread_time
 from typing import Any, NamedTuple
@@ -230,25 +231,26 @@ def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any
 
 
 class TimeBudget:
-    """The computing time of one step; call `begin` at its start.
+    """The time of one step; call `begin` at its start.
 
     Parameters
     ----------
-    limit : time [s], or inf.
+    limit : computing time of the thread [s], or inf.
+    deadline : time of a clock on the wall [s], or inf.
     """
 
-    def __init__(self, limit: float) -> None:
-        self._limit = limit
+    def __init__(self, limit: float, deadline: float = inf) -> None:
+        self._limit, self._deadline = limit, deadline
         self.begin()
 
-    def begin(self) -> None:
-        """Start to measure."""
-        self._wall, self._thread = perf_counter(), thread_time()
+    def begin(self, spent: float = 0.0) -> None:
+        """Start to measure; of the deadline so much is `spent` already [s]."""
+        self._wall, self._thread = perf_counter() - spent, thread_time()
 
     def is_spent(self, share: float = 1.0) -> bool:
         """True if this `share` of the time is used up. The thread's clock is slow, so it is read last."""
-        limit = share * self._limit
-        return perf_counter() - self._wall > limit and thread_time() - self._thread > limit
+        limit, passed = share * self._limit, perf_counter() - self._wall
+        return passed > share * self._deadline or (passed > limit and thread_time() - self._thread > limit)
 
 
 class ProblemSolver:
@@ -266,7 +268,11 @@ class ProblemSolver:
     """
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
-        self.settings, self.budget, self.timed_out = settings, TimeBudget(settings.time_limit), False
+        self.settings, self.budget, self.timed_out = (
+            settings,
+            TimeBudget(settings.time_limit, settings.deadline),
+            False,
+        )
         self.evaluate = PlanEvaluator(settings, n_people, n_walls)
 
     remembered: Array

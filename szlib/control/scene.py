@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
+from math import hypot, inf
 from typing import Literal, NamedTuple
 
 from ..zones.ellipses import BODY_RADIUS, Ellipse
@@ -11,6 +11,8 @@ from .barriers import compute_h, euclidean_segment_formula
 from .person import Person, PlacedZone
 from .settings import MPCSettings, Terminal
 from .tracker import TrackedPeople
+
+_INSTANT = 1e-3  # share of a step over which the slope of a distance is taken
 
 
 class Scene(NamedTuple):
@@ -70,3 +72,37 @@ class Scene(NamedTuple):
             (px, py), (vx, vy) = person.position, person.velocity
             gaps.append(hypot(x - px - time * vx, y - py - time * vy) - BODY_RADIUS - radius)
         return gaps + [euclidean_segment_formula(x, y, *wall[:4]) - radius for wall in self.walls]
+
+    def smallest_gap(self, start: Sequence[float], end: Sequence[float], acceleration: float) -> float:
+        """Lower bound of the disc's gaps to bodies and walls, and of h + eps of people, within a step [m].
+
+        Parameters
+        ----------
+        start, end : (x, y) of the robot now and dt later [m].
+        acceleration : largest acceleration of the robot on the way [m/s2].
+
+        Notes
+        -----
+        If the robot moved straight at a constant velocity, as people do, these distances would be convex
+        functions of time. Such a function lies above its tangents at both ends, so nowhere below the point
+        where they cross. The robot leaves that motion by at most acceleration dt^2 / 8, and no distance
+        changes by more than the way. h has the allowance eps: it is for what a way cuts off a round zone.
+        """
+        (x, y), s = start, self.settings
+        dx, dy, bow = end[0] - x, end[1] - y, acceleration * s.dt**2 / 8
+        reach = hypot(dx, dy) + s.dt * max([hypot(*person.velocity) for person in self.people], default=0.0)
+
+        def gaps_after(share: float) -> list[float]:
+            at = x + share * dx, y + share * dy
+            h = compute_h(*at, self.zones, (), r_robot=s.r_robot, eps=0.0, time=share * s.dt)
+            return self.gaps(*at, share * s.dt) + h
+
+        gaps = gaps_after(0.0)
+        if min(gaps, default=inf) >= reach + bow:
+            return min(gaps, default=inf) - reach - bow
+        for i, rows in enumerate(zip(gaps, *map(gaps_after, (_INSTANT, 1 - _INSTANT, 1.0)), strict=True)):
+            slope, slope_at_end = (rows[1] - rows[0]) / _INSTANT, (rows[3] - rows[2]) / _INSTANT
+            gaps[i] = min(rows)
+            if slope < 0 < slope_at_end:
+                gaps[i] = rows[0] + slope * (rows[3] - slope_at_end - rows[0]) / (slope - slope_at_end)
+        return min(gaps) - _INSTANT * reach - bow

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
+from math import expm1, inf, log1p
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..checks import check_array, require
+from ..checks import check_array, check_number, require
 from ..errors import SolverError
 
 _require = partial(require, error=SolverError)
@@ -37,8 +38,8 @@ class MPCSettings:
     dt : time step [s].
     N : steps of the prediction horizon.
     N_h : steps with barrier conditions, 1 <= N_h <= N; all N steps if there is a terminal condition.
-    gamma : fraction of h that a step may use up, 0 < gamma <= 1. The default was tuned on the paper's four
-        scenarios (notebook 07).
+    gamma : fraction of h that a step of dt may use up, 0 < gamma <= 1: with another dt it is another limit;
+        see `with_gamma_rate`. The default was tuned on the paper's four scenarios (notebook 07).
     Q, P : weights of the state (x, y, vx, vy) against the goal, on the way and at the end, >= 0.
     R : weights of the accelerations (ax, ay), > 0.
     a_max : largest |ax| and |ay| [m/s2].
@@ -66,6 +67,8 @@ class MPCSettings:
     time_limit : computing time of the step's thread after which the best plan so far, or full braking, is
         used [s]; see `Step.timed_out`. `inf` for none. Time of other processes does not count, so that runs
         are the same on a busy machine.
+    deadline : the same, counted by a clock on the wall from the call of `step` [s]: for a robot, whose next
+        control is due whatever else its computer does. A solver looks at it between two iterations.
 
     Raises
     ------
@@ -102,6 +105,7 @@ class MPCSettings:
     slack_weight: float = _setting("measured", 1e5)
     max_iterations: int = _setting("assumed", 100)
     time_limit: float = _setting("assumed", 0.05, paper=np.inf)
+    deadline: float = _setting("assumed", np.inf)
 
     def __post_init__(self) -> None:
         for name, length in (("Q", 4), ("R", 2), ("P", 4)):
@@ -126,7 +130,7 @@ class MPCSettings:
         for name, literal in choices.items():
             given, allowed = getattr(self, name), get_args(literal)
             _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
-        for name, unit in (("time_limit", "seconds"), ("lookahead", "metres")):
+        for name, unit in (("time_limit", "seconds"), ("deadline", "seconds"), ("lookahead", "metres")):
             is_positive = isinstance(value := getattr(self, name), int | float | np.number) and value > 0
             _require(is_positive, name, value, f"a positive number of {unit}, or inf")
         if self.terminal != "none":
@@ -149,6 +153,23 @@ class MPCSettings:
         """
         differing = {f.name: f.metadata["paper"] for f in fields(cls) if "paper" in f.metadata}
         return cls(**{**differing, **changes})
+
+    @property
+    def gamma_rate(self) -> float:
+        """The rate at which h may fall, whatever dt is: h(t) >= h(0) exp(-gamma_rate t) [1/s]."""
+        return -log1p(-self.gamma) / self.dt if self.gamma < 1 else inf
+
+    def with_gamma_rate(self, rate: float) -> MPCSettings:
+        """The same settings with the gamma that gives this `rate` [1/s] at their dt; see `gamma_rate`.
+
+        Examples
+        --------
+        >>> import szlib
+        >>> settings = szlib.MPCSettings(dt=0.2).with_gamma_rate(0.5)
+        >>> round(settings.gamma, 4), settings.gamma_rate
+        (0.0952, 0.5)
+        """
+        return replace(self, gamma=-expm1(-check_number("rate", rate) * self.dt))
 
     def badges(self) -> dict[str, str]:
         """The source of each value, by name.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import dist, hypot
 from typing import Literal, cast, get_args
 
 import numpy as np
@@ -15,6 +16,7 @@ from .step_report import Claims, ProblemRow, StepReport, verify_plan
 Fallback = Literal["warm", "cold", "kept", "relaxed", "braking"]
 FALLBACKS: tuple[Fallback, ...] = get_args(Fallback)
 """The ways to a control, in the order in which they are tried: see `szlib.control.solvers.fallbacks`."""
+HOLDS = 2e-3  # a barrier condition whose residual is smaller than this holds the robot [m]
 Status = Literal["optimal", "kept", "relaxed", "braking"]
 _MEANING = {
     "warm": "optimal, from the last plan",
@@ -43,9 +45,13 @@ class Step:
         where the robot meets a person head-on.
     cost : cost of the plan, without any penalty.
     solve_time : wall-clock time of the whole step [s].
-    timed_out : True if a solver was stopped or skipped because time was up (`MPCSettings.time_limit`).
+    timed_out : True if a solver was stopped or skipped because time was up (`MPCSettings.time_limit` or
+        `deadline`).
     scene : what the step was asked.
     way_length : length of the way to the goal [m]: of the route, else straight; inf if no route was found.
+    stuck : time for which the robot has come no nearer to its goal, from 5 s on; 0 before, while it
+        approaches, and at the goal [s].
+    clock : what is wrong with the times given to `MPCCBF.step`, in a sentence; "" if nothing is.
 
     Examples
     --------
@@ -73,6 +79,8 @@ class Step:
     timed_out: bool
     scene: Scene
     way_length: float = 0.0
+    stuck: float = 0.0
+    clock: str = ""
 
     @property
     def status(self) -> Status:
@@ -123,12 +131,14 @@ class Step:
 
         That is: no person is unknown (see `MPCCBF.step`); the plan satisfies the hard problem, from a state
         that satisfies every barrier; and the robot's disc overlaps no body and no wall, by Euclidean
-        distance, neither now nor after the control. People who turn, stop or speed up within a step may still
-        cause h < 0 after a safe step (notebook 13 counts them); the next step then says so.
+        distance, and enters no zone by more than eps, from now until after the control, between samples
+        too (`Scene.smallest_gap`). People who turn, stop or speed up within a step may still cause h < 0
+        after a safe step (notebook 13 counts them); the next step then says so.
         """
         if not self.feasible or self.unknown or min(self.h.tolist(), default=0.0) < -TOLERANCE:
             return False
-        return min(self._gaps(0) + self._gaps(1), default=0.0) >= -TOLERANCE
+        start, end = self.predicted[:2, :2].tolist()
+        return self.scene.smallest_gap(start, end, hypot(*self.control.tolist())) >= -TOLERANCE
 
     def verify(self) -> StepReport:
         """Check this step again, by formulas that share no code with the controller."""
@@ -153,9 +163,8 @@ class Step:
             lines.append(f"  the plan violates {self._name_row(report.worst)} by {report.slack:.2g}")
             lines.append(f"  what helps: {self._advise(report.worst)}")
         if self.timed_out:
-            lines.append(
-                f"  time was up after {scene.settings.time_limit} s; what helps: a larger time_limit"
-            )
+            limit = min(scene.settings.time_limit, scene.settings.deadline)
+            lines.append(f"  time was up after {limit} s; what helps: a larger time_limit or deadline")
         if self.goal_blocked:
             lines.append(f"  the goal {scene.goal} cannot be reached: h < 0 there; the robot waits beside it")
         if self.way_length == np.inf:
@@ -164,7 +173,18 @@ class Step:
             lines.append(
                 f"  {self.rejected} measurements of people were rejected; {self.unknown} are unknown"
             )
+        if self.stuck:
+            lines.append(f"  no progress for {self.stuck:.1f} s, {self._explain_stuck()}")
+        lines += [f"  {self.clock}"] * bool(self.clock)
         return "\n".join(lines + [f"  WRONG: {fault}" for fault in report.faults])
+
+    def _explain_stuck(self) -> str:
+        """How far the goal is, and who and what holds the robot: the barriers that are at their limit."""
+        holding = np.flatnonzero(self.residual.min(axis=1, initial=np.inf) <= HOLDS)
+        names = " and ".join(self._obstacle(i) for i in holding.tolist()) or "no person and no wall"
+        straight = dist(self.scene.state[:2], self.scene.goal)
+        away = self.way_length if self.way_length < np.inf else straight
+        return f"{away:.1f} m from the goal; held by {names}"
 
     def _gaps(self, k: int) -> list[float]:
         """Euclidean gaps at state k of the plan."""
@@ -181,7 +201,9 @@ class Step:
     def _obstacle(self, i: int) -> str:
         """Name of the person or wall of row `i` of `h`."""
         kind, number = self.scene.obstacle(i)
-        known = self.scene.people[i].id if kind == "person" else None
+        if kind == "wall":
+            return "wall {} ({:g}, {:g})-({:g}, {:g})".format(number, *self.scene.walls[number][:4])
+        known = self.scene.people[i].id
         return f"{kind} {number}" + ("" if known is None else f" (id {known!r})")
 
     def _row_of_h(self, row: ProblemRow) -> int:

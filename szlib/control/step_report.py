@@ -7,7 +7,7 @@ alone, and compared with what the step claims.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from .settings import TOLERANCE
 
 # Two computations of one number may differ by this much, relative to the largest number (at least 1).
 ROUNDING = 1e-7
+_SAMPLES = 17  # times within a step at which gaps are computed
 
 
 class ProblemRow(NamedTuple):
@@ -64,7 +65,8 @@ class StepReport:
     worst : the row with the smallest value.
     slack : by how much `worst` is violated, 0 if it is not.
     h : smallest barrier in the state itself [m]; inf without people and walls.
-    gap : smallest Euclidean gap of the robot's disc to bodies and walls, now and after the control [m].
+    gap : smallest Euclidean gap of the robot's disc to bodies and walls, or h + eps of a person,
+        at times from now until after the control [m].
     feasible, safe : as `Step.feasible` and `Step.safe`, by these numbers.
     """
 
@@ -99,10 +101,11 @@ def verify_plan(scene: Scene, predicted: Array, control: Array, claims: Claims) 
     moved = np.vstack([scene.state, np.c_[x[:-1, :2] + s.dt * x[:-1, 2:] + s.dt**2 / 2 * u, x[1:, 2:]]])
     h = np.reshape([_compute_h(scene, point, k * s.dt) for k, point in enumerate(x[:, :2])], (len(x), -1)).T
     residual = h[:, 1 : s.N_h + 1] - (1 - s.gamma) * h[:, : s.N_h]
-    gaps = [*_compute_gaps(scene, x[0, :2], 0.0), *_compute_gaps(scene, x[1, :2], s.dt)]
+    t = np.linspace(0.0, s.dt, _SAMPLES)[:, None]
+    path = x[0, :2] + t * x[0, 2:] + t**2 / 2 * control
+    gap = _find_gap(scene, path)
     worst = min(_list_rows(scene, x, residual), key=lambda row: row.value)
     slack, min_h = max(0.0, -worst.value), float(h[:, 0].min(initial=np.inf))
-    gap = min(gaps, default=np.inf)
     feasible = slack <= TOLERANCE
     safe = feasible and not scene.tracked.unknown and min(min_h, gap) >= -TOLERANCE
     beyond = max(0.0, float(np.abs([*u, control]).max()) - s.a_max)
@@ -120,12 +123,65 @@ def verify_plan(scene: Scene, predicted: Array, control: Array, claims: Claims) 
     ]
     if not beyond <= ROUNDING / s.dt * size:
         faults.append(f"an acceleration is {beyond:.2g} m/s2 beyond its bound")
-    undecided = min(abs(slack - TOLERANCE), abs(min(min_h, gap) + TOLERANCE)) <= ROUNDING * scale
+    undecided = abs(slack - TOLERANCE) <= ROUNDING * scale
+    undecided |= _is_undecided(scene, path, min(min_h, gap), claims.safe)
     if not undecided and (feasible, safe) != (claims.feasible, claims.safe):
         faults.append(
             f"the step says feasible {claims.feasible}, safe {claims.safe}; found {feasible}, {safe}"
         )
     return StepReport(tuple(faults), differences, beyond, worst, slack, min_h, gap, feasible, safe)
+
+
+def verify_disc(scene: Scene, heading: float, step: Any) -> StepReport:
+    """Check the disc of a robot with two wheels: the report of the point ahead, with the disc's numbers.
+
+    Parameters
+    ----------
+    scene : what the step was asked, for the disc.
+    heading : of the robot now [rad].
+    step : a `DriveStep`.
+    """
+    (v, omega), dt, found = step.control, scene.settings.dt, step.point.verify()
+    turned = 1j * (omega or 1e-9) * np.linspace(0.0, dt, _SAMPLES)
+    way = v * np.exp(1j * heading) * np.expm1(turned) / turned[-1] * dt
+    path = np.array(scene.state[:2]) + np.c_[way.real, way.imag]
+    now, gap = _compute_h(scene, path[0], 0.0), _find_gap(scene, path)
+    worst = min([*now, *_compute_h(scene, path[-1], dt), gap])
+    safe = found.feasible and not scene.tracked.unknown and worst >= -TOLERANCE
+    size, differences = (
+        max(1.0, float(np.abs([*path.ravel(), *now]).max())),
+        {
+            "motion of the disc": float(np.abs(path[[0, -1]] - step.predicted[:2, :2]).max()),
+            "h of the disc": float(np.abs(np.subtract(now, step.h)).max(initial=0.0)),
+        },
+    )
+    faults = [
+        f"{name} differs by {value:.2g}" for name, value in differences.items() if value > ROUNDING * size
+    ]
+    if safe != step.safe and not _is_undecided(scene, path, worst, step.safe):
+        faults.append(f"the step says of the disc safe {step.safe}; found {safe}")
+    return StepReport(
+        **vars(found)
+        | {"faults": (*found.faults, *faults), "differences": found.differences | differences}
+        | {"h": min(now, default=np.inf), "gap": gap, "safe": safe}
+    )
+
+
+def _is_undecided(scene: Scene, path: Array, worst: float, claimed: bool) -> bool:
+    """True if rounding decides whether the step is safe, or a loose bound may say (`claimed`) unsafe."""
+    speed = max([float(np.hypot(*person.velocity)) for person in scene.people], default=0.0)
+    reach = scene.settings.dt * speed + 2 * np.abs(path - path[0]).sum(axis=1).max()
+    is_rounded = abs(worst + TOLERANCE) <= ROUNDING * max(1.0, float(np.abs(path).max()))
+    return bool(is_rounded or (not claimed and worst <= reach))
+
+
+def _find_gap(scene: Scene, path: Array) -> float:
+    """Smallest gap to bodies and walls, and h + eps of people, on the `path` of a step, shape (n, 2) [m]."""
+    found, n = [np.inf], len(scene.people)
+    for point, time in zip(path, np.linspace(0.0, scene.settings.dt, len(path)), strict=True):
+        h = _compute_h(scene, point, time)[:n]
+        found += [*_compute_gaps(scene, point, time), *np.add(h, scene.settings.eps)]
+    return float(min(found))
 
 
 def _list_rows(scene: Scene, x: Array, residual: Array) -> list[ProblemRow]:

@@ -6,14 +6,20 @@ A sensor is noisy and late, and loses people. By the ids of people,
                 before that, and for people without an id whenever they are slower
     position    is moved forward to now at constant velocity, for people who were seen earlier
     unseen      people stay, at constant velocity, for `memory` seconds
-    rejected    are measurements that are not finite, or beyond `LARGEST`. The last known state of the same id
-                takes their place, moved forward; people without such a state are *unknown*
+    rejected    are measurements that are not finite, or beyond `LARGEST`, or measured more than `memory`
+                before or after now. The last known state of the same id takes their place, moved forward;
+                people without such a state are *unknown*
+    late        measurements, older than what is known of the same id, are ignored
+    ids         that are NaN, or given to two people at once, tell nothing. If a person is more than
+                `SAME_PERSON` from where the same id is expected, they are somebody else
+    the clock   may go back: that step is taken to be as long as the one before, and nobody is forgotten
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
-from math import atan2, hypot, inf, isfinite
+from math import atan2, dist, hypot, inf, isfinite
 from typing import NamedTuple, TypeGuard, cast
 
 import numpy as np
@@ -23,6 +29,8 @@ from ..checks import LARGEST, Array
 from ..errors import SolverError
 from .person import Person
 
+SAME_PERSON = 2.0
+"""Distance from the expected position up to which the same id means the same person [m] (assumed)."""
 _LastSeen = tuple[Person, float]  # a person as last seen, and when [s]
 People = Sequence[Person] | ArrayLike
 """People as `Person`s, or as an array, shape (n, 4): x, y [m], vx, vy [m/s]."""
@@ -36,7 +44,8 @@ class TrackedPeople(NamedTuple):
     people : those given, in their order, then those who are remembered.
     rejected : number of those given whose measurement cannot be used.
     unknown : number of rejected people of whom nothing is known that could take the place of the
-        measurement. They are among `people`, as standing, only if their position can be used.
+        measurement. They are among `people`, as standing where they were measured, only if that position can
+        be used.
     """
 
     people: tuple[Person, ...]
@@ -51,7 +60,8 @@ class Tracker:
     ----------
     walking_speed : speed from which on the velocity gives the heading [m/s] (assumed: ten times the noise of
         a sensor that is 2 cm/s off).
-    memory : time for which people who are not seen any more are remembered and respected [s] (assumed).
+    memory : time for which people who are not seen any more are remembered and respected, and the greatest
+        age of a measurement [s] (assumed).
 
     Raises
     ------
@@ -75,6 +85,7 @@ class Tracker:
                 raise SolverError(f"{name} must be a finite number >= 0; got {value!r}")
         self.walking_speed, self.memory = float(walking_speed), float(memory)
         self._last_seen: dict[Hashable, _LastSeen] = {}
+        self._now, self._interval = inf, 0.0
 
     def reset(self) -> None:
         """Forget everybody."""
@@ -103,12 +114,20 @@ class Tracker:
         SolverError : an argument has the wrong type or shape: an error of the program, not of a sensor.
         """
         now = check_time(now)
+        if now < self._now:
+            back = self._now + self._interval - now
+            self._last_seen = {
+                name: (person, time - back) for name, (person, time) in self._last_seen.items()
+            }
+        elif now - self._now <= self.memory:
+            self._interval = now - self._now
+        self._now = now
         if ids is None and stamps is None and not self._last_seen and _have_no_ids(people):
             return TrackedPeople(tuple(people))
         rows = _split_rows(people)
         try:
             names = [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
-            given = set(names)
+            given = Counter(names)
         except TypeError as error:
             raise SolverError(f"ids must be a list of hashable values; got {ids!r:.200}") from error
         if len(names) != len(rows):
@@ -119,7 +138,11 @@ class Tracker:
         rejected = unknown = 0
         row: Person | list[float]
         for row, name, time in zip(rows, names, times, strict=True):
+            if given[name] > 1 or name != name:  # NaN
+                name = None
             last = None if name is None else self._last_seen.get(name)
+            if last is not None and last[1] <= time <= now + self.memory and _is_elsewhere(row, time, *last):
+                self._last_seen[Tracker, name], last = last, None  # may be hidden, and has no id any more
             found, usable = self._update(row, name, time, now, last)
             if found is not None and name is not None and (usable or last is not None):
                 self._last_seen[name] = found
@@ -136,11 +159,15 @@ class Tracker:
         if isinstance(row, Person) and name is None and time == now:
             return (row, now), True
         x, y, vx, vy = (*row.position, *row.velocity) if isinstance(row, Person) else row
-        if not _are_usable(x, y, now - time):
+        if not _are_usable(x, y):
             return last, False
+        heading, zone = (row.heading, row.zone) if isinstance(row, Person) else (None, None)
+        if not abs(now - time) <= self.memory:
+            return last or (Person((x, y), zone=zone, id=name), now), False
+        if last is not None and time < last[1]:
+            return last, True
         if not _are_usable(vx, vy):
             return (Person((x, y), id=name), now) if last is None else (last[0].at((x, y)), time), False
-        heading, zone = (row.heading, row.zone) if isinstance(row, Person) else (None, None)
         is_given = heading is not None and (vx == vy == 0 or name is None or heading != atan2(vy, vx))
         if not is_given and hypot(vx, vy) >= self.walking_speed:
             heading = atan2(vy, vx)
@@ -156,6 +183,13 @@ def _move_forward(person: Person, time: float, now: float) -> Person | None:
     (x, y), (vx, vy) = person.position, person.velocity
     position = (x + (now - time) * vx, y + (now - time) * vy)
     return person.at(position) if _are_usable(*position) else None
+
+
+def _is_elsewhere(row: Person | list[float], time: float, person: Person, seen: float) -> bool:
+    """True if the measurement of this `time` is too far from a `person` who was `seen` before."""
+    x, y = row.position if isinstance(row, Person) else row[:2]
+    expected = _move_forward(person, seen, time)
+    return bool(expected and _are_usable(x, y) and dist((x, y), expected.position) > SAME_PERSON)
 
 
 def _are_usable(*numbers: float) -> bool:

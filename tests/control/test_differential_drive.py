@@ -72,7 +72,7 @@ def test_the_point_lands_where_the_plan_says_near_its_chord_and_within_the_limit
         angle = rng.uniform(-np.pi, np.pi)
         start = point_of(own, drive.ahead)
         end = start + way * np.array([np.cos(angle), np.sin(angle)])
-        (_, reached), (control,) = drive._follow(own.tolist(), end[None])
+        (_, reached), (control,) = drive._follow(own, end[None])
         v, omega = control
         assert abs(v) <= s.v_max * (1 + 1e-12)
         assert abs(omega) <= drive.omega_max * (1 + 1e-12)
@@ -92,7 +92,7 @@ def test_the_chord_error_and_the_limits_are_attained():
         if drive.v_max < drive.settings.v_max:  # the turning rate is what limits
             dt, side = drive.settings.dt, np.arccos(-drive.v_max * drive.settings.dt / 2 / drive.ahead)
             end = [drive.ahead + drive.v_max * dt * np.cos(side), drive.v_max * dt * np.sin(side)]
-            _, (control,) = drive._follow([0.0, 0.0, 0.0], np.array([end]))
+            _, (control,) = drive._follow(np.zeros(5), np.array([end]))
             assert control[1] == pytest.approx(drive.omega_max)
             points = point_of(integrate(np.zeros(3), control, dt, [0, dt / 2, dt]), drive.ahead)
             assert np.hypot(*(points[1] - points[[0, 2]].mean(axis=0))) == pytest.approx(
@@ -109,8 +109,8 @@ def test_the_disc_is_safe_at_any_heading_where_the_point_is_safe():
         drive = szlib.DifferentialDrive(
             ZONE, walls=[wall], settings=s, ahead=rng.uniform(0.1, 0.6), max_people=0
         )
-        zone = draw_zone(rng).placed(rng.uniform(-2, 2, 2), rng.uniform(-np.pi, np.pi))
-        person = szlib.Person((0.0, 0.0), heading=0.0, zone=zone)
+        person = szlib.Person(tuple(rng.uniform(-2, 2, 2)), heading=rng.uniform(-3, 3), zone=draw_zone(rng))
+        zone = person.zone.placed(person.position, person.heading)
         for point in rng.uniform(-5, 5, (60, 2)):
             h = drive._point.barriers(point, [person])
             if h.min() < 0 or h.min() > 0.2:

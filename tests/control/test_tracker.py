@@ -114,12 +114,6 @@ def test_people_not_seen_any_more_are_remembered_at_constant_velocity():
     assert tracker.see(now=0.6).people == ()
 
 
-def test_people_are_forgotten_when_the_clock_is_set_back():
-    tracker = szlib.Tracker()
-    tracker.see([[0, 0, 1.0, 0]], ids=[1], now=1000.0)
-    assert tracker.see(now=0.0).people == ()
-
-
 def test_without_a_time_each_step_is_dt_after_the_last():
     controller = controller_of(tracker=szlib.Tracker(memory=0.25))
     controller.step((-3, 0, 0, 0), GOAL, [[0, 1, 0.5, 0]], ids=["a"])

@@ -209,6 +209,8 @@ def settings_of(rng: np.random.Generator, solver: str = "sqp") -> szlib.MPCSetti
 def person_of(rng: np.random.Generator) -> szlib.Person:
     a = rng.uniform(0.3, 2)
     zone = szlib.Ellipse(tuple(rng.uniform(-0.5, 0.5, 2)), (a, a * rng.uniform(0.1, 1)), rng.uniform(-3, 3))
+    inside = min(1.0, 0.99 / float(np.sqrt(zone.level((0.0, 0.0)))))  # a zone contains its person
+    zone = replace(zone, center=(inside * zone.center[0], inside * zone.center[1]))
     velocity = rng.uniform(-1.5, 1.5, 2) * (rng.random() < 0.6)
     return szlib.Person(tuple(rng.uniform(-5, 5, 2)), tuple(velocity), rng.uniform(-4, 4), zone)
 

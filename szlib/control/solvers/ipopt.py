@@ -88,7 +88,7 @@ class Ipopt(ProblemSolver):
         with _CALL_LOCK:
             found, stats = solver(lbg=0, ubg=self._upper, **problem), solver.stats()
         s = self.settings
-        self.timed_out = stats["return_status"] == "Maximum_CpuTime_Exceeded"
+        self.timed_out = stats["return_status"] in ("Maximum_CpuTime_Exceeded", "Maximum_WallTime_Exceeded")
         inputs = np.clip(np.asarray(found["x"]).ravel()[: 2 * s.N], -s.a_max, s.a_max)
         return self.evaluate(inputs, parameters), bool(stats["success"])
 
@@ -101,8 +101,9 @@ def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any
     options["show_eval_warnings"] = False  # a failure shows in `Step.status`
     options |= {f"ipopt.{name}": value for name, value in _OPTIONS.items()}
     options["ipopt.max_iter"] = settings.max_iterations
-    if settings.time_limit < inf:
-        options["ipopt.max_cpu_time"] = HARD_SHARE * settings.time_limit
+    for name, limit in (("cpu", settings.time_limit), ("wall", settings.deadline)):
+        if limit < inf:
+            options[f"ipopt.max_{name}_time"] = HARD_SHARE * limit
     # Slack counted by its penalty, in the unit of the cost: IPOPT would scale the rest away.
     penalty, weight = ca.SX.sym("penalty", p.rows.numel()), ca.SX.sym("weight")
     hard = {"x": p.inputs, "p": p.parameters, "f": p.cost, "g": ca.vertcat(p.rows, p.terminal)}

@@ -49,7 +49,7 @@ class SolverPool:
     """
 
     def __init__(self, settings: MPCSettings, max_people: int | None, n_walls: int) -> None:
-        self.settings, self.budget = settings, TimeBudget(settings.time_limit)
+        self.settings, self.budget = settings, TimeBudget(settings.time_limit, settings.deadline)
         self._grows = max_people is None
         self.max_people = round_up_size(DEFAULT_MAX_PEOPLE if max_people is None else max_people)
         self._solvers: dict[tuple[int, int], ProblemSolver] = {}
