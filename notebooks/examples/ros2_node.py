@@ -5,12 +5,13 @@
 subscribes  odom                 nav_msgs/Odometry            where the robot is, and its (v, omega)
             people               people_msgs/People           tracked people: name, position, velocity
             goal_pose            geometry_msgs/PoseStamped    the goal; its orientation is not used
-publishes   cmd_vel              geometry_msgs/Twist          (v, omega), every dt
+publishes   cmd_vel              geometry_msgs/Twist          (v, omega), every dt; TwistStamped if `stamped`
             social_costmap       nav_msgs/OccupancyGrid       the zones around people, 0 to 100
 
-Parameters: `zone`, a file that `SocialZone.save` wrote; `walls`, "x1 y1 x2 y2; ..." [m]; `frame`, the one
-frame of all messages and of the walls (messages in another frame are ignored with a warning); of the robot
-`r_robot` [m], `v_max` [m/s], `omega_max` [rad/s], `ahead` [m] (0: the default of `DifferentialDrive`);
+Parameters: `zone`, a file that `SocialZone.save` wrote; `walls`, "x1 y1 x2 y2; ..." [m]; `frame`, the frame
+of the walls, into which all messages are brought by TF (messages in another frame are ignored with a warning
+where TF does not know it at their time, or is not installed; TF is asked for poses, so a frame that people
+are given in should stand still); `stamped`, True for a base that wants TwistStamped; of the robot `r_robot` [m], `v_max` [m/s], `omega_max` [rad/s], `ahead` [m] (0: the default of `DifferentialDrive`);
 `max_people`, the number to prepare for; `timeout` [s]; `costmap_size` and `costmap_resolution` [m].
 
 Watchdog: the node commands zero velocity, every dt, unless it has a goal, and odometry and people no older
@@ -21,22 +22,29 @@ driver must do so when cmd_vel falls silent.
 Tested without ROS by tests/control/test_ros2_node.py.
 """
 
-from math import atan2
+from math import atan2, nan
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import PoseStamped, Twist
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from people_msgs.msg import People
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.time import Time
 
 import szlib
+
+try:
+    import tf2_ros
+except ImportError:
+    tf2_ros = None
 
 DEFAULTS = {
     "zone": "",
     "walls": "",
     "frame": "odom",
+    "stamped": False,
     "r_robot": 0.3,
     "v_max": 0.8,
     "omega_max": 4.0,
@@ -68,10 +76,12 @@ class SocialDrive(Node):
             max_people=self.max_people,
         )
         self.odometry = self.people = self.goal = None
+        self.transforms = tf2_ros and tf2_ros.Buffer()
+        self.listener = tf2_ros and tf2_ros.TransformListener(self.transforms, self)
         self.create_subscription(Odometry, "odom", self.on_odometry, 10)
         self.create_subscription(People, "people", self.on_people, 10)
         self.create_subscription(PoseStamped, "goal_pose", self.on_goal, 10)
-        self.command = self.create_publisher(Twist, "cmd_vel", 10)
+        self.command = self.create_publisher(TwistStamped if self.stamped else Twist, "cmd_vel", 10)
         self.costmap = self.create_publisher(OccupancyGrid, "social_costmap", 1)
         self.create_timer(self.drive.settings.dt, self.on_timer)
 
@@ -79,26 +89,41 @@ class SocialDrive(Node):
         """Store the odometry, unless a number is not finite."""
         own = pose_and_speeds(message)
         if not np.isfinite(own).all():
-            self.warn(f"odom is not finite: {own.tolist()}; it is ignored")
-        elif self.is_in_frame(message, "odom"):
+            self.warn(f"odom is not finite, or its quaternion is no rotation: {own.tolist()}; it is ignored")
+        elif (frame := self.find_frame(message, "odom")) is not None:
+            own[:2], own[2] = frame[:2] + turn(own[:2], frame[2]), own[2] + frame[2]
             self.odometry, self.own = message, own
 
     def on_people(self, message):
         """Store the people who were seen."""
-        if self.is_in_frame(message, "people"):
-            self.people = message
+        frame = self.find_frame(message, "people")
+        if frame is not None:
+            self.people, self.people_frame = message, frame
 
     def on_goal(self, message):
         """Replace the goal."""
-        if self.is_in_frame(message, "goal_pose"):
-            self.goal = (message.pose.position.x, message.pose.position.y)
+        frame = self.find_frame(message, "goal_pose")
+        if frame is not None:
+            at = turn(np.array([message.pose.position.x, message.pose.position.y]), frame[2])
+            self.goal = tuple((frame[:2] + at).tolist())
 
-    def is_in_frame(self, message, topic):
-        """True if the message is in the frame of all messages; else warn."""
-        if message.header.frame_id != self.frame:
-            frame = message.header.frame_id
-            self.warn(f"{topic} is in the frame {frame!r}, not in {self.frame!r}; it is ignored")
-        return message.header.frame_id == self.frame
+    def find_frame(self, message, topic):
+        """(x, y, angle) of the message's frame in the frame of the walls; None and a warning if unknown."""
+        name, why = message.header.frame_id, "there is no TF"
+        if name == self.frame:
+            return np.zeros(3)
+        if tf2_ros:
+            try:
+                when = Time.from_msg(message.header.stamp)
+                found = self.transforms.lookup_transform(self.frame, name, when).transform
+                at = np.array([found.translation.x, found.translation.y, yaw(found.rotation)])
+                if np.isfinite(at).all():
+                    return at
+                why = "its transform is no rotation"
+            except tf2_ros.TransformException as error:
+                why = str(error)
+        self.warn(f"{topic} is in the frame {name!r}, not in {self.frame!r}, and {why}; it is ignored")
+        return None
 
     def warn(self, text):
         """Log a warning, at most one a second."""
@@ -111,7 +136,7 @@ class SocialDrive(Node):
         if missing:
             self.warn(f"no recent {' and '.join(missing)}: the robot stops")
         if missing or self.goal is None:
-            self.command.publish(Twist())
+            self.drive_at(0.0, 0.0)
             return
         try:
             people, options = self.read_people(now)
@@ -119,15 +144,24 @@ class SocialDrive(Node):
         except szlib.SolverError as error:
             self.get_logger().error(f"the goal is dropped: {error}")
             self.goal = None
-            self.command.publish(Twist())
+            self.drive_at(0.0, 0.0)
             return
         if not step.safe:
             min_h = min(step.h, default=np.inf)
             self.warn(f"not safe: {step.fallback}, h = {min_h:.2f} m, {step.point.unknown} unknown")
-        twist = Twist()
-        twist.linear.x, twist.angular.z = step.control.tolist()
-        self.command.publish(twist)
+        if step.stuck or step.clock:
+            self.warn(step.explain())
+        self.drive_at(*step.control.tolist())
         self.costmap.publish(self.draw_costmap(step.point.scene.people))
+
+    def drive_at(self, v, omega):
+        """Publish a command."""
+        message = TwistStamped() if self.stamped else Twist()
+        twist = message.twist if self.stamped else message
+        twist.linear.x, twist.angular.z = v, omega
+        if self.stamped:
+            message.header.stamp = self.get_clock().now().to_msg()
+        self.command.publish(message)
 
     def is_recent(self, message, now):
         """True if there is a message no older than the timeout."""
@@ -140,7 +174,9 @@ class SocialDrive(Node):
     def read_people(self, now):
         """People as an array, shape (n, 4), and the other arguments of `step`: ids, stamps and time."""
         rows = [(p.position.x, p.position.y, p.velocity.x, p.velocity.y) for p in self.people.people]
-        return np.reshape(np.array(rows, float), (-1, 4)), {
+        rows, (x, y, angle) = np.reshape(np.array(rows, float), (-1, 4)), self.people_frame
+        rows = np.hstack([np.add(turn(rows[:, :2], angle), (x, y)), turn(rows[:, 2:], angle)])
+        return rows, {
             "ids": [p.name or None for p in self.people.people],
             "stamps": to_seconds(self.people.header.stamp),
             "now": now,
@@ -162,9 +198,22 @@ class SocialDrive(Node):
 
 def pose_and_speeds(odometry):
     """(x, y, theta, v, omega) of a robot on the plane, shape (5,)."""
-    at, q = odometry.pose.pose.position, odometry.pose.pose.orientation
-    theta = atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))
-    return np.array([at.x, at.y, theta, odometry.twist.twist.linear.x, odometry.twist.twist.angular.z])
+    at, speeds = odometry.pose.pose.position, odometry.twist.twist
+    theta = yaw(odometry.pose.pose.orientation)
+    return np.array([at.x, at.y, theta, speeds.linear.x, speeds.angular.z])
+
+
+def yaw(q):
+    """Angle of a rotation on the plane [rad]; NaN if the quaternion `q` has not the norm 1."""
+    is_rotation = abs(q.x**2 + q.y**2 + q.z**2 + q.w**2 - 1) < 0.01
+    return atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2)) if is_rotation else nan
+
+
+def turn(points, angle):
+    """Points, shape (..., 2), turned by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    with np.errstate(all="ignore"):  # infinite numbers stay unusable
+        return points @ np.array([[c, s], [-s, c]])
 
 
 def to_seconds(stamp):

@@ -34,9 +34,10 @@ def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
         if not hasattr(zone, "ellipse"):
             raise ZoneError(f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}")
         zone = zone.ellipse(speed)
-    xa, ya, xb, yb, a = zone.foci_and_axis
-    if not max(abs(xa), abs(ya), abs(xb), abs(yb), a) <= LARGEST:
+    (m, n), (a, _) = zone.center, zone.semi_axes
+    if not max(abs(m), abs(n), a) <= LARGEST:
         raise ZoneError(f"a zone must lie within {LARGEST:g} m of its person; got {zone}")
+    xa, ya, xb, yb, a = zone.foci_and_axis
     if hypot(xa, ya) + hypot(xb, yb) > 2 * a * (1 + 1e-9):
         raise ZoneError(f"a zone must contain its person, who is at (0, 0) of its frame; got {zone}")
     return zone

@@ -93,6 +93,7 @@ class Scene(NamedTuple):
         reach = hypot(dx, dy) + s.dt * max([hypot(*person.velocity) for person in self.people], default=0.0)
 
         def gaps_after(share: float) -> list[float]:
+            """These distances after a share of the step, without the acceleration."""
             at = x + share * dx, y + share * dy
             h = compute_h(*at, self.zones, (), r_robot=s.r_robot, eps=0.0, time=share * s.dt)
             return self.gaps(*at, share * s.dt) + h

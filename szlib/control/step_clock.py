@@ -86,18 +86,15 @@ class StepClock:
 
     def describe(self, stamps: ArrayLike | None, memory: float) -> str:
         """What is wrong with the times of this step, with the `stamps` of people and a tracker's `memory`."""
-        late = (
-            0.0
-            if stamps is None
-            else float(np.max(np.abs(self.now - np.asarray(stamps, float)), initial=0.0))
-        )
-        period = median_low([held for _, held in self._held][-RATE_STEPS:] or [self._dt])
+        times = np.asarray(self.now if stamps is None else stamps, float)
+        late = float(np.max(np.abs(self.now - times), initial=0.0))
+        recent = [self._held[-1 - i][1] for i in range(RATE_STEPS)] if len(self._held) >= RATE_STEPS else []
+        period = median_low(recent or [self._dt])
         faults = {
             f"the clock went back by {self._back:.3g} s; nobody is forgotten": self._back > 0,
             f"people were measured {late:.3g} s from now, and are remembered for {memory:g} s; do `now` and "
             "`stamps` come from one clock?": late > memory,
             f"steps come every {period:.3g} s, but dt = {self._dt:g} s, and gamma is per step of dt; see "
-            "MPCSettings.with_gamma_rate": len(self._held) >= RATE_STEPS
-            and abs(period - self._dt) > RATE_ERROR * self._dt,
+            "MPCSettings.with_gamma_rate": abs(period - self._dt) > RATE_ERROR * self._dt,
         }
         return "; ".join(sentence for sentence, holds in faults.items() if holds)

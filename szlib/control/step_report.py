@@ -6,7 +6,7 @@ alone, and compared with what the step claims.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -141,30 +141,25 @@ def verify_disc(scene: Scene, heading: float, step: Any) -> StepReport:
     heading : of the robot now [rad].
     step : a `DriveStep`.
     """
-    (v, omega), dt, found = step.control, scene.settings.dt, step.point.verify()
+    found: StepReport = step.point.verify()
+    (v, omega), dt = step.control, scene.settings.dt
     turned = 1j * (omega or 1e-9) * np.linspace(0.0, dt, _SAMPLES)
     way = v * np.exp(1j * heading) * np.expm1(turned) / turned[-1] * dt
     path = np.array(scene.state[:2]) + np.c_[way.real, way.imag]
     now, gap = _compute_h(scene, path[0], 0.0), _find_gap(scene, path)
-    worst = min([*now, *_compute_h(scene, path[-1], dt), gap])
+    min_h = min(now, default=np.inf)
+    worst = min(min_h, gap, *_compute_h(scene, path[-1], dt))
     safe = found.feasible and not scene.tracked.unknown and worst >= -TOLERANCE
-    size, differences = (
-        max(1.0, float(np.abs([*path.ravel(), *now]).max())),
-        {
-            "motion of the disc": float(np.abs(path[[0, -1]] - step.predicted[:2, :2]).max()),
-            "h of the disc": float(np.abs(np.subtract(now, step.h)).max(initial=0.0)),
-        },
-    )
-    faults = [
-        f"{name} differs by {value:.2g}" for name, value in differences.items() if value > ROUNDING * size
-    ]
+    most = ROUNDING * max(1.0, float(np.abs([*path.ravel(), *now]).max()))
+    differences = {
+        "motion of the disc": float(np.abs(path[[0, -1]] - step.predicted[:2, :2]).max()),
+        "h of the disc": float(np.abs(np.subtract(now, step.h)).max(initial=0.0)),
+    }
+    faults = [f"{name} differs by {value:.2g}" for name, value in differences.items() if not value <= most]
     if safe != step.safe and not _is_undecided(scene, path, worst, step.safe):
         faults.append(f"the step says of the disc safe {step.safe}; found {safe}")
-    return StepReport(
-        **vars(found)
-        | {"faults": (*found.faults, *faults), "differences": found.differences | differences}
-        | {"h": min(now, default=np.inf), "gap": gap, "safe": safe}
-    )
+    differences, faults = found.differences | differences, [*found.faults, *faults]
+    return replace(found, faults=tuple(faults), differences=differences, h=min_h, gap=gap, safe=safe)
 
 
 def _is_undecided(scene: Scene, path: Array, worst: float, claimed: bool) -> bool:

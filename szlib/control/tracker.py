@@ -116,9 +116,7 @@ class Tracker:
         now = check_time(now)
         if now < self._now:
             back = self._now + self._interval - now
-            self._last_seen = {
-                name: (person, time - back) for name, (person, time) in self._last_seen.items()
-            }
+            self._last_seen = {k: (person, time - back) for k, (person, time) in self._last_seen.items()}
         elif now - self._now <= self.memory:
             self._interval = now - self._now
         self._now = now

@@ -177,6 +177,7 @@ def drive(
         safe=np.array([step.safe for step in steps], bool),
         slack=np.array([step.slack for step in steps]),
         solve_time=np.array([step.solve_time for step in steps]),
+        stuck=np.array([step.stuck for step in steps], float),
         arrival=arrival,
         has_safety_claims=steps[0].safe is not None,
         inputs=tuple(robot.inputs),
@@ -233,7 +234,7 @@ class ZoneAssignment:
 @dataclass(slots=True)
 class StepRecord:
     """What the log keeps of a step: `control`, `predicted`, `residual`, `fallback`, `safe`, `slack`,
-    `solve_time`.
+    `solve_time`, `stuck`.
 
     The meanings are those of `szlib.Step`; the defaults stand for what a controller does not report.  The
     step itself is not kept: a thousand of them cost a garbage collection.
@@ -246,6 +247,7 @@ class StepRecord:
     safe: bool | None = None
     slack: float = np.nan
     solve_time: float = np.nan
+    stuck: float = 0.0
 
     @classmethod
     def of(cls, step: Any, duration: float) -> StepRecord:

@@ -27,9 +27,10 @@ from .scenario import Scenario
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_FORMAT, _VERSION = "szlib.SimulationLog", 3
+_FORMAT, _VERSION = "szlib.SimulationLog", 4
 _ARRAYS = (
     "states", "controls", "people", "predicted", "residual", "fallback", "safe", "slack", "solve_time",
+    "stuck",
 )  # fmt: skip
 _SHOWN = ("success", "outcome", "time_to_goal", "min_h", "min_clearance", "infeasible_steps")
 
@@ -39,7 +40,7 @@ class SimulationLog(Run):
 
     `szlib.simulate` returns it.  Its arrays are those of `szlib.simulation.Run`: `scenario`, `settings`,
     `zones`, `states`, `controls`, `people`, `predicted`, `residual`, `fallback`, `safe`, `slack`,
-    `solve_time`, `arrival`, `has_safety_claims`, `inputs`.
+    `solve_time`, `stuck`, `arrival`, `has_safety_claims`, `inputs`.
 
     Examples
     --------
@@ -60,7 +61,7 @@ class SimulationLog(Run):
         """One row for each step: the state at its time and the control decided there.
 
         Columns: t [s], x, y [m], vx, vy, speed [m/s], ax, ay [m/s2] (or `inputs`), status, fallback, slack,
-        solve_time [s], cbf_people [m], clearance (the smallest) [m], and for each person i and wall j:
+        solve_time, stuck [s], cbf_people [m], clearance (the smallest) [m], and for each person i and wall j:
         person_i_x, person_i_y [m], person_i_heading [rad], h_person_i, h_wall_j [m].
         """
         n = len(self.zones)
@@ -68,7 +69,8 @@ class SimulationLog(Run):
         columns |= dict(zip(("x", "y", "vx", "vy"), self.states.T, strict=True)) | {"speed": self.speed}
         columns |= dict(zip(self.inputs, self.controls.T, strict=True))
         columns |= {"status": [status_of(name) for name in self.fallback.tolist()], "fallback": self.fallback}
-        columns |= {"slack": self.slack, "solve_time": self.solve_time, "cbf_people": self.cbf_people}
+        columns |= {"slack": self.slack, "solve_time": self.solve_time, "stuck": self.stuck}
+        columns["cbf_people"] = self.cbf_people
         columns["clearance"] = nanmin(self.clearance, axis=1)
         for i in range(n):
             x, y, heading = self.people[:, i, :3].T

@@ -51,6 +51,7 @@ class Run:
     safe : `Step.safe`, shape (n,): True is a safety claim.
     slack : largest violation of a hard constraint by each plan, shape (n,); NaN if not reported.
     solve_time : time of each step, shape (n,) [s]: as reported, else the duration of the call.
+    stuck : time without progress at each step, `Step.stuck`, shape (n,) [s]; 0 if not reported.
     arrival : index of the first state at rest at the goal; None if there is none.
     has_safety_claims : True if the controller reports whether its steps are safe.
     inputs : names of the controls.
@@ -68,6 +69,7 @@ class Run:
     safe: NDArray[np.bool_]
     slack: Array
     solve_time: Array
+    stuck: Array
     arrival: int | None
     has_safety_claims: bool = True
     inputs: tuple[str, ...] = ("ax", "ay")

@@ -215,8 +215,12 @@ class Experiment:
 
     def decide(self) -> list[Step]:
         """The step of each robot at this time; no time passes."""
-        robots, people = zip(self._controllers, self.states, strict=True), self.people
-        return [controller.step(state, self.scenario.goal, people) for controller, state in robots]
+        robots, goal, people = (
+            zip(self._controllers, self.states, strict=True),
+            self.scenario.goal,
+            self.people,
+        )
+        return [controller.step(state, goal, people, now=self.t) for controller, state in robots]
 
     def step(self) -> list[Step]:
         """The step of each robot at this time; then one time step passes."""
@@ -430,4 +434,5 @@ def _robot_snapshot(
         "a_max": step.scene.settings.a_max,
         "allowed": [np.round(corners, 3).tolist() for corners in allowed],
         "safe": step.safe,
+        "stuck": step.stuck,
     }

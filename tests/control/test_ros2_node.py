@@ -19,10 +19,21 @@ pytestmark = pytest.mark.filterwarnings("ignore::szlib.errors.DataWarning")  # a
 
 @pytest.fixture
 def make(monkeypatch, tmp_path):
-    """A node with these parameters."""
+    """A node with these parameters, without TF."""
+    yield from maker(monkeypatch, tmp_path, tf=False)
+
+
+@pytest.fixture
+def make_with_tf(monkeypatch, tmp_path):
+    """A node with these parameters, and with TF."""
+    yield from maker(monkeypatch, tmp_path, tf=True)
+
+
+def maker(monkeypatch, tmp_path, tf):
+    """How to make a node."""
     shape = PolarZone(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
     szlib.SocialZone(shape, 2.0, {1.1: ZONE}).save(tmp_path / "zone.json")
-    with ros.node_module() as module:
+    with ros.node_module(tf) as module:
 
         def node(**parameters):
             given = {"zone": str(tmp_path / "zone.json"), "v_max": 1.0} | parameters
@@ -124,6 +135,55 @@ def test_the_robot_stays_clear_of_people_whose_numbers_cannot_be_used(make):
     hear(node, "people", people(("anna", (np.nan, 0.0, 0.0, 0.0))))
     assert np.abs(tick(node)).max() < 1e-3
     assert "1 unknown" in node.logged[-1]
+
+
+@pytest.mark.parametrize("w", [0.0, 0.9, 2.0, np.nan])
+def test_a_quaternion_whose_norm_is_not_one_is_no_heading(make, w):
+    node, message = make(), odometry(np.zeros(5))
+    message.pose.pose.orientation.w = w
+    hear(node, "people", people())
+    hear(node, "goal_pose", goal(*GOAL))
+    hear(node, "odom", message)
+    assert not tick(node).any() and "its quaternion is no rotation" in node.logged[0]
+    hear(node, "odom", odometry(np.array([0.0, 0.0, 3.0, 0.0, 0.0])))
+    assert tick(node).any()
+
+
+def test_a_base_that_wants_stamped_commands_gets_them(make):
+    node = make(stamped=True)
+    hear(node, "odom", odometry(np.zeros(5)))
+    hear(node, "people", people())
+    hear(node, "goal_pose", goal(*GOAL))
+    ((_, timer),) = node.every.items()
+    timer()
+    (command,) = node.published["cmd_vel"]
+    assert type(command) is ros.TwistStamped and command.twist.linear.x > 0
+    assert command.header.stamp == ros.stamp_of(Node.now)
+
+
+def test_messages_in_frames_that_tf_knows_are_brought_into_the_frame_of_the_walls(make_with_tf, monkeypatch):
+    half = np.pi / 4  # the camera is at (1, 2) and looks along y
+    turned = ros.xyz(w=float(np.cos(half)))
+    turned.z = float(np.sin(half))
+    monkeypatch.setattr(ros.Buffer, "poses", {"camera": (1.0, 2.0, turned), "broken": (0, 0, ros.xyz(w=0.0))})
+    node = make_with_tf()
+    hear(node, "odom", odometry(np.array([3.0, -1.0, 0.5, 0.2, 0.1]), frame="camera"))
+    assert node.own == pytest.approx([2.0, 5.0, 0.5 + np.pi / 2, 0.2, 0.1])
+    hear(node, "people", people(("anna", (3.0, -1.0, 0.4, 0.0)), frame="camera"))
+    assert node.read_people(Node.now)[0] == pytest.approx(np.array([[2.0, 5.0, 0.0, 0.4]]))
+    hear(node, "goal_pose", goal(1.0, 1.0, frame="camera"))
+    assert node.goal == pytest.approx((0.0, 3.0))
+    hear(node, "goal_pose", goal(1.0, 1.0, frame="unknown"))
+    hear(node, "people", people(frame="broken"))
+    assert node.goal == pytest.approx((0.0, 3.0)) and len(node.people.people) == 1
+    assert "unknown does not exist" in node.logged[0] and "is no rotation" in node.logged[1]
+
+
+def test_a_robot_that_is_stuck_says_why(make):
+    node = make(walls="1.2 -3 1.2 3")
+    hear(node, "goal_pose", goal(*GOAL))
+    drive(node, (-4.0, 3.0, 0.0, 0.0), 110)
+    assert any("no progress for" in said and "held by wall 0" in said for said in node.logged)
 
 
 def test_a_goal_inside_a_wall_is_dropped_with_an_error(make):

@@ -30,6 +30,7 @@ Odometry = message(
     pose=SimpleNamespace(pose=POSE),
     twist=SimpleNamespace(twist=SimpleNamespace(linear=xyz(), angular=xyz())),
 )
+TwistStamped = message(header=HEADER, twist=SimpleNamespace(linear=xyz(), angular=xyz()))
 PoseStamped = message(header=HEADER, pose=POSE)
 Walker = message(name="", position=xyz(), velocity=xyz(), reliability=0.0, tagnames=[], tags=[])
 People = message(header=HEADER, people=[])
@@ -68,7 +69,8 @@ class Node:
         self.every[timer_period_sec] = callback
 
     def get_clock(self):
-        return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=round(Node.now * 1e9)))
+        now = SimpleNamespace(nanoseconds=round(Node.now * 1e9), to_msg=lambda: stamp_of(Node.now))
+        return SimpleNamespace(now=lambda: now)
 
     def get_logger(self):
         def say(text, throttle_duration_sec=0.0):
@@ -77,20 +79,44 @@ class Node:
         return SimpleNamespace(warning=say, error=say)
 
 
+class TransformError(Exception):
+    """tf2_ros.TransformException."""
+
+
+class Buffer:
+    """The part of tf2_ros.Buffer that the example uses: `poses` are (x, y, quaternion) by frame."""
+
+    poses = None
+
+    def lookup_transform(self, target_frame, source_frame, time):
+        if source_frame not in self.poses:
+            raise TransformError(f"{source_frame} does not exist")
+        x, y, rotation = self.poses[source_frame]
+        return SimpleNamespace(
+            transform=SimpleNamespace(translation=SimpleNamespace(x=x, y=y, z=0.0), rotation=rotation)
+        )
+
+
 @contextmanager
-def node_module():
-    """The module of the node, which finds these stubs in place of ROS."""
+def node_module(tf=False):
+    """The module of the node, which finds these stubs in place of ROS, with TF or without it."""
     contents = {
         "rclpy": {"init": None, "spin": None, "try_shutdown": None},
         "rclpy.node": {"Node": Node},
         "rclpy.executors": {"ExternalShutdownException": RuntimeError},
+        "rclpy.time": {"Time": SimpleNamespace(from_msg=lambda stamp: stamp)},
         "geometry_msgs": {},
-        "geometry_msgs.msg": {"Twist": Twist, "PoseStamped": PoseStamped},
+        "geometry_msgs.msg": {"Twist": Twist, "TwistStamped": TwistStamped, "PoseStamped": PoseStamped},
         "nav_msgs": {},
         "nav_msgs.msg": {"Odometry": Odometry, "OccupancyGrid": OccupancyGrid},
         "people_msgs": {},
         "people_msgs.msg": {"People": People},
     }
+    if tf:
+        listener = lambda buffer, node: (buffer, node)  # noqa: E731
+        contents["tf2_ros"] = {
+            "Buffer": Buffer, "TransformListener": listener, "TransformException": TransformError
+        }  # fmt: skip
     modules = {name: ModuleType(name) for name in contents}
     for name, content in contents.items():
         vars(modules[name]).update(content)
@@ -101,10 +127,12 @@ def node_module():
         yield module
 
 
+def stamp_of(when):
+    return SimpleNamespace(sec=int(when), nanosec=round((when - int(when)) * 1e9))
+
+
 def stamped(what, frame="odom", late=0.0):
-    when = Node.now - late
-    what.header.frame_id, what.header.stamp.sec = frame, int(when)
-    what.header.stamp.nanosec = round((when - int(when)) * 1e9)
+    what.header.frame_id, what.header.stamp = frame, stamp_of(Node.now - late)
     return what
 
 

@@ -31,6 +31,7 @@ def made(x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: objec
         safe=np.ones(n, bool),
         slack=np.zeros(n),
         solve_time=np.zeros(n),
+        stuck=np.zeros(n),
         arrival=n - 1,
     )
     return replace(log, **changes)

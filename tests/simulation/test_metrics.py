@@ -45,7 +45,7 @@ def make_run(
         predicted=np.zeros((n, 0, 4)),
         residual=np.full((n, len(people) + len(walls), 2), residual),
         arrival=arrival,
-        **{"solve_time": np.zeros(n)} | given | steps,
+        **{"solve_time": np.zeros(n), "stuck": np.zeros(n)} | given | steps,
     )
 
 

@@ -35,6 +35,7 @@ def make_run(name: str, xy: object, *, arrives: bool = True, residual: float = I
         safe=np.ones(n, bool),
         slack=np.zeros(n),
         solve_time=np.zeros(n),
+        stuck=np.zeros(n),
         arrival=n - 1 if arrives else None,
     )
 

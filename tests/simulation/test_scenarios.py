@@ -188,7 +188,7 @@ def passing_log(y, x=(-2.0, -1.0, 0.5, 2.0)):
     states[:, 0], states[:, 1] = x, y
     plans = {"predicted": np.zeros((4, 9, 4)), "residual": np.zeros((4, 1, 2)), "controls": np.zeros((4, 2))}
     steps = {"fallback": np.full(4, "warm"), "safe": np.ones(4, bool)}
-    times = {"slack": np.zeros(4), "solve_time": np.zeros(4), "arrival": 3}
+    times = {"slack": np.zeros(4), "solve_time": np.zeros(4), "stuck": np.zeros(4), "arrival": 3}
     people = np.zeros((4, 1, 5))
     return SimulationLog(scenario, settings, (ZONE,), states, people=people, **plans, **steps, **times)
 

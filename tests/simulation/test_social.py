@@ -27,6 +27,7 @@ def made(states, people=(), walls=(), arrival=None, goal=(10.0, 0.0)):
         controls=np.zeros((n, 2)),
         people=at,
         solve_time=np.zeros(n),
+        stuck=np.zeros(n),
         arrival=arrival,
         has_safety_claims=False,
         **empty,

@@ -108,13 +108,14 @@ class Movie(bytes):
         limits : x0, x1, y0, y1 of the scene [m].
         """
         movie = super().__new__(cls, gif)
-        columns = run.time.tolist(), run.states, run.people, run.predicted, run.h, run.fallback.tolist()
+        columns = run.time.tolist(), run.states, run.people, run.predicted, run.h
+        steps = run.fallback.tolist(), run.stuck.tolist()
         n = len(run.zones)
         movie.run = {
             "layout": scene_layout(run.scenario, run.settings, limits),
             "snapshots": [
-                snapshot(t, state, people, run.zones, plan, h, fallback)
-                for t, state, people, plan, h, fallback in zip(*columns, strict=True)
+                snapshot(t, state, people, run.zones, plan, h, fallback) | {"stuck": stuck}
+                for t, state, people, plan, h, fallback, stuck in zip(*columns, *steps, strict=True)
             ],
             "alt": f"{run.scenario.title or run.scenario.name}: a robot and {n} "
             f"{'person' if n == 1 else 'people'}, {run.time[-1]:.1f} s",

@@ -86,7 +86,7 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
 
 
 def plot_speed(run: Run, *, ax: Axes | None = None) -> Axes:
-    """Plot the robot's speed over time, and its limit.
+    """Plot the robot's speed over time, its limit, and when it makes no progress for 5 s.
 
     Parameters
     ----------
@@ -105,6 +105,8 @@ def plot_speed(run: Run, *, ax: Axes | None = None) -> Axes:
     ax.plot(run.time, run.speed, color=BLUE, label="robot")
     ax.axhline(run.settings.v_max, color=GREY, linestyle="--", label="limit")
     top = 1.15 * max(run.settings.v_max, float(run.speed.max()))
+    if run.stuck.any():
+        ax.fill_between(run.time, 0, top, run.stuck > 0, color=ORANGE, alpha=0.25, label="no progress")
     ax.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, top))
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
     return ax

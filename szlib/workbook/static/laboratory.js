@@ -90,7 +90,8 @@ function addPanel(parent, index, content, configure) {
       drawAccelerations(controls, 112, snapshot, layout.colours);
       const h = snapshot.h === null ? "" : `, least h ${snapshot.h.toFixed(2)} m`;
       const safety = snapshot.safe ? "safe" : "NOT SAFE";
-      status.textContent = `t = ${now.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}, solver: ${snapshot.fallback}, ${safety}`;
+      const stuck = snapshot.stuck ? `, no progress for ${snapshot.stuck.toFixed(1)} s` : "";
+      status.textContent = `t = ${now.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}, solver: ${snapshot.fallback}, ${safety}${stuck}`;
     },
   };
   for (const options of SLIDERS) addSlider(box, options, content.robots[index][options.name], (value) => configure(index, options.name, value));

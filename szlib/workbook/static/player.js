@@ -27,7 +27,8 @@ function play(figure, run) {
     drawBarriers(chart, width, 100, times, values, snapshot.t, [0, times[last]], layout.colours);
     const h = snapshot.h === null ? "" : `, least h ${snapshot.h.toFixed(2)} m`;
     const fallback = snapshot.fallback ? `, solver: ${snapshot.fallback}` : "";
-    status.textContent = `t = ${snapshot.t.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}${fallback}`;
+    const stuck = snapshot.stuck ? `, no progress for ${snapshot.stuck.toFixed(1)} s` : "";
+    status.textContent = `t = ${snapshot.t.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}${fallback}${stuck}`;
   };
   const tick = (now) => {
     if (started === null || !figure.isConnected) return;
