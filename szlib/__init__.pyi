@@ -8,6 +8,7 @@ from .control import (
     Tracker,
     ellipse_distance,
     segment_distance,
+    walls_from_map,
 )
 from .encounters import (
     ATC_SQUARE,
@@ -128,6 +129,7 @@ __all__ = [
     "time_shifted",
     "tracks",
     "walked_area",
+    "walls_from_map",
     "workbook",
     "zones",
 ]

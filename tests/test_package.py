@@ -39,7 +39,7 @@ PUBLIC = [
     "find_encounters", "impose_zone", "make_plaza", "minimum_enclosing_ellipse",
     "null_encounters", "null_test", "of_kind", "pair_correlation", "pool", "read_tracks", "reference_zone",
     "remove_outliers",
-    "rollouts", "segment_distance", "simulate", "time_shifted", "walked_area",
+    "rollouts", "segment_distance", "simulate", "time_shifted", "walked_area", "walls_from_map",
 ]  # fmt: skip
 PROMISED = [
     "SocialZone.fit", "SocialZone.ellipse", "SocialZone.boundary", "SocialZone.save", "SocialZone.load",

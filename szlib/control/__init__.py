@@ -2,6 +2,7 @@
 
 settings              every parameter of the controller: `MPCSettings`
 barriers              distances to walls and zones, and the discrete barrier condition
+maps                  walls from the maps of ROS: `walls_from_map`
 distances             approximate against Euclidean distances, and the margin that is needed
 person                a person as the controller sees them: `Person`
 tracker               people from one measurement to the next: `Tracker`
@@ -29,6 +30,7 @@ from .distances import (
     required_margin,
     wall_margin,
 )
+from .maps import walls_from_grid, walls_from_map
 from .mpc import MPCCBF
 from .person import Person
 from .routes import find_route

@@ -17,6 +17,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike
 
 from ..checks import Array, check_array
@@ -205,8 +206,9 @@ def read_walls(walls: Any) -> Array:
     ----------
     walls : segments, shape (2, 2) each; polylines, shape (m, 2); Shapely's lines, rings, polygons and
         collections, or objects with `.coords`, `.exterior` and `.interiors`, or `.geoms` like them; one or
-        many, nested in any way. The outline of a polygon and the edges of its holes are walls. Corners of a
-        line that are closer than `SHORTEST_WALL` count as one.
+        many, nested in any way. The outline of a polygon and the edges of its holes are walls; to an `MPCCBF`
+        it is solid, so give a room by its `exterior`. Corners of a line that are closer than `SHORTEST_WALL`
+        count as one.
 
     Raises
     ------
@@ -220,6 +222,30 @@ def read_walls(walls: Any) -> Array:
     """
     segments = [check_wall(segment) for line in _find_lines(walls) for segment in _split_line(line)]
     return np.reshape(np.array(segments, float), (-1, 2, 2))
+
+
+class Walls(np.ndarray[Any, np.dtype[np.float64]]):
+    """Segments, shape (n, 2, 2) [m], that know which areas they enclose; what is computed from them does not.
+
+    Attributes
+    ----------
+    solids : these areas, of Shapely; None: not known.
+    """
+
+    solids: Any = None
+
+
+def find_solids(walls: Any) -> Any:
+    """The union of the polygons among `walls`, and of `Walls.solids`; None if there are none."""
+    if hasattr(walls, "exterior"):
+        return shapely.make_valid(
+            shapely.Polygon(walls.exterior.coords, [hole.coords for hole in walls.interiors])
+        )
+    parts = getattr(walls, "geoms", walls)
+    if isinstance(parts, np.ndarray) or not isinstance(parts, Iterable):
+        return getattr(walls, "solids", None)
+    found = [solid for part in parts if (solid := find_solids(part)) is not None]
+    return shapely.union_all(found) if found else None
 
 
 def _find_lines(walls: Any) -> Iterator[Any]:

@@ -38,7 +38,7 @@ from numpy.typing import ArrayLike
 from ..checks import Array, check_array, check_point, check_vector, require
 from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import Ellipse, circle_around
-from .barriers import read_walls
+from .barriers import find_solids, read_walls
 from .controller import Controller
 from .distances import walls_with_margins
 from .head_on import find_target
@@ -66,8 +66,9 @@ class MPCCBF(Controller):
     ----------
     zone : the social zone of a person, in the person's frame [m]; or anything with `.ellipse(speed)`, such as
         a `SocialZone`, whose zone at `settings.zone_speed` is used.
-    walls : segments, shape (n, 2, 2): end points [m]; or anything else that `read_walls` accepts. The
-        attribute `walls` holds their segments.
+    walls : segments, shape (n, 2, 2): end points [m]; or anything else that `read_walls` accepts. Inside of
+        a polygon, or of a map's walls (`walls_from_map`), no step is safe. The attribute `walls` holds their
+        segments.
     settings : every other parameter.
     max_people : number of people to prepare solvers for, at most 1000. None: 8, and more in the background as
         soon as half of this number is present. For more people than are prepared the solver is built within
@@ -98,6 +99,7 @@ class MPCCBF(Controller):
     settings: MPCSettings
     zone: Ellipse
     walls: Array
+    _planner: RoutePlanner | None
 
     def __init__(
         self,
@@ -127,7 +129,7 @@ class MPCCBF(Controller):
         if self.settings.terminal == "person" and len(segments):
             raise SolverError(f"terminal='person' is for open space; got {len(segments)} walls; use 'rest'")
         self.walls, self._wall_rows = segments, walls_with_margins(segments, self.settings)
-        self._planner: RoutePlanner | None = None
+        self._solids, self._planner = find_solids(walls), None
 
     def set_walls(self, walls: Any) -> None:
         """Replace the walls, from the next step on.
@@ -262,7 +264,7 @@ class MPCCBF(Controller):
         """What the step is asked, with the zone of every person."""
         zones = [self.zone_of(person) for person in tracked.people]
         placed = [place_zone(person, zone) for person, zone in zip(tracked.people, zones, strict=True)]
-        return Scene(tuple(state), goal, tracked, zones, placed, self._wall_rows, self.settings)
+        return Scene(tuple(state), goal, tracked, zones, placed, self._wall_rows, self.settings, self._solids)
 
     def _parameters(self, x: list[float], ahead: Point, scene: Scene, size: tuple[int, int]) -> Array:
         """Parameters of the problem of this size: state, target, terminal velocity, people and walls."""

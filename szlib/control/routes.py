@@ -8,11 +8,13 @@ approximate distance of a wall of length L is below rho = r_robot + margin insid
 (`distances.find_safe_boundary` is the curve inside it). A shortest path outside of all boxes turns at their
 corners only, and touches a box there without entering it. The graph of the corners that see each other is
 built once for each set of walls, and the distances of all corners from the goal once for each goal. A step
-then needs to know only which corners the robot sees.
+then needs to know only which corners the robot sees. Of many walls the graph has those that were in the way
+so far: a shortest path around some walls that crosses no other wall is the shortest around all.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import dist, inf
 from typing import Any
 
@@ -27,15 +29,15 @@ from ..errors import SolverError
 from .barriers import read_walls
 
 Point = tuple[float, float]
+_MANY = 64  # walls that are in the graph from the beginning: its building takes some 0.1 s
 _CORNER = (
     1e-3  # distance of a corner of a route from its box [m]: more than rounding, less than a robot feels
 )
 _DETOUR = 0.5  # a route is kept until it is this much longer than it was at its best [m] (assumed)
 _GOAL_MOVED = 0.5  # distances from the goal are kept until it has moved this far [m] (assumed)
 _SAMPLES = 33  # points of a user's route of which the farthest visible one is the target
-_BATCH = 32  # corners that are tried at a time, the most promising first
 _SEEN = 1 - 1e-9  # share of the way to a point that must be free: all but rounding
-_ALL = slice(None)
+_SIGNS = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])  # of the corners of a box
 
 
 def find_route(start: ArrayLike, goal: ArrayLike, walls: Any, clearance: float) -> Array:
@@ -63,13 +65,13 @@ def find_route(start: ArrayLike, goal: ArrayLike, walls: Any, clearance: float) 
     >>> route.round(2).tolist()
     [[0.0, 0.0], [1.5, -1.5], [2.5, -1.5], [4.0, 0.0]]
     """
-    segments = read_walls(walls)
-    c = check_number("clearance", clearance)
+    c, at = check_number("clearance", clearance), check_point("start", start)
     require(c >= 0, "clearance", clearance, "a number >= 0", SolverError)
-    half = np.column_stack(
-        [np.hypot(*(segments[:, 1] - segments[:, 0]).T) / 2 + c, np.full(len(segments), c)]
-    )
-    return RoutePlanner(segments, half).find(check_point("start", start), check_point("goal", goal))
+    segments = read_walls(walls)
+    length = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
+    planner = RoutePlanner(segments, np.column_stack([length / 2 + c, np.full(len(segments), c)]))
+    planner.aim(at, check_point("goal", goal), inf)
+    return np.vstack([at, planner.points[planner.turns]]) if planner.turns else np.zeros((0, 2))
 
 
 def find_boxes(walls: ArrayLike, r_robot: float) -> Array:
@@ -87,12 +89,17 @@ def find_boxes(walls: ArrayLike, r_robot: float) -> Array:
 
 
 class RoutePlanner:
-    """Routes around one set of walls; it remembers the last goal, and the corners of the last route.
+    """Routes around one set of walls; it remembers the last goal and the last route.
 
     Parameters
     ----------
     walls : segments, shape (n, 2, 2) [m].
     half : half sizes of their boxes, along and across, shape (n, 2) [m].
+
+    Attributes
+    ----------
+    points : the corners of the graph, and at last the goal, shape (m, 2) [m].
+    turns : numbers of the points on the way, from the next one to the goal; empty if there is no way.
     """
 
     def __init__(self, walls: Array, half: Array) -> None:
@@ -100,87 +107,83 @@ class RoutePlanner:
         self._half_length, self._middle, self._half = np.hypot(*way.T) / 2, walls.mean(axis=1), half
         along = way / (2 * self._half_length[:, None])
         self._axes = np.stack([along, along[:, ::-1] * (-1, 1)], axis=1)
-        self._corners, self._pairs = self._build_graph()
-        self.reset()
+        self._build_graph(np.arange(len(walls) if len(walls) <= _MANY else 0))
 
     def reset(self) -> None:
         """Forget the goal and the route."""
         self._goal, self._shortest = (inf, inf), inf
-        self._turns: list[int] = []
+        self.turns: list[int] = []
 
-    def _build_graph(self) -> tuple[Array, NDArray[np.intp]]:
-        """Corners outside of all boxes, and pairs of them that see each other, shape (2, m).
+    def _build_graph(self, boxes: NDArray[np.intp]) -> None:
+        """Find the corners outside of these `boxes`, and the pairs of them that see each other.
 
         A shortest path turns at a corner only between ways that touch its box, without entering it. The boxes
         rule pairs out one after another, the largest first, so that few pairs meet all of them.
         """
-        signs = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
-        along = np.maximum(self._half[:, 0], self._half_length + self._half[:, 1])
-        out = signs * (np.column_stack([along, self._half[:, 1]])[:, None] + _CORNER)
-        corners = (self._middle[:, None] + out @ self._axes).reshape(-1, 2)
-        outward = (signs[:, :, None] * self._axes[:, None]).reshape(-1, 2, 2)
-        free = np.full(len(corners), True)
-        boxes = [slice(i, i + 1) for i in np.argsort(-self._half[:, 0]).tolist()]
-        for box in boxes:
-            free[free] = ~self._is_in_boxes(corners[free], box)[:, 0]
-        corners, outward = corners[free], outward[free]
-        pairs: NDArray[np.intp] = np.array(np.triu_indices(len(corners), 1))
+        self._boxes = boxes = boxes[np.argsort(-self._half[boxes, 0])]
+        out = self._half[boxes]
+        out[:, 0] = np.maximum(out[:, 0], self._half_length[boxes] + out[:, 1])
+        outward = _SIGNS[:, :, None] * self._axes[boxes, None]
+        corners = self._middle[boxes, None] + np.einsum("nkij,ni->nkj", outward, out + _CORNER)
+        corners, outward = corners.reshape(-1, 2), outward.reshape(-1, 2, 2)
+        inside = (np.abs(self._to_boxes(corners, boxes)) < self._half[boxes]).all(axis=2)
+        free = ~np.any(inside, axis=1)
+        self._corners, outward = corners[free], outward[free]
+        pairs: NDArray[np.intp] = np.array(np.triu_indices(len(outward), 1))
         for end in (0, 1):
-            way = corners[pairs[1]] - corners[pairs[0]]
+            way = self._corners[pairs[1]] - self._corners[pairs[0]]
             pairs = pairs[:, np.einsum("nij,nj->ni", outward[pairs[end]], way).prod(axis=1) <= 1e-9]
-        for box in boxes:
-            start, end = corners[pairs]
-            pairs = pairs[:, self._measure_free(start, end, self._half, box) >= _SEEN]
-        return corners, pairs
+        for box in boxes[:, None]:
+            start, stop = self._corners[pairs]
+            pairs = pairs[:, self._enter(start, stop, self._half, box)[:, 0] >= _SEEN]
+        self._pairs = pairs
+        self.reset()
 
-    def _to_boxes(self, points: Array, box: slice = _ALL) -> Array:
-        """Coordinates of `points`, shape (..., 2), along and across each box, shape (..., n, 2) [m]."""
-        offset = points[..., None, :] - self._middle[box]
-        return np.asarray(np.einsum("...nj,nij->...ni", offset, self._axes[box]))
+    def _to_boxes(self, points: Array, boxes: Any = slice(None)) -> Array:
+        """Coordinates of `points`, shape (..., 2), along and across n `boxes`, shape (..., n, 2) [m]."""
+        offset = points[..., None, :] - self._middle[boxes]
+        return np.asarray(np.einsum("...nj,nij->...ni", offset, self._axes[boxes]))
 
-    def _is_in_boxes(self, points: Array, box: slice = _ALL) -> NDArray[np.bool_]:
-        """True where one of `points`, shape (..., 2), lies in a box, shape (..., n)."""
-        return np.asarray((np.abs(self._to_boxes(points, box)) < self._half[box]).all(axis=-1))
+    def _enter(self, start: Array, ends: Array, half: Array, boxes: NDArray[np.intp]) -> Array:
+        """Where ways from `start` through `ends`, shape (m, 2), enter n `boxes`, shape (m, n).
 
-    def _measure_free(self, start: Array, ends: Array, half: Array, box: slice = _ALL) -> Array:
-        """How far ways from `start` through `ends`, shape (m, 2), lead until they enter a box, shape (m,).
-
-        As a multiple of the distance to each end; inf if a way enters none.
+        As a multiple of the distance to each end; inf if a way does not enter a box.
         """
-        at = self._to_boxes(start, box)
-        way = self._to_boxes(ends, box) - at
+        at = self._to_boxes(start, boxes)
+        way = self._to_boxes(ends, boxes) - at
         way = np.where(way == 0, 1e-200, way)
-        first, second = (-half[box] - at) / way, (half[box] - at) / way
+        first, second = (-half[boxes] - at) / way, (half[boxes] - at) / way
         enter, leave = np.minimum(first, second).max(axis=-1), np.maximum(first, second).min(axis=-1)
-        hits = (enter < leave) & (leave > 1 - _SEEN)
-        return np.asarray(np.where(hits, np.maximum(enter, 0.0), inf).min(axis=-1, initial=inf))
+        return np.where((enter < leave) & (leave > 1 - _SEEN), np.maximum(enter, 0.0), inf)
+
+    def _measure_free(self, start: Array, ends: Array, half: Array) -> Array:
+        """How far ways from `start` through `ends` lead outside of boxes, at most to the ends.
+
+        As a multiple of the distance to each end, shape (m,).
+        """
+        reach = np.hypot(*(ends - start).T).max(initial=0.0) + half.sum(axis=1)
+        near = np.flatnonzero(np.hypot(*(self._middle - start).T) <= reach)
+        return np.asarray(self._enter(start, ends, half, near).min(axis=1, initial=1.0))
 
     def _cut_boxes(self, *points: Point) -> Array:
         """Half sizes of the boxes, cut back to those of `points` that they hold, but not across a wall."""
         half = self._half
         for point in points:
-            inside = self._is_in_boxes(np.array(point)).nonzero()[0]
-            if len(inside):
-                at, half = np.abs(self._to_boxes(np.array(point))[inside]), half.copy()
-                side = (at[:, 0] <= self._half_length[inside]).astype(int)
-                half[inside, side] = np.minimum(half[inside, side], at[np.arange(len(inside)), side])
+            at = np.abs(self._to_boxes(np.array(point)))
+            inside, beyond = (at < half).all(axis=1), at[:, 0] > self._half_length
+            half = np.where(np.column_stack([inside & beyond, inside & ~beyond]), at, half)
         return half
 
     def _take_goal(self, goal: Point) -> None:
-        """Measure the distances of all corners from the `goal`, the last of `_points`."""
+        """Measure the distances of all corners from the `goal`."""
         self.reset()
         self._goal, n, half = goal, len(self._corners), self._cut_boxes(goal)
-        seen = np.flatnonzero(self._measure_free(np.array(goal), self._corners, half) >= _SEEN)
+        free = self._enter(np.array(goal), self._corners, half, self._boxes) >= _SEEN
+        seen = np.flatnonzero(free.all(axis=1))
         i, j = np.hstack([self._pairs, [seen, np.full(len(seen), n)]]).astype(int)
-        self._points = points = np.vstack([self._corners, goal])
+        self.points = points = np.vstack([self._corners, goal])
         graph = coo_array((np.hypot(*(points[i] - points[j]).T), (i, j)), shape=(n + 1, n + 1))
         self._far, self._next = dijkstra(graph.tocsr(), directed=False, indices=n, return_predecessors=True)
-
-    def find(self, start: Point, goal: Point) -> Array:
-        """The shortest way from `start` to `goal`, shape (m, 2) [m]; empty if there is none."""
-        self.reset()
-        self.aim(start, goal, inf)
-        return np.vstack([start, self._points[self._turns]]) if self._turns else np.zeros((0, 2))
 
     def aim(self, position: Point, goal: Point, lookahead: float) -> tuple[Point, float]:
         """The point to head for from `position` on the way to the `goal`, and the length of that way [m].
@@ -190,39 +193,55 @@ class RoutePlanner:
         """
         if dist(goal, self._goal) > _GOAL_MOVED:
             self._take_goal(goal)
-        self._points[-1] = goal
-        p, half = np.array(position), self._cut_boxes(position, goal)
-        if not self._choose(p, half, self._turns[::-1]):
-            length = np.hypot(*(self._points - p).T) + self._far
-            order = np.argsort(length)[: np.isfinite(length).sum()].tolist()
-            self._turns, self._shortest = [], inf
-            any(self._choose(p, half, order[i : i + _BATCH]) for i in range(0, len(order), _BATCH))
-        if not self._turns:
+        self.points[-1] = goal
+        p, half, corners = (
+            np.array(position),
+            self._cut_boxes(position, goal),
+            np.array(self.turns[3::-1], int),
+        )
+        if not self._choose(p, corners, self._measure_free(p, self.points[corners], half)[:, None]):
+            self._search(p, goal, half)
+        if not self.turns:
             return goal, inf
-        first = self._points[self._turns[0]]
-        length = float(np.hypot(*(first - p)) + self._far[self._turns[0]])
+        first = self.points[self.turns[0]]
+        length = float(np.hypot(*(first - p)) + self._far[self.turns[0]])
         return self._stretch(p, first, half, min(lookahead, length)), length
 
-    def _choose(self, p: Array, half: Array, corners: list[int]) -> bool:
-        """Go from `p` to the first of these `corners` that is in sight; False if none is, or for a detour."""
-        seen = np.flatnonzero(self._measure_free(p, self._points[corners], half) >= _SEEN)
+    def _search(self, p: Array, goal: Point, half: Array) -> None:
+        """Take the shortest way from `p`; walls that it crosses join the graph, until it crosses none."""
+        while True:
+            self.turns, self._shortest = [], inf
+            order = np.argsort(np.hypot(*(self.points - p).T) + self._far)
+            self._choose(p, order, self._enter(p, self.points[order], half, self._boxes))
+            legs = pairwise([p, *self.points[self.turns]])
+            enters = [self._enter(a, b[None], half, np.arange(len(half)))[0] < _SEEN for a, b in legs]
+            crossed = np.setdiff1d(np.flatnonzero(np.any(enters, axis=0)), self._boxes)
+            if not len(crossed):
+                return
+            self._build_graph(np.append(self._boxes, crossed))
+            self._take_goal(goal)
+
+    def _choose(self, p: Array, corners: NDArray[np.intp], enters: Array) -> bool:
+        """Go from `p` to the first of these `corners` on the way to which it `enters` no box.
+
+        False if there is none, or if the way has become a detour. `enters` has shape (corners, boxes).
+        """
+        seen = corners[(enters >= _SEEN).all(axis=1) & np.isfinite(self._far[corners])]
         if not len(seen):
             return False
-        turns = [corners[seen[0]]]
-        length = float(np.hypot(*(self._points[turns[0]] - p)) + self._far[turns[0]])
+        turns = [int(seen[0])]
+        length = float(np.hypot(*(self.points[turns[0]] - p)) + self._far[turns[0]])
         if length > self._shortest + _DETOUR:
             return False
         while turns[-1] < len(self._corners):
             turns.append(int(self._next[turns[-1]]))
-        self._turns, self._shortest = turns, min(length, self._shortest)
+        self.turns, self._shortest = turns, min(length, self._shortest)
         return True
 
     def _stretch(self, p: Array, point: Array, half: Array, reach: float) -> Point:
         """The point at `reach` [m] from `p` in the direction of `point`, or where the way enters a box."""
-        way = point - p
-        away = float(np.hypot(*way)) or 1.0
-        share = min(reach / away, float(self._measure_free(p, point[None], half)[0]))
-        x, y = (p + share * way).tolist()
+        way = (point - p) * (reach / (float(np.hypot(*(point - p))) or 1.0))
+        x, y = (p + self._measure_free(p, p + way[None], half)[0] * way).tolist()
         return x, y
 
     def follow(self, route: Array, position: Point, goal: Point, lookahead: float) -> tuple[Point, float]:

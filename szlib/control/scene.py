@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import hypot, inf
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
+
+import shapely
 
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .barriers import compute_h, euclidean_segment_formula
@@ -27,6 +29,7 @@ class Scene(NamedTuple):
     zones : the same zones in the world.
     walls : end points and margin of each wall, (xa, ya, xb, yb, margin).
     settings : parameters of the controller.
+    solids : areas that walls enclose, of Shapely; None: there are none.
     """
 
     state: tuple[float, ...]
@@ -36,6 +39,7 @@ class Scene(NamedTuple):
     zones: Sequence[PlacedZone]
     walls: Sequence[Sequence[float]]
     settings: MPCSettings
+    solids: Any = None
 
     @property
     def people(self) -> tuple[Person, ...]:
@@ -54,6 +58,11 @@ class Scene(NamedTuple):
         s = self.settings
         at_walls = compute_h(*self.goal, (), self.walls, r_robot=s.r_robot, eps=s.eps)
         return any(zone.blocks(self.goal, s) for zone in self.zones) or any(h < 0 for h in at_walls)
+
+    @property
+    def is_in_solid(self) -> bool:
+        """True if the robot's centre lies inside of a solid wall."""
+        return self.solids is not None and bool(shapely.contains_xy(self.solids, *self.state[:2]))
 
     def obstacle(self, row: int) -> tuple[Literal["person", "wall"], int]:
         """Kind and number of the person or wall of a `row` of `Step.h`."""
@@ -87,7 +96,10 @@ class Scene(NamedTuple):
         functions of time. Such a function lies above its tangents at both ends, so nowhere below the point
         where they cross. The robot leaves that motion by at most acceleration dt^2 / 8, and no distance
         changes by more than the way. h has the allowance eps: it is for what a way cuts off a round zone.
+        Inside of a solid wall the bound is -inf.
         """
+        if self.is_in_solid:
+            return -inf
         (x, y), s = start, self.settings
         dx, dy, bow = end[0] - x, end[1] - y, acceleration * s.dt**2 / 8
         reach = hypot(dx, dy) + s.dt * max([hypot(*person.velocity) for person in self.people], default=0.0)

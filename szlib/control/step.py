@@ -130,10 +130,10 @@ class Step:
         """True if this step keeps the robot safe from walls, and from people who keep their velocity.
 
         That is: no person is unknown (see `MPCCBF.step`); the plan satisfies the hard problem, from a state
-        that satisfies every barrier; and the robot's disc overlaps no body and no wall, by Euclidean
-        distance, and enters no zone by more than eps, from now until after the control, between samples
-        too (`Scene.smallest_gap`). People who turn, stop or speed up within a step may still cause h < 0
-        after a safe step (notebook 13 counts them); the next step then says so.
+        that satisfies every barrier and lies in no solid wall; and the robot's disc overlaps no body and no
+        wall, by Euclidean distance, and enters no zone by more than eps, from now until after the control,
+        between samples too (`Scene.smallest_gap`). People who turn, stop or speed up within a step may still
+        cause h < 0 after a safe step (notebook 13 counts them); the next step then says so.
         """
         if not self.feasible or self.unknown or min(self.h.tolist(), default=0.0) < -TOLERANCE:
             return False
@@ -194,6 +194,8 @@ class Step:
     def _why_not_safe(self) -> str:
         if self.unknown:
             return "the position of a person is unknown, so the robot comes to rest"
+        if self.scene.is_in_solid:
+            return "the robot is inside of a solid wall"
         if (self.h < -TOLERANCE).any():
             return f"the robot is already too close to {self._obstacle(int(np.argmin(self.h)))}"
         return "its plan is not feasible" if not self.feasible else "its disc overlaps a body or a wall"

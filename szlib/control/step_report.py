@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import shapely
 
 from ..checks import Array
 from ..zones.ellipses import BODY_RADIUS
@@ -171,7 +172,12 @@ def _is_undecided(scene: Scene, path: Array, worst: float, claimed: bool) -> boo
 
 
 def _find_gap(scene: Scene, path: Array) -> float:
-    """Smallest gap to bodies and walls, and h + eps of people, on the `path` of a step, shape (n, 2) [m]."""
+    """Smallest gap to bodies and walls, and h + eps of people, on the `path` of a step, shape (n, 2) [m].
+
+    -inf inside of a solid wall.
+    """
+    if scene.solids is not None and scene.solids.distance(shapely.Point(path[0])) == 0:
+        return -np.inf
     found, n = [np.inf], len(scene.people)
     for point, time in zip(path, np.linspace(0.0, scene.settings.dt, len(path)), strict=True):
         h = _compute_h(scene, point, time)[:n]

@@ -1,0 +1,211 @@
+"""Maps of ROS become walls: where, which cells, how few, and what is wrong with a bad one."""
+
+from __future__ import annotations
+
+import copy
+import io
+import pickle
+from math import cos, pi, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from numpy.typing import NDArray
+from PIL import Image
+
+import szlib
+from szlib.control import read_walls, walls_from_grid
+from szlib.control.barriers import find_solids
+
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+GREY = NDArray[np.uint8]
+ENTRIES = {
+    "image": "map.pgm", "resolution": 0.05, "origin": [-1.0, -2.0, 0.0], "negate": 0,
+    "occupied_thresh": 0.65, "free_thresh": 0.196,
+}  # fmt: skip
+
+
+def cells() -> GREY:
+    """Free cells with an occupied block of 20 rows and 10 columns near the lower left corner."""
+    grey = np.full((60, 80), 254, np.uint8)
+    grey[35:55, 4:14] = 0
+    return grey
+
+
+def write_map(folder: Path, grey: GREY | None = None, **changes: Any) -> Path:
+    """A map; an entry that is None is left out."""
+    entries = {key: value for key, value in {**ENTRIES, **changes}.items() if value is not None}
+    if isinstance(name := entries.get("image"), str):
+        Image.fromarray(cells() if grey is None else grey).save(folder / name)
+    path = folder / "map.yaml"
+    path.write_text("".join(f"{key}: {value}\n" for key, value in entries.items()))
+    return path
+
+
+def bounds(walls: Any) -> list[float]:
+    return [*walls.min(axis=(0, 1)).tolist(), *walls.max(axis=(0, 1)).tolist()]
+
+
+@pytest.mark.parametrize("image", ["map.pgm", "map.png"])
+def test_a_block_of_cells_becomes_its_outline_in_the_world(tmp_path: Path, image: str) -> None:
+    walls = szlib.walls_from_map(write_map(tmp_path, image=image))
+    assert walls.shape == (4, 2, 2)
+    assert bounds(walls) == pytest.approx([-0.8, -1.75, -0.3, -0.75])  # rows count from the top
+
+
+def test_yaw_turns_the_map_about_its_origin(tmp_path: Path) -> None:
+    straight = szlib.walls_from_map(write_map(tmp_path))
+    turned = szlib.walls_from_map(write_map(tmp_path, origin=[-1.0, -2.0, pi / 6]))
+    c, s = cos(pi / 6), sin(pi / 6)
+    assert turned - (-1, -2) == pytest.approx((straight - (-1, -2)) @ np.array([[c, s], [-s, c]]))
+
+
+def test_each_kind_of_cell_is_read_as_map_server_reads_it(tmp_path: Path) -> None:
+    grey = np.full((3, 40), 254, np.uint8)
+    grey[1, 5], grey[1, 15], grey[1, 25], grey[1, 35] = 0, 205, 128, 85  # p = 1, 0.196, 0.498, 0.667
+    columns = {
+        (): {5, 35},
+        (("unknown", True),): {5, 15, 25, 35},
+        (("negate", 1), ("unknown", True)): {*range(40)} - {5},
+        (("mode", "scale"), ("unknown", True)): {5, 35},
+        (("free_thresh", 0.1), ("unknown", True)): {5, 15, 25, 35},
+        (("mode", "raw"), ("negate", 1)): {35},
+        (("mode", "raw"), ("unknown", True)): {*range(40)} - {5},
+        (("mode", "raw"), ("occupied_thresh", 0.9)): set(),
+    }
+    for changes, expected in columns.items():
+        given = {"free_thresh": 0.19, **dict(changes)}
+        unknown = bool(given.pop("unknown", False))
+        path = write_map(tmp_path, grey, resolution=1.0, origin=[0.0, 0.0, 0.0], **given)
+        walls = szlib.walls_from_map(path, unknown=unknown)
+        centres = np.arange(40) + 0.5
+        solid = find_solids(walls)
+        found = (
+            set() if solid is None else set(np.flatnonzero(shapely.contains_xy(solid, centres, 1.5)).tolist())
+        )
+        assert found == expected, changes
+
+
+def test_transparent_pixels_of_a_scale_map_are_unknown(tmp_path: Path) -> None:
+    pixels = np.full((10, 10, 2), 255, np.uint8)
+    pixels[4:6, 4:6] = (128, 0)
+    path = write_map(tmp_path, pixels, image="map.png", mode="scale")
+    assert len(szlib.walls_from_map(path)) == 0 and len(szlib.walls_from_map(path, unknown=True)) == 4
+
+
+def test_simplified_outlines_are_few_and_deviate_by_no_more_than_asked() -> None:
+    y, x = np.mgrid[:200, :200]
+    ring = np.abs(np.hypot(x - 100, y - 100) - 80) < 3  # of 8 m, 30 cm thick
+    slanted = np.abs(y - 0.3 * x - 40) < 2
+    raw = walls_from_grid(ring | slanted, 0.05, simplify=0.0)
+    few = walls_from_grid(ring | slanted, 0.05)
+    assert len(few) < len(raw) / 8
+    lines, cells = shapely.multilinestrings(few.tolist()), shapely.multilinestrings(raw.tolist())
+    assert shapely.hausdorff_distance(cells, lines) < 0.05 + 1e-6
+
+
+def test_near_keeps_the_walls_within_a_radius() -> None:
+    grid = np.zeros((100, 100), bool)
+    grid[10:12, 10:12] = grid[80:82, 80:82] = True
+    assert len(walls_from_grid(grid, 0.1)) == 8
+    walls = walls_from_grid(grid, 0.1, near=(1.0, 1.0, 2.0))
+    assert len(walls) == 4 and walls.max() < 2
+
+
+BAD = {
+    "resolution": ("resolution", {"resolution": None}),
+    "negative": ("resolution must be a positive", {"resolution": -0.05}),
+    "word": ("resolution must be numbers", {"resolution": "fine"}),
+    "image": (r"complete; got .*without \['image'\]", {"image": None}),
+    "no image": ("image .other.pgm. cannot be read", {"image": "[map.pgm]"}),
+    "origin": (r"origin must have shape \(3,\)", {"origin": [0.0, 0.0]}),
+    "infinite": ("origin must be finite", {"origin": "[.inf, 0.0, 0.0]"}),
+    "swapped": ("free_thresh must be from 0 to below occupied_thresh = 0.1", {"occupied_thresh": 0.1}),
+    "threshold": ("free_thresh must be", {"occupied_thresh": 65}),
+    "negate": ("negate must be 0 or 1", {"negate": 2}),
+    "mode": ("mode must be 'trinary'", {"mode": "trinity"}),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_a_bad_entry_is_an_error_with_file_and_key(tmp_path: Path, kind: str) -> None:
+    message, changes = BAD[kind]
+    if kind == "no image":
+        path = write_map(tmp_path)
+        path.write_text(path.read_text().replace("map.pgm", "other.pgm"))
+    else:
+        path = write_map(tmp_path, **changes)
+    with pytest.raises(szlib.DataError, match=message) as error:
+        szlib.walls_from_map(path)
+    assert "map.yaml" in str(error.value) or "other.pgm" in str(error.value)
+
+
+def test_a_file_that_is_no_map_is_an_error(tmp_path: Path) -> None:
+    path = write_map(tmp_path)
+    whole = (tmp_path / "map.pgm").read_bytes()
+    wide = io.BytesIO()
+    Image.fromarray(np.zeros((4, 4), np.uint16)).save(wide, "png")
+    for content in (whole[:-100], b"no picture", b"", b"P5\n100000 100000\n255\n", wide.getvalue()):
+        (tmp_path / "map.pgm").write_bytes(content)
+        with pytest.raises(szlib.DataError, match=r"map\.yaml: image .map\.pgm"):
+            szlib.walls_from_map(path)
+    for text in ("- a list", "image: [", "just text", "\0", "a: 2001-99-99"):
+        path.write_text(text)
+        with pytest.raises(szlib.DataError, match=r"map\.yaml"):
+            szlib.walls_from_map(path)
+    path.write_bytes(b"x" * 10_000_001)
+    with pytest.raises(szlib.DataError, match="larger than 10 MB"):
+        szlib.walls_from_map(path)
+    with pytest.raises(szlib.DataError, match=r"no\.yaml"):
+        szlib.walls_from_map(tmp_path / "no.yaml")
+
+
+def test_a_bad_grid_is_an_error() -> None:
+    for arguments in ((np.zeros(4), 0.05), (np.zeros((4, 4)), 0.0), (np.zeros((4, 4)), 0.05, (0.0, 0.0))):
+        with pytest.raises(szlib.SolverError):
+            walls_from_grid(*arguments)
+
+
+# --- solid walls -------------------------------------------------------------------------------------
+
+
+def inside_step(controller: Any, at: tuple[float, float]) -> Any:
+    return controller.step((*at, 0.0, 0.0), (20.0, 0.0))
+
+
+@pytest.mark.parametrize("source", ["polygon", "nested", "map", "set", "copy", "pickle"])
+def test_a_robot_inside_of_a_solid_wall_is_not_safe(source: str) -> None:
+    block = shapely.box(-8.5, -8.5, 8.5, 8.5)
+    walls: Any = [shapely.MultiPolygon([block]), [(30.0, 0.0), (30.0, 1.0)]] if source == "nested" else block
+    if source == "map":
+        walls = walls_from_grid(np.ones((34, 34)), 0.5, (-8.5, -8.5, 0.0))
+    controller = szlib.MPCCBF(ZONE, walls=() if source == "set" else walls)
+    if source == "set":
+        controller.set_walls(walls)
+    if source == "copy":
+        controller = copy.deepcopy(controller)
+    if source == "pickle":
+        controller = pickle.loads(pickle.dumps(controller))
+    inside, outside = inside_step(controller, (0.0, 0.0)), inside_step(controller, (11.0, 0.0))
+    assert not inside.safe and inside.verify().ok and not inside.verify().safe
+    assert "inside of a solid wall" in inside.explain()
+    assert outside.safe and outside.verify().ok
+    drive = szlib.DifferentialDrive(ZONE, walls=walls)
+    inside, outside = drive.step((0.0, 0.0, 0.0), (20.0, 0.0)), drive.step((11.0, 0.0, 0.0), (20.0, 0.0))
+    assert not inside.safe and outside.safe and inside.verify().ok and outside.verify().ok
+
+
+def test_a_room_is_no_solid() -> None:
+    outline = shapely.box(-8.5, -8.5, 8.5, 8.5)
+    courtyard = shapely.box(-9, -9, 9, 9) - outline
+    for walls in (outline.exterior, list(outline.exterior.coords), read_walls(outline), courtyard):
+        step = szlib.MPCCBF(ZONE, walls=walls).step((0.0, 0.0, 0.0, 0.0), (4.0, 0.0))
+        assert step.safe and step.verify().ok
+
+
+def test_arrays_computed_from_walls_do_not_claim_their_solids() -> None:
+    walls = walls_from_grid(np.ones((4, 4)), 1.0)
+    assert find_solids(walls).area == pytest.approx(16.0)
+    assert find_solids(walls + 5.0) is None and find_solids([]) is None
