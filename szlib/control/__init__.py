@@ -10,6 +10,7 @@ head_on               on which side the robot passes a person whom it meets head
 controller            the base class of controllers, and the robots that they drive: `Controller`
 routes                the shortest way around walls: `find_route`
 scene                 what a step is asked
+step_clock            when a controller decides, with which state, and whether the robot makes progress
 step_report           a step checked again by formulas of its own: `StepReport`
 step                  what the controller decided: `Step`
 acceleration_polygon  the accelerations that a step could have chosen: `find_admissible_controls`

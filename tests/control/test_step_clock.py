@@ -126,7 +126,8 @@ def test_a_gamma_rate_lets_h_fall_equally_fast_whatever_dt_is(dt):
 @pytest.mark.parametrize("latency", [0, 1, 3])
 def test_a_late_state_costs_nothing_if_its_age_is_given(latency):
     """The controller gets states and people that are so many steps old; its controls act at once."""
-    controller, walker = szlib.MPCCBF(ZONE), szlib.Person((1.5, 0.2), (-0.5, 0.0), id="w")
+    controller = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(gamma=0.6, N_h=8))
+    walker = szlib.Person((1.5, 0.2), (-0.5, 0.0), id="w")
     states, age = [np.array(START)], 0.1 * latency
     for k in range(130):
         then = max(0, k - latency)

@@ -92,8 +92,9 @@ def attack_arguments(count: int, tally: Counter[str], seed: int = 0) -> None:
                 if i % 5 == 4:
                     state = np.r_[rng.uniform(-3, 3, 2), rng.uniform(-1, 1, 2) * s.v_max]
             controller.reset()
+            same = szlib.Tracker(memory=tracker.memory, walking_speed=tracker.walking_speed)
             after, fresh = (c.step(state, goal, [(0.0, 2.0, 0.3, 0.0)], ids=["a"], stamps=4.9, now=5.0)
-                            for c in (controller, szlib.MPCCBF(ZONE, walls=walls, settings=s)))  # fmt: skip
+                            for c in (controller, szlib.MPCCBF(ZONE, walls=walls, settings=s, tracker=same)))  # fmt: skip
             if not np.allclose(after.control, fresh.control, atol=1e-4):
                 broken(tally, "a reset controller differs from a new one", f"seed [{seed}, {k}, 24]")
             bar.update(A_SETTING)
