@@ -93,8 +93,9 @@ def attack_arguments(count: int, tally: Counter[str], seed: int = 0) -> None:
                     state = np.r_[rng.uniform(-3, 3, 2), rng.uniform(-1, 1, 2) * s.v_max]
             controller.reset()
             same = szlib.Tracker(memory=tracker.memory, walking_speed=tracker.walking_speed)
+            new = szlib.MPCCBF(ZONE, walls=walls, settings=s, tracker=same)
             after, fresh = (c.step(state, goal, [(0.0, 2.0, 0.3, 0.0)], ids=["a"], stamps=4.9, now=5.0)
-                            for c in (controller, szlib.MPCCBF(ZONE, walls=walls, settings=s, tracker=same)))  # fmt: skip
+                            for c in (controller, new))  # fmt: skip
             if not np.allclose(after.control, fresh.control, atol=1e-4):
                 broken(tally, "a reset controller differs from a new one", f"seed [{seed}, {k}, 24]")
             bar.update(A_SETTING)
@@ -168,6 +169,8 @@ class Loop:
     name: str
     another_dt: bool = False
     """The robot asks for a step after any time, not after dt."""
+    goes_back: bool = False
+    """The clock goes back now and then: nobody is forgotten, and each such step says so."""
     lag: bool = False
     """The acceleration follows the control with a time constant: no promise of safety, only of the report."""
     rng: np.random.Generator = field(init=False)
@@ -180,7 +183,7 @@ class Loop:
         world = szlib.Worlds()(88_000_000 + self.seed)
         walls, start = list(world.walls), float(rng.choice([0.0, 1.75e9]))
         controller = szlib.MPCCBF(ZONE, walls=walls, settings=s)
-        x, u, now, hidden = world.start.astype(float), np.zeros(2), start, set[int]()
+        x, u, now, hidden, back = world.start.astype(float), np.zeros(2), start, set[int](), 0.0
         for i in range(TICKS):
             where = f"{self.name}, seed {self.seed}, step {i}"
             truth = [person.after(now - start) for person in world.people]
@@ -189,8 +192,11 @@ class Loop:
             late = rng.uniform(0, 0.4, len(shown))
             then = [truth[k].after(-by) for k, by in zip(shown, late, strict=True)]
             rows = np.reshape([[*person.position, *person.velocity] for person in then], (-1, 4))
-            ids = [f"p{k}" for k in shown]
-            step = controller.step(x, world.goal, rows, ids=ids, stamps=now - late, now=now)
+            ids, jump = [f"p{k}" for k in shown], rng.uniform(1, 9) * (self.goes_back and i % 7 == 5)
+            back += jump
+            step = controller.step(x, world.goal, rows, ids=ids, stamps=now - back - late, now=now - back)
+            if bool(step.clock) != bool(jump) and not self.another_dt:
+                broken(self.tally, "a clock that goes back is not told, or one that does not is", where)
             found = [int(person.id[1:]) for person in step.scene.people]
             if sorted(found) != list(range(len(truth))) or step.unknown or step.rejected:
                 broken(self.tally, "somebody is forgotten", where)
@@ -235,6 +241,7 @@ class Loop:
 
 CHANGES: dict[str, dict[str, bool]] = {
     "measured late": {}, "another dt": {"another_dt": True}, "lag of the motors": {"lag": True},
+    "clock goes back": {"goes_back": True},
 }  # fmt: skip
 
 
