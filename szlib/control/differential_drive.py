@@ -301,7 +301,7 @@ class DifferentialDrive(Controller):
         return DriveStep(
             control=controls[0],
             predicted=np.array(states),
-            h=np.array(h),
+            h=scene.spread(np.array(h)),
             safe=point.feasible and not point.unknown and smallest >= -TOLERANCE,
             heading=theta,
             scene=scene,

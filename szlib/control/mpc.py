@@ -26,7 +26,7 @@ h(x_{N+1}, N+1) = h(x_N, N), and the problem is recursively feasible although th
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from math import dist
+from math import dist, hypot
 from threading import get_ident
 from time import perf_counter
 from typing import Any
@@ -40,7 +40,7 @@ from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import Ellipse, circle_around
 from .barriers import find_solids, read_walls
 from .controller import Controller
-from .distances import walls_with_margins
+from .distances import find_near_walls, walls_with_margins
 from .head_on import find_target
 from .person import Person, SpeedZone, as_ellipse, place_zone
 from .routes import Point, RoutePlanner, find_boxes
@@ -53,6 +53,7 @@ from .step_clock import StepClock
 from .tracker import People, TrackedPeople, Tracker
 
 _MOST_PEOPLE = 1000  # greatest number for which solvers are prepared: those for 10,000 take 1.5 GB of memory
+_FEW_WALLS = 24  # up to this number all walls are in the problem, of more those that are near
 
 
 class MPCCBF(Controller):
@@ -121,7 +122,7 @@ class MPCCBF(Controller):
         require(is_number, "max_people", max_people, expected, SolverError)
         self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
         self._take_walls(walls)
-        self._pool = SolverPool(self.settings, max_people, len(self.walls))
+        self._pool = SolverPool(self.settings, max_people, min(len(self.walls), _FEW_WALLS))
         self.reset()
 
     def _take_walls(self, walls: Any) -> None:
@@ -130,6 +131,7 @@ class MPCCBF(Controller):
             raise SolverError(f"terminal='person' is for open space; got {len(segments)} walls; use 'rest'")
         self.walls, self._wall_rows = segments, walls_with_margins(segments, self.settings)
         self._solids, self._planner = find_solids(walls), None
+        self._near_from, self._near_reach, self._slots = (0.0, 0.0), 0.0, 0
 
     def set_walls(self, walls: Any) -> None:
         """Replace the walls, from the next step on.
@@ -145,7 +147,7 @@ class MPCCBF(Controller):
         """
         self._check_thread()
         self._take_walls(walls)
-        self._pool.get(self._n_people, len(self.walls))
+        self._pool.get(self._n_people, min(len(self.walls), _FEW_WALLS))
 
     def _check_thread(self) -> None:
         if self._thread.setdefault("first", get_ident()) != get_ident():
@@ -161,6 +163,7 @@ class MPCCBF(Controller):
         self._clock, self._n_people = StepClock(self.settings.dt), 0
         self.tracker.reset()
         self._pool.reset()
+        self._near_reach, self._slots = 0.0, 0
         if self._planner:
             self._planner.reset()
 
@@ -220,25 +223,25 @@ class MPCCBF(Controller):
         clock.tick(now, stamps)
         x = clock.bring_forward(self.robot, np.array(x), state_age, np.zeros(2)).tolist()
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
-        scene = self._scene(x, towards, tracked)
+        scene = self._scene(x, towards, tracked)._replace(near=self._find_near(*x))
         ahead, way_length = self._look_ahead((x[0], x[1]), towards, route)
         remaining = way_length if way_length < np.inf else dist(x[:2], towards)
-        self._n_people = len(scene.zones)
-        solver = self._pool.get(self._n_people, len(self.walls))
+        self._n_people, n_walls = len(scene.zones), len(scene.near_walls)
+        solver = self._pool.get(self._n_people, max(n_walls, self._slots))
         self._pool.budget.begin(perf_counter() - began)
         size = solver.evaluate.size
         parameters = self._parameters(x, ahead, scene, size)
         fallback, plan, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
         self._change = np.zeros(plan.inputs.size) if first else plan.inputs - self._plan
-        self._plan, rows = plan.inputs, active_rows(self._n_people, len(self.walls), size)
+        self._plan, rows = plan.inputs, active_rows(self._n_people, n_walls, size)
         clock.hold(self._plan[:2])
         return Step(
             control=self._plan[:2].copy(),
             predicted=plan.states,
             fallback=fallback,
             slack=plan.slack,
-            residual=plan.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h)[rows],
-            h=plan.h[rows, 0],
+            residual=scene.spread(plan.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h)[rows]),
+            h=scene.spread(plan.h[rows, 0]),
             target=parameters[4:6],
             cost=plan.cost,
             solve_time=perf_counter() - began,
@@ -248,6 +251,18 @@ class MPCCBF(Controller):
             stuck=clock.time_without_progress(remaining, towards),
             clock=clock.describe(stamps, self.tracker.memory),
         )
+
+    def _find_near(self, x: float, y: float, vx: float, vy: float) -> Sequence[int] | None:
+        """Numbers of the walls that can matter: see `Scene.near`. They are looked for once a metre."""
+        s, speed = self.settings, max(self.settings.v_max, hypot(vx, vy))
+        if len(self.walls) <= _FEW_WALLS:
+            return None
+        reach = s.r_robot + s.eps + speed * s.dt * (2 / s.gamma + s.N)
+        if reach + dist((x, y), self._near_from) > self._near_reach:
+            self._near_from, self._near_reach = (x, y), reach + 1.0
+            self._near = find_near_walls(self.walls, x, y, self._near_reach)
+            self._slots = max(_FEW_WALLS, self._slots, len(self._near))
+        return self._near
 
     def _look_ahead(self, at: Point, goal: Point, route: ArrayLike | None) -> tuple[Point, float]:
         """The point of the route that attracts the plan, and the length of the way to the `goal` [m]."""
@@ -272,10 +287,10 @@ class MPCCBF(Controller):
             time = max(abs(x[2]), abs(x[3])) / self.settings.a_max
             target = x[0] + x[2] * time / 2, x[1] + x[3] * time / 2  # where full braking ends
         else:
-            target = find_target((x[0], x[1]), ahead, scene.zones, self._wall_rows, self.settings)
+            target = find_target((x[0], x[1]), ahead, scene.zones, scene.near_walls, self.settings)
         end_velocity = scene.zones[0][5:] if scene.terminal == "person" else (0.0, 0.0)
         return np.array(
-            [*x, *target, *end_velocity, *padded_parameters(x, scene.zones, self._wall_rows, size)]
+            [*x, *target, *end_velocity, *padded_parameters(x, scene.zones, scene.near_walls, size)]
         )
 
     def zone_of(self, person: Person) -> Ellipse:

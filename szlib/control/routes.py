@@ -107,6 +107,8 @@ class RoutePlanner:
         self._half_length, self._middle, self._half = np.hypot(*way.T) / 2, walls.mean(axis=1), half
         along = way / (2 * self._half_length[:, None])
         self._axes = np.stack([along, along[:, ::-1] * (-1, 1)], axis=1)
+        reach = np.hypot(*half.T)[:, None]
+        self._tree = shapely.STRtree(shapely.box(*(self._middle - reach).T, *(self._middle + reach).T))
         self._build_graph(np.arange(len(walls) if len(walls) <= _MANY else 0))
 
     def reset(self) -> None:
@@ -139,7 +141,7 @@ class RoutePlanner:
         self._pairs = pairs
         self.reset()
 
-    def _to_boxes(self, points: Array, boxes: Any = slice(None)) -> Array:
+    def _to_boxes(self, points: Array, boxes: NDArray[np.intp]) -> Array:
         """Coordinates of `points`, shape (..., 2), along and across n `boxes`, shape (..., n, 2) [m]."""
         offset = points[..., None, :] - self._middle[boxes]
         return np.asarray(np.einsum("...nj,nij->...ni", offset, self._axes[boxes]))
@@ -161,17 +163,19 @@ class RoutePlanner:
 
         As a multiple of the distance to each end, shape (m,).
         """
-        reach = np.hypot(*(ends - start).T).max(initial=0.0) + half.sum(axis=1)
-        near = np.flatnonzero(np.hypot(*(self._middle - start).T) <= reach)
+        near = self._tree.query(
+            shapely.box(*np.vstack([start, ends]).min(0), *np.vstack([start, ends]).max(0))
+        )
         return np.asarray(self._enter(start, ends, half, near).min(axis=1, initial=1.0))
 
     def _cut_boxes(self, *points: Point) -> Array:
         """Half sizes of the boxes, cut back to those of `points` that they hold, but not across a wall."""
         half = self._half
         for point in points:
-            at = np.abs(self._to_boxes(np.array(point)))
-            inside, beyond = (at < half).all(axis=1), at[:, 0] > self._half_length
-            half = np.where(np.column_stack([inside & beyond, inside & ~beyond]), at, half)
+            near, half = self._tree.query(shapely.Point(point)), half.copy()
+            at = np.abs(self._to_boxes(np.array(point), near))
+            inside, beyond = (at < half[near]).all(axis=1), at[:, 0] > self._half_length[near]
+            half[near] = np.where(np.column_stack([inside & beyond, inside & ~beyond]), at, half[near])
         return half
 
     def _take_goal(self, goal: Point) -> None:

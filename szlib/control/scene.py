@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from math import hypot, inf
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
 import shapely
 
+from ..checks import Array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .barriers import compute_h, euclidean_segment_formula
 from .person import Person, PlacedZone
@@ -30,6 +32,8 @@ class Scene(NamedTuple):
     walls : end points and margin of each wall, (xa, ya, xb, yb, margin).
     settings : parameters of the controller.
     solids : areas that walls enclose, of Shapely; None: there are none.
+    near : numbers of the walls that can matter to this step; None: all. Of many walls those out of reach are
+        left out (`distances.find_near_walls`), and what a step says of them is inf.
     """
 
     state: tuple[float, ...]
@@ -40,6 +44,7 @@ class Scene(NamedTuple):
     walls: Sequence[Sequence[float]]
     settings: MPCSettings
     solids: Any = None
+    near: Sequence[int] | None = None
 
     @property
     def people(self) -> tuple[Person, ...]:
@@ -64,23 +69,36 @@ class Scene(NamedTuple):
         """True if the robot's centre lies inside of a solid wall."""
         return self.solids is not None and bool(shapely.contains_xy(self.solids, *self.state[:2]))
 
+    @property
+    def near_walls(self) -> Sequence[Sequence[float]]:
+        """End points and margin of the walls that can matter."""
+        return self.walls if self.near is None else [self.walls[i] for i in self.near]
+
+    def spread(self, rows: Array) -> Array:
+        """Rows of all people and all walls, from `rows` of people and near walls; inf for the other walls."""
+        if self.near is None:
+            return rows
+        spread = np.full((len(self.people) + len(self.walls), *rows.shape[1:]), inf)
+        spread[[*range(len(self.people)), *(len(self.people) + i for i in self.near)]] = rows
+        return spread
+
     def obstacle(self, row: int) -> tuple[Literal["person", "wall"], int]:
         """Kind and number of the person or wall of a `row` of `Step.h`."""
         people = len(self.people)
         return ("person", row) if row < people else ("wall", row - people)
 
     def h(self, x: float, y: float, time: float = 0.0) -> list[float]:
-        """Barriers of people and then of walls for the robot at (`x`, `y`), `time` seconds from now [m]."""
+        """h of people and then of near walls for the robot at (`x`, `y`), `time` seconds from now [m]."""
         s = self.settings
-        return compute_h(x, y, self.zones, self.walls, r_robot=s.r_robot, eps=s.eps, time=time)
+        return compute_h(x, y, self.zones, self.near_walls, r_robot=s.r_robot, eps=s.eps, time=time)
 
     def gaps(self, x: float, y: float, time: float = 0.0) -> list[float]:
-        """Euclidean gaps of the disc at (`x`, `y`) to bodies and walls, `time` seconds from now [m]."""
+        """Euclidean gaps of the disc at (`x`, `y`) to bodies and near walls, `time` seconds from now [m]."""
         gaps, radius = [], self.settings.r_robot
         for person in self.people:
             (px, py), (vx, vy) = person.position, person.velocity
             gaps.append(hypot(x - px - time * vx, y - py - time * vy) - BODY_RADIUS - radius)
-        return gaps + [euclidean_segment_formula(x, y, *wall[:4]) - radius for wall in self.walls]
+        return gaps + [euclidean_segment_formula(x, y, *wall[:4]) - radius for wall in self.near_walls]
 
     def smallest_gap(self, start: Sequence[float], end: Sequence[float], acceleration: float) -> float:
         """Lower bound of the disc's gaps to bodies and walls, and of h + eps of people, within a step [m].

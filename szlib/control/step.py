@@ -40,7 +40,8 @@ class Step:
         m/s for the terminal velocity].
     residual : h_{k+1} - (1-gamma) h_k, people before walls, shape (people + walls, N_h) [m].
     h : barriers in the state itself, people before walls, shape (people + walls,) [m]. Where one is
-        negative, the robot already is where it should not be, and the plan leads out again.
+        negative, the robot already is where it should not be, and the plan leads out again. Of more than 24
+        walls, those out of reach of the plan have inf here, in `residual` and in `clearance`: see `Scene`.
     target : point that attracts the plan, shape (2,) [m]: the goal, or the point ahead on the route, except
         where the robot meets a person head-on.
     cost : cost of the plan, without any penalty.
@@ -123,7 +124,7 @@ class Step:
         keep their velocity. Negative is an overlap.
         """
         gaps = [self._gaps(k) for k in range(len(self.predicted))]
-        return np.reshape(np.array(gaps, float), (len(gaps), -1)).T
+        return self.scene.spread(np.reshape(np.array(gaps, float), (len(gaps), -1)).T)
 
     @property
     def safe(self) -> bool:
@@ -135,7 +136,7 @@ class Step:
         between samples too (`Scene.smallest_gap`). People who turn, stop or speed up within a step may still
         cause h < 0 after a safe step (notebook 13 counts them); the next step then says so.
         """
-        if not self.feasible or self.unknown or min(self.h.tolist(), default=0.0) < -TOLERANCE:
+        if not self.feasible or self.unknown or (self.h < -TOLERANCE).any():
             return False
         start, end = self.predicted[:2, :2].tolist()
         return self.scene.smallest_gap(start, end, hypot(*self.control.tolist())) >= -TOLERANCE

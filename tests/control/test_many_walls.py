@@ -1,0 +1,116 @@
+"""Of many walls only those in reach are in the problem; plans, claims and reports stay about all of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import szlib
+from szlib.checks import Array
+from szlib.control import advance, euclidean_to_segment, mpc
+from szlib.control.barriers import compute_h
+from szlib.control.distances import find_near_walls, walls_with_margins
+
+ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+S = szlib.MPCSettings()
+START, GOAL = (0.0, 0.0), (15.0, 9.0)
+
+
+def scattered(n: int, seed: int = 0, size: float = 40.0) -> Array:
+    """Short and long walls, none within 1.5 m of start and goal."""
+    rng, walls = np.random.default_rng(seed), list[Array]()
+    while len(walls) < n:
+        middle, angle, half = rng.uniform(-size / 2, size / 2, 2), rng.uniform(0, np.pi), rng.uniform(0.01, 2)
+        along = half * np.array([np.cos(angle), np.sin(angle)])
+        if euclidean_to_segment([START, GOAL], middle - along, middle + along).min() > 1.5:
+            walls.append(np.array([middle - along, middle + along]))
+    return np.array(walls)
+
+
+def drive(controller: szlib.MPCCBF, steps: int) -> list[szlib.Step]:
+    state, taken = np.array([0.0, 0.0, 0.3, 0.1]), list[szlib.Step]()
+    for _ in range(steps):
+        taken.append(controller.step(state, GOAL, [szlib.Person((2.0, 1.0), (-0.3, 0.0))]))
+        state = advance(state, taken[-1].control, 0.1)
+    return taken
+
+
+def test_the_plan_is_that_with_all_walls(monkeypatch: pytest.MonkeyPatch) -> None:
+    walls = scattered(90)
+    near = drive(szlib.MPCCBF(ZONE, walls=walls), 40)
+    monkeypatch.setattr(mpc, "_FEW_WALLS", 1000)
+    whole = drive(szlib.MPCCBF(ZONE, walls=walls), 40)
+    for a, b in zip(near, whole, strict=True):
+        assert a.predicted == pytest.approx(b.predicted, abs=1e-4)
+        assert a.h.shape == b.h.shape == (91,) and a.residual.shape == b.residual.shape
+        assert a.clearance.shape == b.clearance.shape
+        known = np.isfinite(a.h)
+        assert 5 < known.sum() < 100
+        assert a.h[known] == pytest.approx(b.h[known], abs=1e-4)
+        assert (b.residual[~known] > 0).all() and (b.h[~known] > 1).all() and (b.clearance[~known] > 1).all()
+        assert (a.safe, a.status) == (b.safe, b.status)
+        assert a.verify().ok and b.verify().ok, a.verify().faults
+    assert near[0].residual[~np.isfinite(near[0].h)].min() == np.inf
+
+
+def test_no_move_makes_a_wall_out_of_reach_matter() -> None:
+    """Its barrier condition holds wherever the robot goes within the horizon."""
+    rng, v = np.random.default_rng(1), 1.0
+    reach = S.r_robot + S.eps + v * S.dt * (2 / S.gamma + S.N)
+    for half in (5e-4, 0.05, 0.5, 2.0, 20.0):
+        wall = np.array([[(-half, 0.0), (half, 0.0)]])
+        rows, points = walls_with_margins(wall, S), rng.uniform(-12 - half, 12 + half, (3000, 2))
+        out = np.array([p for p in points.tolist() if not find_near_walls(wall, *p, reach)])
+        assert len(out) > 100
+        edge = out[np.argsort(np.abs(np.hypot(*out.T) - reach))][:500]
+        for step in (0.0, (S.N - 1) * v * S.dt):
+            angles = rng.uniform(0, 2 * np.pi, (2, len(edge)))
+            to = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+            x = edge + step * to[0]
+            h, after = (
+                np.array(compute_h(*p.T, (), rows, r_robot=S.r_robot, eps=S.eps))
+                for p in (x, x + v * S.dt * to[1])
+            )
+            assert (after >= (1 - S.gamma) * h).all() and (h > 0).all()
+
+
+def test_a_wall_that_comes_near_is_in_the_problem_in_time() -> None:
+    row = [[(x, 6.0), (x + 0.5, 6.0)] for x in np.arange(-30.0, 30.0, 0.5)]
+    controller, state = szlib.MPCCBF(ZONE, walls=row), np.zeros(4)
+    for _ in range(100):
+        step = controller.step(state, (0.0, 20.0))
+        assert step.safe and step.verify().ok
+        state = advance(state, step.control, 0.1)
+    assert 4.5 < state[1] < 5.5
+
+
+def test_a_robot_that_is_too_fast_sees_farther() -> None:
+    walls = scattered(300)
+    counts = [
+        np.isfinite(szlib.MPCCBF(ZONE, walls=walls).step((0.0, 0.0, speed, 0.0), (9.0, 0.0)).h).sum()
+        for speed in (0.0, 1.0, 2.0)
+    ]
+    assert counts[0] == counts[1] < counts[2]
+
+
+def test_new_walls_and_a_reset_are_noticed() -> None:
+    controller = szlib.MPCCBF(ZONE, walls=scattered(100))
+    first = drive(controller, 5)
+    controller.set_walls(scattered(100, seed=1))
+    other = drive(controller, 5)
+    controller.set_walls(scattered(100))
+    controller.reset()
+    again = drive(controller, 5)
+    assert all(np.array_equal(a.h, b.h) for a, b in zip(first, again, strict=True))
+    assert not np.array_equal(first[0].h, other[0].h)
+
+
+@pytest.mark.parametrize("make", [szlib.MPCCBF, szlib.DifferentialDrive])
+def test_a_run_among_many_walls_has_a_log_about_all(make: Any) -> None:
+    walls = scattered(60)
+    scenario = szlib.Scenario("field", (0, 0, 0, 0), (1.0, 0.2), (szlib.Person((3.0, 0.0)),), walls)
+    log = szlib.simulate(scenario, make(ZONE, walls=walls), max_time=2.0)
+    assert log.residual.shape[1] == log.h.shape[1] == 61
+    assert log.metrics()["unflagged_violations"] == 0
