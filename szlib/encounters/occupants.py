@@ -11,8 +11,11 @@ import pandas as pd
 from ..tracks.clock import clock_index
 from .geometry import AttentionalSpace
 
-_PAIRS_AT_ONCE = 4_000_000  # pairs of people held in memory at a time
+_PAIRS_AT_ONCE = 250_000  # pairs of people held in memory at a time: they fit into a cache
 _ROUNDING = 1e-3  # larger than every rounding error of a position, for any number of ticks [m]
+
+Range = tuple[np.ndarray, np.ndarray]
+"""The low and the high end of a range, for each row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,15 +65,19 @@ def find_occupants(
     Only rows that are `ready` (booleans) have a space.  The space lies inside the area, so only the rows
     `inside` the area (their indices) can be in it.
     """
-    people, other = np.zeros(len(rows), np.int64), np.full(len(rows), -1)
-    reach = float(np.hypot(*space.corners.T).max())
-    for ref, oth in _simultaneous(rows, inside, ready, reach):
+    found = [(np.empty(0, np.intp),) * 2]
+    cosines, sines = np.cos(rows.heading), np.sin(rows.heading)
+    ahead, side = space.corners.T[..., None]
+    x, y = ahead * cosines - side * sines, ahead * sines + side * cosines
+    for ref, oth in _simultaneous(rows, inside, ready, (x.min(0), x.max(0)), (y.min(0), y.max(0))):
         dx, dy = rows.x[oth] - rows.x[ref], rows.y[oth] - rows.y[ref]
-        cos, sin = np.cos(rows.heading[ref]), np.sin(rows.heading[ref])
+        cos, sin = cosines[ref], sines[ref]
         within = space.contains(cos * dx + sin * dy, cos * dy - sin * dx) & (ref != oth)
-        people += np.bincount(ref[within], minlength=len(rows))
-        other[ref[within]] = oth[within]
-    return people, other
+        found.append((ref[within], oth[within]))
+    ref, oth = map(np.concatenate, zip(*found, strict=True))
+    other = np.full(len(rows), -1)
+    other[ref] = oth
+    return np.bincount(ref, minlength=len(rows)), other
 
 
 def occupant_changes(rows: TrackRows, other: np.ndarray, one: np.ndarray) -> np.ndarray:
@@ -86,26 +93,30 @@ def occupant_changes(rows: TrackRows, other: np.ndarray, one: np.ndarray) -> np.
 
 
 def _simultaneous(
-    rows: TrackRows, inside: np.ndarray, ready: np.ndarray, reach: float
+    rows: TrackRows, inside: np.ndarray, ready: np.ndarray, along_x: Range, along_y: Range
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield blocks of pairs (ready row, row inside the area) that share a tick.
 
-    A ready row is also paired with itself.  Pairs farther apart than `reach` along y [m] are left out; in a
-    hall these are most pairs.
+    Pairs are left out that are outside the range of the space of the first along x or y: smallest and largest
+    difference of each of the `rows` [m].  In a hall these are most pairs.
     """
     if len(inside) == 0:
         return
     at = inside[np.lexsort((rows.y[inside], rows.tick[inside], rows.day[inside]))]
     new_tick = np.r_[True, (np.diff(rows.tick[at]) != 0) | (np.diff(rows.day[at]) != 0)]
-    beyond = reach + _ROUNDING
+    x, (low_x, high_x), (low_y, high_y) = rows.x, along_x, along_y
+    ready_rows = np.flatnonzero(ready[at])
+    low, high = low_y[at[ready_rows]] - _ROUNDING, high_y[at[ready_rows]] + _ROUNDING
+    beyond = max(-low.min(initial=0), high.max(initial=0))
     place = rows.y[at] - rows.y[at].min()
     place += (np.cumsum(new_tick) - 1) * (place.max() + 2 * beyond)  # ticks lie out of reach of each other
-    ready_rows = np.flatnonzero(ready[at])
-    first = np.searchsorted(place, place[ready_rows] - beyond)
-    count = np.searchsorted(place, place[ready_rows] + beyond, side="right") - first
+    first = np.searchsorted(place, place[ready_rows] + low)
+    count = np.searchsorted(place, place[ready_rows] + high, side="right") - first
     block = np.cumsum(count) // _PAIRS_AT_ONCE
-    for b in range(int(block[-1]) + 1 if len(block) else 0):
-        chosen = block == b
+    for chosen in map(slice, starts := np.flatnonzero(np.diff(block, prepend=-1)), [*starts[1:], len(block)]):
         size = count[chosen]
         offset = np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
-        yield np.repeat(at[ready_rows[chosen]], size), at[np.repeat(first[chosen], size) + offset]
+        one, other = np.repeat(at[ready_rows[chosen]], size), at[np.repeat(first[chosen], size) + offset]
+        difference = x[other] - x[one]
+        near = (difference >= low_x[one] - _ROUNDING) & (difference <= high_x[one] + _ROUNDING)
+        yield one[near], other[near]

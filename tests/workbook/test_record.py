@@ -152,7 +152,7 @@ def test_notebook_of_a_run_uses_the_data_with_which_the_run_began(record, monkey
 def test_zone_of_other_data_is_not_loaded_if_it_replaces_the_file(record, monkeypatch):
     shape = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
     zone = szlib.SocialZone(shape, 2.0, {1.3: szlib.Ellipse((0, 0), (1, 1))})
-    monkeypatch.setattr(DataCache, "encounters", lambda self: None)
+    monkeypatch.setattr(DataCache, "encounters", lambda self: pd.DataFrame({"encounter": []}))
     monkeypatch.setattr(data_cache.SocialZone, "fit", lambda *_, **__: zone)
     stored, load = record.cache.zone(), szlib.SocialZone.load
     other = replace(stored, r_max=1.0, provenance={"source": "other data"})
@@ -160,9 +160,18 @@ def test_zone_of_other_data_is_not_loaded_if_it_replaces_the_file(record, monkey
     assert record.cache.zone().r_max == 2.0
 
 
+@pytest.mark.parametrize(("n_encounters", "shifts"), [(4999, 39), (5000, 19)])
+def test_where_many_people_meet_the_null_model_has_fewer_shifts(record, monkeypatch, n_encounters, shifts):
+    samples = pd.DataFrame({"encounter": np.arange(n_encounters)})
+    monkeypatch.setattr(DataCache, "encounters", lambda self: samples)
+    monkeypatch.setattr(data_cache, "null_encounters", lambda tracks, **options: options["shifts"])
+    assert record.cache.null_model() == shifts
+    assert record.cache.null_model(few_shifts=4) == (39 if shifts == 39 else 4)
+
+
 def test_damaged_zone_is_fitted_again(record, monkeypatch, capsys):
     (record.out / "zone.json").write_text("{")
-    monkeypatch.setattr(DataCache, "encounters", lambda self: None)
+    monkeypatch.setattr(DataCache, "encounters", lambda self: pd.DataFrame({"encounter": []}))
     monkeypatch.setattr(data_cache.SocialZone, "fit", lambda samples, **_: "zone")
     monkeypatch.setattr(DataCache, "store_zone", lambda self, zone: zone)
     assert record.cache.zone() == "zone"

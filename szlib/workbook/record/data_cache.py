@@ -32,6 +32,8 @@ from ...zones.verdict import describe_missing_encounters
 from .parameters import ZoneMethod
 
 NULL_SHIFTS = 39  # time-shifted copies of the data that the zone is tested against (assumed)
+# With so many encounters in the data, fewer copies decide (assumed): with 19, p can be 0.05 but not less.
+MANY_ENCOUNTERS, FEW_SHIFTS = 5000, 19
 
 
 @dataclass(frozen=True)
@@ -145,13 +147,20 @@ class DataCache:
             SocialZone.fit(self.encounters(), null=self.null_model(), **self.method.fit_options())
         )
 
-    def null_model(self) -> NullEncounters | None:
-        """The null model of the data; None, and a message, where the data is too short for one."""
-        tracks = self.tracks()
+    def null_model(self, few_shifts: int = FEW_SHIFTS) -> NullEncounters | None:
+        """The null model of the data; None, and a message, where the data is too short for one.
+
+        It has `NULL_SHIFTS` shifts, or `few_shifts` where the data has `MANY_ENCOUNTERS` or more.
+        """
+        tracks, n_encounters = self.tracks(), self.encounters()["encounter"].nunique()
         settings = self.method.encounter_settings(self.find_area(tracks))
         try:
             return null_encounters(
-                tracks, settings=settings, shifts=NULL_SHIFTS, r_max=self.method.r_max, progress=False
+                tracks,
+                settings=settings,
+                shifts=NULL_SHIFTS if n_encounters < MANY_ENCOUNTERS else few_shifts,
+                r_max=self.method.r_max,
+                progress=False,
             )
         except DataError as error:
             print(f"The zone is not tested against a null model: {error}")
