@@ -52,7 +52,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_array, check_point, check_vector
+from ..checks import Array, check_array, check_number, check_point, check_vector
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from .barriers import compute_h
@@ -280,7 +280,7 @@ class DifferentialDrive(Controller):
         own = check_array("state", state, (5,) if np.asarray(state, object).size == 5 else (3,)).tolist()
         self._clock.tick(now, stamps)
         old = np.array([*own[:3], *(own[3:] or self._command or (0.0, 0.0))])
-        own = self._clock.bring_forward(self.robot, old, state_age, old[3:])
+        own = self._clock.bring_forward(self.robot, old, check_number("state_age", state_age), old[3:])
         x, y, theta, *speeds = own.tolist()
         centre, lever = check_array("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
         if not self._command and min(self.barriers(centre), default=0.0) < 0:

@@ -35,7 +35,7 @@ from warnings import catch_warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_array, check_point, check_vector, require
+from ..checks import Array, check_array, check_number, check_point, check_vector, require
 from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import Ellipse, circle_around
 from .barriers import find_solids, read_walls
@@ -221,7 +221,8 @@ class MPCCBF(Controller):
         if first:
             self._check_goal(towards)
         clock.tick(now, stamps)
-        x = clock.bring_forward(self.robot, np.array(x), state_age, np.zeros(2)).tolist()
+        if age := check_number("state_age", state_age):
+            x = clock.bring_forward(self.robot, np.array(x), age, np.zeros(2)).tolist()
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
         scene = self._scene(x, towards, tracked)._replace(near=self._find_near(*x))
         ahead, way_length = self._look_ahead((x[0], x[1]), towards, route)

@@ -123,7 +123,8 @@ class Step:
         Shape (people + walls, N+1), people before walls: now, and at each state of the plan, with people who
         keep their velocity. Negative is an overlap.
         """
-        gaps = [self._gaps(k) for k in range(len(self.predicted))]
+        dt, states = self.scene.settings.dt, self.predicted[:, :2].tolist()
+        gaps = [self.scene.gaps(x, y, k * dt) for k, (x, y) in enumerate(states)]
         return self.scene.spread(np.reshape(np.array(gaps, float), (len(gaps), -1)).T)
 
     @property
@@ -186,11 +187,6 @@ class Step:
         straight = dist(self.scene.state[:2], self.scene.goal)
         away = self.way_length if self.way_length < np.inf else straight
         return f"{away:.1f} m from the goal; held by {names}"
-
-    def _gaps(self, k: int) -> list[float]:
-        """Euclidean gaps at state k of the plan."""
-        x, y = self.predicted[k, :2].tolist()
-        return self.scene.gaps(x, y, k * self.scene.settings.dt)
 
     def _why_not_safe(self) -> str:
         if self.unknown:

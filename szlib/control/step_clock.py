@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
+from itertools import islice
 from math import ceil, dist, inf
 from statistics import median_low
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_number, require
+from ..checks import Array, require
 from ..errors import SolverError
 from .controller import Robot
 from .tracker import check_time
@@ -62,7 +63,7 @@ class StepClock:
 
     def bring_forward(self, robot: Robot, own: Array, age: float, at_first: Array) -> Array:
         """State of a `robot` now, from its state `own` of the `age` [s]; `at_first`: before all commands."""
-        left, spans = check_number("state_age", age), list[tuple[Array, float]]()
+        left, spans = age, list[tuple[Array, float]]()
         require(0 <= left <= OLDEST_STATE, "state_age", age, f"0 to {OLDEST_STATE:g} s", SolverError)
         while left > 0 and len(spans) < len(self._held):
             control, held = self._held[-1 - len(spans)]
@@ -86,15 +87,16 @@ class StepClock:
 
     def describe(self, stamps: ArrayLike | None, memory: float) -> str:
         """What is wrong with the times of this step, with the `stamps` of people and a tracker's `memory`."""
-        times = np.asarray(self.now if stamps is None else stamps, float)
-        late = float(np.max(np.abs(self.now - times), initial=0.0))
-        recent = [self._held[-1 - i][1] for i in range(RATE_STEPS)] if len(self._held) >= RATE_STEPS else []
-        period = median_low(recent or [self._dt])
-        faults = {
-            f"the clock went back by {self._back:.3g} s; nobody is forgotten": self._back > 0,
-            f"people were measured {late:.3g} s from now, and are remembered for {memory:g} s; do `now` and "
-            "`stamps` come from one clock?": late > memory,
-            f"steps come every {period:.3g} s, but dt = {self._dt:g} s, and gamma is per step of dt; see "
-            "MPCSettings.with_gamma_rate": abs(period - self._dt) > RATE_ERROR * self._dt,
-        }
-        return "; ".join(sentence for sentence, holds in faults.items() if holds)
+        found = []
+        if self._back:
+            found.append(f"the clock went back by {self._back:.3g} s; nobody is forgotten")
+        late = 0.0 if stamps is None else np.abs(np.asarray(stamps, float) - self.now).max(initial=0.0)
+        if late > memory:
+            found.append(
+                f"people were measured {late:.3g} s from now, and are remembered for {memory:g} s only"
+            )
+        recent = [held for _, held in islice(reversed(self._held), RATE_STEPS)]
+        period = median_low(recent) if len(recent) == RATE_STEPS else self._dt
+        if abs(period - self._dt) > RATE_ERROR * self._dt:
+            found.append(f"steps come every {period:.3g} s, not every dt = {self._dt:g} s: gamma is per dt")
+        return "; ".join(found)
