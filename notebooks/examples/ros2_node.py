@@ -10,9 +10,10 @@ publishes   cmd_vel              geometry_msgs/Twist          (v, omega), every 
 
 Parameters: `zone`, a file that `SocialZone.save` wrote; `walls`, "x1 y1 x2 y2; ..." [m]; `frame`, the frame
 of the walls, into which all messages are brought by TF (messages in another frame are ignored with a warning
-where TF does not know it at their time, or is not installed; TF is asked for poses, so a frame that people
-are given in should stand still); `stamped`, True for a base that wants TwistStamped; of the robot `r_robot` [m], `v_max` [m/s], `omega_max` [rad/s], `ahead` [m] (0: the default of `DifferentialDrive`);
-`max_people`, the number to prepare for; `timeout` [s]; `costmap_size` and `costmap_resolution` [m].
+where TF does not know it at their time, or is not installed; velocities are only turned, so the frame of
+people should stand still); `stamped`, True for a base that wants TwistStamped; of the robot `r_robot` [m],
+`v_max` [m/s], `omega_max` [rad/s], `ahead` [m] (0: the default of `DifferentialDrive`); `max_people`, the
+number to prepare for; `timeout` [s]; `costmap_size` and `costmap_resolution` [m].
 
 Watchdog: the node commands zero velocity, every dt, unless it has a goal, and odometry and people no older
 than `timeout` by their own stamps. Silence about people does not mean that nobody is there: a tracker that
