@@ -245,12 +245,14 @@ class TimeBudget:
 
     def begin(self, spent: float = 0.0) -> None:
         """Start to measure; of the deadline so much is `spent` already [s]."""
-        self._wall, self._thread = perf_counter() - spent, thread_time()
+        self._wall, self._thread, self._spent = perf_counter(), thread_time(), spent
 
     def is_spent(self, share: float = 1.0) -> bool:
         """True if this `share` of the time is used up. The thread's clock is slow, so it is read last."""
         limit, passed = share * self._limit, perf_counter() - self._wall
-        return passed > share * self._deadline or (passed > limit and thread_time() - self._thread > limit)
+        if passed + self._spent > share * self._deadline:
+            return True
+        return passed > limit and thread_time() - self._thread > limit
 
 
 class ProblemSolver:
