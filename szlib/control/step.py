@@ -184,9 +184,7 @@ class Step:
         """How far the goal is, and who and what holds the robot: the barriers that are at their limit."""
         holding = np.flatnonzero(self.residual.min(axis=1, initial=np.inf) <= HOLDS)
         names = " and ".join(self._obstacle(i) for i in holding.tolist()) or "no person and no wall"
-        straight = dist(self.scene.state[:2], self.scene.goal)
-        away = self.way_length if self.way_length < np.inf else straight
-        return f"{away:.1f} m from the goal; held by {names}"
+        return f"{dist(self.scene.state[:2], self.scene.goal):.1f} m from the goal; held by {names}"
 
     def _why_not_safe(self) -> str:
         if self.unknown:

@@ -151,16 +151,14 @@ def verify_disc(scene: Scene, heading: float, step: Any) -> StepReport:
     min_h = min(now, default=np.inf)
     worst = min(min_h, gap, *_compute_h(scene, path[-1], dt))
     safe = found.feasible and not scene.tracked.unknown and worst >= -TOLERANCE
-    most = ROUNDING * max(1.0, float(np.abs([*path.ravel(), *now]).max()))
-    differences = {
-        "motion of the disc": float(np.abs(path[[0, -1]] - step.predicted[:2, :2]).max()),
-        "h of the disc": _differ(np.array(now), step.h),
+    rounding = ROUNDING * max(1.0, float(np.abs([*path.ravel(), *now]).max()))
+    is_right = {
+        "motion": np.abs(path[[0, -1]] - step.predicted[:2, :2]).max() <= rounding,
+        "h": _differ(np.array(now), step.h) <= rounding,
+        "safe": safe == step.safe or _is_undecided(scene, path, worst, step.safe),
     }
-    faults = [f"{name} differs by {value:.2g}" for name, value in differences.items() if not value <= most]
-    if safe != step.safe and not _is_undecided(scene, path, worst, step.safe):
-        faults.append(f"the step says of the disc safe {step.safe}; found {safe}")
-    differences, faults = found.differences | differences, [*found.faults, *faults]
-    return replace(found, faults=tuple(faults), differences=differences, h=min_h, gap=gap, safe=safe)
+    faults = [f"{name} of the disc is wrong" for name, holds in is_right.items() if not holds]
+    return replace(found, faults=(*found.faults, *faults), h=min_h, gap=gap, safe=safe)
 
 
 def _differ(found: Array, claimed: Array) -> float:

@@ -326,7 +326,7 @@ def test_a_drive_step_is_verified_and_explained():
         (lambda step: {"control": np.add(step.control, (0.01, 0.0))}, "motion of the disc"),
         (lambda step: {"heading": step.heading + 0.01}, "motion of the disc"),
         (lambda step: {"h": step.h + 1e-4}, "h of the disc"),
-        (lambda step: {"safe": not step.safe}, "safe False; found True"),
+        (lambda step: {"safe": not step.safe}, "safe of the disc"),
         (lambda step: {"point": szlib.Step(**vars(step.point) | {"slack": 0.1})}, "slack"),
     ],
 )
