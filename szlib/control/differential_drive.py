@@ -45,7 +45,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import asin, atan2, cos, hypot, inf, pi, sin, tan
+from math import asin, atan2, cos, hypot, inf, pi, remainder, sin, tan
 from time import perf_counter
 from typing import Any
 
@@ -59,13 +59,18 @@ from .barriers import compute_h
 from .controller import Controller
 from .distances import walls_with_margins
 from .mpc import MPCCBF
-from .person import Person, SpeedZone, place_zone
+from .person import STANDING_SPEED, Person, SpeedZone, place_zone
 from .scene import Scene
 from .settings import TOLERANCE, MPCSettings
 from .step import Fallback, Step
 from .step_clock import StepClock
 from .step_report import StepReport, verify_disc
 from .tracker import People, Tracker
+
+_NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn on the spot may begin
+_TURNS = np.array(sorted(np.linspace(-pi, pi, 33), key=abs))  # turns that are tried, in this order [rad]
+_TURN, _ALIGNED = 1.0, 0.2  # largest turn that is asked for at once, and where a turn ends [rad]
+_FREE = 0.02  # h that the point needs [m]
 
 
 @dataclass(frozen=True)
@@ -183,8 +188,9 @@ class DifferentialDrive(Controller):
     v_max : speed that it can reach [m/s]; see `ahead`.
     chord_error : largest distance of the point from the straight line between two samples [m].
     goal_clearance : distance of a goal from walls, and from zones of people who stand, at which it can be
-        reached from any side [m]; the disc's centre comes to rest there, at any heading. A closer goal may be
-        missed by up to 2 `ahead`.
+        reached from any side [m]; the disc's centre comes to rest there, at any heading. At a closer goal the
+        robot turns its back to the obstacle and goes backwards; it needs about `goal_clearance` - 2 `ahead`
+        there, else it may miss the goal by up to 2 `ahead`.
 
     Raises
     ------
@@ -249,6 +255,8 @@ class DifferentialDrive(Controller):
         """Forget the last plan and command, and all people."""
         self._point.reset()
         self._command, self._clock = list[float](), StepClock(self.settings.dt)
+        self._seen: Scene | None = None
+        self._turns = False
         self._planned_velocity = [0.0, 0.0]
 
     def step(
@@ -261,6 +269,7 @@ class DifferentialDrive(Controller):
         stamps: ArrayLike | None = None,
         now: float | None = None,
         state_age: float = 0.0,
+        route: ArrayLike | None = None,
     ) -> DriveStep:
         """Decide the (v, omega) to hold for the next `dt`.
 
@@ -270,7 +279,7 @@ class DifferentialDrive(Controller):
             The plan begins at the planned velocity of the point. If the robot was stopped or pushed,
             and (v, omega) differs from the last command by more than a_max dt, it begins at (v, omega).
         goal : (x, y) of the disc's centre [m].
-        people, ids, stamps, now, state_age : as of `MPCCBF.step`.
+        people, ids, stamps, now, state_age, route : as of `MPCCBF.step`.
 
         Raises
         ------
@@ -289,7 +298,14 @@ class DifferentialDrive(Controller):
                 f"least {self.goal_clearance:.2f} m away from all walls"
             )
         start = (*(own[:2] + lever).tolist(), *self._velocity(theta, *speeds))
-        point = self._point.step(start, centre + lever, people, ids=ids, stamps=stamps, now=now)
+        turn = self._find_turn(own[:3].tolist(), centre)
+        towards = (
+            own[:2] + self.ahead * np.array([cos(theta + turn), sin(theta + turn)])
+            if turn
+            else centre + lever
+        )
+        point = self._point.step(start, towards, people, ids=ids, stamps=stamps, now=now, route=route)
+        self._seen = point.scene
         states, controls = self._follow(own, point.predicted[1:, :2])
         self._command, self._planned_velocity = controls[0].tolist(), point.predicted[1, 2:].tolist()
         scene, dt = point.scene._replace(settings=self.settings, walls=self._wall_rows), self.settings.dt
@@ -315,6 +331,26 @@ class DifferentialDrive(Controller):
         (x, y), s = check_point("position", position), self.settings
         zones = [place_zone(person, self._point.zone_of(person)) for person in people]
         return np.array(compute_h(x, y, zones, self._wall_rows, r_robot=s.r_robot, eps=s.eps))
+
+    def _find_turn(self, own: list[float], goal: Array) -> float:
+        """Angle by which the robot turns where it stands, close to its `goal` [rad]; 0: it drives on.
+
+        It turns if the point ahead could not be where it is to be when the disc is at the goal, because of a
+        wall or a person who stands. It turns its back to the goal, or as far as the point could be there
+        then, and goes backwards.
+        """
+        (x, y, theta), (gx, gy), s, scene = own, goal.tolist(), self._point.settings, self._seen
+        if scene is None or hypot(gx - x, gy - y) > (1.5 if self._turns else 1.0) * _NEAR * self.ahead:
+            self._turns = False
+            return 0.0
+        headings = np.array([theta, *(atan2(y - gy, x - gx) + _TURNS)])
+        px, py = gx + self.ahead * np.cos(headings), gy + self.ahead * np.sin(headings)
+        standing = [zone for zone in scene.zones if hypot(zone.vx, zone.vy) < STANDING_SPEED]
+        h = compute_h(px, py, standing, scene.near_walls, r_robot=s.r_robot, eps=s.eps)
+        free = np.min(np.vstack([*h, np.full(len(px), inf)]), axis=0) >= _FREE
+        turn = remainder(float(headings[1:][free[1:].argmax()]) - theta, 2 * pi)
+        self._turns = bool(free[1:].any()) and (abs(turn) > _ALIGNED if self._turns else not free[0])
+        return max(-_TURN, min(turn, _TURN)) if self._turns else 0.0
 
     def _velocity(self, theta: float, v: float, omega: float) -> list[float]:
         """Velocity of the point: as planned, unless the robot does not follow its command."""

@@ -4,6 +4,7 @@ import copy
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
+from typing import Any
 
 import numpy as np
 import pytest
@@ -363,3 +364,37 @@ def test_by_default_the_robot_turns_as_fast_as_a_common_one():
 def test_a_state_of_another_shape_is_refused(state):
     with pytest.raises(szlib.SolverError, match="state must"):
         szlib.DifferentialDrive(ZONE, max_people=0).step(state, (4.0, 0.0))
+
+
+# --- routes, and goals close to a wall ---------------------------------------------------------------
+
+
+def drive_to(goal: tuple[float, float], walls: Any, steps: int, **more: Any) -> list[Any]:
+    drive = szlib.DifferentialDrive(ZONE, walls=walls, settings=szlib.MPCSettings(lookahead=4.0))
+    own, taken = drive.robot.start((-3.0, 0.0, 0.0, 0.0)), []
+    for _ in range(steps):
+        taken.append(drive.step(own, goal, **more))
+        own = drive.robot.advance(own, taken[-1].control, 0.1)
+    return taken
+
+
+def test_a_drive_goes_around_a_wall() -> None:
+    steps = drive_to((3.0, 0.3), [[(0.0, -2.0), (0.0, 2.0)]], 150)
+    assert np.hypot(*(steps[-1].predicted[0, :2] - (3.0, 0.3))) < 0.1
+    assert all(step.safe for step in steps) and steps[80].verify().ok
+
+
+def test_a_drive_follows_a_users_route() -> None:
+    detour = [(-3.0, 0.0), (-3.0, -4.0), (3.0, -4.0), (3.0, 0.0)]
+    steps = drive_to((3.0, 0.3), [[(0.0, -2.0), (0.0, 2.0)]], 220, route=detour)
+    places = np.array([step.predicted[0, :2] for step in steps])
+    assert np.hypot(*(places[-1] - (3.0, 0.3))) < 0.1 and places[:, 1].min() < -2.5
+
+
+@pytest.mark.parametrize("gap", [0.75, 0.9])
+def test_a_drive_turns_its_back_to_a_wall_behind_the_goal(gap: float) -> None:
+    wall = [[(gap, -3.0), (gap, 3.0)]]
+    steps = drive_to((0.0, 0.0), wall, 200)
+    assert min(np.hypot(*step.predicted[0, :2]) for step in steps) < 0.1
+    assert all(step.safe for step in steps)
+    assert abs(steps[-1].heading) > 1.5  # the point ahead would be too close to the wall
