@@ -36,7 +36,7 @@ from .mpc import MPCCBF
 from .person import Person
 from .routes import find_route
 from .scene import Scene
-from .settings import MPCSettings
+from .settings import Crowding, MPCSettings
 from .step import FALLBACKS, Step
 from .step_report import StepReport
 from .tracker import TrackedPeople, Tracker

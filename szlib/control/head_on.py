@@ -45,7 +45,7 @@ def find_target(
     target stays the goal, and the robot yields. The paper has no such rule.
 
     The rule holds only if the barrier is active now, h <= closing speed * dt / gamma, or may become so
-    within the horizon, h <= closing speed * dt * N. (With the first condition alone and gamma > 1/N, the
+    within the horizon, h <= closing speed * horizon. (With the first condition alone and gamma > 1/N, the
     slightest tilt of the zone would decide the side before this rule does.) It does not hold for people who
     walk across the way, because they clear it themselves, nor for a person who stands on the goal. The
     nearest person counts.
@@ -61,7 +61,7 @@ def find_target(
         if abs(way[0] * zone.vy - way[1] * zone.vx) > s.head_on_share * speed * distance:
             continue
         h, closing = barrier(zone.distance(x, y), s.r_robot, s.eps), (s.v_max + speed) * s.dt
-        if h > min(nearest, distance, max(closing / s.gamma, closing * s.N)):
+        if h > min(nearest, distance, max(closing / s.gamma, closing * sum(s.step_lengths))):
             continue
         angles = _find_angles(zone, position, way, s)
         if angles is None:

@@ -40,6 +40,7 @@ from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import Ellipse, circle_around
 from .barriers import find_solids, read_walls
 from .controller import Controller
+from .crowding import list_barriers
 from .distances import find_near_walls, walls_with_margins
 from .head_on import find_target
 from .person import Person, SpeedZone, as_ellipse, place_zone
@@ -147,7 +148,7 @@ class MPCCBF(Controller):
         """
         self._check_thread()
         self._take_walls(walls)
-        self._pool.get(self._n_people, min(len(self.walls), _FEW_WALLS))
+        self._pool.get(self._n_barriers, min(len(self.walls), _FEW_WALLS))
 
     def _check_thread(self) -> None:
         if self._thread.setdefault("first", get_ident()) != get_ident():
@@ -160,7 +161,7 @@ class MPCCBF(Controller):
     def reset(self) -> None:
         """Forget the last plan and all people, so that the next step depends on no earlier one."""
         self._plan, self._change = np.zeros((2, 2 * self.settings.N))
-        self._clock, self._n_people = StepClock(self.settings.dt), 0
+        self._clock, self._n_barriers = StepClock(self.settings.dt), 0
         self.tracker.reset()
         self._pool.reset()
         self._near_reach, self._slots = 0.0, 0
@@ -227,14 +228,15 @@ class MPCCBF(Controller):
         scene = self._scene(x, towards, tracked)._replace(near=self._find_near(*x))
         ahead, way_length = self._look_ahead((x[0], x[1]), towards, route)
         remaining = way_length if way_length < np.inf else dist(x[:2], towards)
-        self._n_people, n_walls = len(scene.zones), len(scene.near_walls)
-        solver = self._pool.get(self._n_people, max(n_walls, self._slots))
+        barriers = list_barriers(scene.level, scene.zones, scene.people, self.settings)
+        self._n_barriers, n_walls = len(barriers), len(scene.near_walls)
+        solver = self._pool.get(self._n_barriers, max(n_walls, self._slots))
         self._pool.budget.begin(perf_counter() - began)
         size = solver.evaluate.size
-        parameters = self._parameters(x, ahead, scene, size)
+        parameters = self._parameters(x, ahead, scene, barriers, size)
         fallback, plan, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
         self._change = np.zeros(plan.inputs.size) if first else plan.inputs - self._plan
-        self._plan, rows = plan.inputs, active_rows(self._n_people, n_walls, size)
+        self._plan, rows = plan.inputs, active_rows(len(scene.zones), n_walls, size)
         clock.hold(self._plan[:2])
         return Step(
             control=self._plan[:2].copy(),
@@ -258,7 +260,9 @@ class MPCCBF(Controller):
         s, speed = self.settings, max(self.settings.v_max, hypot(vx, vy))
         if len(self.walls) <= _FEW_WALLS:
             return None
-        reach = s.r_robot + s.eps + speed * s.dt * (2 / s.gamma + s.N)
+        longest = max(s.step_lengths)
+        time = s.times[-1] + 2 * longest * s.dt / (1 - (1 - s.gamma) ** longest)
+        reach = s.r_robot + s.eps + speed * time
         if reach + dist((x, y), self._near_from) > self._near_reach:
             self._near_from, self._near_reach = (x, y), reach + 1.0
             self._near = find_near_walls(self.walls, x, y, self._near_reach)
@@ -282,17 +286,23 @@ class MPCCBF(Controller):
         placed = [place_zone(person, zone) for person, zone in zip(tracked.people, zones, strict=True)]
         return Scene(tuple(state), goal, tracked, zones, placed, self._wall_rows, self.settings, self._solids)
 
-    def _parameters(self, x: list[float], ahead: Point, scene: Scene, size: tuple[int, int]) -> Array:
-        """Parameters of the problem of this size: state, target, terminal velocity, people and walls."""
+    def _parameters(
+        self,
+        x: list[float],
+        ahead: Point,
+        scene: Scene,
+        barriers: Sequence[Sequence[float]],
+        size: tuple[int, int],
+    ) -> Array:
+        """Parameters of the problem of this size: see `Problem.parameters`."""
         if scene.tracked.unknown:
             time = max(abs(x[2]), abs(x[3])) / self.settings.a_max
             target = x[0] + x[2] * time / 2, x[1] + x[3] * time / 2  # where full braking ends
         else:
             target = find_target((x[0], x[1]), ahead, scene.zones, scene.near_walls, self.settings)
         end_velocity = scene.zones[0][5:] if scene.terminal == "person" else (0.0, 0.0)
-        return np.array(
-            [*x, *target, *end_velocity, *padded_parameters(x, scene.zones, scene.near_walls, size)]
-        )
+        numbers = padded_parameters(x, barriers, scene.near_walls, size)
+        return np.array([*x, *target, *end_velocity, *self._plan[:2], *numbers])
 
     def zone_of(self, person: Person) -> Ellipse:
         """Zone of a `person` in their own frame: their own, or the controller's.

@@ -1,20 +1,24 @@
 """The optimal control problem of the controller, in symbols, for every solver.
 
     min over u_0 .. u_{N-1}
-        (x_N - g)' P (x_N - g) + sum_{k=1}^{N-1} (x_k - g)' Q (x_k - g) + sum_{k=0}^{N-1} u_k' R u_k
+        (x_N - g)' P (x_N - g) + sum_{k=1}^{N-1} m_{k-1} (x_k - g)' Q (x_k - g)
+            + sum_{k=0}^{N-1} m_k u_k' R u_k + j |u_k - u_{k-1}|^2 / m_k
     subject to
-        x_{k+1} = A x_k + B u_k,  x_0 given                           double integrator   (paper, eq. 8)
+        x_{k+1} = A_k x_k + B_k u_k,  x_0 given                       double integrator   (paper, eq. 8)
         -a_max <= u_k <= a_max                                        acceleration        k = 0 .. N-1
         |(vx, vy)_k|^2 <= v_max^2                                     Euclidean speed     k = 1 .. N
-        h_i(x_{k+1}, k+1) - (1 - gamma) h_i(x_k, k) >= 0              every person, wall  k = 0 .. N_h-1
+        h_i(x_{k+1}, t_{k+1}) - (1 - gamma_i)^{m_k} h_i(x_k, t_k) >= 0    each barrier i  k = 0 .. N_h-1
         (vx, vy)_N = w                                                if there is a terminal condition
 
-(paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., k) takes person i at constant
-velocity, k steps ahead. `g` is the target at rest: the goal, except where a person is met head-on
-(`head_on.find_target`); w is 0 or the velocity of a person. The states are eliminated: 2 N unknowns remain.
-The *relaxed* problem adds a slack s >= 0 to each barrier row, and to the speed rows if the robot is already
-too fast, and penalises their sum. The penalty is exact: if the hard problem has a solution near by, both have
-the same one. The terminal condition is never relaxed.
+(paper, eq. 1-2), where x = (x, y, vx, vy), u = (ax, ay), and h_i(., t) takes person i at constant
+velocity, t seconds ahead. Step k takes m_k dt; in the paper m_k = 1, each person and wall has one barrier,
+all gamma_i are the same, and the weight j of jerk is 0. `g` is the target at rest: the goal, except where a
+person is met head-on (`head_on.find_target`); w is 0 or the velocity of a person. The states are eliminated:
+2 N unknowns remain. Each barrier has a price: below `slack_weight`, its rows may be violated, at this price
+for each metre and dt; else they are hard (see `crowding`). The *relaxed* problem adds a slack s >= 0 to each
+hard barrier row, and to the speed rows if the robot is already too fast, and penalises their sum. The penalty
+is exact: if the hard problem has a solution near by, both have the same one. The terminal condition is never
+relaxed.
 """
 
 from __future__ import annotations
@@ -31,7 +35,7 @@ import casadi as ca
 import numpy as np
 
 from ..checks import Array
-from .barriers import barrier, cbf_residual, ellipse_formula, segment_formula
+from .barriers import barrier, ellipse_formula, segment_formula
 from .settings import MPCSettings
 
 # Share of a step's time for the hard problem. The second try begins within half of this share, or not at all,
@@ -49,15 +53,18 @@ class Problem:
     Attributes
     ----------
     inputs : u_0 .. u_{N-1}, shape (2N,).
-    parameters : the state (4), the target (2), the terminal velocity w (2), then for each person the foci and
-        a of the zone and the velocity (7), then for each wall its end points and its margin (5).
+    parameters : the state (4), the target (2), the terminal velocity w (2), the last input u_{-1} (2), then
+        for each barrier of a person the foci and a of the zone, the velocity, gamma and the price (9), then
+        for each wall its end points and its margin (5).
     states : x_0 .. x_N, shape (4, N+1).
     cost : of the plan.
     rows : required to be >= 0: the `n_cbf` barrier conditions, person by person, then wall by wall, and the N
         speed limits.
     terminal : required to be 0; empty without a terminal condition.
-    h : a row for each person and wall, a column for each of the states x_0 .. x_{N_h}.
+    h : a row for each barrier, a column for each of the states x_0 .. x_{N_h}.
     slope, bend : derivatives of h by the position in that state, (h_x, h_y) and (h_xx, h_xy, h_yy).
+    kept : (1 - gamma_i)^{m_k}, a row for each barrier, a column for each step.
+    prices : of a metre of violation of each of `rows`; `slack_weight` for hard ones.
     n_cbf : number of barrier conditions.
     """
 
@@ -70,6 +77,8 @@ class Problem:
     h: Any
     slope: Sequence[Any]
     bend: Sequence[Any]
+    kept: Any
+    prices: Any
     n_cbf: int
 
     @property
@@ -77,30 +86,40 @@ class Problem:
         """Violation of each row and of the terminal condition; 0 where they hold."""
         return ca.vertcat(ca.fmax(0, -self.rows), ca.fabs(self.terminal))
 
+    def is_hard(self, settings: MPCSettings) -> Any:
+        """1 for hard rows and the terminal condition, 0 for rows with a price below that of `settings`."""
+        return ca.vertcat(self.prices >= settings.slack_weight, ca.SX.ones(self.terminal.numel()))
+
 
 @lru_cache(maxsize=256)
 def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem:
     """Build the problem of this module's docstring for `settings`, `n_people` and `n_walls`, or reuse it."""
     s = settings
     inputs, start, target = ca.SX.sym("u", 2, s.N), ca.SX.sym("x0", 4), ca.SX.sym("target", 2)
-    people, walls, w = ca.SX.sym("person", 7, n_people), ca.SX.sym("wall", 5, n_walls), ca.SX.sym("w", 2)
+    people, walls = ca.SX.sym("person", 9, n_people), ca.SX.sym("wall", 5, n_walls)
+    w, last = ca.SX.sym("w", 2), ca.SX.sym("last", 2)
 
     states = [start]
-    for k in range(s.N):
-        position, velocity, a = states[-1][:2], states[-1][2:], inputs[:, k]
-        states.append(ca.vertcat(position + s.dt * velocity + 0.5 * s.dt**2 * a, velocity + s.dt * a))
+    for k, length in enumerate(s.step_lengths):
+        position, velocity, a, dt = states[-1][:2], states[-1][2:], inputs[:, k], length * s.dt
+        states.append(ca.vertcat(position + dt * velocity + 0.5 * dt**2 * a, velocity + dt * a))
     x = ca.horzcat(*states)
 
-    weights = ca.DM([[0.0] * 4, *[s.Q] * (s.N - 1), s.P]).T
+    lengths = np.array(s.step_lengths, float)
+    weights = ca.DM(np.column_stack([np.zeros(4), np.outer(s.Q, lengths[:-1]), s.P]))
     error = x - ca.repmat(ca.vertcat(target, 0, 0), 1, s.N + 1)
-    cost = ca.dot(weights, error**2) + ca.dot(ca.repmat(ca.DM(s.R), 1, s.N), inputs**2)
+    cost = ca.dot(weights, error**2) + ca.dot(ca.DM(np.outer(s.R, lengths)), inputs**2)
+    if s.jerk_weight:
+        change = inputs - ca.horzcat(last, inputs[:, :-1])
+        cost += ca.dot(ca.DM(np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)), change**2)
 
-    h, h_x, h_y, h_xx, h_xy, h_yy = _barriers(s, x[:2, : s.N_h + 1], people, walls)
-    cbf = ca.vec(cbf_residual(h[:, 1:], h[:, :-1], s.gamma).T)
+    h, h_x, h_y, h_xx, h_xy, h_yy = _barriers(s, x[:2, : s.N_h + 1], people[:7, :], walls)
+    kept, prices = _kept_and_prices(s, people[7:, :], n_walls)
+    cbf = ca.vec((h[:, 1:] - kept * h[:, :-1]).T)
     speed = s.v_max**2 - ca.sum1(x[2:, 1:] ** 2).T
     return Problem(
         inputs=ca.vec(inputs),
-        parameters=ca.vertcat(start, target, w, ca.vec(people), ca.vec(walls)),
+        parameters=ca.vertcat(start, target, w, last, ca.vec(people), ca.vec(walls)),
         states=x,
         cost=cost,
         rows=ca.vertcat(cbf, speed),
@@ -108,12 +127,26 @@ def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem
         h=h,
         slope=(h_x, h_y),
         bend=(h_xx, h_xy, h_yy),
+        kept=kept,
+        prices=ca.vertcat(ca.vec(prices.T), s.slack_weight * ca.SX.ones(s.N)),
         n_cbf=cbf.numel(),
     )
 
 
+def _kept_and_prices(s: MPCSettings, given: Any, n_walls: int) -> tuple[Any, Any]:
+    """Share of h that a step has to keep, and the price of each row, both of shape (barriers, N_h).
+
+    `given` : gamma and price of each barrier of a person, shape (2, n).
+    """
+    keep = ca.vertcat(1 - given[0, :].T, ca.SX(1 - s.gamma) * ca.SX.ones(n_walls))
+    price = ca.vertcat(given[1, :].T, s.slack_weight * ca.SX.ones(n_walls))
+    kept = [keep if m == 1 else keep**m for m in s.step_lengths[: s.N_h]]
+    prices = [ca.if_else(price < s.slack_weight, m * price, price) for m in s.step_lengths[: s.N_h]]
+    return ca.horzcat(*kept), ca.horzcat(*prices)
+
+
 def _barriers(s: MPCSettings, at: Any, people: Any, walls: Any) -> list[Any]:
-    """h and its derivatives at positions (2, n), one step apart, each of shape (people + walls, n)."""
+    """h and its derivatives at positions (2, n), one for each time, each of shape (people + walls, n)."""
     x, y, time = (ca.SX.sym(name) for name in ("x", "y", "t"))
     xa, ya, xb, yb, a, vx, vy = person = ca.vertsplit(ca.SX.sym("person", 7))
     distance = ellipse_formula(x - time * vx, y - time * vy, xa, ya, xb, yb, a)
@@ -122,19 +155,22 @@ def _barriers(s: MPCSettings, at: Any, people: Any, walls: Any) -> list[Any]:
     n, found = at.shape[1], [[ca.SX(0, at.shape[1])] for _ in range(6)]
     for h, of, numbers in ((of_person, person, people), (barrier(of_wall, s.r_robot, margin), wall, walls)):
         if count := numbers.shape[1]:
-            values = _differentiated(h, x, y, time, of, s.dt, n).map(count)(ca.repmat(at, 1, count), numbers)
+            once = _differentiated(h, x, y, time, of, s.times, n)
+            values = once.map(count)(ca.repmat(at, 1, count), numbers)
             for parts, value in zip(found, values, strict=True):
                 parts.append(ca.reshape(value, n, count).T)
     return [ca.vertcat(*parts) for parts in found]
 
 
-def _differentiated(h: Any, x: Any, y: Any, time: Any, of: Sequence[Any], dt: float, n: int) -> Any:
-    """A function of n positions, dt apart, and of numbers: h, h_x, h_y, h_xx, h_xy, h_yy, of shape (1, n)."""
+def _differentiated(
+    h: Any, x: Any, y: Any, time: Any, of: Sequence[Any], times: Sequence[float], n: int
+) -> Any:
+    """A function of n positions at these times and of numbers: h and its derivatives, each (1, n)."""
     by, numbers, at = ca.vertcat(x, y), ca.vertcat(*of), ca.SX.sym("at", 2, n)
     hessian, gradient = ca.hessian(h, by)
     outputs = [h, gradient[0], gradient[1], hessian[0, 0], hessian[0, 1], hessian[1, 1]]
     once = ca.Function("h", [by, numbers, time], outputs)
-    everywhere = zip(*(once(at[:, k], numbers, dt * k) for k in range(n)), strict=True)
+    everywhere = zip(*(once(at[:, k], numbers, times[k]) for k in range(n)), strict=True)
     return ca.Function("h", [at, numbers], ca.cse([ca.horzcat(*values) for values in everywhere]))
 
 
@@ -180,7 +216,7 @@ class PlanEvaluation(NamedTuple):
     Attributes
     ----------
     cost : of the plan, without any penalty.
-    slack : largest violation of a row or of the terminal condition, 0 if none.
+    slack : largest violation of a hard row or of the terminal condition, 0 if none.
     inputs : accelerations, shape (2N,) [m/s2].
     rows : see `Problem`.
     states : shape (N+1, 4) [m, m/s].
@@ -226,7 +262,8 @@ class PlanEvaluator:
 @lru_cache(maxsize=256)
 def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, int]:
     p = build_problem(settings, n_people, n_walls)
-    outputs = [ca.vertcat(p.cost, ca.mmax(p.violations)), p.rows, p.states, p.h.T]
+    slack = ca.mmax(p.violations * p.is_hard(settings))
+    outputs = [ca.vertcat(p.cost, slack), p.rows, p.states, p.h.T]
     return dense_function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
 
 

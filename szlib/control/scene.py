@@ -12,6 +12,7 @@ import shapely
 from ..checks import Array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .barriers import compute_h, euclidean_segment_formula
+from .crowding import Level, find_level
 from .person import Person, PlacedZone
 from .settings import MPCSettings, Terminal
 from .tracker import TrackedPeople
@@ -81,6 +82,11 @@ class Scene(NamedTuple):
         spread = np.full((len(self.people) + len(self.walls), *rows.shape[1:]), inf)
         spread[[*range(len(self.people)), *(len(self.people) + i for i in self.near)]] = rows
         return spread
+
+    @property
+    def level(self) -> Level:
+        """How crowded the surroundings of the robot are: see `szlib.control.crowding`."""
+        return find_level(self.state, self.people, self.settings)
 
     def obstacle(self, row: int) -> tuple[Literal["person", "wall"], int]:
         """Kind and number of the person or wall of a `row` of `Step.h`."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
+from functools import cached_property, partial
+from itertools import accumulate
 from math import expm1, inf, log1p
 from typing import Any, Literal, get_args
 
@@ -26,6 +28,41 @@ def _setting(badge: str, default: Any, **paper: Any) -> Any:
 
 
 @dataclass(frozen=True)
+class Crowding:
+    """What the robot gives up, in which order, where people leave it no way: see `control.crowding`.
+
+    Parameters
+    ----------
+    radius : people within this distance of the robot are near [m].
+    few : from this number of near people on, the decay of h has a price; h >= 0 stays hard.
+    many : from this number of near people on, h has a price altogether, and a gap to bodies is hard.
+    price : of a metre, and 0.1 s, of decay beyond gamma [in the unit of `MPCSettings.slack_weight`].
+    gamma : of a decay that has a price.
+    gap : Euclidean gap of the robot's disc to bodies that stays hard [m].
+
+    Raises
+    ------
+    SolverError : a value is out of its range.
+    """
+
+    radius: float = 4.0
+    few: int = 2
+    many: int = 4
+    price: float = 50.0
+    gamma: float = 0.2
+    gap: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "price", "gap", "gamma"):
+            object.__setattr__(self, name, float(check_array(name, getattr(self, name), ())))
+            _require(getattr(self, name) > 0, name, getattr(self, name), "a positive number")
+        _require(self.gamma <= 1, "gamma", self.gamma, "in (0, 1]")
+        for name, least in (("few", 1), ("many", self.few)):
+            value = getattr(self, name)
+            _require(isinstance(value, int) and value >= least, name, value, f"a whole number >= {least}")
+
+
+@dataclass(frozen=True)
 class MPCSettings:
     """Every parameter of the controller.
 
@@ -37,11 +74,14 @@ class MPCSettings:
     ----------
     dt : time step [s].
     N : steps of the prediction horizon.
-    N_h : steps with barrier conditions, 1 <= N_h <= N; all N steps if there is a terminal condition.
+    N_h : steps with barrier conditions, 1 <= N_h <= N; all N if there is a terminal condition or a grid.
+    grid : length of each step of the horizon, in multiples of `dt`, which sets N; the first is 1. Empty: N
+        steps of `dt`.
     gamma : fraction of h that a step of dt may use up, 0 < gamma <= 1: with another dt it is another limit;
         see `with_gamma_rate`. The default was tuned on the paper's four scenarios (notebook 07).
     Q, P : weights of the state (x, y, vx, vy) against the goal, on the way and at the end, >= 0.
     R : weights of the accelerations (ax, ay), > 0.
+    jerk_weight : weight of the squared change of acceleration from step to step, >= 0.
     a_max : largest |ax| and |ay| [m/s2].
     v_max : largest Euclidean speed [m/s]. The paper gives 1 m/s, and does not say that it is the Euclidean
         speed (assumed).
@@ -60,6 +100,7 @@ class MPCSettings:
     terminal : what the plan ends in. "none": nothing, as in the paper. "rest": zero velocity. "person": the
         velocity of the only person, in open space; "rest" unless there is one person. See the proof in
         `szlib.control.mpc`.
+    crowding : what the robot gives up where people leave it no way. None: nothing, as in the paper.
     solver : "sqp", the condensed SQP of `szlib.control.solvers.sqp`, or "ipopt", as in the paper.
     slack_weight : penalty of slack [cost per m, and per m of distance to the goal (at least 1 m)]. The
         multipliers of the barriers grow with that distance as well.
@@ -87,10 +128,12 @@ class MPCSettings:
     dt: float = _setting("paper", 0.1)
     N: int = _setting("paper", 8)
     N_h: int = _setting("paper", 2)
+    grid: tuple[int, ...] = _setting("paper", ())
     gamma: float = _setting("tuned", 0.05)
     Q: tuple[float, float, float, float] = _setting("assumed", (10.0, 10.0, 1.0, 1.0))
     R: tuple[float, float] = _setting("assumed", (1.0, 1.0))
     P: tuple[float, float, float, float] = _setting("assumed", (100.0, 100.0, 10.0, 10.0))
+    jerk_weight: float = _setting("paper", 0.0)
     a_max: float = _setting("assumed", 1.0)
     v_max: float = _setting("paper", 1.0)
     lookahead: float = _setting("paper", np.inf)
@@ -101,6 +144,7 @@ class MPCSettings:
     pass_side: Side = _setting("assumed", "right")  # noqa: RUF009
     head_on_share: float = _setting("assumed", 0.25, paper=0.0)
     terminal: Terminal = _setting("paper", "none")  # noqa: RUF009
+    crowding: Crowding | None = _setting("paper", None)  # noqa: RUF009
     solver: Solver = _setting("measured", "sqp", paper="ipopt")  # noqa: RUF009
     slack_weight: float = _setting("measured", 1e5)
     max_iterations: int = _setting("assumed", 100)
@@ -111,15 +155,32 @@ class MPCSettings:
         for name, length in (("Q", 4), ("R", 2), ("P", 4)):
             weights = check_array(name, getattr(self, name), (length,))
             object.__setattr__(self, name, tuple(weights.tolist()))
+        if self.grid:
+            lengths = [operator.index(length) for length in self.grid]
+            is_grid = lengths[0] == 1 and min(lengths) >= 1 and self.terminal == "none"
+            _require(is_grid, "grid", self.grid, "whole numbers >= 1, the first 1, and no terminal condition")
+            object.__setattr__(self, "grid", tuple(lengths))
+            object.__setattr__(self, "N", len(lengths))
+            object.__setattr__(self, "N_h", len(lengths))
         for name in ("N", "N_h", "max_iterations"):
             value = getattr(self, name)
             _require(isinstance(value, int | np.integer) and value >= 1, name, value, "a whole number >= 1")
-        numbers = ("dt", "gamma", "a_max", "v_max", "r_robot", "eps", "zone_speed", "slack_weight")
+        numbers = (
+            "dt",
+            "gamma",
+            "a_max",
+            "v_max",
+            "r_robot",
+            "eps",
+            "zone_speed",
+            "slack_weight",
+            "jerk_weight",
+        )
         for name in (*numbers, "head_on_share"):
             object.__setattr__(self, name, float(check_array(name, getattr(self, name), ())))
         for name in ("dt", "a_max", "v_max", "zone_speed", "slack_weight"):
             _require(getattr(self, name) > 0, name, getattr(self, name), "a positive number")
-        for name in ("r_robot", "eps"):
+        for name in ("r_robot", "eps", "jerk_weight"):
             _require(getattr(self, name) >= 0, name, getattr(self, name), "a number >= 0")
         _require(0 < self.gamma <= 1, "gamma", self.gamma, "in (0, 1]")
         _require(self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}")
@@ -170,6 +231,37 @@ class MPCSettings:
         (0.0952, 0.5)
         """
         return replace(self, gamma=-expm1(-check_number("rate", rate) * self.dt))
+
+    @classmethod
+    def among_people(cls, **changes: Any) -> MPCSettings:
+        """The controller that a robot should run among people, with `changes` by name.
+
+        It plans 3 s ahead, in 14 steps with barriers on each, follows a route around walls to a point at
+        most 1 m farther than it can come, and prefers a smooth ride. Where people leave it no way, it does
+        not stop for good, but gives up in the order of `Crowding`, and says so: see `Step.safe` and
+        `Step.explain`. Notebook 17 compares it with the paper's controller.
+
+        Examples
+        --------
+        >>> import szlib
+        >>> settings = szlib.MPCSettings.among_people(v_max=1.3)
+        >>> settings.N, round(settings.times[-1], 6)
+        (14, 3.0)
+        """
+        grid = (1,) * 4 + (2,) * 4 + (3,) * 6
+        reach = sum(grid) * changes.get("dt", cls.dt) * changes.get("v_max", cls.v_max)
+        ahead = {"gamma": 0.08, "grid": grid, "jerk_weight": 2.0, "lookahead": reach + 1.0}
+        return cls(**{**ahead, "crowding": Crowding(), **changes})
+
+    @cached_property
+    def step_lengths(self) -> tuple[int, ...]:
+        """Length of each step of the horizon, in multiples of `dt`, N numbers."""
+        return self.grid or (1,) * self.N
+
+    @cached_property
+    def times(self) -> tuple[float, ...]:
+        """Time of each state of the plan, from now, N+1 numbers [s]."""
+        return tuple(self.dt * k for k in accumulate(self.step_lengths, initial=0))
 
     def badges(self) -> dict[str, str]:
         """The source of each value, by name.

@@ -9,6 +9,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 
 from ..checks import Array
+from .crowding import count_near
 from .scene import Scene
 from .settings import TOLERANCE, Terminal
 from .step_report import Claims, ProblemRow, StepReport, verify_plan
@@ -38,7 +39,8 @@ class Step:
     fallback : the way in which the plan was found; see `szlib.control.solvers.fallbacks`.
     slack : largest violation of a hard row by the plan, 0 if none [m for barriers, m2/s2 for speed,
         m/s for the terminal velocity].
-    residual : h_{k+1} - (1-gamma) h_k, people before walls, shape (people + walls, N_h) [m].
+    residual : h_{k+1} - (1-gamma)^m h_k for each step of m dt, people before walls, shape
+        (people + walls, N_h) [m]. In a crowd, or among few, those of people may be negative: see `crowding`.
     h : barriers in the state itself, people before walls, shape (people + walls,) [m]. Where one is
         negative, the robot already is where it should not be, and the plan leads out again. Of more than 24
         walls, those out of reach of the plan have inf here, in `residual` and in `clearance`: see `Scene`.
@@ -123,8 +125,8 @@ class Step:
         Shape (people + walls, N+1), people before walls: now, and at each state of the plan, with people who
         keep their velocity. Negative is an overlap.
         """
-        dt, states = self.scene.settings.dt, self.predicted[:, :2].tolist()
-        gaps = [self.scene.gaps(x, y, k * dt) for k, (x, y) in enumerate(states)]
+        states, times = self.predicted[:, :2].tolist(), self.scene.settings.times
+        gaps = [self.scene.gaps(x, y, time) for (x, y), time in zip(states, times, strict=True)]
         return self.scene.spread(np.reshape(np.array(gaps, float), (len(gaps), -1)).T)
 
     @property
@@ -139,8 +141,16 @@ class Step:
         """
         if not self.feasible or self.unknown or (self.h < -TOLERANCE).any():
             return False
+        if self.scene.level == "crowd" and min(self._h_after, default=0.0) < -TOLERANCE:
+            return False
         start, end = self.predicted[:2, :2].tolist()
         return self.scene.smallest_gap(start, end, hypot(*self.control.tolist())) >= -TOLERANCE
+
+    @property
+    def _h_after(self) -> list[float]:
+        """h after the control [m]."""
+        x, y = self.predicted[1, :2].tolist()
+        return self.scene.h(x, y, self.scene.settings.dt)
 
     def verify(self) -> StepReport:
         """Check this step again, by formulas that share no code with the controller."""
@@ -154,18 +164,22 @@ class Step:
 
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified: what happened, and why no plan is feasible."""
-        scene, (ax, ay), report = self.scene, self.control.tolist(), self.verify()
+        scene, s, (ax, ay) = self.scene, self.scene.settings, self.control.tolist()
+        report = self.verify()
         verdict = "safe" if self.safe else f"not safe: {self._why_not_safe()}"
         lines = [f"Step: {_MEANING[self.fallback]}; {verdict}"]
         lines.append(f"  control ({ax:.3g}, {ay:.3g}) m/s2 after {1e3 * self.solve_time:.2g} ms")
         if len(self.h):
             i = int(np.argmin(self.h))
             lines.append(f"  nearest is {self._obstacle(i)}: h = {self.h[i]:.3g} m")
+        if s.crowding and scene.level != "alone":
+            near = count_near(scene.state, scene.people, s.crowding.radius)
+            lines.append(f"  {near} people are within {s.crowding.radius:g} m: {self._name_level()}")
         if not self.feasible:
             lines.append(f"  the plan violates {self._name_row(report.worst)} by {report.slack:.2g}")
             lines.append(f"  what helps: {self._advise(report.worst)}")
         if self.timed_out:
-            limit = min(scene.settings.time_limit, scene.settings.deadline)
+            limit = min(s.time_limit, s.deadline)
             lines.append(f"  time was up after {limit} s; what helps: a larger time_limit or deadline")
         if self.goal_blocked:
             lines.append(f"  the goal {scene.goal} cannot be reached: h < 0 there; the robot waits beside it")
@@ -186,6 +200,12 @@ class Step:
         names = " and ".join(self._obstacle(i) for i in holding.tolist()) or "no person and no wall"
         return f"{dist(self.scene.state[:2], self.scene.goal):.1f} m from the goal; held by {names}"
 
+    def _name_level(self) -> str:
+        s, inside = self.scene.settings, sum(h < -TOLERANCE for h in self._h_after[: len(self.scene.people)])
+        if self.scene.level == "few":
+            return "the decay of h has a price, h >= 0 is hard"
+        return f"in a crowd; {inside} zones overlap here, keeps {s.crowding.gap:g} m" if s.crowding else ""
+
     def _why_not_safe(self) -> str:
         if self.unknown:
             return "the position of a person is unknown, so the robot comes to rest"
@@ -193,7 +213,11 @@ class Step:
             return "the robot is inside of a solid wall"
         if (self.h < -TOLERANCE).any():
             return f"the robot is already too close to {self._obstacle(int(np.argmin(self.h)))}"
-        return "its plan is not feasible" if not self.feasible else "its disc overlaps a body or a wall"
+        if not self.feasible:
+            return "its plan is not feasible"
+        if min(self._h_after, default=0.0) < -TOLERANCE:
+            return "it enters a zone, in a crowd"
+        return "its disc overlaps a body or a wall"
 
     def _obstacle(self, i: int) -> str:
         """Name of the person or wall of row `i` of `h`."""
@@ -211,11 +235,13 @@ class Step:
             return f"the speed limit at k = {row.k}"
         if row.kind == "end":
             return "the terminal velocity"
+        if row.kind == "body":
+            return f"the gap to the body of {self._obstacle(row.number)} at k = {row.k + 1}"
         return f"the barrier of {self._obstacle(self._row_of_h(row))} from k = {row.k} to {row.k + 1}"
 
     def _advise(self, row: ProblemRow) -> str:
         s = self.scene.settings
-        if row.kind in ("person", "wall") and self.h[self._row_of_h(row)] < -TOLERANCE:
+        if row.kind in ("person", "body", "wall") and self.h[self._row_of_h(row)] < -TOLERANCE:
             return "nothing now, because the robot is already too close; the plan leads out again"
         if row.kind == "speed":
             return f"start at v_max = {s.v_max:g} m/s or slower, or raise v_max"

@@ -27,13 +27,14 @@ class ProblemRow(NamedTuple):
 
     Attributes
     ----------
-    kind : a person's or a wall's barrier, the speed limit, or the terminal condition ("end").
+    kind : a person's or a wall's barrier, the gap to a person's body in a crowd, the speed limit, or the
+        terminal condition ("end").
     number : of the person or wall.
     k : step of the plan: a barrier row links k and k + 1.
     value : negative where the row is violated [m for barriers, m2/s2 for speed, m/s for the end].
     """
 
-    kind: Literal["person", "wall", "speed", "end"]
+    kind: Literal["person", "body", "wall", "speed", "end"]
     number: int
     k: int
     value: float
@@ -65,7 +66,7 @@ class StepReport:
     out_of_bounds : largest |ax| or |ay| of the plan beyond `a_max`, 0 if none [m/s2].
     worst : the row with the smallest value.
     slack : by how much `worst` is violated, 0 if it is not.
-    h : smallest barrier in the state itself [m]; inf without people and walls.
+    h : smallest barrier in the state itself, in a crowd also after the control [m]; inf without any.
     gap : smallest Euclidean gap of the robot's disc to bodies and walls, or h + eps of a person,
         at times from now until after the control [m].
     feasible, safe : as `Step.feasible` and `Step.safe`, by these numbers.
@@ -98,15 +99,24 @@ def verify_plan(scene: Scene, predicted: Array, control: Array, claims: Claims) 
     claims : what the step claims.
     """
     s, x = scene.settings, np.asarray(predicted, float)
-    u = np.diff(x[:, 2:], axis=0) / s.dt
-    moved = np.vstack([scene.state, np.c_[x[:-1, :2] + s.dt * x[:-1, 2:] + s.dt**2 / 2 * u, x[1:, 2:]]])
-    h = np.reshape([_compute_h(scene, point, k * s.dt) for k, point in enumerate(x[:, :2])], (len(x), -1)).T
-    residual = h[:, 1 : s.N_h + 1] - (1 - s.gamma) * h[:, : s.N_h]
+    lengths, level = np.array(s.grid or [1] * s.N), _find_level(scene)
+    dt, times = s.dt * lengths[:, None], s.dt * np.r_[0, np.cumsum(lengths)]
+    u = np.diff(x[:, 2:], axis=0) / dt
+    moved = np.vstack([scene.state, np.c_[x[:-1, :2] + dt * x[:-1, 2:] + dt**2 / 2 * u, x[1:, 2:]]])
+    at = list(zip(x[:, :2], times, strict=True))
+    h = np.reshape([_compute_h(scene, *each) for each in at], (len(x), -1)).T
+    gaps = np.reshape([_compute_gaps(scene, *each) for each in at], (len(x), -1)).T
+    gamma = np.full((len(h), 1), s.gamma)
+    if s.crowding and level != "alone":
+        gamma[: len(scene.people)] = s.crowding.gamma
+    residual = h[:, 1 : s.N_h + 1] - (1 - gamma) ** lengths[: s.N_h] * h[:, : s.N_h]
     t = np.linspace(0.0, s.dt, _SAMPLES)[:, None]
     path = x[0, :2] + t * x[0, 2:] + t**2 / 2 * control
     gap = _find_gap(scene, path)
-    worst = min(_list_rows(scene, x, residual), key=lambda row: row.value)
-    slack, min_h = max(0.0, -worst.value), float(h[:, 0].min(initial=np.inf))
+    worst = min(_list_rows(scene, x, h, gaps, residual), key=lambda row: row.value)
+    # In a crowd no row demands h >= 0, so that of people is checked after the control as well.
+    after = h[: len(scene.people) if level == "crowd" else 0, 1]
+    slack, min_h = max(0.0, -worst.value), float(np.r_[h[:, 0], after].min(initial=np.inf))
     feasible = slack <= TOLERANCE
     safe = feasible and not scene.tracked.unknown and min(min_h, gap) >= -TOLERANCE
     beyond = max(0.0, float(np.abs([*u, control]).max()) - s.a_max)
@@ -188,10 +198,27 @@ def _find_gap(scene: Scene, path: Array) -> float:
     return float(min(found))
 
 
-def _list_rows(scene: Scene, x: Array, residual: Array) -> list[ProblemRow]:
+def _find_level(scene: Scene) -> str:
+    """How crowded it is around the robot, counted anew."""
+    crowding = scene.settings.crowding
+    if crowding is None or not scene.people:
+        return "alone"
+    offsets = np.array([person.position for person in scene.people]) - scene.state[:2]
+    near = (np.hypot(*offsets.T) <= crowding.radius).sum()
+    return "crowd" if near >= crowding.many else "few" if near >= crowding.few else "alone"
+
+
+def _list_rows(scene: Scene, x: Array, h: Array, gaps: Array, residual: Array) -> list[ProblemRow]:
     """Every row of the hard problem."""
-    s = scene.settings
-    rows = [ProblemRow(*scene.obstacle(i), k, float(value)) for (i, k), value in np.ndenumerate(residual)]
+    s, level, rows = scene.settings, _find_level(scene), list[ProblemRow]()
+    for (i, k), value in np.ndenumerate(residual):
+        kind, number = scene.obstacle(i)
+        if kind == "person" and level == "few":
+            rows.append(ProblemRow(kind, number, k, float(h[i, k + 1])))
+        elif kind == "person" and level == "crowd" and s.crowding:
+            rows.append(ProblemRow("body", number, k, float(gaps[i, k + 1]) - s.crowding.gap))
+        else:
+            rows.append(ProblemRow(kind, number, k, float(value)))
     speed = s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1)
     rows += [ProblemRow("speed", 0, k + 1, float(value)) for k, value in enumerate(speed)]
     if scene.terminal != "none":

@@ -347,11 +347,12 @@ def test_a_robot_that_is_too_fast_slows_down_and_reports_slack(solver):
 @pytest.mark.parametrize("kind", [Ipopt, Sqp])
 def test_where_the_hard_problem_has_a_solution_the_relaxed_one_finds_it(kind):
     rng, compared = np.random.default_rng(5), 0
-    solver = kind(szlib.MPCSettings(), 1, 0)
+    solver = kind(settings := szlib.MPCSettings(), 1, 0)
+    person = (*place_zone(FACING, ZONE), settings.gamma, settings.slack_weight)
     while compared < 25:
         state = np.r_[rng.uniform((-5, -1), (-2, 1)), rng.uniform(-0.5, 0.5, 2)]
         goal = (10 ** rng.uniform(0.7, 2), 0.0)
-        parameters = np.r_[state, goal, 0.0, 0.0, place_zone(FACING, ZONE)]
+        parameters = np.r_[state, goal, 0.0, 0.0, 0.0, 0.0, person]
         hard, converged = solver.hard(np.zeros(16), parameters)
         if converged and hard.slack <= TOLERANCE:
             compared += 1

@@ -91,7 +91,7 @@ def test_empty_slots_do_not_change_the_control(monkeypatch, solver, count, formu
 
 def test_empty_slots_are_far_from_everything():
     parameters = padded_parameters((3.0, -2.0, 1.0, 0.0), [], [], (2, 2))
-    people, walls = np.reshape(parameters[:14], (2, 7)), np.reshape(parameters[14:], (2, 5))
+    people, walls = np.reshape(parameters[:18], (2, 9))[:, :7], np.reshape(parameters[18:], (2, 5))
     for x, y in ((3.0, -2.0), (13.0, -2.0), (3.0, 8.0)):
         h = compute_h(x, y, people.tolist(), walls.tolist(), r_robot=0.5, eps=0.05)
         assert min(h) > INACTIVE_H

@@ -13,14 +13,15 @@ from helpers.random_states import ZONE, meetings, questions
 import szlib
 from szlib.control.controller import advance
 from szlib.control.problem import PlanEvaluation, build_problem, remaining_distance
-from szlib.control.settings import TOLERANCE
+from szlib.control.settings import TOLERANCE, Crowding
 from szlib.control.solvers import fallbacks, sqp
 from szlib.control.solvers.sqp_functions import build_sqp_functions
 
 SOLVERS = ("sqp", "ipopt")
 GOAL = (4.0, 0.0)
 FACING = szlib.Person((0.0, 0.0), heading=np.pi)
-FORMULATIONS = ({}, {"N_h": 8}, {"terminal": "rest"})
+CROWDED = {"grid": (1, 1, 2, 3), "jerk_weight": 1.0, "crowding": Crowding(few=1, many=2)}
+FORMULATIONS = ({}, {"N_h": 8}, {"terminal": "rest"}, CROWDED)
 
 
 def settings_of(solver, **settings):
@@ -32,7 +33,9 @@ def controller_of(solver, walls=(), **settings):
     return szlib.MPCCBF(ZONE, walls=walls, settings=settings_of(solver, **settings))
 
 
-@pytest.mark.parametrize(("formulation", "count"), [*zip(FORMULATIONS, (50, 50, 100), strict=True)], ids=str)
+@pytest.mark.parametrize(
+    ("formulation", "count"), [*zip(FORMULATIONS, (50, 50, 100, 100), strict=True)], ids=str
+)
 def test_both_solvers_find_the_same_plan_or_another_local_one_of_the_same_problem(formulation, count):
     same = other = only_one = 0
     for question in islice(questions(seed=1), count):
@@ -42,13 +45,14 @@ def test_both_solvers_find_the_same_plan_or_another_local_one_of_the_same_proble
         if not (sqp.status == ipopt.status == "optimal"):
             only_one += sqp.status != ipopt.status
             continue
-        assert sqp.residual.min(initial=0) >= -TOLERANCE
+        assert sqp.feasible and ("crowding" in formulation or sqp.residual.min(initial=0) >= -TOLERANCE)
         if sqp.cost == pytest.approx(ipopt.cost, rel=1e-6):
             same += 1
             assert sqp.control == pytest.approx(ipopt.control, abs=1e-3)
         else:
             other += 1
-    assert same > 0.7 * count and other <= 0.02 * count and only_one <= 0.01 * count
+    most = 0.03 if "crowding" in formulation else 0.02  # prices make more local minima
+    assert same > 0.7 * count and other <= most * count and only_one <= 0.01 * count
 
 
 @pytest.mark.parametrize("name", szlib.SCENARIOS)

@@ -39,7 +39,8 @@ def solve_with_fallbacks(
     braking = plan_braking(solver.settings, parameters[2:4])
     if plan := attempts.solve_hard_if_time(braking):
         return "cold", plan, attempts.timed_out
-    shifted = solver.evaluate(np.append(last_plan[2:], (0.0, 0.0)), parameters)
+    same_times = last_plan if solver.settings.grid else np.append(last_plan[2:], (0.0, 0.0))
+    shifted = solver.evaluate(same_times, parameters)
     has_end = solver.settings.terminal != "none"
     if has_end and shifted.slack <= TOLERANCE:
         return "kept", shifted, attempts.timed_out
@@ -105,10 +106,10 @@ def plan_braking(s: MPCSettings, velocity: Array) -> Array:
     """Inputs that bring the robot from `velocity` to rest soonest along its path, within `s`, shape (2N,)."""
     vx, vy = velocity.tolist()
     plan: list[float] = []
-    for _ in range(s.N):
-        time = max(s.dt, max(abs(vx), abs(vy)) / s.a_max)
+    for dt in (s.dt * length for length in s.step_lengths):
+        time = max(dt, max(abs(vx), abs(vy)) / s.a_max)
         plan += (-vx / time, -vy / time)
-        vx, vy = vx - s.dt * vx / time, vy - s.dt * vy / time
+        vx, vy = vx - dt * vx / time, vy - dt * vy / time
     return np.array(plan)
 
 

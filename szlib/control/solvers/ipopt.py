@@ -13,6 +13,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from ...checks import Array
 from ..problem import (
@@ -21,6 +22,7 @@ from ..problem import (
     PlanEvaluation,
     ProblemSolver,
     build_problem,
+    dense_function,
     remaining_distance,
 )
 from ..settings import MPCSettings
@@ -57,7 +59,7 @@ class Ipopt(ProblemSolver):
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
         super().__init__(settings, n_people, n_walls)
         with CASADI_LOCK:
-            self._hard, self._relaxed = _build(settings, n_people, n_walls)
+            self._hard, self._relaxed, self._find_prices = _build(settings, n_people, n_walls)
         self._upper = np.zeros(self._hard.numel_out("g"))  # 0 for the terminal condition
         self._upper[: self.evaluate.n_rows] = inf
         self.remembered = np.zeros(0)
@@ -65,22 +67,31 @@ class Ipopt(ProblemSolver):
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan from a `guess` and `parameters`; True if IPOPT converged."""
         a_max = self.settings.a_max
+        if self.settings.crowding:
+            prices = np.asarray(self._find_prices(parameters)).ravel()
+            return self._solve_with_slack(guess, parameters, prices < self.settings.slack_weight)
         return self._solve(self._hard, parameters, x0=guess, p=parameters, lbx=-a_max, ubx=a_max)
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan of the relaxed problem from a `guess` and `parameters`; True if IPOPT converged."""
-        s = self.settings
-        rows = self.evaluate(guess, parameters).rows
-        free = np.ones(rows.size)
-        free[self.evaluate.n_cbf :] = np.hypot(*parameters[2:4]) > s.v_max
-        weight = s.slack_weight * remaining_distance(*parameters[[0, 1, 4, 5]])
+        is_free = np.ones(self.evaluate.n_rows, bool)
+        is_free[self.evaluate.n_cbf :] = np.hypot(*parameters[2:4]) > self.settings.v_max
+        return self._solve_with_slack(guess, parameters, is_free)
+
+    def _solve_with_slack(
+        self, guess: Array, parameters: Array, is_free: NDArray[np.bool_]
+    ) -> tuple[PlanEvaluation, bool]:
+        """The plan with a slack in each row that `is_free`, at its price."""
+        s, rows = self.settings, self.evaluate(guess, parameters).rows
+        prices = np.asarray(self._find_prices(parameters)).ravel()
+        weight = prices * remaining_distance(*parameters[[0, 1, 4, 5]])
         return self._solve(
             self._relaxed,
             parameters,
-            x0=np.r_[guess, np.maximum(-rows, 0) * free * weight],
+            x0=np.r_[guess, np.maximum(-rows, 0) * is_free * weight],
             p=np.r_[parameters, weight],
             lbx=np.r_[np.full(guess.size, -s.a_max), np.zeros(rows.size)],
-            ubx=np.r_[np.full(guess.size, s.a_max), np.where(free > 0, np.inf, 0.0)],
+            ubx=np.r_[np.full(guess.size, s.a_max), np.where(is_free, np.inf, 0.0)],
         )
 
     def _solve(self, solver: Any, parameters: Array, **problem: Any) -> tuple[PlanEvaluation, bool]:
@@ -94,8 +105,8 @@ class Ipopt(ProblemSolver):
 
 
 @lru_cache(maxsize=256)
-def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any]:
-    """The solvers of the hard and of the relaxed problem."""
+def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any, Any]:
+    """The solvers of the hard and of the relaxed problem, and the prices of the rows by the parameters."""
     p = build_problem(settings, n_people, n_walls)
     options: dict[str, Any] = {"expand": True, "print_time": False, "calc_lam_p": False}
     options["show_eval_warnings"] = False  # a failure shows in `Step.status`
@@ -105,7 +116,7 @@ def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any
         if limit < inf:
             options[f"ipopt.max_{name}_time"] = HARD_SHARE * limit
     # Slack counted by its penalty, in the unit of the cost: IPOPT would scale the rest away.
-    penalty, weight = ca.SX.sym("penalty", p.rows.numel()), ca.SX.sym("weight")
+    penalty, weight = ca.SX.sym("penalty", p.rows.numel()), ca.SX.sym("weight", p.rows.numel())
     hard = {"x": p.inputs, "p": p.parameters, "f": p.cost, "g": ca.vertcat(p.rows, p.terminal)}
     relaxed = {
         "x": ca.vertcat(p.inputs, penalty),
@@ -113,4 +124,8 @@ def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any
         "f": p.cost + ca.sum1(penalty),
         "g": ca.vertcat(p.rows + penalty / weight, p.terminal),
     }
-    return ca.nlpsol("hard", "ipopt", hard, options), ca.nlpsol("relaxed", "ipopt", relaxed, options)
+    prices = dense_function("prices", [p.parameters], [p.prices])
+    hard_solver, relaxed_solver = (
+        ca.nlpsol(name, "ipopt", each, options) for name, each in (("hard", hard), ("relaxed", relaxed))
+    )
+    return hard_solver, relaxed_solver, prices

@@ -113,7 +113,7 @@ class SolverPool:
 
 def padded_parameters(
     x: Sequence[float],
-    zones: Sequence[Sequence[float]],
+    barriers: Sequence[Sequence[float]],
     walls: Sequence[Sequence[float]],
     size: tuple[int, int],
 ) -> list[float]:
@@ -122,14 +122,14 @@ def padded_parameters(
     Parameters
     ----------
     x : state of the robot, (x, y, vx, vy) [m, m/s].
-    zones : 7 numbers each, as `PlacedZone`.
+    barriers : of people, 9 numbers each: see `Problem`.
     walls : 5 numbers each: end points and margin [m].
     size : number of people and of walls of the solver.
     """
     away, y = x[0] + _AWAY, x[1]
-    no_person = (away, y, away, y, -INACTIVE_H, 0.0, 0.0)
+    no_person = (away, y, away, y, -INACTIVE_H, 0.0, 0.0, 1.0, INACTIVE_H)
     no_wall = (away, y, away, y + 1.0, -INACTIVE_H)
-    slots = [*zones, *[no_person] * (size[0] - len(zones)), *walls, *[no_wall] * (size[1] - len(walls))]
+    slots = [*barriers, *[no_person] * (size[0] - len(barriers)), *walls, *[no_wall] * (size[1] - len(walls))]
     return list(chain.from_iterable(slots))
 
 

@@ -2,7 +2,7 @@
 
 The unknowns are the 2 N inputs. Each iteration solves
 
-    min over d   1/2 d' H d + grad(scaled cost)' d + slack_weight * sum(s)
+    min over d   1/2 d' H d + grad(scaled cost)' d + prices' s
     subject to   -a_max - u <= d <= a_max - u,   rows + J d + s >= 0,  s >= 0,   terminal + T d = 0
 
 where the scaled cost is that for each metre to the target (at least 1 m), so that the weight stays the same,
@@ -80,8 +80,9 @@ class Sqp(ProblemSolver):
         self._has_multipliers, self._model = False, daqp.Model()
         self._model.settings = _DAQP
         self._model.setup(np.eye(n), *self._program[1:], self._sense)
-        weights = np.full(n + m, self.settings.slack_weight)
-        self._model.soft_weights(w_l=weights, w_u=weights)
+        self._find_prices = BufferedFunction(functions.prices, self._parameters)
+        self._prices = np.full(n + m, self.settings.slack_weight)
+        self._model.soft_weights(w_l=self._prices, w_u=self._prices)
 
     @property
     def remembered(self) -> Array:
@@ -110,6 +111,10 @@ class Sqp(ProblemSolver):
     def _solve(self, guess: Array, parameters: Array, share: float) -> Outcome:
         """Solve; the plan is then in `_trial`, and its measures are in the buffers of `measure`."""
         self._parameters[:] = parameters
+        if self.settings.crowding:
+            self._find_prices.call()
+            self._prices[self._inputs.size :][: self.evaluate.n_rows] = self._find_prices.results[0]
+            self._model.soft_weights(w_l=self._prices, w_u=self._prices)
         outcome: Outcome = "converged"
         # If a row had a multiplier in the last step, it nearly always has one now.
         if self._has_multipliers or not self._is_free():

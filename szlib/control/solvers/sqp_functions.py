@@ -4,7 +4,7 @@ The derivatives follow from the structure of the problem. Positions and velociti
 of the inputs, p = P u + ... and v = V u + ...; a barrier row depends on two positions, a speed row on one
 velocity. So with g_k and S_k the gradient and the Hessian of h by the position in state k,
 
-    row of the Jacobian    g_{k+1}' P_{k+1} - (1 - gamma) g_k' P_k,       -2 v_k' V_k
+    row of the Jacobian    g_{k+1}' P_{k+1} - (1 - gamma)^m g_k' P_k,     -2 v_k' V_k
     Hessian                curvature of the cost + sum_k -2 lambda_k V_k' V_k + sum_k P_k' S_k P_k
 
 with S_k summed over people and walls, weighted by their multipliers. Without its last sum it is that of a
@@ -19,13 +19,15 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from ..barriers import cbf_residual
 from ..problem import Problem, build_problem, dense_function, remaining_distance
 from ..settings import MPCSettings
 
 
 class SqpFunctions(NamedTuple):
-    """Three functions of CasADi; the scaled cost is that for each metre to the target, at least one.
+    """Four functions of CasADi.
+
+    The scaled cost is that for each metre to the target, at least one, and the price of violated rows that
+    have one. Violation and multipliers are those of the hard rows.
 
     Attributes
     ----------
@@ -37,11 +39,13 @@ class SqpFunctions(NamedTuple):
         terminal condition, states and h, all after this share of the step.
     free : parameters -> the inputs of smallest cost without any row or bound, and the sum of their
         violations; None if there is a terminal condition.
+    prices : parameters -> the price of each row.
     """
 
     derive: Any
     measure: Any
     free: Any
+    prices: Any
 
 
 @lru_cache(maxsize=256)
@@ -50,10 +54,11 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
     p, s = build_problem(settings, n_people, n_walls), settings
     u, n_rows = p.inputs, p.rows.numel()
     scale = 1 / remaining_distance(*(p.parameters[i] for i in (0, 1, 4, 5)))
-    cost, gradient = scale * p.cost, ca.gradient(p.cost, u)
+    gradient, is_hard = ca.gradient(p.cost, u), p.is_hard(s)
     values = ca.vertcat(p.rows, p.terminal)
-    violations = p.violations
-    violation, slack = ca.sum1(violations), ca.mmax(violations)
+    of_hard, of_priced = is_hard * p.violations, (1 - is_hard[:n_rows]) * p.violations[:n_rows]
+    cost = scale * p.cost + ca.dot(p.prices, of_priced)
+    violation, slack = ca.sum1(of_hard), ca.mmax(of_hard)
     multipliers = ca.SX.sym("multiplier", values.numel())
     on_rows = ca.norm_inf(multipliers[:n_rows])
     arguments = [u, p.parameters, multipliers]
@@ -77,16 +82,18 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
     found = [cost, violation, p.cost, slack, values, p.states, p.h.T]
     there = ca.Function("there", [u, p.parameters], found)
     *totals, values, states, h = there(trial, p.parameters)
-    merit = ca.vertcat(*totals, ca.norm_inf(step), ca.norm_inf(multipliers), on_rows)
+    merit = ca.vertcat(*totals, ca.norm_inf(step), ca.norm_inf(is_hard * multipliers), on_rows)
     measure = dense_function("measure", [*arguments, step, share], [merit, trial, values, states, h])
+    prices = dense_function("prices", [p.parameters], [p.prices])
     if p.terminal.numel():
-        return SqpFunctions(derive, measure, None)
-    given = p.parameters[:6]
+        return SqpFunctions(derive, measure, None, prices)
+    given = p.parameters[:10]
     to_inputs, to_given = (ca.evalf(ca.jacobian(gradient, by)) for by in (u, given))
     free = -ca.solve(to_inputs, to_given) @ given
     beyond = ca.sum1(ca.fmax(0, ca.fabs(free) - s.a_max))
-    free_plan = dense_function("unbound", [p.parameters], [free, beyond + there(free, p.parameters)[1]])
-    return SqpFunctions(derive, measure, free_plan)
+    violated = ca.Function("violated", [u, p.parameters], [ca.sum1(p.violations)])
+    free_plan = dense_function("unbound", [p.parameters], [free, beyond + violated(free, p.parameters)])
+    return SqpFunctions(derive, measure, free_plan, prices)
 
 
 def _jacobian(p: Problem, s: MPCSettings, to_position: Any, to_velocity: Any) -> Any:
@@ -95,7 +102,7 @@ def _jacobian(p: Problem, s: MPCSettings, to_position: Any, to_velocity: Any) ->
     by_axis = []
     for slope in p.slope:
         slopes = ca.horzsplit(slope)
-        ends = [cbf_residual(slopes[k + 1] @ maps[k + 1], slopes[k] @ maps[k], s.gamma) for k in range(s.N_h)]
+        ends = [slopes[k + 1] @ maps[k + 1] - (p.kept[:, k] * slopes[k]) @ maps[k] for k in range(s.N_h)]
         by_axis.append(ca.vertcat(*ends))
     rows = np.arange(s.N_h * n).reshape(s.N_h, n).T.ravel()
     columns = np.arange(2 * s.N).reshape(2, s.N).T.ravel()
@@ -111,18 +118,19 @@ def _jacobian(p: Problem, s: MPCSettings, to_position: Any, to_velocity: Any) ->
 
 def _hessians(p: Problem, s: MPCSettings, multipliers: Any, to_position: Any) -> tuple[Any, Any]:
     """Hessians by the inputs of the speed rows and of the barrier rows, each weighted by its multipliers."""
-    # V_k' V_k is dt^2 for any two inputs before k: the later of the two says which rows have both.
+    # V_k' V_k is dt_i dt_j for inputs i and j before k: the later of the two says which rows have both.
+    lengths = s.dt * np.array(s.step_lengths)
     later = np.maximum.outer(range(s.N), range(s.N)).ravel(order="F")
     on_speed = multipliers[p.n_cbf : p.n_cbf + s.N]
     after = ca.DM(np.triu(np.ones((s.N, s.N)))) @ on_speed
-    of_speed = ca.kron(ca.reshape((-2 * s.dt**2 * after)[later.tolist()], s.N, s.N), ca.DM.eye(2))
-    # The matrix from h_0 .. h_{N_h} to the rows h_{k+1} - (1 - gamma) h_k.
-    to_rows = cbf_residual(np.eye(s.N_h, s.N_h + 1, 1), np.eye(s.N_h, s.N_h + 1), s.gamma)
-    weights = (ca.sparsify(ca.DM(to_rows)).T @ ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0])).T
+    of_speed = ca.reshape((-2 * after)[later.tolist()], s.N, s.N) * np.outer(lengths, lengths)
+    # h_k is in two rows: with lambda_{k-1}, where a step ends, and -kept_k lambda_k, where the next begins.
+    on_rows, none = ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0]).T, ca.SX(p.h.shape[0], 1)
+    weights = ca.horzcat(none, on_rows) - ca.horzcat(p.kept * on_rows, none)
     xx, xy, yy = (ca.sum1(weights * bend) for bend in p.bend)
     bends = [ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h + 1)]
     to_xy = _for_x_and_y(to_position)
-    return of_speed, to_xy.T @ ca.diagcat(*bends) @ to_xy
+    return ca.kron(of_speed, ca.DM.eye(2)), to_xy.T @ ca.diagcat(*bends) @ to_xy
 
 
 def _for_x_and_y(one: Any) -> Any:
