@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from ..checks import Array
-from .barriers import cbf_residual, compute_h
+from .barriers import compute_h
 from .step import Step
 
 _REACH = 3  # reach of the curves, in half-widths of the box of accelerations: enough to cross the whole box
@@ -57,8 +57,9 @@ class AdmissibleControls(NamedTuple):
 def find_admissible_controls(step: Step) -> AdmissibleControls:
     """Find the accelerations that a step could have chosen: bounds, speed limit, and every barrier row.
 
-    A terminal condition is ignored, because with the rest of the plan unchanged it allows only the chosen
-    acceleration. If the plan is not feasible, the polygon is empty or does not contain the control.
+    Prices are ignored: every decay counts as hard. A terminal condition is ignored, because with the rest of
+    the plan unchanged it allows only the chosen acceleration. If the plan is not feasible, the polygon is empty
+    or does not contain the control.
 
     Parameters
     ----------
@@ -113,15 +114,19 @@ def _edges(step: Step) -> list[tuple[Array, Array]]:
 
 def _residuals(step: Step, first: Array) -> Array:
     """Residual of each barrier row for other first accelerations, (obstacles, N_h, n, 2) to (.., n)."""
-    s, k = step.scene.settings, np.arange(step.scene.settings.N_h + 1)[:, None]
-    moved = s.dt**2 * np.maximum(k - 0.5, 0)[..., None]
+    s = step.scene.settings
+    times, keeps = np.array(s.times[: s.N_h + 1])[:, None], 1 - np.full((len(step.h), 1, 1), s.gamma)
+    if s.crowding and step.scene.level != "alone":
+        keeps[: len(step.scene.people)] = 1 - s.crowding.gamma
+    keeps = keeps ** np.array(s.step_lengths[: s.N_h])[:, None]
+    moved = s.dt * np.maximum(times - 0.5 * s.dt, 0)[..., None]
     left = []
     for i, change in enumerate(first - step.control):
         now, after = (
-            _barrier(step, i, step.predicted[rows, None, :2] + moved[rows] * change, s.dt * k[rows])
+            _barrier(step, i, step.predicted[rows, None, :2] + moved[rows] * change, times[rows])
             for rows in (slice(s.N_h), slice(1, s.N_h + 1))
         )
-        left.append(cbf_residual(after, now, s.gamma))
+        left.append(after - keeps[i] * now)
     return np.reshape(np.array(left, float), first.shape[:-1])
 
 

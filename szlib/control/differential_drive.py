@@ -362,10 +362,10 @@ class DifferentialDrive(Controller):
         return [v * c - sideways * s, v * s + sideways * c]
 
     def _follow(self, own: Array, points: Array) -> tuple[list[Array], list[Array]]:
-        """States of the disc, and the commands that bring the point to `points`, shape (N, 2)."""
-        dt, at, states, controls = self.settings.dt, own, [self.robot.body(own)], list[Array]()
-        for px, py in points.tolist():
-            x, y, theta = at[:3].tolist()
+        """States of the disc, and the commands that bring the point to `points`, shape (up to N, 2)."""
+        at, states, controls = own, [self.robot.body(own)], list[Array]()
+        for (px, py), length in zip(points.tolist(), self.settings.step_lengths, strict=False):
+            (x, y, theta), dt = at[:3].tolist(), length * self.settings.dt
             c, s = cos(theta), sin(theta)
             dx, dy = px - x - self.ahead * c, py - y - self.ahead * s
             share = min(1.0, self.v_max * dt / (hypot(dx, dy) or 1.0))
