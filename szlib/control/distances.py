@@ -151,8 +151,8 @@ def find_near_walls(walls: Array, x: float, y: float, reach: float) -> list[int]
         gamma h(x_k) >= gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
                      >= F(s) - F(s - v dt) >= h(x_k) - h(x_{k+1})
 
-    A step of m dt keeps (1 - gamma)^m of h: the same with m dt and 1 - (1 - gamma)^m, and the longest step needs
-    most. If the wall is farther by v times the horizon now, this holds on the whole horizon.
+    A step of m dt keeps (1 - gamma)^m of h: the same with m dt and 1 - (1 - gamma)^m, and the longest step
+    needs most. If the wall is farther by v times the horizon now, this holds on the whole horizon.
     """
     length = np.hypot(*(walls[:, 1] - walls[:, 0]).T)
     d = np.asarray(segment_formula(x, y, *walls.reshape(-1, 4).T))
