@@ -172,7 +172,8 @@ def measure_shape(
             raise ZoneError(
                 f"{MIN_COMPARED} encounters of people who cross or come towards each other needed"
             )
-        ellipses = zone_ellipses(np.vstack([estimator.best, estimator.draws]), (slow, speed, fast))
+        best = zone_ellipses(estimator.best[None], (slow, speed, fast))
+        ellipses = np.vstack([best, estimator.posterior((slow, speed, fast))])
     except ZoneError as error:
         return [
             Finding(each, np.nan, np.nan, np.nan, unit, n, False, reason=str(error))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -217,6 +219,17 @@ def test_intervals_are_those_of_the_posterior(estimator: RespectEstimator) -> No
         assert abs(truth - (low + high) / 2) <= 0.75 * (high - low), f"{name}: three standard deviations"
     of_b = estimator.draws[:, 5]
     assert at.loc["b", "high"] == pytest.approx(np.exp(np.quantile(of_b, 0.975)), abs=0.03)
+
+
+def test_the_posterior_is_never_surer_than_the_model_is_right(estimator: RespectEstimator) -> None:
+    middle = estimator.draws.mean(axis=0)
+    for scale in (0.01, 1.0):
+        sure = replace(estimator)
+        sure.__dict__["draws"] = middle + scale * (estimator.draws - middle)
+        raw, found = respect_likelihood.zone_ellipses(sure.draws, [1.1])[:, 0, :4], sure.posterior([1.1])
+        assert found[:, 0, :4].mean(axis=0) == pytest.approx(raw.mean(axis=0))
+        least = np.array([0.05, 0.012, 0.05, 0.012])
+        assert found[:, 0, :4].std(axis=0) == pytest.approx(np.maximum(raw.std(axis=0), least))
 
 
 # --- the default, and what is refused ----------------------------------------------------------------
