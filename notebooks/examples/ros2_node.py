@@ -5,6 +5,7 @@
 subscribes  odom                 nav_msgs/Odometry            where the robot is, and its (v, omega)
             people               people_msgs/People           tracked people: name, position, velocity
             goal_pose            geometry_msgs/PoseStamped    the goal; its orientation is not used
+            map                  nav_msgs/OccupancyGrid       more walls, around what is occupied
 publishes   cmd_vel              geometry_msgs/Twist          (v, omega), every dt; TwistStamped if `stamped`
             social_costmap       nav_msgs/OccupancyGrid       the zones around people, 0 to 100
 
@@ -32,6 +33,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from people_msgs.msg import People
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 
 import szlib
@@ -68,10 +70,11 @@ class SocialDrive(Node):
         if not self.zone:
             raise szlib.ZoneError("the parameter `zone` must name a file of SocialZone.save; got ''")
         self.zone_around, walls = szlib.SocialZone.load(self.zone), self.walls.split(";")
+        self.own_walls = [np.reshape(w.split(), (2, 2)).astype(float) for w in walls if w.strip()]
         self.drive = szlib.DifferentialDrive(
             self.zone_around,
-            walls=[np.reshape(wall.split(), (2, 2)).astype(float) for wall in walls if wall.strip()],
-            settings=szlib.MPCSettings(r_robot=self.r_robot, v_max=self.v_max),
+            walls=self.own_walls,
+            settings=szlib.MPCSettings(r_robot=self.r_robot, v_max=self.v_max, lookahead=4.0),
             omega_max=self.omega_max,
             ahead=self.ahead or None,
             max_people=self.max_people,
@@ -82,6 +85,8 @@ class SocialDrive(Node):
         self.create_subscription(Odometry, "odom", self.on_odometry, 10)
         self.create_subscription(People, "people", self.on_people, 10)
         self.create_subscription(PoseStamped, "goal_pose", self.on_goal, 10)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.create_subscription(OccupancyGrid, "map", self.on_map, latched)
         self.command = self.create_publisher(TwistStamped if self.stamped else Twist, "cmd_vel", 10)
         self.costmap = self.create_publisher(OccupancyGrid, "social_costmap", 1)
         self.create_timer(self.drive.settings.dt, self.on_timer)
@@ -107,6 +112,21 @@ class SocialDrive(Node):
         if frame is not None:
             at = turn(np.array([message.pose.position.x, message.pose.position.y]), frame[2])
             self.goal = tuple((frame[:2] + at).tolist())
+
+    def on_map(self, message):
+        """Take the outlines of cells that are occupied, by 65 % or more, as walls beside those of `walls`."""
+        message.header.stamp.sec = message.header.stamp.nanosec = 0  # where the map is now
+        frame, info = self.find_frame(message, "map"), message.info
+        if frame is None:
+            return
+        try:
+            cells = np.reshape(np.array(message.data), (info.height, info.width)) >= 65
+            at = frame[:2] + turn(np.array([info.origin.position.x, info.origin.position.y]), frame[2])
+            origin = (*at.tolist(), yaw(info.origin.orientation) + frame[2])
+            walls = szlib.control.walls_from_grid(cells, info.resolution, origin)
+            self.drive.set_walls([walls, self.own_walls])
+        except (ValueError, szlib.SolverError) as error:
+            self.warn(f"map cannot be used: {error}; it is ignored")
 
     def find_frame(self, message, topic):
         """(x, y, angle) of the message's frame in the frame of the walls; None and a warning if unknown."""

@@ -5,7 +5,7 @@ from math import hypot
 import helpers.ros_stubs as ros
 import numpy as np
 import pytest
-from helpers.ros_stubs import Node, goal, hear, odometry, people
+from helpers.ros_stubs import Node, goal, grid, hear, odometry, people
 
 import szlib
 from szlib.control.differential_drive import Unicycle
@@ -180,7 +180,7 @@ def test_messages_in_frames_that_tf_knows_are_brought_into_the_frame_of_the_wall
 
 
 def test_a_robot_that_is_stuck_says_why(make):
-    node = make(walls="1.2 -3 1.2 3")
+    node = make(walls="1.2 -3 1.2 3; -3 -3 -3 3; -3 -3 1.2 -3; -3 3 1.2 3")
     hear(node, "goal_pose", goal(*GOAL))
     drive(node, (-4.0, 3.0, 0.0, 0.0), 110)
     assert any("no progress for" in said and "held by wall 0" in said for said in node.logged)
@@ -218,3 +218,28 @@ def test_the_costmap_lies_where_the_people_are(make):
 def test_a_missing_zone_parameter_is_named_in_the_error(make):
     with pytest.raises(szlib.ZoneError, match="parameter `zone`"):
         make(zone="")
+
+
+def test_a_map_gives_walls_in_the_frame_of_the_walls(make_with_tf, monkeypatch):
+    turned = ros.xyz(w=float(np.cos(np.pi / 4)))
+    turned.z = float(np.sin(np.pi / 4))
+    monkeypatch.setattr(ros.Buffer, "poses", {"map": (10.0, 0.0, turned)})
+    node = make_with_tf(walls="4 -3 4 3")
+    cells = np.zeros((8, 10), int)
+    cells[2:4, 1:5], cells[6, 6], cells[7, 7] = 100, -1, 40  # a block, an unknown cell, and one below 65 %
+    hear(node, "map", grid(cells, 0.5, (1.0, 2.0, 0.0), frame="map"))
+    walls = node.drive.walls
+    assert walls.shape == (5, 2, 2)
+    block = walls[:4]
+    assert [*block.min(axis=(0, 1)), *block.max(axis=(0, 1))] == pytest.approx([6.0, 1.5, 7.0, 3.5])
+    assert not node.drive.step((6.5, 2.5, 0.0), (9.0, 9.0)).safe
+
+
+def test_a_map_that_cannot_be_used_changes_nothing(make):
+    node = make(walls="4 -3 4 3")
+    short, still = grid(np.zeros((4, 4), int), 0.5, (0, 0, 0)), grid(np.zeros((4, 4), int), 0.0, (0, 0, 0))
+    short.data = short.data[:-1]
+    for bad in (short, still, grid(np.zeros((4, 4), int), 0.5, (0, 0, 0), frame="elsewhere")):
+        hear(node, "map", bad)
+        assert node.drive.walls.shape == (1, 2, 2)
+    assert len(node.logged) == 3 and "cannot be used" in node.logged[0] and "resolution" in node.logged[1]

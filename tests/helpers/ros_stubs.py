@@ -104,6 +104,7 @@ def node_module(tf=False):
         "rclpy": {"init": None, "spin": None, "try_shutdown": None},
         "rclpy.node": {"Node": Node},
         "rclpy.executors": {"ExternalShutdownException": RuntimeError},
+        "rclpy.qos": {"QoSProfile": SimpleNamespace, "DurabilityPolicy": SimpleNamespace(TRANSIENT_LOCAL=1)},
         "rclpy.time": {"Time": SimpleNamespace(from_msg=lambda stamp: stamp)},
         "geometry_msgs": {},
         "geometry_msgs.msg": {"Twist": Twist, "TwistStamped": TwistStamped, "PoseStamped": PoseStamped},
@@ -151,6 +152,15 @@ def people(*walkers, **how):
         walker.name, walker.position.x, walker.position.y = name, x, y
         walker.velocity.x, walker.velocity.y = vx, vy
         what.people.append(walker)
+    return stamped(what, **how)
+
+
+def grid(cells, side, origin, **how):
+    what = OccupancyGrid()
+    (what.info.height, what.info.width), what.info.resolution = cells.shape, side
+    what.info.origin.position.x, what.info.origin.position.y, angle = origin
+    what.info.origin.orientation.z, what.info.origin.orientation.w = sin(angle / 2), cos(angle / 2)
+    what.data = cells.ravel().tolist()
     return stamped(what, **how)
 
 
