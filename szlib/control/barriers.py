@@ -185,6 +185,28 @@ def ellipse_distance(points: ArrayLike, ellipse: Ellipse) -> Array:
     return np.asarray(ellipse_formula(xy[..., 0], xy[..., 1], *ellipse.foci_and_axis))
 
 
+def find_near_walls(walls: Array, x: float, y: float, reach: float) -> list[int]:
+    """Numbers of the `walls`, shape (n, 2, 2), whose way s from (`x`, `y`) is at most `reach` [m].
+
+    Notes
+    -----
+    With d the approximate distance to a wall of length L, s = L/2 (sqrt(1 + 4 d/L) - 1), so that d = F(s) =
+    s + s^2/L. It changes by no more than the robot moves (`szlib.control.differential_drive`). A wall can be
+    left out of the problem while s >= r_robot + eps + 2 v dt/gamma (dt and gamma of the longest step): then
+    its rows hold whatever a robot does that is no faster than v. With S = r_robot + eps, and r_robot + margin
+    <= F(S) (`distances.wall_margin`),
+
+        gamma h(x_k) >= gamma (F(s) - F(S)) = gamma (s - S) (1 + (s + S)/L) >= v dt (1 + 2 s/L)
+                     >= F(s) - F(s - v dt) >= h(x_k) - h(x_{k+1})
+
+    A step of m dt keeps (1 - gamma)^m of h: the same with m dt and 1 - (1 - gamma)^m, and the longest step
+    needs most. If the wall is farther by v times the horizon now, this holds on the whole horizon.
+    """
+    length = np.hypot(*(walls[:, 1] - walls[:, 0]).T)
+    d = np.asarray(segment_formula(x, y, *walls.reshape(-1, 4).T))
+    return [*map(int, np.flatnonzero(length / 2 * (np.sqrt(1 + 4 * d / length) - 1) <= reach))]
+
+
 def check_wall(wall: ArrayLike) -> Array:
     """End points of a `wall`, shape (2, 2) [m]; SolverError if it is shorter than `SHORTEST_WALL`."""
     ends = check_array("wall", wall, (2, 2))

@@ -38,10 +38,10 @@ from numpy.typing import ArrayLike
 from ..checks import Array, check_array, check_number, check_point, check_vector, require
 from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import Ellipse, circle_around
-from .barriers import find_solids, read_walls
+from .barriers import find_near_walls, find_solids, read_walls
 from .controller import Controller
 from .crowding import list_barriers
-from .distances import find_near_walls, walls_with_margins
+from .distances import walls_with_margins
 from .head_on import find_target
 from .person import Person, SpeedZone, as_ellipse, place_zone
 from .routes import Point, RoutePlanner, find_boxes

@@ -128,9 +128,8 @@ class RoutePlanner:
         outward = _SIGNS[:, :, None] * self._axes[boxes, None]
         corners = self._middle[boxes, None] + np.einsum("nkij,ni->nkj", outward, out + _CORNER)
         corners, outward = corners.reshape(-1, 2), outward.reshape(-1, 2, 2)
-        inside = (np.abs(self._to_boxes(corners, boxes)) < self._half[boxes]).all(axis=2)
-        free = ~np.any(inside, axis=1)
-        self._corners, outward = corners[free], outward[free]
+        inside = np.any(np.all(np.abs(self._to_boxes(corners, boxes)) < self._half[boxes], axis=2), axis=1)
+        self._corners, outward = corners[~inside], outward[~inside]
         pairs: NDArray[np.intp] = np.array(np.triu_indices(len(outward), 1))
         for end in (0, 1):
             way = self._corners[pairs[1]] - self._corners[pairs[0]]
@@ -163,9 +162,8 @@ class RoutePlanner:
 
         As a multiple of the distance to each end, shape (m,).
         """
-        near = self._tree.query(
-            shapely.box(*np.vstack([start, ends]).min(0), *np.vstack([start, ends]).max(0))
-        )
+        points = np.vstack([start, ends])
+        near = self._tree.query(shapely.box(*points.min(axis=0), *points.max(axis=0)))
         return np.asarray(self._enter(start, ends, half, near).min(axis=1, initial=1.0))
 
     def _cut_boxes(self, *points: Point) -> Array:
@@ -198,11 +196,8 @@ class RoutePlanner:
         if dist(goal, self._goal) > _GOAL_MOVED:
             self._take_goal(goal)
         self.points[-1] = goal
-        p, half, corners = (
-            np.array(position),
-            self._cut_boxes(position, goal),
-            np.array(self.turns[3::-1], int),
-        )
+        p, half = np.array(position), self._cut_boxes(position, goal)
+        corners = np.array(self.turns[3::-1], int)
         if not self._choose(p, corners, self._measure_free(p, self.points[corners], half)[:, None]):
             self._search(p, goal, half)
         if not self.turns:
@@ -254,11 +249,8 @@ class RoutePlanner:
         It begins at the point of the route nearest to the robot. Where no point of it is in sight, the robot
         takes a way of its own.
         """
-        line, p, half = (
-            shapely.LineString([*route, goal]),
-            np.array(position),
-            self._cut_boxes(position, goal),
-        )
+        p, half = np.array(position), self._cut_boxes(position, goal)
+        line = shapely.LineString([*route, goal])
         begin = line.project(shapely.Point(position))
         at = np.linspace(begin, min(line.length, begin + lookahead), _SAMPLES)
         points = shapely.get_coordinates(shapely.line_interpolate_point(line, at))

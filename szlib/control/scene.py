@@ -34,7 +34,7 @@ class Scene(NamedTuple):
     settings : parameters of the controller.
     solids : areas that walls enclose, of Shapely; None: there are none.
     near : numbers of the walls that can matter to this step; None: all. Of many walls those out of reach are
-        left out (`distances.find_near_walls`), and what a step says of them is inf.
+        left out (`barriers.find_near_walls`), and what a step says of them is inf.
     """
 
     state: tuple[float, ...]

@@ -10,8 +10,8 @@ import pytest
 import szlib
 from szlib.checks import Array
 from szlib.control import advance, euclidean_to_segment, mpc
-from szlib.control.barriers import compute_h
-from szlib.control.distances import find_near_walls, walls_with_margins
+from szlib.control.barriers import compute_h, find_near_walls
+from szlib.control.distances import walls_with_margins
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 S = szlib.MPCSettings()
