@@ -14,8 +14,7 @@ from .geometry import AttentionalSpace
 _PAIRS_AT_ONCE = 250_000  # pairs of people held in memory at a time: they fit into a cache
 _ROUNDING = 1e-3  # larger than every rounding error of a position, for any number of ticks [m]
 
-Range = tuple[np.ndarray, np.ndarray]
-"""The low and the high end of a range, for each row."""
+Range = tuple[np.ndarray, np.ndarray]  # low and high end, for each row
 
 
 @dataclass(frozen=True, eq=False)

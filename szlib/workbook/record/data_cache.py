@@ -154,13 +154,10 @@ class DataCache:
         """
         tracks, n_encounters = self.tracks(), self.encounters()["encounter"].nunique()
         settings = self.method.encounter_settings(self.find_area(tracks))
+        shifts = NULL_SHIFTS if n_encounters < MANY_ENCOUNTERS else few_shifts
         try:
             return null_encounters(
-                tracks,
-                settings=settings,
-                shifts=NULL_SHIFTS if n_encounters < MANY_ENCOUNTERS else few_shifts,
-                r_max=self.method.r_max,
-                progress=False,
+                tracks, settings=settings, shifts=shifts, r_max=self.method.r_max, progress=False
             )
         except DataError as error:
             print(f"The zone is not tested against a null model: {error}")
