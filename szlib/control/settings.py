@@ -88,6 +88,7 @@ class MPCSettings:
     r_robot : radius of the robot [m].
     lookahead : the plan heads for the point of the route that lies at most this far ahead [m]: see
         `szlib.control.routes`. `inf`, as in the paper: there is no route, and the plan heads for the goal.
+        Among hundreds of walls a new goal may take a second; a `route` can be given instead (`MPCCBF.step`).
     eps : margin for the error of the approximate distances [m].
     margin : around walls. "euclidean": what each wall requires so that the robot does not touch it, and at
         least eps (see `wall_margin`). "paper": eps, which allows overlaps with the ends of walls shorter
