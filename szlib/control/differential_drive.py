@@ -45,7 +45,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import asin, atan2, cos, hypot, inf, pi, remainder, sin, tan
+from math import asin, atan2, cos, dist, hypot, inf, pi, remainder, sin, tan
 from time import perf_counter
 from typing import Any
 
@@ -60,6 +60,7 @@ from .controller import Controller
 from .distances import walls_with_margins
 from .mpc import MPCCBF
 from .person import STANDING_SPEED, Person, SpeedZone, place_zone
+from .routes import Point
 from .scene import Scene
 from .settings import TOLERANCE, MPCSettings
 from .step import Fallback, Step
@@ -166,6 +167,11 @@ class _Point(MPCCBF):
 
     def _check_goal(self, goal: tuple[float, float]) -> None:
         pass
+
+    def _look_ahead(self, at: Point, goal: Point, route: ArrayLike | None) -> tuple[Point, float]:
+        """As of `MPCCBF`, but straight to a `goal` so close that no wall lies between, as in a turn."""
+        away = dist(at, goal)
+        return (goal, away) if away < self.settings.r_robot else super()._look_ahead(at, goal, route)
 
 
 class DifferentialDrive(Controller):
