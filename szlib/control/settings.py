@@ -251,7 +251,7 @@ class MPCSettings:
         """
         grid = (1,) * 4 + (2,) * 4 + (3,) * 6
         reach = sum(grid) * changes.get("dt", cls.dt) * changes.get("v_max", cls.v_max)
-        ahead = {"gamma": 0.08, "grid": grid, "jerk_weight": 2.0, "lookahead": reach + 1.0}
+        ahead = {"gamma": 0.08, "grid": grid, "jerk_weight": 8.0, "lookahead": reach + 1.0}
         return cls(**{**ahead, "crowding": Crowding(), **changes})
 
     @cached_property
