@@ -92,8 +92,8 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # | [13 - Against everything else](13_comparison.ipynb) | Is the fitted ellipse worth its trouble? | 15 min |
 # | [14 - Data quality](14_data_quality.ipynb) | Before anything is learned from a file of tracks: can it be trusted, and which days are unlike the others? | 15 min |
 # | [15 - Respect or emptiness?](15_respect.ipynb) | Around a walking person there is a place where nobody is. Do people keep out of it, or is it only rare that two of them are anywhere near each other? | 30 min |
-# | [16 - What is true?](16_claims.ipynb) | What does the paper claim, and what of it does the data support? | 30 min |
-# | [17 - Other people's crowds](17_crowds.ipynb) | So far everybody walked as this workbook made them walk. What becomes of the robot among people who walk by somebody else's model and react to it - and among people who were recorded, and would have walked like that whatever it does? | 25 min |
+# | [16 - What is true?](16_claims.ipynb) | What does the paper claim, and what of it does the data support? | 35 min |
+# | [17 - Other people's crowds](17_crowds.ipynb) | So far everybody walked as this workbook made them walk. What becomes of the robot among people who walk by somebody else's model and react to it - and among people who were recorded, and would have walked like that whatever it does? | 30 min |
 # | [18 - Eleven meetings](18_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 15 min |
 # | [19 - A sensitivity atlas](19_atlas.ipynb) | Notebooks 08 to 10 show one corridor, one passage, one pace, one zone. What would the robot have done in others? | 15 min |
 # | [20 - The laboratory](20_laboratory.ipynb) | What does the robot do if *you* put the person somewhere else, move the goal, narrow the corridor, or change gamma while it drives? | 10 min |
@@ -103,7 +103,7 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # ## Three routes
 #
 # - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [08](08_corridor.ipynb), [20](20_laboratory.ipynb): 1 h 05 min to read.
-# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [11](11_feasibility.ipynb), [16](16_claims.ipynb), [21](21_sentences.ipynb): 3 h 55 min to read.
+# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [11](11_feasibility.ipynb), [16](16_claims.ipynb), [21](21_sentences.ipynb): 4 h 00 min to read.
 # - **Six weeks: the course.** One exercise sheet a week; running and looking around come on top.
 #
 # | week | topic | notebooks | to read | sheet | to do |
@@ -111,9 +111,9 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # | 1 | People: who is where, who meets whom | [01](01_tracks.ipynb), [02](02_encounters.ipynb), [14](14_data_quality.ipynb) | 40 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 50 min |
 # | 2 | Which samples to believe | [03](03_outliers.ipynb) | 20 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 55 min |
 # | 3 | From samples to a zone | [04](04_hull.ipynb), [05](05_zones.ipynb) | 25 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
-# | 4 | How sure? Respect or emptiness | [15](15_respect.ipynb), [16](16_claims.ipynb) | 1 h 00 min | [sheet 4](exercises/sheet4_certainty.ipynb) | 50 min |
+# | 4 | How sure? Respect or emptiness | [15](15_respect.ipynb), [16](16_claims.ipynb) | 1 h 05 min | [sheet 4](exercises/sheet4_certainty.ipynb) | 50 min |
 # | 5 | Barriers, and a controller of your own | [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [11](11_feasibility.ipynb), [12](12_distances.ipynb) | 1 h 10 min | [sheet 5](exercises/sheet5_barriers.ipynb) | 1 h 00 min |
-# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb), [19](19_atlas.ipynb), [20](20_laboratory.ipynb), [21](21_sentences.ipynb) | 2 h 40 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
+# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb), [19](19_atlas.ipynb), [20](20_laboratory.ipynb), [21](21_sentences.ipynb) | 2 h 45 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
 
 # %% [markdown]
 # **The exercises** are functions that you write. `exercises.check("velocity", velocity)` asks yours for cases

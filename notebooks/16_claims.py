@@ -21,7 +21,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [15 - Respect or emptiness?](15_respect.ipynb) · next: [17 - Other
-# people's crowds](17_crowds.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 30 min to read
+# people's crowds](17_crowds.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 35 min to read
 #
 # **Afterwards you can** say which claims of the paper the data supports, and with which interval.
 
