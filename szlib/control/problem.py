@@ -197,10 +197,12 @@ class BufferedFunction:
     ----------
     function : the CasADi function.
     arguments : one array for each of its arguments.
+    last_results : arrays for its last results; for the others it makes some.
     """
 
-    def __init__(self, function: Any, *arguments: Array) -> None:
-        self.results = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
+    def __init__(self, function: Any, *arguments: Array, last_results: Sequence[Array] = ()) -> None:
+        n_made = function.n_out() - len(last_results)
+        self.results = [*(np.zeros(function.nnz_out(i)) for i in range(n_made)), *last_results]
         buffer, call = function.buffer()
         for i, array in enumerate(arguments):
             buffer.set_arg(i, array.data)

@@ -15,7 +15,7 @@ from szlib.control.controller import advance
 from szlib.control.problem import PlanEvaluation, build_problem, remaining_distance
 from szlib.control.settings import TOLERANCE, Crowding
 from szlib.control.solvers import fallbacks, sqp
-from szlib.control.solvers.sqp_functions import build_sqp_functions
+from szlib.control.solvers.sqp_functions import QuadraticProgram, build_sqp_functions
 
 SOLVERS = ("sqp", "ipopt")
 GOAL = (4.0, 0.0)
@@ -79,7 +79,7 @@ def test_each_solver_package_is_imported_by_its_modules_only():
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)
 def test_structured_derivatives_equal_automatic_ones(formulation):
     settings = szlib.MPCSettings(**formulation)
-    p, derive = build_problem(settings, 2, 1), build_sqp_functions(settings, 2, 1).derive
+    p = build_problem(settings, 2, 1)
     values = ca.vertcat(p.rows, p.terminal)
     multipliers = ca.SX.sym("multipliers", values.numel())
     arguments = [p.inputs, p.parameters, multipliers]
@@ -95,13 +95,15 @@ def test_structured_derivatives_equal_automatic_ones(formulation):
             ca.hessian(cost + on_speed, p.inputs)[0],
         ],
     )
-    rng = np.random.default_rng(8)
+    rng, at = np.random.default_rng(8), [np.zeros(symbols.numel()) for symbols in arguments]
+    program = QuadraticProgram(build_sqp_functions(settings, 2, 1), settings.N_h, *at)
     for _ in range(5):
-        at = [rng.normal(size=symbols.numel()) for symbols in arguments]
-        gradient, jacobian, hessian, gauss = (np.asarray(each) for each in expected(*at))
-        found = [np.asarray(each) for each in derive(*at)[3:]]
-        for one, other in zip(found, (gradient, jacobian.T, hessian, gauss), strict=True):
-            assert one == pytest.approx(other, rel=1e-11, abs=1e-11)
+        for array in at:
+            array[:] = rng.normal(size=array.size)
+        program.derive()
+        found = program.gradient, program.jacobian, program.exact, program.gauss
+        for one, other in zip(found, expected(*at), strict=True):
+            assert one.reshape(other.shape) == pytest.approx(np.asarray(other), rel=1e-11, abs=1e-11)
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=str)

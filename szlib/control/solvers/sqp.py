@@ -28,7 +28,7 @@ import numpy as np
 from ...checks import Array
 from ..problem import CASADI_LOCK, HARD_SHARE, BufferedFunction, PlanEvaluation, ProblemSolver
 from ..settings import MPCSettings
-from .sqp_functions import SqpFunctions, build_sqp_functions
+from .sqp_functions import QuadraticProgram, SqpFunctions, build_sqp_functions
 
 Outcome = Literal["converged", "stalled", "timed out", "failed"]
 # The SQP has converged if its last step moves no input by more than this [m/s2]: with the exact Hessian, when
@@ -66,15 +66,13 @@ class Sqp(ProblemSolver):
         self._inputs, self._step, self._share = np.zeros(n), np.zeros(n), np.ones(1)
         self._parameters, self._multipliers = np.zeros(derive.nnz_in(1)), np.zeros(m)
         arguments = self._inputs, self._parameters, self._multipliers
-        self._derive = BufferedFunction(derive, *arguments)
+        self._at_inputs = program = QuadraticProgram(functions, self.settings.N_h, *arguments)
         self._measure = BufferedFunction(functions.measure, *arguments, self._step, self._share)
         free = functions.free
         self._free = None if free is None else BufferedFunction(free, self._parameters)
-        self._before, self._lower, self._upper, gradient, jacobian, exact, gauss = self._derive.results
+        self._before, self._lower, self._upper = program.merit, program.lower, program.upper
         self._after, self._trial, self._values, states, h = self._measure.results
-        self._jacobian = jacobian.reshape(m, n)
-        self._program = (exact.reshape(n, n), gradient, self._jacobian, self._upper, self._lower)
-        self._gauss_newton = (gauss.reshape(n, n), *self._program[1:])
+        self._program = (program.exact, program.gradient, program.jacobian, program.upper, program.lower)
         self._sense = np.repeat(np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows])
         self._measured = (self._trial, *self.evaluate.shaped(self._values, states, h))
         self._has_multipliers, self._model = False, daqp.Model()
@@ -197,10 +195,10 @@ class Sqp(ProblemSolver):
 
     def _linearise(self) -> bool:
         """Give the quadratic program at `_inputs` to DAQP; True if with the exact Hessian."""
-        self._derive.call()
+        self._at_inputs.derive()
         exact = bool(self._model.update(*self._program) >= 0)
         if not exact:
-            self._model.update(*self._gauss_newton)
+            self._model.update(self._at_inputs.gauss, *self._program[1:])
         return exact
 
     def _merit(self, price: float, share: float) -> float:
@@ -212,7 +210,7 @@ class Sqp(ProblemSolver):
     def _lower_merit(self, price: float, before: float) -> bool:
         """Set `_trial` to where the merit is lower: corrected to second order, else on a shorter step."""
         step, n = self._step.copy(), self._step.size
-        self._lower[n:] = self._jacobian @ step - self._values
+        self._lower[n:] = self._at_inputs.jacobian @ step - self._values
         end = n + self.evaluate.n_rows
         self._upper[end:] = self._lower[end:]
         self._model.update(bupper=self._upper, blower=self._lower)

@@ -1,4 +1,4 @@
-"""The CasADi functions of the SQP: the quadratic program, the merit of a step, the unconstrained plan.
+"""The functions of the SQP: the quadratic program, the merit of a step, the unconstrained plan.
 
 The derivatives follow from the structure of the problem. Positions and velocities are constant linear maps
 of the inputs, p = P u + ... and v = V u + ...; a barrier row depends on two positions, a speed row on one
@@ -8,7 +8,8 @@ velocity. So with g_k and S_k the gradient and the Hessian of h by the position 
     Hessian                curvature of the cost + sum_k -2 lambda_k V_k' V_k + sum_k P_k' S_k P_k
 
 with S_k summed over people and walls, weighted by their multipliers. Without its last sum it is that of a
-Gauss-Newton step.
+Gauss-Newton step. CasADi gives g_k, S_k and the rest; the products with P_k and V_k are matrix products of
+NumPy, because element by element they would take most of the time (`QuadraticProgram`).
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from ..problem import Problem, build_problem, dense_function, remaining_distance
+from ...checks import Array
+from ..problem import BufferedFunction, Problem, build_problem, dense_function, remaining_distance
 from ..settings import MPCSettings
 
 
 class SqpFunctions(NamedTuple):
-    """Four functions of CasADi.
+    """Four functions of CasADi, and what their results are multiplied by.
 
     The scaled cost is that for each metre to the target, at least one, and the price of violated rows that
     have one. Violation and multipliers are those of the hard rows.
@@ -32,20 +34,61 @@ class SqpFunctions(NamedTuple):
     Attributes
     ----------
     derive : (inputs, parameters, multipliers) -> (scaled cost, violation, largest multiplier of a row, of a
-        speed row), lower and upper bounds, gradient, Jacobian, Hessian of the Lagrangian, and that Hessian
-        without the curvature of the barriers.
+        speed row), lower and upper bounds, gradient, Hessian of the Lagrangian without the curvature of the
+        barriers, for each step g_{k+1} and -(1 - gamma)^m g_k of each barrier, then S_{k+1} P_{k+1}, and the
+        Jacobian of the other rows and of the terminal condition.
     measure : (inputs, parameters, multipliers, step, share) -> (scaled cost, violation, cost, slack, largest
         element of the step, largest multiplier, largest of a row), inputs, values of the rows and of the
         terminal condition, states and h, all after this share of the step.
     free : parameters -> the inputs of smallest cost without any row or bound, and the sum of their
         violations; None if there is a terminal condition.
     prices : parameters -> the price of each row.
+    to_positions : P_0 .. P_{N_h}, shape (N_h+1, 2, 2N).
+    n_cbf : number of barrier conditions.
     """
 
     derive: Any
     measure: Any
     free: Any
     prices: Any
+    to_positions: Array
+    n_cbf: int
+
+
+class QuadraticProgram:
+    """The quadratic program at a plan, in arrays that stay where they are: change the arguments, then `derive`.
+
+    Parameters
+    ----------
+    functions : of the problem.
+    n_steps : number of steps that have barriers, N_h.
+    arguments : arrays of the inputs, the parameters and the multipliers.
+
+    Attributes
+    ----------
+    merit, lower, upper, gradient : see `SqpFunctions.derive`.
+    jacobian : of the rows and the terminal condition by the inputs, shape (rows, 2N).
+    exact, gauss : Hessian of the Lagrangian, with and without the curvature of the barriers, shape (2N, 2N).
+    """
+
+    def __init__(self, functions: SqpFunctions, n_steps: int, *arguments: Array) -> None:
+        n, n_cbf = arguments[0].size, functions.n_cbf
+        self.jacobian, self.exact = np.zeros((arguments[2].size, n)), np.zeros((n, n))
+        self._function = BufferedFunction(functions.derive, *arguments, last_results=[self.jacobian[n_cbf:]])
+        self.merit, self.lower, self.upper, self.gradient, gauss, slopes, bends, _ = self._function.results
+        self.gauss = gauss.reshape(n, n)
+        to_ends = functions.to_positions[1:]
+        to_steps = np.concatenate([to_ends, functions.to_positions[:-1]], axis=1)
+        of_steps = self.jacobian[:n_cbf].reshape(-1, n_steps, n).swapaxes(0, 1)
+        self._of_barriers = slopes.reshape(n_steps, -1, 4), to_steps, of_steps
+        self._of_curvature = to_ends.reshape(-1, n).T, bends.reshape(-1, n), self.exact
+
+    def derive(self) -> None:
+        """Fill the arrays from the arguments."""
+        self._function.call()
+        np.matmul(*self._of_barriers)
+        np.matmul(*self._of_curvature)
+        self.exact += self.gauss
 
 
 @lru_cache(maxsize=256)
@@ -63,18 +106,16 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
     on_rows = ca.norm_inf(multipliers[:n_rows])
     arguments = [u, p.parameters, multipliers]
 
-    map_of = np.asarray(ca.evalf(ca.jacobian(ca.vec(p.states), u))).reshape(s.N + 1, 4, s.N, 2)
-    to_position, to_velocity = map_of[: s.N_h + 1, 0, :, 0], map_of[1:, 2, :, 0]
+    map_of = np.asarray(ca.evalf(ca.jacobian(ca.vec(p.states), u))).reshape(s.N + 1, 4, 2 * s.N)
+    to_positions, on_speed = map_of[: s.N_h + 1, :2], multipliers[p.n_cbf : n_rows]
     curvature = scale * ca.evalf(ca.jacobian(gradient, u))
-    of_speed, of_barriers = _hessians(p, s, multipliers, to_position)
-    gauss = ca.cse(ca.tril(curvature + of_speed))
-    exact = gauss + ca.tril(of_barriers)
-    merit = ca.vertcat(cost, violation, on_rows, ca.norm_inf(multipliers[p.n_cbf : n_rows]))
+    gauss = ca.cse(ca.tril2symm(ca.tril(curvature + _hessian_of_speed(s, on_speed))))
+    merit = ca.vertcat(cost, violation, on_rows, ca.norm_inf(on_speed))
     lower = ca.vertcat(-s.a_max - u, -values)
     upper = ca.vertcat(s.a_max - u, ca.inf * ca.SX.ones(n_rows), -p.terminal)
-    jacobian = _jacobian(p, s, to_position, to_velocity)
-    hessians = ca.tril2symm(exact), ca.tril2symm(gauss)
-    outputs = [merit, lower, upper, scale * gradient, jacobian.T, *hessians]
+    of_barriers = _slopes(p, s), _bends(p, s, multipliers, to_positions)
+    others = ca.cse(ca.jacobian(values[p.n_cbf :], u)).T
+    outputs = [merit, lower, upper, scale * gradient, gauss, *of_barriers, others]
     derive = dense_function("derive", arguments, outputs)
 
     step, share = ca.SX.sym("d", u.numel()), ca.SX.sym("s")
@@ -86,53 +127,41 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
     measure = dense_function("measure", [*arguments, step, share], [merit, trial, values, states, h])
     prices = dense_function("prices", [p.parameters], [p.prices])
     if p.terminal.numel():
-        return SqpFunctions(derive, measure, None, prices)
+        return SqpFunctions(derive, measure, None, prices, to_positions, p.n_cbf)
     given = p.parameters[:10]
     to_inputs, to_given = (ca.evalf(ca.jacobian(gradient, by)) for by in (u, given))
     free = -ca.solve(to_inputs, to_given) @ given
     beyond = ca.sum1(ca.fmax(0, ca.fabs(free) - s.a_max))
     violated = ca.Function("violated", [u, p.parameters], [ca.sum1(p.violations)])
     free_plan = dense_function("unbound", [p.parameters], [free, beyond + violated(free, p.parameters)])
-    return SqpFunctions(derive, measure, free_plan, prices)
+    return SqpFunctions(derive, measure, free_plan, prices, to_positions, p.n_cbf)
 
 
-def _jacobian(p: Problem, s: MPCSettings, to_position: Any, to_velocity: Any) -> Any:
-    """Jacobian of the rows and the terminal condition by the inputs, shape (rows, 2N)."""
-    maps, n = [ca.sparsify(ca.DM(row[None])) for row in to_position], p.h.shape[0]
-    by_axis = []
-    for slope in p.slope:
-        slopes = ca.horzsplit(slope)
-        ends = [slopes[k + 1] @ maps[k + 1] - (p.kept[:, k] * slopes[k]) @ maps[k] for k in range(s.N_h)]
-        by_axis.append(ca.vertcat(*ends))
-    rows = np.arange(s.N_h * n).reshape(s.N_h, n).T.ravel()
-    columns = np.arange(2 * s.N).reshape(2, s.N).T.ravel()
-    velocities = ca.diagcat(*(-2 * p.states[2:, k].T for k in range(1, s.N + 1)))
-    blocks = [
-        ca.horzcat(*by_axis)[rows.tolist(), columns.tolist()],
-        ca.cse(velocities @ _for_x_and_y(to_velocity)),
-    ]
-    if p.terminal.numel():
-        blocks.append(_for_x_and_y(to_velocity[-1:]))
-    return ca.vertcat(*blocks)
+def _slopes(p: Problem, s: MPCSettings) -> Any:
+    """For each step and barrier the slope of its row by the positions at the end and at the start, 4 numbers."""
+    steps = []
+    for k in range(s.N_h):
+        ends = [slope[:, k + 1] for slope in p.slope] + [-p.kept[:, k] * slope[:, k] for slope in p.slope]
+        steps.append(ca.horzcat(*ends).T)
+    return ca.horzcat(*steps)
 
 
-def _hessians(p: Problem, s: MPCSettings, multipliers: Any, to_position: Any) -> tuple[Any, Any]:
-    """Hessians by the inputs of the speed rows and of the barrier rows, each weighted by its multipliers."""
+def _hessian_of_speed(s: MPCSettings, multipliers: Any) -> Any:
+    """Hessian by the inputs of the speed rows, weighted by their multipliers."""
     # V_k' V_k is dt_i dt_j for inputs i and j before k: the later of the two says which rows have both.
     lengths = s.dt * np.array(s.step_lengths)
     later = np.maximum.outer(range(s.N), range(s.N)).ravel(order="F")
-    on_speed = multipliers[p.n_cbf : p.n_cbf + s.N]
-    after = ca.DM(np.triu(np.ones((s.N, s.N)))) @ on_speed
-    of_speed = ca.reshape((-2 * after)[later.tolist()], s.N, s.N) * np.outer(lengths, lengths)
+    after = ca.DM(np.triu(np.ones((s.N, s.N)))) @ multipliers
+    of_one_axis = ca.reshape((-2 * after)[later.tolist()], s.N, s.N) * np.outer(lengths, lengths)
+    return ca.kron(of_one_axis, ca.DM.eye(2))
+
+
+def _bends(p: Problem, s: MPCSettings, multipliers: Any, to_positions: Array) -> Any:
+    """S_k P_k of each step k, by the position at its end: S_k is weighted by the multipliers of the rows."""
     # h_k is in two rows: with lambda_{k-1}, where a step ends, and -kept_k lambda_k, where the next begins.
     on_rows, none = ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0]).T, ca.SX(p.h.shape[0], 1)
-    weights = ca.horzcat(none, on_rows) - ca.horzcat(p.kept * on_rows, none)
-    xx, xy, yy = (ca.sum1(weights * bend) for bend in p.bend)
-    bends = [ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h + 1)]
-    to_xy = _for_x_and_y(to_position)
-    return ca.kron(of_speed, ca.DM.eye(2)), to_xy.T @ ca.diagcat(*bends) @ to_xy
-
-
-def _for_x_and_y(one: Any) -> Any:
-    """The linear map `one` of an axis, for x and y in turn."""
-    return ca.kron(ca.sparsify(ca.DM(one)), ca.DM.eye(2))
+    weights = on_rows - ca.horzcat((p.kept * on_rows)[:, 1:], none)
+    xx, xy, yy = (ca.sum1(weights * bend[:, 1:]) for bend in p.bend)
+    bends = (ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h))
+    maps = map(ca.sparsify, map(ca.DM, to_positions[1:]))
+    return ca.horzcat(*((bend @ to_end).T for bend, to_end in zip(bends, maps, strict=True)))
