@@ -187,7 +187,8 @@ def find_safe_boundary(of: Ellipse | ArrayLike, distance: float, n: int = 2001) 
     """
     if isinstance(of, Ellipse):
         (a, b), reach = of.semi_axes, of.semi_axes[0] + distance
-        return replace(of, semi_axes=(reach, float(np.sqrt(reach**2 - a**2 + b**2))), support=None).curve(n)
+        across = min(reach, float(np.sqrt(reach**2 - a**2 + b**2)))  # a circle stays one, without rounding
+        return replace(of, semi_axes=(reach, across), support=None).curve(n)
     start, end = check_wall(of)
     length, psi = float(np.hypot(*(end - start))), np.linspace(0, np.pi / 2, n)
     along = (end - start) / length

@@ -225,7 +225,7 @@ class MPCCBF(Controller):
         if age := check_number("state_age", state_age):
             x = clock.bring_forward(self.robot, np.array(x), age, np.zeros(2)).tolist()
         tracked = self.tracker.see(people, now=clock.now, ids=ids, stamps=stamps)
-        scene = self._scene(x, towards, tracked)._replace(near=self._find_near(*x))
+        scene = self._scene(x, towards, tracked, self._find_near(*x))
         ahead, way_length = self._look_ahead((x[0], x[1]), towards, route)
         remaining = way_length if way_length < np.inf else dist(x[:2], towards)
         barriers = list_barriers(scene.level, scene.zones, scene.people, self.settings)
@@ -280,11 +280,14 @@ class MPCCBF(Controller):
             return self._planner.aim(at, goal, s.lookahead)
         return self._planner.follow(check_array("route", route, (..., 2)), at, goal, s.lookahead)
 
-    def _scene(self, state: Sequence[float], goal: tuple[float, float], tracked: TrackedPeople) -> Scene:
+    def _scene(
+        self, state: Sequence[float], goal: Point, tracked: TrackedPeople, near: Sequence[int] | None = None
+    ) -> Scene:
         """What the step is asked, with the zone of every person."""
         zones = [self.zone_of(person) for person in tracked.people]
         placed = [place_zone(person, zone) for person, zone in zip(tracked.people, zones, strict=True)]
-        return Scene(tuple(state), goal, tracked, zones, placed, self._wall_rows, self.settings, self._solids)
+        walls, solids = self._wall_rows, self._solids
+        return Scene(tuple(state), goal, tracked, zones, placed, walls, self.settings, solids, near)
 
     def _parameters(
         self,

@@ -164,13 +164,17 @@ class RoutePlanner:
         """
         points = np.vstack([start, ends])
         near = self._tree.query(shapely.box(*points.min(axis=0), *points.max(axis=0)))
+        if not len(near):
+            return np.ones(len(ends))
         return np.asarray(self._enter(start, ends, half, near).min(axis=1, initial=1.0))
 
     def _cut_boxes(self, *points: Point) -> Array:
         """Half sizes of the boxes, cut back to those of `points` that they hold, but not across a wall."""
         half = self._half
         for point in points:
-            near, half = self._tree.query(shapely.Point(point)), half.copy()
+            if not len(near := self._tree.query(shapely.points(point))):
+                continue
+            half = half.copy()
             at = np.abs(self._to_boxes(np.array(point), near))
             inside, beyond = (at < half[near]).all(axis=1), at[:, 0] > self._half_length[near]
             half[near] = np.where(np.column_stack([inside & beyond, inside & ~beyond]), at, half[near])

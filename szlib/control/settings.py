@@ -166,22 +166,13 @@ class MPCSettings:
         for name in ("N", "N_h", "max_iterations"):
             value = getattr(self, name)
             _require(isinstance(value, int | np.integer) and value >= 1, name, value, "a whole number >= 1")
-        numbers = (
-            "dt",
-            "gamma",
-            "a_max",
-            "v_max",
-            "r_robot",
-            "eps",
-            "zone_speed",
-            "slack_weight",
-            "jerk_weight",
-        )
-        for name in (*numbers, "head_on_share"):
+        positive = "dt", "a_max", "v_max", "zone_speed", "slack_weight"
+        not_negative = "r_robot", "eps", "jerk_weight"
+        for name in (*positive, *not_negative, "gamma", "head_on_share"):
             object.__setattr__(self, name, float(check_array(name, getattr(self, name), ())))
-        for name in ("dt", "a_max", "v_max", "zone_speed", "slack_weight"):
+        for name in positive:
             _require(getattr(self, name) > 0, name, getattr(self, name), "a positive number")
-        for name in ("r_robot", "eps", "jerk_weight"):
+        for name in not_negative:
             _require(getattr(self, name) >= 0, name, getattr(self, name), "a number >= 0")
         _require(0 < self.gamma <= 1, "gamma", self.gamma, "in (0, 1]")
         _require(self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}")

@@ -190,8 +190,8 @@ def _is_elsewhere(row: Person | list[float], time: float, person: Person, seen: 
     return bool(expected and _are_usable(x, y) and dist((x, y), expected.position) > SAME_PERSON)
 
 
-def _are_usable(*numbers: float) -> bool:
-    return all(abs(number) <= LARGEST for number in numbers)
+def _are_usable(x: float, y: float) -> bool:
+    return abs(x) <= LARGEST and abs(y) <= LARGEST
 
 
 def _have_no_ids(people: People) -> TypeGuard[Sequence[Person]]:

@@ -20,7 +20,7 @@ program.
 from __future__ import annotations
 
 from math import isnan
-from typing import Literal
+from typing import Any, Literal
 
 import daqp
 import numpy as np
@@ -142,14 +142,15 @@ class Sqp(ProblemSolver):
         self._measure_inputs()
         return True
 
+    @np.errstate(all="ignore")  # on the focus of a zone the slopes are not finite; DAQP refuses them
     def _iterate(self, share: float) -> Outcome:
         """Improve `_inputs`, within this share of the budget; no price goes above the weight of slack."""
         price, rises, best, limit = 0.0, 0, (0.0, 0.0), self.settings.slack_weight
-        self._model.update(sense=self._sense)  # a copy has only the multipliers: forget which rows are active
+        sense: Any = self._sense  # a copy has only the multipliers: forget which rows are active
         for _ in range(self.settings.max_iterations):
             if self.budget.is_spent(share):
                 return "timed out"
-            exact = self._linearise()
+            exact, sense = self._linearise(sense), None
             step, _, flag, info = self._model.solve()
             if flag < 0:
                 return "failed"
@@ -193,12 +194,15 @@ class Sqp(ProblemSolver):
         self._step[:] = 0
         self._measure.call()
 
-    def _linearise(self) -> bool:
-        """Give the quadratic program at `_inputs` to DAQP; True if with the exact Hessian."""
+    def _linearise(self, sense: Any) -> bool:
+        """Give the quadratic program at `_inputs` to DAQP; True if with the exact Hessian.
+
+        If it is told the kinds of constraints, `sense`, it forgets which ones were active; else it is None.
+        """
         self._at_inputs.derive()
-        exact = bool(self._model.update(*self._program) >= 0)
+        exact = bool(self._model.update(*self._program, sense) >= 0)
         if not exact:
-            self._model.update(self._at_inputs.gauss, *self._program[1:])
+            self._model.update(self._at_inputs.gauss, *self._program[1:], sense)
         return exact
 
     def _merit(self, price: float, share: float) -> float:

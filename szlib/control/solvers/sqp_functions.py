@@ -56,7 +56,7 @@ class SqpFunctions(NamedTuple):
 
 
 class QuadraticProgram:
-    """The quadratic program at a plan, in arrays that stay where they are: change the arguments, then `derive`.
+    """The quadratic program at a plan, in arrays that stay where they are: set the arguments, then `derive`.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class QuadraticProgram:
         """Fill the arrays from the arguments."""
         self._function.call()
         np.matmul(*self._of_barriers)
-        np.matmul(*self._of_curvature)
+        np.dot(*self._of_curvature)
         self.exact += self.gauss
 
 
@@ -138,12 +138,14 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
 
 
 def _slopes(p: Problem, s: MPCSettings) -> Any:
-    """For each step and barrier the slope of its row by the positions at the end and at the start, 4 numbers."""
-    steps = []
-    for k in range(s.N_h):
-        ends = [slope[:, k + 1] for slope in p.slope] + [-p.kept[:, k] * slope[:, k] for slope in p.slope]
-        steps.append(ca.horzcat(*ends).T)
-    return ca.horzcat(*steps)
+    """For each step and barrier the slope of its row by the positions at the end and at the start, 4 numbers.
+
+    The first start is given, and its slope is taken as 0: it may be infinite, on the focus of a zone.
+    """
+    none = ca.SX(p.h.shape[0], 1)
+    ends = [slope[:, 1:] for slope in p.slope]
+    starts = [ca.horzcat(none, -p.kept[:, 1:] * slope[:, 1:-1]) for slope in p.slope]
+    return ca.horzcat(*(ca.horzcat(*(of[:, k] for of in ends + starts)).T for k in range(s.N_h)))
 
 
 def _hessian_of_speed(s: MPCSettings, multipliers: Any) -> Any:
@@ -162,6 +164,5 @@ def _bends(p: Problem, s: MPCSettings, multipliers: Any, to_positions: Array) ->
     on_rows, none = ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0]).T, ca.SX(p.h.shape[0], 1)
     weights = on_rows - ca.horzcat((p.kept * on_rows)[:, 1:], none)
     xx, xy, yy = (ca.sum1(weights * bend[:, 1:]) for bend in p.bend)
-    bends = (ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h))
-    maps = map(ca.sparsify, map(ca.DM, to_positions[1:]))
-    return ca.horzcat(*((bend @ to_end).T for bend, to_end in zip(bends, maps, strict=True)))
+    bends = [ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h)]
+    return ca.horzcat(*((bends[k] @ ca.sparsify(ca.DM(to_positions[k + 1]))).T for k in range(s.N_h)))
