@@ -7,7 +7,8 @@ Five people walk across a circle of 4 m radius by ORCA and do not see the robot,
 Places, numbers and rules are those of C. Chen et al., "Crowd-robot interaction: crowd-aware robot navigation
 with attention-based deep reinforcement learning", ICRA 2019; the code is our own.  CrowdNav's robot has any
 velocity at once; szlib's controllers drive a double integrator, and decide once or twice in each 0.25 s.
-Their settings were chosen on the seeds 0 to 99 (CrowdNav's validation), which are not in the table.
+The time steps, accelerations and zones of the table were tried on the seeds 0 to 99 (CrowdNav's validation),
+which are not in it.
 """
 
 from __future__ import annotations
