@@ -30,8 +30,8 @@ REFUSED = {
 _CLIENTS: set[Any] = set()
 # Set while the run is being stopped.
 _STOPPING = Event()
-# A signal that ends a kernel and the run reaches the run within this time [s].
-_SIGNAL_DELAY = 0.5
+# A signal that stops a kernel and the run reaches the run within this time [s].
+_SIGNAL_DELAY = 1.0
 # The notebooks that import a package beside them, and so need their folder on the module path.
 NEEDS_FOLDER = re.compile(r"^from studies\b", re.MULTILINE)
 # The record of a notebook that wrote none.
@@ -118,7 +118,7 @@ def run_cells(
                 with closing(ensure_event_loop()), temporary_folder() as private:
                     folders = {"TMPDIR": str(private), "IPYTHONDIR": str(private)}
                     client.execute(env={**os.environ, **own, **folders, **environment})
-            except RuntimeError:  # the kernel has ended
+            except Exception:  # of a cell, or the kernel has ended
                 if _STOPPING.wait(_SIGNAL_DELAY):
                     _CLIENTS.discard(client)
                 raise
