@@ -156,13 +156,14 @@ class MPCSettings:
         for name, length in (("Q", 4), ("R", 2), ("P", 4)):
             weights = check_array(name, getattr(self, name), (length,))
             object.__setattr__(self, name, tuple(weights.tolist()))
-        if self.grid:
-            lengths = [operator.index(length) for length in self.grid]
-            is_grid = lengths[0] == 1 and min(lengths) >= 1 and self.terminal == "none"
-            _require(is_grid, "grid", self.grid, "whole numbers >= 1, the first 1, and no terminal condition")
-            object.__setattr__(self, "grid", tuple(lengths))
-            object.__setattr__(self, "N", len(lengths))
-            object.__setattr__(self, "N_h", len(lengths))
+        object.__setattr__(self, "grid", grid := tuple(operator.index(length) for length in self.grid))
+        if grid:
+            is_grid = grid[0] == 1 and min(grid) >= 1 and self.terminal == "none"
+            _require(is_grid, "grid", grid, "whole numbers >= 1, the first 1, and no terminal condition")
+            object.__setattr__(self, "N", len(grid))
+            object.__setattr__(self, "N_h", len(grid))
+        if isinstance(self.crowding, dict):  # of a saved run
+            object.__setattr__(self, "crowding", Crowding(**self.crowding))
         for name in ("N", "N_h", "max_iterations"):
             value = getattr(self, name)
             _require(isinstance(value, int | np.integer) and value >= 1, name, value, "a whole number >= 1")

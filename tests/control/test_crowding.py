@@ -105,6 +105,13 @@ def test_the_scenarios_of_the_paper_keep_their_claims(name):
         assert holds, (claim.text, value)
 
 
+def test_the_settings_are_saved_with_a_run(tmp_path):
+    scenario = szlib.SCENARIOS["passing"]
+    log = szlib.simulate(scenario, szlib.MPCCBF(ZONE, settings=SETTINGS), max_time=1.0)
+    log.save(tmp_path / "run")
+    assert szlib.SimulationLog.load(tmp_path / "run").settings == SETTINGS
+
+
 def test_one_step_of_an_even_grid_is_the_step_without_a_grid():
     person = szlib.Person((0.0, 0.3), (-0.5, 0.0))
     plain = szlib.MPCSettings(N=6, N_h=6, time_limit=np.inf)
