@@ -203,13 +203,18 @@ def start(command: list[str], place: Path) -> subprocess.Popen[bytes]:
 
 
 def contents(out: Path) -> dict[str, bytes]:
-    """Finished files without times; of notebooks the figures. Hidden are locks and unfinished files."""
-    return {
+    """Finished files without times; of notebooks the figures.
+
+    Hidden files are locks and unfinished files. A record that is not closed is unfinished, too: it holds the
+    checks that a notebook made before its kernel ended.
+    """
+    found = {
         str(file.relative_to(out)): figures(file) if file.suffix == ".ipynb" else file.read_bytes()
         for file in sorted(out.rglob("*"))
         if file.is_file() and not file.name.startswith(".")
         and file.name not in ("summary.json", "report.html")
     }  # fmt: skip
+    return {name: content for name, content in found.items() if b'"closed": false' not in content}
 
 
 def figures(notebook: Path) -> bytes:
