@@ -155,7 +155,7 @@ def finish(
 ) -> None:  # fmt: skip
     """Let the command finish: the results are those of an undisturbed one, and nothing else is left.
 
-    szlib removes an unfinished file when it is an hour old, so those that a killed process left are made older.
+    szlib removes an unfinished file when it is an hour old, so those of killed processes are made older.
     """
     out = Path(command[-1])
     for unfinished in out.rglob(".szlib-part-*"):
