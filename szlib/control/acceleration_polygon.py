@@ -114,11 +114,10 @@ def _edges(step: Step) -> list[tuple[Array, Array]]:
 
 def _residuals(step: Step, first: Array) -> Array:
     """Residual of each barrier row for other first accelerations, (obstacles, N_h, n, 2) to (.., n)."""
-    s = step.scene.settings
-    times, keeps = np.array(s.times[: s.N_h + 1])[:, None], 1 - np.full((len(step.h), 1, 1), s.gamma)
-    if s.crowding and step.scene.level != "alone":
-        keeps[: len(step.scene.people)] = 1 - s.crowding.gamma
-    keeps = keeps ** np.array(s.step_lengths[: s.N_h])[:, None]
+    s, n_people = step.scene.settings, len(step.scene.people)
+    times, lengths = np.array(s.times[: s.N_h + 1])[:, None], np.array(s.step_lengths[: s.N_h])[:, None]
+    gammas = [gamma for *_, gamma, _ in step.scene.barriers[:n_people]] + [s.gamma] * len(step.scene.walls)
+    keeps = (1 - np.reshape(gammas, (-1, 1, 1))) ** lengths
     moved = s.dt * np.maximum(times - 0.5 * s.dt, 0)[..., None]
     left = []
     for i, change in enumerate(first - step.control):

@@ -40,7 +40,6 @@ from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import Ellipse, circle_around
 from .barriers import find_near_walls, find_solids, read_walls
 from .controller import Controller
-from .crowding import list_barriers
 from .distances import walls_with_margins
 from .head_on import find_target
 from .person import Person, SpeedZone, as_ellipse, place_zone
@@ -228,8 +227,8 @@ class MPCCBF(Controller):
         scene = self._scene(x, towards, tracked, self._find_near(*x))
         ahead, way_length = self._look_ahead((x[0], x[1]), towards, route)
         remaining = way_length if way_length < np.inf else dist(x[:2], towards)
-        barriers = list_barriers(scene.level, scene.zones, scene.people, self.settings)
-        self._n_barriers, n_walls = len(barriers), len(scene.near_walls)
+        barriers, n_walls = scene.barriers, len(scene.near_walls)
+        self._n_barriers = len(barriers)
         solver = self._pool.get(self._n_barriers, max(n_walls, self._slots))
         self._pool.budget.begin(perf_counter() - began)
         size = solver.evaluate.size

@@ -12,7 +12,7 @@ import shapely
 from ..checks import Array
 from ..zones.ellipses import BODY_RADIUS, Ellipse
 from .barriers import compute_h, euclidean_segment_formula
-from .crowding import Level, find_level
+from .crowding import Level, find_level, list_barriers
 from .person import Person, PlacedZone
 from .settings import MPCSettings, Terminal
 from .tracker import TrackedPeople
@@ -87,6 +87,11 @@ class Scene(NamedTuple):
     def level(self) -> Level:
         """How crowded the surroundings of the robot are: see `szlib.control.crowding`."""
         return find_level(self.state, self.people, self.settings)
+
+    @property
+    def barriers(self) -> Sequence[Sequence[float]]:
+        """Each barrier of people, as in `Problem.parameters`: see `szlib.control.crowding.list_barriers`."""
+        return list_barriers(self.level, self.zones, self.people, self.settings)
 
     def obstacle(self, row: int) -> tuple[Literal["person", "wall"], int]:
         """Kind and number of the person or wall of a `row` of `Step.h`."""

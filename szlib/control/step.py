@@ -11,8 +11,8 @@ import numpy as np
 from ..checks import Array
 from .crowding import count_near
 from .scene import Scene
-from .settings import TOLERANCE, Terminal
-from .step_report import Claims, ProblemRow, StepReport, verify_plan
+from .settings import TOLERANCE, Crowding, Terminal
+from .step_report import ProblemRow, StepReport, verify_plan
 
 Fallback = Literal["warm", "cold", "kept", "relaxed", "braking"]
 FALLBACKS: tuple[Fallback, ...] = get_args(Fallback)
@@ -139,12 +139,23 @@ class Step:
         between samples too (`Scene.smallest_gap`). People who turn, stop or speed up within a step may still
         cause h < 0 after a safe step (notebook 13 counts them); the next step then says so.
         """
-        if not self.feasible or self.unknown or (self.h < -TOLERANCE).any():
-            return False
+        return not self._find_danger()
+
+    def _find_danger(self) -> str:
+        """Why this step is not safe; "" if it is."""
+        if self.unknown:
+            return "the position of a person is unknown, so the robot comes to rest"
+        if self.scene.is_in_solid:
+            return "the robot is inside of a solid wall"
+        if (self.h < -TOLERANCE).any():
+            return f"the robot is already too close to {self._obstacle(int(np.argmin(self.h)))}"
+        if not self.feasible:
+            return "its plan is not feasible"
         if self.scene.level == "crowd" and min(self._h_after, default=0.0) < -TOLERANCE:
-            return False
+            return "it enters a zone, in a crowd"
         start, end = self.predicted[:2, :2].tolist()
-        return self.scene.smallest_gap(start, end, hypot(*self.control.tolist())) >= -TOLERANCE
+        gap = self.scene.smallest_gap(start, end, hypot(*self.control.tolist()))
+        return "" if gap >= -TOLERANCE else "its disc overlaps a body or a wall"
 
     @property
     def _h_after(self) -> list[float]:
@@ -154,8 +165,7 @@ class Step:
 
     def verify(self) -> StepReport:
         """Check this step again, by formulas that share no code with the controller."""
-        claims = Claims(self.h, self.residual, self.slack, self.feasible, self.safe)
-        return verify_plan(self.scene, self.predicted, self.control, claims)
+        return verify_plan(self)
 
     def __repr__(self) -> str:
         ax, ay = self.control.tolist()
@@ -165,16 +175,14 @@ class Step:
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified: what happened, and why no plan is feasible."""
         scene, s, (ax, ay) = self.scene, self.scene.settings, self.control.tolist()
-        report = self.verify()
-        verdict = "safe" if self.safe else f"not safe: {self._why_not_safe()}"
-        lines = [f"Step: {_MEANING[self.fallback]}; {verdict}"]
+        report, danger = self.verify(), self._find_danger()
+        lines = [f"Step: {_MEANING[self.fallback]}; {f'not safe: {danger}' if danger else 'safe'}"]
         lines.append(f"  control ({ax:.3g}, {ay:.3g}) m/s2 after {1e3 * self.solve_time:.2g} ms")
         if len(self.h):
             i = int(np.argmin(self.h))
             lines.append(f"  nearest is {self._obstacle(i)}: h = {self.h[i]:.3g} m")
         if s.crowding and scene.level != "alone":
-            near = count_near(scene.state, scene.people, s.crowding.radius)
-            lines.append(f"  {near} people are within {s.crowding.radius:g} m: {self._name_level()}")
+            lines.append(f"  {self._describe_crowd(s.crowding)}")
         if not self.feasible:
             lines.append(f"  the plan violates {self._name_row(report.worst)} by {report.slack:.2g}")
             lines.append(f"  what helps: {self._advise(report.worst)}")
@@ -200,24 +208,13 @@ class Step:
         names = " and ".join(self._obstacle(i) for i in holding.tolist()) or "no person and no wall"
         return f"{dist(self.scene.state[:2], self.scene.goal):.1f} m from the goal; held by {names}"
 
-    def _name_level(self) -> str:
-        s, inside = self.scene.settings, sum(h < -TOLERANCE for h in self._h_after[: len(self.scene.people)])
-        if self.scene.level == "few":
-            return "the decay of h has a price, h >= 0 is hard"
-        return f"in a crowd; {inside} zones overlap here, keeps {s.crowding.gap:g} m" if s.crowding else ""
-
-    def _why_not_safe(self) -> str:
-        if self.unknown:
-            return "the position of a person is unknown, so the robot comes to rest"
-        if self.scene.is_in_solid:
-            return "the robot is inside of a solid wall"
-        if (self.h < -TOLERANCE).any():
-            return f"the robot is already too close to {self._obstacle(int(np.argmin(self.h)))}"
-        if not self.feasible:
-            return "its plan is not feasible"
-        if min(self._h_after, default=0.0) < -TOLERANCE:
-            return "it enters a zone, in a crowd"
-        return "its disc overlaps a body or a wall"
+    def _describe_crowd(self, crowding: Crowding) -> str:
+        near = count_near(self.scene.state, self.scene.people, crowding.radius)
+        meaning = "a fast decay of h has a price, h >= 0 is hard"
+        if self.scene.level == "crowd":
+            inside = sum(h < -TOLERANCE for h in self._h_after[: len(self.scene.people)])
+            meaning = f"in a crowd; {inside} zones overlap here, keeps {crowding.gap:g} m"
+        return f"{near} people are within {crowding.radius:g} m: {meaning}"
 
     def _obstacle(self, i: int) -> str:
         """Name of the person or wall of row `i` of `h`."""

@@ -40,21 +40,6 @@ class ProblemRow(NamedTuple):
     value: float
 
 
-class Claims(NamedTuple):
-    """What a step claims of its plan: attributes of `Step` of the same names.
-
-    Attributes
-    ----------
-    h, residual, slack, feasible, safe : as of `Step`.
-    """
-
-    h: Array
-    residual: Array
-    slack: float
-    feasible: bool
-    safe: bool
-
-
 @dataclass(frozen=True)
 class StepReport:
     """What `Step.verify` found.
@@ -88,17 +73,10 @@ class StepReport:
         return not self.faults
 
 
-def verify_plan(scene: Scene, predicted: Array, control: Array, claims: Claims) -> StepReport:
-    """Check a plan and what is claimed of it.
-
-    Parameters
-    ----------
-    scene : what the step was asked.
-    predicted : states of the plan, shape (N+1, 4) [m, m/s].
-    control : the first acceleration, shape (2,) [m/s2].
-    claims : what the step claims.
-    """
-    s, x = scene.settings, np.asarray(predicted, float)
+def verify_plan(step: Any) -> StepReport:
+    """Check the plan of a `step` (a `Step`), and its claims: h, residual, slack, feasible and safe."""
+    scene: Scene = step.scene
+    s, x, control = scene.settings, np.asarray(step.predicted, float), step.control
     lengths, level = np.array(s.grid or [1] * s.N), _find_level(scene)
     dt, times = s.dt * lengths[:, None], s.dt * np.r_[0, np.cumsum(lengths)]
     u = np.diff(x[:, 2:], axis=0) / dt
@@ -123,9 +101,9 @@ def verify_plan(scene: Scene, predicted: Array, control: Array, claims: Claims) 
     size, scale = max(1.0, float(np.abs(x).max())), max(1.0, float(np.abs(h).max(initial=0.0)))
     differences = {
         "motion": float(max(np.abs(moved - x).max(), s.dt * np.abs(u[0] - control).max())),
-        "h": _differ(h[:, 0], claims.h),
-        "residual": _differ(residual, claims.residual),
-        "slack": abs(slack - claims.slack),
+        "h": _differ(h[:, 0], step.h),
+        "residual": _differ(residual, step.residual),
+        "slack": abs(slack - step.slack),
     }
     faults = [
         f"{name} differs by {value:.2g}"
@@ -135,11 +113,10 @@ def verify_plan(scene: Scene, predicted: Array, control: Array, claims: Claims) 
     if not beyond <= ROUNDING / s.dt * size:
         faults.append(f"an acceleration is {beyond:.2g} m/s2 beyond its bound")
     undecided = abs(slack - TOLERANCE) <= ROUNDING * scale
-    undecided |= _is_undecided(scene, path, min(min_h, gap), claims.safe)
-    if not undecided and (feasible, safe) != (claims.feasible, claims.safe):
-        faults.append(
-            f"the step says feasible {claims.feasible}, safe {claims.safe}; found {feasible}, {safe}"
-        )
+    claims = step.feasible, step.safe
+    undecided |= _is_undecided(scene, path, min(min_h, gap), claims[1])
+    if not undecided and (feasible, safe) != claims:
+        faults.append("the step says feasible {}, safe {}; found {}, {}".format(*claims, feasible, safe))
     return StepReport(tuple(faults), differences, beyond, worst, slack, min_h, gap, feasible, safe)
 
 

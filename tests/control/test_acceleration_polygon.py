@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 import szlib
-from szlib.control.acceleration_polygon import find_admissible_controls
+from szlib.control.acceleration_polygon import _residuals, find_admissible_controls
 from szlib.control.step import Step
 
 ZONE = szlib.Ellipse((0.05, 0.0), (0.97, 0.75))
@@ -83,3 +83,14 @@ def test_the_control_of_an_infeasible_plan_lies_outside_the_polygon() -> None:
     step = step_at([0.0, 0.0, 1.0, 0.0], szlib.Person((1.6, 0.0), (-0.5, 0.0)), [])
     assert not step.feasible
     assert not find_admissible_controls(step).polygon.covers(shapely.Point(step.control))
+
+
+@pytest.mark.parametrize("n_people", [1, 2, 4])
+def test_each_row_has_the_gamma_of_its_barrier_however_crowded_it_is(n_people: int) -> None:
+    crowding = szlib.control.Crowding(gamma=0.3)
+    settings = szlib.MPCSettings(gamma=0.05, crowding=crowding)
+    people = [szlib.Person((3.0, y), (-0.5, 0.0)) for y in (0.0, 1.5, -1.5, 2.5)[:n_people]]
+    step = szlib.MPCCBF(ZONE, walls=PASSAGE, settings=settings).step([0.0, 0.0, 0.5, 0.0], (6.0, 0.0), people)
+    assert step.scene.level == {1: "alone", 2: "few", 4: "crowd"}[n_people]
+    chosen = np.broadcast_to(step.control, (*step.residual.shape, 1, 2))
+    assert _residuals(step, chosen)[..., 0] == pytest.approx(step.residual, abs=1e-9)
