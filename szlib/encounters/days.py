@@ -24,15 +24,22 @@ import pandas as pd
 from tqdm import tqdm
 
 from ..errors import DataError, DataWarning, SzlibError
-from ..files import claim_folder
-from ..input_files import printable, unchanged_files
+from ..files import claim_folder, folder_purpose
+from ..input_files import printable, read_json_object, unchanged_files
 from ..parallel import run_tasks
 from ..tracks import datasets, funnels
 from ..tracks.options import ReadOptions
 from ..tracks.recordings import find_day, name_recordings
 from .areas import has_calendar
 from .geometry import Area
-from .one_day import describe_source, find_area, find_encounters_in_files, load_day, store_day
+from .one_day import (
+    describe_source,
+    find_area,
+    find_encounters_in_files,
+    load_day,
+    read_parameters,
+    store_day,
+)
 from .settings import EncounterSettings
 
 PURPOSE = "encounters by day"  # purpose of an extraction's folder, as its marker states it
@@ -53,6 +60,7 @@ class Extraction:
     sources : what the result of each finished day is made of: content, parameters and version.
     area : where encounters were searched, the same in every day; None where each recording has its own, or
         no day has one.
+    settings, options : what counted as an encounter, and how the files were read.
 
     Examples
     --------
@@ -69,6 +77,40 @@ class Extraction:
     exclude: tuple[str, ...] = ()
     sources: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     area: Area | None = None
+    settings: EncounterSettings = field(default_factory=EncounterSettings)
+    options: ReadOptions = field(default_factory=ReadOptions)
+
+    @classmethod
+    def load(cls, out: str | Path, *, exclude: Iterable[str] = ()) -> Extraction:
+        """Load the days that `extract_days` left in the folder `out`, but not those in `exclude`.
+
+        Raises
+        ------
+        DataError : the folder holds no extracted days, or they differ in settings or version; or none is
+            left, or a day is damaged.
+        """
+        folder, excluded = Path(out), sorted(map(str, exclude))
+        if folder_purpose(folder) != PURPOSE:
+            raise DataError(f"{folder}: holds no extracted days; expected a folder of `szlib extract`")
+        stored = {file.name.removesuffix(".parquet.json"): file for file in folder.glob("*.parquet.json")}
+        sources: dict[str, dict[str, Any]] = {}
+        for day in sorted(stored.keys() - set(excluded)):
+            sources[day] = read_json_object(stored[day]).get("made_of") or {}
+            if "parameters" not in sources[day]:
+                raise DataError(f"{stored[day]}: is damaged; extract the day again")
+        if not sources:
+            raise DataError(f"{folder}: no day is left; all of {', '.join(sorted(stored))} are excluded")
+        first = next(iter(sources))
+        made_by = [{**source, "files": None} for source in sources.values()]
+        if other := next((day for day, of in zip(sources, made_by, strict=True) if of != made_by[0]), None):
+            raise DataError(
+                f"{folder}: {other} was extracted with other settings than {first}, or another version; "
+                "extract all days again, or exclude it"
+            )
+        table = pd.DataFrame({"day": list(sources), "status": "kept"})
+        settings, options = read_parameters(sources[first]["parameters"])
+        area = settings.area if isinstance(settings.area, Area) else None
+        return cls(folder, table, tuple(excluded), sources, area, settings, options)
 
     @property
     def failed(self) -> pd.DataFrame:
@@ -193,7 +235,7 @@ def extract_days(
         )
         for day, of_day in included
     ]
-    with tqdm(total=len(tasks), unit="day", disable=not progress) as bar:
+    with tqdm(total=len(tasks), unit="day", disable=None if progress else True) as bar:
         for row in run_tasks(tasks, n_jobs=n_jobs):
             rows.append(row)
             bar.update()
@@ -201,8 +243,9 @@ def extract_days(
     sources = {row["day"]: row.pop("source") for row in rows}
     table = pd.DataFrame(rows).sort_values("day", ignore_index=True)
     is_one = shared == included or given.area == settings.area
-    area = settings.area if is_one and isinstance(settings.area, Area) else None
-    return Extraction(folder, table, excluded, sources, area)
+    settings = settings if is_one else given
+    area = settings.area if isinstance(settings.area, Area) else None
+    return Extraction(folder, table, excluded, sources, area, settings, options)
 
 
 def _group_by_day(files: Sequence[Path], options: ReadOptions) -> dict[str, list[str]]:

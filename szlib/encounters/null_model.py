@@ -127,7 +127,7 @@ def null_encounters(
     find = partial(_find_shifted, people, seed, minutes, r_max, settings, kinds)
     batches = [range(k, min(k + _TASK_SHIFTS, shifts)) for k in range(0, shifts, _TASK_SHIFTS)]
     found: dict[int, tuple[pd.DataFrame, pd.DataFrame]] = {}
-    with tqdm(total=shifts, unit="shift", disable=not progress) as bar:
+    with tqdm(total=shifts, unit="shift", disable=None if progress else True) as bar:
         for part in run_tasks([joblib.delayed(find)(batch) for batch in batches], n_jobs=n_jobs):
             found |= part
             bar.update(len(part))

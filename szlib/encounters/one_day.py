@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from ..tracks.formats import find_format
 from ..tracks.options import ReadOptions
 from .areas import AUTO, area_for, as_area, place_apart
 from .finding import find_encounters
-from .geometry import Area, Region, Square
+from .geometry import Area, AttentionalSpace, Region, Square
 from .near_rows import read_near_area, select_near_rows
 from .samples import no_samples
 from .settings import EncounterSettings
@@ -162,6 +162,16 @@ def describe_source(
     content = sorted([Path(file).name, *file_content(Path(file))] for file in files)
     parameters = settings.as_json() | asdict(options)
     return {"version": _VERSION, "szlib": __version__, "files": content, "parameters": parameters}
+
+
+def read_parameters(parameters: Mapping[str, Any]) -> tuple[EncounterSettings, ReadOptions]:
+    """Settings and options from the `parameters` of `describe_source`; a missing one has its default."""
+    values = {**parameters, "space": AttentionalSpace(**parameters["space"])}
+    settings, options = (
+        {each.name: values[each.name] for each in fields(kind) if each.name in values}
+        for kind in (EncounterSettings, ReadOptions)
+    )
+    return EncounterSettings(**settings), ReadOptions(**options)
 
 
 def store_day(folder: Path, day: str, samples: pd.DataFrame, source: Mapping[str, Any]) -> None:

@@ -120,7 +120,7 @@ def rollouts(
     chunks = [range(first, min(first + CHUNK_SIZE, seed + n)) for first in range(seed, seed + n, CHUNK_SIZE)]
     tasks = [delayed(run_chunk)(setup, chunk, folder) for chunk in chunks]
     tables: list[pd.DataFrame] = []
-    with tqdm(total=n, unit="world", disable=not progress) as bar:
+    with tqdm(total=n, unit="world", disable=None if progress else True) as bar:
         for table in run_tasks(tasks, n_jobs=n_jobs):
             tables.append(table)
             bar.update(len(table))

@@ -120,6 +120,17 @@ def build_parser() -> argparse.ArgumentParser:
     extract.add_argument("-j", "--jobs", type=_job_count, default=1, metavar="N", help=text["jobs"])
     extract.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help=text["exclude"])
     extract.set_defaults(command=_extract)
+
+    text = texts["fit"]
+    fit = commands.add_parser("fit", help=text["summary"], parents=[data])
+    fit.add_argument("data", nargs="+", metavar="DAYS", help=text["data"])
+    fit.add_argument("--out", default="zone.json", metavar="FILE", help=text["out"])
+    fit.add_argument("--method", choices=("quantile", "paper", "hull", "respect"), help=text["method"])
+    fit.add_argument("--kind", nargs="+", metavar="KIND", help=text["kind"])
+    fit.add_argument("--tracks", nargs="+", default=[], metavar="PATH", help=text["tracks"])
+    fit.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help=text["exclude"])
+    fit.add_argument("-j", "--jobs", type=_job_count, default=1, metavar="N", help=text["jobs"])
+    fit.set_defaults(command=_fit)
     return parser
 
 
@@ -234,6 +245,20 @@ def _extract(options: argparse.Namespace) -> int:
         )  # fmt: skip
     print(extraction)
     return 1 if len(extraction.failed) else 0
+
+
+def _fit(options: argparse.Namespace) -> int:
+    """Fit a zone to extracted days or tracks."""
+    from ..encounters.settings import EncounterSettings
+    from ..tracks.options import ReadOptions
+    from .fit_command import fit
+
+    settings = EncounterSettings(area=options.area, has_walls=options.walls)
+    reading = ReadOptions()
+    names = ("out", "method", "kind", "tracks", "exclude", "jobs")
+    given = {name: getattr(options, name) for name in names}
+    print(fit(options.data, settings=settings, reading=reading, **given))
+    return 0
 
 
 def _require_workbook_packages() -> None:

@@ -197,7 +197,7 @@ def _execute_all(
         }
     not_started = {"status": "not started", "seconds": 0.0, **EMPTY_RECORD}
     outcomes = {script.stem: not_started for script in scripts}
-    bar = tqdm(total=len(scripts), unit="notebook", desc=home.name)
+    bar = tqdm(total=len(scripts), unit="notebook", desc=home.name, disable=None)
     futures: list[Future[Any]] = []
     with bar, cluster(scheduler) as client, _open_executor(client, jobs, futures) as executor:
         for batch in split_batches(scripts):

@@ -385,3 +385,31 @@ def test_another_backend_of_joblib_gives_the_same_result(
     with joblib.parallel_config("threading"):
         extract(days, tmp_path, n_jobs=2)
     assert contents(tmp_path) == reference
+
+
+def test_extraction_is_loaded_from_its_folder(days: list[Path], tmp_path: Path) -> None:
+    made = extract(days, tmp_path / "out", min_speed=0.5, max_gap=0.7)
+    loaded = szlib.Extraction.load(tmp_path / "out")
+    pd.testing.assert_frame_equal(loaded.samples(), made.samples(), check_exact=True)
+    assert list(loaded.table["day"]) == list(DATES) and loaded.area == made.area
+    assert loaded.settings == szlib.EncounterSettings(area=made.area, min_speed=0.5)
+    assert loaded.options == szlib.ReadOptions(max_gap=0.7)
+    some = szlib.Extraction.load(tmp_path / "out", exclude=DATES[:3])
+    assert set(some.samples()["day"]) == {DATES[3]}
+
+
+def test_folder_without_extracted_days_is_refused(days: list[Path], tmp_path: Path) -> None:
+    with pytest.raises(szlib.DataError, match="holds no extracted days"):
+        szlib.Extraction.load(tmp_path)
+    extract(days[:1], tmp_path / "out")
+    (tmp_path / "out" / f"{DATES[0]}.parquet.json").write_text("{")
+    with pytest.raises(szlib.DataError, match=rf"{DATES[0]}.parquet.json: is damaged; extract the day again"):
+        szlib.Extraction.load(tmp_path / "out")
+
+
+def test_days_of_different_settings_are_not_mixed(days: list[Path], tmp_path: Path) -> None:
+    extract(days[:1], tmp_path / "out", min_speed=0.5)
+    extract(days[1:2], tmp_path / "out", min_speed=0.6)
+    message = f"{DATES[1]} was extracted with other settings than {DATES[0]}"
+    with pytest.raises(szlib.DataError, match=message):
+        szlib.Extraction.load(tmp_path / "out")

@@ -18,6 +18,7 @@ from ...encounters.areas import as_area, place_apart
 from ...encounters.finding import find_encounters
 from ...encounters.geometry import Area
 from ...encounters.null_model import NullEncounters, null_encounters
+from ...encounters.settings import EncounterSettings
 from ...errors import DataError, ZoneError
 from ...files import load_cached, store_cached, write_checksum
 from ...input_files import file_content, printable, unchanged_files
@@ -150,18 +151,13 @@ class DataCache:
     def null_model(self, few_shifts: int = FEW_SHIFTS) -> NullEncounters | None:
         """The null model of the data; None, and a message, where the data is too short for one.
 
-        It has `NULL_SHIFTS` shifts, or `few_shifts` where the data has `MANY_ENCOUNTERS` or more.
+        See `find_null_model` for its shifts, `few_shifts` where the data has many encounters.
         """
-        tracks, n_encounters = self.tracks(), self.encounters()["encounter"].nunique()
+        tracks = self.tracks()
         settings = self.method.encounter_settings(self.find_area(tracks))
-        shifts = NULL_SHIFTS if n_encounters < MANY_ENCOUNTERS else few_shifts
-        try:
-            return null_encounters(
-                tracks, settings=settings, shifts=shifts, r_max=self.method.r_max, progress=False
-            )
-        except DataError as error:
-            print(f"The zone is not tested against a null model: {error}")
-            return None
+        return find_null_model(
+            tracks, self.encounters(), settings, few_shifts=few_shifts, r_max=self.method.r_max
+        )
 
     def ellipse(self) -> Ellipse:
         """The ellipse that the robot keeps out of: the zone at `zone_speed`, in the person's frame."""
@@ -207,6 +203,27 @@ class DataCache:
     def _zone_source(self) -> dict[str, Any]:
         """What the zone is made from."""
         return self._source() | {"fit": self.method.fit_options()}
+
+
+def find_null_model(
+    tracks: pd.DataFrame,
+    samples: pd.DataFrame,
+    settings: EncounterSettings,
+    *,
+    few_shifts: int = FEW_SHIFTS,
+    **options: Any,
+) -> NullEncounters | None:
+    """The null model of `tracks`; None, and a message, where they are too short for one.
+
+    It has `NULL_SHIFTS` shifts, or `few_shifts` where the `samples` are of `MANY_ENCOUNTERS` or more.
+    `settings` and `options` are as for `szlib.null_encounters`.
+    """
+    shifts = NULL_SHIFTS if samples["encounter"].nunique() < MANY_ENCOUNTERS else few_shifts
+    try:
+        return null_encounters(tracks, settings=settings, shifts=shifts, **{"progress": False, **options})
+    except DataError as error:
+        print(f"The zone is not tested against a null model: {error}")
+        return None
 
 
 def describe_missing_data(file: Path) -> str:

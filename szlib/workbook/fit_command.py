@@ -1,0 +1,135 @@
+"""The command `szlib fit`: from extracted days, or tracks, to a zone with its table, verdict and figure."""
+
+from __future__ import annotations
+
+import io
+import os
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+
+from ..control.settings import MPCSettings
+from ..encounters.areas import AUTO
+from ..encounters.days import PURPOSE, Extraction
+from ..encounters.finding import find_encounters
+from ..encounters.kinds import of_kind
+from ..encounters.one_day import FEW_ENCOUNTERS, known_area, relax_conditions, require_encounters
+from ..encounters.settings import EncounterSettings
+from ..errors import DataError, DataWarning, StorageError, ZoneError
+from ..files import folder_purpose, write_file
+from ..input_files import file_content, printable, read_json_object
+from ..tracks import datasets
+from ..tracks.clock import read_tracks
+from ..tracks.options import ReadOptions
+from ..zones.outliers import R_MAX
+from ..zones.social_zone import SocialZone
+from ..zones.uncertainty import N_RESAMPLES
+from ..zones.verdict import describe_missing_encounters
+from ..zones.zone_file import FORMAT
+from .record.data_cache import find_null_model
+
+SPEED = MPCSettings.zone_speed  # of the zone that is drawn and judged [m/s]
+NO_TRACKS = (
+    "no null model: extracted days hold no tracks; add --tracks FILE... (those of one day are enough) to "
+    "compare with people who ignore each other"
+)
+
+
+def fit(
+    paths: Sequence[str],
+    *,
+    out: str | Path,
+    settings: EncounterSettings,
+    reading: ReadOptions,
+    method: str | None = None,
+    kind: Sequence[str] | None = None,
+    tracks: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    jobs: int = 1,
+) -> str:
+    """Fit a zone, write it and its figure, and return its table and verdict as text.
+
+    Parameters
+    ----------
+    paths : a folder of extracted days, or files of tracks.
+    out : the file of the zone; its figure has the same name, with .png.
+    settings, reading : what counts as an encounter and how files are read; extracted days have their own.
+    method, kind : as `method` of `szlib.SocialZone.fit`, and as `szlib.of_kind`.
+    tracks : tracks of extracted days, for the null model.
+    exclude : extracted days to leave out.
+    jobs : processes for the null model.
+
+    Raises
+    ------
+    DataError : the paths are neither, or hold no encounters; or tracks are of other days.
+    StorageError : the zone cannot be written there.
+    ZoneError : there are too few encounters for a zone.
+    """
+    from matplotlib.figure import Figure
+
+    file = _require_place(Path(out))
+    if any(folder_purpose(path) == PURPOSE for path in paths):
+        if len(paths) > 1:
+            raise DataError(f"{' '.join(paths)}: give one folder of extracted days, or files of tracks")
+        days = Extraction.load(paths[0], exclude=exclude)
+        samples, settings, reading = days.samples(), days.settings, days.options
+        of_days = [list(content) for source in days.sources.values() for content in source["files"]]
+        files = datasets.find(tracks) if tracks else []
+        if other := [each for each in files if [each.name, *file_content(each)] not in of_days]:
+            raise DataError(f"{printable(other[0])}: is none of the files of the extracted days, unchanged")
+        table = read_tracks(files, options=reading) if files else None
+    else:
+        for name in [name for name, given in (("tracks", tracks), ("exclude", exclude)) if given]:
+            raise DataError(f"--{name} belongs to a folder of extracted days; {paths[0]} is none")
+        files = datasets.find(paths)
+        settings = replace(settings, area=known_area(settings, files, reading) or AUTO)
+        table = read_tracks(files, options=reading)
+        samples = find_encounters(table, settings=settings)
+        is_small = "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS
+        require_encounters(samples, relax_conditions(samples, table, settings) if is_small else "")
+    samples, null = of_kind(samples, kind), None
+    if table is not None:
+        null = find_null_model(table, samples, settings, r_max=R_MAX, kinds=kind, n_jobs=jobs, progress=True)
+    elif method == "respect":
+        raise DataError(f"method respect needs a null model; {NO_TRACKS}")
+    try:
+        with warnings.catch_warnings(action="ignore", category=DataWarning):  # the verdicts say the same
+            zone = SocialZone.fit(samples, method=method, null=null, n_resamples=N_RESAMPLES)
+    except (ZoneError, DataError) as error:
+        missing = describe_missing_encounters({"encounters": samples["encounter"].nunique()})
+        raise ZoneError("; ".join(filter(None, [str(error), missing]))) from error
+    figure, content = Figure(figsize=(6, 4.5), layout="constrained"), io.BytesIO()
+    zone.plot(SPEED if SPEED in zone.ellipses else None, ax=figure.subplots())
+    figure.savefig(content, format="png", dpi=150)
+    zone.save(file)
+    write_file(picture := file.with_suffix(".png"), content.getvalue())
+    notes = [f"zone: {printable(file)}; figure: {printable(picture)}"]
+    notes += [] if table is not None else [NO_TRACKS]
+    verdict = f"zone at {SPEED:g} m/s: {zone.verdict(SPEED).sentence}"
+    return "\n".join([format_zone(zone), *notes, verdict])
+
+
+def format_zone(zone: SocialZone) -> str:
+    """Format the semi-axes of a `zone` with their intervals, and its verdicts: one line for each speed."""
+    table = zone.table()
+    shown = pd.DataFrame({"speed [m/s]": table["speed"].map("{:g}".format)})
+    for name in ("a", "b"):
+        rows = table[[name, f"{name}_low", f"{name}_high"]].itertuples(index=False)
+        shown[f"{name} [m] (95 %)"] = [f"{v:.2f} ({low:.2f} to {high:.2f})" for v, low, high in rows]
+    shown["encounters"] = table["encounters"].map("{:,.0f}".format)
+    lines = shown.assign(verdict=table["verdict"]).to_string(index=False)
+    return f"method {zone.method}\n{lines.replace('(nan to nan)', '   (unknown)')}"
+
+
+def _require_place(file: Path) -> Path:
+    """The `file`, if a zone can be written there: before hours of work, not after them."""
+    if file.suffix != ".json":
+        raise StorageError(f"{printable(file)}: expected a file that ends in .json")
+    if not file.parent.is_dir() or not os.access(file.parent, os.W_OK):
+        raise StorageError(f"{printable(file.parent)}: is no folder that can be written; choose another one")
+    if file.exists() and read_json_object(file).get("format") != FORMAT:
+        raise StorageError(f"{printable(file)}: exists, and is no zone of szlib; choose another name")
+    return file

@@ -1,0 +1,145 @@
+"""`szlib fit`: from extracted days, or tracks, to a zone with its table, verdict and figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from helpers.faulty_disk import FaultyDisk
+
+import szlib
+from szlib.workbook import fit_command
+from szlib.workbook.cli import main
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A day with enough encounters for a zone, and its extraction beside it, in `days`."""
+    folder = tmp_path_factory.mktemp("recording")
+    plaza = szlib.PlazaSettings(n_encounters=700, date="2012-10-24")
+    path = szlib.make_plaza(folder / "atc-20121024.csv", settings=plaza)
+    szlib.extract_days(path, out=folder / "days", progress=False)
+    return path
+
+
+@pytest.fixture(autouse=True)
+def few_shifts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer shifts of the null model than a user gets: the most expensive part of `szlib fit`."""
+    monkeypatch.setattr(fit_command, "N_RESAMPLES", 20)
+    monkeypatch.setattr("szlib.workbook.record.data_cache.NULL_SHIFTS", 3)
+
+
+def fit(*arguments: object) -> int:
+    return main(["fit", *map(str, arguments)])
+
+
+def test_zone_from_tracks_is_that_of_the_library(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "zone.json"
+    assert fit(recording, "--out", out) == 0
+    printed, zone = capsys.readouterr().out, szlib.SocialZone.load(out)
+    tracks = szlib.read_tracks(recording)
+    null = szlib.null_encounters(tracks, shifts=3, progress=False)
+    expected = szlib.SocialZone.fit(szlib.find_encounters(tracks), null=null, n_resamples=20)
+    assert zone.ellipses == expected.ellipses
+    assert zone.null_test == expected.null_test and zone.null_test is not None
+    assert printed.splitlines()[-1] == f"zone at 1.1 m/s: {zone.verdict(1.1).sentence}"
+    rows = [line.split() for line in printed.splitlines()[2:8]]
+    assert [float(row[0]) for row in rows] == list(zone.ellipses)
+    assert [float(row[1]) for row in rows] == [round(e.semi_axes[0], 2) for e in zone.ellipses.values()]
+    assert {" ".join(row[10:]) for row in rows} == {str(zone.verdict(speed)) for speed in zone.ellipses}
+    assert (tmp_path / "zone.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_extracted_days_have_no_null_model_until_their_tracks_are_given(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    days, out = recording.with_name("days"), tmp_path / "zone.json"
+    assert fit(days, "--out", out, "--method", "quantile") == 0
+    assert szlib.SocialZone.load(out).null_test is None
+    printed = capsys.readouterr().out
+    assert "no null model: extracted days hold no tracks; add --tracks FILE" in printed
+    assert fit(days, "--out", out, "--method", "quantile", "--tracks", recording) == 0
+    zone = szlib.SocialZone.load(out)
+    assert zone.null_test is not None and zone.null_test.n_shifts == 3
+    assert "no null model" not in capsys.readouterr().out
+
+
+def test_kinds_are_those_of_the_library(recording: Path, tmp_path: Path) -> None:
+    days, out = recording.with_name("days"), tmp_path / "zone.json"
+    assert fit(days, "--out", out, "--kind", "opposite", "crossing") == 0
+    samples = szlib.Extraction.load(days).samples()
+    expected = szlib.SocialZone.fit(szlib.of_kind(samples, ["opposite", "crossing"]), n_resamples=20)
+    assert szlib.SocialZone.load(out).ellipses == expected.ellipses
+
+
+def test_excluded_day_is_not_fitted(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    arguments = [recording.with_name("days"), "--out", tmp_path / "zone.json", "--exclude", "2012-10-24"]
+    assert fit(*arguments) == 2
+    assert "no day is left; all of 2012-10-24 are excluded" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["{days}", "--method", "respect"],
+            "method respect needs a null model; no null model",
+        ),
+        (["{days}", "--kind", "friends"], "unknown kinds ['friends']"),
+        (["{days}", "--out", "{day}"], "atc-20121024.csv: expected a file that ends in .json"),
+        (["{days}", "--out", "{folder}/other.json"], "other.json: exists, and is no zone of szlib"),
+        (["{days}", "--out", "{folder}/nowhere/zone.json"], "nowhere: is no folder that can be written"),
+        (["{days}", "--out", "{day}/zone.json"], "atc-20121024.csv: is no folder that can be written"),
+        (["{days}", "{day}"], "atc-20121024.csv: give one folder of extracted days, or files of tracks"),
+        (["{days}", "--tracks", "{other}"], "other.csv: is none of the files of the extracted days"),
+        (["{day}", "--tracks", "{day}"], "--tracks belongs to a folder of extracted days"),
+        (["{missing}"], "missing.csv: no such file"),
+        (["{day}", "--exclude", "2012-10-24"], "--exclude belongs to a folder of extracted days"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_at_once(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    (tmp_path / "other.json").write_text("{}")
+    (tmp_path / "other.csv").write_text("t,id,x,y\n0,1,0,0\n")
+    names = {
+        "days": recording.with_name("days"), "day": recording, "folder": tmp_path,
+        "other": tmp_path / "other.csv", "missing": tmp_path / "missing.csv",
+    }  # fmt: skip
+    before = recording.read_bytes()
+    given = [text.format_map(names) for text in arguments]
+    assert fit("--out", tmp_path / "zone.json", *given) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+    assert recording.read_bytes() == before and not (tmp_path / "zone.json").exists()
+
+
+def test_too_few_encounters_are_said_with_what_is_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    day = szlib.make_plaza(tmp_path / "few.csv", settings=szlib.PlazaSettings(n_encounters=1))
+    assert fit(day, "--out", tmp_path / "zone.json") == 2
+    assert "encounters were found, 600 are needed" in capsys.readouterr().err
+    assert not (tmp_path / "zone.json").exists()
+
+
+def test_damaged_day_is_named(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    szlib.extract_days(recording, out=tmp_path / "days", progress=False)
+    file = tmp_path / "days" / "2012-10-24.parquet"
+    file.write_bytes(file.read_bytes()[:-9])
+    assert fit(tmp_path / "days", "--out", tmp_path / "zone.json") == 2
+    assert "2012-10-24.parquet: is not the result of this extraction" in capsys.readouterr().err
+
+
+def test_a_full_disk_leaves_the_earlier_zone(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    days, out = recording.with_name("days"), tmp_path / "zone.json"
+    assert fit(days, "--out", out) == 0
+    before = out.read_bytes()
+    with FaultyDisk(failing=0):
+        assert fit(days, "--out", out, "--kind", "strangers") == 2
+    assert "cannot write the zone" in capsys.readouterr().err
+    assert out.read_bytes() == before
