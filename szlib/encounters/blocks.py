@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import polars as pl
 
@@ -23,6 +24,7 @@ class UsableBlocks:
     ----------
     scan : scan of the file.
     layout : its format.
+    plain : the unpacked file, for messages.
     n_usable : number of usable rows so far.
     farthest : their largest absolute coordinate [unit of the file].
     reasons : number of the other rows by reason.
@@ -31,6 +33,7 @@ class UsableBlocks:
 
     scan: pl.LazyFrame
     layout: TrackFormat
+    plain: Path | None = None
     n_usable: int = 0
     farthest: float = 0.0
     reasons: Counter[str] = field(default_factory=Counter)
@@ -42,7 +45,9 @@ class UsableBlocks:
             0,
         )  # line numbers of the scan take long
         for block in columns.collect_batches(chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming"):
-            good, reasons, first = reject_rows(block.with_row_index("line", offset=read + 1), self.layout)
+            good, reasons, first = reject_rows(
+                block.with_row_index("line", offset=read + 1), self.layout, self.plain
+            )
             read += block.height
             self.reasons.update(reasons)
             self.first_fault = self.first_fault or first

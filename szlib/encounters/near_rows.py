@@ -17,7 +17,7 @@ import polars as pl
 from .. import memory
 from ..tracks import funnels
 from ..tracks.clock import TICKS_PER_SECOND, VELOCITY_SPAN
-from ..tracks.formats import TrackFormat, open_file
+from ..tracks.formats import TrackFormat, find_format, open_file
 from ..tracks.options import ReadOptions
 from ..tracks.plausibility import check_unit
 from ..tracks.readers import merge, order_by_person, read_raw, read_stage
@@ -88,21 +88,20 @@ def read_near_area(
     options = options or ReadOptions()
     files = [Path(paths)] if isinstance(paths, str | Path) else list(paths)
     path = files[0]
-    if area is not None and len(files) == 1 and path.is_file():
-        with open_file(path, options) as (layout, scan, _):
-            if layout.is_streamed:
-                max_gap = options.max_gap or layout.max_gap or 0.0
-                cells = Cells(area.grown(REACH).box, duration, max_gap, layout.metres)
-                with suppress(UnsortedError):
-                    blocks, parts, n_near = UsableBlocks(scan, layout), [], 0
-                    for rows in select_near(cells, blocks):
-                        parts.append(rows)
-                        n_near += rows.height
-                        what = f"{path}: to hold {n_near:,} rows near the area, or more,"
-                        memory.require(n_near * _ROW_BYTES, what)
-                    near = pl.concat(parts, rechunk=True)
-                    near = near[order_by_person(near["id"].to_numpy())]
-                    return _as_table(near, blocks, path, layout, options)
+    if area is not None and len(files) == 1 and path.is_file() and find_format(path, options).is_streamed:
+        with open_file(path, options) as (layout, scan, plain), suppress(UnsortedError):
+            max_gap = options.max_gap or layout.max_gap or 0.0
+            cells = Cells(area.grown(REACH).box, duration, max_gap, layout.metres)
+            blocks, parts, n_near = UsableBlocks(scan, layout, plain), [], 0
+            for rows in select_near(cells, blocks):
+                parts.append(rows)
+                n_near += rows.height
+                memory.require(
+                    n_near * _ROW_BYTES, f"{path}: to hold {n_near:,} rows near the area, or more,"
+                )
+            near = pl.concat(parts, rechunk=True)
+            near = near[order_by_person(near["id"].to_numpy())]
+            return _as_table(near, blocks, path, layout, options)
     return read_raw(files, options=options)
 
 
@@ -111,7 +110,7 @@ def _as_table(
 ) -> pd.DataFrame:
     """The rows as a table as from `read_raw`, with the funnel of the whole file."""
     stage = read_stage(path, layout, blocks.n_usable, dict(blocks.reasons), blocks.first_fault)
-    if options.unit is None:
+    if options.metres is None:
         check_unit(pl.DataFrame({"x": [blocks.farthest], "y": [0.0]}), layout, path)
     far = {"never near the area": blocks.n_usable - near.height}
     stages = [stage, funnels.stage("near the area", blocks.n_usable, near.height, far)]

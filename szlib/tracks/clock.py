@@ -54,6 +54,7 @@ def read_tracks(
     exclude: Iterable[str] = (),
     file_format: str | None = None,
     unit: str | None = None,
+    scale: float | None = None,
     frame_rate: float | None = None,
     columns: Columns | None = None,
     max_gap: float | None = None,
@@ -63,13 +64,14 @@ def read_tracks(
 
     Parameters
     ----------
-    paths : a file, or several, plain or .gz: ATC raw, ATC 1 Hz, EWAP obsmat, tidy CSV or Parquet; by PedPy's
-        loaders texts and HDF5 of Juelich's archive, Viswalk, Vadere, JuPedSim (extra `pedpy`).  Or tables: a
-        pandas DataFrame, PedPy's TrajectoryData.
+    paths : a file, or several, plain or .gz: a table as text, Parquet, Feather or SQLite; ATC raw, ATC 1 Hz,
+        EWAP obsmat, UCY's vsp, TrajNet++, THOR-MAGNI, Pathfinder's JSON; by PedPy's loaders texts and HDF5 of
+        Juelich's archive, Viswalk, Vadere, JuPedSim (extra `pedpy`).  Or tables: of pandas, Polars, Arrow,
+        GeoPandas, MovingPandas, PedPy's TrajectoryData.
     options : how files are read; None takes the defaults.
     exclude : days "YYYY-MM-DD" to leave out, as event days were left out in the paper (sec. 2).
-    file_format, unit, frame_rate, columns, max_gap, tz : each as in `szlib.ReadOptions`; a value given here
-        replaces that of `options`.
+    file_format, unit, scale, frame_rate, columns, max_gap, tz : each as in `szlib.ReadOptions`; a value
+        given here replaces that of `options`.
 
     Returns
     -------
@@ -89,8 +91,8 @@ def read_tracks(
     (['day', 'id', 't', 'x', 'y', 'vx', 'vy'], 41)
     """
     given = {
-        "file_format": file_format, "unit": unit, "frame_rate": frame_rate, "columns": columns,
-        "max_gap": max_gap, "tz": tz,
+        "file_format": file_format, "unit": unit, "scale": scale, "frame_rate": frame_rate,
+        "columns": columns, "max_gap": max_gap, "tz": tz,
     }  # fmt: skip
     changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     options = replace(options or ReadOptions(), **changes)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 from zoneinfo import ZoneInfo
 
 import polars as pl
@@ -17,11 +20,17 @@ COLUMN_NAMES = ("t", "id", "x", "y", "frame", "day")  # what a column can hold
 # Formats of files that szlib reads.
 FORMAT_NAMES = (
     "atc-raw", "atc-1hz", "ewap", "tidy",
-    "juelich-text", "juelich-hdf5", "viswalk", "vadere", "jupedsim",
+    "juelich-text", "juelich-hdf5", "viswalk", "vadere", "jupedsim", "pathfinder",
+    "vsp", "trajnet", "magni",
 )  # fmt: skip
 FRAME_RATES = (1.0, 240.0)  # lowest and highest number of frames a second that a video can have
+_FASTEST_COUNT = 1e9  # highest frame rate [1/s]: what counts time may count nanoseconds
+FRAMES = 25.0  # a usual frame rate [1/s], for suggestions
 SHORTEST_GAP = 0.1  # one step of the common clock [s]; a track cannot end after a shorter gap
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # metres in a unit of position
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048}  # metres in a unit of position
+# Environment variable of the command that reads files, such as "szlib inspect hall.csv"; unset in a program.
+COMMAND_VARIABLE = "SZLIB_COMMAND"
+_LONGEST_COMMAND = 400  # a longer one, of many files, is not repeated
 
 
 @dataclass(frozen=True)
@@ -31,19 +40,22 @@ class ReadOptions:
     Attributes
     ----------
     file_format : one of `FORMAT_NAMES`; None recognises the format by the content of the file.
-    unit : unit of the positions, "m", "cm" or "mm"; None takes the format's.  The speeds and the extent of
-        the tracks are checked: a given unit that cannot be right is a warning, an assumed one an error.
-    frame_rate : frames a second, where `columns` (or a table without t) name a column frame.  EWAP files:
-        None estimates it from their velocities (15 for the ETH sequence, 25 for hotel, zara and students).
-        The funnel states the rate.  An unusual rate is a warning; an uncertain one is an error.
+    unit : unit of the positions, "m", "cm", "mm" or "ft"; None takes that of the format, or of the names of
+        the columns ("x [mm]").  The speeds and the extent of the tracks are checked: a given unit that cannot
+        be right is a warning, an assumed one an error.
+    scale : metres in one unit of position, such as 0.02 for pixels of 2 cm, in place of `unit`.
+    frame_rate : frames a second (1000 for milliseconds), where `columns` or a table name a column frame.
+        EWAP files: None estimates it from their velocities (15 for the ETH sequence, 25 for hotel, zara and
+        students).  The funnel states the rate.  An unusual rate is a warning; an uncertain one is an error.
     columns : the column of a table, CSV or Parquet file that holds each quantity, such as {"frame": "Frame",
         "id": "ped", "x": "X", "y": "Y"}: a name, or the number of the field from 0 where the file has no
-        header.  Times are in column t [s] (in a DataFrame or Parquet file also as datetimes), or counted in
-        column frame.
+        header.  Others are found by usual names in several languages (`szlib.tracks.formats.columns`).  Times
+        are in column t: seconds, dates with times (ISO 8601), or milliseconds and less since 1970; or they
+        are counted in column frame.  Ids may be text; each text has the same number in every file.
     max_gap : a longer gap between two samples ends a track [s], more than 0.1; None takes the format's (ATC
         raw 0.5, ATC 1 Hz 1.6; EWAP 2.25 sampling intervals; tidy 4 of them, at least 0.5 and at most 5).
-    tz : time zone whose calendar gives the day of a time stamp, and of times without a zone; None takes the
-        format's (ATC: Asia/Tokyo; others: UTC).
+    tz : time zone whose calendar gives the day of a time stamp, and of times without a zone; None takes that
+        of the file's times, else UTC (ATC: Asia/Tokyo).
 
     Raises
     ------
@@ -58,11 +70,12 @@ class ReadOptions:
     >>> szlib.ReadOptions(unit="feet")
     Traceback (most recent call last):
     ...
-    szlib.errors.DataError: unit must be one of ['m', 'cm', 'mm']; got 'feet'
+    szlib.errors.DataError: unit must be one of ['m', 'cm', 'mm', 'ft']; got 'feet'
     """
 
     file_format: str | None = None
     unit: str | None = None
+    scale: float | None = None
     frame_rate: float | None = None
     columns: Columns | None = None
     max_gap: float | None = None
@@ -70,12 +83,15 @@ class ReadOptions:
 
     def __post_init__(self) -> None:
         rate, gap = self.frame_rate, self.max_gap
-        lowest, highest = FRAME_RATES
         is_known = self.file_format in (None, *FORMAT_NAMES)
         require(is_known, "file_format", self.file_format, f"one of {list(FORMAT_NAMES)}")
         require(self.unit in (None, *UNITS), "unit", self.unit, f"one of {list(UNITS)}")
-        is_possible = rate is None or lowest <= rate <= highest
-        require(is_possible, "frame_rate", rate, f"frames a second from {lowest:g} to {highest:g}")
+        is_length = self.scale is None or 0 < self.scale <= 1e3
+        require(is_length, "scale", self.scale, "metres in one unit of position, more than 0")
+        if self.unit and self.scale:
+            raise DataError("both unit and scale are given; expected one of them")
+        is_possible = rate is None or 1 <= rate <= _FASTEST_COUNT
+        require(is_possible, "frame_rate", rate, f"frames a second from 1 to {_FASTEST_COUNT:g}")
         if unknown := sorted(set(self.columns or ()) - set(COLUMN_NAMES)):
             raise DataError(f"columns: {unknown} are unknown; expected some of {list(COLUMN_NAMES)}")
         if {"t", "frame"} <= set(self.columns or ()):
@@ -91,3 +107,43 @@ class ReadOptions:
             pl.select(pl.from_epoch(pl.lit(0)).dt.convert_time_zone(zone))
         except (KeyError, ValueError, OSError, pl.exceptions.PolarsError) as error:
             raise DataError(f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'") from error
+
+    @property
+    def metres(self) -> float | None:
+        """Metres in one unit of position; None where neither unit nor scale is given."""
+        return UNITS[self.unit] if self.unit else self.scale
+
+    def as_json(self) -> dict[str, Any]:
+        """The options that are given, as JSON values: ``ReadOptions(**options.as_json())`` is the same."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+
+def arguments(options: Mapping[str, Any]) -> str:
+    """The `options` of a `ReadOptions`, by name, as the command line takes them.
+
+    Examples
+    --------
+    >>> from szlib.tracks.options import arguments
+    >>> arguments({"columns": {"t": "Zeit", "id": "Person"}, "file_format": "tidy"})
+    '--columns t=Zeit,id=Person --format tidy'
+    """
+    words = []
+    for name, value in options.items():
+        is_columns = isinstance(value, Mapping)
+        text = (
+            ",".join(f"{key}={column}" for key, column in value.items())
+            if is_columns
+            else f"{value:g}"
+            if isinstance(value, float)
+            else value
+        )
+        words += ["--" + name.removeprefix("file_").replace("_", "-"), text]
+    return shlex.join(words)
+
+
+def advise(**options: Any) -> str:
+    """Advice to read again with `options`: as arguments, or from a shell as the whole command."""
+    if command := os.environ.get(COMMAND_VARIABLE):
+        command = command if len(command) <= _LONGEST_COMMAND else "the same command with"
+        return f"try: {command} {arguments(options)}"
+    return "pass " + " and ".join(f"{name}={value!r}" for name, value in options.items())

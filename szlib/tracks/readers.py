@@ -17,7 +17,7 @@ import polars as pl
 from ..errors import DataError, warn
 from . import funnels
 from .formats import TrackFormat, open_file
-from .formats.base import EXPECTED
+from .formats.base import EXPECTED, MISSING
 from .formats.tidy import is_table, open_table
 from .options import ReadOptions
 from .plausibility import check_people, check_unit, find_implausible, suggest_reading
@@ -123,30 +123,35 @@ def _read_file(source: Any, path: Path, options: ReadOptions) -> LoadedFile:
     if is_table(source):
         layout, scan = open_table(source, path, options)
         rows = scan.collect()
+        good, reasons, first = reject_rows(rows, layout)
     else:
-        with open_file(path, options, is_whole=True) as (layout, scan, _):
+        with open_file(path, options, is_whole=True) as (layout, scan, plain):
             rows = scan.collect()
-    good, reasons, first = reject_rows(rows, layout)
+            good, reasons, first = reject_rows(rows, layout, plain)
     hint = suggest_reading(rows, layout) if layout.is_ambiguous and 2 * good.height < rows.height else ""
     stage = read_stage(path, layout, good.height, reasons, first, hint)
     if layout.is_ambiguous:
-        check_people(good, layout, path, is_unit_given=options.unit is not None)
-    if options.unit is None:
+        check_people(good, layout, path, is_unit_given=options.metres is not None)
+    if options.metres is None:
         check_unit(good, layout, path)
     return LoadedFile(path, layout.to_metres(good, path, options.tz), [stage], layout)
 
 
 def reject_rows(
-    rows: pl.DataFrame, layout: TrackFormat
+    rows: pl.DataFrame, layout: TrackFormat, plain: Path | None = None
 ) -> tuple[pl.DataFrame, dict[str, int], tuple[int, str] | None]:
     """The usable `rows` of a file in this `layout`.
 
-    Also returns the number of the other rows by reason, and line and reason of the first one.
+    Also returns the number of the other rows by reason, and line and reason of the first one, with what file
+    `plain` holds there.
     """
     rows = rows.with_columns(reason=layout.rejection_reason())
     bad = rows.filter(pl.col("reason").is_not_null())
     reasons = dict(bad.group_by("reason", maintain_order=True).len().iter_rows())
     first = bad.select("line", "reason").row(0) if bad.height else None
+    if first and first[1] == MISSING:
+        name = next(name for name in ("t", "id", "x", "y") if bad[name][0] is None)
+        first = (first[0], f"{MISSING} ({layout.show_field(plain, first[0], name)})")
     return rows.filter(pl.col("reason").is_null()).with_columns(id="exact_id"), reasons, first
 
 
@@ -181,7 +186,8 @@ def read_stage(
     if n_good == 0:
         raise DataError(f"{path}: holds no row; {EXPECTED}")
     if first:
-        _warn_rejected(f"{path.name}, first at line {first[0]}", reasons)
+        detail = first[1].partition(" (")[2]
+        _warn_rejected(f"{path.name}, first at line {first[0]}{detail and f' ({detail}'}", reasons)
     rate = f" at {1 / layout.seconds:g} frames/s" if layout.seconds != 1 else ""
     return funnels.stage(f"read {path.name}{rate}", n_good + n_bad, n_good, reasons)
 

@@ -26,11 +26,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..checks import check_columns
 from ..errors import DataError
 from ..input_files import read_small, reading
 from . import funnels
-from .clock import to_clock
+from .clock import read_tracks, to_clock
+from .formats.published import read_magni_rows
 from .options import ReadOptions
 from .recordings import check_names
 
@@ -38,8 +38,6 @@ GRAND_CENTRAL_RATE = 25.0  # frames a second of the video of Grand Central; ever
 GRAND_CENTRAL_SCALE = 0.8  # metres in one unit of its homography (OpenTraj)
 EDINBURGH_RATE = 9.0  # approximate frames a second of Edinburgh's files; the rate varies over short times
 EDINBURGH_PIXEL, EDINBURGH_ROWS = 0.0247, 480  # metres in a pixel on the floor, and rows of an image
-# Samples of THOR-MAGNI closer than this [s] belong to two sessions (0.01 s between them, 0.4 within).
-_SESSION = 0.2
 _TRACK = re.compile(r"TRACK\.R(\d+)\s*=\s*\[(.*?)\]\s*;\s*$", flags=re.MULTILINE)
 
 
@@ -158,8 +156,7 @@ def read_magni(path: str | Path, *, max_gap: float = 0.9) -> pd.DataFrame:
     >>> read_magni("A.csv")["id"].unique()
     array([104])
     """
-    rows = _read_magni_rows(Path(path))
-    return _finish(rows[["day", "id", "t", "x", "y"]], Path(path).name, max_gap, {})
+    return read_tracks(path, file_format="magni", max_gap=max_gap)
 
 
 def read_magni_groups(path: str | Path) -> pd.DataFrame:
@@ -189,7 +186,7 @@ def read_magni_groups(path: str | Path) -> pd.DataFrame:
     >>> read_magni_groups("A.csv")["id"].tolist()
     [101, 102]
     """
-    rows, n_groups = _read_magni_rows(Path(path)), 0
+    rows, n_groups = read_magni_rows(Path(path), Path(path)), 0
     members: list[tuple[int, int]] = []
     for (session, label), people in rows.groupby(["session", "label"]):
         match = re.search(r"Group (\d+)", str(label))
@@ -263,22 +260,6 @@ def _read_edinburgh_file(path: Path, frame_rate: float) -> tuple[pd.DataFrame, i
     raw["x"] = EDINBURGH_PIXEL * blobs["column"]
     raw["y"] = EDINBURGH_PIXEL * (EDINBURGH_ROWS - blobs["row"])
     return raw, int(repeated.sum())
-
-
-def _read_magni_rows(path: Path) -> pd.DataFrame:
-    """Rows of THOR-MAGNI as day, t, x, y, session, label, id."""
-    with reading(path, "as CSV", "a file of THOR-MAGNI"):
-        rows = pd.read_csv(path)
-    check_columns(rows, ["Time", "ag_id", "x", "y", "data_label"])
-    times = np.unique(rows["Time"])
-    session = np.searchsorted(times[1:][np.diff(times) < _SESSION], rows["Time"], side="right")
-    helmet = rows["ag_id"].astype(str).str.extract(r"(\d+)$")[0]
-    if helmet.isna().any():
-        name = rows.loc[helmet.isna(), "ag_id"].iloc[0]
-        raise DataError(f"{path}: ag_id {name!r} ends in no number; expected one like Helmet_4")
-    people = pd.DataFrame({"day": path.name.split(".")[0], "t": rows["Time"], "session": session})
-    people[["x", "y", "label"]] = rows[["x", "y", "data_label"]]
-    return people.assign(id=100 * (session + 1) + helmet.astype(int))
 
 
 def _finish(raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str, int]) -> pd.DataFrame:

@@ -84,6 +84,13 @@ def build_parser() -> argparse.ArgumentParser:
     area.add_argument("--area", "--square", nargs=4, type=float, metavar=rectangle, help=text["area"])
     area.add_argument("--polygon", dest="area", metavar="FILE", help=text["polygon"])
     area.add_argument("--auto", dest="area", action="store_const", const="auto", help=text["auto"])
+    data.add_argument("--columns", action="append", default=[], metavar="NAME=COLUMN", help=text["columns"])
+    data.add_argument("--unit", metavar="UNIT", help=text["unit"])
+    data.add_argument("--scale", type=float, metavar="METRES", help=text["scale"])
+    data.add_argument("--frame-rate", type=float, metavar="RATE", help=text["frame_rate"])
+    data.add_argument("--tz", metavar="ZONE", help=text["tz"])
+    data.add_argument("--format", dest="file_format", metavar="FORMAT", help=text["format"])
+    data.add_argument("--max-gap", type=float, metavar="SECONDS", help=text["max_gap"])
     data.add_argument("--walls", action="store_true", help=text["walls"])
     data.add_argument("--memory", metavar="SIZE", help=text["memory"])
     cluster.add_argument("--scheduler", metavar="ADDRESS", help=text["scheduler"])
@@ -134,6 +141,19 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _read_options(options: argparse.Namespace) -> dict[str, Any]:
+    """The options of `ReadOptions` that a command gives."""
+    columns: dict[str, str | int] = {}
+    for pair in (pair for text in options.columns for pair in re.split(r",(?=[a-z]+=)", text)):
+        name, equals, column = pair.partition("=")
+        if not equals or not column:
+            raise DataError(f"columns: {pair!r} must be NAME=COLUMN, such as t=Zeit or id=0; see --help")
+        columns[name.strip()] = int(column) if column.isdecimal() and column.isascii() else column.strip()
+    names = ("unit", "scale", "frame_rate", "tz", "file_format", "max_gap")
+    given = {"columns": columns or None, **{name: getattr(options, name) for name in names}}
+    return {name: value for name, value in given.items() if value is not None}
+
+
 def _run(options: argparse.Namespace) -> int:
     """Execute the notebooks without a browser, and check their results.
 
@@ -165,6 +185,8 @@ def _run(options: argparse.Namespace) -> int:
         parameters["area"] = options.area
     if options.walls:
         parameters["has_walls"] = True
+    if reading := _read_options(options):
+        parameters["reading"] = reading
     _require_workbook_packages()
     from . import folders
     from .runner import format_summary, run
@@ -219,10 +241,11 @@ def _inspect(options: argparse.Namespace) -> int:
             f"{options.file}: stands for {len(files)} files; expected one file; inspect each by itself"
         )
     advice, settings = "", EncounterSettings(area=options.area, has_walls=options.walls)
+    reading = ReadOptions(**_read_options(options))
     with warnings.catch_warnings(action="ignore", category=DataWarning):  # the table shows the same counts
-        samples = find_encounters_in_files(files, settings, ReadOptions())
+        samples = find_encounters_in_files(files, settings, reading)
         if "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS:
-            advice = relax_conditions(samples, read_tracks(files), settings)
+            advice = relax_conditions(samples, read_tracks(files, options=reading), settings)
     if "area" in samples.attrs:
         print(f"area {samples.attrs['area']}")
         if samples.attrs["area_reason"]:
@@ -237,11 +260,12 @@ def _extract(options: argparse.Namespace) -> int:
     """Extract the encounters of many days, and print the table of days."""
     from ..encounters.days import extract_days
     from ..parallel import cluster
+    from ..tracks.options import ReadOptions
 
     with cluster(options.scheduler):
         extraction = extract_days(
             options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude,
-            area=options.area, has_walls=options.walls,
+            options=ReadOptions(**_read_options(options)), area=options.area, has_walls=options.walls,
         )  # fmt: skip
     print(extraction)
     return 1 if len(extraction.failed) else 0

@@ -245,7 +245,7 @@ def test_day_without_encounters_gives_an_empty_table(days: list[Path], tmp_path:
     [
         ({"speed": 1}, "unknown parameter"),
         ({"tz": "Mars"}, "unknown time zone 'Mars'"),
-        ({"unit": "ft"}, "unit must be one of"),
+        ({"unit": "yd"}, "unit must be one of"),
         ({"file_format": "csv"}, "file_format must be .*; got 'csv'"),
     ],
 )

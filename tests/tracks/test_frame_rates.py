@@ -119,8 +119,10 @@ def test_a_frame_rate_is_refused_where_times_are_in_seconds(tmp_path: Path) -> N
     (tmp_path / "tidy.csv").write_text("t,id,x,y\n0,1,0,0\n0.1,1,1,0\n")
     with pytest.raises(szlib.DataError, match="is tidy, whose times are in seconds; leave frame_rate out"):
         szlib.read_tracks(tmp_path / "tidy.csv", frame_rate=25)
-    for wrong in (0, -15, float("nan"), 1e6):
-        with pytest.raises(szlib.DataError, match="frame_rate must be frames a second from 1 to 240; got"):
+    for wrong in (0, -15, float("nan"), 1e10):
+        with pytest.raises(
+            szlib.DataError, match=r"frame_rate must be frames a second from 1 to 1e\+09; got"
+        ):
             szlib.read_tracks(ewap(tmp_path, rate=25), frame_rate=wrong)
 
 

@@ -39,10 +39,11 @@ def frames() -> pd.DataFrame:
 SPOILED = {
     "millimetres: pass unit='mm'": lambda: table().assign(x=lambda t: t["x"] * 1e3, y=lambda t: t["y"] * 1e3),
     "centimetres: pass unit='cm'": lambda: table().assign(x=lambda t: t["x"] * 1e2, y=lambda t: t["y"] * 1e2),
-    "feet: multiply them by 0.3048": lambda: walkers(1.0 / 0.3048),
-    "milliseconds: divide": lambda: table().assign(t=lambda t: t["t"] * 1e3),
-    "milliseconds: divide them": lambda: table().assign(t=lambda t: (t["t"] + 1.7e9) * 1e3),
-    "numbers of frames: pass": frames,
+    "feet: pass unit='ft'": lambda: walkers(1.0 / 0.3048),
+    "milliseconds: pass columns={'frame': 't'} and frame_rate=1000": lambda: table().assign(
+        t=lambda t: t["t"] * 1e3
+    ),
+    "numbers of frames: pass columns={'frame': 't'} and frame_rate=25": frames,
     "longitude and latitude": lambda: table().assign(
         x=lambda t: 135.5 + t["x"] / 90_000, y=lambda t: 34.7 + t["y"] / 111_000
     ),
@@ -61,7 +62,7 @@ def test_the_error_suggests_what_was_misread(message: str) -> None:
         read_raw(SPOILED[message]())
 
 
-@pytest.mark.parametrize("message", [t for t in SPOILED if "pass unit" in t or "columns=" in t])
+@pytest.mark.parametrize("message", [t for t in SPOILED if "pass unit='m" in t or "{'t'" in t])
 def test_the_suggested_options_give_the_right_table(message: str) -> None:
     with pytest.raises(szlib.DataError) as error:
         read_raw(SPOILED[message]())
@@ -91,13 +92,13 @@ def test_implausible_files_are_refused_like_tables(tmp_path: Path) -> None:
 
 def test_only_formats_that_leave_doubt_get_a_suggestion(tmp_path: Path) -> None:
     """Times in milliseconds since 1970: every row is rejected. Eight numbers in a row are atc-raw."""
-    spoiled = SPOILED["milliseconds: divide them"]().assign(v=1.0, a=0.1)
+    spoiled = table().assign(t=lambda t: (t["t"] + 1.7e9) * 1e3, v=1.0, a=0.1)
     spoiled.to_csv(tmp_path / "public.csv", index=False, header=False)
-    with pytest.raises(szlib.DataError, match="as atc-1hz; times look like milliseconds: divide them"):
+    with pytest.raises(szlib.DataError, match="as atc-1hz; times look like milliseconds: pass columns="):
         read_raw(tmp_path / "public.csv")
     raw = spoiled.assign(x=1e3 * spoiled["x"], y=1e3 * spoiled["y"], b=0.0, c=0.0)
     raw.to_csv(tmp_path / "raw.csv", index=False, header=False)
-    with pytest.raises(szlib.DataError, match="as atc-raw; expected one of: atc-raw"):
+    with pytest.raises(szlib.DataError, match="as atc-raw; expected a table"):
         read_raw(tmp_path / "raw.csv")
 
 
@@ -120,7 +121,7 @@ def test_an_implausible_given_unit_warns() -> None:
 
 def test_pixels_get_no_advice_that_makes_people_slow() -> None:
     with pytest.raises(
-        szlib.DataError, match=r"people move at 3\d.* m/s .*; convert other units, such as pixels"
+        szlib.DataError, match=r"people move at 3\d.* m/s .*; if they are pixels .*, pass scale=0\.032"
     ):
         read_raw(walkers(38.0))
     with pytest.warns(szlib.DataWarning, match=r"the median of their speed is 0\.3\d m/s"):

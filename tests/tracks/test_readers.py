@@ -6,6 +6,7 @@ import datetime
 import gzip
 import os
 import random
+import re
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -202,7 +203,8 @@ def test_a_bad_row_is_rejected_with_a_warning_that_gives_its_line(
 ) -> None:
     content = "\n".join([*GOOD[:3], bad, *GOOD[3:], bad])
     frame, message = read_quietly(write(tmp_path / "a.csv", content + "\n"))
-    assert message == f"a.csv, first at line 4: rejected rows: 2 x {reason}"
+    assert re.sub(r" \(column .*?\)", "", message) == f"a.csv, first at line 4: rejected rows: 2 x {reason}"
+    assert ("holds" in message) == (reason == "missing or not a number")
     assert stage_of(frame, "read") == {
         "stage": "read a.csv",
         "entered": len(GOOD) + 2,
@@ -218,7 +220,7 @@ def test_every_format_gives_the_line_of_a_bad_row(tmp_path: Path, name: str, lin
     _, message = read_quietly(
         write(tmp_path / "a.csv", "\n".join([*rows[: line - 1], "x", *rows[line - 1 :]]))
     )
-    assert message.startswith(f"a.csv, first at line {line}: rejected rows: 1 x missing or")
+    assert re.match(rf"a\.csv, first at line {line}\b.*: rejected rows: 1 x missing or", message)
 
 
 def test_a_file_of_mostly_bad_rows_is_refused(tmp_path: Path) -> None:
@@ -278,13 +280,13 @@ UNUSABLE: dict[str, tuple[str | bytes, str]] = {
     "blank first line": ("\n" + as_raw(samples()), "line 1: the file is empty or begins with a blank line"),
     "only a header": ("t,id,x,y\n", "holds no row"),
     "missing columns": ("t,id,x\n1,2,3\n", "line 1: 't,id,x' has no column y"),
-    "other columns": ("time,person,east,north\n1,2,3,4\n", "has no column t, id, x, y"),
+    "other columns": ("time,person,east,north\n1,2,3,4\n", "has no column x, y"),
     "a column twice": ("t,id,x,y,x\n1,2,3,4,5\n", "names x twice"),
     "no header": (TIDY_ROWS, "has no column t, id, x, y"),
     "semicolons": (as_1hz(samples()).replace(",", ";"), "line 1"),
     "milliseconds": (as_1hz(samples()).replace(".", ""), "line 1: time not in seconds since 1970"),
-    "milliseconds, tidy": ("t,id,x,y\n1351040400000,7,5,5\n", "line 2: time not in seconds since 1970"),
-    "ids as names": ("t,id,x,y\n1.0,anna,5,5\n1.0,bob,5,6\n", "line 2: missing or not a number"),
+    "days since 1970": ("t,id,x,y\n15637000000,7,5,5\n", "line 2: time not in seconds since 1970"),
+    "places as names": ("t,id,x,y\n1,1,door,5\n2,1,5,6\n3,1,in,\n", "a number (column 'x' holds 'door')"),
     "metres in a raw file": (as_raw(scaled(1e-3)), "unit='m'"),
     "millimetres, 1 Hz": (as_1hz(scaled(1e3)), "unit='mm'"),
     "millimetres, EWAP": (as_ewap(scaled(1e3)), "unit='mm'"),
@@ -339,7 +341,7 @@ def test_parquet_columns_of_wrong_type_are_refused(tmp_path: Path) -> None:
     for message, table in {
         "no column y": rows.drop(columns="y"),
         "time not in seconds": rows.assign(t=[datetime.time(9, 30)] * len(rows)),
-        "not a number": rows.assign(id="p" + rows["id"].astype(str)),
+        "not a number": rows.assign(x="p" + rows["x"].astype(str)),
         "cannot be read as tidy": rows.assign(x=[[1.0, 2.0]] * len(rows)),
     }.items():
         table.to_parquet(tmp_path / "a.parquet")
@@ -441,8 +443,8 @@ def test_unknown_options_are_refused(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", as_raw(samples()))
     with pytest.raises(szlib.DataError, match=r"file_format must be .*; got 'csv'"):
         read_raw(path, options=szlib.ReadOptions(file_format="csv"))
-    with pytest.raises(szlib.DataError, match=r"unit must be one of .*; got 'ft'"):
-        read_raw(path, options=szlib.ReadOptions(unit="ft"))
+    with pytest.raises(szlib.DataError, match=r"unit must be one of .*; got 'yd'"):
+        read_raw(path, options=szlib.ReadOptions(unit="yd"))
     with pytest.raises(szlib.DataError, match=r"a\.csv, line 1: missing or extra fields; 60 of 60 rows"):
         read_raw(path, options=szlib.ReadOptions(file_format="atc-1hz"))
 

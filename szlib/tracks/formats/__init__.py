@@ -1,11 +1,14 @@
 """Formats of track files: a class each, which recognises a file by its first line and scans it.
 
-base    what all formats share: `TrackFormat`
-atc     the ATC mall's files, raw and 1 Hz
-ewap    EWAP files, whose frame rate is estimated
-tidy    tables: CSV, Parquet, DataFrames, PedPy's TrajectoryData
-pedpy   formats of other programs, read by PedPy's loaders
-unpack  files on disk, plain or .gz
+base       what all formats share: `TrackFormat`
+atc        the ATC mall's files, raw and 1 Hz
+ewap       EWAP files, whose frame rate is estimated
+tidy       tables: text, Parquet, Feather, SQLite, those of other libraries
+columns    which column of a table holds what
+values     times, ids and numbers of a table
+published  UCY's splines, TrajNet++, THOR-MAGNI
+pedpy      formats of other programs, read by PedPy's loaders
+unpack     files on disk, plain or .gz
 """
 
 from __future__ import annotations
@@ -22,10 +25,13 @@ from .atc import ATC_1HZ, ATC_RAW
 from .base import EXPECTED, TrackFormat
 from .ewap import EWAP
 from .pedpy import PEDPY_FORMATS
-from .tidy import PARQUET, TIDY
+from .published import RECORDING_FORMATS
+from .tidy import ARROW, TIDY
 from .unpack import LONGEST_LINE, read_first_line, require_memory, unpacked
 
-FORMATS: dict[str, TrackFormat] = {each.name: each for each in (*PEDPY_FORMATS, ATC_RAW, ATC_1HZ, EWAP, TIDY)}
+FORMATS: dict[str, TrackFormat] = {
+    each.name: each for each in (*RECORDING_FORMATS, *PEDPY_FORMATS, ATC_RAW, ATC_1HZ, EWAP, TIDY)
+}
 """Formats by name, in the order of recognition."""
 
 
@@ -44,9 +50,10 @@ def open_file(
             require_memory(plain, path)
         with plain.open("rb") as stream:
             head = stream.readline(LONGEST_LINE)
-        found, scan = recognise(head, options).open(plain, path, head, options)
+        found = recognise(head, options)
         try:
-            yield found.in_unit(options.unit), scan, plain
+            found, scan = found.open(plain, path, head, options)
+            yield found.in_metres(options.metres), scan, plain
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
             raise DataError(f"{path}: cannot be read as {found.name} ({error}); {EXPECTED}") from error
 
@@ -58,8 +65,8 @@ def find_format(path: Path, options: ReadOptions) -> TrackFormat:
 
 def recognise(head: bytes, options: ReadOptions) -> TrackFormat:
     """The format in `options`, or else the one of a file whose first line is `head`."""
-    if PARQUET.recognises(head):
-        return PARQUET
+    if ARROW.recognises(head):
+        return ARROW
     if options.file_format:
         return FORMATS[options.file_format]
     found = next(each for each in FORMATS.values() if each.recognises(head))

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import ClassVar, Self
 
 import polars as pl
 
 from ...errors import DataError
-from ..options import UNITS, ReadOptions
+from ..options import ReadOptions
+from .unpack import LONGEST_LINE
 
 EXPECTED = (
-    "expected one of: atc-raw (8 numbers, commas, no header), atc-1hz (6 numbers, commas, no header), "
-    "ewap (8 numbers, blanks), or tidy CSV with a header or Parquet with columns t, id, x, y; or, by "
-    "PedPy, texts or HDF5 of Juelich's archive, Viswalk, Vadere, JuPedSim; plain or .gz; "
-    "Grand Central, Edinburgh and THOR-MAGNI are read by szlib.tracks.sites"
+    "expected a table (text, Parquet, Feather, SQLite) with columns t or frame, id, x, y; or atc-raw (8 "
+    "numbers, commas), atc-1hz (6 numbers, commas), ewap (8 numbers, blanks), vsp, TrajNet++, THOR-MAGNI; "
+    "or, by PedPy, files of Juelich's archive, Viswalk, Vadere, JuPedSim, Pathfinder; plain or .gz; "
+    "Grand Central and Edinburgh are read by szlib.tracks.sites"
 )
 """The formats, for error messages."""
+MISSING = "missing or not a number"  # why a row is rejected, where a value cannot be read
 # A clock that stays below this (1973) does not count from 1970, and gives no calendar day.
 CALENDAR_BEGINS = 1e8
 _LAST_SECOND = 4_102_444_800.0  # 2100-01-01; later time stamps are not seconds since 1970
@@ -37,8 +41,14 @@ class TrackFormat:
     columns : the number of the field that holds t, id, x, y (and day).
     metres, seconds : one unit of position [m] and of time [s].
     max_gap : a longer gap between samples ends a track [s]; None takes a multiple of the sampling interval.
-    separator : character between two fields; a blank stands for any run of blanks.
+    separator : character between two fields; a blank stands for any run of blanks, "" for a file without
+        lines.
     has_header : whether the first line names the columns.
+    texts : columns whose fields are read as text.
+    quote : character around a field that may hold separators; None: there is none.
+    time_unit : seconds in a unit of t by the name of its column, 1 for frames; None where nothing says it.
+    names : names of all columns, if the file has any.
+    text : what the file was taken for, for people.
     start : time at which the clock of the file begins [s since 1970]; not 0 where it counts from midnight.
 
     Each class sets, for all its files:
@@ -61,6 +71,11 @@ class TrackFormat:
     max_gap: float | None = None
     separator: str = ","
     has_header: bool = False
+    texts: frozenset[str] = frozenset({"day", "id"})
+    quote: str | None = None
+    time_unit: float | None = None
+    names: tuple[str, ...] = ()
+    text: str = ""
     start: float = 0.0
 
     tz: ClassVar[str] = "UTC"
@@ -74,10 +89,12 @@ class TrackFormat:
 
     def recognises(self, head: bytes) -> bool:
         """Whether `head`, the first line of a file, looks like this format: numbers, as many as fields."""
-        parts = decode_line(head).split(None if self.separator == " " else self.separator)
+        parts = self.split(decode_line(head))
         return len(parts) == self.n_fields and sum(map(is_number, parts)) * 2 > len(parts)
 
-    def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
+    def open(
+        self, plain: Path, path: Path, head: bytes, options: ReadOptions
+    ) -> tuple[TrackFormat, pl.LazyFrame]:
         """Complete the format with what a file says, and scan the file.
 
         Parameters
@@ -101,9 +118,35 @@ class TrackFormat:
         found = replace(self, start=self.clock_start(path, first))
         return found, found.scan(plain)
 
-    def in_unit(self, unit: str | None) -> Self:
-        """The format with positions in `unit`, if one is given."""
-        return self if unit is None else replace(self, metres=UNITS[unit])
+    def in_metres(self, metres: float | None) -> Self:
+        """The format with positions in units of `metres`, if they are given."""
+        return self if metres is None else replace(self, metres=metres)
+
+    def split(self, line: str) -> list[str]:
+        """The fields of a `line`."""
+        if self.separator == " ":
+            return line.split()
+        fields = next(csv.reader([line.replace("\r", " ")], delimiter=self.separator), [])
+        return [field.strip(" \"'") for field in fields]
+
+    def name_columns(self, **quantities: str) -> dict[str, str | int]:
+        """The columns that hold `quantities`, as for `ReadOptions.columns`; "t" stands for the time's.
+
+        A file without names needs all of them.
+        """
+        names = self.names if any(self.names) else range(self.n_fields)
+        whole = {} if any(self.names) else {name: name for name in self.columns if name not in ("t", "day")}
+        return {name: names[self.columns[of]] for name, of in {**quantities, **whole, **quantities}.items()}
+
+    def show_field(self, plain: Path | None, line: int, name: str) -> str:
+        """The column that holds `name`, and what is in it at a `line` of file `plain`, for people."""
+        k = self.columns.get(name)
+        shown = name if k is None or not any(self.names) else repr(self.names[k])
+        if k is None or plain is None or not self.separator:
+            return f"column {shown}"
+        with plain.open("rb") as stream:
+            fields = self.split(decode_line(next(islice(stream, line - 1, None), b"")[:LONGEST_LINE]))
+        return f"column {shown} holds {fields[k][:80]!r}" if k < len(fields) else f"column {shown} is missing"
 
     def clock_start(self, path: Path, first: str) -> float:
         """Time at which the clock of file `path` with first line `first` begins [s since 1970]."""
@@ -123,7 +166,7 @@ class TrackFormat:
         beyond = {name: pl.col(name).abs() * unit > most for name, (unit, most) in limit.items()}
         reasons = {
             "missing or extra fields": pl.col("ragged"),
-            "missing or not a number": pl.any_horizontal(pl.col(numbers).is_null()),
+            MISSING: pl.any_horizontal(pl.col(numbers).is_null()),
             "not finite": ~pl.all_horizontal(pl.col(numbers).is_finite()),
             "id not a whole number": pl.col("exact_id").is_null(),
             "time not in seconds since 1970": beyond["t"],
@@ -149,15 +192,19 @@ class TrackFormat:
         return good.select("day", "id", *numbers)
 
     def scan(self, plain: Path) -> pl.LazyFrame:
-        """Scan the lines of file `plain`."""
+        """Scan the lines of file `plain`, with exact ids."""
+        return _with_exact_ids(self.scan_rows(plain))
+
+    def scan_rows(self, plain: Path) -> pl.LazyFrame:
+        """Scan the lines of file `plain`: line, ragged and `columns`, as numbers or as `texts`."""
         return self._scan_blanks(plain) if self.separator == " " else self._scan_separated(plain)
 
     def _scan_separated(self, plain: Path) -> pl.LazyFrame:
-        numbers = {index for name, index in self.columns.items() if name not in ("day", "id")}
+        numbers = {index for name, index in self.columns.items() if name not in self.texts}
         fields = {f"f{i}": pl.Float64 if i in numbers else pl.String for i in range(self.n_fields)}
         scan = pl.scan_csv(
             plain, schema={**fields, "extra": pl.String}, has_header=False, skip_lines=int(self.has_header),
-            separator=self.separator, quote_char=None, encoding="utf8-lossy", ignore_errors=True,
+            separator=self.separator, quote_char=self.quote, encoding="utf8-lossy", ignore_errors=True,
             truncate_ragged_lines=True,
             missing_columns="insert", extra_columns="ignore", raise_if_empty=False, glob=False,
             row_index_name="line", row_index_offset=1 + self.has_header,
@@ -170,17 +217,16 @@ class TrackFormat:
             named["day"] = named["day"].str.strip_chars(' "')
         if self.start:
             named["t"] = named["t"] + self.start
-        return _with_exact_ids(scan.select("line", ragged=ragged, **named))
+        return scan.select("line", ragged=ragged, **named)
 
     def _scan_blanks(self, plain: Path) -> pl.LazyFrame:
         text = plain.read_bytes().decode("utf-8", errors="replace").removeprefix("\ufeff").removesuffix("\n")
         lines = pl.LazyFrame({"text": text.split("\n")[int(self.has_header) :]})
         parts = pl.col("text").str.extract_all(r"\S+")
         fields = {name: parts.list.get(i, null_on_oob=True) for name, i in self.columns.items()}
-        texts = ("day", "id")
-        numbers = {n: f if n in texts else f.cast(pl.Float64, strict=False) for n, f in fields.items()}
+        numbers = {n: f if n in self.texts else f.cast(pl.Float64, strict=False) for n, f in fields.items()}
         rows = lines.with_row_index("line", offset=1 + self.has_header)
-        return _with_exact_ids(rows.select("line", ragged=parts.list.len() != self.n_fields, **numbers))
+        return rows.select("line", ragged=parts.list.len() != self.n_fields, **numbers)
 
 
 def decode_line(line: bytes) -> str:
@@ -190,6 +236,12 @@ def decode_line(line: bytes) -> str:
 
 def decode_first_line(head: bytes, path: Path) -> str:
     """The first line `head` of file `path` as text; raises DataError where it is binary or blank."""
+    if head.startswith(b"PK\3\4"):
+        command = f"pandas.read_excel({path.name!r}).to_csv({path.stem + '.csv'!r}, index=False)"
+        raise DataError(
+            f"{path}, line 1: is packed by zip, as Excel's files are; unpack it, or save the sheet as CSV in "
+            f'Excel, or by: python -c "import pandas; {command}"'
+        )
     if b"\0" in head:
         raise DataError(f"{path}, line 1: is binary, not text; {EXPECTED}")
     first = decode_line(head)
@@ -209,10 +261,11 @@ def is_number(text: str) -> bool:
 
 def scan_table(rows: pl.DataFrame) -> pl.LazyFrame:
     """Scan table `rows` with columns t, id, x, y (, day) like a file; lines are counted from 1."""
-    day = [pl.col("day").cast(pl.String)] if "day" in rows.columns else []
+    if "line" not in rows.columns:
+        rows = rows.with_row_index("line", offset=1).with_columns(ragged=pl.lit(False))
+    day = [pl.col("day").cast(pl.String)] if rows.schema.get("day", pl.Date) != pl.Date else []
     numbers = [pl.col(name).cast(pl.Float64, strict=False) for name in ("t", "x", "y")]
-    found = rows.lazy().select("id", *numbers, *day, ragged=pl.lit(False))
-    return _with_exact_ids(found.with_row_index("line", offset=1))
+    return _with_exact_ids(rows.lazy().with_columns(*numbers, *day))
 
 
 def _with_exact_ids(scan: pl.LazyFrame) -> pl.LazyFrame:

@@ -15,6 +15,7 @@ import polars as pl
 from ...errors import DataError
 from ..options import ReadOptions
 from .base import TrackFormat, decode_line, scan_table
+from .tidy import open_database
 
 # Vadere records footsteps; PedPy brings them to as many frames a second as the clock has ticks.
 _VADERE_RATE = 10.0
@@ -38,8 +39,8 @@ class _PedPyFormat(TrackFormat):
         """Whether `head`, the first line of a file, begins as in this format."""
         return head.removeprefix(b"\xef\xbb\xbf").startswith(self.begins)
 
-    def in_unit(self, unit: str | None) -> Self:
-        """The format itself for any `unit`: PedPy gives metres."""
+    def in_metres(self, metres: float | None) -> Self:
+        """The format itself for any `metres`: PedPy gives metres."""
         return self
 
     def loader_options(self, path: Path, options: ReadOptions) -> dict[str, Any]:
@@ -51,7 +52,9 @@ class _PedPyFormat(TrackFormat):
             )
         return {}
 
-    def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
+    def open(
+        self, plain: Path, path: Path, head: bytes, options: ReadOptions
+    ) -> tuple[TrackFormat, pl.LazyFrame]:
         """As `TrackFormat.open`; raises DataError also where PedPy is missing or cannot read the file."""
         if options.columns:
             raise DataError(f"{path}: is {self.name}, whose columns are known; leave columns out")
@@ -76,6 +79,18 @@ class _PedPyFormat(TrackFormat):
             raise DataError(f"{path}: states {rate:g} frames/s; expected a positive number")
         rows = pl.from_pandas(data.rename(columns={"frame": "t"}), nan_to_null=False)
         return replace(self, seconds=1 / rate), scan_table(rows)
+
+
+@dataclass(frozen=True)
+class _JuPedSim(_PedPyFormat):
+    """SQLite files of JuPedSim; others are tables of people's own."""
+
+    def open(
+        self, plain: Path, path: Path, head: bytes, options: ReadOptions
+    ) -> tuple[TrackFormat, pl.LazyFrame]:
+        """As `TrackFormat.open`, or as `tidy.open_database`."""
+        own = None if options.file_format == self.name else open_database(plain, path, options)
+        return own or super().open(plain, path, head, options)
 
 
 @dataclass(frozen=True)
@@ -109,7 +124,7 @@ class _Vadere(_PedPyFormat):
 
 
 PEDPY_FORMATS: tuple[_PedPyFormat, ...] = (
-    _PedPyFormat("jupedsim", loader="load_trajectory_from_jupedsim_sqlite", begins=(b"SQLite format 3\0",)),
+    _JuPedSim("jupedsim", loader="load_trajectory_from_jupedsim_sqlite", begins=(b"SQLite format 3\0",)),
     _PedPyFormat("juelich-hdf5", loader="load_trajectory_from_ped_data_archive_hdf5", begins=(b"\x89HDF",)),
     _PedPyFormat("viswalk", loader="load_trajectory_from_viswalk", begins=(b"$VISION", b"$PEDESTRIAN")),
     _Vadere("vadere", loader="load_trajectory_from_vadere", begins=(b"#IDXCOL",)),

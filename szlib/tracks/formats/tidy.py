@@ -1,26 +1,39 @@
-"""Tables of t (or frame), id, x, y and perhaps day: CSV, Parquet, DataFrames, PedPy's TrajectoryData."""
+"""Tables of t (or frame), id, x, y and perhaps day: text, Parquet, Feather, SQLite, and of other libraries.
+
+However a table comes, its columns are found by `columns.find_columns`, and their values read by `values`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sqlite3
+from contextlib import closing
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 import pandas as pd
 import polars as pl
 import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.dataset  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
+import shapely
 
 from ... import memory
 from ...errors import DataError
 from ..options import ReadOptions
-from .base import EXPECTED, TrackFormat, decode_first_line, is_number, scan_table
-from .unpack import BYTES_PER_ROW
+from .base import TrackFormat, decode_first_line, decode_line, is_number, scan_table
+from .columns import find_columns
+from .unpack import BYTES_PER_ROW, LONGEST_LINE
+from .values import to_ids, to_numbers, to_times
+
+_SAMPLE = 2000  # rows in which columns are guessed
+_FIRST = 20  # lines of a text that show what its columns hold
 
 
 @dataclass(frozen=True)
-class _TidyText(TrackFormat):
+class _Table(TrackFormat):
     """Text whose first line names the columns, or whose columns `ReadOptions.columns` counts."""
 
     is_ambiguous = True
@@ -35,90 +48,86 @@ class _TidyText(TrackFormat):
         first = decode_first_line(head, path)
         separator = max(",;\t", key=first.count)
         separator = separator if separator in first else " "
-        parts = [part.strip().strip('"') for part in first.split(None if separator == " " else separator)]
-        numbers = [k for k in (options.columns or {}).values() if isinstance(k, int) and 0 <= k < len(parts)]
-        has_header = not (numbers and all(is_number(parts[k]) for k in numbers))
-        shown = first if len(first) <= 80 else first[:77] + "..."
+        with plain.open("rb") as stream:
+            lines = [decode_line(line[:LONGEST_LINE]) for line in islice(stream, 1, _FIRST + 1)]
+        found = replace(self, separator=separator, quote='"' if any('"' in line for line in lines) else None)
+        parts = found.split(first)
+        has_header = not all(map(is_number, parts))
         names = parts if has_header else [""] * len(parts)
-        found = self.with_columns(names, options, f"{path}, line 1: {shown!r}")
-        found = replace(found, separator=separator, has_header=has_header)
-        return found, found.scan(plain)
+        found = replace(found, has_header=has_header, n_fields=len(parts))
 
-    def with_columns(self, names: Sequence[str], options: ReadOptions, where: str) -> Self:
-        """The format of a table with column `names`, read with `options`.
+        def sample() -> pl.DataFrame:
+            """All columns of the first rows."""
+            every = {f"f{k}": k for k in range(len(parts))}
+            whole = replace(found, columns=every, texts=frozenset(every))
+            rows = whole.scan_rows(plain).head(_SAMPLE).collect()
+            return rows.select(pl.col(name).str.replace(",", ".", literal=True) for name in every)
 
-        Raises DataError, beginning with `where`, for a column that is missing, doubled or unknown, for frames
-        without a frame rate, and for a frame rate without frames.
-        """
-        given = dict(options.columns or {})
-        has_frames = "frame" in given or ("t" not in given and "t" not in names and "frame" in names)
-        time = "frame" if has_frames else "t"
-        wanted = {"t": given.get(time, time)} | {name: given.get(name, name) for name in ("id", "x", "y")}
-        if "day" in given or "day" in names:
-            wanted["day"] = given.get("day", "day")
-        numbered = {name: k for name, k in wanted.items() if isinstance(k, int)}
-        texts = {name: str(k) for name, k in wanted.items() if not isinstance(k, int)}
-        if missing := [text for text in texts.values() if text not in names]:
-            raise DataError(
-                f"{where} has no column {', '.join(missing)}; name the right ones with "
-                f"columns={{'t': ..., 'id': ..., 'x': ..., 'y': ...}}; {EXPECTED}"
-            )
-        if doubled := [text for text in texts.values() if list(names).count(text) > 1]:
-            raise DataError(f"{where} names {', '.join(doubled)} twice; rename one of them")
-        if beyond := [k for k in numbered.values() if not 0 <= k < len(names)]:
-            raise DataError(f"{where} has no field {beyond[0]}; it has {len(names)}, the first is 0")
-        if not has_frames and options.frame_rate is not None:
-            raise DataError(
-                f"{where}: is tidy, whose times are in seconds; leave frame_rate out, or name the column "
-                "that counts frames: columns={'frame': ...}"
-            )
-        if has_frames and options.frame_rate is None:
-            raise DataError(f"{where}: {wanted['t']!r} counts frames; pass frame_rate=, frames a second")
-        return replace(
-            self,
-            n_fields=len(names),
-            columns=numbered | {name: list(names).index(text) for name, text in texts.items()},
-            seconds=1 / options.frame_rate if options.frame_rate else 1.0,
-        )
+        shown = first if len(first) <= 80 else first[:77] + "..."
+        found = find_columns(found, names, options, f"{path}, line 1: {shown!r}", sample)
+        fields = [found.split(line) for line in lines if line]
+        texts = {
+            name
+            for name, k in found.columns.items()
+            if not all(is_number(f[k]) for f in fields if k < len(f))
+        }
+        found = replace(found, texts=frozenset(texts | {"day", "id"}))
+        return found.with_values(found.scan_rows(plain).collect(), options)
+
+    def with_values(self, rows: pl.DataFrame, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
+        """The format completed with what its times are, and a scan of `rows` as from `TrackFormat.open`."""
+        decimal = "," if self.separator in (";", "\t", " ") else "."
+        found, t = self, rows["t"]
+        if self.time_unit is not None and 2 * to_numbers(t, decimal).null_count() <= len(t):
+            t = to_numbers(t, decimal) * self.time_unit
+        else:
+            times = to_times(t, options.tz or self.tz, decimal)
+            t = times.seconds
+            if times.kind:
+                found = replace(self, text=f"{self.text}; t: {times.kind}")
+            if times.day is not None and options.tz is None and "day" not in rows.columns:
+                rows = rows.with_columns(day=times.day)
+        x, y = (to_numbers(rows[name], decimal) for name in "xy")
+        return found, scan_table(rows.with_columns(t=t, id=to_ids(rows["id"]), x=x, y=y))
 
 
 @dataclass(frozen=True)
-class _TidyParquet(_TidyText):
-    """A Parquet file."""
+class _ArrowTable(_Table):
+    """A Parquet or a Feather file; by pyarrow, as a damaged file can make Polars abort the process."""
 
     def recognises(self, head: bytes) -> bool:
-        """Whether `head` begins as Parquet does."""
-        return head.startswith(b"PAR1")
+        """Whether `head` begins as Parquet and Feather do."""
+        return head.startswith((b"PAR1", b"ARROW1"))
 
     def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
-        """As `TrackFormat.open`; by pyarrow, as a damaged file can make Polars abort the process."""
+        """As `TrackFormat.open`."""
+        kind = "Parquet" if head.startswith(b"PAR1") else "Feather"
         try:
-            with pq.ParquetFile(plain) as file:
-                names = file.schema_arrow.names
-                found = self.with_columns(names, options, f"{path}")
-                n_rows = file.metadata.num_rows
-                memory.require(n_rows * BYTES_PER_ROW, f"{path}: to read {n_rows:,} rows")
-                table = file.read([names[at] for at in found.columns.values()])
+            schema = pq.read_schema(plain) if kind == "Parquet" else pa.ipc.open_file(plain).schema
+            data, names = pa.dataset.dataset(plain, schema, kind.lower()), schema.names
+            found = find_columns(self, names, options, f"{path}", lambda: pl.DataFrame(data.head(_SAMPLE)))
+            n_rows = data.count_rows()
+            memory.require(n_rows * BYTES_PER_ROW, f"{path}: to read {n_rows:,} rows")
+            table = data.to_table(columns=[names[at] for at in found.columns.values()])
             table.validate(full=True)
-            named = pa.table({name: table[names[at]] for name, at in found.columns.items()})  # no metadata
         except DataError:
             raise
         except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
-            raise DataError(f"{path}: damaged Parquet ({error}); fetch or write the file again") from error
-        rows = pl.DataFrame(named)
-        if isinstance(rows["t"].dtype, pl.Datetime | pl.Duration | pl.Date):
-            times = _convert_times(rows["t"].to_pandas(), options.tz or self.tz)
-            rows = rows.with_columns(t=pl.Series(times))
-        return found, scan_table(rows)
+            raise DataError(f"{path}: damaged {kind} ({error}); fetch or write the file again") from error
+        named = {name: table[names[at]] for name, at in found.columns.items()}
+        return found.with_values(pl.DataFrame(pa.table(named)), options)  # without metadata
 
 
-TIDY = _TidyText("tidy", has_header=True)
-PARQUET = _TidyParquet("tidy", has_header=True)
+TIDY = _Table("tidy", has_header=True)
+TABLE = replace(TIDY, separator="")
+ARROW = _ArrowTable("tidy", has_header=True, separator="")
 
 
 def is_table(source: object) -> bool:
-    """Whether `source` is a DataFrame or a TrajectoryData, and not a path."""
-    return isinstance(source, pd.DataFrame) or (hasattr(source, "data") and hasattr(source, "frame_rate"))
+    """Whether `source` is a table of pandas, Polars, Arrow, GeoPandas, MovingPandas or PedPy, and no path."""
+    names = ("__arrow_c_stream__", "to_point_gdf")
+    is_known = isinstance(source, pd.DataFrame) or any(hasattr(source, name) for name in names)
+    return is_known or (hasattr(source, "data") and hasattr(source, "frame_rate"))
 
 
 def open_table(source: Any, where: Path, options: ReadOptions) -> tuple[TrackFormat, pl.LazyFrame]:
@@ -126,35 +135,82 @@ def open_table(source: Any, where: Path, options: ReadOptions) -> tuple[TrackFor
 
     Times may be datetimes; without a zone they are those of the time zone in `options`.
     """
-    if not isinstance(source, pd.DataFrame):  # PedPy's, which counts frames
-        options = replace(
-            options,
-            columns={"frame": "frame"} | dict(options.columns or {}),
-            frame_rate=float(options.frame_rate or source.frame_rate),
-        )
-        source = source.data
-    names = [str(name) for name in source.columns]
+    if hasattr(source, "to_point_gdf"):  # MovingPandas
+        source = source.to_point_gdf()
+    elif hasattr(source, "frame_rate"):  # PedPy's, which counts frames
+        rate = float(options.frame_rate or source.frame_rate)
+        columns = {"frame": "frame"} | dict(options.columns or {})
+        source, options = source.data, replace(options, columns=columns, frame_rate=rate)
+    if isinstance(source, pd.DataFrame):
+        source = _with_points(source, where)
+        names = [str(name) for name in source.columns]
+    else:
+        source = pl.DataFrame(source)
+        names = source.columns
     shown = f"{where}: a table of {', '.join(names[:12])}"
-    found = TIDY.with_columns(names, options, shown)
-    rows = {name: source.iloc[:, at] for name, at in found.columns.items()}
-    rows["t"] = _convert_times(rows["t"], options.tz or found.tz)
-    rows |= {name: pd.to_numeric(rows[name], errors="coerce") for name in ("t", "id", "x", "y")}
-    if "day" in rows:
-        rows["day"] = rows["day"].astype("string")
+
+    def column(at: int) -> pl.Series:
+        """A column of the table; one of mixed types as text."""
+        if isinstance(source, pl.DataFrame):
+            return source.to_series(at)
+        values = source.iloc[:, at].reset_index(drop=True)
+        is_mixed = values.dtype == object or isinstance(values.dtype, pd.CategoricalDtype)
+        return pl.Series(values.astype("string") if is_mixed else values)
+
+    def sample() -> pl.DataFrame:
+        """The first rows."""
+        return pl.DataFrame({f"f{k}": column(k).head(_SAMPLE) for k in range(len(names))})
+
     try:
-        table = pl.DataFrame(
-            {name: pl.from_pandas(values.reset_index(drop=True)) for name, values in rows.items()}
-        )
-    except (pl.exceptions.PolarsError, TypeError, ValueError) as error:
+        found = find_columns(TABLE, names, options, shown, sample)
+        rows = pl.DataFrame({name: column(at) for name, at in found.columns.items()})
+        found, scan = found.with_values(rows, options)
+    except DataError:
+        raise
+    except (pl.exceptions.PolarsError, pa.ArrowException, TypeError, ValueError) as error:
         raise DataError(f"{shown}: cannot be read ({error}); expected numbers in t, id, x and y") from error
-    return found.in_unit(options.unit), scan_table(table)
+    return found.in_metres(options.metres), scan
 
 
-def _convert_times(times: pd.Series[Any], tz: str) -> pd.Series[Any]:
-    """Times as numbers: datetimes [s since 1970], durations [s], anything else as it is."""
-    if pd.api.types.is_timedelta64_dtype(times):
-        return times.dt.total_seconds()  # type: ignore[no-any-return]
-    if not pd.api.types.is_datetime64_any_dtype(times):
-        return times
-    local = times.dt.tz_localize(tz, ambiguous="NaT", nonexistent="NaT") if times.dt.tz is None else times
-    return (local - pd.Timestamp(0, tz="UTC")).dt.total_seconds()
+def _with_points(table: pd.DataFrame, where: Path) -> pd.DataFrame:
+    """A table with x, y of its points, as in GeoPandas, and with t of its index if this holds dates."""
+    name = str(table.index.name or "t")
+    if isinstance(table.index, pd.DatetimeIndex) and name not in table.columns:
+        table = table.reset_index(names=name)
+    points = getattr(table, "geometry", None)
+    if points is None or {"x", "y"} <= set(table.columns):
+        return table
+    if getattr(getattr(table, "crs", None), "is_geographic", False):
+        advice = "project them to metres: table.to_crs(table.estimate_utm_crs())"
+        raise DataError(f"{where}: its points are in degrees; {advice}")
+    shapes = np.asarray(points, object)
+    flat = pd.DataFrame(table.drop(columns=points.name))
+    return flat.assign(x=shapely.get_x(shapes), y=shapely.get_y(shapes))
+
+
+def open_database(plain: Path, path: Path, options: ReadOptions) -> tuple[TrackFormat, pl.LazyFrame] | None:
+    """The format and a scan of the tracks in the SQLite file `plain`, given as `path`.
+
+    None where it is JuPedSim's, or damaged.
+
+    Raises DataError where not exactly one of its tables can be read with `options`.
+    """
+    readable, refused = [], []
+    with closing(sqlite3.connect(plain)) as file:
+        try:
+            names = [name for (name,) in file.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+        except sqlite3.DatabaseError:
+            return None
+        for name in [] if "trajectory_data" in names else names:
+            try:
+                readable.append(open_table(pd.read_sql(f'SELECT * FROM "{name}"', file), path, options))
+            except DataError as error:
+                refused.append(error)
+    if len(readable) > 1:
+        command = f"sqlite3 -header -csv {path.name} 'SELECT * FROM {names[0]}' > tracks.csv"
+        raise DataError(
+            f"{path}: several of the tables {names} can be tracks; write one to a file: {command}"
+        )
+    if refused and not readable:
+        raise refused[0]
+    return readable[0] if readable else None

@@ -72,7 +72,7 @@ def require_memory(plain: Path, path: Path) -> None:
     if most * BYTES_PER_ROW <= memory.limit():
         return
     with plain.open("rb") as stream:
-        if stream.read(4) == b"PAR1":
+        if stream.read(4) in (b"PAR1", b"ARRO"):
             return  # its rows are counted before they are read
         rows = 0
         while block := stream.read(1 << 22):

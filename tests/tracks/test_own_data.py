@@ -1,0 +1,232 @@
+"""Files in the shapes that people have are read, at most with the options that the error proposes."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+import shapely
+from helpers.file_shapes import BEGIN, SHAPES, TEXTS, hall, write_shape
+from helpers.track_files import write
+
+import szlib
+from szlib.tracks.options import COMMAND_VARIABLE, arguments
+from szlib.tracks.readers import read_raw
+from szlib.workbook.cli import main
+
+REFUSED = {"hall.xlsx": "save the sheet as CSV"}
+AREA = ["--area", "0", "12", "0", "8"]
+
+
+def proposed(text: str) -> list[str]:
+    """The first command that an error proposes."""
+    return shlex.split(re.search(r"try: szlib (.*?)(?:; |\n|$)", text)[1])
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_shape_is_read_with_the_options_that_errors_propose(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = ["inspect", str(write_shape(name, tmp_path)), *AREA]
+    for _ in range(3):
+        monkeypatch.setenv(COMMAND_VARIABLE, shlex.join(["szlib", *command]))
+        if main(command) == 0:
+            break
+        message = capsys.readouterr().err
+        if name in REFUSED:
+            assert REFUSED[name] in message
+            return
+        command = proposed(message)
+    people = 40 if name == "crowd.vsp" else 1040  # of which only control points are given
+    kept = re.search(r"read .*?kept +([\d,]+)", capsys.readouterr().out, flags=re.DOTALL)
+    assert int(kept[1].replace(",", "")) >= people
+
+
+SAME = [name for name in TEXTS if name not in ("crowd.vsp", "magni.csv", "obsmat.txt")]
+GIVEN: dict[str, dict] = {
+    "iso-local.csv": {"tz": "Europe/Berlin"}, "frames.csv": {"frame_rate": 25},
+    "pixels.csv": {"frame_rate": 25, "scale": 0.02}, "mm.csv": {"unit": "mm"}, "cm.csv": {"unit": "cm"},
+    "feet.csv": {"unit": "ft"},
+    "headerless.txt": {"columns": {"frame": 0, "id": 1, "x": 2, "y": 3}, "frame_rate": 25},
+    "unknown-names.csv": {"columns": dict(zip(("t", "id", "x", "y"), "abcd", strict=True))},
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::szlib.DataWarning")
+@pytest.mark.parametrize("name", SAME)
+def test_every_shape_holds_the_same_people(name: str, tmp_path: Path) -> None:
+    options = szlib.ReadOptions(**GIVEN.get(name, {}))
+    read = read_raw(write_shape(name, tmp_path), options=options)
+    right = hall().sort_values(["id", "t"], ignore_index=True)
+    if name == "text-ids.csv":
+        order = read.groupby("id", sort=False)["t"].agg(["min", "max"])
+        assert len(order) == right["id"].nunique()
+        read = read.sort_values(["x", "y", "t"])
+        right = right.sort_values(["x", "y", "t"])
+    else:
+        assert read["id"].tolist() == right["id"].tolist()
+    since = BEGIN if read["t"].min() > 1e8 else 0
+    np.testing.assert_allclose(read["t"] - since, right["t"], atol=1e-6)
+    np.testing.assert_allclose(read[["x", "y"]], right[["x", "y"]], atol=1e-3 + 2e-9)
+
+
+def test_splines_pass_through_their_control_points(tmp_path: Path) -> None:
+    read = read_raw(write_shape("crowd.vsp", tmp_path), options=szlib.ReadOptions(scale=0.02))
+    right = hall().groupby("id").nth(list(range(0, 26, 4))).sort_values(["id", "t"])
+    np.testing.assert_allclose(read[["id", "t", "x", "y"]], right[["id", "t", "x", "y"]], atol=1e-4)
+
+
+def test_the_day_is_that_of_the_file_then_of_the_option_then_of_utc(tmp_path: Path) -> None:
+    """The recording begins at 22:13 UTC, when it is the next day in Tokyo."""
+    with_zone = write_shape("iso-zone.csv", tmp_path)
+    assert set(read_raw(with_zone)["day"]) == {"2023-11-15"}
+    assert set(read_raw(with_zone, options=szlib.ReadOptions(tz="UTC"))["day"]) == {"2023-11-14"}
+    nanoseconds = write_shape("nanoseconds.csv", tmp_path)
+    assert set(read_raw(nanoseconds)["day"]) == {"2023-11-14"}
+    assert set(read_raw(nanoseconds, options=szlib.ReadOptions(tz="Asia/Tokyo"))["day"]) == {"2023-11-15"}
+    moments = pd.to_datetime(hall()["t"] + BEGIN, unit="s", utc=True).dt.tz_convert("Asia/Tokyo")
+    assert set(read_raw(hall().assign(t=moments).drop(columns="frame"))["day"]) == {"2023-11-15"}
+
+
+def test_a_text_id_has_the_same_number_in_every_file(tmp_path: Path) -> None:
+    both = pd.read_csv(write_shape("text-ids.csv", tmp_path)).sort_values("t")
+    half = both["t"] < both["t"].median()
+    for name, rows in {"a.csv": both[half], "b.csv": both[~half]}.items():
+        rows.to_csv(tmp_path / name, index=False)
+    parts = szlib.read_tracks([tmp_path / "a.csv", tmp_path / "b.csv"])
+    whole = szlib.read_tracks(tmp_path / "text-ids.csv")
+    assert set(parts["id"]) == set(whole["id"]) and parts["day"].nunique() == 1
+
+
+def test_a_unit_in_a_name_is_used_and_a_given_one_replaces_it(tmp_path: Path) -> None:
+    rows = hall()[["t", "id", "x", "y"]].assign(x=lambda r: r["x"] * 1e3, y=lambda r: r["y"] * 1e3)
+    table = rows.set_axis(["Time (s)", "Person ID", "X [mm]", "Y [mm]"], axis=1)
+    assert read_raw(table)["x"].max() == hall()["x"].max()
+    with pytest.warns(szlib.DataWarning, match="people move at"):
+        assert read_raw(table, options=szlib.ReadOptions(unit="cm"))["x"].max() == 10 * hall()["x"].max()
+    pixels = table.set_axis(["time", "id", "x_px", "y_px"], axis=1)
+    with pytest.raises(szlib.DataError, match="positions are in pixels; pass scale="):
+        read_raw(pixels)
+
+
+UNCLEAR = {
+    "time, timestamp can all be t; pass columns={'t': 'time'}": ["time", "id", "x", "y", "timestamp"],
+    "names x twice; rename one": ["t", "id", "x", "y", "x"],
+    "has no column y; people walk if these are {'t': 't', 'id': 'id', 'x': 'x', 'y': 'north'}": [
+        "t", "id", "x", "north", "note",
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message", UNCLEAR)
+def test_a_column_that_is_not_clear_is_not_guessed(message: str) -> None:
+    rows = hall()[["t", "id", "x", "y"]].assign(more=0.0)
+    with pytest.raises(szlib.DataError, match=re.escape(message)):
+        read_raw(rows.set_axis(UNCLEAR[message], axis=1))
+
+
+def test_an_exact_name_is_taken_before_a_usual_one() -> None:
+    rows = hall()[["t", "id", "x", "y"]]
+    more = rows.assign(time=-1.0, track=7, pos_x=0.0)
+    pd.testing.assert_frame_equal(read_raw(more), read_raw(rows))
+
+
+def test_a_value_that_is_no_number_is_named_with_its_column_and_line(tmp_path: Path) -> None:
+    rows = ["Zeit;Person;X;Y", "0,0;1;0,0;1,0", "0,4;1;0,5;1,0", "0,8;1;k.A.;1,0"]
+    file = write(tmp_path / "hall.csv", "\n".join(rows))
+    with pytest.warns(szlib.DataWarning, match=r"hall\.csv, first at line 4 \(column 'X' holds 'k\.A\.'\)"):
+        assert len(read_raw(file)) == 2
+    with pytest.raises(szlib.DataError, match=r"line 2: missing or not a number \(column 'X' holds 'k\.A"):
+        read_raw(write(tmp_path / "hall.csv", "\n".join([rows[0], rows[3]])))
+
+
+# --- tables of other libraries ------------------------------------------------------------------------
+
+
+class Points(pd.DataFrame):
+    """A table with points, as those of GeoPandas."""
+
+    @property
+    def _constructor(self) -> type:
+        return Points
+
+    geometry = property(lambda self: self["position"])
+    crs = property(lambda self: SimpleNamespace(is_geographic=bool(self["position"].iloc[0].x > 100)))
+
+
+def points(rows: pd.DataFrame, east: float = 0.0) -> Points:
+    table = Points(rows[["t", "id"]])
+    table["position"] = [shapely.Point(x + east, y) for x, y in zip(rows["x"], rows["y"], strict=True)]
+    return table
+
+
+def moving(rows: pd.DataFrame) -> object:
+    """As MovingPandas: people with points, whose times are the index."""
+    table = points(rows).rename(columns={"id": "traj_id"})
+    table.index = pd.DatetimeIndex(pd.to_datetime(table.pop("t") + BEGIN, unit="s"), name="t")
+    return SimpleNamespace(to_point_gdf=lambda: table)
+
+
+TABLES: dict[str, Callable[[pd.DataFrame], object]] = {
+    "polars": pl.from_pandas, "arrow": pa.Table.from_pandas, "geopandas": points, "movingpandas": moving,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("library", TABLES)
+def test_tables_of_other_libraries_are_read(library: str) -> None:
+    rows = hall()[["t", "id", "x", "y"]]
+    read, right = read_raw(TABLES[library](rows)), read_raw(rows)
+    np.testing.assert_allclose(read["t"] - (BEGIN if library == "movingpandas" else 0), right["t"], atol=1e-6)
+    pd.testing.assert_frame_equal(read[["id", "x", "y"]], right[["id", "x", "y"]])
+
+
+def test_points_in_degrees_are_refused() -> None:
+    with pytest.raises(szlib.DataError, match="points are in degrees; project them to metres"):
+        read_raw(points(hall(), east=139.0))
+
+
+def test_tables_of_a_database_that_do_not_decide_are_refused(tmp_path: Path) -> None:
+    import sqlite3
+
+    file = tmp_path / "two.sqlite"
+    with sqlite3.connect(file) as database:
+        for name in ("monday", "tuesday"):
+            hall().to_sql(name, database, index=False)
+    database.close()
+    with pytest.raises(
+        szlib.DataError, match=r"several of the tables .* can be tracks; .* sqlite3 -header -csv"
+    ):
+        read_raw(file)
+
+
+# --- the same options everywhere ----------------------------------------------------------------------
+
+
+def test_options_are_the_same_as_values_and_as_arguments() -> None:
+    options = szlib.ReadOptions(columns={"t": "Zeit", "id": 1}, unit="mm", tz="Asia/Tokyo", max_gap=2.0)
+    assert szlib.ReadOptions(**options.as_json()) == options
+    assert arguments(options.as_json()) == "--unit mm --columns t=Zeit,id=1 --max-gap 2 --tz Asia/Tokyo"
+
+
+@pytest.mark.parametrize("columns", ["Zeit", "t=", "when=Zeit", "t=Zeit,frame=Bild"])
+def test_columns_that_say_nothing_are_refused(
+    columns: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["inspect", str(write_shape("plain.csv", tmp_path)), "--columns", columns]) == 2
+    assert "columns" in capsys.readouterr().err
+
+
+def test_extract_reads_with_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "data").mkdir()
+    file = write_shape("pixels.csv", tmp_path / "data")
+    days = ["extract", str(file), "--out", str(tmp_path / "days"), *AREA]
+    assert main([*days, "--frame-rate", "25", "--scale", "0.02", "--columns", "id=track_id"]) == 0
+    assert re.search(r"pixels +done +1 +1040 ", capsys.readouterr().out)
