@@ -61,8 +61,10 @@ SETTINGS = {
     "MPC-CBF": szlib.MPCSettings(),
     "MPC-CBF, rest": szlib.MPCSettings(terminal="rest"),
     "MPC-CBF, gamma 0.2": szlib.MPCSettings(gamma=0.2, N_h=8),
+    "MPC-CBF, among people": szlib.MPCSettings.among_people(),
 }
-"""szlib's defaults; plans that end at rest; barriers on the whole horizon that may be used up faster."""
+"""szlib's defaults; plans that end at rest; barriers on the whole horizon that may be used up faster; and the
+controller that is recommended in crowds."""
 PROBE = 1
 """The trial that is driven again in each run of notebook 17: barriers bind there."""
 BY = ("crowd", "sees", "controller")
