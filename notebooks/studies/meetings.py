@@ -30,8 +30,9 @@ METHODS = {
     **{name: (name, szlib.MPCSettings()) for name in CONTROLLERS},
     "MPC-CBF, bolder": ("MPC-CBF", szlib.MPCSettings(gamma=0.2, N=24, N_h=24)),
     "MPC-CBF, N = 24 alone": ("MPC-CBF", szlib.MPCSettings(N=24)),
+    "MPC-CBF, among people": ("MPC-CBF", szlib.MPCSettings.among_people()),
 }
-"""Controllers and their settings, by name: szlib's defaults, and two changes of them."""
+"""Controllers and their settings, by name: szlib's defaults, two changes of them, and those among people."""
 
 
 def meet(
