@@ -210,6 +210,8 @@ record.claim("and it keeps its promises as well", (steps.drop(hidden) == 0).all(
 stuck = {name: mean[name]["success"]["robot crowding"] for name in ("MPC-CBF", "MPC-CBF, bolder")}
 record.claim("crowded in, it does not always find the gap", stuck["MPC-CBF"] < 1, stuck)
 record.claim("the bolder one more often", stuck["MPC-CBF"] < stuck["MPC-CBF, bolder"], stuck)
+
+# %%
 among = mean["MPC-CBF, among people"]
 record.claim(
     "the controller among people arrives in all variations of all meetings",
