@@ -105,9 +105,15 @@ def build_parser() -> argparse.ArgumentParser:
     run.add_argument("--out", type=os.path.abspath, metavar="FOLDER", help=text["out"])
     run.add_argument("-j", "--jobs", type=_job_count, default=n_jobs, metavar="N", help=text["jobs"])
     run.add_argument("--only", nargs="+", default=[], metavar="NN", help=text["only"])
+    run.add_argument("--notebooks", metavar="FOLDER", help=text["notebooks"])
     pair = "NAME=VALUE"
     run.add_argument("-p", "--parameter", action="append", default=[], metavar=pair, help=text["parameter"])
     run.set_defaults(command=_run)
+
+    text = texts["notebooks"]
+    notebooks = commands.add_parser("notebooks", help=text["summary"])
+    notebooks.add_argument("folder", metavar="FOLDER", help=text["folder"])
+    notebooks.set_defaults(command=_notebooks)
 
     text = texts["report"]
     report = commands.add_parser("report", help=text["summary"])
@@ -188,16 +194,16 @@ def _run(options: argparse.Namespace) -> int:
     if reading := _read_options(options):
         parameters["reading"] = reading
     _require_workbook_packages()
-    from . import folders
     from .runner import format_summary, run
 
     summary = run(
         options.data[0] if len(options.data) == 1 else options.data,
-        out=options.out or folders.RESULTS,
+        out=options.out,
         jobs=options.jobs,
         only=options.only,
         parameters=parameters,
         scheduler=options.scheduler,
+        notebooks=options.notebooks,
     )
     print(format_summary(summary))
     if "report" in summary:
@@ -211,13 +217,23 @@ def _run(options: argparse.Namespace) -> int:
     return 0 if summary["passed"] else 1
 
 
+def _notebooks(options: argparse.Namespace) -> int:
+    """Copy the notebooks, and say how to go on."""
+    _require_workbook_packages()
+    from .folders import copy_notebooks
+
+    place = printable(copy_notebooks(options.folder))
+    print(f"{place}: szlib run --notebooks {place} runs them, jupyter lab {place} opens them")
+    return 0
+
+
 def _report(options: argparse.Namespace) -> int:
     """Write the report of a run again."""
     _require_workbook_packages()
     from . import folders
     from .report import write_report
 
-    home = Path(options.folder) if options.folder else folders.results_root(folders.RESULTS) / "synthetic"
+    home = Path(options.folder) if options.folder else folders.default_results() / "synthetic"
     print(printable(os.path.relpath(file := write_report(home))))
     if options.open:
         import webbrowser
@@ -288,10 +304,7 @@ def _fit(options: argparse.Namespace) -> int:
 def _require_workbook_packages() -> None:
     """Raise SzlibError if a package is missing that executes the notebooks."""
     if missing := [name for name in _WORKBOOK_PACKAGES if find_spec(name) is None]:
-        raise SzlibError(
-            f"the notebooks need {', '.join(missing)}: pip install 'szlib[workbook]'; the notebooks "
-            "themselves come with the repository: clone it, and call `make run` there"
-        )
+        raise SzlibError(f"the notebooks need {', '.join(missing)}: pip install 'szlib[workbook]'")
 
 
 def _parse_parameter(text: str) -> tuple[str, Any]:

@@ -13,33 +13,94 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..errors import DataError
+from ..errors import DataError, StorageError
 from ..files import claim_folder, folder_purpose
 from ..input_files import printable
 from ..tracks import datasets
 
-# The folder of the notebooks, beside the package in the repository.
-NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
+# The folder of the notebooks: in an installed package, or beside the package in the repository.
+BUNDLED = Path(__file__).resolve().parent / "notebooks"
+NOTEBOOKS = BUNDLED if BUNDLED.is_dir() else BUNDLED.parents[2] / "notebooks"
 RESULTS = "../results"  # the default folder of all results, relative to the notebooks
 RESULTS_OF = "results of "  # how the purpose of each folder of results begins
 PURPOSE = f"{RESULTS_OF}the workbook"  # the purpose that marks the folder of all results
 LAB = "lab"  # the folder, among all results, of notebooks that are executed by hand
 PARAMETERS = "parameters.json"  # file of a run: its data and parameters
+# What a copy of the notebooks leaves out: their executed copies.
+_UNNEEDED = shutil.ignore_patterns("*.ipynb", "__pycache__", "real_day", "tools", ".*")
 RUN_VARIABLE = "SZLIB_RUN"  # environment variable of a kernel: the results folder of the kernel's run
 
 
 def results_root(results: str | Path) -> Path:
-    """Absolute path of the folder of all `results`; a relative path starts at the notebooks."""
-    return ((NOTEBOOKS if NOTEBOOKS.is_dir() else Path()) / results).resolve()
+    """Absolute path of the folder of all `results`.
+
+    A relative path starts at the notebooks of the repository, or else at the current folder.
+    """
+    return ((Path() if NOTEBOOKS == BUNDLED else NOTEBOOKS) / results).resolve()
 
 
-def list_notebooks() -> list[Path]:
-    """The scripts of the notebooks in reading order: 00, 01 ... 06, 06b, 07 ..."""
-    return sorted(NOTEBOOKS.glob("[0-9][0-9]*_*.py"))
+def default_results(notebooks: Path | None = None) -> Path:
+    """The folder of all results of the `notebooks`: beside those of the repository, else `results` here."""
+    in_repository = (notebooks or NOTEBOOKS) == NOTEBOOKS != BUNDLED
+    return results_root(RESULTS) if in_repository else Path("results").resolve()
+
+
+def find_notebooks(folder: str | Path | None = None) -> Path:
+    """The notebooks in a `folder`, or in `notebooks` inside it.
+
+    None: those of the repository; in an installed package those of the current folder, else its own.
+    Raises DataError if there are none.
+    """
+    given = Path(folder or ".").resolve()
+    places = [NOTEBOOKS] if folder is None and NOTEBOOKS != BUNDLED else [given, given / "notebooks"]
+    places += [BUNDLED] if folder is None else []
+    found = next((place for place in places if list_notebooks(place)), None)
+    if found is None:
+        name = printable(folder or NOTEBOOKS)
+        raise DataError(f"{name}: there are no notebooks; expected a folder that `szlib notebooks` wrote")
+    return found
+
+
+def list_notebooks(folder: Path) -> list[Path]:
+    """The scripts of the notebooks in a `folder`, in reading order: 00, 01 ... 06, 06b, 07 ..."""
+    return sorted(folder.glob("[0-9][0-9]*_*.py"))
+
+
+def copy_notebooks(folder: str | Path) -> Path:
+    """Copy the workbook, with its exercises, to `notebooks` in a `folder`, and return that path.
+
+    Each script gets a notebook beside it, not executed; Jupytext keeps the two together. Raises StorageError
+    if there are files already, or the copy cannot be written.
+    """
+    import jupytext
+
+    place = Path(folder) / "notebooks"
+    try:
+        if place.exists() and any(place.iterdir()):
+            raise StorageError(f"{printable(place)}: holds files; choose a new or empty folder")
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=".szlib-", dir=place.parent) as private:
+            whole = shutil.copytree(NOTEBOOKS, Path(private, place.name), ignore=_UNNEEDED)
+            for script in (
+                *list_notebooks(whole),
+                *whole.glob("exercises/*.py"),
+                *whole.glob("solutions/*.py"),
+            ):
+                jupytext.write(jupytext.read(script), script.with_suffix(".ipynb"))
+            if place.exists():
+                place.rmdir()
+            whole.replace(place)
+    except OSError as error:
+        raise StorageError(
+            f"{printable(place)}: cannot be made ({error.strerror or error}); choose another folder"
+        ) from error
+    return place
 
 
 def has_name(notebook: Path, name: str) -> bool:

@@ -47,22 +47,24 @@ _POLL = 0.5  # longest wait before Ctrl-C is noticed, whichever thread receives 
 def run(
     data: str | Sequence[str] = datasets.SYNTHETIC,
     *,
-    out: str | Path = folders.RESULTS,
+    out: str | Path | None = None,
     jobs: int = 1,
     only: Iterable[str] = (),
     parameters: Mapping[str, Any] | None = None,
     scheduler: str | None = None,
+    notebooks: str | Path | None = None,
 ) -> dict[str, Any]:
     """Execute the notebooks on a data set, and collect their results.
 
     Parameters
     ----------
     data : "synthetic", the name of another data set, or paths of track files.
-    out : folder of all results; those of this run go to a folder inside, see `szlib.workbook.folders`.
+    out : folder of all results (None: `folders.default_results`); those of this run go to a folder inside.
     jobs : number of notebooks that run at the same time.
     only : numbers ("07") or names of the notebooks; empty: all.
     parameters : parameters of the notebooks by name, such as {"seed": 1}.
     scheduler : address of a Dask cluster that shares this file system.
+    notebooks : the folder of the notebooks; None as for `folders.find_notebooks`.
 
     Returns
     -------
@@ -78,13 +80,15 @@ def run(
     StorageError : the results cannot be written, or another run writes to the same folder.
     SzlibError : a process may open too few files or use too little memory, or 127.0.0.1 is not reached.
     """
-    scripts = choose_notebooks(only)
+    place = folders.find_notebooks(notebooks)
+    scripts = choose_notebooks(only, place)
     names, jobs = [script.stem for script in scripts], max(limit_jobs(jobs, len(scripts)), 1)
     _require_limits(_FILES_OF_KERNEL + _FILES_OF_CLIENT * jobs)
     _require_loopback()
-    known = sorted({*scripts, *(s for s in folders.list_notebooks() if s.stem[:2] <= PRODUCERS[-1])})
+    known = sorted({*scripts, *(s for s in folders.list_notebooks(place) if s.stem[:2] <= PRODUCERS[-1])})
     given = check_parameters(parameters or {}, known)
-    results, data = folders.results_root(out), folders.absolute_data(data)
+    results = folders.default_results(place) if out is None else folders.results_root(out)
+    data = folders.absolute_data(data)
     home = folders.claim_results(results, data, given)
     with folder_lock(home), safe_path(), _private_temporary_files():
         files = DataCache(home, data, seed=given.get("seed", 0)).files()
@@ -166,17 +170,12 @@ def _private_temporary_files() -> Iterator[None]:
         tempfile.tempdir = before
 
 
-def choose_notebooks(only: Iterable[str]) -> list[Path]:
-    """The scripts of the notebooks whose numbers or names are in `only`; all if it is empty.
+def choose_notebooks(only: Iterable[str], place: Path | None = None) -> list[Path]:
+    """The scripts of the notebooks in `place` whose numbers or names are in `only`; all if it is empty.
 
     Raises DataError for an unknown name, and if there are no notebooks.
     """
-    scripts, wanted = folders.list_notebooks(), list(only)
-    if not scripts:
-        raise DataError(
-            f"{folders.NOTEBOOKS}: there are no notebooks; they come with the repository, not with the "
-            "package: clone it, and call `make run` there"
-        )
+    scripts, wanted = folders.list_notebooks(place or folders.find_notebooks()), list(only)
     if unknown := [name for name in wanted if not any(folders.has_name(script, name) for script in scripts)]:
         raise DataError(
             f"no notebook {', '.join(unknown)}; there are {', '.join(script.stem for script in scripts)}"

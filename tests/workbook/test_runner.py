@@ -259,7 +259,7 @@ def test_missing_packages_are_named(monkeypatch, capsys):
 
 
 def test_missing_notebooks_are_explained(notebooks):
-    with pytest.raises(DataError, match="they come with the repository"):
+    with pytest.raises(DataError, match="notebooks: there are no notebooks; expected a folder"):
         runner.run()
 
 
