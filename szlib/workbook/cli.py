@@ -294,7 +294,7 @@ def _fit(options: argparse.Namespace) -> int:
     from .fit_command import fit
 
     settings = EncounterSettings(area=options.area, has_walls=options.walls)
-    reading = ReadOptions()
+    reading = ReadOptions(**_read_options(options))
     names = ("out", "method", "kind", "tracks", "exclude", "jobs")
     given = {name: getattr(options, name) for name in names}
     print(fit(options.data, settings=settings, reading=reading, **given))

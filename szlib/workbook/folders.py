@@ -67,9 +67,9 @@ def find_notebooks(folder: str | Path | None = None) -> Path:
     return found
 
 
-def list_notebooks(folder: Path) -> list[Path]:
-    """The scripts of the notebooks in a `folder`, in reading order: 00, 01 ... 06, 06b, 07 ..."""
-    return sorted(folder.glob("[0-9][0-9]*_*.py"))
+def list_notebooks(folder: Path | None = None) -> list[Path]:
+    """The scripts of the notebooks in a `folder` (None: `NOTEBOOKS`), in reading order: 06, 06b, 07 ..."""
+    return sorted((folder or NOTEBOOKS).glob("[0-9][0-9]*_*.py"))
 
 
 def copy_notebooks(folder: str | Path) -> Path:

@@ -52,6 +52,17 @@ def test_zone_from_tracks_is_that_of_the_library(
     assert (tmp_path / "zone.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_columns_of_other_names_and_units_are_read(recording: Path, tmp_path: Path) -> None:
+    tracks = szlib.read_tracks(recording)[["t", "id", "x", "y"]]
+    tracks[["x", "y"]] *= 100
+    tracks.set_axis(["Zeit", "Person", "Ost", "Nord"], axis=1).to_csv(tmp_path / "hall.csv", index=False)
+    out, columns = tmp_path / "zone.json", "t=Zeit,id=Person,x=Ost,y=Nord"
+    given = ["--columns", columns, "--unit", "cm", "--area", *map(float, str(szlib.ATC_SQUARE).split())]
+    assert fit(tmp_path / "hall.csv", "--out", out, "--method", "quantile", *given) == 0
+    zone, expected = szlib.SocialZone.load(out), szlib.find_encounters(szlib.read_tracks(recording))
+    assert zone.provenance["encounters"] == expected["encounter"].nunique()
+
+
 def test_extracted_days_have_no_null_model_until_their_tracks_are_given(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
