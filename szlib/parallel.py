@@ -24,7 +24,7 @@ from . import memory
 from .errors import SzlibError
 from .files import process_folder
 
-_CONNECT_TIMEOUT = 10  # longest wait for the answer of a scheduler [s]
+_CONNECT_TIMEOUT = 10.0  # longest wait for the answer of a scheduler, and for its first worker [s]
 _MAX_PER_CORE = 4  # more processes than this for each core slow each other down
 _HEARTBEAT = 0.5  # interval at which a process checks that its parent lives [s]
 
@@ -146,10 +146,11 @@ def _run_in_share(parent: int, share: int, task: tuple[Callable[..., Any], Any, 
 
 
 @contextmanager
-def cluster(address: str | None) -> Iterator[Any]:
+def cluster(address: str | None, *, wait: float = _CONNECT_TIMEOUT) -> Iterator[Any]:
     """Run parallel work inside a with block on the Dask scheduler at `address`; yields the client.
 
-    None changes nothing. Raises SzlibError if no scheduler answers, or the extra `cluster` is not installed.
+    None changes nothing. `wait` is the longest wait for the first worker [s]. Raises SzlibError if no
+    scheduler answers, no worker joins it, or the extra `cluster` is not installed.
     """
     if address is None:
         yield None
@@ -159,11 +160,19 @@ def cluster(address: str | None) -> Iterator[Any]:
     except ImportError as error:
         raise SzlibError("a scheduler needs Dask; install it with: pip install -e '.[cluster]'") from error
     try:
-        client = Client(address, timeout=_CONNECT_TIMEOUT)
+        client = Client(address, timeout=max(wait, _CONNECT_TIMEOUT))
     except (OSError, ValueError) as error:
         raise SzlibError(
             f"no Dask scheduler answers at {address!r} ({error}); start one with `dask scheduler`, and give "
             "its address, such as tcp://10.0.0.1:8786"
         ) from error
-    with client, joblib.parallel_config("dask"):
-        yield client
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=wait)
+        except TimeoutError as error:
+            raise SzlibError(
+                f"no worker joined the scheduler at {address!r} within {wait:g} s; start one with "
+                f"`dask worker {address}`, or wait longer, such as --wait 600"
+            ) from error
+        with joblib.parallel_config("dask"):
+            yield client

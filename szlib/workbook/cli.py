@@ -94,6 +94,7 @@ def build_parser() -> argparse.ArgumentParser:
     data.add_argument("--walls", action="store_true", help=text["walls"])
     data.add_argument("--memory", metavar="SIZE", help=text["memory"])
     cluster.add_argument("--scheduler", metavar="ADDRESS", help=text["scheduler"])
+    cluster.add_argument("--wait", type=float, default=10.0, metavar="SECONDS", help=text["wait"])
 
     summary, _, rules = str(inspect.getdoc(_run)).partition("\n\n")
     text, n_jobs = texts["run"], min(os.cpu_count() or 1, 4)
@@ -194,17 +195,19 @@ def _run(options: argparse.Namespace) -> int:
     if reading := _read_options(options):
         parameters["reading"] = reading
     _require_workbook_packages()
+    from ..parallel import cluster
     from .runner import format_summary, run
 
-    summary = run(
-        options.data[0] if len(options.data) == 1 else options.data,
-        out=options.out,
-        jobs=options.jobs,
-        only=options.only,
-        parameters=parameters,
-        scheduler=options.scheduler,
-        notebooks=options.notebooks,
-    )
+    with cluster(options.scheduler, wait=options.wait) as client:
+        summary = run(
+            options.data[0] if len(options.data) == 1 else options.data,
+            out=options.out,
+            jobs=options.jobs,
+            only=options.only,
+            parameters=parameters,
+            client=client,
+            notebooks=options.notebooks,
+        )
     print(format_summary(summary))
     if "report" in summary:
         print(f"report: {printable(os.path.relpath(summary['report']))}")
@@ -278,7 +281,7 @@ def _extract(options: argparse.Namespace) -> int:
     from ..parallel import cluster
     from ..tracks.options import ReadOptions
 
-    with cluster(options.scheduler):
+    with cluster(options.scheduler, wait=options.wait):
         extraction = extract_days(
             options.data, out=options.out, n_jobs=options.jobs, exclude=options.exclude,
             options=ReadOptions(**_read_options(options)), area=options.area, has_walls=options.walls,

@@ -23,7 +23,7 @@ from .. import __version__, memory
 from ..errors import DataError, SzlibError
 from ..files import folder_lock, process_folder, write_file
 from ..input_files import file_content, read_json_object
-from ..parallel import cluster, limit_jobs, safe_path, uninterrupted
+from ..parallel import limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets, funnels
 from . import folders
 from .notebook_execution import EMPTY_RECORD, end_kernels, execute_notebook
@@ -51,7 +51,7 @@ def run(
     jobs: int = 1,
     only: Iterable[str] = (),
     parameters: Mapping[str, Any] | None = None,
-    scheduler: str | None = None,
+    client: Any = None,
     notebooks: str | Path | None = None,
 ) -> dict[str, Any]:
     """Execute the notebooks on a data set, and collect their results.
@@ -63,7 +63,7 @@ def run(
     jobs : number of notebooks that run at the same time.
     only : numbers ("07") or names of the notebooks; empty: all.
     parameters : parameters of the notebooks by name, such as {"seed": 1}.
-    scheduler : address of a Dask cluster that shares this file system.
+    client : of a Dask cluster that shares this file system, as from `szlib.parallel.cluster`.
     notebooks : the folder of the notebooks; None as for `folders.find_notebooks`.
 
     Returns
@@ -97,7 +97,7 @@ def run(
             (home / "zone.json").unlink(missing_ok=True)
         source, earlier = _start_summary(home, data, files, given, names)
         variables = given | {"data": data, "results": str(results)}
-        outcomes = _execute_all(scripts, variables, home, jobs, scheduler)
+        outcomes = _execute_all(scripts, variables, home, jobs, client)
         verdict = _judge(zone, source["files"], given) if (zone := home / "zone.json").exists() else ""
         if (samples := home / "encounters.parquet").exists():
             table = pd.read_parquet(samples, columns=[])
@@ -184,11 +184,11 @@ def choose_notebooks(only: Iterable[str], place: Path | None = None) -> list[Pat
 
 
 def _execute_all(
-    scripts: Sequence[Path], given: Mapping[str, Any], home: Path, jobs: int, scheduler: str | None
+    scripts: Sequence[Path], given: Mapping[str, Any], home: Path, jobs: int, client: Any
 ) -> dict[str, dict[str, Any]]:
     """Execute the notebooks; the outcome of each by its name, in their order."""
     environment = {folders.RUN_VARIABLE: str(home)}
-    if not scheduler:
+    if client is None:
         threads = max(1, (os.cpu_count() or 1) // jobs)
         environment |= {
             memory.VARIABLE: str(memory.limit() // jobs),
@@ -198,7 +198,7 @@ def _execute_all(
     outcomes = {script.stem: not_started for script in scripts}
     bar = tqdm(total=len(scripts), unit="notebook", desc=home.name, disable=None)
     futures: list[Future[Any]] = []
-    with bar, cluster(scheduler) as client, _open_executor(client, jobs, futures) as executor:
+    with bar, _open_executor(client, jobs, futures) as executor:
         for batch in split_batches(scripts):
             if any(outcome["status"] == "refused" for outcome in outcomes.values()):
                 break  # the later notebooks need its result

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -140,6 +142,45 @@ def test_error_names_an_address_without_scheduler(monkeypatch: pytest.MonkeyPatc
         pass
     with parallel.cluster(None) as client:
         assert client is None
+
+
+def test_extract_waits_for_workers_that_come_late(day: Path, tmp_path: Path) -> None:
+    """As in a queue: the scheduler is up, its workers start later; without `--wait` the error says so."""
+    pytest.importorskip("distributed")
+    scheduler_file = tmp_path / "scheduler.json"
+    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
+    scheduler = subprocess.Popen([*dask, "--scheduler-file", str(scheduler_file)], stderr=subprocess.DEVNULL)
+    worker = None
+    try:
+        end = time.monotonic() + 60
+        while not scheduler_file.exists() and time.monotonic() < end:
+            time.sleep(0.1)
+        address = json.loads(scheduler_file.read_text())["address"]
+        with (
+            pytest.raises(szlib.SzlibError, match=r"no worker joined the scheduler .* --wait 600"),
+            parallel.cluster(address, wait=0.5),
+        ):
+            pass
+        extract = [sys.executable, "-m", "szlib", "extract", str(day), "--out", str(tmp_path / "out")]
+        program = subprocess.Popen([*extract, "--scheduler", address, "--wait", "60"])
+        time.sleep(3.0)
+        dask = [
+            sys.executable,
+            "-m",
+            "distributed.cli.dask_worker",
+            address,
+            "--nthreads",
+            "1",
+            "--no-dashboard",
+        ]
+        worker = subprocess.Popen(dask, stderr=subprocess.DEVNULL, cwd=tmp_path)
+        assert program.wait(timeout=120) == 0
+    finally:
+        for process in (scheduler, worker):
+            if process is not None:
+                process.terminate()
+                process.wait()
+    assert len(list((tmp_path / "out").glob("*.parquet"))) == 1
 
 
 def test_inspect_says_that_nobody_walks_where_it_finds_no_area(
