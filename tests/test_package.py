@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import dataclasses
 import inspect
+import json
+import os
 import re
 import subprocess
 import sys
@@ -14,8 +16,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+import yaml
 
 import szlib
+from szlib.workbook.cli import build_parser
 
 PACKAGE = Path(szlib.__file__).parent
 TESTS = Path(__file__).parent
@@ -257,3 +261,19 @@ def test_the_keywords_of_the_paper_are_there() -> None:
     assert {"fraction", "r_max"} <= parameters(szlib.remove_outliers)
     assert {"method", "r_max", "speeds"} <= parameters(szlib.SocialZone.fit)
     assert {"gamma", "N", "N_h", "dt", "pass_side"} <= parameters(szlib.MPCSettings)
+
+
+def test_ready_made_environments_name_what_exists() -> None:
+    """A container, Binder and a workflow for users install from the lock, and call commands that exist."""
+    root = PACKAGE.parent
+    container = json.loads((root / ".devcontainer" / "devcontainer.json").read_text())
+    assert container["postCreateCommand"] == "make .venv/installed"
+    assert "\nINSTALLED := $(VENV)/installed\n" in (root / "Makefile").read_text()
+    binder = root / ".binder"
+    (line,) = (binder / "requirements.txt").read_text().splitlines()
+    assert (binder / line.removeprefix("-r ")).resolve() == (root / "environment.lock").resolve()
+    workflow = yaml.safe_load((root / "notebooks" / "examples" / "github_actions.yml").read_text())
+    commands = [step["run"] for step in workflow["jobs"]["zones"]["steps"] if "run" in step]
+    (run,) = [command for command in commands if "szlib" in command]
+    options = build_parser().parse_args(run.split()[1:])
+    assert (options.area, options.out) == ("auto", os.path.abspath("../results"))
