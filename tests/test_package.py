@@ -276,4 +276,4 @@ def test_ready_made_environments_name_what_exists() -> None:
     commands = [step["run"] for step in workflow["jobs"]["zones"]["steps"] if "run" in step]
     (run,) = [command for command in commands if "szlib" in command]
     options = build_parser().parse_args(run.split()[1:])
-    assert (options.area, options.out) == ("auto", os.path.abspath("../results"))
+    assert (options.area, Path(options.out)) == ("auto", Path("../results").resolve())
