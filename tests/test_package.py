@@ -6,7 +6,6 @@ import ast
 import dataclasses
 import inspect
 import json
-import os
 import re
 import subprocess
 import sys
