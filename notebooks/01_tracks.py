@@ -44,6 +44,7 @@ from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
+reading = {}  # options of szlib.ReadOptions, such as {"unit": "mm", "columns": {"t": "Zeit"}}
 seed = 0
 results = "../results"
 
@@ -77,7 +78,8 @@ parameters(
 
 # %%
 files = record.cache.files()
-raw = readers.read_raw(files)
+options = record.cache.method.read_options()
+raw = readers.read_raw(files, options=options)
 print(f"{len(files)} file(s), {len(raw):,} rows, {raw.groupby('day')['id'].nunique().sum():,} people")
 raw.head(3)
 
@@ -90,7 +92,7 @@ raw.head(3)
 # notebook 14 shows what noise does to it.
 
 # %%
-people = clock.to_clock(raw)
+people = clock.to_clock(raw, max_gap=options.max_gap)
 people.head(3)
 
 # %%

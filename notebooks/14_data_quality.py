@@ -70,14 +70,15 @@ parameters(
 
 # %%
 files = record.cache.files()
+options = record.cache.method.read_options()
 if record.cache.is_synthetic:
     for day, (encounters, standing) in enumerate(((700, 0.08), (700, 0.08), (1000, 0.8))):
         file = record.out / f"plaza-day{day + 2}-{seed}.csv"
         date = f"2000-01-{3 + day:02}"
         settings = PlazaSettings(n_encounters=encounters, standing=standing, date=date)
         files.append(make_plaza(file, seed=seed + day + 1, settings=settings))
-seconds = pd.concat([quality.summarise_seconds(file).assign(file=file.name) for file in files])
-zone = find_format(files[0], szlib.ReadOptions()).tz  # of the clock: that of the mall, or UTC
+seconds = pd.concat([quality.summarise_seconds(file, options).assign(file=file.name) for file in files])
+zone = options.tz or find_format(files[0], options).tz  # of the clock: that of the mall, or UTC
 print(f"{len(files)} files, {seconds['rows'].sum():,} rows, {len(seconds):,} person-seconds; clock: {zone}")
 
 # %% [markdown]
@@ -100,8 +101,8 @@ if len(both):
 # ## Frames, gaps, lengths of tracks, ids
 
 # %%
-intervals = np.concatenate([quality.measure_frame_intervals(file) for file in files])
-found = pd.concat([quality.summarise_people(file).assign(file=file.name) for file in files])
+intervals = np.concatenate([quality.measure_frame_intervals(file, options) for file in files])
+found = pd.concat([quality.summarise_people(file, options).assign(file=file.name) for file in files])
 table = found.assign(length=found["last_seen"] - found["first_seen"]).groupby("file", as_index=False)
 table = table.agg(
     people=("id", "nunique"),
@@ -202,7 +203,7 @@ record.figure(figure, "hours")
 own = not has_dates and len(files) > 1 and area in ("", "auto")  # each recording its own area
 conditions = record.cache.method.encounter_settings("auto" if own else record.cache.find_area())
 extraction = szlib.extract_days(
-    files, out=record.out / "days", exclude=exclude, progress=False, settings=conditions
+    files, out=record.out / "days", exclude=exclude, progress=False, settings=conditions, options=options
 )
 extraction.table.drop(columns="seconds")
 

@@ -294,6 +294,6 @@ def _person_codes(frame: pd.DataFrame) -> np.ndarray:
     """One integer for each (day, id), ordered by day, then id."""
     days, ids = frame["day"].array, frame["id"].to_numpy()
     begins = np.flatnonzero(np.r_[True, (ids[1:] != ids[:-1]) | np.asarray(days[1:] != days[:-1])])
-    day = pd.factorize(days[begins], sort=True)[0].astype(np.int64)
+    day = pd.factorize(pd.Index(days[begins]), sort=True)[0].astype(np.int64)
     person, people = pd.factorize(ids[begins], sort=True)
     return np.repeat(day * len(people) + person, np.diff(begins, append=len(ids)))

@@ -110,7 +110,7 @@ def find_walking(
         chosen = {**known, **dict(zip(missing, choice, strict=True))}
         order = tuple(chosen[place] for place in range(4))
         rows = columns[list(order)]
-        if rate != 1 and (rows[0] % 1 != 0).any():
+        if rate != 1 and (rows[0][np.isfinite(rows[0])] % 1 != 0).any():
             continue
         motion = measure_motion(rows / [[rate], [1.0], [1.0], [1.0]])
         if motion is not None and motion.is_walking:

@@ -13,18 +13,26 @@ import pandas as pd
 import polars as pl
 
 from .formats import TrackFormat, open_file
+from .motion import measure_motion
 from .options import ReadOptions
 
 STANDING = 0.1
 """A person who moves less than this within a second stands [m] (measured: sensor noise is smaller)."""
 
 
-def summarise_seconds(path: str | Path) -> pd.DataFrame:
+ROWS = 200_000
+"""Number of rows by which a file is described."""
+
+_MAP, _INK = 60, " .:+#"  # letters in a line of a map; letters from nobody to most people
+
+
+def summarise_seconds(path: str | Path, options: ReadOptions | None = None) -> pd.DataFrame:
     """Summarise a file by person and second.
 
     Parameters
     ----------
     path : a file that `szlib.read_tracks` reads, plain or .gz.
+    options : how it is read; None takes the defaults.
 
     Returns
     -------
@@ -48,7 +56,7 @@ def summarise_seconds(path: str | Path) -> pd.DataFrame:
     1     1.0     2    1.2
     2     2.0     2    NaN
     """
-    with open_file(Path(path), ReadOptions()) as (layout, scan, plain):
+    with open_file(Path(path), options or ReadOptions()) as (layout, scan, plain):
         speed = pl.lit(np.nan)
         if layout.speed_field:
             number, unit = layout.speed_field
@@ -63,8 +71,10 @@ def summarise_seconds(path: str | Path) -> pd.DataFrame:
     return table.assign(moved=np.r_[moved[1:], np.nan])
 
 
-def measure_frame_intervals(path: str | Path) -> np.ndarray:
-    """Times from one frame of file `path` to the next [s]; a frame is a time at which somebody was seen.
+def measure_frame_intervals(path: str | Path, options: ReadOptions | None = None) -> np.ndarray:
+    """Times from one frame of file `path`, read with `options`, to the next [s].
+
+    A frame is a time at which somebody was seen.
 
     Examples
     --------
@@ -74,13 +84,15 @@ def measure_frame_intervals(path: str | Path) -> np.ndarray:
     >>> measure_frame_intervals("stand.csv")
     array([0.5, 1. ])
     """
-    with open_file(Path(path), ReadOptions()) as (layout, scan, _):
+    with open_file(Path(path), options or ReadOptions()) as (layout, scan, _):
         frames = scan.select(pl.col("t").drop_nulls().unique()).collect(engine="streaming")["t"]
     return np.asarray(np.diff(np.sort(frames.to_numpy())) * layout.seconds)
 
 
-def summarise_people(path: str | Path) -> pd.DataFrame:
-    """Summarise the file `path` by person: id, first_seen, last_seen, longest_gap [s], rows.
+def summarise_people(path: str | Path, options: ReadOptions | None = None) -> pd.DataFrame:
+    """Summarise the file `path`, read with `options`, by person.
+
+    Columns id, first_seen, last_seen, longest_gap [s], rows.
 
     Examples
     --------
@@ -92,7 +104,7 @@ def summarise_people(path: str | Path) -> pd.DataFrame:
     0   1         0.0        1.5          1.0     3
     """
     time = pl.col("t")
-    with open_file(Path(path), ReadOptions()) as (layout, scan, _):
+    with open_file(Path(path), options or ReadOptions()) as (layout, scan, _):
         people = _usable_rows(layout, scan).group_by("id")
         gap = time.sort().diff().max()
         summary = people.agg(first_seen=time.min(), last_seen=time.max(), longest_gap=gap, rows=pl.len())
@@ -103,6 +115,41 @@ def _usable_rows(layout: TrackFormat, scan: pl.LazyFrame) -> pl.LazyFrame:
     """Usable rows: id, t [s], x, y [m], and what else the scan holds."""
     time, place = pl.col("t") * layout.seconds, pl.col("x", "y") * layout.metres
     return scan.filter(layout.rejection_reason().is_null()).with_columns(time, place, id="exact_id")
+
+
+def describe_file(path: str | Path, options: ReadOptions | None = None) -> str:
+    """Describe the file `path`, read with `options`, in a few lines, by its first rows.
+
+    They say what it was taken for, how people move in it and where, and draw a map.
+
+    Examples
+    --------
+    >>> import numpy as np, pandas as pd
+    >>> from szlib.tracks.quality import describe_file
+    >>> walk = pd.DataFrame({"time": np.arange(30) / 2, "ped": 1, "x": 0.6 * np.arange(30), "y": 0.0})
+    >>> walk.to_csv("walk.csv", index=False)
+    >>> print(describe_file("walk.csv"))  # doctest: +ELLIPSIS
+    walk.csv is read as tidy: t = time, id = ped, x = x, y = y
+    ...
+    """
+    with open_file(path := Path(path), options or ReadOptions()) as (layout, scan, _):
+        rows = _usable_rows(layout, scan).head(ROWS).select("t", "id", "x", "y").collect()
+    t, person, x, y = rows.to_numpy().T
+    lines = [f"{path.name} is read as {layout.name}" + (f": {layout.text}" if layout.text else "")]
+    if rows.height == 0:
+        return lines[0]
+    seconds, motion = float(np.ptp(t)), measure_motion(np.array([t, person, x, y]))
+    first = "first " if rows.height == ROWS else ""
+    lines.append(f"{first}{rows.height:,} rows: {rows['id'].n_unique():,} people in {seconds:,.1f} s")
+    if motion is not None:
+        speeds = f"speed {motion.median_speed:.2f} m/s (median), {motion.high_speed:.2f} (90 % quantile)"
+        lines.append(f"{speeds}; a person is seen every {motion.interval:.3g} s")
+    (west, east), (south, north) = ((each.min(), each.max()) for each in (x, y))
+    lines.append(f"x {west:.1f} to {east:.1f} m, y {south:.1f} to {north:.1f} m; where people were seen:")
+    shape = (max(1, round(_MAP * min((north - south) / max(east - west, 1e-9), 1.0) / 2)), _MAP)
+    counts = np.histogram2d(y, x, bins=shape)[0][::-1]
+    levels = np.ceil(np.minimum(counts / max(np.quantile(counts, 0.95), 1.0), 1.0) * (len(_INK) - 1))
+    return "\n".join([*lines, *("".join(_INK[int(level)] for level in row) for row in levels)])
 
 
 def count_visits_by_hour(rows: pd.DataFrame, *, tz: str = "UTC") -> pd.DataFrame:

@@ -16,6 +16,7 @@ import inspect
 import json
 import os
 import re
+import shlex
 import signal
 import sys
 import threading
@@ -252,7 +253,8 @@ def _inspect(options: argparse.Namespace) -> int:
     from ..encounters.settings import EncounterSettings
     from ..tracks import datasets, funnels
     from ..tracks.clock import read_tracks
-    from ..tracks.options import ReadOptions
+    from ..tracks.options import ReadOptions, arguments
+    from ..tracks.quality import describe_file
 
     files = datasets.find([options.file])
     if len(files) != 1:
@@ -261,6 +263,7 @@ def _inspect(options: argparse.Namespace) -> int:
         )
     advice, settings = "", EncounterSettings(area=options.area, has_walls=options.walls)
     reading = ReadOptions(**_read_options(options))
+    print(describe_file(files[0], reading))
     with warnings.catch_warnings(action="ignore", category=DataWarning):  # the table shows the same counts
         samples = find_encounters_in_files(files, settings, reading)
         if "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS:
@@ -272,6 +275,12 @@ def _inspect(options: argparse.Namespace) -> int:
     print(funnels.text(funnels.get(samples)))
     if advice:
         print(advice)
+    words = ["szlib", "run", "--data", options.file, *(["--walls"] if options.walls else [])]
+    if isinstance(options.area, list):
+        words += ["--area", *map("{:g}".format, options.area)]
+    elif options.area:
+        words += ["--auto"] if options.area == "auto" else ["--polygon", options.area]
+    print("go on with:", f"{shlex.join(words)} {arguments(reading.as_json())}".strip())
     return 0
 
 

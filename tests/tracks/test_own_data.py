@@ -20,7 +20,10 @@ from helpers.track_files import write
 import szlib
 from szlib.tracks.options import COMMAND_VARIABLE, arguments
 from szlib.tracks.readers import read_raw
+from szlib.workbook import folders
 from szlib.workbook.cli import main
+from szlib.workbook.record import DataCache, ZoneMethod
+from szlib.workbook.record.parameters import check_parameters
 
 REFUSED = {"hall.xlsx": "save the sheet as CSV"}
 AREA = ["--area", "0", "12", "0", "8"]
@@ -45,9 +48,11 @@ def test_every_shape_is_read_with_the_options_that_errors_propose(
             assert REFUSED[name] in message
             return
         command = proposed(message)
-    people = 40 if name == "crowd.vsp" else 1040  # of which only control points are given
-    kept = re.search(r"read .*?kept +([\d,]+)", capsys.readouterr().out, flags=re.DOTALL)
-    assert int(kept[1].replace(",", "")) >= people
+    printed = capsys.readouterr().out
+    kept = re.search(r"^read .*?kept +([\d,]+)", printed, flags=re.DOTALL | re.MULTILINE)
+    assert kept[1] == ("280" if name == "crowd.vsp" else "1,040")  # of splines only control points are given
+    assert "40 people" in printed and re.search(r"speed 1\.\d+ m/s \(median\)", printed)
+    assert shlex.split(printed.splitlines()[-1])[3:7] == ["szlib", "run", "--data", command[1]]
 
 
 SAME = [name for name in TEXTS if name not in ("crowd.vsp", "magni.csv", "obsmat.txt")]
@@ -222,6 +227,21 @@ def test_columns_that_say_nothing_are_refused(
 ) -> None:
     assert main(["inspect", str(write_shape("plain.csv", tmp_path)), "--columns", columns]) == 2
     assert "columns" in capsys.readouterr().err
+
+
+def test_notebooks_read_with_the_options_of_their_parameter(tmp_path: Path) -> None:
+    reading = {"columns": {"id": "track_id"}, "frame_rate": 25, "scale": 0.02}
+    file = str(write_shape("pixels.csv", tmp_path))
+    assert check_parameters({"reading": reading}, folders.list_notebooks()) == {"reading": reading}
+    cache = DataCache(tmp_path / "results", file, "0 12 0 8", method=ZoneMethod(reading=reading))
+    tracks = szlib.read_tracks(file, **reading)
+    pd.testing.assert_frame_equal(cache.tracks(), tracks)
+    settings = cache.method.encounter_settings("0 12 0 8")
+    found = cache.encounters()
+    assert len(found) == len(szlib.find_encounters(tracks, settings=settings)) > 0
+    other = DataCache(tmp_path / "results", file, "0 12 0 8", method=ZoneMethod(reading={}))
+    with pytest.raises(szlib.DataError, match="counts frames"):
+        other.encounters()  # not those that were stored with other options
 
 
 def test_extract_reads_with_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -29,7 +30,11 @@ def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureF
     spoilt = day.with_name("spoilt.csv")
     spoilt.write_text(day.read_text() + "1,2\n")
     assert main(["inspect", str(spoilt)]) == 0
-    area, *lines, advice = (line.split() for line in capsys.readouterr().out.splitlines())
+    described, printed = re.split(r"^(?=area )", capsys.readouterr().out, flags=re.MULTILINE)
+    assert described.startswith("spoilt.csv is read as atc-raw")
+    assert re.search(r"speed 1\.\d+ m/s \(median\)", described)
+    area, *lines, advice, command = (line.split() for line in printed.splitlines())
+    assert command == ["go", "on", "with:", "szlib", "run", "--data", str(spoilt)]
     assert area == ["area", *str(ATC_SQUARE).split()]
     assert advice[1:4] == ["encounters", "are", "few;"]
     counts = [int(line[-1].replace(",", "")) for line in lines]
@@ -42,7 +47,9 @@ def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureF
 
 def test_area_takes_negative_numbers_in_exponent_form(day: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["inspect", str(day), "--square", "-1.85e1", "2e1", "-.2E+2", "30."]) == 0
-    assert capsys.readouterr().out.splitlines()[0] == "area -18.5 20.0 -20.0 30.0"
+    printed = capsys.readouterr().out.splitlines()
+    assert "area -18.5 20.0 -20.0 30.0" in printed
+    assert printed[-1].endswith("--area -18.5 20 -20 30")
 
 
 def test_file_may_be_called_like_a_number(

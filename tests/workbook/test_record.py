@@ -124,10 +124,10 @@ def test_rows_of_a_file_that_is_replaced_and_put_back_are_not_stored(record, mon
     file, read = record.cache.files()[0], data_cache.read_tracks
     content, before = file.read_bytes(), file.stat()
 
-    def read_another(files):
+    def read_another(files, options):
         file.write_text("t,id,x,y\n0,1,0,0\n1,1,5,0\n")
         try:
-            return read(files)
+            return read(files, options=options)
         finally:
             file.write_bytes(content)
             os.utime(file, ns=(before.st_atime_ns, before.st_mtime_ns))

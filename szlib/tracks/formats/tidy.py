@@ -25,7 +25,7 @@ from ...errors import DataError
 from ..options import ReadOptions
 from .base import TrackFormat, decode_first_line, decode_line, is_number, scan_table
 from .columns import find_columns
-from .unpack import BYTES_PER_ROW, LONGEST_LINE
+from .unpack import BYTES_PER_ROW, LONGEST_LINE, require_memory
 from .values import to_ids, to_numbers, to_times
 
 _SAMPLE = 2000  # rows in which columns are guessed
@@ -45,6 +45,7 @@ class _Table(TrackFormat):
 
     def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
         """As `TrackFormat.open`, with the separator and the header of the file."""
+        require_memory(plain, path)
         first = decode_first_line(head, path)
         separator = max(",;\t", key=first.count)
         separator = separator if separator in first else " "

@@ -26,7 +26,6 @@ from ...plaza.generation import make_plaza
 from ...plaza.settings import PlazaSettings
 from ...tracks import datasets
 from ...tracks.clock import read_tracks
-from ...tracks.options import ReadOptions
 from ...zones.ellipses import Ellipse
 from ...zones.social_zone import SocialZone, recorded_hours
 from ...zones.verdict import describe_missing_encounters
@@ -93,8 +92,9 @@ class DataCache:
         """The track table of the data set; recordings that have each their own area stand side by side."""
         settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
-            tracks = read_tracks(files)
-            return tracks if one_day.known_area(settings, files, ReadOptions()) else place_apart(tracks)
+            options = self.method.read_options()
+            tracks = read_tracks(files, options=options)
+            return tracks if one_day.known_area(settings, files, options) else place_apart(tracks)
 
     def find_area(self, tracks: pd.DataFrame | None = None) -> Area:
         """The area in which encounters are found: the one given, or the default of the data.
@@ -106,7 +106,7 @@ class DataCache:
             return replace(as_area(text), reason=reason)
         settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
-            area = as_area(one_day.with_area(settings, files, ReadOptions(), tracks).area)
+            area = as_area(one_day.with_area(settings, files, self.method.read_options(), tracks).area)
         store_cached(self._path("area.txt"), f"{area}\n{area.reason}".encode(), self._source())
         return area
 
@@ -198,6 +198,7 @@ class DataCache:
             files = self.contents
         source = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "area": self.area}
         source |= {"szlib": __version__, "parameters": self.method.encounter_settings().as_json()}
+        source |= {"reading": self.method.reading}
         return json.loads(json.dumps(source))  # type: ignore[no-any-return]
 
     def _zone_source(self) -> dict[str, Any]:

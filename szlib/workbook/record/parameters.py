@@ -6,7 +6,7 @@ import ast
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from ...encounters.geometry import PAPER_SPACE, AttentionalSpace
 from ...encounters.settings import EncounterSettings
 from ...errors import DataError, SolverError
 from ...input_files import printable
+from ...tracks.options import ReadOptions
 from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
@@ -35,7 +36,7 @@ RANGES: dict[str, tuple[float, float]] = {
 }  # fmt: skip
 OPTIONS = {"data": "--data", "results": "--out"}  # parameters that are options of the command line
 # Parameters that no check depends on: the data, the way of computing, and the amount shown.
-NEUTRAL = {*OPTIONS, "area", "n_jobs", "examples"}
+NEUTRAL = {*OPTIONS, "area", "reading", "n_jobs", "examples"}
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class ZoneMethod:
     ----------
     space_width, space_length : size of the attentional space [m] (notebook 02).
     duration, min_distance, min_speed : conditions of an encounter [s, m, m/s] (notebook 02).
+    reading : how the files of the data are read: options of `szlib.ReadOptions` by name (notebook 01).
     has_walls : whether the outline of the area is a wall, beyond which the space may reach (notebook 02).
     r_max : distance up to which samples count [m] (notebook 03).
     q : fraction of encounters that may enter the quantile zone (notebook 05).
@@ -67,11 +69,20 @@ class ZoneMethod:
     r_max: float = R_MAX
     q: float = QUANTILE
     zone_speed: float = MPCSettings.zone_speed
+    reading: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     @classmethod
     def from_variables(cls, variables: Mapping[str, Any]) -> ZoneMethod:
         """Take the values from the `variables` of a notebook; a missing variable has its default."""
         return cls(**{each.name: variables[each.name] for each in fields(cls) if each.name in variables})
+
+    def read_options(self) -> ReadOptions:
+        """Options of `szlib.read_tracks`; raises DataError where `reading` holds something else."""
+        try:
+            return ReadOptions(**self.reading)
+        except TypeError as error:
+            expected = 'options of szlib.ReadOptions by name, such as {"unit": "mm"}'
+            raise DataError(f"parameter reading: expected {expected}; got {self.reading!a:.80}") from error
 
     def encounter_settings(self, area: object = None) -> EncounterSettings:
         """Settings of `szlib.find_encounters` for encounters in an `area`."""
@@ -110,6 +121,8 @@ def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dic
     """
     if given.get("area") not in (None, "", AUTO):
         given = {**given, "area": str(as_area(given["area"]))}
+    if "reading" in given:
+        given = {**given, "reading": ZoneMethod(reading=given["reading"]).read_options().as_json()}
     defaults: dict[str, list[Any]] = {}
     for notebook in notebooks:
         for name, value in read_defaults(notebook).items():
@@ -169,6 +182,8 @@ def _check_type(name: str, value: Any, default: Any) -> None:
 
 
 def _check_range(name: str, value: Any) -> None:
+    if isinstance(value, Mapping):
+        return
     if isinstance(value, float) and not math.isfinite(value):
         raise DataError(f"parameter {name}: expected a finite number; got {value!r}")
     if isinstance(value, str) and printable(value) != value:
