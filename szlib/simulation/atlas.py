@@ -13,6 +13,7 @@ import joblib
 import numpy as np
 import pandas as pd
 
+from ..checks import require
 from ..control.mpc import MPCCBF
 from ..control.settings import MPCSettings
 from ..errors import SolverError
@@ -56,11 +57,10 @@ class AtlasCell:
     size: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.scene not in SCENES:
-            raise SolverError(f"scene must be one of {', '.join(SCENES)}; got {self.scene!r}")
+        require(self.scene in SCENES, "scene", self.scene, f"one of {', '.join(SCENES)}", SolverError)
         for name in ("width", "pace", "size"):
-            if not getattr(self, name) > 0:
-                raise SolverError(f"{name} must be a positive number; got {getattr(self, name)!r}")
+            value = getattr(self, name)
+            require(value > 0, name, value, "a positive number", SolverError)
 
     def scenario(self) -> Scenario:
         """The scenario with this width and pace; the side walls of a pathway keep their outer ends."""

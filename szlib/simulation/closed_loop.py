@@ -8,7 +8,7 @@ moves them.  World frame, metres and seconds.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import hypot, isfinite
 from time import perf_counter
 from typing import Any
@@ -31,7 +31,16 @@ ZoneTransform = Callable[[Ellipse], Ellipse]
 # Zone of people if neither they nor the controller have one: their body.
 BODY_ZONE = Ellipse((0.0, 0.0), (BODY_RADIUS, BODY_RADIUS))
 _ABSENT = (np.nan,) * 5
-_NO_PLAN = np.zeros((0, 4))
+# What the log keeps of each step, as of `szlib.Step`, and its value if a controller does not report it.
+# The step itself is not kept: a thousand of them cost a garbage collection.
+_UNREPORTED = {
+    "predicted": np.zeros((0, 4)),
+    "residual": None,
+    "fallback": "",
+    "safe": None,
+    "slack": np.nan,
+    "stuck": 0.0,
+}
 
 
 def simulate(
@@ -138,7 +147,8 @@ def drive(
     arrival: int | None = None
     controller.reset()
     own, numbers = robot.start(scenario.start), list[float | None]()
-    states, steps, seen_by_step = list[Array](), list[StepRecord](), list[list[int]]()
+    states, controls, seen_by_step = list[Array](), list[Array](), list[list[int]]()
+    reported: dict[str, list[Any]] = {name: [] for name in (*_UNREPORTED, "solve_time")}
     for k in range(round(end / dt) + 1):
         state = robot.body(own)
         everyone = zones.assign(crowd(k * dt, state))
@@ -149,37 +159,36 @@ def drive(
         seen_by_step.append([i for i, p in zip(present, observed, strict=True) if p is not None])
         seen = tuple([p for p in observed if p is not None])
         begin = perf_counter()
-        decision = controller.step(own, goal, seen)
-        step = StepRecord.of(decision, perf_counter() - begin)
+        step = controller.step(own, goal, seen)
+        defaults = {**_UNREPORTED, "solve_time": perf_counter() - begin}
+        for name, column in reported.items():
+            column.append(getattr(step, name, defaults[name]))
+        control = np.asarray(step.control, float)
         states.append(state)
-        steps.append(step)
+        controls.append(control)
         x, y, vx, vy = state.tolist()
         if arrival is None and hypot(vx, vy) <= STOPPED_SPEED and hypot(x - gx, y - gy) <= GOAL_RADIUS:
             arrival = k
             if until_arrival:
                 break
-        if not all(map(isfinite, step.control.tolist())):
-            given = step.control.tolist()
+        if not all(map(isfinite, given := control.tolist())):
             raise SolverError(f"{scenario.name!r}: the controller gave {given} at {k * dt:g} s")
-        own = robot.advance(own, step.control, dt)
-    n, n_people = len(steps), len(everyone)
-    residuals = [step.residual for step in steps]
+        own = robot.advance(own, control, dt)
+    n, n_people = len(states), len(everyone)
     return SimulationLog(
         scenario=scenario,
         settings=s,
         zones=tuple(zones.zone_of(i, None) for i in range(n_people)),
         states=np.array(states),
-        controls=np.array([step.control for step in steps]),
+        controls=np.array(controls),
         people=_fill_headings(np.reshape(np.array(numbers, float), (n, n_people, 5))),
-        predicted=_stack_plans([step.predicted for step in steps]),
-        residual=_align_residuals(residuals, seen_by_step, n_people, len(scenario.walls)),
-        fallback=np.array([step.fallback for step in steps]),
-        safe=np.array([step.safe for step in steps], bool),
-        slack=np.array([step.slack for step in steps]),
-        solve_time=np.array([step.solve_time for step in steps]),
-        stuck=np.array([step.stuck for step in steps], float),
+        predicted=_stack_plans(reported["predicted"]),
+        residual=_align_residuals(reported["residual"], seen_by_step, n_people, len(scenario.walls)),
+        fallback=np.array(reported["fallback"]),
+        safe=np.array(reported["safe"], bool),
+        **{name: np.array(reported[name], float) for name in ("slack", "solve_time", "stuck")},
         arrival=arrival,
-        has_safety_claims=steps[0].safe is not None,
+        has_safety_claims=reported["safe"][0] is not None,
         inputs=tuple(robot.inputs),
     )
 
@@ -231,32 +240,6 @@ class ZoneAssignment:
         ]
 
 
-@dataclass(slots=True)
-class StepRecord:
-    """What the log keeps of a step: `control`, `predicted`, `residual`, `fallback`, `safe`, `slack`,
-    `solve_time`, `stuck`.
-
-    The meanings are those of `szlib.Step`; the defaults stand for what a controller does not report.  The
-    step itself is not kept: a thousand of them cost a garbage collection.
-    """
-
-    control: Array
-    predicted: Array = field(default_factory=lambda: _NO_PLAN)
-    residual: Array | None = None
-    fallback: str = ""
-    safe: bool | None = None
-    slack: float = np.nan
-    solve_time: float = np.nan
-    stuck: float = 0.0
-
-    @classmethod
-    def of(cls, step: Any, duration: float) -> StepRecord:
-        """The record of a `step` whose call takes `duration` [s]: its attributes that have these names."""
-        reported = {name: getattr(step, name) for name in cls.__slots__ if hasattr(step, name)}
-        reported["control"] = np.asarray(step.control, float)
-        return cls(**{"solve_time": duration, **reported})
-
-
 def _fill_headings(people: Array) -> Array:
     """Replace missing headings of people who are present by their last known heading, or 0."""
     headings, is_present = people[:, :, 2], ~np.isnan(people[:, :, 0])
@@ -269,8 +252,6 @@ def _fill_headings(people: Array) -> Array:
 def _stack_plans(plans: Sequence[Array]) -> Array:
     """The plan of each step, shape (n, N+1, 4); (n, 0, 4) if there are none, NaN after shorter ones."""
     longest = max(map(len, plans))
-    if all(len(plan) == longest for plan in plans):
-        return np.array(plans)
     return np.array([np.pad(p, ((0, longest - len(p)), (0, 0)), constant_values=np.nan) for p in plans])
 
 
@@ -281,8 +262,6 @@ def _align_residuals(rows: Sequence[Any], seen: Sequence[list[int]], n_people: i
     """
     if any(row is None for row in rows):
         return np.zeros((len(rows), n_people + n_walls, 0))
-    if all(len(row) == len(i) + n_walls == n_people + n_walls for row, i in zip(rows, seen, strict=True)):
-        return np.array(rows)
     residuals = np.full((len(rows), n_people + n_walls, rows[0].shape[1]), np.nan)
     for residual, row, i in zip(residuals, rows, seen, strict=True):
         if len(row) < len(i) + n_walls:

@@ -13,10 +13,9 @@ robot navigation algorithms", 2023.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product
 from math import pi, sqrt
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -66,7 +65,7 @@ def use_hall_circle(fitted: Ellipse) -> Ellipse:
 
 def use_kirby_ellipse(fitted: Ellipse) -> Ellipse:
     """The smallest ellipse around `kirby_curve` at `KIRBY_SPEED`, in place of the `fitted` ellipse."""
-    return _fit_kirby_ellipse(KIRBY_SPEED)
+    return _fit_kirby_ellipse()
 
 
 def kirby_curve(angles: Array, speed: float) -> Array:
@@ -85,8 +84,8 @@ def kirby_curve(angles: Array, speed: float) -> Array:
 
 
 @lru_cache
-def _fit_kirby_ellipse(speed: float) -> Ellipse:
-    return minimum_enclosing_ellipse_of_curve(lambda angles: kirby_curve(angles, speed), [-pi / 2, pi / 2])
+def _fit_kirby_ellipse() -> Ellipse:
+    return minimum_enclosing_ellipse_of_curve(partial(kirby_curve, speed=KIRBY_SPEED), [-pi / 2, pi / 2])
 
 
 ZONES: Mapping[str, ZoneTransform] = MappingProxyType(
@@ -171,21 +170,19 @@ def measure_time_inside(run: Run) -> dict[str, float]:
 def compare(
     n: int,
     *,
-    seed: int = 0,
     controllers: Sequence[str] | Mapping[str, ControllerFactory] = ("MPC-CBF",),
     zones: Sequence[str] | Mapping[str, ZoneTransform] = tuple(ZONES),
     formulations: Sequence[str] | Mapping[str, MPCSettings] = tuple(FORMULATIONS),
     behaviours: Sequence[str] | Mapping[str, CrowdModel] = ("as expected",),
     worlds: ScenarioSource = WORLDS,
-    out: str | Path | None = None,
-    n_jobs: int = 1,
-    progress: bool = True,
+    **options: Any,
 ) -> pd.DataFrame:
     """Drive through the same n worlds with each combination of methods.
 
     Parameters
     ----------
-    n, seed, worlds, out, n_jobs, progress : as of `rollouts`.
+    n, worlds : as of `rollouts`.
+    options : `seed`, `out`, `n_jobs` and `progress` of `rollouts`.
     controllers : names in `CONTROLLERS`, or a mapping from names of your own to controller factories.
     zones : names in `ZONES`, or a mapping to zone transforms.
     formulations : names in `FORMULATIONS`, or a mapping to settings.
@@ -213,19 +210,9 @@ def compare(
     tables = []
     for names in product(*map(_resolve_names, methods, (CONTROLLERS, ZONES, FORMULATIONS, BEHAVIOURS))):
         (_, controller), (_, zone), (_, settings), (_, behaviour) = names
-        table = rollouts(
-            n,
-            seed=seed,
-            settings=settings,
-            worlds=worlds,
-            behaviour=behaviour,
-            controller=controller,
-            zone_transform=zone,
-            measure=measure_time_inside,
-            out=out,
-            n_jobs=n_jobs,
-            progress=progress,
-        )
+        robot = {"settings": settings, "controller": controller, "zone_transform": zone}
+        people = {"worlds": worlds, "behaviour": behaviour}
+        table = rollouts(n, **robot, **people, measure=measure_time_inside, **options)
         tables.append(table.assign(**dict(zip(METHOD, (name for name, _ in names), strict=True))))
     return pd.concat(tables, ignore_index=True)
 

@@ -54,14 +54,19 @@ ScenarioSource = Callable[[int], Scenario]
 Measure = Callable[[Run], dict[str, float]]  # further columns of a row; a function of a module
 
 
+def make_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
+    """The MPC-CBF controller for a `scenario` with `settings`; people without a zone have `DEFAULT_ZONE`."""
+    return MPCCBF(DEFAULT_ZONE, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
+
+
 def rollouts(
     n: int,
     *,
     seed: int = 0,
     settings: MPCSettings | None = None,
     worlds: ScenarioSource | None = None,
-    behaviour: CrowdModel | None = None,
-    controller: ControllerFactory | None = None,
+    behaviour: CrowdModel = UNAFFECTED,
+    controller: ControllerFactory = make_mpc_cbf,
     zone_transform: ZoneTransform | None = None,
     measure: Measure | None = None,
     out: str | Path | None = None,
@@ -104,14 +109,8 @@ def rollouts(
     """
     if n < 1:
         raise SolverError(f"n must be at least 1; got {n}")
-    setup = RolloutSetup(
-        settings or MPCSettings(),
-        worlds or Worlds(),
-        behaviour or UNAFFECTED,
-        controller or make_mpc_cbf,
-        zone_transform,
-        measure,
-    )
+    scene = worlds or Worlds(), behaviour, controller
+    setup = RolloutSetup(settings or MPCSettings(), *scene, zone_transform, measure)
     folder = None if out is None else Path(out) / setup.key()
     if folder is not None:
         claim_folder(folder.parent, PURPOSE)
@@ -127,35 +126,23 @@ def rollouts(
     return pd.concat(tables).sort_values("seed", ignore_index=True)
 
 
-def make_mpc_cbf(scenario: Scenario, settings: MPCSettings, zone: Ellipse = DEFAULT_ZONE) -> MPCCBF:
-    """The MPC-CBF controller for a `scenario` with `settings`; `zone` is that of people who have
-    none.
-    """
-    return MPCCBF(zone, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
-
-
-class ControllerPool:
-    """A `ControllerFactory` like `make_mpc_cbf` that reuses controllers.
-
-    Scenarios with the same numbers of people and walls share one controller: to build one takes as long as
-    ten steps.  The loop resets it before each run, so that it remembers nothing of the last world.
-    """
-
-    def __init__(self) -> None:
-        self._controllers: dict[tuple[int, int], MPCCBF] = {}
-
-    def __call__(self, scenario: Scenario, settings: MPCSettings) -> MPCCBF:
-        size = len(scenario.people), len(scenario.walls)
-        if size not in self._controllers:
-            self._controllers[size] = make_mpc_cbf(scenario, settings)
-        self._controllers[size].set_walls(scenario.walls)
-        return self._controllers[size]
-
-
 @lru_cache(maxsize=1)
-def _worker_pool(settings: MPCSettings, thread: int) -> ControllerPool:
-    """The controllers of one worker thread for these settings, kept from chunk to chunk."""
-    return ControllerPool()
+def _controllers_of(settings: MPCSettings, thread: int) -> dict[tuple[int, int], MPCCBF]:
+    """The controllers of one thread for these settings, kept from chunk to chunk."""
+    return {}
+
+
+def reuse_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
+    """As `make_mpc_cbf`, but a `scenario` shares the controller of the last one of its size for `settings`.
+
+    The size is the numbers of people and walls. To build a controller takes as long as ten steps. The loop
+    resets it before each run, so that it remembers nothing of the last world.
+    """
+    controllers, size = _controllers_of(settings, get_ident()), (len(scenario.people), len(scenario.walls))
+    if size not in controllers:
+        controllers[size] = make_mpc_cbf(scenario, settings)
+    controllers[size].set_walls(scenario.walls)
+    return controllers[size]
 
 
 @dataclass(frozen=True)
@@ -235,7 +222,7 @@ def run_chunk(setup: RolloutSetup, seeds: range, folder: Path | None = None) -> 
     if file is not None and (content := load_cached(file, key)) is not None:
         return pd.read_parquet(io.BytesIO(content))
     if setup.controller is make_mpc_cbf:
-        setup = replace(setup, controller=_worker_pool(setup.settings, get_ident()))
+        setup = replace(setup, controller=reuse_mpc_cbf)
     rows = []
     for seed in seeds:
         log = setup.run(seed)

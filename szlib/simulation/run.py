@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Array
-from ..control.barriers import compute_h, euclidean_segment_formula
+from ..control.barriers import barrier, ellipse_distance, euclidean_segment_formula, segment_formula
 from ..control.distances import walls_with_margins
 from ..control.person import Person
 from ..control.settings import MPCSettings
@@ -127,14 +127,10 @@ class Run:
     @cached_property
     def h(self) -> Array:
         """Barriers with the true positions of people, shape (n, P+W) [m]."""
-        s, h = self.settings, list[Array]()
-        for (x, y), zone in zip(self.relative.T.swapaxes(0, 1), self.zones, strict=True):
-            at_rest = [(*zone.foci_and_axis, 0.0, 0.0)]  # in the person's frame
-            h += compute_h(x, y, at_rest, (), r_robot=s.r_robot, eps=s.eps)
-        x, y = self.states[:, 0], self.states[:, 1]
-        walls = walls_with_margins(self.scenario.walls, s)
-        h += compute_h(x, y, (), walls, r_robot=s.r_robot, eps=s.eps)
-        return np.reshape(h, (-1, len(self.states))).T
+        s, (x, y) = self.settings, (self.states[:, :1], self.states[:, 1:2])
+        *ends, margin = np.reshape(walls_with_margins(self.scenario.walls, s), (-1, 5)).T
+        to_people = barrier(self.distances_to_zones(self.zones, ellipse_distance), s.r_robot, s.eps)
+        return np.hstack([to_people, barrier(segment_formula(x, y, *ends), s.r_robot, margin)])
 
     @cached_property
     def clearance(self) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from ..checks import Array
-from ..control.barriers import compute_h
+from ..control.barriers import barrier, ellipse_distance
 from ..control.settings import TOLERANCE
 from ..encounters.geometry import wrap_angle
 from .run import Run
@@ -59,8 +59,8 @@ def _find_violations(run: Run) -> Iterator[tuple[Any, ...]]:
             continue
         expected = before[:2] + dt * before[3:]
         zone = run.zones[i].placed((float(expected[0]), float(expected[1])), float(before[2]))
-        at_rest, s, (x, y) = [(*zone.foci_and_axis, 0.0, 0.0)], run.settings, run.states[k + 1, :2].tolist()
-        (h_claimed,) = compute_h(x, y, at_rest, (), r_robot=s.r_robot, eps=s.eps)
+        distance = float(ellipse_distance(run.states[k + 1, :2], zone))
+        h_claimed = barrier(distance, run.settings.r_robot, run.settings.eps)
         deviation = float(np.hypot(*(after[:2] - expected)))
         change = _classify_change(before, after, deviation, dt)
         yield t, i, h, h_claimed, deviation, change, h_claimed >= -TOLERANCE

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..checks import Array, check_array
+from ..checks import Array, check_array, require
 from ..control.barriers import check_wall
 from ..control.person import Person
 from ..errors import SolverError
@@ -90,8 +90,8 @@ class Scenario:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "people", tuple(self.people))
-        if not 0 < self.duration < np.inf:
-            raise SolverError(f"duration must be a positive number of seconds; got {self.duration}")
+        is_positive = 0 < self.duration < np.inf
+        require(is_positive, "duration", self.duration, "a positive number of seconds", SolverError)
 
     def turn_people(self) -> Scenario:
         """The same scene with all people facing the other way; people who walk then walk backwards."""
@@ -141,9 +141,9 @@ class Behaviour:
 
     def __post_init__(self) -> None:
         for each in fields(self):
-            value = np.asarray(getattr(self, each.name))
-            if not (np.isfinite(value) & (value >= 0)).all():
-                raise SolverError(f"{each.name} must be finite and >= 0; got {getattr(self, each.name)}")
+            value = getattr(self, each.name)
+            is_valid = np.isfinite(value) & np.greater_equal(value, 0)
+            require(np.all(is_valid), each.name, value, "finite and >= 0", SolverError)
 
     def start(self, scenario: Scenario, seed: int) -> Crowd:
         """The true motion of the people of a `scenario`, with times and sides of changes from the `seed`."""

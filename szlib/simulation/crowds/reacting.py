@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ...checks import Array, check_array
+from ...checks import Array, check_array, require
 from ...control.person import Person
 from ...control.settings import MPCSettings
 from ...errors import SolverError
@@ -55,15 +55,14 @@ class ReactingPeople(CrowdModel):
     r_robot: float = MPCSettings.r_robot
 
     def __post_init__(self) -> None:
-        models, appearances = tuple(MODELS), get_args(RobotAppearance)
-        if not callable(self.model) and self.model not in models:
-            known = ", ".join(models)
-            raise SolverError(f"model must be {known}, or make a model from walkers; got {self.model!r}")
-        if self.sees not in appearances:
-            raise SolverError(f"sees must be one of {', '.join(appearances)}; got {self.sees!r}")
+        models, appearances = ", ".join(MODELS), get_args(RobotAppearance)
+        is_model = callable(self.model) or self.model in MODELS
+        require(is_model, "model", self.model, f"{models}, or make a model from walkers", SolverError)
+        expected = f"one of {', '.join(appearances)}"
+        require(self.sees in appearances, "sees", self.sees, expected, SolverError)
         for name in ("pace", "jitter", "r_robot"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise SolverError(f"{name} must be finite and >= 0; got {getattr(self, name)}")
+            value = getattr(self, name)
+            require(0 <= value < np.inf, name, value, "finite and >= 0", SolverError)
 
     def start(self, scenario: Scenario, seed: int) -> Crowd:
         """The people of a `scenario` from time 0 on, with goals shifted by the `seed`.

@@ -10,7 +10,7 @@ from math import cos, dist, pi, sin
 
 import numpy as np
 
-from ...checks import Array
+from ...checks import Array, require
 from ...control.barriers import compute_h, euclidean_segment_formula
 from ...control.distances import required_margin
 from ...control.person import Person, PlacedZone, place_zone
@@ -75,14 +75,11 @@ class Worlds:
     def __post_init__(self) -> None:
         for name in ("people", "pace", "wall_length", "travel"):
             low, high = getattr(self, name)
-            if not 0 <= low <= high < np.inf:
-                raise SolverError(f"{name} must be a range 0 <= low <= high; got {(low, high)}")
-        for name in ("standing", "walls"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise SolverError(f"{name} must be a fraction in [0, 1]; got {getattr(self, name)}")
+            require(0 <= low <= high < np.inf, name, (low, high), "a range 0 <= low <= high", SolverError)
+        for name, value in (("standing", self.standing), ("walls", self.walls)):
+            require(0 <= value <= 1, name, value, "a fraction in [0, 1]", SolverError)
         for name in ("max_walls", "size", "duration"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise SolverError(f"{name} must be positive; got {getattr(self, name)}")
+            require(0 < getattr(self, name) < np.inf, name, getattr(self, name), "positive", SolverError)
 
     def __call__(self, seed: int) -> Scenario:
         """The world of a `seed`: the same one each time, whatever controller drives in it.
