@@ -32,6 +32,15 @@ _LOCK, _UNFINISHED, _TEMPORARY = ".szlib-lock", ".szlib-part-", "szlib-"
 _ABANDONED = 3600.0  # age at which an unfinished file is removed [s]: no write takes so long
 
 
+@contextmanager
+def _explain_errors(what: str, advice: str) -> Iterator[None]:
+    """Raise an error of the file system as StorageError: `what` failed, the reason, and `advice`."""
+    try:
+        yield
+    except OSError as error:
+        raise StorageError(f"{what} ({error.strerror or error}); {advice}") from error
+
+
 def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) -> None:
     """Write `content` to `path` completely, or leave the file as it was.
 
@@ -40,7 +49,8 @@ def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) 
     """
     path = Path(path)
     unfinished = path.parent / f"{_UNFINISHED}{uuid.uuid4().hex}"
-    try:
+    advice = "make room, or choose a folder that is writable; files that were finished before are intact"
+    with _explain_errors(f"{path}: cannot be written", advice):
         try:
             _fill(unfinished, content.encode() if isinstance(content, str) else content, durable)
             unfinished.replace(path)
@@ -50,11 +60,6 @@ def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) 
             with suppress(OSError):  # a file that could not be created cannot be removed
                 unfinished.unlink()
             raise
-    except OSError as error:
-        raise StorageError(
-            f"{path}: cannot be written ({error.strerror or error}); make room, or choose a folder that is "
-            "writable; files that were finished before are intact"
-        ) from error
 
 
 def _fill(unfinished: Path, content: bytes, durable: bool) -> None:
@@ -118,7 +123,7 @@ def claim_folder(folder: str | Path, purpose: str, *, inputs: Iterable[Path] = (
     StorageError : the folder is refused, or cannot be made or read.
     """
     folder = Path(folder)
-    try:
+    with _explain_errors(f"{folder}: cannot be made or read", "choose another folder"):
         place = folder.resolve()
         if inside := [file for file in inputs if place in file.resolve().parents]:
             raise StorageError(
@@ -136,10 +141,6 @@ def claim_folder(folder: str | Path, purpose: str, *, inputs: Iterable[Path] = (
             with FileLock(folder / _LOCK):  # of two processes one comes first
                 owner = folder_purpose(folder) or _mark(folder, purpose)
         _remove_abandoned(folder)
-    except OSError as error:
-        raise StorageError(
-            f"{folder}: cannot be made or read ({error.strerror or error}); choose another folder"
-        ) from error
     if owner != purpose:
         raise StorageError(f"{folder}: holds {owner}; {purpose} need another folder")
     return folder
@@ -178,16 +179,13 @@ def folder_lock(folder: str | Path) -> Iterator[None]:
     Raises StorageError where another process has reserved it, or where this one may not write.
     """
     lock = FileLock(Path(folder) / f"{_LOCK}-run", timeout=0)
-    try:
-        lock.acquire()
-    except Timeout as error:
-        raise StorageError(
-            f"{folder}: another process is writing there; wait until it ends, or choose another folder"
-        ) from error
-    except OSError as error:
-        raise StorageError(
-            f"{folder}: cannot be written ({error.strerror or error}); choose another folder"
-        ) from error
+    with _explain_errors(f"{folder}: cannot be written", "choose another folder"):
+        try:
+            lock.acquire()
+        except Timeout as error:
+            raise StorageError(
+                f"{folder}: another process is writing there; wait until it ends, or choose another folder"
+            ) from error
     try:
         yield
     finally:
@@ -202,17 +200,13 @@ def temporary_folder() -> Iterator[Path]:
     Raises StorageError where there is no room for it, or the umask forbids its use.
     """
     remove_abandoned_temporary()
-    try:
+    with _explain_errors("no temporary folder", "make room, or name another one in $TMPDIR"):
         folder = Path(tempfile.mkdtemp(prefix=f"{_TEMPORARY}{os.getpid()}-"))
         if folder.stat().st_mode & 0o700 != 0o700:
             folder.rmdir()
             raise StorageError("new files may not be used by their owner (umask); call umask 022 first")
         lock = FileLock(folder / _LOCK)
         lock.acquire()
-    except OSError as error:
-        raise StorageError(
-            f"no temporary folder ({error.strerror or error}); make room, or name another one in $TMPDIR"
-        ) from error
     try:
         yield folder
     finally:

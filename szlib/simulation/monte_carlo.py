@@ -66,7 +66,7 @@ def rollouts(
     settings: MPCSettings | None = None,
     worlds: ScenarioSource | None = None,
     behaviour: CrowdModel = UNAFFECTED,
-    controller: ControllerFactory = make_mpc_cbf,
+    controller: ControllerFactory | None = None,
     zone_transform: ZoneTransform | None = None,
     measure: Measure | None = None,
     out: str | Path | None = None,
@@ -109,7 +109,7 @@ def rollouts(
     """
     if n < 1:
         raise SolverError(f"n must be at least 1; got {n}")
-    scene = worlds or Worlds(), behaviour, controller
+    scene = worlds or Worlds(), behaviour, controller or make_mpc_cbf
     setup = RolloutSetup(settings or MPCSettings(), *scene, zone_transform, measure)
     folder = None if out is None else Path(out) / setup.key()
     if folder is not None:

@@ -18,7 +18,7 @@ import numpy as np
 from ...checks import Array
 from ..problem import HARD_SHARE, PlanEvaluation, ProblemSolver
 from ..settings import TOLERANCE, MPCSettings
-from ..step import Fallback
+from ..step import FALLBACKS, Fallback
 
 
 def solve_with_fallbacks(
@@ -33,63 +33,33 @@ def solve_with_fallbacks(
     change : by which the last plan differed from the one before, shape (2N,) [m/s2].
     parameters : of the problem: see `Problem`.
     """
-    attempts = _Attempts(solver, parameters)
-    if plan := attempts.solve_hard(_continue_trend(solver.settings, last_plan, change)):
-        return "warm", plan, attempts.timed_out
-    braking = plan_braking(solver.settings, parameters[2:4])
-    if plan := attempts.solve_hard_if_time(braking):
-        return "cold", plan, attempts.timed_out
-    same_times = last_plan if solver.settings.grid else np.append(last_plan[2:], (0.0, 0.0))
-    shifted = solver.evaluate(same_times, parameters)
-    has_end = solver.settings.terminal != "none"
+    s, timed_out, unfinished = solver.settings, False, None
+    guess = _continue_trend(s, last_plan, change)
+    for fallback in FALLBACKS[:2]:  # warm and cold
+        plan, converged = solver.hard(guess, parameters)
+        if converged and plan.slack <= TOLERANCE:
+            return fallback, plan, timed_out
+        timed_out |= solver.timed_out
+        if solver.timed_out and np.isfinite(plan.inputs).all():
+            unfinished = plan.inputs
+        guess = braking = plan_braking(s, parameters[2:4])
+        if fallback == "warm" and solver.budget.is_spent(HARD_SHARE / 2):
+            timed_out = True
+            break
+    shifted = solver.evaluate(last_plan if s.grid else np.append(last_plan[2:], (0.0, 0.0)), parameters)
+    has_end = s.terminal != "none"
     if has_end and shifted.slack <= TOLERANCE:
-        return "kept", shifted, attempts.timed_out
+        return "kept", shifted, timed_out
     shifted_is_safe = has_end and _reaches_safe_end(shifted, parameters)
     full_braking = solver.evaluate(braking, parameters)
-    relaxed, converged = attempts.solve_relaxed(shifted.inputs, full_braking.slack)
-    if relaxed and (not shifted_is_safe or _reaches_safe_end(relaxed, parameters)):
-        is_satisfied = converged and relaxed.slack <= TOLERANCE
-        return "warm" if is_satisfied else "relaxed", relaxed, attempts.timed_out
-    if shifted_is_safe:
-        return "kept", shifted, attempts.timed_out
-    return "braking", full_braking, attempts.timed_out
-
-
-class _Attempts:
-    """The calls of the solver within one step, and what one call leaves for the next."""
-
-    def __init__(self, solver: ProblemSolver, parameters: Array) -> None:
-        self.solver, self.parameters = solver, parameters
-        self.timed_out = False
-        self._unfinished: Array | None = None
-
-    def solve_hard(self, guess: Array) -> PlanEvaluation | None:
-        """The plan that satisfies the problem, found from a `guess`; None if there is none."""
-        plan, converged = self.solver.hard(guess, self.parameters)
-        if converged and plan.slack <= TOLERANCE:
-            return plan
-        self.timed_out |= self.solver.timed_out
-        if self.solver.timed_out and np.isfinite(plan.inputs).all():
-            self._unfinished = plan.inputs
-        return None
-
-    def solve_hard_if_time(self, guess: Array) -> PlanEvaluation | None:
-        """As `solve_hard` from a `guess`; None if too little time is left."""
-        if self.solver.budget.is_spent(HARD_SHARE / 2):
-            self.timed_out = True
-            return None
-        return self.solve_hard(guess)
-
-    def solve_relaxed(self, guess: Array, slack_limit: float) -> tuple[PlanEvaluation | None, bool]:
-        """The relaxed plan from a `guess`, None if it is unusable; and True if it converged.
-
-        A plan that was cut short is usable if it violates no row by more than `slack_limit`.
-        """
-        start = guess if self._unfinished is None else self._unfinished
-        plan, converged = self.solver.relaxed(start, self.parameters)
-        self.timed_out |= self.solver.timed_out
-        is_usable = converged or (self.solver.timed_out and plan.slack <= slack_limit)
-        return (plan if is_usable and np.isfinite(plan.inputs).all() else None), converged
+    relaxed, converged = solver.relaxed(shifted.inputs if unfinished is None else unfinished, parameters)
+    timed_out |= solver.timed_out
+    # A plan that was cut short is usable if it violates no row by more than braking does.
+    is_usable = converged or (solver.timed_out and relaxed.slack <= full_braking.slack)
+    is_usable &= bool(np.isfinite(relaxed.inputs).all())
+    if is_usable and (not shifted_is_safe or _reaches_safe_end(relaxed, parameters)):
+        return "warm" if converged and relaxed.slack <= TOLERANCE else "relaxed", relaxed, timed_out
+    return ("kept", shifted, timed_out) if shifted_is_safe else ("braking", full_braking, timed_out)
 
 
 def _continue_trend(s: MPCSettings, last_plan: Array, change: Array) -> Array:
