@@ -32,6 +32,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown
+from studies import chains as chains_study
 
 import szlib
 from szlib.control.acceleration_polygon import find_admissible_controls
@@ -246,7 +247,7 @@ Markdown(
 # passing side, claims of the paper that hold (s, m, m/s).
 
 # %%
-chains = paper_claims.compare_chains((paper_zone, paper), (zone, settings))
+chains = chains_study.compare_chains((paper_zone, paper), (zone, settings))
 record.table(chains, "10_chains")
 entries = [
     f"{r.time_to_goal:.1f}, {r.min_h:.2f}, {r.min_speed:.2f}, {r.passing_side}, {r.claims_held}/{r.claims}"
@@ -273,7 +274,7 @@ rest = (found.loc["ours", list(units)] - found.loc["side rule", list(units)]).ab
 lines = {name: f"- {name}: {', '.join(which) or 'nothing'}" for name, which in effects.items()}
 for name in (name for name in names if "side rule" in effects[name]):
     old, new = found.loc[("paper", name)], found.loc[("side rule", name)]
-    moved = [key for key in units if abs(new[key] - old[key]) > paper_claims.RESOLUTION[key]]
+    moved = [key for key in units if abs(new[key] - old[key]) > chains_study.RESOLUTION[key]]
     parts = [f"{units[key][0]} {old[key]:.2f} to {new[key]:.2f}{units[key][1]}" for key in moved]
     parts += [f"passing side {old['passing_side']} to {new['passing_side']}"]
     lines[name] += f"; with it {', '.join(parts)}"

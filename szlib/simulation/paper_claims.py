@@ -1,8 +1,7 @@
 """The claims of the paper, tested on data: each is an effect with an interval, and a verdict.
 
 An effect above 0 supports the claim.  Where the interval contains 0, the data decide nothing.  The interval
-is a 95 % interval, but for the delay of the robot: its runs are deterministic, so it is the range over the
-scenarios.
+is a 95 % interval; of runs, which are deterministic, it is the range over the scenarios.
 
 Any zone has a shape, also that of people who ignore each other: at Grand Central the quantile zone of a
 time-shifted crowd reaches farther ahead than behind.  So a claim about the shape is decided by
@@ -11,8 +10,8 @@ time-shifted crowd reaches farther ahead than behind.  So a claim about the shap
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from math import log2, sqrt
 from typing import Any
 
@@ -21,20 +20,15 @@ import pandas as pd
 from scipy.stats import binomtest, chi2
 
 from ..checks import check_columns
-from ..control.mpc import MPCCBF
-from ..control.settings import MPCSettings
 from ..encounters.kinds import OPPOSITE
 from ..encounters.null_model import NullEncounters
 from ..errors import DataError, ZoneError
-from ..zones.ellipses import Ellipse
 from ..zones.outliers import R_MAX
 from ..zones.respect import MIN_COMPARED, RespectEstimator
 from ..zones.respect_likelihood import zone_ellipses
 from ..zones.social_zone import SocialZone
-from .closed_loop import simulate
 from .metrics import compute_metrics
 from .run import Run
-from .scenarios.paper import SCENARIOS
 
 PAPER_RATE = 16_181 / 92  # encounters a day in the paper (sec. 2)
 LEVEL = 0.95  # level of all confidence intervals here
@@ -44,10 +38,6 @@ CONFIDENCE = "95 % interval"
 RANGE = "range over scenarios"
 # Attributes of a `Finding` that are columns of a table of findings.
 COLUMNS = ("claim", "effect", "low", "high", "interval", "unit", "n", "verdict")
-# What decides a run of a scenario: the zone, and the settings of the controller.
-Chain = tuple[Ellipse, MPCSettings]
-# Changes of a run up to these count as none in `compare_chains` [s, m, m/s] (assumed).
-RESOLUTION = {"time_to_goal": 0.25, "min_h": 0.02, "min_speed": 0.05}
 LARGER_AHEAD = "the zone reaches farther ahead than behind"
 GROWS_WITH_SPEED = "the zone grows with walking speed"
 ENCOUNTER_RATE = "as many encounters a day as in the paper, within a factor of two"
@@ -229,71 +219,6 @@ def measure_encounter_rate(encounters: int, days: float) -> Finding:
     return Finding(ENCOUNTER_RATE, effect(encounters), ends[0], top, "doublings", encounters)
 
 
-def measure_delay_by_size(
-    zone: Ellipse, *, scales: Sequence[float] = (0.8, 1.2), names: Iterable[str] = tuple(SCENARIOS)
-) -> Finding:
-    """A larger zone makes the robot later at its goal (sec. 4): mean and range over scenarios of the paper.
-
-    The robot has szlib's default settings. The runs are deterministic: the claim is supported if the robot is
-    later in every scenario.
-
-    Parameters
-    ----------
-    zone : the zone.
-    scales : factors of its size; the first and the last are compared.
-    names : names of the scenarios.
-    """
-    delays = []
-    for name in names:
-        times = [run_scenario(name, zone.scaled(scale))["time_to_goal"] for scale in scales]
-        delays.append(times[-1] - times[0])
-    claim = f"a zone {scales[-1] / scales[0]:.1f} times as large makes the robot later"
-    mean, low, high = float(np.mean(delays)), float(np.min(delays)), float(np.max(delays))
-    return Finding(claim, mean, low, high, "s", len(delays), interval=RANGE)
-
-
-def run_scenario(name: str, zone: Ellipse) -> dict[str, float]:
-    """Metrics of the paper's scenario of this `name` with a `zone` and szlib's default settings."""
-    scenario = replace(SCENARIOS[name], claims=())
-    return simulate(scenario, MPCCBF(zone, walls=scenario.walls)).metrics()
-
-
-def compare_chains(paper: Chain, ours: Chain, *, names: Iterable[str] = tuple(SCENARIOS)) -> pd.DataFrame:
-    """Drive the paper's scenarios with the paper's chain, with each of our differences alone, and with ours.
-
-    The zone, the margin and the side rule are switched on with our solver, because IPOPT takes several times
-    as long. The row "solver" shows what that changes.
-
-    Parameters
-    ----------
-    paper : the zone of `SocialZone.fit(method="paper")`, and `MPCSettings.paper()`.
-    ours : our zone and settings.
-    names : names of the scenarios.
-
-    Returns
-    -------
-    One row for each scenario and chain: "paper", "solver", "zone", "margin", "side rule" and "ours", with
-    time_to_goal [s], min_h [m], min_speed [m/s], passing_side, claims_held, claims (how many hold, of how
-    many), and changed: whether the run differs from the paper's by more than `RESOLUTION`, in its side, or in
-    its claims.
-    """
-    (paper_zone, to_the_letter), (zone, own) = paper, ours
-    settings = replace(to_the_letter, solver=own.solver)
-    chains = {
-        "paper": paper,
-        "solver": (paper_zone, settings),
-        "zone": (zone, settings),
-        "margin": (paper_zone, replace(settings, margin=own.margin)),
-        "side rule": (paper_zone, replace(settings, head_on_share=own.head_on_share)),
-        "ours": ours,
-    }
-    rows = []
-    for name in names:
-        runs = [{"scenario": name, "chain": chain, **_drive(name, *parts)} for chain, parts in chains.items()]
-        rows += [row | {"changed": _differs(row, runs[0])} for row in runs]
-    return pd.DataFrame(rows)
-
-
 def describe_run(run: Run, claims: Mapping[str, tuple[bool, float]]) -> str:
     """Describe a `run` of a scenario: its numbers, and which of the `claims` hold, by their texts."""
     found = compute_metrics(run)
@@ -308,23 +233,6 @@ def describe_run(run: Run, claims: Mapping[str, tuple[bool, float]]) -> str:
         f"Claims that do not hold: {' '.join(failed) or 'none.'}",
     ]
     return " ".join(parts)
-
-
-def _drive(name: str, zone: Ellipse, settings: MPCSettings) -> dict[str, Any]:
-    """A run of a scenario in numbers, and how many of the paper's claims hold."""
-    scenario = SCENARIOS[name]
-    log = simulate(scenario, MPCCBF(zone, walls=scenario.walls, settings=settings))
-    metrics, held = log.metrics(), [claim.check(log)[0] for claim in scenario.claims]
-    shown = {column: metrics[column] for column in (*RESOLUTION, "passing_side")}
-    return {**shown, "claims_held": sum(held), "claims": len(held)}
-
-
-def _differs(row: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether two runs of one scenario differ; runs that both do not arrive take equally long."""
-    if any(row[name] != other[name] for name in ("passing_side", "claims_held")):
-        return True
-    a, b = (np.array([each[name] for name in RESOLUTION]) for each in (row, other))
-    return not np.isclose(a, b, rtol=0, atol=list(RESOLUTION.values()), equal_nan=True).all()
 
 
 def _read_interval(zone: SocialZone, speed: float, quantity: str) -> tuple[float, float, float]:

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from helpers.passing_pairs import null_of, passing_pairs, respecting
-from studies.claims import measure_density
+from studies import chains as chains_study
+from studies import claims as claims_study
 
 import szlib
 from szlib.simulation import paper_claims as claims
@@ -66,7 +67,7 @@ def test_density_is_low_only_in_an_area_with_fewer_people_than_around_it(share: 
     inside = area.contains(x, y)
     stays = rng.uniform(size=n) < np.where(inside, share, 1.0) / max(share, 1.0)
     rows = {"day": "d", "id": rng.integers(500, size=n), "t": rng.uniform(0, 5 * 3600, n), "x": x, "y": y}
-    found = measure_density(pd.DataFrame(rows)[stays], area)
+    found = claims_study.measure_density(pd.DataFrame(rows)[stays], area)
     assert found.verdict.startswith(verdict)
     assert found.n == 5 and found.effect == pytest.approx(-np.log2(share), abs=0.1)
 
@@ -185,23 +186,23 @@ def test_delays_have_their_range_over_scenarios(monkeypatch: pytest.MonkeyPatch)
     def run_scenario(name: str, zone: szlib.Ellipse) -> dict[str, float]:
         return {"time_to_goal": 10 + times[name] * zone.semi_axes[0]}
 
-    monkeypatch.setattr(claims, "run_scenario", run_scenario)
-    found = claims.measure_delay_by_size(zone, scales=(1.0, 1.5, 2.0), names=times)
+    monkeypatch.setattr(claims_study, "run_scenario", run_scenario)
+    found = claims_study.measure_delay_by_size(zone, scales=(1.0, 1.5, 2.0), names=times)
     assert (found.effect, found.low, found.high, found.n) == (3.0, 1.0, 5.0, 3)
     assert (found.claim, found.verdict) == ("a zone 2.0 times as large makes the robot later", "supported")
     assert str(found) == "+3.00 [+1.00, +5.00] s (range over scenarios): supported"
     table = claims.tabulate_findings([found, finding(0.1, 0.3)], data="here")
     assert table["interval"].tolist() == ["range over scenarios", "95 % interval"]
     times["waiting"] = -1.0
-    mixed = claims.measure_delay_by_size(zone, scales=(1.0, 2.0), names=times)
+    mixed = claims_study.measure_delay_by_size(zone, scales=(1.0, 2.0), names=times)
     assert mixed.low == -1 and mixed.verdict == "not decidable with n = 3"
-    earlier = claims.measure_delay_by_size(zone, scales=(2.0, 1.0), names=("passing", "corridor"))
+    earlier = claims_study.measure_delay_by_size(zone, scales=(2.0, 1.0), names=("passing", "corridor"))
     assert earlier.verdict == "contradicted"
 
 
 def test_a_larger_zone_makes_the_robot_later() -> None:
     zone = szlib.Ellipse((0.05, 0.0), (0.9, 0.7))
-    found = claims.measure_delay_by_size(zone, names=("passing", "corridor"))
+    found = claims_study.measure_delay_by_size(zone, names=("passing", "corridor"))
     assert found.low > 0 and found.n == 2
     assert zone.scaled(2.0) == szlib.Ellipse((0.1, 0.0), (1.8, 1.4))
 
@@ -242,7 +243,8 @@ TILTED = szlib.Ellipse((0.03, 0.0), (0.96, 0.75), 0.02)
 def chains() -> pd.DataFrame:
     letter = szlib.MPCSettings.paper()
     ours = szlib.MPCSettings(time_limit=np.inf)
-    table = claims.compare_chains((TILTED, letter), (TILTED.scaled(1.2), ours), names=("passing", "waiting"))
+    names, larger = ("passing", "waiting"), TILTED.scaled(1.2)
+    table = chains_study.compare_chains((TILTED, letter), (larger, ours), names=names)
     return table.set_index(["scenario", "chain"])
 
 
@@ -275,9 +277,9 @@ def test_the_side_is_due_to_the_rule_and_not_to_the_paper(chains: pd.DataFrame) 
 )  # fmt: skip
 def test_a_run_differs_in_a_number_a_side_or_a_claim(change: dict[str, object], differs: bool) -> None:
     row = {"time_to_goal": 10.0, "min_h": 0.1, "min_speed": 0.5, "passing_side": "right", "claims_held": 2}
-    assert claims._differs(row | change, row) == differs
+    assert chains_study.differs(row | change, row) == differs
     stuck = row | {"time_to_goal": np.nan}
-    assert not claims._differs(stuck, stuck)
+    assert not chains_study.differs(stuck, stuck)
 
 
 def test_a_run_is_described_with_its_claims() -> None:
@@ -304,12 +306,12 @@ def test_the_interval_of_a_rate_is_exact() -> None:
 
 
 def test_runs_differ_in_their_side_their_claims_or_a_number() -> None:
-    row = dict.fromkeys(claims.RESOLUTION, 1.0) | {"passing_side": "left", "claims_held": 2}
-    assert not claims._differs(row, dict(row))
+    row = dict.fromkeys(chains_study.RESOLUTION, 1.0) | {"passing_side": "left", "claims_held": 2}
+    assert not chains_study.differs(row, dict(row))
     for other in ({"passing_side": "right"}, {"passing_side": "aft"}, {"claims_held": 1}, {"claims_held": 3}):
-        assert claims._differs(row, row | other)
-    for name, resolution in claims.RESOLUTION.items():
-        assert not claims._differs(row, row | {name: 1.0 + 0.9 * resolution})
-        assert claims._differs(row, row | {name: 1.0 + 1.1 * resolution})
-        assert claims._differs(row, row | {name: np.nan})
-        assert not claims._differs(row | {name: np.nan}, row | {name: np.nan})
+        assert chains_study.differs(row, row | other)
+    for name, resolution in chains_study.RESOLUTION.items():
+        assert not chains_study.differs(row, row | {name: 1.0 + 0.9 * resolution})
+        assert chains_study.differs(row, row | {name: 1.0 + 1.1 * resolution})
+        assert chains_study.differs(row, row | {name: np.nan})
+        assert not chains_study.differs(row | {name: np.nan}, row | {name: np.nan})

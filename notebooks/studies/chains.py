@@ -1,0 +1,72 @@
+"""The paper's chain of methods and ours, with each difference alone: the table of notebook 10."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from szlib import MPCCBF, SCENARIOS, Ellipse, MPCSettings, simulate
+
+Chain = tuple[Ellipse, MPCSettings]
+"""What decides a run of a scenario: the zone, and the settings of the controller."""
+RESOLUTION = {"time_to_goal": 0.25, "min_h": 0.02, "min_speed": 0.05}
+"""Changes of a run up to these count as none in `compare_chains` [s, m, m/s] (assumed)."""
+
+
+def compare_chains(paper: Chain, ours: Chain, *, names: Iterable[str] = tuple(SCENARIOS)) -> pd.DataFrame:
+    """Drive the paper's scenarios with the paper's chain, with each of our differences alone, and with ours.
+
+    The zone, the margin and the side rule are switched on with our solver, because IPOPT takes several times
+    as long. The row "solver" shows what that changes.
+
+    Parameters
+    ----------
+    paper : the zone of `SocialZone.fit(method="paper")`, and `MPCSettings.paper()`.
+    ours : our zone and settings.
+    names : names of the scenarios.
+
+    Returns
+    -------
+    One row for each scenario and chain: "paper", "solver", "zone", "margin", "side rule" and "ours", with
+    time_to_goal [s], min_h [m], min_speed [m/s], passing_side, claims_held, claims (how many hold, of how
+    many), and changed: whether the run differs from the paper's by more than `RESOLUTION`, in its side, or in
+    its claims.
+    """
+    (paper_zone, to_the_letter), (zone, own) = paper, ours
+    settings = replace(to_the_letter, solver=own.solver)
+    chains = {
+        "paper": paper,
+        "solver": (paper_zone, settings),
+        "zone": (zone, settings),
+        "margin": (paper_zone, replace(settings, margin=own.margin)),
+        "side rule": (paper_zone, replace(settings, head_on_share=own.head_on_share)),
+        "ours": ours,
+    }
+    rows = []
+    for name in names:
+        runs = [
+            {"scenario": name, "chain": chain, **drive_chain(name, *parts)} for chain, parts in chains.items()
+        ]
+        rows += [row | {"changed": differs(row, runs[0])} for row in runs]
+    return pd.DataFrame(rows)
+
+
+def drive_chain(name: str, zone: Ellipse, settings: MPCSettings) -> dict[str, Any]:
+    """A run of a scenario in numbers, and how many of the paper's claims hold."""
+    scenario = SCENARIOS[name]
+    log = simulate(scenario, MPCCBF(zone, walls=scenario.walls, settings=settings))
+    metrics, held = log.metrics(), [claim.check(log)[0] for claim in scenario.claims]
+    shown = {column: metrics[column] for column in (*RESOLUTION, "passing_side")}
+    return {**shown, "claims_held": sum(held), "claims": len(held)}
+
+
+def differs(row: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether two runs of one scenario differ; runs that both do not arrive take equally long."""
+    if any(row[name] != other[name] for name in ("passing_side", "claims_held")):
+        return True
+    a, b = (np.array([each[name] for name in RESOLUTION]) for each in (row, other))
+    return not np.isclose(a, b, rtol=0, atol=list(RESOLUTION.values()), equal_nan=True).all()
