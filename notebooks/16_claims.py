@@ -404,7 +404,7 @@ size = {"low": (line["a_low"] / line["a"]), "middle": 1.0, "high": (line["a_high
 rows = []
 for name in szlib.SCENARIOS:
     for end, scale in size.items():
-        metrics = claims_study.run_scenario(name, kept.scaled(scale))
+        metrics = claims.run_scenario(name, kept.scaled(scale))
         rows.append(
             (
                 name,
@@ -422,7 +422,7 @@ driven.pivot(index="scenario", columns="zone", values=["time to goal [s]", "yiel
 
 # %%
 # the runs are deterministic: the brackets hold the range over the four scenarios, no 95 % interval
-trade = claims_study.measure_delay_by_size(zone.ellipses[zone_speed])
+trade = claims.measure_delay_by_size(zone.ellipses[zone_speed])
 record.claim(trade.claim, trade.low > 0, str(trade))
 fig, ax = plt.subplots(figsize=(7, 3.5), layout="constrained")
 for (name, part), (shade, line) in zip(

@@ -200,40 +200,8 @@ def later(strangers: pd.DataFrame, null: szlib.NullEncounters) -> tuple[claims.F
         zone = szlib.SocialZone.fit(strangers, null=null, speeds=(SPEED,), n_resamples=0)
     except szlib.SzlibError as error:
         return undecided(DELAYED_BY_SIZE, strangers, error), "quantile"
-    found = measure_delay_by_size(zone.ellipses[SPEED])
+    found = claims.measure_delay_by_size(zone.ellipses[SPEED])
     return replace(found, claim=DELAYED_BY_SIZE, adequate=zone.adequate(SPEED)), zone.method
-
-
-def measure_delay_by_size(
-    zone: szlib.Ellipse,
-    *,
-    scales: Sequence[float] = (0.8, 1.2),
-    names: Iterable[str] = tuple(szlib.SCENARIOS),
-) -> claims.Finding:
-    """A larger zone makes the robot later at its goal (sec. 4): mean and range over scenarios of the paper.
-
-    The robot has szlib's default settings. The runs are deterministic: the claim is supported if the robot is
-    later in every scenario.
-
-    Parameters
-    ----------
-    zone : the zone.
-    scales : factors of its size; the first and the last are compared.
-    names : names of the scenarios.
-    """
-    delays = []
-    for name in names:
-        times = [run_scenario(name, zone.scaled(scale))["time_to_goal"] for scale in scales]
-        delays.append(times[-1] - times[0])
-    claim = f"a zone {scales[-1] / scales[0]:.1f} times as large makes the robot later"
-    mean, low, high = float(np.mean(delays)), float(np.min(delays)), float(np.max(delays))
-    return claims.Finding(claim, mean, low, high, "s", len(delays), interval=claims.RANGE)
-
-
-def run_scenario(name: str, zone: szlib.Ellipse) -> dict[str, float]:
-    """Metrics of the paper's scenario of this `name` with a `zone` and szlib's default settings."""
-    scenario = replace(szlib.SCENARIOS[name], claims=())
-    return szlib.simulate(scenario, szlib.MPCCBF(zone, walls=scenario.walls)).metrics()
 
 
 def undecided(claim: str, people: pd.DataFrame, error: szlib.SzlibError) -> claims.Finding:

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from helpers.passing_pairs import null_of, passing_pairs, respecting
 from studies import chains as chains_study
-from studies import claims as claims_study
+from studies.claims import measure_density
 
 import szlib
 from szlib.simulation import paper_claims as claims
@@ -67,7 +67,7 @@ def test_density_is_low_only_in_an_area_with_fewer_people_than_around_it(share: 
     inside = area.contains(x, y)
     stays = rng.uniform(size=n) < np.where(inside, share, 1.0) / max(share, 1.0)
     rows = {"day": "d", "id": rng.integers(500, size=n), "t": rng.uniform(0, 5 * 3600, n), "x": x, "y": y}
-    found = claims_study.measure_density(pd.DataFrame(rows)[stays], area)
+    found = measure_density(pd.DataFrame(rows)[stays], area)
     assert found.verdict.startswith(verdict)
     assert found.n == 5 and found.effect == pytest.approx(-np.log2(share), abs=0.1)
 
@@ -186,23 +186,23 @@ def test_delays_have_their_range_over_scenarios(monkeypatch: pytest.MonkeyPatch)
     def run_scenario(name: str, zone: szlib.Ellipse) -> dict[str, float]:
         return {"time_to_goal": 10 + times[name] * zone.semi_axes[0]}
 
-    monkeypatch.setattr(claims_study, "run_scenario", run_scenario)
-    found = claims_study.measure_delay_by_size(zone, scales=(1.0, 1.5, 2.0), names=times)
+    monkeypatch.setattr(claims, "run_scenario", run_scenario)
+    found = claims.measure_delay_by_size(zone, scales=(1.0, 1.5, 2.0), names=times)
     assert (found.effect, found.low, found.high, found.n) == (3.0, 1.0, 5.0, 3)
     assert (found.claim, found.verdict) == ("a zone 2.0 times as large makes the robot later", "supported")
     assert str(found) == "+3.00 [+1.00, +5.00] s (range over scenarios): supported"
     table = claims.tabulate_findings([found, finding(0.1, 0.3)], data="here")
     assert table["interval"].tolist() == ["range over scenarios", "95 % interval"]
     times["waiting"] = -1.0
-    mixed = claims_study.measure_delay_by_size(zone, scales=(1.0, 2.0), names=times)
+    mixed = claims.measure_delay_by_size(zone, scales=(1.0, 2.0), names=times)
     assert mixed.low == -1 and mixed.verdict == "not decidable with n = 3"
-    earlier = claims_study.measure_delay_by_size(zone, scales=(2.0, 1.0), names=("passing", "corridor"))
+    earlier = claims.measure_delay_by_size(zone, scales=(2.0, 1.0), names=("passing", "corridor"))
     assert earlier.verdict == "contradicted"
 
 
 def test_a_larger_zone_makes_the_robot_later() -> None:
     zone = szlib.Ellipse((0.05, 0.0), (0.9, 0.7))
-    found = claims_study.measure_delay_by_size(zone, names=("passing", "corridor"))
+    found = claims.measure_delay_by_size(zone, names=("passing", "corridor"))
     assert found.low > 0 and found.n == 2
     assert zone.scaled(2.0) == szlib.Ellipse((0.1, 0.0), (1.8, 1.4))
 

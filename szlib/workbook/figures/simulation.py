@@ -271,11 +271,6 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
     label_metres(ax, "t")
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # the layout is done
-    fixed: list[Artist] = [*ax.lines, ax.title]
-    for artist in fixed:
-        artist.set_animated(True)  # not in the background: the axes are, and nothing in them
-    canvas.draw()  # type: ignore[no-untyped-call]
-    background = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
 
     def draw_frame(row: int) -> Image.Image:
         """The scene at a row of the run."""
@@ -283,9 +278,7 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
         moving += ax.plot(*run.predicted[row, :, :2].T, ".", color=GREEN, markersize=3)
         moving += _draw_moving(ax, run, row, robot=BLUE, zone=RED)
         ax.set_title(f"t = {run.time[row]:4.1f} s, robot at {run.speed[row]:.2f} m/s (shown twice as fast)")
-        canvas.restore_region(background)  # type: ignore[no-untyped-call]
-        for artist in sorted((*fixed, *moving), key=Artist.get_zorder):
-            ax.draw_artist(artist)
+        canvas.draw()  # type: ignore[no-untyped-call]
         for artist in moving:
             artist.remove()
         pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
