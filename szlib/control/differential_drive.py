@@ -305,11 +305,8 @@ class DifferentialDrive(Controller):
             )
         start = (*(own[:2] + lever).tolist(), *self._velocity(theta, *speeds))
         turn = self._find_turn(own[:3].tolist(), centre)
-        towards = (
-            own[:2] + self.ahead * np.array([cos(theta + turn), sin(theta + turn)])
-            if turn
-            else centre + lever
-        )
+        at_end = own[:2] if turn else centre  # of the axle: it turns where it stands, or drives to the goal
+        towards = at_end + self.ahead * np.array([cos(theta + turn), sin(theta + turn)])
         point = self._point.step(start, towards, people, ids=ids, stamps=stamps, now=now, route=route)
         self._seen = point.scene
         states, controls = self._follow(own, point.predicted[1:, :2])

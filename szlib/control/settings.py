@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from itertools import accumulate
@@ -25,6 +26,13 @@ Terminal = Literal["none", "rest", "person"]
 def _setting(badge: str, default: Any, **paper: Any) -> Any:
     """A default and its source; `paper`: the value that the paper has instead."""
     return field(default=default, metadata={"badge": badge, **paper})
+
+
+def _check_numbers(settings: Any, expected: str, holds: Callable[[float], bool], *names: str) -> None:
+    """Make the settings of these names floats; SolverError unless each `holds` what is `expected`."""
+    for name in names:
+        object.__setattr__(settings, name, value := float(check_array(name, getattr(settings, name), ())))
+        _require(holds(value), name, value, expected)
 
 
 @dataclass(frozen=True)
@@ -53,10 +61,8 @@ class Crowding:
     gap: float = 0.2
 
     def __post_init__(self) -> None:
-        for name in ("radius", "price", "gap", "gamma"):
-            object.__setattr__(self, name, float(check_array(name, getattr(self, name), ())))
-            _require(getattr(self, name) > 0, name, getattr(self, name), "a positive number")
-        _require(self.gamma <= 1, "gamma", self.gamma, "in (0, 1]")
+        _check_numbers(self, "a positive number", lambda v: v > 0, "radius", "price", "gap")
+        _check_numbers(self, "in (0, 1]", lambda v: 0 < v <= 1, "gamma")
         for name, least in (("few", 1), ("many", self.few)):
             value = getattr(self, name)
             _require(isinstance(value, int) and value >= least, name, value, f"a whole number >= {least}")
@@ -168,14 +174,10 @@ class MPCSettings:
             value = getattr(self, name)
             _require(isinstance(value, int | np.integer) and value >= 1, name, value, "a whole number >= 1")
         positive = "dt", "a_max", "v_max", "zone_speed", "slack_weight"
-        not_negative = "r_robot", "eps", "jerk_weight"
-        for name in (*positive, *not_negative, "gamma", "head_on_share"):
-            object.__setattr__(self, name, float(check_array(name, getattr(self, name), ())))
-        for name in positive:
-            _require(getattr(self, name) > 0, name, getattr(self, name), "a positive number")
-        for name in not_negative:
-            _require(getattr(self, name) >= 0, name, getattr(self, name), "a number >= 0")
-        _require(0 < self.gamma <= 1, "gamma", self.gamma, "in (0, 1]")
+        _check_numbers(self, "a positive number", lambda v: v > 0, *positive)
+        _check_numbers(self, "a number >= 0", lambda v: v >= 0, "r_robot", "eps", "jerk_weight")
+        _check_numbers(self, "in (0, 1]", lambda v: 0 < v <= 1, "gamma")
+        _check_numbers(self, "in [0, 0.5]", lambda v: 0 <= v <= 0.5, "head_on_share")
         _require(self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}")
         _require(min(self.Q) >= 0, "Q", self.Q, "weights >= 0")
         _require(min(self.P) >= 0, "P", self.P, "weights >= 0")
@@ -189,7 +191,6 @@ class MPCSettings:
             _require(is_positive, name, value, f"a positive number of {unit}, or inf")
         if self.terminal != "none":
             object.__setattr__(self, "N_h", self.N)
-        _require(0 <= self.head_on_share <= 0.5, "head_on_share", self.head_on_share, "in [0, 0.5]")
 
     @classmethod
     def paper(cls, **changes: Any) -> MPCSettings:

@@ -200,14 +200,13 @@ class Experiment:
         if speed is not None:
             _check_range("speed", speed, *RANGES["speed"])
             moved, start = ([_with_speed(person, speed) for person in group] for group in (moved, start))
-        changed = replace(
-            self.scenario,
-            goal=self.scenario.goal if goal is None else _check_places("goal", goal, (2,)),
-            walls=self.scenario.walls
-            if walls is None
-            else _check_places("walls", np.reshape(walls, (-1, 4)), (..., 4)).reshape(-1, 2, 2),
-            people=tuple(start),
-        )
+        changes: dict[str, Any] = {"people": tuple(start)}
+        if goal is not None:
+            changes["goal"] = _check_places("goal", goal, (2,))
+        if walls is not None:
+            ends = _check_places("walls", np.reshape(walls, (-1, 4)), (..., 4))
+            changes["walls"] = ends.reshape(-1, 2, 2)
+        changed = replace(self.scenario, **changes)
         if walls is not None:
             for controller in self._controllers:
                 controller.set_walls(changed.walls)
@@ -215,12 +214,9 @@ class Experiment:
 
     def decide(self) -> list[Step]:
         """The step of each robot at this time; no time passes."""
-        robots, goal, people = (
-            zip(self._controllers, self.states, strict=True),
-            self.scenario.goal,
-            self.people,
-        )
-        return [controller.step(state, goal, people, now=self.t) for controller, state in robots]
+        given = self.scenario.goal, self.people
+        robots = zip(self._controllers, self.states, strict=True)
+        return [controller.step(state, *given, now=self.t) for controller, state in robots]
 
     def step(self) -> list[Step]:
         """The step of each robot at this time; then one time step passes."""

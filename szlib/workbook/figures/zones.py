@@ -158,13 +158,8 @@ def plot_zone(
     else:
         ax.plot(*boundary.T, color=GREY, linewidth=1.5, label=f"radius by direction ({zone.method})")
     name = "smallest enclosing ellipse" if is_hull else "fitted ellipse"
-    ax.plot(
-        *ellipse.curve().T,
-        color=BLUE,
-        linewidth=2,
-        linestyle="-" if verdict == "usable" else "--",
-        label=name,
-    )
+    line = "-" if verdict == "usable" else "--"
+    ax.plot(*ellipse.curve().T, line, color=BLUE, linewidth=2, label=name)
     _draw_interval(ax, zone, speed, color=ORANGE, alpha=0.35, label="its 95 % interval")
     if ellipse.support is not None:
         ax.plot(*ellipse.support.T, "o", color=BLUE, label=f"its {len(ellipse.support)} support points")
