@@ -24,20 +24,7 @@ from ..checks import Array
 from ..encounters.geometry import wrap_angle
 from ..errors import ZoneError
 from ..files import write_file
-from .settings import (
-    MARGIN,
-    MIN_WALKING_SPEED,
-    SPACE,
-    WINDOW,
-    PlazaSettings,
-    interpolate_zones,
-    lead_time,
-    rotate,
-    rotate_left,
-    start_time,
-    swept_length,
-    unit_vectors,
-)
+from .settings import MARGIN, MIN_WALKING_SPEED, SPACE, WINDOW, PlazaSettings, swept_length
 
 KINDS = ("overtaking", "head-on", "crossing", "together", "standing", "intruder")
 """Kinds of encounter; the first three by the angle between the directions of motion when closest."""
@@ -120,13 +107,13 @@ def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) ->
     plan, speed, before, motion = _draw_encounters(rng, settings)
     n = len(plan)
     heading = rng.uniform(-np.pi, np.pi, n)
-    ahead, swept = unit_vectors(heading), swept_length(speed)
-    half = (np.abs(ahead) * swept[:, None] + np.abs(rotate_left(ahead)) * SPACE.width) / 2
+    ahead, swept = _unit_vectors(heading), swept_length(speed)
+    half = (np.abs(ahead) * swept[:, None] + np.abs(_rotate_left(ahead)) * SPACE.width) / 2
     low, high = np.transpose([settings.area.x, settings.area.y])
     middle = rng.uniform(low + half + MARGIN, high - half - MARGIN)
     walker = middle + (speed * before - swept / 2)[:, None] * ahead
-    start = start_time(settings) + np.arange(n) * (settings.tracked + _PAUSE)
-    offset, other_v, swerve = np.moveaxis(rotate(motion, heading[:, None]), 1, 0)
+    start = settings.compute_start_time() + np.arange(n) * (settings.tracked + _PAUSE)
+    offset, other_v, swerve = np.moveaxis(_rotate(motion, heading[:, None]), 1, 0)
     apart = np.abs(np.arctan2(motion[:, 1, 1], motion[:, 1, 0]))
     kind = np.where(
         plan == "passing", np.select([apart < np.pi / 4, apart > 3 * np.pi / 4], KINDS[:2], KINDS[2]), plan
@@ -135,7 +122,7 @@ def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) ->
     columns = {
         name + axis: v[:, k] for name, v in zip(_VECTORS, vectors, strict=True) for k, axis in enumerate("xy")
     }
-    closest = start + lead_time(settings) + before
+    closest = start + settings.lead_time + before
     return pd.DataFrame({"kind": kind, "start": start, "closest": closest, **columns})
 
 
@@ -221,15 +208,15 @@ def _draw(
     `bearing` is the parameter of the nearest point on the ellipse; intruders pass the person at this bearing.
     """
     n, standing, intruder = len(plan), plan == "standing", plan == "intruder"
-    center, semi_axes, angle = interpolate_zones(settings, speed)
+    center, semi_axes, angle = settings.interpolate_zones(speed)
     a, b = semi_axes.T
     beside = np.arctan2(b * np.cos(angle), a * np.sin(angle)) + np.pi * rng.integers(2, size=n)
-    unit = unit_vectors(np.where(standing, beside, bearing))
-    edge = rotate(rotate_left(unit) * semi_axes, angle)
-    point = center + rotate(unit * semi_axes, angle)
+    unit = _unit_vectors(np.where(standing, beside, bearing))
+    edge = _rotate(_rotate_left(unit) * semi_axes, angle)
+    point = center + _rotate(unit * semi_axes, angle)
     edge /= np.linalg.norm(edge, axis=-1, keepdims=True)
-    tangent = np.where(intruder[:, None], rotate_left(unit), edge)
-    normal = -rotate_left(tangent)
+    tangent = np.where(intruder[:, None], _rotate_left(unit), edge)
+    normal = -_rotate_left(tangent)
     intrusion = rng.uniform(*settings.intruder_distances, n)
     offset = np.where(intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal)
     (low, high), limit = settings.intruder_speeds, 2 * settings.max_speed
@@ -246,7 +233,7 @@ def _is_possible(
     settings: PlazaSettings, plan: NDArray[np.str_], speed: Array, before: Array, motion: Array
 ) -> NDArray[np.bool_]:
     """Which motions start ahead of the walker, have walking speeds, and stay outside both zones."""
-    lead = lead_time(settings)
+    lead = settings.lead_time
     moments = np.linspace(-lead, WINDOW + lead, 1 + round(_CHECKS * settings.tracked))
     since = (np.append(moments, 0.0) - before[:, None])[..., None]
     swerved, deviation = _swerve(since)
@@ -266,7 +253,7 @@ def _is_possible(
     possible[some] = _stays_outside(settings, position[some], walker_speed)
     some = np.flatnonzero(possible & is_respectful & ~is_standing)
     course = np.arctan2(velocity[some, :, 1], velocity[some, :, 0])
-    possible[some] = _stays_outside(settings, rotate(-position[some], -course), pace[some])
+    possible[some] = _stays_outside(settings, _rotate(-position[some], -course), pace[some])
     return np.asarray(possible)
 
 
@@ -281,8 +268,8 @@ def _swerve(since: Array) -> tuple[Array, Array]:
 
 def _stays_outside(settings: PlazaSettings, points: Array, speed: Array) -> NDArray[np.bool_]:
     """Which paths (n, moments, 2) [m] stay outside the zones at speeds (n, moments) at all moments; (n,)."""
-    center, semi_axes, angle = interpolate_zones(settings, speed)
-    mapped = rotate(points - center, -angle) / semi_axes  # the zones become the unit disc
+    center, semi_axes, angle = settings.interpolate_zones(speed)
+    mapped = _rotate(points - center, -angle) / semi_axes  # the zones become the unit disc
     return np.asarray((np.linalg.norm(mapped, axis=-1) >= 1).all(axis=1))
 
 
@@ -321,3 +308,19 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
 def _stratify(rng: np.random.Generator, n: int, low: float, high: float) -> Array:
     """n numbers in random order, one in each nth part from low to high."""
     return low + (high - low) * rng.permutation(np.arange(n) + rng.uniform(size=n)) / n
+
+
+def _unit_vectors(angle: Array) -> Array:
+    """Unit vectors (..., 2) at `angle` (...) [rad]."""
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def _rotate_left(vectors: Array) -> Array:
+    """Rotate `vectors` (..., 2) by 90 degrees, counter-clockwise."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+
+
+def _rotate(vectors: Array, angle: Array) -> Array:
+    """Rotate `vectors` (..., 2) by `angle` (...) [rad], counter-clockwise."""
+    cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    return np.asarray(cos * vectors + sin * _rotate_left(vectors))

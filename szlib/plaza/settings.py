@@ -131,7 +131,7 @@ class PlazaSettings:
                 f"at speeds up to {high} m/s, the area needs sides of at least {needed:.1f} m; "
                 f"got {given:.1f} m; use a larger area or slower walkers"
             )
-        start_time(self)
+        self.compute_start_time()
         zones = map(self.true_zone, np.linspace(low, high, 3))
         reach = ellipse_reach(np.array([(*zone.center, *zone.semi_axes, zone.angle) for zone in zones]))
         if not (reach < R_MAX).all():  # NaN where a zone does not contain the person
@@ -142,52 +142,34 @@ class PlazaSettings:
 
     def true_zone(self, speed: float) -> Ellipse:
         """The true zone, in the person's frame [m], of a person who walks at `speed` [m/s]."""
-        (m, n), (a, b), angle = interpolate_zones(self, np.array(float(speed)))
+        (m, n), (a, b), angle = self.interpolate_zones(np.array(float(speed)))
         return Ellipse((m, n), (a, b), float(angle))
 
+    def interpolate_zones(self, speed: Array) -> tuple[Array, Array, Array]:
+        """Centres (..., 2), semi-axes (..., 2) [m] and angles (...) [rad] of the zones at `speed`."""
+        slow, fast = self.slow_zone, self.fast_zone
+        share = (speed - _LOW_SPEED) / (_HIGH_SPEED - _LOW_SPEED)
+        turn = Ellipse((0, 0), (1, 1), fast.angle - slow.angle).angle  # the shorter rotation
+        center, semi_axes = (
+            np.add(start, share[..., None] * np.subtract(end, start))
+            for start, end in ((slow.center, fast.center), (slow.semi_axes, fast.semi_axes))
+        )
+        return center, semi_axes, slow.angle + share * turn
 
-def interpolate_zones(settings: PlazaSettings, speed: Array) -> tuple[Array, Array, Array]:
-    """Centres (..., 2), semi-axes (..., 2) [m] and angles (...) [rad] of zones of `settings` at `speed`."""
-    slow, fast = settings.slow_zone, settings.fast_zone
-    share = (speed - _LOW_SPEED) / (_HIGH_SPEED - _LOW_SPEED)
-    turn = Ellipse((0, 0), (1, 1), fast.angle - slow.angle).angle  # the shorter rotation
-    center, semi_axes = (
-        np.add(start, share[..., None] * np.subtract(end, start))
-        for start, end in ((slow.center, fast.center), (slow.semi_axes, fast.semi_axes))
-    )
-    return center, semi_axes, slow.angle + share * turn
+    def compute_start_time(self) -> float:
+        """Compute the time at which the first pair comes [s since 1970]."""
+        try:
+            day = datetime.strptime(self.date, "%Y-%m-%d").replace(hour=_FIRST_HOUR, tzinfo=_JAPAN)
+        except ValueError as error:
+            raise DataError(f'date must be a day "YYYY-MM-DD"; got {self.date!r}') from error
+        return day.timestamp()
 
-
-def start_time(settings: PlazaSettings) -> float:
-    """Time at which the first pair of a plaza with these `settings` comes [s since 1970]."""
-    try:
-        day = datetime.strptime(settings.date, "%Y-%m-%d").replace(hour=_FIRST_HOUR, tzinfo=_JAPAN)
-    except ValueError as error:
-        raise DataError(f'date must be a day "YYYY-MM-DD"; got {settings.date!r}') from error
-    return day.timestamp()
-
-
-def lead_time(settings: PlazaSettings) -> float:
-    """Time for which a pair is seen before its window, and after it [s], on a plaza with `settings`."""
-    return (settings.tracked - WINDOW) / 2
+    @property
+    def lead_time(self) -> float:
+        """Time for which a pair is seen before its window, and after it [s]."""
+        return (self.tracked - WINDOW) / 2
 
 
 def swept_length(speed: float | Array) -> Array:
     """Length of the area that the attentional space sweeps at `speed` within the window [m]."""
     return np.asarray(SPACE.length + speed * _SWEPT)
-
-
-def unit_vectors(angle: Array) -> Array:
-    """Unit vectors (..., 2) at `angle` (...) [rad]."""
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def rotate_left(vectors: Array) -> Array:
-    """Rotate `vectors` (..., 2) by 90 degrees, counter-clockwise."""
-    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
-
-
-def rotate(vectors: Array, angle: Array) -> Array:
-    """Rotate `vectors` (..., 2) by `angle` (...) [rad], counter-clockwise."""
-    cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
-    return np.asarray(cos * vectors + sin * rotate_left(vectors))

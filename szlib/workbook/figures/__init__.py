@@ -2,7 +2,8 @@
 
 `plot_*` draws on the axes it is given, or on new ones, and returns them.  `draw_*` makes a whole figure.
 
-style        colours, sizes, labels in metres, legends
+palette      colours
+style        sizes, labels in metres, people, legends
 tracks       where people walked, how fast, and how many rows each stage keeps
 encounters   the attentional space, paths, and where the other person is
 zones        outliers, the hull, zones by speed, the pair correlation
@@ -29,6 +30,7 @@ from .encounters import (
     plot_encounter_paths,
     plot_relative_positions,
 )
+from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED, pick_colours
 from .simulation import (
     animate,
     draw_run_grid,
@@ -38,19 +40,6 @@ from .simulation import (
     plot_scenario,
     plot_speed,
 )
-from .style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    add_legend_below,
-    add_shared_legend,
-    alt_text,
-    get_axes,
-    label_metres,
-    pick_colours,
-)
+from .style import add_legend_below, add_shared_legend, alt_text, get_axes, label_metres
 from .tracks import plot_funnel, plot_map, plot_speed_histogram
 from .zones import plot_hull, plot_outliers, plot_pair_correlation, plot_zone, plot_zones

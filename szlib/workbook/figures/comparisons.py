@@ -13,7 +13,8 @@ from matplotlib.ticker import LogLocator
 
 from ...simulation.safety_claims import MOTION_CHANGES
 from ...zones.pooling import POSITIVE, UNITS, Pooled
-from .style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, add_legend_below, add_shared_legend, get_axes
+from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
+from .style import add_legend_below, add_shared_legend, get_axes
 
 # Colour and hatching of each kind of safety violation.
 _BARS = {

@@ -19,7 +19,8 @@ from ...control.barriers import barrier, check_wall, ellipse_distance, segment_d
 from ...control.distances import compute_distance_error, find_safe_boundary, required_margin
 from ...control.step import Step
 from ...zones.ellipses import Ellipse
-from .style import BLACK, BLUE, GREEN, GREY, RED, add_legend_below, draw_person, get_axes, label_metres
+from .palette import BLACK, BLUE, GREEN, GREY, RED
+from .style import add_legend_below, draw_person, get_axes, label_metres
 
 # Line styles of walls 0, 1, 2, 3; then again from the first.
 _WALL_LINES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))

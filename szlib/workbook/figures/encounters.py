@@ -12,19 +12,8 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle, Polygon
 
 from ...encounters.geometry import Area, AttentionalSpace
-from .style import (
-    BLACK,
-    BLUE,
-    GREY,
-    ORANGE,
-    RED,
-    SEQUENCE,
-    add_legend_below,
-    area_patch,
-    draw_person,
-    get_axes,
-    label_metres,
-)
+from .palette import BLACK, BLUE, GREY, ORANGE, RED, SEQUENCE
+from .style import add_legend_below, area_patch, draw_person, get_axes, label_metres
 
 _N_BINS = 40  # cells across r_max, or twice r_max: 5 or 10 cm for the paper's 2 m
 

@@ -19,7 +19,7 @@ from ...control.settings import MPCSettings
 from ...simulation.run import Run
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
-from .style import BLUE, GREEN, RED
+from .palette import BLUE, GREEN, RED
 
 _STATIC = Path(__file__).parents[1] / "static"  # what a browser shows
 

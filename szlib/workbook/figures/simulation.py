@@ -25,18 +25,8 @@ from ...simulation.run import Run, nanmin
 from ...simulation.scenario import Scenario
 from ...zones.ellipses import Ellipse
 from .movies import Movie, place_zones
-from .style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    add_legend_below,
-    draw_person,
-    get_axes,
-    label_metres,
-)
+from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED
+from .style import add_legend_below, draw_person, get_axes, label_metres
 
 _ROBOT_COLOURS = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
 _ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])

@@ -1,4 +1,4 @@
-"""The style that all figures share: colours, sizes, labels in metres, legends beside the data."""
+"""The style that all figures share: sizes, labels in metres, people, legends beside the data."""
 
 from __future__ import annotations
 
@@ -14,10 +14,6 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
 from ...encounters.geometry import Area
-
-BLUE, ORANGE, GREEN, RED, GREY, BLACK = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#999999", "#000000"
-
-SEQUENCE = "viridis"
 
 
 def get_axes(ax: Axes | None, *, size: tuple[float, float] = (6.0, 4.5)) -> Axes:
@@ -63,18 +59,6 @@ def area_patch(area: Area, **style: Any) -> PathPatch:
     """Return the borders of `area`, with its holes, as one patch; `style` as for matplotlib's PathPatch."""
     rings = [Path(ring, closed=True) for ring in area.outlines]
     return PathPatch(Path.make_compound_path(*rings), fill=False, **style)
-
-
-def pick_colours(values: Sequence[Any]) -> list[Any]:
-    """Return one colour for each of the `values`, from dark to light, without the palest.
-
-    Examples
-    --------
-    >>> from szlib.workbook import figures
-    >>> len(figures.pick_colours([0.7, 1.1, 1.5]))
-    3
-    """
-    return list(plt.get_cmap(SEQUENCE)(np.linspace(0, 0.85, len(values))))
 
 
 def add_legend_below(ax: Axes, *, gap: float = 0.13, ncols: int = 2) -> Legend:

@@ -7,7 +7,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from ...encounters.geometry import Area
-from .style import BLUE, GREY, RED, SEQUENCE, add_legend_below, area_patch, get_axes, label_metres
+from .palette import BLUE, GREY, RED, SEQUENCE
+from .style import add_legend_below, area_patch, get_axes, label_metres
 
 
 def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes | None = None) -> Axes:

@@ -21,18 +21,8 @@ from ...errors import DataWarning, ZoneError
 from ...zones.ellipses import Ellipse
 from ...zones.hulls import HullZone
 from ...zones.occupancy import PairCorrelation
-from .style import (
-    BLACK,
-    BLUE,
-    GREY,
-    ORANGE,
-    RED,
-    add_legend_below,
-    draw_person,
-    get_axes,
-    label_metres,
-    pick_colours,
-)
+from .palette import BLACK, BLUE, GREY, ORANGE, RED, pick_colours
+from .style import add_legend_below, draw_person, get_axes, label_metres
 
 FittedZone = Any
 """A `szlib.SocialZone`; it imports this module for its method `plot`, so it cannot be imported here."""
