@@ -273,13 +273,10 @@ def summarise(
     wide = values.unstack(list(by))
     drawn = np.random.default_rng(seed).integers(len(wide), size=(resamples, len(wide)))
     counts = np.stack([np.bincount(row, minlength=len(wide)) for row in drawn])
-    data, has_value = wide.fillna(0.0).to_numpy(), wide.notna().to_numpy()
-    weight = counts @ has_value
-    means = np.divide(counts @ data, weight, out=np.full(weight.shape, np.nan), where=weight > 0)
-    some = np.asarray(has_value.any(axis=0))
-    low, high = bounds = np.full((2, len(some)), np.nan)
-    bounds[:, some] = np.nanquantile(means[:, some], [(1 - level) / 2, (1 + level) / 2], axis=0)
+    weight = counts @ wide.notna().to_numpy()
+    means = np.full(weight.shape, np.nan)
+    np.divide(counts @ wide.fillna(0.0).to_numpy(), weight, out=means, where=weight > 0)
+    low, high = pd.DataFrame(means).quantile([(1 - level) / 2, (1 + level) / 2]).to_numpy()
     table = pd.DataFrame(wide.columns.tolist(), columns=["metric", *by])
-    mean = np.where(some, data.sum(axis=0) / np.maximum(has_value.sum(axis=0), 1), np.nan)
-    table = table.assign(mean=mean, low=low, high=high, n=has_value.sum(axis=0))
+    table = table.assign(mean=np.asarray(wide.mean()), low=low, high=high, n=np.asarray(wide.count()))
     return table.assign(first=wide.iloc[0].to_numpy())[[*by, "metric", "mean", "low", "high", "n", "first"]]
