@@ -240,11 +240,15 @@ class PlanEvaluator:
     Parameters
     ----------
     settings, n_people, n_walls : of the problem; `size` holds the last two.
+
+    Attributes
+    ----------
+    find_prices : the function of CasADi from the parameters to the price of each row.
     """
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
         with CASADI_LOCK:
-            evaluate, self.n_cbf = _evaluation(settings, n_people, n_walls)
+            evaluate, self.find_prices, self.n_cbf = _evaluation(settings, n_people, n_walls)
             self.n_rows = evaluate.nnz_out(1)
             self._inputs, self._parameters = np.zeros(evaluate.nnz_in(0)), np.zeros(evaluate.nnz_in(1))
             self.function = BufferedFunction(evaluate, self._inputs, self._parameters)
@@ -263,11 +267,12 @@ class PlanEvaluator:
 
 
 @lru_cache(maxsize=256)
-def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, int]:
+def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any, int]:
     p = build_problem(settings, n_people, n_walls)
     slack = ca.mmax(p.violations * p.is_hard(settings))
     outputs = [ca.vertcat(p.cost, slack), p.rows, p.states, p.h.T]
-    return dense_function("evaluate", [p.inputs, p.parameters], outputs), p.n_cbf
+    prices = dense_function("prices", [p.parameters], [p.prices])
+    return dense_function("evaluate", [p.inputs, p.parameters], outputs), prices, p.n_cbf
 
 
 class TimeBudget:

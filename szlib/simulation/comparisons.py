@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
 from itertools import product
 from math import pi, sqrt
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -88,46 +87,38 @@ def _fit_kirby_ellipse() -> Ellipse:
     return minimum_enclosing_ellipse_of_curve(partial(kirby_curve, speed=KIRBY_SPEED), [-pi / 2, pi / 2])
 
 
-ZONES: Mapping[str, ZoneTransform] = MappingProxyType(
-    {
-        "none": use_body,
-        "equal circle": use_equal_circle,
-        "Hall": use_hall_circle,
-        "Kirby": use_kirby_ellipse,
-        "fitted": keep_zone,
-    }
-)
+ZONES: Mapping[str, ZoneTransform] = {
+    "none": use_body,
+    "equal circle": use_equal_circle,
+    "Hall": use_hall_circle,
+    "Kirby": use_kirby_ellipse,
+    "fitted": keep_zone,
+}
 """Zones that the robot keeps out of, by name."""
 
-FORMULATIONS: Mapping[str, MPCSettings] = MappingProxyType(
-    {
-        "paper": MPCSettings.paper(),
-        "szlib": MPCSettings(),
-        "whole horizon": MPCSettings(N_h=MPCSettings.N),
-        "rest": MPCSettings(terminal="rest"),
-    }
-)
+FORMULATIONS: Mapping[str, MPCSettings] = {
+    "paper": MPCSettings.paper(),
+    "szlib": MPCSettings(),
+    "whole horizon": MPCSettings(N_h=MPCSettings.N),
+    "rest": MPCSettings(terminal="rest"),
+}
 """Settings by name: the paper's to the letter, szlib's defaults, and two changes of them."""
 
-BEHAVIOURS: Mapping[str, Behaviour] = MappingProxyType(
-    {
-        "as expected": Behaviour(),
-        "speeds up": Behaviour(pace=2.0),
-        "turns": Behaviour(turn=pi / 2),
-        "stops": Behaviour(pace=0.0),
-        "seen 10 cm off": Behaviour(noise=0.1),
-    }
-)
+BEHAVIOURS: Mapping[str, Behaviour] = {
+    "as expected": Behaviour(),
+    "speeds up": Behaviour(pace=2.0),
+    "turns": Behaviour(turn=pi / 2),
+    "stops": Behaviour(pace=0.0),
+    "seen 10 cm off": Behaviour(noise=0.1),
+}
 """How people move, or how the controller sees them, by name."""
 
-CONTROLLERS: Mapping[str, ControllerFactory] = MappingProxyType(
-    {
-        "MPC-CBF": make_mpc_cbf,
-        "straight": StraightController,
-        "social force": SocialForceController,
-        "dynamic window": DynamicWindowController,
-    }
-)
+CONTROLLERS: Mapping[str, ControllerFactory] = {
+    "MPC-CBF": make_mpc_cbf,
+    "straight": StraightController,
+    "social force": SocialForceController,
+    "dynamic window": DynamicWindowController,
+}
 """Controllers, by name."""
 
 METHOD = ("controller", "zone", "formulation", "behaviour")  # columns of `compare` that name a method

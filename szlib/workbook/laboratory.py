@@ -33,8 +33,6 @@ from . import folders
 from .figures.movies import read_scripts, scene_layout, snapshot
 from .record.parameters import RANGES
 
-__all__ = ["Experiment", "LaboratoryWidget", "RobotOptions", "is_interactive", "make_scene", "show_sliders"]
-
 _MARGIN = 0.7  # around everything that can be dragged [m]
 _FARTHEST = 1e4  # largest coordinate [m]
 _MOST_WALLS = 50  # number of walls for which the solvers are built within a second

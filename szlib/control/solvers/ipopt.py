@@ -22,7 +22,6 @@ from ..problem import (
     PlanEvaluation,
     ProblemSolver,
     build_problem,
-    dense_function,
     remaining_distance,
 )
 from ..settings import MPCSettings
@@ -59,7 +58,7 @@ class Ipopt(ProblemSolver):
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
         super().__init__(settings, n_people, n_walls)
         with CASADI_LOCK:
-            self._hard, self._relaxed, self._find_prices = _build(settings, n_people, n_walls)
+            self._hard, self._relaxed = _build(settings, n_people, n_walls)
         self._upper = np.zeros(self._hard.numel_out("g"))  # 0 for the terminal condition
         self._upper[: self.evaluate.n_rows] = inf
         self.remembered = np.zeros(0)
@@ -68,7 +67,7 @@ class Ipopt(ProblemSolver):
         """The plan from a `guess` and `parameters`; True if IPOPT converged."""
         a_max = self.settings.a_max
         if self.settings.crowding:
-            prices = np.asarray(self._find_prices(parameters)).ravel()
+            prices = np.asarray(self.evaluate.find_prices(parameters)).ravel()
             return self._solve_with_slack(guess, parameters, prices < self.settings.slack_weight)
         return self._solve(self._hard, parameters, x0=guess, p=parameters, lbx=-a_max, ubx=a_max)
 
@@ -83,7 +82,7 @@ class Ipopt(ProblemSolver):
     ) -> tuple[PlanEvaluation, bool]:
         """The plan with a slack in each row that `is_free`, at its price."""
         s, rows = self.settings, self.evaluate(guess, parameters).rows
-        prices = np.asarray(self._find_prices(parameters)).ravel()
+        prices = np.asarray(self.evaluate.find_prices(parameters)).ravel()
         weight = prices * remaining_distance(*parameters[[0, 1, 4, 5]])
         return self._solve(
             self._relaxed,
@@ -105,8 +104,8 @@ class Ipopt(ProblemSolver):
 
 
 @lru_cache(maxsize=256)
-def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any, Any]:
-    """The solvers of the hard and of the relaxed problem, and the prices of the rows by the parameters."""
+def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any]:
+    """The solvers of the hard and of the relaxed problem."""
     p = build_problem(settings, n_people, n_walls)
     options: dict[str, Any] = {"expand": True, "print_time": False, "calc_lam_p": False}
     options["show_eval_warnings"] = False  # a failure shows in `Step.status`
@@ -124,8 +123,4 @@ def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any
         "f": p.cost + ca.sum1(penalty),
         "g": ca.vertcat(p.rows + penalty / weight, p.terminal),
     }
-    prices = dense_function("prices", [p.parameters], [p.prices])
-    hard_solver, relaxed_solver = (
-        ca.nlpsol(name, "ipopt", each, options) for name, each in (("hard", hard), ("relaxed", relaxed))
-    )
-    return hard_solver, relaxed_solver, prices
+    return ca.nlpsol("hard", "ipopt", hard, options), ca.nlpsol("relaxed", "ipopt", relaxed, options)

@@ -78,7 +78,7 @@ class Sqp(ProblemSolver):
         self._has_multipliers, self._model = False, daqp.Model()
         self._model.settings = _DAQP
         self._model.setup(np.eye(n), *self._program[1:], self._sense)
-        self._find_prices = BufferedFunction(functions.prices, self._parameters)
+        self._find_prices = BufferedFunction(self.evaluate.find_prices, self._parameters)
         self._prices = np.full(n + m, self.settings.slack_weight)
         self._model.soft_weights(w_l=self._prices, w_u=self._prices)
 

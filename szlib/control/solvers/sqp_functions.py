@@ -26,7 +26,7 @@ from ..settings import MPCSettings
 
 
 class SqpFunctions(NamedTuple):
-    """Four functions of CasADi, and what their results are multiplied by.
+    """Three functions of CasADi, and what their results are multiplied by.
 
     The scaled cost is that for each metre to the target, at least one, and the price of violated rows that
     have one. Violation and multipliers are those of the hard rows.
@@ -42,7 +42,6 @@ class SqpFunctions(NamedTuple):
         terminal condition, states and h, all after this share of the step.
     free : parameters -> the inputs of smallest cost without any row or bound, and the sum of their
         violations; None if there is a terminal condition.
-    prices : parameters -> the price of each row.
     to_positions : P_0 .. P_{N_h}, shape (N_h+1, 2, 2N).
     n_cbf : number of barrier conditions.
     """
@@ -50,7 +49,6 @@ class SqpFunctions(NamedTuple):
     derive: Any
     measure: Any
     free: Any
-    prices: Any
     to_positions: Array
     n_cbf: int
 
@@ -125,16 +123,15 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
     *totals, values, states, h = there(trial, p.parameters)
     merit = ca.vertcat(*totals, ca.norm_inf(step), ca.norm_inf(is_hard * multipliers), on_rows)
     measure = dense_function("measure", [*arguments, step, share], [merit, trial, values, states, h])
-    prices = dense_function("prices", [p.parameters], [p.prices])
     if p.terminal.numel():
-        return SqpFunctions(derive, measure, None, prices, to_positions, p.n_cbf)
+        return SqpFunctions(derive, measure, None, to_positions, p.n_cbf)
     given = p.parameters[:10]
     to_inputs, to_given = (ca.evalf(ca.jacobian(gradient, by)) for by in (u, given))
     free = -ca.solve(to_inputs, to_given) @ given
     beyond = ca.sum1(ca.fmax(0, ca.fabs(free) - s.a_max))
     violated = ca.Function("violated", [u, p.parameters], [ca.sum1(p.violations)])
     free_plan = dense_function("unbound", [p.parameters], [free, beyond + violated(free, p.parameters)])
-    return SqpFunctions(derive, measure, free_plan, prices, to_positions, p.n_cbf)
+    return SqpFunctions(derive, measure, free_plan, to_positions, p.n_cbf)
 
 
 def _slopes(p: Problem, s: MPCSettings) -> Any:

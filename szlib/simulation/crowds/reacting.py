@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import atan2, hypot
-from types import MappingProxyType
 from typing import Literal, get_args
 
 import numpy as np
@@ -20,7 +19,7 @@ from .orca import OrcaModel
 from .social_force import SocialForceModel
 from .walking_model import ModelFactory, Walkers, WalkingModel
 
-MODELS: Mapping[str, ModelFactory] = MappingProxyType({"orca": OrcaModel, "social force": SocialForceModel})
+MODELS: Mapping[str, ModelFactory] = {"orca": OrcaModel, "social force": SocialForceModel}
 """Models of walking, by name; they need the extra `crowds`."""
 RobotAppearance = Literal["robot", "person", "nothing"]
 MIN_HEADING_SPEED = 0.2  # slower people keep their last heading [m/s] (assumed)
