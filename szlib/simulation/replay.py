@@ -94,7 +94,7 @@ class Replay(CrowdModel):
         )
 
 
-class Replays(tuple[Replay, ...], CrowdModel):
+class Replays(tuple[Replay, ...]):
     """Several replays, each with its seed: worlds and behaviour of `rollouts`.
 
     ``szlib.rollouts(len(replays), worlds=replays, behaviour=replays)``: seed 0 is the first replay; after the
@@ -108,6 +108,10 @@ class Replays(tuple[Replay, ...], CrowdModel):
     def start(self, scenario: Scenario, seed: int) -> Crowd:
         """The people of the replay of a `seed`, whatever the `scenario`."""
         return self[seed % len(self)].start(scenario, seed)
+
+    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
+        """The `people` themselves; nothing is drawn from `rng`."""
+        return people
 
 
 class ReplacedWalker(Controller):
