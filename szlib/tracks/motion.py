@@ -89,7 +89,7 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
 
 
 def find_walking(
-    columns: np.ndarray, known: Mapping[int, int] | None = None, rate: float = 1.0
+    columns: np.ndarray, known: Mapping[int, int] | None = None, rate: float = 1.0, metres: float = 1.0
 ) -> tuple[int, ...] | None:
     """The columns in which people walk, as t, id, x, y; None where there are none.
 
@@ -98,6 +98,7 @@ def find_walking(
     columns : numbers, shape (m, n).
     known : number of the column of t (0), id (1), x (2) and y (3), as far as they are known.
     rate : of t [1/s]; with another than 1 s, t must be whole numbers.
+    metres : metres in a unit of x and y.
 
     Returns
     -------
@@ -112,7 +113,7 @@ def find_walking(
         rows = columns[list(order)]
         if rate != 1 and (rows[0][np.isfinite(rows[0])] % 1 != 0).any():
             continue
-        motion = measure_motion(rows / [[rate], [1.0], [1.0], [1.0]])
+        motion = measure_motion(rows * [[1 / rate], [1.0], [metres], [metres]])
         if motion is not None and motion.is_walking:
             n_moved = sum(k != place for place, k in enumerate(order))
             found.append((round(motion.irregularity, 3), n_moved, order))

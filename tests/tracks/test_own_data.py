@@ -122,6 +122,19 @@ def test_a_unit_in_a_name_is_used_and_a_given_one_replaces_it(tmp_path: Path) ->
         read_raw(pixels)
 
 
+def test_columns_are_suggested_also_where_only_names_or_speeds_tell_the_unit() -> None:
+    rows = hall()[["t", "id", "x", "y"]].assign(x=lambda r: r["x"] * 1e3, y=lambda r: r["y"] * 1e3)
+    for names, options in (
+        (["when", "who", "east (mm)", "north (mm)"], {}), (["when", "who", "east", "north"], {"unit": "mm"}),
+    ):  # fmt: skip
+        columns = dict(zip(("t", "id", "x", "y"), names, strict=True))
+        advice = " and ".join(f"{name}={value!r}" for name, value in {"columns": columns, **options}.items())
+        table = rows.set_axis(names, axis=1)
+        with pytest.raises(szlib.DataError, match=re.escape(f"; pass {advice}")):
+            read_raw(table)
+        assert len(read_raw(table, options=szlib.ReadOptions(columns=columns, **options))) == len(rows)
+
+
 UNCLEAR = {
     "time, timestamp can all be t; pass columns={'t': 'time'}": ["time", "id", "x", "y", "timestamp"],
     "names x twice; rename one": ["t", "id", "x", "y", "x"],

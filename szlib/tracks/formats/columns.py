@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import TypeVar
 
 import numpy as np
@@ -77,7 +78,9 @@ def find_columns(
     found = {quantity: at[quantity][0] for quantity in quantities if at[quantity]}
     if missing := [quantity for quantity in quantities if quantity not in found]:
         lacking = ", ".join(str(given.get(quantity, quantity)) for quantity in missing)
-        raise DataError(f"{where} has no column {lacking}; {_suggest(names, given, found, missing, sample)}")
+        raise DataError(
+            f"{where} has no column {lacking}; {_suggest(names, options, found, missing, sample)}"
+        )
     time = found.pop("frame" if has_frames else "t")
     if has_frames and options.frame_rate is None:
         raise DataError(
@@ -128,7 +131,7 @@ def _candidates(
 
 def _suggest(
     names: Sequence[str],
-    given: Mapping[str, str | int],
+    options: ReadOptions,
     found: Mapping[str, int],
     missing: Sequence[str],
     sample: Callable[[], pl.DataFrame],
@@ -142,15 +145,22 @@ def _suggest(
     known = {
         quantities.index(q): usable.index(k) for q, k in found.items() if q in quantities and k in usable
     }
-    for rate in (FRAMES,) if quantities[0] == "frame" else (1.0, FRAMES):
-        if usable and (order := find_walking(np.array([numbers[k] for k in usable]), known, rate)):
+    stated = {UNITS[unit] for _, unit in map(_split_unit, names) if unit in UNITS} | {options.metres} - {None}
+    readings = product((FRAMES,) if quantities[0] == "frame" else (1.0, FRAMES), stated or UNITS.values())
+    given = dict(options.columns or {})
+    for rate, metres in readings if usable else ():
+        values = np.array([numbers[k] for k in usable])
+        if order := find_walking(values, known, rate, metres or 1.0):
             time = "t" if rate == 1 else "frame"
             shown = [names[usable[k]] or usable[k] for k in order]
             columns = {**given, **dict(zip((time, "id", "x", "y"), shown, strict=True))}
-            advice = advise(columns=columns, **({} if rate == 1 else {"frame_rate": rate}))
+            unit = next((name for name, each in UNITS.items() if each == metres != 1 and not stated), None)
+            more = {"frame_rate": None if rate == 1 else rate, "unit": unit}
+            advice = advise(columns=columns, **{name: value for name, value in more.items() if value})
             return f"people walk if these are {columns}; {advice}"
     listed = ", ".join(map(repr, filter(None, names[:12]))) or f"{len(names)} fields without a header"
-    return f"it has {listed}; name the right ones with columns={{'t': ..., 'id': ..., 'x': ..., 'y': ...}}"
+    named = {**given, **dict.fromkeys(missing, "...")}
+    return f"it has {listed}; name the right ones: {advise(columns=named)}"
 
 
 def _as_floats(values: pl.Series) -> np.ndarray:
