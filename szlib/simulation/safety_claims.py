@@ -6,7 +6,6 @@ controller is given (`szlib.Step.safe`).  It claims nothing for people who chang
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -42,20 +41,16 @@ def safety_violations(run: Run) -> pd.DataFrame:
     explained : True if the claim holds for the person as the controller was given them (h_claimed >= 0), or
         if there was no claim.
     """
-    columns = ["t", "person", "h", "h_claimed", "deviation", "change", "explained"]
-    return pd.DataFrame(_find_violations(run), columns=columns)
-
-
-def _find_violations(run: Run) -> Iterator[tuple[Any, ...]]:
+    rows: list[tuple[Any, ...]] = []
     h_next, n, dt = run.h[1:], len(run.zones), run.settings.dt
     for k, i in np.argwhere(run.safe[:-1, None] & (h_next < -TOLERANCE)).tolist():
         t, h = float(run.time[k + 1]), float(h_next[k, i])
         if i >= n:
-            yield t, i, h, h, 0.0, "wall", False
+            rows.append((t, i, h, h, 0.0, "wall", False))
             continue
         before, after = run.people[k, i], run.people[k + 1, i]
         if np.isnan(before).any():
-            yield t, i, h, np.nan, np.nan, "came", True
+            rows.append((t, i, h, np.nan, np.nan, "came", True))
             continue
         expected = before[:2] + dt * before[3:]
         zone = run.zones[i].placed((float(expected[0]), float(expected[1])), float(before[2]))
@@ -63,7 +58,9 @@ def _find_violations(run: Run) -> Iterator[tuple[Any, ...]]:
         h_claimed = barrier(distance, run.settings.r_robot, run.settings.eps)
         deviation = float(np.hypot(*(after[:2] - expected)))
         change = _classify_change(before, after, deviation, dt)
-        yield t, i, h, h_claimed, deviation, change, h_claimed >= -TOLERANCE
+        rows.append((t, i, h, h_claimed, deviation, change, h_claimed >= -TOLERANCE))
+    columns = ["t", "person", "h", "h_claimed", "deviation", "change", "explained"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def _classify_change(before: Array, after: Array, deviation: float, dt: float) -> str:

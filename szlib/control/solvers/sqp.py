@@ -98,16 +98,16 @@ class Sqp(ProblemSolver):
 
     def hard(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan from a `guess` and `parameters`, relaxed if rows stay violated; True if it converged."""
-        outcome = self._solve(guess, parameters, HARD_SHARE)
-        return self._plan(), outcome == "converged"
+        plan, outcome = self._solve(guess, parameters, HARD_SHARE)
+        return plan, outcome == "converged"
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The same; True as well if no step lowers the merit any more, from a `guess` and `parameters`."""
-        outcome = self._solve(guess, parameters, 1.0)
-        return self._plan(), outcome in ("converged", "stalled")
+        plan, outcome = self._solve(guess, parameters, 1.0)
+        return plan, outcome in ("converged", "stalled")
 
-    def _solve(self, guess: Array, parameters: Array, share: float) -> Outcome:
-        """Solve; the plan is then in `_trial`, and its measures are in the buffers of `measure`."""
+    def _solve(self, guess: Array, parameters: Array, share: float) -> tuple[PlanEvaluation, Outcome]:
+        """The plan from a `guess`, within this share of the budget, and how the search for it ended."""
         self._parameters[:] = parameters
         if self.settings.crowding:
             self._find_prices.call()
@@ -123,12 +123,8 @@ class Sqp(ProblemSolver):
             if outcome != "converged":
                 self._measure_inputs()
         self.timed_out = outcome == "timed out"
-        return outcome
-
-    def _plan(self) -> PlanEvaluation:
-        """The plan in the buffers."""
         cost, slack = self._after[2:4].tolist()
-        return PlanEvaluation(cost, slack, *[array.copy() for array in self._measured])
+        return PlanEvaluation(cost, slack, *[array.copy() for array in self._measured]), outcome
 
     def _is_free(self) -> bool:
         """True if the minimum of the cost alone satisfies all bounds and rows; then it is the plan."""
