@@ -13,8 +13,9 @@ WORKBOOK, RUN, DAYS = "results of the workbook", "results of ", "encounters by d
 CACHED = ("encounters.parquet", "zone.json", "paper_zone.json", "area.txt", "plaza-*.csv")
 NOTEBOOK = "[0-9][0-9]*_*"
 OF_RUN = (
-    "report.html", "summary.json", "parameters.json", f"{NOTEBOOK}.ipynb", f"{NOTEBOOK}.csv",
-    f"records/{NOTEBOOK}.json", f"figures/{NOTEBOOK}", *CACHED, *(f"{name}.json" for name in CACHED),
+    "report.html", "report.html.json", "summary.json", "parameters.json",
+    f"{NOTEBOOK}.ipynb", f"{NOTEBOOK}.csv", f"records/{NOTEBOOK}.json", f"figures/{NOTEBOOK}",
+    *CACHED, *(f"{name}.json" for name in CACHED),
 )  # fmt: skip
 # What `make docs` writes.
 OF_SITE = ("index.html", "search.js", "report.html", "szlib.html", "szlib/**/*.html")

@@ -23,8 +23,9 @@ import threading
 import tomllib
 import traceback
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
+class _CommandParser(argparse.ArgumentParser):
+    """A parser whose help may end with a text that is made when the help is printed."""
+
+    list_parameters: Callable[[], str] | None = None
+
+    def format_help(self) -> str:
+        """The help, and the list of parameters if there is one."""
+        return super().format_help() + (f"\n{self.list_parameters()}\n" if self.list_parameters else "")
+
+
 def build_parser() -> argparse.ArgumentParser:
     """Build the parser of the command line; `help.toml` describes the commands and their arguments."""
     texts = tomllib.loads(Path(__file__).with_name("help.toml").read_text(encoding="utf-8"))
@@ -77,10 +88,10 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="szlib", description=__doc__, formatter_class=as_written)
     parser.add_argument("--version", action="version", version=f"szlib {__version__}")
     parser.set_defaults(memory=None)
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_CommandParser)
 
     text, rectangle = texts["shared"], ("X0", "X1", "Y0", "Y1")
-    data, cluster = argparse.ArgumentParser(add_help=False), argparse.ArgumentParser(add_help=False)
+    data, cluster = _CommandParser(add_help=False), _CommandParser(add_help=False)
     area = data.add_mutually_exclusive_group()
     area.add_argument("--area", "--square", nargs=4, type=float, metavar=rectangle, help=text["area"])
     area.add_argument("--polygon", dest="area", metavar="FILE", help=text["polygon"])
@@ -103,10 +114,13 @@ def build_parser() -> argparse.ArgumentParser:
         "run", help=text["summary"], parents=[data, cluster], formatter_class=as_written
     )
     run.description, run.epilog = summary, rules
+    run.list_parameters = partial(_list_parameters, texts["parameters"])
     run.add_argument("--data", nargs="+", default=["synthetic"], metavar="DATA", help=text["data"])
     run.add_argument("--out", type=os.path.abspath, metavar="FOLDER", help=text["out"])
     run.add_argument("-j", "--jobs", type=_job_count, default=n_jobs, metavar="N", help=text["jobs"])
     run.add_argument("--only", nargs="+", default=[], metavar="NN", help=text["only"])
+    run.add_argument("--force", action="store_true", help=text["force"])
+    run.add_argument("--junit", metavar="FILE", help=text["junit"])
     run.add_argument("--notebooks", metavar="FOLDER", help=text["notebooks"])
     pair = "NAME=VALUE"
     run.add_argument("-p", "--parameter", action="append", default=[], metavar=pair, help=text["parameter"])
@@ -197,8 +211,11 @@ def _run(options: argparse.Namespace) -> int:
         parameters["reading"] = reading
     _require_workbook_packages()
     from ..parallel import cluster
-    from .runner import format_summary, run
+    from .folders import require_place
+    from .machine_summaries import append_markdown, write_junit
+    from .runner import format_summary, list_results, run
 
+    junit = require_place(Path(options.junit)) if options.junit else None
     with cluster(options.scheduler, wait=options.wait) as client:
         summary = run(
             options.data[0] if len(options.data) == 1 else options.data,
@@ -208,8 +225,12 @@ def _run(options: argparse.Namespace) -> int:
             parameters=parameters,
             client=client,
             notebooks=options.notebooks,
+            force=options.force,
         )
     print(format_summary(summary))
+    append_markdown(*list_results(summary))
+    if junit:
+        write_junit(summary, junit)
     if "report" in summary:
         print(f"report: {printable(os.path.relpath(summary['report']))}")
     if summary.get("verdict"):
@@ -219,6 +240,14 @@ def _run(options: argparse.Namespace) -> int:
         error = next(iter(refused.values()))
         raise SzlibError(f"{', '.join(refused)}: could not be run: {error}; finished results stay")
     return 0 if summary["passed"] else 1
+
+
+def _list_parameters(meanings: dict[str, str]) -> str:
+    """The parameters of the notebooks; `meanings` are those of parameters without a comment."""
+    from . import folders
+    from .notebook_parameters import describe_parameters
+
+    return describe_parameters(folders.list_notebooks(folders.find_notebooks()), meanings)
 
 
 def _notebooks(options: argparse.Namespace) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
@@ -29,6 +28,7 @@ from ..zones.social_zone import SocialZone
 from ..zones.uncertainty import N_RESAMPLES
 from ..zones.verdict import describe_missing_encounters
 from ..zones.zone_file import FORMAT
+from .folders import require_place
 from .record.data_cache import find_null_model
 
 SPEED = MPCSettings.zone_speed  # of the zone that is drawn and judged [m/s]
@@ -125,11 +125,9 @@ def format_zone(zone: SocialZone) -> str:
 
 
 def _require_place(file: Path) -> Path:
-    """The `file`, if a zone can be written there: before hours of work, not after them."""
+    """The `file`, if a zone can be written there."""
     if file.suffix != ".json":
         raise StorageError(f"{printable(file)}: expected a file that ends in .json")
-    if not file.parent.is_dir() or not os.access(file.parent, os.W_OK):
-        raise StorageError(f"{printable(file.parent)}: is no folder that can be written; choose another one")
-    if file.exists() and read_json_object(file).get("format") != FORMAT:
+    if require_place(file).exists() and read_json_object(file).get("format") != FORMAT:
         raise StorageError(f"{printable(file)}: exists, and is no zone of szlib; choose another name")
     return file

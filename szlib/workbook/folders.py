@@ -31,6 +31,7 @@ RESULTS = "../results"  # the default folder of all results, relative to the not
 RESULTS_OF = "results of "  # how the purpose of each folder of results begins
 PURPOSE = f"{RESULTS_OF}the workbook"  # the purpose that marks the folder of all results
 LAB = "lab"  # the folder, among all results, of notebooks that are executed by hand
+REPORT = "report.html"  # file of a run: its report
 PARAMETERS = "parameters.json"  # file of a run: its data and parameters
 # What a copy of the notebooks leaves out: their executed copies.
 _UNNEEDED = shutil.ignore_patterns("*.ipynb", "__pycache__", "real_day", "tools", ".*")
@@ -161,9 +162,18 @@ def remove_outputs(folder: Path, notebooks: Iterable[str]) -> None:
 
     Raises OSError if a file cannot be removed.
     """
-    outputs = [folder / "report.html"]
-    for name in notebooks:
-        outputs += [folder / f"{name}.ipynb", folder / "records" / f"{name}.json"]
-        outputs += (folder / "figures").glob(f"{name}-*")
-    for file in outputs:
+    for file in [folder / REPORT, *(file for name in notebooks for file in list_outputs(folder, name))]:
         file.unlink(missing_ok=True)
+
+
+def list_outputs(folder: Path, notebook: str) -> list[Path]:
+    """Files of a `notebook` in a results `folder` that every run writes again: copy, record and figures."""
+    figures = (folder / "figures").glob(f"{notebook}-*")
+    return [folder / f"{notebook}.ipynb", folder / "records" / f"{notebook}.json", *figures]
+
+
+def require_place(file: Path) -> Path:
+    """The `file`, if it can be written to its folder: before hours of work, not after them."""
+    if not file.parent.is_dir() or not os.access(file.parent, os.W_OK):
+        raise StorageError(f"{printable(file.parent)}: is no folder that can be written; choose another one")
+    return file

@@ -43,7 +43,7 @@ from . import folders
 from .figures.movies import read_scripts
 from .record.display import format_value
 
-REPORT = "report.html"  # the file of the report, in the folder of a run
+REPORT = folders.REPORT
 _LARGEST_NOTEBOOK = 100_000_000  # of an executed notebook, with its animations [bytes]
 _STATIC = Path(__file__).parent / "static"
 _HARMLESS = tomllib.loads((_STATIC / "harmless.toml").read_text(encoding="utf-8"))

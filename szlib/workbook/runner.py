@@ -6,6 +6,7 @@ summary.json and writes the report.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import socket
@@ -21,20 +22,18 @@ from tqdm import tqdm
 
 from .. import __version__, memory
 from ..errors import DataError, SzlibError
-from ..files import folder_lock, process_folder, write_file
+from ..files import folder_lock, load_cached, process_folder, write_checksum, write_file
 from ..input_files import file_content, read_json_object
 from ..parallel import limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets, funnels
 from . import folders
+from .kept_results import PRODUCTS, SUMMARIES, find_kept, outcome_checksum, package_checksum
 from .notebook_execution import EMPTY_RECORD, end_kernels, execute_notebook
 from .record.data_cache import DataCache, describe_missing_data, read_stored_zone
 from .record.display import format_value
 from .record.parameters import METHOD_DEFAULTS, check_parameters
 
-# Notebooks whose results later ones need: the encounters and the zone.
-PRODUCERS = ("02", "05")
-# Notebooks that read the records of all others. The others are independent of each other.
-SUMMARIES = ("21",)
+PRODUCERS = tuple(PRODUCTS)
 # Notebooks that take longest. They start first in their batch, so that no core waits for them at its end.
 LONGEST = ("15", "16", "18")
 SUMMARY = "summary.json"  # file of the outcome of a run
@@ -53,6 +52,7 @@ def run(
     parameters: Mapping[str, Any] | None = None,
     client: Any = None,
     notebooks: str | Path | None = None,
+    force: bool = False,
 ) -> dict[str, Any]:
     """Execute the notebooks on a data set, and collect their results.
 
@@ -65,14 +65,15 @@ def run(
     parameters : parameters of the notebooks by name, such as {"seed": 1}.
     client : of a Dask cluster that shares this file system, as from `szlib.parallel.cluster`.
     notebooks : the folder of the notebooks; None as for `folders.find_notebooks`.
+    force : whether to repeat notebooks whose stored results are of the same notebook, code, data, parameters.
 
     Returns
     -------
     The summary: passed; notebooks, for each one its status ("done"; "undecided": it ended early, with too few
     encounters for a zone; "error": a cell failed; "refused": data, disk or memory do not allow it;
     "not started": an earlier one was refused), seconds, checks and key figures; the path of the report; the
-    verdict. The same, with notebooks of earlier runs on the same data, parameters and version, is in
-    ``summary.json``.
+    verdict; the names of notebooks that were kept, not repeated. The same, with notebooks of earlier runs on
+    the same data, parameters and version, is in ``summary.json``.
 
     Raises
     ------
@@ -82,7 +83,7 @@ def run(
     """
     place = folders.find_notebooks(notebooks)
     scripts = choose_notebooks(only, place)
-    names, jobs = [script.stem for script in scripts], max(limit_jobs(jobs, len(scripts)), 1)
+    jobs = max(limit_jobs(jobs, len(scripts)), 1)
     _require_limits(_FILES_OF_KERNEL + _FILES_OF_CLIENT * jobs)
     _require_loopback()
     known = sorted({*scripts, *(s for s in folders.list_notebooks(place) if s.stem[:2] <= PRODUCERS[-1])})
@@ -92,12 +93,25 @@ def run(
     home = folders.claim_results(results, data, given)
     with folder_lock(home), safe_path(), _private_temporary_files():
         files = DataCache(home, data, seed=given.get("seed", 0)).files()
-        folders.remove_outputs(home, names)
         if read_stored_zone(home / "zone.json") is None:  # missing, damaged or of another version
             (home / "zone.json").unlink(missing_ok=True)
-        source, earlier = _start_summary(home, data, files, given, names)
-        variables = given | {"data": data, "results": str(results)}
-        outcomes = _execute_all(scripts, variables, home, jobs, client)
+        contents = [[file.name, *file_content(file)] for file in files]
+        source: dict[str, Any] = {"szlib": __version__, "data": datasets.label(data)}
+        source |= {"files": contents, "parameters": given}
+        stored, code = _stored_outcomes(home, source), package_checksum(place)
+        kept = [] if force else find_kept(home, scripts, stored, code)
+        due = [script for script in scripts if script.stem not in kept]
+        names = [script.stem for script in due]
+        outcomes = {name: each for name, each in stored.items() if name not in names}
+        write_file(home / folders.PARAMETERS, json.dumps(source, indent=1))
+        if due:
+            folders.remove_outputs(home, names)
+            _store_unfinished(home, outcomes, names)
+            variables = given | {"data": data, "results": str(results)}
+            for script, outcome in _execute_all(due, variables, home, jobs, client):
+                outcome["checksum"] = outcome_checksum(home, script, outcome, code)
+                outcomes[script.stem] = outcome
+                _store_unfinished(home, outcomes, names)
         verdict = _judge(zone, source["files"], given) if (zone := home / "zone.json").exists() else ""
         if (samples := home / "encounters.parquet").exists():
             table = pd.read_parquet(samples, columns=[])
@@ -109,13 +123,21 @@ def run(
                 source["warnings"] += [] if verdict else [advice]
                 verdict = f"{verdict}; {advice.partition('; ')[2]}" if verdict else ""
         source |= {"verdict": verdict} if verdict else {}
-        summary, everything = (_summarise(source, each) for each in (outcomes, {**earlier, **outcomes}))
-        write_file(home / SUMMARY, json.dumps(everything, indent=1))
-        if any((home / f"{name}.ipynb").exists() for name in everything["notebooks"]):
-            from .report import write_report  # importing it takes longer than all other imports
+        text = json.dumps(_summarise(source, outcomes), indent=1)
+        write_file(home / SUMMARY, text)
+        if any((home / f"{name}.ipynb").exists() for name in outcomes):
+            _update_report(report := home / folders.REPORT, hashlib.sha256(text.encode()).hexdigest())
+            source["report"] = str(report)
+        chosen = {script.stem: outcomes[script.stem] for script in scripts}
+        return _summarise(source | {"kept": kept}, chosen)
 
-            summary["report"] = str(write_report(home))
-        return summary
+
+def _update_report(file: Path, made_of: str) -> None:
+    """Write the report again, unless the `file` is that of the summary with the checksum `made_of`."""
+    if load_cached(file, made_of) is None:
+        from .report import write_report  # importing it takes longer than all other imports
+
+        write_checksum(file, write_report(file.parent).read_bytes(), made_of)
 
 
 def _judge(file: Path, contents: Sequence[Any], parameters: Mapping[str, Any]) -> str:
@@ -185,8 +207,8 @@ def choose_notebooks(only: Iterable[str], place: Path | None = None) -> list[Pat
 
 def _execute_all(
     scripts: Sequence[Path], given: Mapping[str, Any], home: Path, jobs: int, client: Any
-) -> dict[str, dict[str, Any]]:
-    """Execute the notebooks; the outcome of each by its name, in their order."""
+) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Execute the notebooks; yield the script and the outcome of each when it has ended."""
     environment = {folders.RUN_VARIABLE: str(home)}
     if client is None:
         threads = max(1, (os.cpu_count() or 1) // jobs)
@@ -194,25 +216,29 @@ def _execute_all(
             memory.VARIABLE: str(memory.limit() // jobs),
             "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", str(threads)),
         }
-    not_started = {"status": "not started", "seconds": 0.0, **EMPTY_RECORD}
-    outcomes = {script.stem: not_started for script in scripts}
+    ended, is_refused = set[Path](), False
     bar = tqdm(total=len(scripts), unit="notebook", desc=home.name, disable=None)
     futures: list[Future[Any]] = []
     with bar, _open_executor(client, jobs, futures) as executor:
         for batch in split_batches(scripts):
-            if any(outcome["status"] == "refused" for outcome in outcomes.values()):
+            if is_refused:
                 break  # the later notebooks need its result
             arguments = (dict(given), str(home), environment)
             with uninterrupted():
                 futures[:] = [executor.submit(execute_notebook, str(script), *arguments) for script in batch]
+            script_of = dict(zip(futures, batch, strict=True))
             running = set(futures)
             while running:
                 done, running = wait(running, timeout=_POLL, return_when=FIRST_COMPLETED)
                 for future in done:
-                    name, outcomes[name] = future.result()
+                    name, outcome = future.result()
+                    ended.add(script := script_of[future])
+                    is_refused |= outcome["status"] == "refused"
                     bar.update()
-                    bar.set_postfix_str(f"{name} {outcomes[name]['status']}")
-    return outcomes
+                    bar.set_postfix_str(f"{name} {outcome['status']}")
+                    yield script, outcome
+    for script in (script for script in scripts if script not in ended):
+        yield script, {"status": "not started", "seconds": 0.0, **EMPTY_RECORD}
 
 
 def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:
@@ -240,30 +266,23 @@ def _open_executor(client: Any, jobs: int, futures: Sequence[Future[Any]]) -> It
             raise
 
 
-def _start_summary(
-    home: Path,
-    data: str | Sequence[str],
-    files: Sequence[Path],
-    parameters: Mapping[str, Any],
-    names: Sequence[str],
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Remove the outcomes of the notebooks `names`; return the source of the run, and the other outcomes.
+def _store_unfinished(home: Path, outcomes: Mapping[str, Any], names: Sequence[str]) -> None:
+    """Write the `outcomes` that there are as a summary that has not passed; `names` are of all that run."""
+    if not outcomes:
+        (home / SUMMARY).unlink(missing_ok=True)
+        return
+    left = [name for name in names if name not in outcomes]
+    unfinished = {"passed": False, "unfinished": left, "notebooks": outcomes}
+    write_file(home / SUMMARY, json.dumps(unfinished, indent=1), durable=False)
 
-    The source is version, content of the data, parameters. The other outcomes stay only if parameters.json
-    equals it. Until the run is finished, the summary in the folder has not passed.
-    """
-    before = read_json_object(home / folders.PARAMETERS)
-    outcomes = read_json_object(home / SUMMARY).get("notebooks", {})
-    contents = [[file.name, *file_content(file)] for file in files]
-    source = {"szlib": __version__, "data": datasets.label(data), "files": contents, "parameters": parameters}
-    is_same = before == json.loads(json.dumps(source))
-    earlier = {name: outcome for name, outcome in outcomes.items() if is_same and name not in names}
-    (home / SUMMARY).unlink(missing_ok=True)
-    if earlier:
-        unfinished = {"passed": False, "unfinished": list(names), "notebooks": earlier}
-        write_file(home / SUMMARY, json.dumps(unfinished, indent=1))
-    write_file(home / folders.PARAMETERS, json.dumps(source, indent=1))
-    return source, earlier
+
+def _stored_outcomes(home: Path, source: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The outcomes in the summary of an earlier run of the same `source`: version, data and parameters."""
+    is_same = read_json_object(home / folders.PARAMETERS) == json.loads(json.dumps(source))
+    stored = read_json_object(home / SUMMARY).get("notebooks") if is_same else None
+    outcomes = stored.items() if isinstance(stored, dict) else ()
+    whole = ((name, each) for name, each in outcomes if isinstance(each, dict))
+    return {name: each for name, each in whole if each.keys() >= EMPTY_RECORD.keys()}
 
 
 def _summarise(source: Mapping[str, Any], notebooks: Mapping[str, Any]) -> dict[str, Any]:
@@ -279,7 +298,15 @@ def has_passed(outcome: Mapping[str, Any]) -> bool:
 
 def format_summary(summary: Mapping[str, Any]) -> str:
     """Format the `summary` of a run: a row for each notebook, each result that does not hold, the verdict."""
-    rows, notes = [("notebook", "seconds", "checks", "observed", "key figures")], []
+    rows, notes = list_results(summary)
+    table = [f"{row[0]:<24} {row[1]:>7} {row[2]:>11} {row[3]:>9}  {row[4]}" for row in rows]
+    return "\n".join([*table, *notes])
+
+
+def list_results(summary: Mapping[str, Any]) -> tuple[list[tuple[str, ...]], list[str]]:
+    """List rows of a table of the `summary` of a run, the first its head, and notes, the last its result."""
+    rows: list[tuple[str, ...]] = [("notebook", "seconds", "checks", "observed", "key figures")]
+    notes = []
     for name, outcome in summary["notebooks"].items():
         done = outcome["status"] == "done"
         held = [_count_passed(outcome, kind) for kind in ("check", "observation")]
@@ -294,9 +321,12 @@ def format_summary(summary: Mapping[str, Any]) -> str:
     notes += [f"not decidable on this data, see the report: {', '.join(undecided)}"] if undecided else []
     notes += [f"data: {text}" for text in summary.get("warnings", ())]
     notes += [f"area: {summary['area']}"] if "area" in summary else []
-    table = [f"{row[0]:<24} {row[1]:>7} {row[2]:>11} {row[3]:>9}  {row[4]}" for row in rows]
+    if n_kept := len(summary.get("kept", ())):
+        notes.append(
+            f"{n_kept} of {len(rows) - 1} notebooks are kept from an earlier run; --force repeats them"
+        )
     end = f"all checks {'that were made ' if undecided else ''}hold"
-    return "\n".join([*table, *notes, end if summary["passed"] else "NOT ALL CHECKS HOLD"])
+    return rows, [*notes, end if summary["passed"] else "NOT ALL CHECKS HOLD"]
 
 
 def _count_passed(outcome: Mapping[str, Any], kind: str) -> str:

@@ -217,7 +217,7 @@ def contents(out: Path) -> dict[str, bytes]:
         str(file.relative_to(out)): figures(file) if file.suffix == ".ipynb" else file.read_bytes()
         for file in sorted(out.rglob("*"))
         if file.is_file() and not file.name.startswith(".")
-        and file.name not in ("summary.json", "report.html")
+        and file.name not in ("summary.json", "report.html", "report.html.json")
     }  # fmt: skip
     return {name: content for name, content in found.items() if b'"closed": false' not in content}
 

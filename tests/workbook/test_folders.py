@@ -75,7 +75,7 @@ def test_summary_keeps_the_other_notebooks_of_the_same_data(workbook, tmp_path):
 def test_summary_has_not_passed_before_the_run_ends(workbook, tmp_path, monkeypatch):
     run()
     monkeypatch.setattr(runner, "wait", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
-    assert main(["run", "--data", "mine.csv", "--out", "out", "--only", "08"]) == 130
+    assert main(["run", "--data", "mine.csv", "--out", "out", "--only", "08", "--force"]) == 130
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
     assert (left["passed"], left["unfinished"], list(left["notebooks"])) == (False, ["08_two"], ["01_one"])
 

@@ -87,7 +87,8 @@ def test_too_low_a_limit_of_open_files_is_raised_where_the_system_allows_it(
         resource, "getrlimit", lambda what: limits if what == resource.RLIMIT_NOFILE else (-1, -1)
     )
     monkeypatch.setattr(resource, "setrlimit", lambda _, pair: given.append(pair))
-    monkeypatch.setattr(runner, "_execute_all", lambda *_: {})
+    done = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
+    monkeypatch.setattr(runner, "_execute_all", lambda scripts, *_: [(script, done) for script in scripts])
     notebooks(_01_one="")
     runner.run("mine.csv", out=tmp_path / "out")
     assert given == ([raised] if raised else [])

@@ -211,10 +211,10 @@ def test_notebooks_that_run_at_the_same_time_share_the_cores(notebooks, monkeypa
     monkeypatch.setattr(runner, "execute_notebook", lambda *task: given.append(task[-1]) or ("01_a", DONE))
     notebooks(**{f"_0{n}_a": "" for n in range(1, 5)})
     monkeypatch.delenv("OMP_NUM_THREADS")
-    runner.run("mine.csv", out="out", jobs=jobs)
+    runner.run("mine.csv", out="out", jobs=jobs, force=True)
     assert {environment["OMP_NUM_THREADS"] for environment in given} == {threads}
     monkeypatch.setenv("OMP_NUM_THREADS", "5")
-    runner.run("mine.csv", out="out", jobs=jobs)
+    runner.run("mine.csv", out="out", jobs=jobs, force=True)
     assert given[-1]["OMP_NUM_THREADS"] == "5", "the user's own value stays"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -21,6 +20,7 @@ from ...tracks.options import ReadOptions
 from ...zones.outliers import R_MAX
 from ...zones.quantile import QUANTILE
 from ...zones.social_zone import SPEEDS
+from ..notebook_parameters import OPTIONS, read_defaults
 
 # Parameters that set the controller under another name, or that list values of one of its settings.
 SETTINGS = {"gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
@@ -34,7 +34,6 @@ RANGES: dict[str, tuple[float, float]] = {
     "fraction": (1e-6, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
     "eccentricities": (0, 0.999999), "size": (0.05, 20), "size_b": (0.05, 20), "speed": (0, 10),
 }  # fmt: skip
-OPTIONS = {"data": "--data", "results": "--out"}  # parameters that are options of the command line
 # Parameters that no check depends on: the data, the way of computing, and the amount shown.
 NEUTRAL = {*OPTIONS, "area", "reading", "n_jobs", "examples"}
 
@@ -144,18 +143,6 @@ def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dic
                 _check_type(name, each, default[0] if default else "")
             _check_range(name, each)
     return {name: value for name, value in given.items() if any(value != each for each in defaults[name])}
-
-
-def read_defaults(notebook: Path) -> dict[str, Any]:
-    """Read the default parameters from the cell tagged "parameters" of a `notebook` (a percent script)."""
-    cells = re.split(r"^# %%", notebook.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    return {
-        node.targets[0].id: ast.literal_eval(node.value)
-        for head, _, body in (cell.partition("\n") for cell in cells)
-        if re.search(r'tags=\[[^]]*"parameters"', head)
-        for node in ast.parse(body).body
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
-    }
 
 
 def check_injected(cells: Sequence[str]) -> None:

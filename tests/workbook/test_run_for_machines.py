@@ -1,0 +1,123 @@
+"""What `szlib run` writes for machines: JUnit XML, a Markdown summary, no progress bar in a log."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from szlib.workbook.cli import main
+
+pytestmark = pytest.mark.usefixtures("without_kernels")
+GOOD = 'record.check("sum", True, 2)\nrecord.claim("paper", False, 0.25)'
+BAD = 'record.check("a < b & c", False, "\\x1b[0m")\nrecord.check("fine", True)'
+
+
+@pytest.fixture(autouse=True)
+def no_summary_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("GITHUB_STEP_SUMMARY", raising=False)
+
+
+def run(*arguments: str) -> int:
+    return main(["run", "--data", "mine.csv", "--out", "out", "-j", "1", *arguments])
+
+
+def test_junit_has_a_suite_for_each_notebook_and_a_case_for_each_check(
+    notebooks: Callable[..., Path],
+) -> None:
+    notebooks(_01_good=GOOD, _02_bad=BAD, _03_crash="1 / 0")
+    assert run("--junit", "junit.xml") == 1
+    root = ET.parse("junit.xml").getroot()
+    assert root.tag == "testsuites"
+    suites = {suite.attrib["name"]: suite for suite in root}
+    assert list(suites) == ["01_good", "02_bad", "03_crash"]
+    cases = {name: [(c.attrib["name"], [e.tag for e in c]) for c in suite] for name, suite in suites.items()}
+    assert cases == {
+        "01_good": [("01_good", []), ("sum", [])],
+        "02_bad": [("02_bad", []), ("a < b & c", ["failure"]), ("fine", [])],
+        "03_crash": [("03_crash", ["error"])],
+    }
+    for suite in root:
+        assert all(
+            case.tag == "testcase" and case.attrib["classname"] == suite.attrib["name"] for case in suite
+        )
+        found = {tag: len(suite.findall(f".//{tag}")) for tag in ("testcase", "failure", "error", "skipped")}
+        names = {"testcase": "tests", "failure": "failures", "error": "errors", "skipped": "skipped"}
+        assert {names[tag]: str(n) for tag, n in found.items()}.items() <= suite.attrib.items()
+        assert float(suite.attrib["time"]) >= 0
+    assert "ZeroDivisionError" in suites["03_crash"][0][0].attrib["message"]
+
+
+def test_undecided_and_not_started_notebooks_are_skipped_in_junit(
+    notebooks: Callable[..., Path],
+) -> None:
+    notebooks(_02_wrong="import szlib\nraise szlib.DataError('wrong')", _07_later="")
+    assert run("--junit", "junit.xml") == 2
+    tags = [[child.tag for child in case] for case in ET.parse("junit.xml").iter("testcase")]
+    assert tags == [["error"], ["skipped"]]
+
+
+@pytest.mark.parametrize("place", ["nowhere/junit.xml", "mine.csv/junit.xml"])
+def test_junit_file_that_cannot_be_written_is_refused_before_the_run(
+    notebooks: Callable[..., Path], capsys: pytest.CaptureFixture[str], place: str
+) -> None:
+    notebooks(_01_good=GOOD)
+    assert run("--junit", place) == 2
+    assert "is no folder that can be written" in capsys.readouterr().err
+    assert not Path("out").exists()
+
+
+def test_markdown_is_appended_where_github_asks_for_it(
+    notebooks: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "step.md"
+    file.write_text("before\n")
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(file))
+    notebooks(_01_good=GOOD, _02_bad='record.check("a | b", False, 3)')
+    assert run() == 1
+    lines = file.read_text().splitlines()
+    assert lines[0] == "before"
+    rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines if line[:1] == "|"]
+    assert rows[0] == ["notebook", "seconds", "checks", "observed", "key figures"]
+    assert [[row[0], *row[2:]] for row in rows[2:]] == [
+        ["01_good", "1/1", "-", "seed 0"], ["02_bad", "0/1", "-", "seed 0"],
+    ]  # fmt: skip
+    assert "- 02_bad: a \\| b: FAILED (3)" in lines
+    assert "**NOT ALL CHECKS HOLD**" in lines
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_step_summary_that_cannot_be_written_is_a_warning(
+    notebooks: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "nowhere" / "step.md"))
+    notebooks(_01_good=GOOD)
+    assert run() == 0
+    assert "GITHUB_STEP_SUMMARY" in capsys.readouterr().err
+
+
+def test_a_log_has_no_progress_bar(
+    notebooks: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    notebooks(_01_good=GOOD)
+    assert run() == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_help_lists_every_parameter_with_default_and_meaning(capsys: pytest.CaptureFixture[str]) -> None:
+    """Those of the workbook itself."""
+    from szlib.workbook import folders
+    from szlib.workbook.record.parameters import OPTIONS, read_defaults
+
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    _, _, text = capsys.readouterr().out.partition("parameters (-p NAME=VALUE):\n")
+    rows = [line.split(None, 3) for line in text.splitlines()]
+    words = " ".join(text.split())
+    for script in folders.list_notebooks():
+        for name, value in read_defaults(script).items():
+            assert name in OPTIONS or f"{name} = {value!r} " in words, (script.stem, name)
+    assert all(len(row) == 4 for row in rows if len(row) > 1 and row[1] == "="), "each has a meaning"
