@@ -19,7 +19,7 @@ program.
 
 from __future__ import annotations
 
-from math import isnan
+from math import inf, isnan
 from typing import Any, Literal
 
 import daqp
@@ -31,12 +31,12 @@ from ..settings import MPCSettings
 from .sqp_functions import QuadraticProgram, SqpFunctions, build_sqp_functions
 
 Outcome = Literal["converged", "stalled", "timed out", "failed"]
-# The SQP has converged if its last step moves no input by more than this [m/s2]: with the exact Hessian, when
-# the error is of the order of its square, and without.
-CONVERGED = {True: 1e-2, False: 1e-5}
-# The rows are satisfied if their violations sum up to no more than this. The error of an input is up to
-# 2 / dt^2 times as large, 2e-6 m/s2.
-VIOLATED = 1e-8
+# The SQP has converged if its last step moves no input by more than the first number [m/s2], and the
+# violations of the rows sum up to no more than the second. With the exact Hessian the error is of the order
+# of the square of the step. That of an input is up to 2 / dt^2 times as large as the violations: 2e-6 m/s2.
+CONVERGED = {True: (1e-2, 1e-8), False: (1e-5, 1e-8)}
+# The same after `PATIENCE` iterations among people: without the exact Hessian, further ones gain little.
+LATE, PATIENCE = {True: (1e-2, 1e-7), False: (1e-3, 1e-7)}, 20
 PRICE = 1.1  # price of violation in the merit, as a multiple of the largest multiplier: exact above 1
 SHORTEST = 1e-3  # smallest share of a step that is still tried
 ROUNDING = 1e-12  # share by which the merit may rise from rounding alone
@@ -143,7 +143,8 @@ class Sqp(ProblemSolver):
         """Improve `_inputs`, within this share of the budget; no price goes above the weight of slack."""
         price, rises, best, limit = 0.0, 0, (0.0, 0.0), self.settings.slack_weight
         sense: Any = self._sense  # a copy has only the multipliers: forget which rows are active
-        for _ in range(self.settings.max_iterations):
+        patience = inf if self.settings.crowding is None else PATIENCE
+        for k in range(self.settings.max_iterations):
             if self.budget.is_spent(share):
                 return "timed out"
             exact, sense = self._linearise(sense), None
@@ -163,8 +164,9 @@ class Sqp(ProblemSolver):
             before, after = best[0] + price * best[1], cost + price * violation
             if isnan(before):
                 return "failed"
-            is_satisfied = violation <= VIOLATED or largest_multiplier >= limit
-            has_converged = curved == on_rows == violation == 0 or (size <= CONVERGED[exact] and is_satisfied)
+            moved, violated = (CONVERGED if k < patience else LATE)[exact]
+            is_satisfied = violation <= violated or largest_multiplier >= limit
+            has_converged = curved == on_rows == violation == 0 or (size <= moved and is_satisfied)
             if has_converged or after <= before * (1 + ROUNDING):
                 rises = 0
             elif rises < RISES:
@@ -179,7 +181,7 @@ class Sqp(ProblemSolver):
                 rises = 0
             else:
                 self._measure_inputs()
-                return "converged" if size <= CONVERGED[False] else "stalled"
+                return "converged" if size <= CONVERGED[False][0] else "stalled"
             if has_converged:
                 return "converged"
             self._inputs[:] = self._trial
