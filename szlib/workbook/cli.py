@@ -211,11 +211,10 @@ def _run(options: argparse.Namespace) -> int:
         parameters["reading"] = reading
     _require_workbook_packages()
     from ..parallel import cluster
-    from .folders import require_place
-    from .machine_summaries import append_markdown, write_junit
+    from .machine_summaries import append_markdown, require_junit, write_junit
     from .runner import format_summary, list_results, run
 
-    junit = require_place(Path(options.junit)) if options.junit else None
+    junit = require_junit(Path(options.junit)) if options.junit else None
     with cluster(options.scheduler, wait=options.wait) as client:
         summary = run(
             options.data[0] if len(options.data) == 1 else options.data,

@@ -130,4 +130,6 @@ def _require_place(file: Path) -> Path:
         raise StorageError(f"{printable(file)}: expected a file that ends in .json")
     if require_place(file).exists() and read_json_object(file).get("format") != FORMAT:
         raise StorageError(f"{printable(file)}: exists, and is no zone of szlib; choose another name")
+    if not file.exists() and (picture := file.with_suffix(".png")).exists():
+        raise StorageError(f"{printable(picture)}: exists without a zone; choose another name for the zone")
     return file

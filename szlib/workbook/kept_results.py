@@ -38,7 +38,7 @@ def outcome_checksum(home: Path, script: Path, outcome: Mapping[str, Any], code:
 def find_kept(
     home: Path, scripts: Sequence[Path], stored: Mapping[str, Mapping[str, Any]], code: str
 ) -> list[str]:
-    """The names of the notebooks among `scripts` whose `stored` outcomes need no other run.
+    """The names of the notebooks among `scripts` whose `stored` outcomes, and outputs in `home`, can be kept.
 
     `code` is the `package_checksum`.  A summary of all is kept only with all others.
     """

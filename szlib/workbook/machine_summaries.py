@@ -9,15 +9,25 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import warn
+from ..errors import StorageError, warn
 from ..files import write_file
-from ..input_files import printable
+from ..input_files import printable, read_small
+from .folders import require_place
 from .record.display import format_value
 
 # The environment variable in which GitHub names the file for the summary of a step.
 GITHUB = "GITHUB_STEP_SUMMARY"
 # The element of JUnit for a notebook of each status that is not "done".
 _ELEMENTS = {"error": "error", "refused": "error", "undecided": "skipped", "not started": "skipped"}
+
+
+def require_junit(file: Path) -> Path:
+    """The `file`, if JUnit XML can be written there without replacing anything else; else StorageError."""
+    if file.suffix != ".xml":
+        raise StorageError(f"{printable(file)}: expected a file that ends in .xml")
+    if require_place(file).exists() and b"<testsuites" not in read_small(file)[:100]:
+        raise StorageError(f"{printable(file)}: exists, and is no JUnit XML of szlib; choose another name")
+    return file
 
 
 def write_junit(summary: Mapping[str, Any], file: str | Path) -> None:

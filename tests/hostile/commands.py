@@ -200,11 +200,11 @@ def furnish(place: Path) -> None:
 
 def fingerprint(place: Path) -> dict[str, str]:
     """Everything that a command must leave as it is, and unfinished files, which it must not leave."""
-    ours = {"out", "days", "results", "latin\udce4", "out\nline"}
+    ours = {"out", "days", "results", "latin\udce4", "out\nline", "nowhere", "zone.json", "zone.png"}
     found = {}
     for path in sorted(place.rglob("*")):
-        top = path.relative_to(place).parts[0]
-        if top in ours and not path.name.startswith(".szlib-part-"):
+        top, *inside = path.relative_to(place).parts
+        if (top in ours or "notebooks" in inside) and not path.name.startswith(".szlib-part-"):
             continue
         stat = path.lstat()
         known = (

@@ -101,6 +101,7 @@ def test_excluded_day_is_not_fitted(recording: Path, tmp_path: Path, capsys: pyt
         (["{days}", "--kind", "friends"], "unknown kinds ['friends']"),
         (["{days}", "--out", "{day}"], "atc-20121024.csv: expected a file that ends in .json"),
         (["{days}", "--out", "{folder}/other.json"], "other.json: exists, and is no zone of szlib"),
+        (["{days}", "--out", "{folder}/plan.json"], "plan.png: exists without a zone"),
         (["{days}", "--out", "{folder}/nowhere/zone.json"], "nowhere: is no folder that can be written"),
         (["{days}", "--out", "{day}/zone.json"], "atc-20121024.csv: is no folder that can be written"),
         (["{days}", "{day}"], "atc-20121024.csv: give one folder of extracted days, or files of tracks"),
@@ -114,6 +115,7 @@ def test_what_cannot_be_fitted_is_refused_at_once(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     (tmp_path / "other.json").write_text("{}")
+    (tmp_path / "plan.png").write_bytes(b"a map of the hall")
     (tmp_path / "other.csv").write_text("t,id,x,y\n0,1,0,0\n")
     names = {
         "days": recording.with_name("days"), "day": recording, "folder": tmp_path,

@@ -29,6 +29,7 @@ def test_junit_has_a_suite_for_each_notebook_and_a_case_for_each_check(
 ) -> None:
     notebooks(_01_good=GOOD, _02_bad=BAD, _03_crash="1 / 0")
     assert run("--junit", "junit.xml") == 1
+    assert run("--junit", "junit.xml") == 1, "written again"
     root = ET.parse("junit.xml").getroot()
     assert root.tag == "testsuites"
     suites = {suite.attrib["name"]: suite for suite in root}
@@ -59,13 +60,22 @@ def test_undecided_and_not_started_notebooks_are_skipped_in_junit(
     assert tags == [["error"], ["skipped"]]
 
 
-@pytest.mark.parametrize("place", ["nowhere/junit.xml", "mine.csv/junit.xml"])
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [
+        ("nowhere/junit.xml", "nowhere: is no folder that can be written"),
+        ("mine.csv/junit.xml", "mine.csv: is no folder that can be written"),
+        ("mine.csv", "expected a file that ends in .xml"),
+        ("other.xml", "exists, and is no JUnit XML of szlib"),
+    ],
+)
 def test_junit_file_that_cannot_be_written_is_refused_before_the_run(
-    notebooks: Callable[..., Path], capsys: pytest.CaptureFixture[str], place: str
+    notebooks: Callable[..., Path], capsys: pytest.CaptureFixture[str], place: str, message: str
 ) -> None:
     notebooks(_01_good=GOOD)
+    Path("other.xml").write_text("<thesis/>")
     assert run("--junit", place) == 2
-    assert "is no folder that can be written" in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert not Path("out").exists()
 
 
