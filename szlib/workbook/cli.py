@@ -121,6 +121,7 @@ def build_parser() -> argparse.ArgumentParser:
     run.add_argument("--only", nargs="+", default=[], metavar="NN", help=text["only"])
     run.add_argument("--force", action="store_true", help=text["force"])
     run.add_argument("--junit", metavar="FILE", help=text["junit"])
+    run.add_argument("--figures", choices=("svg", "pdf"), help=text["figures"])
     run.add_argument("--notebooks", metavar="FOLDER", help=text["notebooks"])
     pair = "NAME=VALUE"
     run.add_argument("-p", "--parameter", action="append", default=[], metavar=pair, help=text["parameter"])
@@ -225,6 +226,7 @@ def _run(options: argparse.Namespace) -> int:
             client=client,
             notebooks=options.notebooks,
             force=options.force,
+            figures=options.figures,
         )
     print(format_summary(summary))
     append_markdown(*list_results(summary))

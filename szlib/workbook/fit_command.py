@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import pandas as pd
-
 from ..control.settings import MPCSettings
 from ..encounters.areas import AUTO
 from ..encounters.days import PURPOSE, Extraction
@@ -27,6 +25,7 @@ from ..zones.outliers import R_MAX
 from ..zones.social_zone import SocialZone
 from ..zones.uncertainty import N_RESAMPLES
 from ..zones.verdict import describe_missing_encounters
+from ..zones.zone_export import format_table
 from ..zones.zone_file import FORMAT
 from .folders import require_place
 from .record.data_cache import find_null_model
@@ -109,19 +108,7 @@ def fit(
     notes = [f"zone: {printable(file)}; figure: {printable(picture)}"]
     notes += [] if table is not None else [NO_TRACKS]
     verdict = f"zone at {SPEED:g} m/s: {zone.verdict(SPEED).sentence}"
-    return "\n".join([format_zone(zone), *notes, verdict])
-
-
-def format_zone(zone: SocialZone) -> str:
-    """Format the semi-axes of a `zone` with their intervals, and its verdicts: one line for each speed."""
-    table = zone.table()
-    shown = pd.DataFrame({"speed [m/s]": table["speed"].map("{:g}".format)})
-    for name in ("a", "b"):
-        rows = table[[name, f"{name}_low", f"{name}_high"]].itertuples(index=False)
-        shown[f"{name} [m] (95 %)"] = [f"{v:.2f} ({low:.2f} to {high:.2f})" for v, low, high in rows]
-    shown["encounters"] = table["encounters"].map("{:,.0f}".format)
-    lines = shown.assign(verdict=table["verdict"]).to_string(index=False)
-    return f"method {zone.method}\n{lines.replace('(nan to nan)', '   (unknown)')}"
+    return "\n".join([f"method {zone.method}", format_table(zone).to_string(index=False), *notes, verdict])
 
 
 def _require_place(file: Path) -> Path:

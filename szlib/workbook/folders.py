@@ -35,6 +35,9 @@ REPORT = "report.html"  # file of a run: its report
 PARAMETERS = "parameters.json"  # file of a run: its data and parameters
 # What a copy of the notebooks leaves out: their executed copies.
 _UNNEEDED = shutil.ignore_patterns("*.ipynb", "__pycache__", "real_day", "tools", ".*")
+FIGURES_VARIABLE = (
+    "SZLIB_FIGURES"  # environment variable of a kernel: a second format of figures, such as svg
+)
 RUN_VARIABLE = "SZLIB_RUN"  # environment variable of a kernel: the results folder of the kernel's run
 
 

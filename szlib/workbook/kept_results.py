@@ -36,20 +36,32 @@ def outcome_checksum(home: Path, script: Path, outcome: Mapping[str, Any], code:
 
 
 def find_kept(
-    home: Path, scripts: Sequence[Path], stored: Mapping[str, Mapping[str, Any]], code: str
+    home: Path,
+    scripts: Sequence[Path],
+    stored: Mapping[str, Mapping[str, Any]],
+    code: str,
+    figures: str | None = None,
 ) -> list[str]:
     """The names of the notebooks among `scripts` whose `stored` outcomes, and outputs in `home`, can be kept.
 
-    `code` is the `package_checksum`.  A summary of all is kept only with all others.
+    `code` is the `package_checksum`.  Each figure must be there in the format `figures`, too.  A summary of
+    all is kept only with all others.
     """
     kept = [
         script.stem
         for script in scripts
         if (outcome := stored.get(script.stem, {})).get("status") in ("done", "undecided")
+        and _has_figures(home, outcome, figures)
         and outcome.get("checksum") == outcome_checksum(home, script, outcome, code)
     ]
     others = {script.stem for script in scripts if not script.stem.startswith(SUMMARIES)}
     return [name for name in kept if name in others or others <= set(kept)]
+
+
+def _has_figures(home: Path, outcome: Mapping[str, Any], kind: str | None) -> bool:
+    """Whether each figure of a notebook is also there in the format `kind`, if there is one."""
+    names = [Path(str(name)) for name in outcome["figures"] if str(name).endswith(".png")]
+    return not kind or all((home / "figures" / name.with_suffix(f".{kind}")).exists() for name in names)
 
 
 def _checksum(texts: Iterable[str], files: Iterable[Path]) -> str:

@@ -53,6 +53,7 @@ def run(
     client: Any = None,
     notebooks: str | Path | None = None,
     force: bool = False,
+    figures: str | None = None,
 ) -> dict[str, Any]:
     """Execute the notebooks on a data set, and collect their results.
 
@@ -65,6 +66,7 @@ def run(
     parameters : parameters of the notebooks by name, such as {"seed": 1}.
     client : of a Dask cluster that shares this file system, as from `szlib.parallel.cluster`.
     notebooks : the folder of the notebooks; None as for `folders.find_notebooks`.
+    figures : a format in which figures are saved besides PNG, "svg" or "pdf".
     force : whether to repeat notebooks whose stored results are of the same notebook, code, data, parameters.
 
     Returns
@@ -99,7 +101,7 @@ def run(
         source: dict[str, Any] = {"szlib": __version__, "data": datasets.label(data)}
         source |= {"files": contents, "parameters": given}
         stored, code = _stored_outcomes(home, source), package_checksum(place)
-        kept = [] if force else find_kept(home, scripts, stored, code)
+        kept = [] if force else find_kept(home, scripts, stored, code, figures)
         due = [script for script in scripts if script.stem not in kept]
         names = [script.stem for script in due]
         outcomes = {name: each for name, each in stored.items() if name not in names}
@@ -108,7 +110,7 @@ def run(
             folders.remove_outputs(home, names)
             _store_unfinished(home, outcomes, names)
             variables = given | {"data": data, "results": str(results)}
-            for script, outcome in _execute_all(due, variables, home, jobs, client):
+            for script, outcome in _execute_all(due, variables, home, jobs, client, figures):
                 outcome["checksum"] = outcome_checksum(home, script, outcome, code)
                 outcomes[script.stem] = outcome
                 _store_unfinished(home, outcomes, names)
@@ -206,10 +208,10 @@ def choose_notebooks(only: Iterable[str], place: Path | None = None) -> list[Pat
 
 
 def _execute_all(
-    scripts: Sequence[Path], given: Mapping[str, Any], home: Path, jobs: int, client: Any
+    scripts: Sequence[Path], given: Mapping[str, Any], home: Path, jobs: int, client: Any, figures: str | None
 ) -> Iterator[tuple[Path, dict[str, Any]]]:
     """Execute the notebooks; yield the script and the outcome of each when it has ended."""
-    environment = {folders.RUN_VARIABLE: str(home)}
+    environment = {folders.RUN_VARIABLE: str(home), folders.FIGURES_VARIABLE: figures or ""}
     if client is None:
         threads = max(1, (os.cpu_count() or 1) // jobs)
         environment |= {

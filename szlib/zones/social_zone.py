@@ -42,6 +42,7 @@ from .uncertainty import (
     estimate_uncertainty,
 )
 from .verdict import Verdict, describe_missing_encounters, judge
+from .zone_export import as_geojson, as_latex, as_ros_params
 from .zone_file import read_zone, write_zone
 
 if TYPE_CHECKING:
@@ -327,6 +328,38 @@ class SocialZone:
         from ..workbook.figures.zones import plot_zone, plot_zones
 
         return plot_zones(self, ax=ax) if speed is None else plot_zone(self, speed, ax=ax)
+
+    def to_geojson(self, *, n: int = 72) -> str:
+        """The ellipses as GeoJSON text: a polygon of `n` corners for each speed, with its verdict.
+
+        Coordinates are metres in the frame of the person, x ahead, y to the left: no longitudes.
+
+        Examples
+        --------
+        >>> import json, szlib
+        >>> path = szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=300))
+        >>> samples = szlib.find_encounters(szlib.read_tracks(path))
+        >>> zone = szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=0)
+        >>> json.loads(zone.to_geojson())["features"][0]["geometry"]["type"]
+        'Polygon'
+        """
+        return as_geojson(self, n)
+
+    def to_ros_params(self, *, layer: str = "social_zone") -> str:
+        """The ellipses as YAML text: parameters of ROS 2, lists with one entry for each speed.
+
+        They stand under ``/**: ros__parameters``, so that every node finds them in the name of the costmap
+        `layer`: speeds [m/s], center_x, center_y, semi_major, semi_minor [m], angle [rad], verdict, and the
+        radius [m] of the circle that contains the zone in every direction, for layers that know only circles.
+        """
+        return as_ros_params(self, layer)
+
+    def to_latex(self) -> str:
+        """The table of semi-axes, intervals, encounters and verdicts as LaTeX, for the package booktabs.
+
+        It needs no other package; `pandas.DataFrame.to_latex`, for all columns of `table`, needs Jinja2.
+        """
+        return as_latex(self)
 
     def save(self, path: str | Path) -> None:
         """Write the zone as JSON to the file `path`, as a whole or not at all."""

@@ -3,6 +3,7 @@
 import inspect
 import io
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -334,3 +335,28 @@ def test_safety_violations_are_shares_of_the_steps_claimed_safe():
     table["claimed_safe_steps"], table["turned"], table["came"] = [1000, 500], [3, 0], [0, 1]
     widths = [bar.get_width() for bars in figures.plot_safety_claims(table).containers for bar in bars]
     assert sorted(widths)[-2:] == [2, 3]
+
+
+def test_recorded_encounter_is_animated_in_real_time(tmp_path: Path) -> None:
+    plaza = szlib.make_plaza(tmp_path / "plaza.csv", settings=szlib.PlazaSettings(n_encounters=20))
+    tracks = szlib.read_tracks(plaza)
+    samples = szlib.find_encounters(tracks)
+    number = int(samples["encounter"].iloc[-1])
+    seconds = np.ptp(samples.loc[samples["encounter"] == number, "t"])
+    options = {"margin": 0.5, "every": 0.5, "width": 5.0}
+    gif = figures.animate_encounter(tracks, samples, number, **options)
+    movie = Image.open(io.BytesIO(gif))
+    assert movie.n_frames == round((seconds + 1.0) / 0.5) + 1
+    frames = []
+    for k in range(movie.n_frames):
+        movie.seek(k)
+        assert movie.info["duration"] == 500
+        frames.append(np.asarray(movie.convert("RGB"), int))
+    assert all((np.abs(now - before) > 60).any() for before, now in pairwise(frames)), "people move"
+    assert gif != figures.animate_encounter(
+        tracks, samples, number, zone=szlib.Ellipse((0, 0), (1, 1)), **options
+    )
+    with pytest.raises(szlib.DataError, match=r"encounter -1 is not among the \d+ encounters"):
+        figures.animate_encounter(tracks, samples, -1)
+    with pytest.raises(szlib.DataError, match="its people are not in these tracks"):
+        figures.animate_encounter(tracks.head(0), samples, number)

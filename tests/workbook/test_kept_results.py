@@ -128,6 +128,20 @@ def test_a_stopped_run_keeps_what_it_had_finished_and_nothing_else(
     assert executed() == ["03_two", "21_all"]
 
 
+def test_figures_of_another_format_are_added_once(executed: Callable[..., list[str]], tmp_path: Path) -> None:
+    script, home = tmp_path / "notebooks" / "01_one.py", tmp_path / "out" / "mine" / "figures"
+    draw = (
+        "import matplotlib.figure as m\nf = m.Figure()\nf.subplots().plot([1, 2])\nrecord.figure(f, 'line')"
+    )
+    script.write_text(script.read_text().replace("record.close()", f"{draw}\nrecord.close()"))
+    assert executed() == ["01_one", "21_all"]
+    assert executed("--figures", "svg") == ["01_one", "21_all"]
+    assert (home / "01_one-line.svg").read_text().startswith("<?xml") and (home / "01_one-line.png").exists()
+    assert executed("--figures", "svg") == executed() == []
+    assert executed("--figures", "pdf") == ["01_one", "21_all"]
+    assert (home / "01_one-line.pdf").read_bytes().startswith(b"%PDF")
+
+
 def test_a_notebook_that_failed_is_repeated(executed: Callable[..., list[str]], tmp_path: Path) -> None:
     script = tmp_path / "notebooks" / "01_one.py"
     script.write_text(script.read_text().replace("record.close()", "1 / 0"))

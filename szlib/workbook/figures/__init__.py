@@ -25,6 +25,7 @@ from .comparisons import (
 )
 from .control import draw_step, plot_admissible_controls, plot_distance, plot_distance_error, plot_step
 from .encounters import (
+    animate_encounter,
     plot_attentional_space,
     plot_distance_by_direction,
     plot_encounter_paths,

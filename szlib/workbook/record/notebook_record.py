@@ -126,11 +126,14 @@ class NotebookRecord:
         self._record("claim", what, _is_true(supported), value, result)
 
     def figure(self, figure: Figure, name: str) -> None:
-        """Save a `figure` in the results as NN_topic-`name`.png, and show it."""
-        content = io.BytesIO()
-        figure.savefig(content, dpi=150, bbox_inches="tight")
-        self._save_picture(content.getvalue(), f"{self.name}-{name}.png")
-        show_figure(figure, content.getvalue())
+        """Save a `figure` in the results as NN_topic-`name`.png (`--figures`: also .svg), and show it."""
+        pictures = {}
+        for kind in filter(None, ("png", os.environ.get(folders.FIGURES_VARIABLE))):
+            content = io.BytesIO()
+            figure.savefig(content, format=kind, dpi=150, bbox_inches="tight")
+            self._save_picture(content.getvalue(), f"{self.name}-{name}.{kind}")
+            pictures[kind] = content.getvalue()
+        show_figure(figure, pictures["png"])
 
     def animation(self, content: bytes, name: str) -> None:
         """Save the `content` of an animated GIF in the results as NN_topic-`name`.gif."""
