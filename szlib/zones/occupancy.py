@@ -63,26 +63,19 @@ def pair_correlation(samples: pd.DataFrame, null: NullEncounters) -> PairCorrela
     check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
     if len(null.encounters) == 0:
         raise ZoneError("the null model has no encounter: nothing to compare; use more shifts")
-    real, model = (
-        _count(each, null.r_max) / n_encounters
-        for each, n_encounters in (
-            (samples, samples["encounter"].nunique()),
-            (null.samples, len(null.encounters)),
-        )
-    )
-    cell = (360 / _N_DIRECTIONS, null.r_max / _N_DISTANCES)
-    real, model = (
-        gaussian_filter(each, np.divide(_BLUR, cell), mode=("wrap", "nearest")) for each in (real, model)
-    )
+    real = _smooth_density(samples, samples["encounter"].nunique(), null.r_max)
+    model = _smooth_density(null.samples, len(null.encounters), null.r_max)
     g = np.divide(real, model, out=np.full(real.shape, np.nan), where=model > 0)
     turn = (np.arange(_N_DIRECTIONS) + 0.5) / _N_DIRECTIONS
     distance: Array = (np.arange(_N_DISTANCES) + 0.5) / _N_DISTANCES * null.r_max
     return PairCorrelation(distance, 2 * np.pi * turn, g)
 
 
-def _count(samples: pd.DataFrame, r_max: float) -> Array:
-    """Count samples nearer than `r_max` [m] by direction, from 0 rad counter-clockwise, and distance."""
+def _smooth_density(samples: pd.DataFrame, n_encounters: int, r_max: float) -> Array:
+    """Smoothed samples per encounter within `r_max` [m], by direction (from 0 rad on) and distance."""
     ranges = [(0, 2 * np.pi), (0, np.nextafter(r_max, 0))]  # the last bin holds its upper end
     turn = np.mod(samples["los_angle"].to_numpy(float), 2 * np.pi)
     bins = (_N_DIRECTIONS, _N_DISTANCES)
-    return np.asarray(np.histogram2d(turn, samples["distance"].to_numpy(float), bins=bins, range=ranges)[0])
+    counts = np.histogram2d(turn, samples["distance"].to_numpy(float), bins=bins, range=ranges)[0]
+    blur = np.divide(_BLUR, (360 / _N_DIRECTIONS, r_max / _N_DISTANCES))
+    return np.asarray(gaussian_filter(counts / n_encounters, blur, mode=("wrap", "nearest")))

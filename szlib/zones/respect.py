@@ -53,9 +53,8 @@ _KINDS = ("opposite", "crossing")
 _MIN_EVIDENCE = 20.0  # twice the log likelihood ratio of a zone against none: the 1 % level of 8 parameters
 _NULL_DRAWN = (4000, 8000)  # encounters drawn from the null model, at least and at most; else two for each
 _NULL_PER_ENCOUNTER = 2  # of the data
-MIN_COMPARED = (
-    150  # encounters of the data within r_max: with fewer the zone reaches as far as nobody was seen
-)
+# Encounters of the data within r_max: with fewer the zone reaches as far as nobody was seen.
+MIN_COMPARED = 150
 _MAX_LEFT_OUT = 5
 # What the edge of people differs from that of the model: least standard deviation of the posterior of centre
 # (ahead, left), semi-axes [m] and angle (notebook 16, plazas of other seeds).

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,18 +18,16 @@ from .outliers import FRACTION, N_NEIGHBOURS
 from .social_zone import SocialZone
 
 # Values of `szlib.find_encounters`, besides its defaults.
-SEARCH: Mapping[str, Sequence[Any]] = MappingProxyType(
-    {
-        "min_distance": (0.0, 0.5, 2.0),
-        "min_speed": (0.2, 0.6),
-        "duration": (2.0, 4.0),
-        "kinds": ("strangers", ("opposite", "crossing")),
-    }
-)
+SEARCH: Mapping[str, Sequence[Any]] = {
+    "min_distance": (0.0, 0.5, 2.0),
+    "min_speed": (0.2, 0.6),
+    "duration": (2.0, 4.0),
+    "kinds": ("strangers", ("opposite", "crossing")),
+}
 # Values of `szlib.SocialZone.fit`, besides the paper's.
-FIT: Mapping[str, Sequence[Any]] = MappingProxyType(
-    {"r_max": (1.5, 2.5), "fraction": (0.0, 0.01), "n_neighbours": (10, 50)}
-)
+FIT: Mapping[str, Sequence[Any]] = {
+    "r_max": (1.5, 2.5), "fraction": (0.0, 0.01), "n_neighbours": (10, 50)
+}  # fmt: skip
 SPEEDS = (0.9, 1.3)
 """Speeds besides `speed` [m/s]."""
 NARROWER = 1.0  # the area is made narrower by this on each side [m]
@@ -62,37 +60,37 @@ def sensitivity(
     ------
     ZoneError : there is no zone with the defaults.
     """
-    usual_fit: dict[str, Any] = {"method": method, "n_resamples": 0}
+    usual: dict[str, Any] = {"method": method, "speeds": (speed,), "n_resamples": 0}
     if method == "paper":  # whose options are those of the hull
-        usual_fit |= {"method": "hull", "fraction": FRACTION, "n_neighbours": N_NEIGHBOURS}
-    rows: list[tuple[str, str, int, float, float, float]] = []
-
-    def add(parameter: str, value: Any, samples: pd.DataFrame, at: float = speed, **keywords: Any) -> None:
-        """One row: the zone of these samples at this speed."""
-        count, sizes = int(samples["encounter"].nunique()), (np.nan, np.nan, np.nan)
+        usual |= {"method": "hull", "fraction": FRACTION, "n_neighbours": N_NEIGHBOURS}
+    rows: list[tuple[Any, ...]] = []
+    for parameter, value, samples, options in _variations(tracks, area, has_walls, fit):
+        sizes: tuple[float, ...] = (np.nan, np.nan, np.nan)
         try:
             # The number of encounters is in the table.
             with warnings.catch_warnings(action="ignore", category=DataWarning):
-                zone = SocialZone.fit(samples, speeds=(at,), **{**usual_fit, **keywords})
-            ellipse = zone.ellipses[at]
+                (ellipse,) = SocialZone.fit(samples, **(usual | options)).ellipses.values()
             sizes = (*ellipse.semi_axes, ellipse.area)
         except (ZoneError, DataError):
             if not rows:
                 raise
         text = ", ".join(value) if isinstance(value, tuple) else str(value)
-        rows.append((parameter, text, count, *sizes))
+        rows.append((parameter, text, samples["encounter"].nunique(), *sizes))
+    return pd.DataFrame(rows, columns=["parameter", "value", "encounters", "a", "b", "area"])
 
-    tracks = select_near_rows(tracks, area, max(SEARCH["duration"]))  # searched many times
-    usual = find_encounters(tracks, area=area, has_walls=has_walls)
-    add("default", "", usual)
+
+def _variations(
+    tracks: pd.DataFrame, area: Area, has_walls: bool, fit: Mapping[str, Sequence[Any]]
+) -> Iterator[tuple[str, Any, pd.DataFrame, dict[str, Any]]]:
+    """Parameter, value, samples and options of the fit, for each variation."""
+    search = partial(find_encounters, select_near_rows(tracks, area, max(SEARCH["duration"])))
+    samples = search(area=area, has_walls=has_walls)
+    yield "default", "", samples, {}
     for name, values in SEARCH.items():
         for value in values:
-            add(name, value, find_encounters(tracks, area=area, has_walls=has_walls, **{name: value}))
-    smaller = area.grown(-NARROWER)
-    add("area", f"{NARROWER:g} m narrower", find_encounters(tracks, area=smaller, has_walls=has_walls))
+            yield name, value, search(area=area, has_walls=has_walls, **{name: value}), {}
+    smaller = search(area=area.grown(-NARROWER), has_walls=has_walls)
+    yield "area", f"{NARROWER:g} m narrower", smaller, {}
     for name, values in fit.items():
-        for value in values:
-            add(name, value, usual, **{name: value})
-    for value in SPEEDS:
-        add("speed", value, usual, at=value)
-    return pd.DataFrame(rows, columns=["parameter", "value", "encounters", "a", "b", "area"])
+        yield from ((name, value, samples, {name: value}) for value in values)
+    yield from (("speed", value, samples, {"speeds": (value,)}) for value in SPEEDS)

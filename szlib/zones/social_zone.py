@@ -13,7 +13,7 @@ which this number is sufficient.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -51,12 +51,10 @@ if TYPE_CHECKING:
 SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 """Default speeds of the reference pedestrian [m/s] (assumed; the paper shows a range)."""
 
-
-_PAPER = partial(HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_NEIGHBOURS)
 # The methods of `SocialZone.fit`: the estimator, and its options.
 METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
     "quantile": (QuantileEstimator.from_samples, ("q",)),
-    "paper": (_PAPER, ()),
+    "paper": (partial(HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_NEIGHBOURS), ()),
     "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours", "speed_scale")),
     "respect": (RespectEstimator.from_samples, ()),
 }
@@ -119,16 +117,17 @@ class SocialZone:
     def __repr__(self) -> str:
         sizes = [f"{v:g}: {e.semi_axes[0]:.2f} x {e.semi_axes[1]:.2f}" for v, e in self.ellipses.items()]
         adequate = [f"{speed:g}" for speed in self.ellipses if self.adequate(speed)]
-        intervals = "none" if self.uncertainty is None else self.uncertainty.description
-        return "\n".join(
-            [
-                f"SocialZone: method {self.method!r}, people within {self.r_max:g} m",
-                f"semi-axes at each speed [m/s: m]: {', '.join(sizes) or 'none'}",
-                f"undefined at [m/s]: {', '.join(f'{speed:g}' for speed in self.undefined) or 'none'}",
-                f"enough encounters at [m/s]: {', '.join(adequate) or 'none'}",
-                f"verdict: {self._describe_verdicts()}",
-                f"intervals: {intervals}",
-            ]
+        by_verdict: dict[str, list[str]] = {}
+        for speed in self.ellipses:
+            by_verdict.setdefault(self.verdict(speed), []).append(f"{speed:g}")
+        verdicts = [f"{verdict} at {', '.join(speeds)} m/s" for verdict, speeds in by_verdict.items()]
+        return (
+            f"SocialZone: method {self.method!r}, people within {self.r_max:g} m\n"
+            f"semi-axes at each speed [m/s: m]: {', '.join(sizes) or 'none'}\n"
+            f"undefined at [m/s]: {', '.join(f'{speed:g}' for speed in self.undefined) or 'none'}\n"
+            f"enough encounters at [m/s]: {', '.join(adequate) or 'none'}\n"
+            f"verdict: {'; '.join(verdicts)}\n"
+            f"intervals: {'none' if self.uncertainty is None else self.uncertainty.description}"
         )
 
     @classmethod
@@ -210,7 +209,14 @@ class SocialZone:
                 f"no speed has a zone: {reasons}; half of the samples are slower than {median:.1f} m/s: "
                 "choose a speed near that, or add data"
             )
-        provenance = _provenance(samples, {"method": method, "r_max": float(r_max)}, estimator)
+        provenance = {
+            "szlib": __version__,
+            "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
+            "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
+            "hours": recorded_hours(samples),
+            "parameters": {"method": method, "r_max": float(r_max), **estimator.parameters},
+            "funnel": estimator.funnel,
+        }
         test, null_radii = None, {}
         if null is not None:
             require(
@@ -225,8 +231,10 @@ class SocialZone:
         sides = uncertainty = None
         if "encounter" in samples:
             sides = count_by_side(samples, fitted_speeds, r_max=r_max)
-        if "encounter" in samples and n_resamples:
-            uncertainty = estimate_uncertainty(estimator, list(ellipses), n_resamples=n_resamples, seed=seed)
+            if n_resamples:
+                uncertainty = estimate_uncertainty(
+                    estimator, list(ellipses), n_resamples=n_resamples, seed=seed
+                )
         zone = cls(
             shape, float(r_max), ellipses, undefined, provenance, method, sides, uncertainty, test, null_radii
         )
@@ -282,13 +290,6 @@ class SocialZone:
         'no null model: fit the zone with null=szlib.null_encounters(tracks)'
         """
         return judge(self, float(speed))
-
-    def _describe_verdicts(self) -> str:
-        """The verdicts at all fitted speeds."""
-        by_verdict: dict[str, list[str]] = {}
-        for speed in self.ellipses:
-            by_verdict.setdefault(str(self.verdict(speed)), []).append(f"{speed:g}")
-        return "; ".join(f"{verdict} at {', '.join(speeds)} m/s" for verdict, speeds in by_verdict.items())
 
     def missing_data(self, speed: float) -> str:
         """Describe the sides that lack encounters at a `speed` [m/s]; "" if none does."""
@@ -369,18 +370,6 @@ class SocialZone:
     def load(cls, path: str | Path) -> SocialZone:
         """Read a zone that `save` wrote to the file `path`; raises ZoneError if it is damaged or no zone."""
         return read_zone(Path(path), cls)
-
-
-def _provenance(samples: pd.DataFrame, parameters: Mapping[str, Any], estimator: Estimator) -> dict[str, Any]:
-    """Origin of a zone: version, days, encounters, parameters and funnel."""
-    return {
-        "szlib": __version__,
-        "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
-        "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
-        "hours": recorded_hours(samples),
-        "parameters": {**parameters, **estimator.parameters},
-        "funnel": estimator.funnel,
-    }
 
 
 def recorded_hours(samples: pd.DataFrame) -> float | None:

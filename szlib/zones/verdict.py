@@ -9,7 +9,7 @@ A zone alone cannot tell: every method returns one for people who ignore each ot
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -41,7 +41,7 @@ class Verdict(str):
 
     reasons: tuple[str, ...]
 
-    def __new__(cls, outcome: str, reasons: Iterator[str] | list[str] | tuple[str, ...] = ()) -> Self:
+    def __new__(cls, outcome: str, reasons: Iterable[str] = ()) -> Self:
         verdict = super().__new__(cls, outcome)
         verdict.reasons = tuple(reasons)
         return verdict
@@ -58,14 +58,10 @@ def judge(zone: FittedZone, speed: float) -> Verdict:
     if test is not None and not test.is_significant and test.n_encounters >= MIN_TESTED:
         compared = f"p = {test.p_value:.3g} ({test.n_shifts} shifts, {test.n_encounters} encounters)"
         return Verdict(NO_RESPECT, [f"people came as near as people who ignore each other would: {compared}"])
-    reasons = [*_missing_data(zone, speed), *_null_model(zone, speed), *_intervals(zone, speed)]
+    reasons = [*filter(None, (describe_missing_encounters(zone.provenance), zone.missing_data(speed)))]
+    reasons += funnels.warnings(zone.provenance.get("funnel", []))
+    reasons += [*_null_model(zone, speed), *_intervals(zone, speed)]
     return Verdict(UNDECIDED, reasons) if reasons else Verdict(USABLE, [f"{test}"])
-
-
-def _missing_data(zone: FittedZone, speed: float) -> Iterator[str]:
-    """What is missing or implausible in the data."""
-    yield from filter(None, (describe_missing_encounters(zone.provenance), zone.missing_data(speed)))
-    yield from funnels.warnings(zone.provenance.get("funnel", []))
 
 
 def describe_missing_encounters(provenance: Mapping[str, Any]) -> str:
@@ -102,16 +98,13 @@ def _null_model(zone: FittedZone, speed: float) -> Iterator[str]:
 
 def _intervals(zone: FittedZone, speed: float) -> Iterator[str]:
     """What is wrong with the intervals."""
+    counts = {} if zone.side_counts is None else zone.side_counts.set_index("speed")["encounters"]
     for fitted in _neighbours(zone, speed):
         for name in ("a", "b"):
             low, high = _interval(zone, fitted, name)
             if not (low > 0 and np.isfinite(high)):
                 yield f"at {fitted:g} m/s the interval of the semi-axis {name} cannot be given"
-        counts = zone.side_counts
-        if (
-            counts is not None
-            and (counts.loc[counts["speed"] == fitted, "encounters"] < MIN_ENCOUNTERS).any()
-        ):
+        if counts.get(fitted, MIN_ENCOUNTERS) < MIN_ENCOUNTERS:
             yield f"at {fitted:g} m/s the interval rests on fewer than {MIN_ENCOUNTERS} encounters"
 
 
@@ -127,8 +120,5 @@ def _interval(zone: FittedZone, speed: float, quantity: str) -> tuple[float, flo
 def _neighbours(zone: FittedZone, speed: float) -> list[float]:
     """The fitted speeds next to `speed` [m/s], below and above; one if it was fitted itself."""
     fitted = sorted(zone.ellipses)
-    around = {
-        max((v for v in fitted if v <= speed), default=None),
-        min((v for v in fitted if v >= speed), default=None),
-    }
-    return sorted(v for v in around if v is not None)
+    below, above = [v for v in fitted if v <= speed], [v for v in fitted if v >= speed]
+    return sorted({*below[-1:], *above[:1]})
