@@ -8,7 +8,7 @@ second term corrected)
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import cos, hypot, pi, sin
 
@@ -74,7 +74,7 @@ class Ellipse:
     def foci(self) -> Array:
         """The two foci, shape (2, 2) [m], at c = sqrt(a^2 - b^2) from the centre (paper, sec. 3)."""
         a, b = self.semi_axes
-        c = np.sqrt((a - b) * (a + b)) * np.array([np.cos(self.angle), np.sin(self.angle)])
+        c = np.sqrt((a - b) * (a + b)) * unit_vectors(self.angle)
         return np.array([self.center + c, self.center - c])
 
     @cached_property
@@ -115,6 +115,11 @@ class Ellipse:
         return Ellipse(center, self.semi_axes, self.angle + heading)
 
 
+def unit_vectors(theta: ArrayLike) -> Array:
+    """Unit vectors in the directions `theta` (...) [rad], shape (..., 2)."""
+    return np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+
+
 def circle_around(zone: Ellipse) -> Ellipse:
     """The smallest circle around a person that contains the person's `zone` for every heading.
 
@@ -133,7 +138,7 @@ def circle_around(zone: Ellipse) -> Ellipse:
     1.1
     """
     radius = _greatest_distance(zone.center, zone.semi_axes, zone.angle)
-    return replace(zone, center=(0.0, 0.0), semi_axes=(radius, radius), angle=0.0, support=None)
+    return Ellipse((0.0, 0.0), (radius, radius))
 
 
 @lru_cache(maxsize=256)

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -24,7 +24,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ..checks import Array
 from ..errors import ZoneError
 from ..tracks import funnels
-from .ellipses import Ellipse
+from .ellipses import Ellipse, unit_vectors
 from .enclosing_ellipse import check_points, minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
 from .estimators import Estimator
 from .outliers import complementary_points, encounter_numbers, remove_outliers
@@ -98,9 +98,7 @@ class Slice:
 
     def boundary(self, theta: ArrayLike) -> Array:
         """Boundary of the zone in the directions `theta` (...) [rad], in the person's frame, (..., 2) [m]."""
-        theta = np.asarray(theta, float)
-        directions = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
-        return np.asarray((self.r_max - self.reach(theta))[..., None] * directions)
+        return np.asarray((self.r_max - self.reach(theta))[..., None] * unit_vectors(theta))
 
     def _edges(self) -> tuple[Array, Array]:
         """Outward unit normals (k, 2) and distances from the origin (k,) of the polygon's edges."""
@@ -233,9 +231,10 @@ class HullEstimator(Estimator):
         ----------
         samples, r_max, fraction, n_neighbours, speed_scale : as in `szlib.remove_outliers`.
         """
-        inliers = remove_outliers(
-            samples, fraction=fraction, r_max=r_max, n_neighbours=n_neighbours, speed_scale=speed_scale
-        )
+        options: dict[str, Any] = {
+            "fraction": fraction, "n_neighbours": n_neighbours, "speed_scale": speed_scale
+        }  # fmt: skip
+        inliers = remove_outliers(samples, r_max=r_max, **options)
         speed = inliers["speed"].to_numpy(float)
         points = np.column_stack([complementary_points(inliers, r_max=r_max), speed])
         n_vertices = len(hull_vertices(points))
@@ -246,11 +245,7 @@ class HullEstimator(Estimator):
             number=number,
             r_max=float(r_max),
             encounters=encounters,
-            parameters={
-                "fraction": None if fraction is None else float(fraction),
-                "n_neighbours": None if n_neighbours is None else int(n_neighbours),
-                "speed_scale": None if speed_scale is None else float(speed_scale),
-            },
+            parameters=options,
             funnel=[*funnels.get(inliers), stage],
         )
 
@@ -265,7 +260,7 @@ class HullEstimator(Estimator):
         than slices.
         """
         ellipses = np.full((len(weights), len(speeds), 5), np.nan)
-        unit = np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+        unit = unit_vectors(DIRECTIONS)
         start: dict[int, list[int]] = {}
         for i, weight in enumerate(weights):
             with suppress(ZoneError):

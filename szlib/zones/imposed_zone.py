@@ -28,6 +28,7 @@ from ..encounters.time_shift import time_shifted
 from ..errors import ZoneError
 from ..tracks import funnels
 from .ellipses import Ellipse
+from .outliers import pair_numbers
 
 
 def impose_zone(
@@ -98,15 +99,12 @@ class PairedSamples:
         """Prepare `samples` as from `szlib.find_encounters`; raises DataError if a column is missing."""
         if len(samples):
             check_columns(samples, SAMPLE_COLUMNS)
-        people = np.sort(samples[["ref_id", "other_id"]].to_numpy(), axis=1)
-        names = {"day": samples["day"].to_numpy(), "one": people[:, 0], "two": people[:, 1]}
-        pair = pd.DataFrame(names).groupby([*names], observed=True).ngroup()
         views = [
             samples["distance"] * np.exp(1j * samples[angle].where(samples[speed] >= WALKING))
             for angle, speed in (("los_angle", "speed"), ("other_los_angle", "other_speed"))
         ]
         points = np.array([np.column_stack([np.real(view), np.imag(view)]) for view in views])
-        return cls(samples, np.asarray(pair, np.intp), points)
+        return cls(samples, pair_numbers(samples), points)
 
     def pairs_inside(self, ellipse: Ellipse) -> NDArray[np.bool_]:
         """Whether, at any sample of each pair, one person is inside the other's `ellipse`; (pairs,)."""

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..checks import Array, check_columns, check_rows, require
 from ..errors import DataError, warn
 from ..tracks import funnels
+from .ellipses import unit_vectors
 
 R_MAX = 2.0
 """Longest distance that counts as close [m] (paper, sec. 2)."""
@@ -55,7 +56,7 @@ def complementary_points(samples: pd.DataFrame, *, r_max: float = R_MAX) -> Arra
     is_valid = np.isfinite(angle) & (distance >= 0) & (distance <= r_max)
     expected = f"expected 0 <= distance <= r_max = {r_max} m and a finite los_angle"
     check_rows(samples, is_valid, ["los_angle", "distance"], expected)
-    return np.asarray((r_max - distance)[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+    return np.asarray((r_max - distance)[:, None] * unit_vectors(angle))
 
 
 def is_close(distance: Array, r_max: float) -> NDArray[np.bool_]:
@@ -81,6 +82,14 @@ def encounter_numbers(samples: pd.DataFrame) -> tuple[NDArray[np.intp], pd.DataF
         groups = samples.groupby(keys, sort=False, observed=True, dropna=False)
         number = np.asarray(groups.ngroup(), np.intp)
     return number, samples.iloc[np.unique(number, return_index=True)[1]]
+
+
+def pair_numbers(samples: pd.DataFrame) -> NDArray[np.intp]:
+    """The number of the pair of people of each of `samples` (n,), on each day, whoever is the reference."""
+    people = np.sort(samples[["ref_id", "other_id"]].to_numpy(), axis=1)
+    day = samples["day"].to_numpy() if "day" in samples else 0
+    table = pd.DataFrame({"day": day, "one": people[:, 0], "two": people[:, 1]})
+    return np.asarray(table.groupby([*table], observed=True, dropna=False).ngroup(), np.intp)
 
 
 def nearest_approaches(samples: pd.DataFrame) -> pd.DataFrame:
@@ -234,9 +243,8 @@ def _find_far(places: Array, n_neighbours: int | None) -> NDArray[np.bool_]:
         return is_far
     while True:
         rest = np.flatnonzero(~is_far)
-        n = n_neighbours
-        if n is None:
-            n = max(N_NEIGHBOURS, math.ceil(NEIGHBOUR_SHARE * len(rest)))
+        usual = max(N_NEIGHBOURS, math.ceil(NEIGHBOUR_SHARE * len(rest)))
+        n = usual if n_neighbours is None else n_neighbours
         if is_far.any() and len(rest) <= n:
             return is_far
         is_new = local_outlier_factors(places[rest], n) > OUTLIER_FACTOR

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import Array
 from ..errors import ZoneError
-from .ellipses import Ellipse
+from .ellipses import Ellipse, unit_vectors
 
 # Directions of the radii, counter-clockwise from ahead [rad].
 DIRECTIONS: Array = np.radians(np.arange(-180.0, 180.0, 5.0))
@@ -88,11 +88,10 @@ class PolarZone:
 
         It is linear between known directions and NaN where no person was seen.
         """
-        theta = np.asarray(theta, float)
         directions = np.append(self.directions, self.directions[0] + 2 * np.pi)
         radii = np.append(self.radii_at(speed), self.radii_at(speed)[0])
-        r = np.interp((theta - directions[0]) % (2 * np.pi) + directions[0], directions, radii)
-        return np.asarray(r[..., None] * np.stack([np.cos(theta), np.sin(theta)], axis=-1))
+        r = np.interp(np.subtract(theta, directions[0]) % (2 * np.pi) + directions[0], directions, radii)
+        return np.asarray(r[..., None] * unit_vectors(theta))
 
     def ellipse(self, speed: float) -> Ellipse:
         """The ellipse fitted at a `speed` [m/s]; raises ZoneError if too few directions have data."""
@@ -142,7 +141,7 @@ def fit_ellipses(radii: Array, directions: Array = DIRECTIONS) -> Array:
     rows = np.flatnonzero(np.isfinite(radii).all(axis=1) & (radii.sum(axis=1) > 0))
     if not len(rows):
         return ellipses
-    unit = np.stack([np.cos(directions), np.sin(directions)], axis=-1)
+    unit = unit_vectors(directions)
     scale = radii[rows].mean(axis=1)
     target = radii[rows] / scale[:, None]
     p = np.tile([0.0, 0.0, 1.0, 0.0, 1.0], (len(rows), 1))  # m, n, and the root [[p, r], [r, s]] of the form

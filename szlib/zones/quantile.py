@@ -170,16 +170,12 @@ class QuantileEstimator(Estimator):
         entered, kept = len(encounter_numbers(samples)[1]), len(approaches.encounters)
         near = funnels.stage("encounters: near", entered, kept, {f"never within {r_max} m": entered - kept})
         sector = 360 * SECTOR / len(DIRECTIONS)
+        assumed = {"sector_deg": sector, "speed_band": SPEED_BAND, "smoothing": SMOOTHING}
         return cls(
             approaches=approaches,
             q=float(q),
             encounters=approaches.encounters,
-            parameters={
-                "q": float(q),
-                "sector_deg": sector,
-                "speed_band": SPEED_BAND,
-                "smoothing": SMOOTHING,
-            },
+            parameters={"q": float(q), **assumed},
             funnel=[*funnels.get(samples), near],
         )
 

@@ -81,34 +81,26 @@ class PairPaths:
         is_finite = np.isfinite(samples[columns].to_numpy(float)).all(axis=1)
         check_rows(samples, is_finite, columns, "expected finite numbers")
         number, encounters = encounter_numbers(samples)
-        points, speeds, rows = [], [], []
+        views = []
         for angle, own_speed in VIEWS:
             theta, r = smooth_paths(samples, angle)
             own, path = samples[own_speed].to_numpy(float), r * np.exp(1j * theta)
             # A person who stands has no direction of motion, and one of unknown velocity has none either.
             has_zone = np.isfinite(path) & (own >= (WALKING if own_speed == "other_speed" else 0.0))
-            points.append(path[has_zone])
-            speeds.append(np.clip(own[has_zone], *_SPEED_BOUNDS) - REFERENCE_SPEED)
-            rows.append(number[has_zone])
-        z, speed, row = map(np.concatenate, (points, speeds, rows))
-        order = np.argsort(row, kind="stable")
-        z, speed, row = z[order], speed[order], row[order]
+            carried = np.clip(own, *_SPEED_BOUNDS) - REFERENCE_SPEED
+            view = pd.DataFrame({"x": path.real, "y": path.imag, "speed": carried, "row": number})
+            views.append(view[has_zone])
+        paths = pd.concat(views).sort_values("row", kind="stable")
+        x, y, speed, row = (paths[name].to_numpy() for name in paths)
         first = np.flatnonzero(np.diff(row, prepend=-1))
         may_be_nearest = np.zeros(len(row), bool)
         for p in _bank():
-            level = _level(z.real, z.imag, speed, p)[0]
+            level = _level(x, y, speed, p)[0]
             may_be_nearest |= level == np.minimum.reduceat(level, first)[row]
         kept = row[may_be_nearest]
         names = encounters["kind"].to_numpy(object) if "kind" in encounters else np.full(len(encounters), "")
-        return cls(
-            x=z.real[may_be_nearest],
-            y=z.imag[may_be_nearest],
-            speed=speed[may_be_nearest],
-            encounter=kept,
-            first=np.flatnonzero(np.diff(kept, prepend=-1)),
-            kind=names,
-            encounters=encounters,
-        )
+        x, y, speed = (each[may_be_nearest] for each in (x, y, speed))
+        return cls(x, y, speed, kept, np.flatnonzero(np.diff(kept, prepend=-1)), names, encounters)
 
     def distances(self, p: Array, *, gradient: bool = False) -> tuple[Array, Array]:
         """h of each encounter for the parameters `p`, shape (k,) [m].
@@ -142,29 +134,27 @@ def _level(x: Array, y: Array, speed: Array, p: Array) -> tuple[Array, Array, Ar
 
 
 @cache
-def _bank() -> list[Array]:
-    """Parameters of ellipses of all forms."""
-    rng, bank = np.random.default_rng(_BANK_SEED), []
-    for _ in range(_BANK):
-        p = np.zeros(len(_PARAMETERS))
-        p[0], p[2], p[7] = rng.uniform(-0.25, 0.25), rng.uniform(-0.1, 0.1), rng.uniform(-0.3, 0.3)
-        p[3], p[5] = rng.uniform(np.log(0.35), np.log(1.5)), rng.uniform(np.log(0.35), np.log(1.3))
-        bank.append(p)
+def _bank() -> Array:
+    """Parameters of ellipses of all forms, one a row."""
+    bank = np.zeros((_BANK, len(_PARAMETERS)))
+    low, high = (-0.25, -0.1, -0.3, *np.log([0.35, 0.35])), (0.25, 0.1, 0.3, *np.log([1.5, 1.3]))
+    bank[:, [0, 2, 7, 3, 5]] = np.random.default_rng(_BANK_SEED).uniform(low, high, (_BANK, 5))
     return bank
 
 
-def _factor(h: Array, p: Array) -> Array:
-    """g(h), shape (k,)."""
+def _factor(h: Array, p: Array) -> tuple[Array, Array, Array, Array]:
+    """g(h) (k,), and what it is made of: the edge, the excess there, and max(h, 0) / c."""
     f, (w, excess, reach) = expit(p[8]), np.exp(p[9:])
-    return np.asarray(f + (1 - f) * expit(h / w) * (1 + excess * np.exp(-np.maximum(h, 0) / reach)))
+    s, outside = expit(h / w), np.maximum(h, 0) / reach
+    near = excess * np.exp(-outside)
+    return f + (1 - f) * s * (1 + near), s, near, outside
 
 
 def _factor_and_slopes(h: Array, p: Array) -> tuple[Array, Array, Array]:
     """g(h) (k,), its derivative by h (k,), and by the last four parameters (k, 4)."""
-    f, (w, excess, reach) = expit(p[8]), np.exp(p[9:])
-    s, outside = expit(h / w), np.maximum(h, 0) / reach
-    near = excess * np.exp(-outside)
-    g, out = f + (1 - f) * s * (1 + near), (1 - f) * s
+    g, s, near, outside = _factor(h, p)
+    f, (w, _, reach) = expit(p[8]), np.exp(p[9:])
+    out = (1 - f) * s
     by_h = out * ((1 - s) / w * (1 + near) - near / reach * (h > 0))
     by_f, by_w = f * (1 - f) * (1 - s * (1 + near)), -out * (1 - s) * (1 + near) * h / w
     return g, by_h, np.stack([by_f, by_w, out * near, out * near * outside], axis=1)
@@ -208,10 +198,13 @@ class Likelihood:
         """The power of the likelihood in the posterior, since the null model is random as well."""
         return float(1 / (1 + self.weights.sum() / len(self.null.kind)))
 
-    def log_ratios(self, p: Array) -> Array:
-        """Log likelihood ratio of the parameters `p` against no zone, of each encounter, shape (k,)."""
-        g, against = (_factor(each.distances(p)[0], p) for each in (self.data, self.null))
-        out = np.log(g)
+    def log_ratios(self, p: Array, distances: Sequence[Array] | None = None) -> Array:
+        """Log likelihood ratio of the parameters `p` against no zone, of each encounter, shape (k,).
+
+        `distances` are h of data and null model; None: those of `p`.
+        """
+        h, h_null = distances or [each.distances(p)[0] for each in (self.data, self.null)]
+        out, against = np.log(_factor(h, p)[0]), _factor(h_null, p)[0]
         for of_data, of_null in self.kinds:
             out[of_data] -= np.log(against[of_null].mean())
         return np.asarray(self.weights * out)
@@ -256,10 +249,7 @@ class Likelihood:
         for radius, f, w, excess in product(_RADII.tolist(), (-3, -1), np.log([0.05, 0.15]), (-2, 2, 5)):
             p = circle.copy()
             p[3], p[5], p[8:11] = np.log(1.1 * radius), np.log(0.9 * radius), (f, w, excess)
-            g, against = (_factor(each - radius, p) for each in near)
-            value = self.weights @ np.log(g) - _minus_log_prior(p)[0]
-            for of_data, of_null in self.kinds:
-                value -= self.weights[of_data].sum() * np.log(against[of_null].mean())
+            value = self.log_ratios(p, [each - radius for each in near]).sum() - _minus_log_prior(p)[0]
             found.append((float(value), radius, p))
         best: list[tuple[float, float, Array]] = []
         for each in sorted(found, key=lambda found: -found[0]):

@@ -36,7 +36,7 @@ from scipy.stats import norm
 
 from ..checks import Array, require
 from .estimators import Estimator
-from .outliers import encounter_numbers
+from .outliers import encounter_numbers, pair_numbers
 from .polar import DIRECTIONS, ellipse_reach
 from .quantile import SPEED_BAND
 
@@ -106,9 +106,9 @@ def count_by_side(samples: pd.DataFrame, speeds: Sequence[float], *, r_max: floa
     rows = []
     for speed in speeds:
         in_band = np.abs(close["speed"].to_numpy(float) - speed) <= SPEED_BAND
-        sides = np.unique(np.column_stack([side[in_band], number[in_band]]), axis=0)[:, 0]
-        n_encounters = len(np.unique(number[in_band]))
-        rows.append([speed, n_encounters, *np.bincount(sides, minlength=len(SIDES)).tolist()])
+        seen = np.zeros((len(SIDES), number.max(initial=-1) + 1), bool)
+        seen[side[in_band], number[in_band]] = True
+        rows.append([speed, seen.any(axis=0).sum(), *seen.sum(axis=1)])
     table = pd.DataFrame(rows, columns=["speed", "encounters", *SIDES])
     return table.astype({"speed": float, **dict.fromkeys(table.columns[1:], int)})
 
@@ -135,9 +135,7 @@ def resampling_units(encounters: pd.DataFrame) -> tuple[str, NDArray[np.intp]]:
         return "days", pd.factorize(encounters["day"])[0]
     if not {"ref_id", "other_id"} <= set(encounters):
         return "encounters", np.arange(len(encounters))
-    day = pd.factorize(encounters["day"])[0] if "day" in encounters else np.zeros(len(encounters), int)
-    people = np.sort(np.column_stack([encounters["ref_id"], encounters["other_id"]]), axis=1)
-    return "pairs", np.unique(np.column_stack([day, people]), axis=0, return_inverse=True)[1].ravel()
+    return "pairs", pair_numbers(encounters)
 
 
 def estimate_uncertainty(
@@ -186,15 +184,12 @@ def estimate_uncertainty(
     differences[..., angle] = (differences[..., angle] + 90) % 180 - 90
     intervals = _interval(values, differences, factor, not is_posterior)
     bands = np.maximum(_interval(reach, ellipse_reach(resampled) - reach, factor, not is_posterior), 0)
-    return Uncertainty(
-        LEVEL,
-        int(n_resamples),
-        unit,
-        description,
+    tables = (
         _interval_table(speeds, "quantity", QUANTITIES, intervals),
         _interval_table(speeds, "direction", DIRECTIONS, bands),
         _influence(estimator, speeds, ellipses[0]),
     )
+    return Uncertainty(LEVEL, int(n_resamples), unit, description, *tables)
 
 
 def _influence(estimator: Estimator, speeds: Sequence[float], ellipses: Array) -> pd.DataFrame:

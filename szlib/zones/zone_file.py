@@ -137,8 +137,7 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "uncertainty": uncertainty,
         "null_test": null_test,
         "null_radii": {
-            float(each["speed"]): np.nan if each["radius"] is None else float(each["radius"])
-            for each in content["null_radii"]
+            float(each["speed"]): float(np.array(each["radius"], float)) for each in content["null_radii"]
         },
     }
 
@@ -166,6 +165,8 @@ def _to_json(value: Any) -> Any:
         return {name: column.to_numpy() for name, column in value.items()}
     if isinstance(value, Uncertainty | NullTest | RespectRadius | PolarZone):
         return {_KEYS.get(name, name): each for name, each in vars(value).items()}
+    if isinstance(value, np.generic):
+        return value.item()
     if not isinstance(value, np.ndarray):
         raise TypeError(f"{type(value).__name__} is no JSON value")
     out = value.astype(object)
