@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # The notebooks show their figures in every verb, and their kernels are those of .venv.
 unexport MPLBACKEND JUPYTER_PATH
 
-.PHONY: run report docs test lab bench lock audit hostile notebooks dist clean
+.PHONY: run report docs test lab bench lock lowest audit hostile notebooks dist clean
 
 run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza; fails where a check does not hold
 	$(BIN)/szlib run
@@ -48,6 +48,13 @@ notebooks: $(INSTALLED)  ## execute the committed copies anew, and renew the REA
 lock: $(INSTALLED)  ## pin every dependency with hashes, for every platform, from pyproject.toml
 	$(BIN)/uv pip compile pyproject.toml --universal --all-extras --generate-hashes --upgrade --quiet \
 	    --no-emit-index-url --custom-compile-command "make lock" --output-file environment.lock
+
+# Warnings are no errors here: old libraries warn of each other.
+lowest: $(INSTALLED)  ## the suite without the workbook, with the oldest version of every dependency
+	$(BIN)/uv venv --quiet --clear $(VENV)/lowest
+	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --resolution lowest-direct -e ".[cluster,crowds,pedpy,test]"
+	$(VENV)/lowest/$(notdir $(BIN))/python -m pytest -p no:cacheprovider -W default -n 2 --dist loadfile \
+	    tests/tracks tests/encounters tests/zones tests/plaza tests/control tests/simulation
 
 audit: $(INSTALLED)  ## fail where a pinned version has a published vulnerability, or where PyPI cannot be asked
 	@$(BIN)/python -c "import urllib.request; urllib.request.urlopen('https://pypi.org/pypi/pip/json', timeout=20)" \

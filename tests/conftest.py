@@ -13,7 +13,6 @@ from unittest import mock
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: threads of BLAS that wait take a core
 
 import hypothesis
-import jupytext
 import pandas as pd
 import pytest
 from helpers.track_tables import real_data
@@ -76,6 +75,8 @@ def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., 
 @pytest.fixture
 def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     """Run the cells of notebooks in this process, to test what a run does around them."""
+    import jupytext
+
     from szlib.workbook import notebook_execution
 
     def run_cells(script: Path, given: dict[str, Any], folder: Path, environment: dict[str, str]) -> None:
