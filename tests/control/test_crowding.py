@@ -11,6 +11,7 @@ from szlib.control.crowding import find_level
 from szlib.control.settings import TOLERANCE, Crowding
 from szlib.errors import SolverError
 from szlib.simulation.closed_loop import drive
+from szlib.simulation.monte_carlo import rerun_world
 from szlib.simulation.scenarios.random_worlds import Worlds
 
 SETTINGS = szlib.MPCSettings.among_people(time_limit=np.inf)
@@ -142,3 +143,11 @@ def test_bad_settings_are_refused(wrong, message):
 def test_bad_crowding_is_refused(wrong):
     with pytest.raises(SolverError, match=next(iter(wrong))):
         Crowding(**wrong)
+
+
+@pytest.mark.parametrize("seed", [77010607, 77011329])
+def test_a_robot_that_starts_fast_towards_a_wall_brakes(seed):
+    """With the last plan as the only guess, the relaxed plan led through the wall at full speed."""
+    log = rerun_world(seed, settings=SETTINGS)
+    assert log.success
+    assert log.metrics()["min_clearance"] > 0.1

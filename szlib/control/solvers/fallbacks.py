@@ -52,7 +52,10 @@ def solve_with_fallbacks(
         return "kept", shifted, timed_out
     shifted_is_safe = has_end and _reaches_safe_end(shifted, parameters)
     full_braking = solver.evaluate(braking, parameters)
-    relaxed, converged = solver.relaxed(shifted.inputs if unfinished is None else unfinished, parameters)
+    start = shifted if unfinished is None else solver.evaluate(unfinished, parameters)
+    if s.grid and full_braking.slack < start.slack:
+        start = full_braking  # a plan with a long horizon may lead through a wall, and stay there
+    relaxed, converged = solver.relaxed(start.inputs, parameters)
     timed_out |= solver.timed_out
     # A plan that was cut short is usable if it violates no row by more than braking does.
     is_usable = converged or (solver.timed_out and relaxed.slack <= full_braking.slack)
