@@ -16,7 +16,6 @@ from tqdm import tqdm
 
 import szlib
 from szlib.simulation.monte_carlo import rerun_world
-from szlib.simulation.scenarios.random_worlds import Worlds
 
 BODY = 0.25
 TOLERANCE = 1e-6
@@ -29,7 +28,6 @@ WORLDS = {False: 12, True: 20_000}
 BETWEEN = np.array([0.25, 0.5, 0.75])
 """Fractions of dt at which the robot is looked at between samples."""
 FIRST_WORLD = 77_000_000
-CROWDED = Worlds(people=(6, 10), standing=0.2, pace=(0.3, 1.2), walls=0.3, size=8.0, travel=(5.0, 8.0))
 CRUEL = {False: 60, True: 3_000}
 
 
@@ -260,7 +258,7 @@ def attack_steps(count: int, tally: Counter[str], seed: int = 0, solver: str = "
             bar.update(A_SETTING)
 
 
-def attack_worlds(seeds: range, tally: Counter[str], name: str = "worlds", **parameters: Any) -> None:
+def attack_worlds(seeds: range, tally: Counter[str], **parameters: Any) -> None:
     """Whole runs: motion, barriers, overlaps, and what was said of them, from the states alone."""
     for seed in tqdm(seeds, unit="world", leave=False):
         log = rerun_world(seed, **parameters)
@@ -271,10 +269,10 @@ def attack_worlds(seeds: range, tally: Counter[str], name: str = "worlds", **par
         gaps = np.array([judge.gaps(p, t) for p, t in zip(x[:, :2], times, strict=True)]).reshape(len(x), -1)
         people, numbers = len(judge.people), log.metrics()
         moved = np.c_[x[:-1, :2] + dt * x[:-1, 2:] + dt**2 / 2 * u, x[:-1, 2:] + dt * u]
-        tally[name] += 1
-        tally[f"{name} with h < 0"] += int(h.min(initial=1) < -TOLERANCE)
-        tally[f"{name} with an overlap of a wall"] += int(gaps[:, people:].min(initial=1) < -TOLERANCE)
-        tally[f"{name} with an overlap of a person"] += int(gaps[:, :people].min(initial=1) < -TOLERANCE)
+        tally["worlds"] += 1
+        tally["worlds with h < 0"] += int(h.min(initial=1) < -TOLERANCE)
+        tally["worlds with an overlap of a wall"] += int(gaps[:, people:].min(initial=1) < -TOLERANCE)
+        tally["worlds with an overlap of a person"] += int(gaps[:, :people].min(initial=1) < -TOLERANCE)
         said = log.safe[:-1]
         tally["broken: safe before h < 0"] += int((said & (h[1:].min(axis=1, initial=1) < -1e-5)).sum())
         tally["broken: safe before an overlap"] += int(
@@ -341,12 +339,6 @@ def attack(long: bool) -> Counter[str]:
     attack_worlds(range(FIRST_WORLD, FIRST_WORLD + WORLDS[long] // 2), tally)
     rest = szlib.MPCSettings(terminal="rest")
     attack_worlds(range(FIRST_WORLD, FIRST_WORLD + WORLDS[long] // 2), tally, settings=rest)
-    among = szlib.MPCSettings.among_people(time_limit=np.inf)
-    last = FIRST_WORLD + WORLDS[long]
-    attack_worlds(range(FIRST_WORLD, last), tally, settings=among, name="worlds, among people")
-    attack_worlds(
-        range(last, last + WORLDS[long] // 10), tally, settings=among, worlds=CROWDED, name="crowds"
-    )
     for solver in ("sqp", "ipopt"):
         attack_time(CRUEL[long], tally, solver)
     return tally
