@@ -21,7 +21,9 @@ from szlib.workbook.cli import build_parser
 POLICY = '<meta http-equiv="Content-Security-Policy" content="{}">'
 
 
-@pytest.mark.parametrize("attack", ["commands", "damaged_tracks", "files", "races", "terminal", "adversary"])
+@pytest.mark.parametrize(
+    "attack", ["commands", "damaged_tracks", "files", "races", "terminal", "adversary", "among_people"]
+)
 def test_attack_breaks_nothing(attack, tmp_path):
     done = subprocess.run(
         [sys.executable, str(Path(__file__).parent), attack],
