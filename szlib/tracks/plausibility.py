@@ -92,14 +92,14 @@ def check_unit(rows: pl.DataFrame, layout: TrackFormat, path: Path) -> None:
     if layout.metres < 1 and (reach := float(np.abs(positions).max())) * layout.metres < _MIN_SITE:
         raise DataError(
             f"{path}: positions reach only {reach:.3g}, expected millimetres as in {layout.name}; if they "
-            "are metres, {advise(unit='m')}; if the site is that small, {advise(unit='mm')}"
+            f"are metres, {advise(unit='m')}; if the site is that small, {advise(unit='mm')}"
         )
     if layout.metres == 1:
         low, high = np.quantile(positions, [0.01, 0.99], axis=0)
         if (spread := float((high - low).max())) > MAX_SITE:
             raise DataError(
                 f"{path}: positions spread over {spread:.3g}, expected metres as in {layout.name}; if they "
-                "are millimetres, {advise(unit='mm')}; if the site is that wide, {advise(unit='m')}"
+                f"are millimetres, {advise(unit='mm')}; if the site is that wide, {advise(unit='m')}"
             )
 
 

@@ -124,11 +124,11 @@ def find_day(path: Path, options: ReadOptions) -> str | None:
     first = decode_line(read_first_line(path))
     try:
         layout = find_format(path, options)
-        time = layout.first_time(path, first)
-        if time is None or not time >= CALENDAR_BEGINS:
+        time = float(layout.split(first)[layout.columns["t"]]) + layout.clock_start(path, first)
+        if layout.is_sequence or not time >= CALENDAR_BEGINS:
             return None
         return datetime.fromtimestamp(time, ZoneInfo(options.tz or layout.tz)).strftime("%Y-%m-%d")
-    except (ValueError, OverflowError, OSError):  # a damaged first row
+    except (LookupError, ValueError, OverflowError, OSError):  # a table, or a damaged first row
         return None
 
 

@@ -30,7 +30,7 @@ from ..errors import DataError
 from ..input_files import read_small, reading
 from . import funnels
 from .clock import read_tracks, to_clock
-from .formats.published import read_magni_rows
+from .formats.parsed import read_magni_rows
 from .options import ReadOptions
 from .recordings import check_names
 

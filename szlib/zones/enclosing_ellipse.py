@@ -111,7 +111,7 @@ def minimum_enclosing_ellipse_of_curve(curve: Curve, breaks: ArrayLike = ()) -> 
         if np.max(excess, initial=0) <= _CURVE_TOLERANCE:
             return _scale_to_contain(ellipse, np.vstack([points, peak_points]))
         outside = excess > 0
-        finer = spacing[outside] / _ZOOM**number * np.linspace(-1, 1, 4 * _ZOOM + 1)[:, None]
+        finer = spacing[outside] / float(_ZOOM) ** number * np.linspace(-1, 1, 4 * _ZOOM + 1)[:, None]
         points = np.vstack([points, peak_points, _evaluate(curve, (peaks[outside] + finer).ravel())])
     raise ZoneError(
         f"after {_MAX_ROUNDS} rounds the curve still leaves its ellipse, by {np.max(excess):.1e} in level; "

@@ -1,4 +1,4 @@
-"""Formats of track files: a class each, which recognises a file by its first line and scans it.
+"""Formats of track files: each recognises a file by its first line, and scans it.
 
 base       what all formats share: `TrackFormat`
 atc        the ATC mall's files, raw and 1 Hz
@@ -6,8 +6,7 @@ ewap       EWAP files, whose frame rate is estimated
 tidy       tables: text, Parquet, Feather, SQLite, those of other libraries
 columns    which column of a table holds what
 values     times, ids and numbers of a table
-published  UCY's splines, TrajNet++, THOR-MAGNI
-pedpy      formats of other programs, read by PedPy's loaders
+parsed     formats that are read as a whole: UCY's splines, TrajNet++, THOR-MAGNI, those that PedPy reads
 unpack     files on disk, plain or .gz
 """
 
@@ -24,13 +23,12 @@ from ..options import ReadOptions
 from .atc import ATC_1HZ, ATC_RAW
 from .base import EXPECTED, TrackFormat
 from .ewap import EWAP
-from .pedpy import PEDPY_FORMATS
-from .published import RECORDING_FORMATS
+from .parsed import PARSED_FORMATS
 from .tidy import ARROW, TIDY
 from .unpack import LONGEST_LINE, read_first_line, require_memory, unpacked
 
 FORMATS: dict[str, TrackFormat] = {
-    each.name: each for each in (*RECORDING_FORMATS, *PEDPY_FORMATS, ATC_RAW, ATC_1HZ, EWAP, TIDY)
+    each.name: each for each in (*PARSED_FORMATS, ATC_RAW, ATC_1HZ, EWAP, TIDY)
 }
 """Formats by name, in the order of recognition."""
 

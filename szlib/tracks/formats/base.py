@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from itertools import islice
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Self
+from zoneinfo import ZoneInfo
 
 import polars as pl
 
@@ -27,7 +29,9 @@ MISSING = "missing or not a number"  # why a row is rejected, where a value cann
 CALENDAR_BEGINS = 1e8
 _LAST_SECOND = 4_102_444_800.0  # 2100-01-01; later time stamps are not seconds since 1970
 _FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
-_MINUTES_PER_DAY = 24 * 60
+_DAY, _MINUTE = 86_400, 60  # [s]
+
+Opened = tuple["TrackFormat", pl.LazyFrame]  # the format of a file, and a scan of its rows
 
 
 @dataclass(frozen=True)
@@ -50,14 +54,13 @@ class TrackFormat:
     names : names of all columns, if the file has any.
     text : what the file was taken for, for people.
     start : time at which the clock of the file begins [s since 1970]; not 0 where it counts from midnight.
-
-    Each class sets, for all its files:
-
+    year : the year of files named ``MMDD.csv``, which may count from midnight; None where they do not.
     tz : time zone of its calendar, unless `ReadOptions` give one.
     area : area in which encounters are looked for unless another is given: (lowest, highest) x and y [m].
     is_ambiguous : whether a file in other units or with other columns can look the same; speeds are checked.
     is_streamed : whether files are too large to be read as a whole.
     is_sequence : whether each file is a recording of its own, without a calendar.
+    is_in_metres : whether positions are in metres, whatever unit is given.
     has_known_columns : whether `ReadOptions.columns` is refused.
     has_optional_end : whether the last field of a row may be missing.
     speed_field : number of the field that holds the sensor's speed, and its unit [m/s].
@@ -77,24 +80,23 @@ class TrackFormat:
     names: tuple[str, ...] = ()
     text: str = ""
     start: float = 0.0
-
-    tz: ClassVar[str] = "UTC"
-    area: ClassVar[tuple[tuple[float, float], tuple[float, float]] | None] = None
-    is_ambiguous: ClassVar[bool] = False
-    is_streamed: ClassVar[bool] = False
-    is_sequence: ClassVar[bool] = False
-    has_optional_end: ClassVar[bool] = False
-    has_known_columns: ClassVar[bool] = False
-    speed_field: ClassVar[tuple[int, float] | None] = None
+    year: int | None = None
+    tz: str = "UTC"
+    area: tuple[tuple[float, float], tuple[float, float]] | None = None
+    is_ambiguous: bool = False
+    is_streamed: bool = False
+    is_sequence: bool = False
+    is_in_metres: bool = False
+    has_optional_end: bool = False
+    has_known_columns: bool = False
+    speed_field: tuple[int, float] | None = None
 
     def recognises(self, head: bytes) -> bool:
         """Whether `head`, the first line of a file, looks like this format: numbers, as many as fields."""
         parts = self.split(decode_line(head))
         return len(parts) == self.n_fields and sum(map(is_number, parts)) * 2 > len(parts)
 
-    def open(
-        self, plain: Path, path: Path, head: bytes, options: ReadOptions
-    ) -> tuple[TrackFormat, pl.LazyFrame]:
+    def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> Opened:
         """Complete the format with what a file says, and scan the file.
 
         Parameters
@@ -120,7 +122,7 @@ class TrackFormat:
 
     def in_metres(self, metres: float | None) -> Self:
         """The format with positions in units of `metres`, if they are given."""
-        return self if metres is None else replace(self, metres=metres)
+        return self if metres is None or self.is_in_metres else replace(self, metres=metres)
 
     def split(self, line: str) -> list[str]:
         """The fields of a `line`."""
@@ -149,15 +151,15 @@ class TrackFormat:
         return f"column {shown} holds {fields[k][:80]!r}" if k < len(fields) else f"column {shown} is missing"
 
     def clock_start(self, path: Path, first: str) -> float:
-        """Time at which the clock of file `path` with first line `first` begins [s since 1970]."""
-        return 0.0
-
-    def first_time(self, path: Path, first: str) -> float | None:
-        """Time of the `first` line of file `path` [s since 1970]; None where the line does not give it.
-
-        Raises ValueError where the line holds no number.
-        """
-        return None
+        """Midnight of the day that names file `path` [s since 1970], if its `first` line counts from it."""
+        if self.year is None:
+            return 0.0
+        try:
+            day = datetime.strptime(f"{self.year}{file_stem(path)}", "%Y%m%d")
+            since = float(self.split(first)[self.columns["t"]])
+        except ValueError:  # named otherwise, or the first row is damaged
+            return 0.0
+        return day.replace(tzinfo=ZoneInfo(self.tz)).timestamp() if 0 <= since < _DAY else 0.0
 
     def rejection_reason(self) -> pl.Expr:
         """Why a row is rejected; null where it is usable."""
@@ -283,9 +285,9 @@ def file_stem(path: Path) -> str:
 
 def _find_days(t: pl.Series, tz: str) -> pl.Series | pl.Expr:
     """The local date of each time [s since 1970]; a single one where all minutes have the same date."""
-    first, last = (int(moment) // 60 for moment in (t.min(), t.max()))  # type: ignore[arg-type]
-    if last - first < _MINUTES_PER_DAY:
-        days = _local_date(pl.Series(range(60 * first, 60 * last + 1, 60)), tz).unique()
+    first, last = (int(moment) // _MINUTE * _MINUTE for moment in (t.min(), t.max()))  # type: ignore[arg-type]
+    if last - first < _DAY:
+        days = _local_date(pl.Series(range(first, last + 1, _MINUTE)), tz).unique()
         if len(days) == 1:
             return pl.lit(days[0])
     return _local_date(t.floor().cast(pl.Int64), tz)

@@ -31,8 +31,6 @@ _STEP = 0.02  # shorter steps [m] are ignored
 class _Ewap(TrackFormat):
     """Rows of 8 numbers: frame, id, x, z, y [m], vx, vz, vy [m/s]; z is the height."""
 
-    is_sequence = True
-
     def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
         """As `TrackFormat.open`; the frame rate is the one given, or estimated from the velocities."""
         decode_first_line(head, path)
@@ -41,7 +39,8 @@ class _Ewap(TrackFormat):
         return replace(self, seconds=seconds, max_gap=max_gap), rows.lazy()
 
 
-EWAP = _Ewap("ewap", 8, {"t": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}, separator=" ")
+_COLUMNS = {"t": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
+EWAP = _Ewap("ewap", 8, _COLUMNS, separator=" ", is_sequence=True)
 
 
 def measure_frames(rows: pl.DataFrame, path: Path, given: float | None) -> tuple[float, float | None]:

@@ -36,8 +36,8 @@ _FIRST = 20  # lines of a text that show what its columns hold
 class _Table(TrackFormat):
     """Text whose first line names the columns, or whose columns `ReadOptions.columns` counts."""
 
-    is_ambiguous = True
-    has_optional_end = True
+    is_ambiguous: bool = True
+    has_optional_end: bool = True
 
     def recognises(self, head: bytes) -> bool:
         """True for any `head`: what no other format recognises is read as a table."""
