@@ -206,7 +206,7 @@ def test_every_controller_setting_has_description_and_badge():
 
 
 def test_committed_table_says_how_it_was_made_and_fails_if_a_row_is_not_reproduced(
-    record, tmp_path, monkeypatch
+    record, tmp_path, monkeypatch, capsys
 ):
     for module in (committed, committed_tables):
         monkeypatch.setattr(module, "TABLES", tmp_path)
@@ -223,6 +223,10 @@ def test_committed_table_says_how_it_was_made_and_fails_if_a_row_is_not_reproduc
     assert [c["passed"] for c in record.checks] == [True, False, False]
     assert record.checks[1]["value"] == {"mean": [0.123456, 0.124456]}
     assert record.checks[1]["name"] == "row 0 of tables/99_made.csv is reproduced"
+    capsys.readouterr()
+    whole = record.committed_table("99_made", lambda row: {}, where="name in []")
+    assert len(whole) == 3 and len(record.checks) == 3
+    assert "not checked: tables/99_made.csv has no row that can be computed here" in capsys.readouterr().out
 
 
 def test_every_committed_table_says_how_it_was_made():
