@@ -186,7 +186,7 @@ class RoutePlanner:
         self._goal, n, half = goal, len(self._corners), self._cut_boxes(goal)
         free = self._enter(np.array(goal), self._corners, half, self._boxes) >= _SEEN
         seen = np.flatnonzero(free.all(axis=1))
-        i, j = np.hstack([self._pairs, [seen, np.full(len(seen), n)]]).astype(int)
+        i, j = np.hstack([self._pairs, [seen, np.full(len(seen), n)]]).astype(np.intc)
         self.points = points = np.vstack([self._corners, goal])
         graph = coo_array((np.hypot(*(points[i] - points[j]).T), (i, j)), shape=(n + 1, n + 1))
         self._far, self._next = dijkstra(graph.tocsr(), directed=False, indices=n, return_predecessors=True)
