@@ -82,86 +82,37 @@ class _CommandParser(argparse.ArgumentParser):
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """Build the parser of the command line; `help.toml` describes the commands and their arguments."""
-    texts = tomllib.loads(Path(__file__).with_name("help.toml").read_text(encoding="utf-8"))
+    """Build the parser of the command line from `commands.toml`, which describes each command."""
+    content = tomllib.loads(Path(__file__).with_name("commands.toml").read_text(encoding="utf-8"))
     as_written = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(prog="szlib", description=__doc__, formatter_class=as_written)
     parser.add_argument("--version", action="version", version=f"szlib {__version__}")
     parser.set_defaults(memory=None)
+    groups = {name: _CommandParser(add_help=False) for name in content["groups"]}
+    for name, group in groups.items():
+        one = group.add_mutually_exclusive_group() if name == "area" else group
+        _add_arguments(one, content["groups"][name])
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_CommandParser)
-
-    text, rectangle = texts["shared"], ("X0", "X1", "Y0", "Y1")
-    data, cluster = _CommandParser(add_help=False), _CommandParser(add_help=False)
-    area = data.add_mutually_exclusive_group()
-    area.add_argument("--area", "--square", nargs=4, type=float, metavar=rectangle, help=text["area"])
-    area.add_argument("--polygon", dest="area", metavar="FILE", help=text["polygon"])
-    area.add_argument("--auto", dest="area", action="store_const", const="auto", help=text["auto"])
-    data.add_argument("--columns", action="append", default=[], metavar="NAME=COLUMN", help=text["columns"])
-    data.add_argument("--unit", metavar="UNIT", help=text["unit"])
-    data.add_argument("--scale", type=float, metavar="METRES", help=text["scale"])
-    data.add_argument("--frame-rate", type=float, metavar="RATE", help=text["frame_rate"])
-    data.add_argument("--tz", metavar="ZONE", help=text["tz"])
-    data.add_argument("--format", dest="file_format", metavar="FORMAT", help=text["format"])
-    data.add_argument("--max-gap", type=float, metavar="SECONDS", help=text["max_gap"])
-    data.add_argument("--walls", action="store_true", help=text["walls"])
-    data.add_argument("--memory", metavar="SIZE", help=text["memory"])
-    cluster.add_argument("--scheduler", metavar="ADDRESS", help=text["scheduler"])
-    cluster.add_argument("--wait", type=float, default=10.0, metavar="SECONDS", help=text["wait"])
-
-    summary, _, rules = str(inspect.getdoc(_run)).partition("\n\n")
-    text, n_jobs = texts["run"], min(os.cpu_count() or 1, 4)
-    run = commands.add_parser(
-        "run", help=text["summary"], parents=[data, cluster], formatter_class=as_written
-    )
-    run.description, run.epilog = summary, rules
-    run.list_parameters = partial(_list_parameters, texts["parameters"])
-    run.add_argument("--data", nargs="+", default=["synthetic"], metavar="DATA", help=text["data"])
-    run.add_argument("--out", type=os.path.abspath, metavar="FOLDER", help=text["out"])
-    run.add_argument("-j", "--jobs", type=_job_count, default=n_jobs, metavar="N", help=text["jobs"])
-    run.add_argument("--only", nargs="+", default=[], metavar="NN", help=text["only"])
-    run.add_argument("--force", action="store_true", help=text["force"])
-    run.add_argument("--junit", metavar="FILE", help=text["junit"])
-    run.add_argument("--figures", choices=("svg", "pdf"), help=text["figures"])
-    run.add_argument("--notebooks", metavar="FOLDER", help=text["notebooks"])
-    pair = "NAME=VALUE"
-    run.add_argument("-p", "--parameter", action="append", default=[], metavar=pair, help=text["parameter"])
-    run.set_defaults(command=_run)
-
-    text = texts["notebooks"]
-    notebooks = commands.add_parser("notebooks", help=text["summary"])
-    notebooks.add_argument("folder", metavar="FOLDER", help=text["folder"])
-    notebooks.set_defaults(command=_notebooks)
-
-    text = texts["report"]
-    report = commands.add_parser("report", help=text["summary"])
-    report.add_argument("folder", nargs="?", metavar="FOLDER", help=text["folder"])
-    report.add_argument("--open", action="store_true", help=text["open"])
-    report.set_defaults(command=_report)
-
-    text = texts["inspect"]
-    look = commands.add_parser("inspect", help=text["summary"], parents=[data])
-    look.add_argument("file", help=text["file"])
-    look.set_defaults(command=_inspect)
-
-    text = texts["extract"]
-    extract = commands.add_parser("extract", help=text["summary"], parents=[data, cluster])
-    extract.add_argument("data", nargs="+", metavar="PATH", help=text["data"])
-    extract.add_argument("--out", default="results/days", metavar="FOLDER", help=text["out"])
-    extract.add_argument("-j", "--jobs", type=_job_count, default=1, metavar="N", help=text["jobs"])
-    extract.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help=text["exclude"])
-    extract.set_defaults(command=_extract)
-
-    text = texts["fit"]
-    fit = commands.add_parser("fit", help=text["summary"], parents=[data])
-    fit.add_argument("data", nargs="+", metavar="DAYS", help=text["data"])
-    fit.add_argument("--out", default="zone.json", metavar="FILE", help=text["out"])
-    fit.add_argument("--method", choices=("quantile", "paper", "hull", "respect"), help=text["method"])
-    fit.add_argument("--kind", nargs="+", metavar="KIND", help=text["kind"])
-    fit.add_argument("--tracks", nargs="+", default=[], metavar="PATH", help=text["tracks"])
-    fit.add_argument("--exclude", nargs="+", default=[], metavar="DAY", help=text["exclude"])
-    fit.add_argument("-j", "--jobs", type=_job_count, default=1, metavar="N", help=text["jobs"])
-    fit.set_defaults(command=_fit)
+    for name, each in content["commands"].items():
+        parents = [groups[group] for group in each.get("groups", ())]
+        command = commands.add_parser(name, help=each["summary"], parents=parents, formatter_class=as_written)
+        _add_arguments(command, each["arguments"])
+        command.set_defaults(command=globals()[f"_{name}"])
+    run = commands.choices["run"]
+    run.set_defaults(jobs=min(os.cpu_count() or 1, 4))
+    run.description, _, run.epilog = str(inspect.getdoc(_run)).partition("\n\n")
+    run.list_parameters = partial(_list_parameters, content["parameters"])
     return parser
+
+
+def _add_arguments(parser: Any, arguments: dict[str, dict[str, Any]]) -> None:
+    """Add the `arguments` of `commands.toml` to a parser, or to a group of one."""
+    for names, options in arguments.items():
+        if "type" in options:
+            options["type"] = _TYPES[options["type"]]
+        if isinstance(options.get("metavar"), list):
+            options["metavar"] = tuple(options["metavar"])
+        parser.add_argument(*names.split(), **options)
 
 
 def _read_options(options: argparse.Namespace) -> dict[str, Any]:
@@ -335,11 +286,9 @@ def _fit(options: argparse.Namespace) -> int:
     from ..tracks.options import ReadOptions
     from .fit_command import fit
 
-    settings = EncounterSettings(area=options.area, has_walls=options.walls)
-    reading = ReadOptions(**_read_options(options))
-    names = ("out", "method", "kind", "tracks", "exclude", "jobs")
-    given = {name: getattr(options, name) for name in names}
-    print(fit(options.data, settings=settings, reading=reading, **given))
+    given = {name: getattr(options, name) for name in ("out", "method", "kind", "tracks", "exclude", "jobs")}
+    given["settings"] = EncounterSettings(area=options.area, has_walls=options.walls)
+    print(fit(options.data, reading=ReadOptions(**_read_options(options)), **given))
     return 0
 
 
@@ -375,6 +324,10 @@ def _job_count(text: str) -> int:
     if not text.isascii() or not text.isdigit() or len(text) > 9 or int(text) < 1:
         raise argparse.ArgumentTypeError(f"expected a whole number >= 1; got {text[:40]!a}")
     return int(text)
+
+
+# Types of arguments in `commands.toml`.
+_TYPES: dict[str, Callable[[str], Any]] = {"float": float, "path": os.path.abspath, "count": _job_count}
 
 
 @contextmanager
