@@ -26,12 +26,8 @@ _OPEN: ContextVar[Mapping[Path, BinaryIO]] = ContextVar("open")
 
 def open_regular(path: Path) -> BinaryIO:
     """Open the regular file `path` to read it; OSError for anything else, such as a FIFO without end."""
-
-    def at_once(name: str, flags: int) -> int:
-        """Open a file without waiting for a process that writes it."""
-        return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
-
-    stream = open(path, "rb", opener=at_once)  # noqa: SIM115 - paths have no opener
+    at_once = getattr(os, "O_NONBLOCK", 0)  # do not wait for a process that writes the file
+    stream = open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once))  # noqa: SIM115
     if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
         return stream
     stream.close()

@@ -26,9 +26,8 @@ _granted: ContextVar[int | None] = ContextVar("granted", default=None)
 def parse_size(text: str) -> int:
     """Bytes of `text`, such as "4GB", "512 MiB" or "2g"; raises MemoryLimitError for other text."""
     found = re.fullmatch(r"(\d{1,15}(?:\.\d{1,9})?) ?([KMGT]?)(I?)B?", text.strip().upper(), re.ASCII)
-    size = (
-        0.0 if not found else float(found[1]) * (1024 if found[3] else 1000) ** " KMGT".index(found[2] or " ")
-    )
+    number, prefix, binary = found.groups() if found else ("0", "", "")
+    size = float(number) * (1024 if binary else 1000) ** " KMGT".index(prefix or " ")
     if not 1 <= size < 1e18:
         raise MemoryLimitError(f"memory {text!r}: expected an amount such as 4GB or 512MB")
     return int(size)
@@ -46,12 +45,11 @@ def limit() -> int:
 @contextmanager
 def granted(size: int | None) -> Iterator[None]:
     """Set the limit to `size` bytes inside a with block; None changes nothing."""
-    token = _granted.set(size) if size is not None else None
+    token = _granted.set(_granted.get() if size is None else size)
     try:
         yield
     finally:
-        if token is not None:
-            _granted.reset(token)
+        _granted.reset(token)
 
 
 def require(size: float, what: str) -> None:

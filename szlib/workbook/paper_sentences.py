@@ -14,7 +14,7 @@ from typing import Any
 
 import pandas as pd
 
-from .record.display import format_value
+from .record.display import format_result
 from .record.notebook_record import NotebookRecord
 
 NOT_RUN = "not run with this data"  # verdict of a sentence whose checks were not made in this run
@@ -57,7 +57,9 @@ def judge_sentences(record: NotebookRecord) -> pd.DataFrame:
         for notebook, made in records.items()
         for check in made
     }
-    numbers = {name: f"{name}: {check['result']}" + _in_brackets(check) for name, check in checks.items()}
+    numbers = {
+        name: f"{name}: {format_result(check['result'], check['value'])}" for name, check in checks.items()
+    }
     made_in = {notebook.split("_")[0] for notebook in records}
     table = load_sentences()
     table["verdict"] = [
@@ -86,10 +88,5 @@ def judge(kind: str, names: Sequence[str], checks: Mapping[str, Mapping[str, Any
         return f"{kind}, but a check fails" if failed else kind
     if not failed:
         return "supported"
-    return (
-        "not decidable" if all(result.startswith("not decidable") for result in failed) else "not supported"
-    )
-
-
-def _in_brackets(check: Mapping[str, Any]) -> str:
-    return "" if check["value"] is None else f" ({format_value(check['value'])})"
+    is_open = all(result.startswith("not decidable") for result in failed)
+    return "not decidable" if is_open else "not supported"

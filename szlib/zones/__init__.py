@@ -37,11 +37,3 @@ from .respect_profile import RespectRadius
 from .respect_significance import NullTest, null_test
 from .social_zone import SocialZone
 from .uncertainty import count_by_side
-
-__all__ = [
-    "BODY_RADIUS", "Ellipse", "Grid", "HullZone", "NullTest", "PairCorrelation",
-    "PairedSamples", "PolarZone", "Pooled", "ReferenceZone", "RespectRadius", "SocialZone", "circle_around",
-    "complementary_points", "count_by_side", "draw_costmap", "hull_vertices",
-    "impose_zone", "is_outlier", "minimum_enclosing_ellipse", "minimum_enclosing_ellipse_of_curve",
-    "null_test", "pair_correlation", "pool", "reference_zone", "remove_outliers", "slice_hull",
-]  # fmt: skip

@@ -51,14 +51,13 @@ class Estimator(ABC):
         """Fit the zone to all encounters at `speeds`, ascending [m/s]."""
 
     @abstractmethod
-    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
+    def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
         """Fit ellipses to weighted encounters.
 
         Parameters
         ----------
         weights : weight of each encounter in each fit, shape (k, n).
         speeds : speeds of the zones, shape (s,) [m/s].
-        rng : source of randomness to resample the null model, if the estimator has one; None: no resampling.
 
         Returns
         -------

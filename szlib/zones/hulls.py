@@ -135,9 +135,8 @@ def slice_hull(points: ArrayLike, speed: float, *, r_max: float) -> Slice:
         raise ZoneError(
             f"the zone at {speed:g} m/s is undefined: the data covers {low:.3f} to {high:.3f} m/s"
         )
-    edges = np.unique(
-        np.sort(np.vstack([hull.simplices[:, pair] for pair in ((0, 1), (1, 2), (2, 0))]), axis=1), axis=0
-    )
+    pairs = np.sort(hull.simplices, axis=1)[:, [[0, 1], [0, 2], [1, 2]]]
+    edges = np.unique(pairs.reshape(-1, 2), axis=0)
     i, j = edges[(v[edges[:, 0]] - speed) * (v[edges[:, 1]] - speed) <= 0].T
     i, j = i[v[i] != v[j]], j[v[i] != v[j]]
     share = ((speed - v[i]) / (v[j] - v[i]))[:, None]
@@ -253,8 +252,8 @@ class HullEstimator(Estimator):
         """The zone outside the hull of all points, whatever the `speeds`."""
         return HullZone(hull_vertices(self.points), self.r_max)
 
-    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
-        """Fit ellipses to the encounters with positive `weights` at `speeds`; `rng` is not used.
+    def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
+        """Fit ellipses to the encounters with positive `weights` at `speeds`.
 
         They enclose the boundary in 72 directions, which comes directly from the hull's faces: this is faster
         than slices.

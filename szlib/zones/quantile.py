@@ -184,8 +184,8 @@ class QuantileEstimator(Estimator):
         radii = [quantile_radii(self.approaches, speed, self.q)[0] for speed in speeds]
         return PolarZone(np.array(speeds), DIRECTIONS, np.array(radii))
 
-    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
-        """Fit ellipses to encounters with `weights` at `speeds` (see `Estimator`); `rng` is not used."""
+    def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
+        """Fit ellipses to encounters with `weights` at `speeds` (see `Estimator`)."""
         radii = np.stack([quantile_radii(self.approaches, v, self.q, weights) for v in speeds], axis=1)
         return fit_ellipses(fill_gaps(radii.reshape(-1, radii.shape[-1]))).reshape(*radii.shape[:2], 5)
 

@@ -170,8 +170,8 @@ class RespectEstimator(Estimator):
             raise ZoneError("the respect zone does not contain its person; add data")
         return PolarZone(np.array(speeds), DIRECTIONS, radii)
 
-    def refit(self, weights: Array, speeds: Sequence[float], rng: np.random.Generator | None = None) -> Array:
-        """Fit ellipses to encounters with `weights` at `speeds`, from the fit of all; `rng` is not used."""
+    def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
+        """Fit ellipses to encounters with `weights` at `speeds`, from the fit of all."""
         fits = [Likelihood.of(self.data, self.null, w).maximise([self.best]) for w in weights]
         return zone_ellipses(np.array(fits), speeds)
 

@@ -24,24 +24,24 @@ _SPEED_BOUNDS = (0.3, 2.0)  # slower and faster people carry the ellipse of thes
 # Columns of the samples: direction of the other person, and speed, of each of the two people.
 VIEWS = (("los_angle", "speed"), ("other_los_angle", "other_speed"))
 
-# Parameter: lowest and highest value, mean and standard deviation of its prior.
-_PARAMETERS = {
-    "centre ahead [m]": (-0.5, 0.5, 0.0, 0.15),
-    "its change with speed": (-0.5, 0.5, 0.0, 0.15),
-    "centre to the left [m]": (-0.3, 0.3, 0.0, 0.15),
-    "log semi-axis along [m]": (np.log(0.1), np.log(1.9), np.log(0.8), 0.5),
-    "its change with speed ": (-0.6, 0.6, 0.0, 0.15),
-    "log semi-axis across [m]": (np.log(0.1), np.log(1.9), np.log(0.8), 0.5),
-    "its change with speed  ": (-0.6, 0.6, 0.0, 0.15),
-    "shear": (-0.6, 0.6, 0.0, 0.15),
-    "logit f": (-6.0, 1.5, 0.0, np.inf),
-    "log w [m]": (np.log(0.015), np.log(0.3), 0.0, np.inf),
-    "log A": (-5.0, 8.0, -3.0, 2.0),
-    "log c [m]": (np.log(0.08), np.log(0.6), 0.0, np.inf),
-}
-_LOW, _HIGH, _MEAN, _SPREAD = np.array(list(_PARAMETERS.values())).T
+# Of each parameter: lowest and highest value, mean and standard deviation of its prior, and the standard
+# deviation of the first steps of the Metropolis chain.
+_PARAMETERS = [
+    (-0.5, 0.5, 0.0, 0.15, 0.05),  # centre ahead [m]
+    (-0.5, 0.5, 0.0, 0.15, 0.05),  # its change with speed
+    (-0.3, 0.3, 0.0, 0.15, 0.02),  # centre to the left [m]
+    (np.log(0.1), np.log(1.9), np.log(0.8), 0.5, 0.06),  # logarithm of the semi-axis along [m]
+    (-0.6, 0.6, 0.0, 0.15, 0.06),  # its change with speed
+    (np.log(0.1), np.log(1.9), np.log(0.8), 0.5, 0.03),  # logarithm of the semi-axis across [m]
+    (-0.6, 0.6, 0.0, 0.15, 0.05),  # its change with speed
+    (-0.6, 0.6, 0.0, 0.15, 0.05),  # shear
+    (-6.0, 1.5, 0.0, np.inf, 0.3),  # logit f
+    (np.log(0.015), np.log(0.3), 0.0, np.inf, 0.3),  # log w [m]
+    (-5.0, 8.0, -3.0, 2.0, 0.7),  # log A
+    (np.log(0.08), np.log(0.6), 0.0, np.inf, 0.3),  # log c [m]
+]
+_LOW, _HIGH, _MEAN, _SPREAD, _FIRST_STEPS = np.transpose(_PARAMETERS)
 _ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
-_FIRST_STEPS = np.array([0.05, 0.05, 0.02, 0.06, 0.06, 0.03, 0.05, 0.05, 0.3, 0.3, 0.7, 0.3])
 _BANK, _BANK_SEED = 24, 0  # ellipses that say which samples may be the nearest
 _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
 _STARTS, _START_GAP = 3, 0.15  # number of best circles tried, and the least difference of their radii [m]

@@ -307,10 +307,8 @@ class SocialZone:
         _high (its interval, NaN if there is none); influence: the greatest change if one encounter is left
         out [m]; encounters within r_max at that speed; adequate; verdict.
         """
-        rows = [
-            (v, *e.center, *e.semi_axes, np.degrees(e.angle), e.area)
-            for v, e in sorted(self.ellipses.items())
-        ]
+        ellipses = sorted(self.ellipses.items())
+        rows = [(v, *e.center, *e.semi_axes, np.degrees(e.angle), e.area) for v, e in ellipses]
         table = pd.DataFrame(rows, columns=["speed", *QUANTITIES]).set_index("speed")
         ends = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
         table[[*ends, "influence", "encounters"]] = np.nan

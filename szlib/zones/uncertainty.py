@@ -176,7 +176,7 @@ def estimate_uncertainty(
         description = f"bootstrap: {n} of {n} {unit}, bias-corrected percentiles"
     ellipses = estimator.refit(np.ones((1, len(member))), speeds)
     if resampled is None:
-        resampled = estimator.refit(drawn[:, member].astype(float), speeds, rng)
+        resampled = estimator.refit(drawn[:, member].astype(float), speeds)
     reach = ellipse_reach(ellipses)
     values = _quantities(ellipses)
     differences = _quantities(resampled) - values

@@ -11,9 +11,8 @@ import yaml
 
 from .. import __version__
 from .ellipses import circle_around
+from .verdict import FittedZone
 
-FittedZone = Any
-"""A `szlib.SocialZone`; it imports this module, so it cannot be imported here."""
 _DIGITS = 4  # decimals of metres and radians: tenths of a millimetre
 _SPECIAL = {"%": r"\%", "&": r"\&", "_": r"\_", "#": r"\#"}  # letters that LaTeX reads as commands
 

@@ -195,10 +195,8 @@ class Turning(Estimator):
     def fit_shape(self, speeds: Sequence[float]) -> ZoneShape:
         raise NotImplementedError
 
-    def refit(
-        self, weights: np.ndarray, speeds: Sequence[float], rng: np.random.Generator | None = None
-    ) -> np.ndarray:
-        angle = np.radians(89 if rng is None else -89)
+    def refit(self, weights: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
+        angle = np.radians(89 if len(weights) == 1 else -89)
         return np.broadcast_to([0.0, 0.0, 1.0, 0.7, angle], (len(weights), len(speeds), 5))
 
     def find_influential(self, speeds: Sequence[float]) -> np.ndarray:

@@ -10,7 +10,6 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,8 @@ Case = tuple[tuple[Any, ...], Any]
 Judge = Callable[[tuple[Any, ...], Any, Any], str]
 Rng = np.random.Generator
 
+# Texts of all tasks, by the name of the task.
+_TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 _MAX_SHOWN = 6  # numbers of an array in a message
 
 
@@ -168,27 +169,15 @@ def make_task(
     ------
     KeyError : a task or a mistake has no text.
     """
-    texts = dict(load_texts()[name])
+    texts = dict(_TEXTS[name])
     messages = texts.pop("mistakes", {})
     described = {messages[key]: answer for key, answer in mistakes.items()}
     return Task(name, case=case, mistakes=described, judge=judge, **texts)
 
 
-@cache
-def load_texts() -> dict[str, Any]:
-    """Texts of all tasks, by the name of the task."""
-    return tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
-
-
 def formula(draw: Callable[[Rng], tuple[Any, ...]], solution: Answer) -> Callable[[Rng], Case]:
     """Cases with arguments from `draw` and the correct answer from the function `solution`."""
-
-    def case(rng: Rng) -> Case:
-        """Draw arguments and compute the correct answer."""
-        args = draw(rng)
-        return args, solution(*args)
-
-    return case
+    return lambda rng: ((args := draw(rng)), solution(*args))
 
 
 def _arguments(args: tuple[Any, ...]) -> str:

@@ -198,8 +198,7 @@ class DataCache:
             files = self.contents
         source = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "area": self.area}
         source |= {"szlib": __version__, "parameters": self.method.encounter_settings().as_json()}
-        source |= {"reading": self.method.reading}
-        return json.loads(json.dumps(source))  # type: ignore[no-any-return]
+        return source | {"reading": self.method.reading}
 
     def _zone_source(self) -> dict[str, Any]:
         """What the zone is made from."""

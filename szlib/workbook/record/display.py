@@ -75,6 +75,11 @@ def format_value(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
+def format_result(result: str, value: Any) -> str:
+    """The `result` of a check or a claim with its `value`: "holds (2)"."""
+    return result if value is None else f"{result} ({format_value(value)})"
+
+
 def show_figure(figure: Figure, picture: bytes) -> None:
     """Show a saved `picture` of a `figure` in the notebook, smaller and in 256 colours, with its alt text.
 

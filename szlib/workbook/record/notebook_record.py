@@ -23,7 +23,7 @@ from ...input_files import read_json_object
 from .. import folders
 from .committed_tables import find_differences, read_table
 from .data_cache import DataCache
-from .display import format_outputs, format_value, show_figure, style_table
+from .display import format_outputs, format_result, format_value, show_figure, style_table
 from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, ZoneMethod, check_injected, read_defaults
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ class NotebookRecord:
     def _record(self, kind: str, name: str, passed: bool, value: object, result: str) -> None:
         value = _to_plain(value)
         self.checks.append({"kind": kind, "name": name, "passed": passed, "value": value, "result": result})
-        print(f"{kind}: {name}: {result}" + ("" if value is None else f" ({format_value(value)})"))
+        print(f"{kind}: {name}: {format_result(result, value)}")
         self._store(closed=False)
 
     def _store(self, *, closed: bool) -> None:

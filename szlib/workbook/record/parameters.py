@@ -85,14 +85,9 @@ class ZoneMethod:
 
     def encounter_settings(self, area: object = None) -> EncounterSettings:
         """Settings of `szlib.find_encounters` for encounters in an `area`."""
-        return EncounterSettings(
-            area=area,
-            space=AttentionalSpace(length=self.space_length, width=self.space_width),
-            duration=self.duration,
-            min_distance=self.min_distance,
-            min_speed=self.min_speed,
-            has_walls=self.has_walls,
-        )
+        space = AttentionalSpace(length=self.space_length, width=self.space_width)
+        names = ("duration", "min_distance", "min_speed", "has_walls")
+        return EncounterSettings(area=area, space=space, **{name: getattr(self, name) for name in names})
 
     def fit_options(self) -> dict[str, Any]:
         """Keywords of `szlib.SocialZone.fit`."""
@@ -123,9 +118,8 @@ def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dic
     if "reading" in given:
         given = {**given, "reading": ZoneMethod(reading=given["reading"]).read_options().as_json()}
     defaults: dict[str, list[Any]] = {}
-    for notebook in notebooks:
-        for name, value in read_defaults(notebook).items():
-            defaults.setdefault(name, []).append(value)
+    for name, value in (each for notebook in notebooks for each in read_defaults(notebook).items()):
+        defaults.setdefault(name, []).append(value)
     if unknown := sorted(given.keys() - defaults.keys()):
         raise DataError(
             f"unknown parameter {', '.join(map(ascii, unknown))}; the notebooks know "
