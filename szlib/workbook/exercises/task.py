@@ -10,6 +10,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,6 @@ Case = tuple[tuple[Any, ...], Any]
 Judge = Callable[[tuple[Any, ...], Any, Any], str]
 Rng = np.random.Generator
 
-# Texts of all tasks, by the name of the task.
-_TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 _MAX_SHOWN = 6  # numbers of an array in a message
 
 
@@ -169,10 +168,16 @@ def make_task(
     ------
     KeyError : a task or a mistake has no text.
     """
-    texts = dict(_TEXTS[name])
+    texts = dict(load_texts()[name])
     messages = texts.pop("mistakes", {})
     described = {messages[key]: answer for key, answer in mistakes.items()}
     return Task(name, case=case, mistakes=described, judge=judge, **texts)
+
+
+@cache
+def load_texts() -> dict[str, Any]:
+    """Texts of all tasks, by the name of the task."""
+    return tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 
 
 def formula(draw: Callable[[Rng], tuple[Any, ...]], solution: Answer) -> Callable[[Rng], Case]:
