@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+import shapely
 from scipy.ndimage import distance_transform_edt
+from shapely.geometry.base import BaseGeometry
 
 from ..checks import check_columns
 from ..errors import DataError, warn
@@ -17,9 +19,6 @@ from ..input_files import printable, read_small, reading
 from ..tracks import funnels
 from ..tracks.clock import COLUMNS
 from .geometry import PAPER_SPACE, Area, AttentionalSpace, Region, Square
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
 AUTO = "auto"  # stands for the area that `walked_area` finds
 EXPECTED = (
@@ -96,8 +95,6 @@ def area_for(tracks: pd.DataFrame, area: object, space: AttentionalSpace = PAPER
     places = _find_places(tracks)
     if len(set(places.values())) < 2:
         return walked_area(tracks, space=space)
-    import shapely
-
     groups = tracks.groupby(tracks["day"].astype(str).map(places))
     found = {name: walked_area(part, space=space) for name, part in groups}
     shapes = [a.polygon if isinstance(a, Region) else shapely.Polygon(*a.outlines) for a in found.values()]
@@ -241,8 +238,6 @@ def _trim(seen: np.ndarray, first: np.ndarray, end: np.ndarray) -> tuple[np.ndar
 
 def _outline(seen: np.ndarray, corner: np.ndarray, part: float, space: AttentionalSpace) -> BaseGeometry:
     """The outline of `seen` parts, without strips narrower than 1 m and pieces narrower than the space."""
-    import shapely
-
     ends = np.diff(np.pad(seen, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     (column, low), high = np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
     whole, strip = shapely.union_all(shapely.box(column, low, column + 1, high)), 0.5 / part
@@ -320,8 +315,6 @@ def _from_file(path: Path) -> Area:
 
 def _from_geojson(text: str) -> Area:
     """All polygons of a GeoJSON geometry, feature or collection, in one."""
-    import shapely
-
     try:
         shape = shapely.from_geojson(text)
     except shapely.errors.ShapelyError as error:
@@ -333,6 +326,4 @@ def _from_geojson(text: str) -> Area:
 
 
 def _from_shape(shape: BaseGeometry) -> Area:
-    import shapely
-
     return Region(shapely.to_wkt(shapely.force_2d(shape), rounding_precision=-1)).simplest()

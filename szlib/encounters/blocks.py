@@ -40,14 +40,11 @@ class UsableBlocks:
     first_fault: tuple[int, str] | None = None
 
     def __iter__(self) -> Iterator[pl.DataFrame]:
-        columns, read = (
-            self.scan.select("ragged", "exact_id", *NUMBERS),
-            0,
-        )  # line numbers of the scan take long
+        read = 0  # line numbers of the scan take long
+        columns = self.scan.select("ragged", "exact_id", *NUMBERS)
         for block in columns.collect_batches(chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming"):
-            good, reasons, first = reject_rows(
-                block.with_row_index("line", offset=read + 1), self.layout, self.plain
-            )
+            lines = block.with_row_index("line", offset=read + 1)
+            good, reasons, first = reject_rows(lines, self.layout, self.plain)
             read += block.height
             self.reasons.update(reasons)
             self.first_fault = self.first_fault or first

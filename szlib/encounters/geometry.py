@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from ..checks import require
 from ..errors import DataError
 from ..tracks.formats.atc import ATC_AREA
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
 
 @dataclass(frozen=True)
@@ -114,8 +112,6 @@ class Region:
     @cached_property
     def polygon(self) -> BaseGeometry:
         """The polygon as a Shapely geometry; raises DataError if it is not valid."""
-        import shapely
-
         try:
             polygon = shapely.from_wkt(self.wkt)
         except (shapely.errors.ShapelyError, TypeError) as error:
@@ -146,15 +142,11 @@ class Region:
     @property
     def outlines(self) -> list[np.ndarray]:
         """Every border, outer and inner, closed, each (n, 2) [m]."""
-        import shapely
-
         rings = shapely.get_parts(shapely.get_rings(shapely.get_parts(self.polygon)))
         return [shapely.get_coordinates(ring) for ring in rings]
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Whether each point (arrays `x`, `y` of one shape) lies inside or on the border."""
-        import shapely
-
         return np.asarray(shapely.intersects_xy(self.polygon, x, y))
 
     def covers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -162,8 +154,6 @@ class Region:
 
         Where the area is not convex, four corners inside are not enough: a pillar can stand between them.
         """
-        import shapely
-
         inside = np.asarray(self.contains(x, y).all(axis=0))
         if not self.convex:
             at = np.flatnonzero(inside)

@@ -25,7 +25,7 @@ from .. import memory
 from ..checks import check_columns, check_rows, require
 from ..errors import DataError
 from . import funnels
-from .options import SHORTEST_GAP, Columns, ReadOptions
+from .options import SHORTEST_GAP, ReadOptions
 from .readers import is_sorted, read_raw
 
 TICKS_PER_SECOND = 10  # the common clock: positions at multiples of 0.1 s
@@ -52,13 +52,7 @@ def read_tracks(
     *,
     options: ReadOptions | None = None,
     exclude: Iterable[str] = (),
-    file_format: str | None = None,
-    unit: str | None = None,
-    scale: float | None = None,
-    frame_rate: float | None = None,
-    columns: Columns | None = None,
-    max_gap: float | None = None,
-    tz: str | None = None,
+    **parameters: Any,
 ) -> pd.DataFrame:
     """Read files or tables, one or many, into one track table on the common clock.
 
@@ -70,8 +64,8 @@ def read_tracks(
         GeoPandas, MovingPandas, PedPy's TrajectoryData.
     options : how files are read; None takes the defaults.
     exclude : days "YYYY-MM-DD" to leave out, as event days were left out in the paper (sec. 2).
-    file_format, unit, scale, frame_rate, columns, max_gap, tz : each as in `szlib.ReadOptions`; a value
-        given here replaces that of `options`.
+    parameters : single values in place of those of `options`: file_format, unit, scale, frame_rate, columns,
+        max_gap, tz, each as in `szlib.ReadOptions`; None leaves that of `options`.
 
     Returns
     -------
@@ -90,12 +84,8 @@ def read_tracks(
     >>> list(tracks.columns), len(tracks)
     (['day', 'id', 't', 'x', 'y', 'vx', 'vy'], 41)
     """
-    given = {
-        "file_format": file_format, "unit": unit, "scale": scale, "frame_rate": frame_rate,
-        "columns": columns, "max_gap": max_gap, "tz": tz,
-    }  # fmt: skip
-    changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    options = replace(options or ReadOptions(), **changes)
+    given = {name: value for name, value in parameters.items() if value is not None}
+    options = replace(options or ReadOptions(), **given)
     return _interpolate(read_raw(paths, options=options, exclude=exclude), options.max_gap)
 
 

@@ -66,23 +66,17 @@ def check_tracks(tracks: pd.DataFrame) -> None:
         raise DataError(f"columns are {list(tracks.columns)}; expected {COLUMNS} first, in this order")
     if not pd.api.types.is_integer_dtype(tracks["id"]):
         raise DataError(f"id is {tracks['id'].dtype}; expected whole numbers")
-    _check_velocities(tracks)
+    right, given = compute_velocities(tracks), tracks[["vx", "vy"]].to_numpy(float)
+    is_right = np.isclose(given, right, rtol=0, atol=_TOLERANCE, equal_nan=True).all(axis=1)
+    table = tracks.assign(expected_vx=right[:, 0], expected_vy=right[:, 1])
+    advice = "let szlib.tracks.clock.to_clock compute velocities from positions, and never bridge a gap"
+    columns = ["day", "id", "t", "vx", "vy", "expected_vx", "expected_vy"]
+    check_rows(table, is_right, columns, f"expected velocities over +-0.5 s; {advice}")
     stages = funnels.get(tracks)
     if not stages:
         raise DataError('the table has no funnel; expected its stages in .attrs["funnel"]')
     for stage in stages:
         funnels.stage(stage["stage"], stage["entered"], stage["kept"], stage["rejected"])
-
-
-def _check_velocities(tracks: pd.DataFrame) -> None:
-    """Raise DataError where velocity is not the displacement over +-0.5 s within its piece."""
-    expected = compute_velocities(tracks)
-    given = tracks[["vx", "vy"]].to_numpy(float)
-    is_right = np.isclose(given, expected, rtol=0, atol=_TOLERANCE, equal_nan=True).all(axis=1)
-    table = tracks.assign(expected_vx=expected[:, 0], expected_vy=expected[:, 1])
-    columns = ["day", "id", "t", "vx", "vy", "expected_vx", "expected_vy"]
-    advice = "let szlib.tracks.clock.to_clock compute velocities from positions, and never bridge a gap"
-    check_rows(table, is_right, columns, f"expected velocities over +-0.5 s; {advice}")
 
 
 def read_groups(path: str | Path) -> pd.DataFrame:
@@ -157,6 +151,5 @@ def to_pedpy(tracks: pd.DataFrame) -> TrajectoryData:
             f"PedPy has no days, and the table has {len(days)}: {list(days)[:5]}; pass one of them"
         )
     frame = nearest_tick(tracks["t"].to_numpy(float))
-    data = pd.DataFrame({"id": tracks["id"].to_numpy(), "frame": frame})
-    data[["x", "y"]] = tracks[["x", "y"]].to_numpy()
-    return TrajectoryData(data=data, frame_rate=float(TICKS_PER_SECOND))
+    data = tracks[["id", "x", "y"]].assign(frame=frame).reset_index(drop=True)
+    return TrajectoryData(data=data[["id", "frame", "x", "y"]], frame_rate=float(TICKS_PER_SECOND))

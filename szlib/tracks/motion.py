@@ -26,7 +26,7 @@ class Motion(NamedTuple):
     interval : median time between two samples of a person [s].
     irregularity : interquartile range of that time, over its median.
     width : width of the site [m].
-    has_whole_times, has_whole_ids : whether all times, and all ids, are whole numbers.
+    has_whole_ids : whether all ids are whole numbers.
     doubled : fraction of rows at whose time the person has another row.
     """
 
@@ -35,7 +35,6 @@ class Motion(NamedTuple):
     interval: float
     irregularity: float
     width: float
-    has_whole_times: bool
     has_whole_ids: bool
     doubled: float
 
@@ -82,7 +81,6 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
         interval=float(step),
         irregularity=float((high - low) / step) if step > 0 else np.inf,
         width=float(np.ptp(np.quantile([x, y], [0.01, 0.99], axis=1), axis=0).max()),
-        has_whole_times=bool((t % 1 == 0).all()),
         has_whole_ids=bool((person % 1 == 0).all()),
         doubled=float((steps <= 0).mean()),
     )

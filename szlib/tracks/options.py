@@ -83,15 +83,18 @@ class ReadOptions:
 
     def __post_init__(self) -> None:
         rate, gap = self.frame_rate, self.max_gap
-        is_known = self.file_format in (None, *FORMAT_NAMES)
-        require(is_known, "file_format", self.file_format, f"one of {list(FORMAT_NAMES)}")
-        require(self.unit in (None, *UNITS), "unit", self.unit, f"one of {list(UNITS)}")
-        is_length = self.scale is None or 0 < self.scale <= 1e3
-        require(is_length, "scale", self.scale, "metres in one unit of position, more than 0")
+        length = "metres in one unit of position, more than 0"
+        count = f"frames a second from 1 to {_FASTEST_COUNT:g}"
+        for name, is_valid, expected in (
+            ("file_format", self.file_format in (None, *FORMAT_NAMES), f"one of {list(FORMAT_NAMES)}"),
+            ("unit", self.unit in (None, *UNITS), f"one of {list(UNITS)}"),
+            ("scale", self.scale is None or 0 < self.scale <= 1e3, length),
+            ("frame_rate", rate is None or 1 <= rate <= _FASTEST_COUNT, count),
+            ("max_gap", gap is None or gap > SHORTEST_GAP, "longer than the clock's 0.1 s"),
+        ):
+            require(is_valid, name, getattr(self, name), expected)
         if self.unit and self.scale:
             raise DataError("both unit and scale are given; expected one of them")
-        is_possible = rate is None or 1 <= rate <= _FASTEST_COUNT
-        require(is_possible, "frame_rate", rate, f"frames a second from 1 to {_FASTEST_COUNT:g}")
         if unknown := sorted(set(self.columns or ()) - set(COLUMN_NAMES)):
             raise DataError(f"columns: {unknown} are unknown; expected some of {list(COLUMN_NAMES)}")
         if {"t", "frame"} <= set(self.columns or ()):
@@ -100,7 +103,6 @@ class ReadOptions:
             raise DataError(
                 f"columns are for tidy tables; leave columns out, or file_format={self.file_format!r}"
             )
-        require(gap is None or gap > SHORTEST_GAP, "max_gap", gap, "longer than the clock's 0.1 s")
         try:
             zone = "UTC" if self.tz is None else self.tz
             ZoneInfo(zone)
@@ -129,14 +131,9 @@ def arguments(options: Mapping[str, Any]) -> str:
     """
     words = []
     for name, value in options.items():
-        is_columns = isinstance(value, Mapping)
-        text = (
-            ",".join(f"{key}={column}" for key, column in value.items())
-            if is_columns
-            else f"{value:g}"
-            if isinstance(value, float)
-            else value
-        )
+        text = f"{value:g}" if isinstance(value, float) else str(value)
+        if isinstance(value, Mapping):
+            text = ",".join(f"{key}={column}" for key, column in value.items())
         words += ["--" + name.removeprefix("file_").replace("_", "-"), text]
     return shlex.join(words)
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import io
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -199,13 +201,14 @@ class TrackFormat:
 
     def scan_rows(self, plain: Path) -> pl.LazyFrame:
         """Scan the lines of file `plain`: line, ragged and `columns`, as numbers or as `texts`."""
-        return self._scan_blanks(plain) if self.separator == " " else self._scan_separated(plain)
-
-    def _scan_separated(self, plain: Path) -> pl.LazyFrame:
+        source: Path | io.BytesIO = plain
+        if self.separator == " ":  # any run of blanks
+            lines = re.sub(rb"^[ \t\r]+|[ \t\r]+$", b"", plain.read_bytes(), flags=re.MULTILINE)
+            source = io.BytesIO(re.sub(rb"[ \t]+", b" ", lines))
         numbers = {index for name, index in self.columns.items() if name not in self.texts}
         fields = {f"f{i}": pl.Float64 if i in numbers else pl.String for i in range(self.n_fields)}
         scan = pl.scan_csv(
-            plain, schema={**fields, "extra": pl.String}, has_header=False, skip_lines=int(self.has_header),
+            source, schema={**fields, "extra": pl.String}, has_header=False, skip_lines=int(self.has_header),
             separator=self.separator, quote_char=self.quote, encoding="utf8-lossy", ignore_errors=True,
             truncate_ragged_lines=True,
             missing_columns="insert", extra_columns="ignore", raise_if_empty=False, glob=False,
@@ -220,15 +223,6 @@ class TrackFormat:
         if self.start:
             named["t"] = named["t"] + self.start
         return scan.select("line", ragged=ragged, **named)
-
-    def _scan_blanks(self, plain: Path) -> pl.LazyFrame:
-        text = plain.read_bytes().decode("utf-8", errors="replace").removeprefix("\ufeff").removesuffix("\n")
-        lines = pl.LazyFrame({"text": text.split("\n")[int(self.has_header) :]})
-        parts = pl.col("text").str.extract_all(r"\S+")
-        fields = {name: parts.list.get(i, null_on_oob=True) for name, i in self.columns.items()}
-        numbers = {n: f if n in self.texts else f.cast(pl.Float64, strict=False) for n, f in fields.items()}
-        rows = lines.with_row_index("line", offset=1 + self.has_header)
-        return rows.select("line", ragged=parts.list.len() != self.n_fields, **numbers)
 
 
 def decode_line(line: bytes) -> str:
