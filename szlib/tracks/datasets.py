@@ -54,6 +54,11 @@ class DataSet:
     hashes: dict[str, str]
     hash_file: Callable[[str], str]
 
+    def find_fault(self, file: Path) -> str:
+        """What is wrong with the content of a `file` of this name; empty if nothing is."""
+        found, expected = self.hash_file(str(file)), self.hashes[file.name]
+        return "" if found == expected else f"its hash is {found}, expected {expected}"
+
 
 def _read_hashes(name: str) -> dict[str, str]:
     """Hash by file name, from a list "hash  name"."""
@@ -152,10 +157,10 @@ def _fetch(store: pooch.Pooch, name: str, data: DataSet) -> Path:
     """A file from the cache, or downloaded into it; a file with a wrong hash does not stay there."""
     for _ in range(_ATTEMPTS):
         file = Path(store.fetch(name, progressbar=True))
-        if (found := data.hash_file(str(file))) == data.hashes[name]:
+        if not (fault := data.find_fault(file)):
             return file
         file.unlink()
-    raise OSError(f"{name}: its hash is {found}, expected {data.hashes[name]}")
+    raise OSError(f"{name}: {fault}")
 
 
 def _verify(file: Path, data: DataSet) -> Path:
@@ -164,10 +169,8 @@ def _verify(file: Path, data: DataSet) -> Path:
         raise DataError(
             f"{file}: no such file; ${DATA_DIR_VARIABLE} must name a folder with {file.parent.name}/ in it"
         )
-    if (found := data.hash_file(str(file))) != (expected := data.hashes[file.name]):
-        raise DataError(
-            f"{file}: its hash is {found}, expected {expected}; the file is damaged or of another version"
-        )
+    if fault := data.find_fault(file):
+        raise DataError(f"{file}: {fault}; the file is damaged or of another version")
     return file
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
@@ -203,7 +204,8 @@ class TrackFormat:
         """Scan the lines of file `plain`: line, ragged and `columns`, as numbers or as `texts`."""
         source: Path | io.BytesIO = plain
         if self.separator == " ":  # any run of blanks
-            lines = re.sub(rb"^[ \t\r]+|[ \t\r]+$", b"", plain.read_bytes(), flags=re.MULTILINE)
+            text = plain.read_bytes().removeprefix(codecs.BOM_UTF8)
+            lines = re.sub(rb"^[ \t\r]+|[ \t\r]+$", b"", text, flags=re.MULTILINE)
             source = io.BytesIO(re.sub(rb"[ \t]+", b" ", lines))
         numbers = {index for name, index in self.columns.items() if name not in self.texts}
         fields = {f"f{i}": pl.Float64 if i in numbers else pl.String for i in range(self.n_fields)}

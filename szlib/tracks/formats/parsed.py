@@ -6,6 +6,7 @@ and JuPedSim by PedPy, which comes with the extra `pedpy` and gives frames, ids 
 
 from __future__ import annotations
 
+import codecs
 import json
 import re
 from collections.abc import Callable
@@ -54,7 +55,7 @@ class _ParsedFormat(TrackFormat):
 
     def recognises(self, head: bytes) -> bool:
         """Whether `head`, the first line of a file, begins as in this format."""
-        return re.match(self.begins, head.removeprefix(b"\xef\xbb\xbf")) is not None
+        return re.match(self.begins, head.removeprefix(codecs.BOM_UTF8)) is not None
 
     def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> Opened:
         """As `TrackFormat.open`."""

@@ -67,11 +67,8 @@ class _Table(TrackFormat):
         shown = first if len(first) <= 80 else first[:77] + "..."
         found = find_columns(found, names, options, f"{path}, line 1: {shown!r}", sample)
         fields = [found.split(line) for line in lines if line]
-        texts = {
-            name
-            for name, k in found.columns.items()
-            if not all(is_number(f[k]) for f in fields if k < len(f))
-        }
+        is_text = {k for row in fields for k, text in enumerate(row) if not is_number(text)}
+        texts = {name for name, k in found.columns.items() if k in is_text}
         found = replace(found, texts=frozenset(texts | {"day", "id"}))
         return found.with_values(found.scan_rows(plain).collect(), options)
 
