@@ -124,8 +124,10 @@ def find_day(path: Path, options: ReadOptions) -> str | None:
     first = decode_line(read_first_line(path))
     try:
         layout = find_format(path, options)
+        if layout.is_sequence or not layout.separator:
+            return None
         time = float(layout.split(first)[layout.columns["t"]]) + layout.clock_start(path, first)
-        if layout.is_sequence or not time >= CALENDAR_BEGINS:
+        if not time >= CALENDAR_BEGINS:
             return None
         return datetime.fromtimestamp(time, ZoneInfo(options.tz or layout.tz)).strftime("%Y-%m-%d")
     except (LookupError, ValueError, OverflowError, OSError):  # a table, or a damaged first row
