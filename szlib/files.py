@@ -201,17 +201,31 @@ def temporary_folder() -> Iterator[Path]:
     """
     remove_abandoned_temporary()
     with _explain_errors("no temporary folder", "make room, or name another one in $TMPDIR"):
-        folder = Path(tempfile.mkdtemp(prefix=f"{_TEMPORARY}{os.getpid()}-"))
-        if folder.stat().st_mode & 0o700 != 0o700:
-            folder.rmdir()
-            raise StorageError("new files may not be used by their owner (umask); call umask 022 first")
-        lock = FileLock(folder / _LOCK)
-        lock.acquire()
+        while (locked := _make_temporary()) is None:
+            pass
+        folder, lock = locked
     try:
         yield folder
     finally:
         lock.release()
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _make_temporary() -> tuple[Path, FileLock] | None:
+    """Make and lock a temporary folder; None if another process removed it before it was locked."""
+    folder = Path(tempfile.mkdtemp(prefix=f"{_TEMPORARY}{os.getpid()}-"))
+    mode = folder.stat().st_mode
+    if mode & 0o700 != 0o700:
+        folder.rmdir()
+        raise StorageError("new files may not be used by their owner (umask); call umask 022 first")
+    lock = FileLock(folder / _LOCK)
+    with suppress(FileNotFoundError):
+        lock.acquire()
+        if (folder / _LOCK).is_file() and folder.stat().st_mode == mode:  # the lock makes a missing folder
+            return folder, lock
+        lock.release()
+        shutil.rmtree(folder, ignore_errors=True)
+    return None
 
 
 @cache

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import errno
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -116,6 +117,30 @@ def test_only_old_unfinished_files_are_removed(tmp_path: Path) -> None:
     make_old(folder / ".szlib-part-old")
     files.claim_folder(folder, "days")
     assert [path.name for path in folder.glob(".szlib-part-*")] == [".szlib-part-new"]
+
+
+@pytest.mark.parametrize("is_locked", [False, True])
+def test_a_temporary_folder_that_another_process_takes_for_abandoned_is_made_again(
+    is_locked: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between the making of its lock and the locking, another process may remove the folder."""
+    monkeypatch.setattr(files.tempfile, "tempdir", str(tmp_path))
+    acquire, removed = files.FileLock.acquire, list[Path]()
+
+    def acquire_late(lock: files.FileLock, *arguments: object, **named: object) -> object:
+        folder = Path(lock.lock_file).parent
+        if removed:
+            return acquire(lock, *arguments, **named)
+        removed.append(folder)
+        found = acquire(lock, *arguments, **named) if is_locked else None
+        shutil.rmtree(folder)
+        return found if is_locked else acquire(lock, *arguments, **named)
+
+    monkeypatch.setattr(files.FileLock, "acquire", acquire_late)
+    with files.temporary_folder() as folder:
+        assert folder.is_dir()
+        assert folder != removed[0]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_temporary_folders_are_removed_once_their_process_has_ended(
