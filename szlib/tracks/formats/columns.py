@@ -160,7 +160,7 @@ def _suggest(
             return f"people walk if these are {columns}; {advice}"
     listed = ", ".join(map(repr, filter(None, names[:12]))) or f"{len(names)} fields without a header"
     named = {**given, **dict.fromkeys(missing, "...")}
-    return f"it has {listed}; name the right ones: {advise(columns=named)}"
+    return f"it has {listed}; {advise(columns=named)}"
 
 
 def _as_floats(values: pl.Series) -> np.ndarray:
