@@ -1,7 +1,7 @@
 """A robot's own loop, without any framework: `python plain_loop.py`.
 
-Each 0.1 s: where the robot is, who is near, one step of the controller, one command. Replace the three functions
-below by those of your robot.
+Every 0.1 s it reads the robot's state and the people near it, takes one step of the controller, and sends one
+command. Replace the three functions below by those of your robot.
 """
 
 import szlib

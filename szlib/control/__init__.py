@@ -9,7 +9,7 @@ tracker               people from one measurement to the next: `Tracker`
 head_on               on which side the robot passes a person whom it meets head-on
 controller            the base class of controllers, and the robots that they drive: `Controller`
 routes                the shortest way around walls: `find_route`
-crowding              what the robot gives up among people who leave it no way: `Crowding`
+crowding              which barriers stay hard near several people, and which get a price
 scene                 what a step is asked
 step_clock            when a controller decides, with which state, and whether the robot makes progress
 step_report           a step checked again by formulas of its own: `StepReport`

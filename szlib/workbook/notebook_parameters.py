@@ -35,7 +35,7 @@ def _comment(body: str, node: ast.Assign) -> str:
 
 
 def describe_parameters(notebooks: Sequence[Path], meanings: Mapping[str, str]) -> str:
-    """List the parameters of the `notebooks` for a terminal: default, meaning, and who has them.
+    """List the parameters of the `notebooks` for a terminal: default, meaning, and numbers of notebooks.
 
     `meanings` replace missing and short comments.  Parameters that many notebooks have come first.
     """

@@ -3,9 +3,12 @@
     warm      the problem, from the last plan, changed as it changed in the step before
     cold      the problem, from full braking
     kept      the last plan, shifted, if it still satisfies the problem        terminal condition only
-    relaxed   the problem with penalised slack
+    relaxed   the problem with penalised slack, from the last plan (with a grid, or from braking)
     kept      the last plan, shifted, if it reaches a safe end                 terminal condition only
     braking   to rest as soon as the bounds allow
+
+With a grid the relaxed problem begins at braking where that violates less than the last plan, which may lead
+through a wall.
 
 When the time of a step is up, the remaining solvers are skipped. A relaxed plan that was cut short is used if
 it violates no more than braking does. For the reason of "kept" see `szlib.control.mpc`.

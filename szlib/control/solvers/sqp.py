@@ -195,7 +195,7 @@ class Sqp(ProblemSolver):
     def _linearise(self, sense: Any) -> bool:
         """Give the quadratic program at `_inputs` to DAQP; True if with the exact Hessian.
 
-        If it is told the kinds of constraints, `sense`, it forgets which ones were active; else it is None.
+        With `sense`, the kinds of constraints, DAQP forgets which ones were active; with None it does not.
         """
         self._at_inputs.derive()
         exact = bool(self._model.update(*self._program, sense) >= 0)
