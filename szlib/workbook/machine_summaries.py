@@ -42,7 +42,7 @@ def write_junit(summary: Mapping[str, Any], file: str | Path) -> None:
             result = f"{check['result']} ({format_value(check['value'])})"
             cases.append((check["name"], None if check["passed"] else "failure", result))
         kinds = [kind for _, kind, _ in cases]
-        seconds = str(outcome["seconds"])
+        seconds = f"{outcome['seconds']:.3f}"
         suite = ET.SubElement(root, "testsuite", name=name, tests=str(len(cases)), time=seconds)
         for kind, plural in (("failure", "failures"), ("error", "errors"), ("skipped", "skipped")):
             suite.set(plural, str(kinds.count(kind)))

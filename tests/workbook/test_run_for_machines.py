@@ -7,8 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from helpers.junit_schema import violations
 
 from szlib.workbook.cli import main
+from szlib.workbook.machine_summaries import write_junit
 
 pytestmark = pytest.mark.usefixtures("without_kernels")
 GOOD = 'record.check("sum", True, 2)\nrecord.claim("paper", False, 0.25)'
@@ -32,6 +34,7 @@ def test_junit_has_a_suite_for_each_notebook_and_a_case_for_each_check(
     assert run("--junit", "junit.xml") == 1, "written again"
     root = ET.parse("junit.xml").getroot()
     assert root.tag == "testsuites"
+    assert violations(root) == []
     suites = {suite.attrib["name"]: suite for suite in root}
     assert list(suites) == ["01_good", "02_bad", "03_crash"]
     cases = {name: [(c.attrib["name"], [e.tag for e in c]) for c in suite] for name, suite in suites.items()}
@@ -56,8 +59,35 @@ def test_undecided_and_not_started_notebooks_are_skipped_in_junit(
 ) -> None:
     notebooks(_02_wrong="import szlib\nraise szlib.DataError('wrong')", _07_later="")
     assert run("--junit", "junit.xml") == 2
-    tags = [[child.tag for child in case] for case in ET.parse("junit.xml").iter("testcase")]
+    root = ET.parse("junit.xml").getroot()
+    assert violations(root) == []
+    tags = [[child.tag for child in case] for case in root.iter("testcase")]
     assert tags == [["error"], ["skipped"]]
+
+
+@pytest.mark.parametrize("seconds", [0, 1e-5, 2.3456789, 98765.4])
+def test_junit_is_valid_in_the_schema_of_jenkins(tmp_path: Path, seconds: float) -> None:
+    """With every status, whatever the time, and with control characters in names and messages."""
+    check = {"kind": "check", "name": "\x00 < & \udc80", "result": "\x1b[0m", "value": None, "passed": False}
+    each = {"seconds": seconds, "checks": [check], "error": "ValueError: \x08"}
+    statuses = ("done", "error", "refused", "undecided", "not started")
+    outcomes = {status: {"status": status, **each} for status in statuses}
+    write_junit({"notebooks": outcomes}, tmp_path / "junit.xml")
+    assert violations(ET.parse(tmp_path / "junit.xml").getroot()) == []
+
+
+@pytest.mark.parametrize(
+    ("suite", "problem"),
+    [
+        ('<testsuite name="a" failures="0" errors="0"/>', "<testsuite> lacks tests"),
+        ('<testsuite name="a" tests="0" failures="0" errors="0" passed="1"/>', "<testsuite> has passed"),
+        ('<testsuite name="a" tests="0" failures="0" errors="0" time="1e-05"/>', "time='1e-05' is not"),
+        ('<testsuite name="a" tests="0" failures="0" errors="0"><failure/></testsuite>', "has <failure>"),
+        ('<testsuite name="a" tests="0" failures="0" errors="0">b</testsuite>', "has the text 'b'"),
+    ],
+)
+def test_the_schema_of_jenkins_refuses(suite: str, problem: str) -> None:
+    assert problem in "\n".join(violations(ET.fromstring(f"<testsuites>{suite}</testsuites>")))
 
 
 @pytest.mark.parametrize(
