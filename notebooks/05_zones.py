@@ -31,11 +31,12 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from laboratory import show_sliders
 
 import szlib
 from szlib.plaza.settings import PlazaSettings
 from szlib.simulation import paper_claims as claims
-from szlib.workbook import figures, laboratory
+from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 
 # %% tags=["parameters"]
@@ -207,9 +208,7 @@ record.figure(fig, "reach")
 
 # %%
 low, high = (round(v, 2) for v in zone.speed_range)
-laboratory.show_sliders(
-    lambda speed: figures.plot_zone(zone, speed), speed=(1.1, low + 0.1, high - 0.1, 0.05)
-)
+show_sliders(lambda speed: figures.plot_zone(zone, speed), speed=(1.1, low + 0.1, high - 0.1, 0.05))
 
 # %% [markdown]
 # ## The plaza and a real day, side by side

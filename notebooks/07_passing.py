@@ -38,12 +38,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown
+from laboratory import show_sliders
 from studies import gamma_table
 
 import szlib
 from szlib.simulation import paper_claims
 from szlib.simulation.metrics import find_avoidance_start
-from szlib.workbook import figures, laboratory
+from szlib.workbook import figures
 from szlib.workbook.record import NotebookRecord, settings_table
 
 # %% tags=["parameters"]
@@ -407,7 +408,7 @@ def run_with(gamma: float) -> None:
     szlib.simulate(scenario, other).plot()
 
 
-laboratory.show_sliders(run_with, gamma=(gamma, 0.01, max(0.2, gamma), 0.01))
+show_sliders(run_with, gamma=(gamma, 0.01, max(0.2, gamma), 0.01))
 
 # %% [markdown]
 # **What it means.** The minimum zone is a last boundary: the barrier turns distance into a speed limit, and gamma

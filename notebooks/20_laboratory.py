@@ -31,9 +31,10 @@
 # %%
 import numpy as np
 import pandas as pd
+from laboratory import Experiment, LaboratoryWidget, RobotOptions, is_interactive, make_scene
 
 import szlib
-from szlib.workbook import figures, laboratory
+from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
 
 # %% tags=["parameters"]
@@ -83,11 +84,11 @@ samples = record.cache.encounters()
 pace = record.cache.method.zone_speed
 hull = szlib.SocialZone.fit(samples, method="hull", speeds=(pace,), n_resamples=0)
 zones = {"quantile": record.cache.ellipse(), "hull": hull.ellipse(pace)}
-first = laboratory.RobotOptions(gamma, N_h, a_max, size, estimator)
-second = laboratory.RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)
+first = RobotOptions(gamma, N_h, a_max, size, estimator)
+second = RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)
 
 # %%
-scene = laboratory.make_scene(goal, person, speed, walls, start=[-4.0, 0.0])
+scene = make_scene(goal, person, speed, walls, start=[-4.0, 0.0])
 logs = {}
 for name, choice in (("A", first), ("B", second)):
     controller = szlib.MPCCBF(choice.zone(zones), walls=scene.walls, settings=choice.settings())
@@ -120,15 +121,13 @@ record.key |= {"A: time_to_goal": a["time_to_goal"], "B: time_to_goal": b["time_
 # chosen. *share* writes a parameter cell: put it below that of this notebook, and it begins with your scene.
 
 # %%
-laboratory.LaboratoryWidget(
-    laboratory.Experiment(scene, zones, [first, second])
-) if laboratory.is_interactive() else None
+LaboratoryWidget(Experiment(scene, zones, [first, second])) if is_interactive() else None
 
 # %% [markdown]
 # What is shown live is what `szlib.simulate` computes, step by step:
 
 # %%
-trial = laboratory.Experiment(scene, zones, [first, second])
+trial = Experiment(scene, zones, [first, second])
 same = []
 for k in range(min(60, *(len(log.states) for log in logs.values()))):
     same += [np.array_equal(x, log.states[k]) for x, log in zip(trial.states, logs.values(), strict=True)]

@@ -5,7 +5,6 @@ paper_sentences  every sentence of the paper that can be checked, and its verdic
 exercises     the tasks of the exercise sheets, with their checkers and hints
 folders       the folders of results
 record        what a notebook records, and the data that notebooks share
-laboratory    a scene that can be dragged and set while it runs
 runner        execution of all notebooks, with a summary
 notebook_execution, forked_kernel  execution of one notebook; kernels that start at once
 report        a run as one HTML file

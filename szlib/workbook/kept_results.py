@@ -18,9 +18,10 @@ SUMMARIES = ("21",)
 
 
 def package_checksum(notebooks: Path) -> str:
-    """SHA-256 of the code of szlib, and of the tables and studies that the `notebooks` use."""
+    """SHA-256 of the code of szlib, and of the tables, studies and laboratory that the `notebooks` use."""
     package = Path(__file__).parents[1]
-    parts = (package.rglob("*.*"), folders.NOTEBOOKS.glob("tables/*"), notebooks.glob("studies/*.py"))
+    beside = (notebooks.glob(f"{name}/*.*") for name in ("laboratory", "studies"))
+    parts = (package.rglob("*.*"), folders.NOTEBOOKS.glob("tables/*"), *beside)
     files = {file for part in parts for file in part if file.is_file() and file.suffix != ".pyc"}
     return _checksum([], sorted(files))
 

@@ -33,7 +33,7 @@ _STOPPING = Event()
 # A signal that stops a kernel and the run reaches the run within this time [s].
 _SIGNAL_DELAY = 1.0
 # The notebooks that import a package beside them, and so need their folder on the module path.
-NEEDS_FOLDER = re.compile(r"^from studies\b", re.MULTILINE)
+NEEDS_FOLDER = re.compile(r"^from (?:laboratory|studies)\b", re.MULTILINE)
 # The record of a notebook that wrote none.
 EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
 

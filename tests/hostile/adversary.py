@@ -32,8 +32,9 @@ PLANTED = [
     "cloudpickle", "loky", "jupytext", "papermill", "nbformat", "nbclient", "nbconvert", "ipykernel",
     "IPython", "ipykernel_launcher", "jupyter_client", "jupyter_core", "zmq", "tornado", "traitlets",
     "anywidget", "ipywidgets", "jinja2", "bs4", "latex2mathml", "distributed", "dask", "szlib", "studies",
-    "helpers", "sitecustomize", "usercustomize", "conftest", "ipython_config", "ipython_kernel_config",
-    "jupyter_config", "typing_extensions", "matplotlib_inline", "debugpy", "comm", "decorator",
+    "laboratory", "helpers", "sitecustomize", "usercustomize", "conftest", "ipython_config",
+    "ipython_kernel_config", "jupyter_config", "typing_extensions", "matplotlib_inline", "debugpy", "comm",
+    "decorator",
 ]  # fmt: skip
 KERNEL = {"display_name": "python3", "language": "python"}
 SCRIPTS = [

@@ -3,11 +3,11 @@
 from dataclasses import asdict
 from threading import Thread
 
+import laboratory
 import numpy as np
 import pytest
 
 import szlib
-from szlib.workbook import laboratory
 
 ZONES = {"quantile": szlib.Ellipse((0.05, 0.0), (0.95, 0.75)), "hull": szlib.Ellipse((0.0, 0.0), (0.9, 0.7))}
 WALLS = [-6.0, 2.3, 7.0, 2.3, -6.0, -2.3, 7.0, -2.3]

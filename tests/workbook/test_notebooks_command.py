@@ -33,7 +33,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
 def test_the_wheel_holds_the_workbook_and_stays_small(wheel: zipfile.ZipFile) -> None:
     inside = {name.removeprefix("szlib/workbook/notebooks/") for name in wheel.namelist()}
     notebooks = ROOT / "notebooks"
-    parts = ("[0-9]*.py", "studies/*.py", "exercises/*.py", "solutions/*.py", "tables/*.csv", "examples/*.py")
+    rooms = ("laboratory", "studies", "exercises", "solutions", "examples")
+    parts = ("[0-9]*.py", "laboratory/*.js", "tables/*.csv", *(f"{room}/*.py" for room in rooms))
     expected = {file.relative_to(notebooks).as_posix() for part in parts for file in notebooks.glob(part)}
     assert len(expected) > 70 and expected <= inside
     assert {name for name in inside if name.startswith("figures/")} == {

@@ -1,7 +1,7 @@
 """The laboratory: one scene with several robots, which a user drags and sets while it runs.
 
 `Experiment` holds the scene and its robots.  `LaboratoryWidget` shows it in JupyterLab or in the classic
-notebook, on a canvas that `static/laboratory.js` draws.  The page asks for each step, and the kernel computes
+notebook, on a canvas that `laboratory.js` draws.  The page asks for each step, and the kernel computes
 it.  The widget uses anywidget, which needs no build step and no extension of JupyterLab.
 """
 
@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from math import cos, degrees, radians, sin
+from pathlib import Path
 from typing import Any
 
 import anywidget
@@ -19,19 +20,19 @@ import numpy as np
 import shapely
 import traitlets
 
-from ..checks import Array, check_array, check_number, require
-from ..control.acceleration_polygon import find_admissible_controls
-from ..control.controller import advance
-from ..control.mpc import MPCCBF
-from ..control.person import Person
-from ..control.settings import MPCSettings
-from ..control.step import Step
-from ..errors import SolverError, SzlibError
-from ..simulation.scenario import Scenario
-from ..zones.ellipses import Ellipse
-from . import folders
-from .figures.movies import read_scripts, scene_layout, snapshot
-from .record.parameters import RANGES
+from szlib.checks import Array, check_array, check_number, require
+from szlib.control.acceleration_polygon import find_admissible_controls
+from szlib.control.controller import advance
+from szlib.control.mpc import MPCCBF
+from szlib.control.person import Person
+from szlib.control.settings import MPCSettings
+from szlib.control.step import Step
+from szlib.errors import SolverError, SzlibError
+from szlib.simulation.scenario import Scenario
+from szlib.workbook import folders
+from szlib.workbook.figures.movies import read_scripts, scene_layout, snapshot
+from szlib.workbook.record.parameters import RANGES
+from szlib.zones.ellipses import Ellipse
 
 _MARGIN = 0.7  # around everything that can be dragged [m]
 _FARTHEST = 1e4  # largest coordinate [m]
@@ -59,7 +60,7 @@ class RobotOptions:
 
     Examples
     --------
-    >>> from szlib.workbook import laboratory
+    >>> import laboratory
     >>> laboratory.RobotOptions(gamma=0.2).settings().gamma
     0.2
     """
@@ -120,7 +121,7 @@ class Experiment:
     Examples
     --------
     >>> import szlib
-    >>> from szlib.workbook import laboratory
+    >>> import laboratory
     >>> zones = {"quantile": szlib.Ellipse((0.05, 0.0), (0.95, 0.75))}
     >>> scene = laboratory.make_scene((4, 0), (2, 0, 180), 0.5, [], start=(-4, 0))
     >>> experiment = laboratory.Experiment(scene, zones, [laboratory.RobotOptions()])
@@ -258,7 +259,7 @@ def make_scene(
 
     Examples
     --------
-    >>> from szlib.workbook import laboratory
+    >>> import laboratory
     >>> scene = laboratory.make_scene((4, 0), (2, 0, 180), 0.5, [], start=(-4, 0))
     >>> scene.people[0].position
     (2.0, 0.0)
@@ -291,7 +292,7 @@ def is_interactive() -> bool:
 
     Examples
     --------
-    >>> from szlib.workbook import laboratory
+    >>> import laboratory
     >>> laboratory.is_interactive()
     False
     """
@@ -308,7 +309,7 @@ def show_sliders(draw: Callable[..., object], **sliders: tuple[float, float, flo
 
     Examples
     --------
-    >>> from szlib.workbook import laboratory
+    >>> import laboratory
     >>> laboratory.show_sliders(lambda speed: print(speed), speed=(1.0, 0.5, 1.5, 0.1))
     """
     if not is_interactive():
@@ -337,7 +338,7 @@ class LaboratoryWidget(anywidget.AnyWidget):
     Examples
     --------
     >>> import szlib
-    >>> from szlib.workbook import laboratory
+    >>> import laboratory
     >>> zones = {"quantile": szlib.Ellipse((0.05, 0.0), (0.95, 0.75))}
     >>> scene = laboratory.make_scene((4, 0), (2, 0, 180), 0.5, [], start=(-4, 0))
     >>> experiment = laboratory.Experiment(scene, zones, [laboratory.RobotOptions()])
@@ -346,7 +347,7 @@ class LaboratoryWidget(anywidget.AnyWidget):
     True
     """
 
-    _esm = read_scripts("scene", "laboratory")
+    _esm = read_scripts("scene") + (Path(__file__).with_name("laboratory.js")).read_text(encoding="utf-8")
     content = traitlets.Dict().tag(sync=True)
 
     def __init__(self, experiment: Experiment) -> None:
@@ -418,7 +419,7 @@ class LaboratoryWidget(anywidget.AnyWidget):
 def _robot_snapshot(
     t: float, state: Array, people: Sequence[Person], zone: Ellipse, step: Step
 ) -> dict[str, Any]:
-    """One time of one robot, for `static/laboratory.js`."""
+    """One time of one robot, for `laboratory.js`."""
     placed = np.array([(*p.position, p.heading or 0.0) for p in people]).reshape(-1, 3)
     zones = [zone] * len(people)
     parts = shapely.get_parts(find_admissible_controls(step).polygon.simplify(0.01))  # 0.01 m/s2 off
