@@ -47,7 +47,6 @@
 # %%
 import szlib
 from szlib.workbook import folders
-from szlib.workbook.exercises import SHEETS
 from szlib.workbook.record import NotebookRecord
 
 # %% tags=["parameters"]
@@ -58,9 +57,10 @@ results = "../results"
 
 # %%
 record = NotebookRecord("00_start_here", globals())
-tasks = [task for sheet in SHEETS.values() for task in sheet]
-print(f"szlib {szlib.__version__}: {len(folders.list_notebooks())} notebooks, {len(tasks)} exercises")
-record.key["exercises"] = len(tasks)
+sheets = [file.read_text(encoding="utf-8") for file in folders.NOTEBOOKS.glob("exercises/sheet*.py")]
+record.key["exercises"] = sum(sheet.count("\njudges.check(") for sheet in sheets)
+n_exercises = record.key["exercises"]
+print(f"szlib {szlib.__version__}: {len(folders.list_notebooks())} notebooks, {n_exercises} exercises")
 ours, paper = szlib.MPCSettings(), szlib.MPCSettings.paper()
 for settings in (ours, paper):
     numbers = (settings.dt, settings.N, settings.N_h, settings.v_max, settings.r_robot, settings.eps)
@@ -116,8 +116,8 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb), [19](19_atlas.ipynb), [20](20_laboratory.ipynb), [21](21_sentences.ipynb) | 2 h 45 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
 
 # %% [markdown]
-# **The exercises** are functions that you write. `exercises.check("velocity", velocity)` asks yours for cases
-# that it draws afresh and says in words what is right or wrong; `exercises.hint("velocity", 1)` gives a hint,
+# **The exercises** are functions that you write. `judges.check("velocity", velocity)` asks yours for cases
+# that it draws afresh and says in words what is right or wrong; `judges.hint("velocity", 1)` gives a hint,
 # 3 is nearly the solution. The solutions lie apart, in `solutions/`. For a class,
 # `python notebooks/tools/sheets.py --class FOLDER` makes a course of [nbgrader](https://nbgrader.readthedocs.io)
 # (`pip install nbgrader`): what is handed out, and checks that give points, one for each minute.

@@ -15,7 +15,7 @@
 # # Sheet 1 - Tracks and meetings
 #
 # Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `exercises.hint("velocity", 1)` prints a hint, 2 the next, 3 is nearly
+# words what is right or wrong. `judges.hint("velocity", 1)` prints a hint, 2 the next, 3 is nearly
 # the solution. Units are metres, seconds and radians throughout.
 
 # %% [markdown]
@@ -24,11 +24,12 @@
 # [01](../01_tracks.ipynb), [02](../02_encounters.ipynb), [14](../14_data_quality.ipynb)
 
 # %%
+import judges
 import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib.workbook import exercises, figures
+from szlib.workbook import figures
 
 # %% [markdown]
 # ## 1.1 Velocity (5 min)
@@ -47,7 +48,7 @@ def velocity(path, k, half):
 
 
 # %%
-exercises.check("velocity", velocity)
+judges.check("velocity", velocity)
 
 # %% [markdown]
 # ## 1.2 The line of sight (10 min)
@@ -77,7 +78,7 @@ def line_of_sight(ref, heading, other):
 
 
 # %%
-exercises.check("line_of_sight", line_of_sight)
+judges.check("line_of_sight", line_of_sight)
 
 # %% [markdown]
 # ## 1.3 The attentional space (15 min)
@@ -99,7 +100,7 @@ def in_space(ref, heading, others):
 
 
 # %%
-exercises.check("in_space", in_space)
+judges.check("in_space", in_space)
 
 # %% [markdown]
 # ## 1.4 What one sample a second loses (20 min)
@@ -117,4 +118,4 @@ def one_hertz(radius, speed, interval):
 
 
 # %%
-exercises.check("one_hertz", one_hertz)
+judges.check("one_hertz", one_hertz)

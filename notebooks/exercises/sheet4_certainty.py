@@ -15,7 +15,7 @@
 # # Sheet 4 - How sure?
 #
 # Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `exercises.hint("p_value", 1)` prints a hint, 2 the next, 3 is nearly
+# words what is right or wrong. `judges.hint("p_value", 1)` prints a hint, 2 the next, 3 is nearly
 # the solution.
 
 # %% [markdown]
@@ -25,10 +25,11 @@
 # [16](../16_claims.ipynb)
 
 # %%
+import judges
 import matplotlib.pyplot as plt
 import numpy as np
 
-from szlib.workbook import exercises, figures
+from szlib.workbook import figures
 
 # %% [markdown]
 # ## 4.1 The quantile zone in one direction (10 min)
@@ -47,7 +48,7 @@ def quantile_radius(nearest, q):
 
 
 # %%
-exercises.check("quantile_radius", quantile_radius)
+judges.check("quantile_radius", quantile_radius)
 
 # %% [markdown]
 # ## 4.2 Why the hull shrinks (15 min)
@@ -65,7 +66,7 @@ def expected_nearest(mean, n):
 
 
 # %%
-exercises.check("expected_nearest", expected_nearest)
+judges.check("expected_nearest", expected_nearest)
 
 # %%
 counts = np.geomspace(10, 1000, 20).astype(int)
@@ -101,7 +102,7 @@ def p_value(observed, null):
 
 
 # %%
-exercises.check("p_value", p_value)
+judges.check("p_value", p_value)
 
 # %% [markdown]
 # ## 4.4 The null model (15 min)
@@ -120,4 +121,4 @@ def shifted(t, person, shift, period):
 
 
 # %%
-exercises.check("shifted", shifted)
+judges.check("shifted", shifted)

@@ -15,7 +15,7 @@
 # # Sheet 6 - The robot
 #
 # Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `exercises.hint("speed_limit", 1)` prints a hint, 2 the next, 3 is
+# words what is right or wrong. `judges.hint("speed_limit", 1)` prints a hint, 2 the next, 3 is
 # nearly the solution.
 
 # %% [markdown]
@@ -27,11 +27,12 @@
 # [21](../21_sentences.ipynb)
 
 # %%
+import judges
 import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib.workbook import exercises, figures
+from szlib.workbook import figures
 
 # %% [markdown]
 # ## 6.1 The speed limit (5 min)
@@ -49,7 +50,7 @@ def speed_limit(h, gamma, dt, person_speed):
 
 
 # %%
-exercises.check("speed_limit", speed_limit)
+judges.check("speed_limit", speed_limit)
 
 # %% [markdown]
 # ## 6.2 gamma by experiment (40 min)
@@ -77,7 +78,7 @@ def largest_gamma(zone, a_max, gammas):
 
 
 # %%
-exercises.check("largest_gamma", largest_gamma)
+judges.check("largest_gamma", largest_gamma)
 
 # %% [markdown]
 # ## 6.3 The terminal proof (15 min)
@@ -96,7 +97,7 @@ def next_plan(plan):
 
 
 # %%
-exercises.check("next_plan", next_plan)
+judges.check("next_plan", next_plan)
 
 # %% [markdown]
 # ## 6.4 Predict, then run (20 min)
@@ -120,4 +121,4 @@ def prediction():
 
 
 # %%
-exercises.check("prediction", prediction)
+judges.check("prediction", prediction)

@@ -15,7 +15,7 @@
 # # Sheet 2 - Inside out
 #
 # Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `exercises.hint("complementary", 1)` prints a hint, 2 the next, 3 is
+# words what is right or wrong. `judges.hint("complementary", 1)` prints a hint, 2 the next, 3 is
 # nearly the solution.
 
 # %% [markdown]
@@ -24,10 +24,17 @@
 # [solved](../solutions/sheet2_outliers.ipynb) · 55 min · belongs to [03](../03_outliers.ipynb)
 
 # %%
+# Solution: the judges are in the folder of the sheets.
+import sys
+
+sys.path.append("../exercises")
+
+# %%
+import judges
 import matplotlib.pyplot as plt
 import numpy as np
 
-from szlib.workbook import exercises, figures
+from szlib.workbook import figures
 
 # %% [markdown]
 # ## 2.1 Complementary coordinates (5 min)
@@ -47,7 +54,7 @@ def complementary(los_angle, distance, r_max):
 
 
 # %%
-exercises.check("complementary", complementary)
+judges.check("complementary", complementary)
 
 # %% [markdown]
 # ## 2.2 The nearest approach (10 min)
@@ -66,7 +73,7 @@ def nearest(samples):
 
 
 # %%
-exercises.check("nearest", nearest)
+judges.check("nearest", nearest)
 
 # %% [markdown]
 # ## 2.3 Who is found (10 min)
@@ -86,7 +93,7 @@ def found(removed, intruder):
 
 
 # %%
-exercises.check("found", found)
+judges.check("found", found)
 
 # %% [markdown]
 # ## 2.4 LOF's blind spot (30 min)
@@ -108,7 +115,7 @@ def blind_spot(cloud):
 
 
 # %%
-exercises.check("blind_spot", blind_spot)
+judges.check("blind_spot", blind_spot)
 
 # %% [markdown]
 # **Solution.** Among its 20 nearest neighbours each of the 31 samples finds only samples of the same

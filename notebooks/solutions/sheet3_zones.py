@@ -15,7 +15,7 @@
 # # Sheet 3 - From samples to a zone
 #
 # Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `exercises.hint("crossing", 1)` prints a hint, 2 the next, 3 is nearly
+# words what is right or wrong. `judges.hint("crossing", 1)` prints a hint, 2 the next, 3 is nearly
 # the solution.
 
 # %% [markdown]
@@ -25,11 +25,18 @@
 # [05](../05_zones.ipynb)
 
 # %%
+# Solution: the judges are in the folder of the sheets.
+import sys
+
+sys.path.append("../exercises")
+
+# %%
+import judges
 import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib.workbook import exercises, figures
+from szlib.workbook import figures
 
 # %% [markdown]
 # ## 3.1 A slice by hand (10 min)
@@ -49,7 +56,7 @@ def crossing(a, b, speed):
 
 
 # %%
-exercises.check("crossing", crossing)
+judges.check("crossing", crossing)
 
 # %% [markdown]
 # ## 3.2 The zone that a slice leaves (25 min)
@@ -85,7 +92,7 @@ def zone_radius(polygon, theta, r_max):
 
 
 # %%
-exercises.check("zone_radius", zone_radius)
+judges.check("zone_radius", zone_radius)
 
 # %% [markdown]
 # ## 3.3 The smallest ellipse (20 min)
@@ -105,7 +112,7 @@ def triangle_ellipse(triangle):
 
 
 # %%
-exercises.check("triangle_ellipse", triangle_ellipse)
+judges.check("triangle_ellipse", triangle_ellipse)
 
 # %% [markdown]
 # ## 3.4 A zone of your own (an evening, 150 min)
@@ -139,4 +146,4 @@ def my_zone(samples):
 
 
 # %%
-exercises.check("my_zone", my_zone)
+judges.check("my_zone", my_zone)

@@ -15,7 +15,7 @@
 # # Sheet 5 - Barriers
 #
 # Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `exercises.hint("barrier_row", 1)` prints a hint, 2 the next, 3 is
+# words what is right or wrong. `judges.hint("barrier_row", 1)` prints a hint, 2 the next, 3 is
 # nearly the solution.
 
 # %% [markdown]
@@ -25,11 +25,18 @@
 # [06b](../06b_build_a_controller.ipynb), [11](../11_feasibility.ipynb), [12](../12_distances.ipynb)
 
 # %%
+# Solution: the judges are in the folder of the sheets.
+import sys
+
+sys.path.append("../exercises")
+
+# %%
+import judges
 import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib.workbook import exercises, figures
+from szlib.workbook import figures
 
 # %% [markdown]
 # ## 5.1 Focal distance (15 min)
@@ -55,7 +62,7 @@ def focal_distance(points, center, semi_axes, angle):
 
 
 # %%
-exercises.check("focal_distance", focal_distance)
+judges.check("focal_distance", focal_distance)
 
 # %% [markdown]
 # ## 5.2 The distance to a wall (15 min)
@@ -81,7 +88,7 @@ def wall_distance(points, a, b):
 
 
 # %%
-exercises.check("wall_distance", wall_distance)
+judges.check("wall_distance", wall_distance)
 
 # %% [markdown]
 # ## 5.3 A barrier row (10 min)
@@ -102,7 +109,7 @@ def barrier_row(d_now, d_next, gamma, r_robot, eps):
 
 
 # %%
-exercises.check("barrier_row", barrier_row)
+judges.check("barrier_row", barrier_row)
 
 # %% [markdown]
 # ## 5.4 The margin at the end of a wall (20 min)
@@ -123,7 +130,7 @@ def end_margin(r_robot, length):
 
 
 # %%
-exercises.check("end_margin", end_margin)
+judges.check("end_margin", end_margin)
 
 # %% [markdown]
 # **Solution.** It comes to r^2 / L: with the paper's robot (0.5 m) and margin (5 cm) a wall must be 5

@@ -15,7 +15,7 @@
 # # Sheet 6 - The robot
 #
 # Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `exercises.hint("speed_limit", 1)` prints a hint, 2 the next, 3 is
+# words what is right or wrong. `judges.hint("speed_limit", 1)` prints a hint, 2 the next, 3 is
 # nearly the solution.
 
 # %% [markdown]
@@ -27,11 +27,18 @@
 # [21](../21_sentences.ipynb)
 
 # %%
+# Solution: the judges are in the folder of the sheets.
+import sys
+
+sys.path.append("../exercises")
+
+# %%
+import judges
 import matplotlib.pyplot as plt
 import numpy as np
 
 import szlib
-from szlib.workbook import exercises, figures
+from szlib.workbook import figures
 
 # %% [markdown]
 # ## 6.1 The speed limit (5 min)
@@ -50,7 +57,7 @@ def speed_limit(h, gamma, dt, person_speed):
 
 
 # %%
-exercises.check("speed_limit", speed_limit)
+judges.check("speed_limit", speed_limit)
 
 # %% [markdown]
 # ## 6.2 gamma by experiment (40 min)
@@ -86,7 +93,7 @@ def largest_gamma(zone, a_max, gammas):
 
 
 # %%
-exercises.check("largest_gamma", largest_gamma)
+judges.check("largest_gamma", largest_gamma)
 
 # %% [markdown]
 # **Solution.** Straight ahead the barrier allows $v = \gamma h / \Delta t$, so $h$ falls off as
@@ -112,7 +119,7 @@ def next_plan(plan):
 
 
 # %%
-exercises.check("next_plan", next_plan)
+judges.check("next_plan", next_plan)
 
 # %% [markdown]
 # **Solution.** Its states are $\mathbf{x}_1, \dots, \mathbf{x}_N, \mathbf{x}_N$. All rows but the
@@ -147,4 +154,4 @@ def prediction():
 
 
 # %%
-exercises.check("prediction", prediction)
+judges.check("prediction", prediction)

@@ -8,6 +8,7 @@ glossary, are in this file. A test checks that the cells in the notebooks are up
 
 import math
 import re
+import sys
 import textwrap
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ import jupytext
 import nbformat
 
 HERE = Path(__file__).parents[1]
+sys.path.append(str(HERE / "exercises"))  # the judges
 START = "00_start_here"
 PAPER = "https://arxiv.org/abs/2405.15101"
 WORDS, LINES = 120, 15
@@ -249,7 +251,7 @@ def make_navigation(page: Page, story: list[Page], uses: dict[str, str]) -> str:
 
 def make_sheet_navigation(name: str) -> str:
     """The navigation cell of an exercise sheet, the same in both folders."""
-    from szlib.workbook.exercises import SHEETS
+    from judges import SHEETS
 
     names, minutes = list(SHEETS), sum(task.minutes for task in SHEETS[name])
     at = names.index(name)
@@ -279,7 +281,7 @@ def make_map(story: list[Page]) -> str:
 
 def make_routes(story: list[Page]) -> str:
     """The cell of 00 with the three routes."""
-    from szlib.workbook.exercises import SHEETS
+    from judges import SHEETS
 
     rows = ["## Three routes", ""]
     for name, numbers in ROUTES:

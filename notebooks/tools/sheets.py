@@ -11,8 +11,10 @@ among the packages of the workbook: `pip install nbgrader` first.
 
 import argparse
 import re
+import shutil
 import subprocess
 import sys
+from itertools import chain
 from pathlib import Path
 
 import jupytext
@@ -21,13 +23,29 @@ from nbclient import NotebookClient
 
 HERE = Path(__file__).parents[1]
 SOLUTIONS, EXERCISES = HERE / "solutions", HERE / "exercises"
+sys.path.append(str(EXERCISES))  # the judges
+JUDGES, UNNEEDED = EXERCISES / "judges", shutil.ignore_patterns("__pycache__")
 SOLVED = re.compile(r"^( *)### BEGIN SOLUTION\n.*?### END SOLUTION$", re.DOTALL | re.MULTILINE)
 STUB = r"\1# YOUR CODE HERE\n\1raise NotImplementedError()"
-REMARK = re.compile(r"\n# %% \[markdown\]\n# \*\*Solution\.\*\*.*(?:\n#.*)*\n")
-CHECK = re.compile(r'^exercises\.check\("(\w+)", \w+\)$')
+REMARK = re.compile(
+    r"\n# %% \[markdown\]\n# \*\*Solution\.\*\*.*(?:\n#.*)*\n"
+    r"|\n# %%\n# Solution: (?:.*\n)*?(?=\n# %%)"
+)
+CHECK = re.compile(r'^judges\.check\("(\w+)", \w+\)$')
 CONFIG = """c = get_config()
 c.CourseDirectory.course_id = "szlib"
 c.ExecutePreprocessor.timeout = 120
+"""
+LECTURER = """# A course of szlib
+
+Run these commands in this folder; students need szlib, lecturers szlib and nbgrader.
+
+1. Hand out `release/SHEET`: the sheet, and the folder `judges`, which must stay beside it.
+2. Put what a student hands in into `submitted/STUDENT/SHEET/SHEET.ipynb`.
+3. `nbgrader autograde SHEET` runs each submission with your `judges`, not with the student's.
+4. `nbgrader export --to grades.csv` writes the points: one a minute of each task that passes.
+5. Grade the essay of each sheet by its rubric: `nbgrader formgrader` in JupyterLab shows it beside the answer.
+6. `nbgrader generate_feedback SHEET` writes `feedback/STUDENT/SHEET/SHEET.html`.
 """
 
 
@@ -62,6 +80,8 @@ def make_sheets(*, text_only: bool = False) -> None:
         exercise = EXERCISES / source.name
         exercise.write_text(make_exercise(text), encoding="utf-8")
         sheet, solved = (jupytext.reads(each, fmt="py:percent") for each in (make_exercise(text), text))
+        for number, cell in chain(enumerate(sheet.cells), enumerate(solved.cells)):
+            cell.id = f"{source.stem[:6]}-{number}"  # the same identifiers at every execution
         jupytext.write(_copy_with_text(sheet, exercise) or sheet, exercise.with_suffix(".ipynb"))
         copy = _copy_with_text(solved, source) if text_only else None
         if copy is None:
@@ -85,7 +105,7 @@ def _copy_with_text(new: nbformat.NotebookNode, script: Path) -> nbformat.Notebo
 
 def make_course(folder: Path) -> None:
     """Write a course of nbgrader into `folder`; nbgrader then makes the sheets for students, `release/`."""
-    from szlib.workbook.exercises import SHEETS
+    from judges import SHEETS
 
     for name, tasks in SHEETS.items():
         place = folder / "source" / name
@@ -93,12 +113,14 @@ def make_course(folder: Path) -> None:
         text = (SOLUTIONS / f"{name}.py").read_text(encoding="utf-8")
         sheet = make_graded(text, {task.name: task.minutes for task in tasks})
         jupytext.write(sheet, place / f"{name}.ipynb")
+        shutil.copytree(JUDGES, place / "judges", dirs_exist_ok=True, ignore=UNNEEDED)
     (folder / "nbgrader_config.py").write_text(CONFIG, encoding="utf-8")
     for name in SHEETS:
         command = ["-m", "nbgrader", "generate_assignment", name, "--create", "--force"]
         subprocess.run([sys.executable, *command], cwd=folder, check=True)
+    (folder / "README.md").write_text(LECTURER, encoding="utf-8")
     print(
-        f"{folder / 'release'} holds the sheets for students; grade them with `nbgrader autograde` in {folder}"
+        f"{folder / 'release'} holds the sheets for students; {folder / 'README.md'} says how to grade them"
     )
 
 

@@ -2,7 +2,6 @@
 
 figures       every figure, one file a room
 paper_sentences  every sentence of the paper that can be checked, and its verdict in a run
-exercises     the tasks of the exercise sheets, with their checkers and hints
 folders       the folders of results
 record        what a notebook records, and the data that notebooks share
 runner        execution of all notebooks, with a summary

@@ -93,8 +93,8 @@ def test_an_exercise_is_solved(notebook, copy):
     saved = opened.save()
     assert errors(saved) == []
     outputs = {c.source: str(c.outputs) for c in saved.cells if c.cell_type == "code"}
-    assert "passed - focal_distance" in outputs['exercises.check("focal_distance", focal_distance)']
-    assert "not yet - wall_distance" in outputs['exercises.check("wall_distance", wall_distance)']
+    assert "passed - focal_distance" in outputs['judges.check("focal_distance", focal_distance)']
+    assert "not yet - wall_distance" in outputs['judges.check("wall_distance", wall_distance)']
     assert answer in [cell.source for cell in jupytext.read(opened.file.with_suffix(".py")).cells]
 
 

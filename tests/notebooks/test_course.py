@@ -6,10 +6,10 @@ from collections import Counter
 
 import jupytext
 import pytest
+from judges import SHEETS
 
 import szlib
 from szlib.workbook import folders
-from szlib.workbook.exercises import SHEETS
 
 
 def _course():

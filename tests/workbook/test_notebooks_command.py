@@ -33,8 +33,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
 def test_the_wheel_holds_the_workbook_and_stays_small(wheel: zipfile.ZipFile) -> None:
     inside = {name.removeprefix("szlib/workbook/notebooks/") for name in wheel.namelist()}
     notebooks = ROOT / "notebooks"
-    rooms = ("laboratory", "studies", "exercises", "solutions", "examples")
-    parts = ("[0-9]*.py", "laboratory/*.js", "tables/*.csv", *(f"{room}/*.py" for room in rooms))
+    rooms = ("laboratory", "studies", "exercises", "exercises/judges", "solutions", "examples")
+    texts = ("laboratory/*.js", "exercises/judges/*.toml", "tables/*.csv")
+    parts = ("[0-9]*.py", *texts, *(f"{room}/*.py" for room in rooms))
     expected = {file.relative_to(notebooks).as_posix() for part in parts for file in notebooks.glob(part)}
     assert len(expected) > 70 and expected <= inside
     assert {name for name in inside if name.startswith("figures/")} == {

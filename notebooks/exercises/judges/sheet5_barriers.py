@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ...control.barriers import barrier, cbf_residual, ellipse_distance, segment_distance
-from ...control.distances import euclidean_to_segment, required_margin
-from ...zones.ellipses import Ellipse
+from szlib.control.barriers import barrier, cbf_residual, ellipse_distance, segment_distance
+from szlib.control.distances import euclidean_to_segment, required_margin
+from szlib.zones.ellipses import Ellipse
+
 from .task import Rng, formula, make_task
 
 

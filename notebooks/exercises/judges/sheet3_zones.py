@@ -11,13 +11,14 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from ...encounters.finding import find_encounters
-from ...plaza.generation import make_plaza
-from ...plaza.settings import SLOW_INTRUDERS, PlazaSettings
-from ...tracks.clock import read_tracks
-from ...zones.ellipses import Ellipse
-from ...zones.enclosing_ellipse import minimum_enclosing_ellipse
-from ...zones.hulls import Slice
+from szlib.encounters.finding import find_encounters
+from szlib.plaza.generation import make_plaza
+from szlib.plaza.settings import SLOW_INTRUDERS, PlazaSettings
+from szlib.tracks.clock import read_tracks
+from szlib.zones.ellipses import Ellipse
+from szlib.zones.enclosing_ellipse import minimum_enclosing_ellipse
+from szlib.zones.hulls import Slice
+
 from .task import Case, Rng, formula, make_task
 
 _TOLERANCE = 0.08  # largest error of the learner's zone, in centre and semi-axes [m]

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...plaza.accuracy import precision_and_recall
-from ...zones.outliers import N_NEIGHBOURS, complementary_points, local_outlier_factors
+from szlib.plaza.accuracy import precision_and_recall
+from szlib.zones.outliers import N_NEIGHBOURS, complementary_points, local_outlier_factors
+
 from .task import Case, Rng, formula, make_task
 
 _WINDOW = 31  # samples of one encounter: 3 s at 10 Hz

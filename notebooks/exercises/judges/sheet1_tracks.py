@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ...encounters.geometry import AttentionalSpace, wrap_angle
+from szlib.encounters.geometry import AttentionalSpace, wrap_angle
+
 from .task import Rng, formula, make_task
 
 _TICK = 0.1  # of the common clock [s]

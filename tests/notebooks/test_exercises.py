@@ -11,11 +11,11 @@ import matplotlib.pyplot as plt
 import nbformat
 import numpy as np
 import pytest
+from judges import SHEETS, Task, check, hint, sheet6_robot
+from judges.task import load_texts
 
 import szlib
 from szlib.workbook import folders
-from szlib.workbook.exercises import SHEETS, Task, check, hint, sheet6_robot
-from szlib.workbook.exercises.task import load_texts
 
 TASKS = {
     task.name: (sheet, number, task) for sheet, tasks in SHEETS.items() for number, task in enumerate(tasks)
@@ -246,7 +246,7 @@ class TestSheet:
         outputs = [
             out["data"]["text/plain"]
             for c in copy
-            if c.source.startswith("exercises.check")
+            if c.source.startswith("judges.check")
             for out in c.outputs
         ]
         assert [line.split(" - ")[0] for line in outputs] == ["passed"] * len(SHEETS[sheet])
@@ -255,7 +255,7 @@ class TestSheet:
         monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
         found: dict[str, object] = {}
         for cell in cells(sheets.EXERCISES / f"{sheet}.py"):
-            if cell.cell_type == "code" and not cell.source.startswith("exercises.check"):
+            if cell.cell_type == "code" and not cell.source.startswith("judges.check"):
                 exec(cell.source, found)
 
     def test_each_check_of_a_class_is_graded_and_locked(self, sheet):

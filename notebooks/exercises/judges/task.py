@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...errors import SzlibError
+from szlib.errors import SzlibError
 
 Answer = Callable[..., Any]
 # The arguments for the learner's function, and the correct answer.
@@ -42,7 +42,7 @@ class Verdict:
 
     Examples
     --------
-    >>> from szlib.workbook.exercises import Verdict
+    >>> from judges import Verdict
     >>> Verdict("velocity", True, "correct in 5 fresh cases")
     passed - velocity: correct in 5 fresh cases
     """
@@ -81,7 +81,7 @@ class Task:
     Examples
     --------
     >>> import numpy as np
-    >>> from szlib.workbook.exercises import Task
+    >>> from judges import Task
     >>> double = Task("double", 1, (), lambda rng: ((3.0,), 6.0), {"you add 2": lambda x: x + 2}, unit="m")
     >>> double.check(lambda x: x + 2, np.random.default_rng(0))
     not yet - double: you add 2: expected 6.0 m; got 5.0 for (3.0)

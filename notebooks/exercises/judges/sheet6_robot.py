@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ...control.mpc import MPCCBF
-from ...control.settings import MPCSettings
-from ...simulation.closed_loop import simulate
-from ...simulation.metrics import find_avoidance_start
-from ...simulation.scenarios.paper import SCENARIOS
-from ...zones.ellipses import Ellipse
+from szlib.control.mpc import MPCCBF
+from szlib.control.settings import MPCSettings
+from szlib.simulation.closed_loop import simulate
+from szlib.simulation.metrics import find_avoidance_start
+from szlib.simulation.scenarios.paper import SCENARIOS
+from szlib.zones.ellipses import Ellipse
+
 from .task import Case, Rng, formula, make_task
 
 _GAMMAS = (0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.12, 0.15, 0.2)  # that the experiment tries

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import DataError
+from szlib.errors import DataError
+
 from . import sheet1_tracks, sheet2_outliers, sheet3_zones, sheet4_certainty, sheet5_barriers, sheet6_robot
 from .task import Answer, Task, Verdict
 
@@ -34,10 +35,10 @@ def check(name: str, answer: Answer, *, seed: int | None = None) -> Verdict:
 
     Examples
     --------
-    >>> from szlib.workbook import exercises
+    >>> import judges
     >>> def speed_limit(h, gamma, dt, person_speed):
     ...     return gamma * h / dt - person_speed
-    >>> exercises.check("speed_limit", speed_limit)
+    >>> judges.check("speed_limit", speed_limit)
     passed - speed_limit: correct in 5 fresh cases
     """
     task = _find_task(name)
@@ -60,8 +61,8 @@ def hint(name: str, number: int = 1) -> None:
 
     Examples
     --------
-    >>> from szlib.workbook import exercises
-    >>> exercises.hint("velocity", 1)
+    >>> import judges
+    >>> judges.hint("velocity", 1)
     hint 1 of 3: Velocity is displacement divided by time.
     """
     hints = _find_task(name).hints
