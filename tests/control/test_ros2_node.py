@@ -1,4 +1,4 @@
-"""The ROS 2 node of notebooks/examples, without ROS: stubs of rclpy and messages, a robot that obeys."""
+"""The ROS 2 nodes of notebooks/examples, without ROS: stubs of rclpy and messages, a robot that obeys."""
 
 from math import hypot
 
@@ -17,28 +17,43 @@ GOAL = (5.0, 0.5)
 pytestmark = pytest.mark.filterwarnings("ignore::szlib.errors.DataWarning")  # a zone of nobody's data
 
 
+CLASSES = {"ros2_node": "SocialDrive", "ros2_node_full": "FullSocialDrive"}
+
+
+@pytest.fixture(params=CLASSES)
+def make_either(request, monkeypatch, tmp_path):
+    """A node with these parameters: the short one, or the full one without TF."""
+    yield from maker(monkeypatch, tmp_path, request.param)
+
+
+@pytest.fixture
+def make_short(monkeypatch, tmp_path):
+    """The short node with these parameters."""
+    yield from maker(monkeypatch, tmp_path, "ros2_node")
+
+
 @pytest.fixture
 def make(monkeypatch, tmp_path):
-    """A node with these parameters, without TF."""
-    yield from maker(monkeypatch, tmp_path, tf=False)
+    """The full node with these parameters, without TF."""
+    yield from maker(monkeypatch, tmp_path, "ros2_node_full")
 
 
 @pytest.fixture
 def make_with_tf(monkeypatch, tmp_path):
-    """A node with these parameters, and with TF."""
-    yield from maker(monkeypatch, tmp_path, tf=True)
+    """The full node with these parameters, and with TF."""
+    yield from maker(monkeypatch, tmp_path, "ros2_node_full", tf=True)
 
 
-def maker(monkeypatch, tmp_path, tf):
+def maker(monkeypatch, tmp_path, module_name, tf=False):
     """How to make a node."""
     shape = PolarZone(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
     szlib.SocialZone(shape, 2.0, {1.1: ZONE}).save(tmp_path / "zone.json")
-    with ros.node_module(tf) as module:
+    with ros.node_module(module_name, tf) as module:
 
         def node(**parameters):
             given = {"zone": str(tmp_path / "zone.json"), "v_max": 1.0} | parameters
             monkeypatch.setattr(Node, "given", given)
-            return module.SocialDrive()
+            return getattr(module, CLASSES[module_name])()
 
         yield node
 
@@ -68,8 +83,8 @@ def drive(node, walker, steps, silent=(), late=0.04):
     return path
 
 
-def test_the_robot_reaches_its_goal_past_a_person(make):
-    node = make(walls="-1 3 7 3; -1 -3 7 -3")
+def test_the_robot_reaches_its_goal_past_a_person(make_either):
+    node = make_either(walls="-1 3 7 3; -1 -3 7 -3")
     hear(node, "goal_pose", goal(*GOAL))
     walker = (4.0, 0.2, -0.4, 0.0)
     path = drive(node, walker, 150)
@@ -82,8 +97,8 @@ def test_the_robot_reaches_its_goal_past_a_person(make):
 
 
 @pytest.mark.parametrize("topic", ["odom", "people"])
-def test_the_robot_stops_when_a_topic_falls_silent(make, topic):
-    node = make()
+def test_the_robot_stops_when_a_topic_falls_silent(make_either, topic):
+    node = make_either()
     hear(node, "goal_pose", goal(*GOAL))
     path = drive(node, (4.0, 2.5, 0.0, 0.0), 60, silent=(topic,))
     commands = np.array([command for _, command in path])
@@ -98,8 +113,8 @@ def test_the_robot_stops_when_a_topic_falls_silent(make, topic):
     assert abs(again[0]) <= 2 * 0.1
 
 
-def test_the_robot_waits_for_odometry_people_and_goal(make):
-    node = make()
+def test_the_robot_waits_for_odometry_people_and_goal(make_either):
+    node = make_either()
     assert not tick(node).any()
     hear(node, "odom", odometry(np.zeros(5)))
     hear(node, "people", people())
@@ -128,13 +143,13 @@ def test_odometry_that_is_not_finite_is_ignored(make):
     assert tick(node).any()
 
 
-def test_the_robot_stays_clear_of_people_whose_numbers_cannot_be_used(make):
-    node = make()
+def test_the_robot_stays_clear_of_people_whose_numbers_cannot_be_used(make_either):
+    node = make_either()
     hear(node, "goal_pose", goal(*GOAL))
     hear(node, "odom", odometry(np.zeros(5)))
     hear(node, "people", people(("anna", (np.nan, 0.0, 0.0, 0.0))))
     assert np.abs(tick(node)).max() < 1e-3
-    assert "1 unknown" in node.logged[-1]
+    assert "1 are unknown" in node.logged[-1]
 
 
 @pytest.mark.parametrize("w", [0.0, 0.9, 2.0, np.nan])
@@ -170,24 +185,24 @@ def test_messages_in_frames_that_tf_knows_are_brought_into_the_frame_of_the_wall
     hear(node, "odom", odometry(np.array([3.0, -1.0, 0.5, 0.2, 0.1]), frame="camera"))
     assert node.own == pytest.approx([2.0, 5.0, 0.5 + np.pi / 2, 0.2, 0.1])
     hear(node, "people", people(("anna", (3.0, -1.0, 0.4, 0.0)), frame="camera"))
-    assert node.read_people(Node.now)[0] == pytest.approx(np.array([[2.0, 5.0, 0.0, 0.4]]))
+    assert node.people == pytest.approx(np.array([[2.0, 5.0, 0.0, 0.4]]))
     hear(node, "goal_pose", goal(1.0, 1.0, frame="camera"))
     assert node.goal == pytest.approx((0.0, 3.0))
     hear(node, "goal_pose", goal(1.0, 1.0, frame="unknown"))
     hear(node, "people", people(frame="broken"))
-    assert node.goal == pytest.approx((0.0, 3.0)) and len(node.people.people) == 1
+    assert node.goal == pytest.approx((0.0, 3.0)) and len(node.people) == 1
     assert "unknown does not exist" in node.logged[0] and "is no rotation" in node.logged[1]
 
 
-def test_a_robot_that_is_stuck_says_why(make):
-    node = make(walls="1.2 -3 1.2 3; -3 -3 -3 3; -3 -3 1.2 -3; -3 3 1.2 3")
+def test_a_robot_that_is_stuck_says_why(make_either):
+    node = make_either(walls="1.2 -3 1.2 3; -3 -3 -3 3; -3 -3 1.2 -3; -3 3 1.2 3")
     hear(node, "goal_pose", goal(*GOAL))
     drive(node, (-4.0, 3.0, 0.0, 0.0), 110)
     assert any("no progress for" in said and "held by wall 0" in said for said in node.logged)
 
 
-def test_a_goal_inside_a_wall_is_dropped_with_an_error(make):
-    node = make(walls="4 -3 4 3")
+def test_a_goal_inside_a_wall_is_dropped_with_an_error(make_either):
+    node = make_either(walls="4 -3 4 3")
     hear(node, "odom", odometry(np.zeros(5)))
     hear(node, "people", people())
     hear(node, "goal_pose", goal(3.95, 0.0))
@@ -205,7 +220,7 @@ def test_the_costmap_lies_where_the_people_are(make):
     tick(node)
     (grid,) = node.published["social_costmap"]
     assert (grid.header.frame_id, grid.info.width, grid.info.height) == ("odom", 80, 80)
-    assert grid.header.stamp == node.people.header.stamp
+    assert grid.header.stamp == node.people_stamp
     corner = grid.info.origin.position
     costs = np.reshape(grid.data, (80, 80))
     assert costs.max() == 100
@@ -218,6 +233,20 @@ def test_the_costmap_lies_where_the_people_are(make):
 def test_a_missing_zone_parameter_is_named_in_the_error(make):
     with pytest.raises(szlib.ZoneError, match="parameter `zone`"):
         make(zone="")
+
+
+def test_a_zone_that_does_not_exist_is_refused(make_either):
+    with pytest.raises(szlib.ZoneError, match=r"nowhere\.json"):
+        make_either(zone="nowhere.json")
+
+
+def test_the_short_node_stands_still_when_a_number_of_its_odometry_is_not_finite(make_short):
+    node = make_short()
+    hear(node, "people", people())
+    hear(node, "goal_pose", goal(*GOAL))
+    hear(node, "odom", odometry(np.array([0.0, np.nan, 0.0, 0.0, 0.0])))
+    assert not tick(node).any()
+    assert "the goal is dropped: state must be finite" in node.logged[-1]
 
 
 def test_a_map_gives_walls_in_the_frame_of_the_walls(make_with_tf, monkeypatch):

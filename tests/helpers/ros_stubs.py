@@ -1,6 +1,6 @@
-"""ROS 2, as far as notebooks/examples/ros2_node.py needs it: stubs of rclpy and of messages."""
+"""ROS 2, as far as the nodes of notebooks/examples need it: stubs of rclpy and of messages."""
 
-import importlib.util
+import importlib
 import sys
 from contextlib import contextmanager
 from copy import deepcopy
@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from unittest import mock
 
-NODE = Path(__file__).parents[2] / "notebooks" / "examples" / "ros2_node.py"
+EXAMPLES = Path(__file__).parents[2] / "notebooks" / "examples"
 START = 1.75e9
 
 
@@ -51,9 +51,7 @@ class Node:
         self.logged += (
             [] if type(self.given.get(name, value)) is type(value) else [f"{name} has another type"]
         )
-
-    def get_parameter(self, name):
-        return SimpleNamespace(value=self.given.get(name, sys.modules["ros2_node"].DEFAULTS[name]))
+        return SimpleNamespace(value=self.given.get(name, value))
 
     def create_subscription(self, msg_type, topic, callback, qos_profile):
         self.subscribed[topic] = (msg_type, callback)
@@ -98,14 +96,14 @@ class Buffer:
 
 
 @contextmanager
-def node_module(tf=False):
-    """The module of the node, which finds these stubs in place of ROS, with TF or without it."""
+def node_module(node_name, tf=False):
+    """The module of a node, which finds these stubs in place of ROS, with TF or without it."""
     contents = {
         "rclpy": {"init": None, "spin": None, "try_shutdown": None},
         "rclpy.node": {"Node": Node},
         "rclpy.executors": {"ExternalShutdownException": RuntimeError},
         "rclpy.qos": {"QoSProfile": SimpleNamespace, "DurabilityPolicy": SimpleNamespace(TRANSIENT_LOCAL=1)},
-        "rclpy.time": {"Time": SimpleNamespace(from_msg=lambda stamp: stamp)},
+        "rclpy.time": {"Time": SimpleNamespace(from_msg=time_of)},
         "geometry_msgs": {},
         "geometry_msgs.msg": {"Twist": Twist, "TwistStamped": TwistStamped, "PoseStamped": PoseStamped},
         "nav_msgs": {},
@@ -121,11 +119,17 @@ def node_module(tf=False):
     modules = {name: ModuleType(name) for name in contents}
     for name, content in contents.items():
         vars(modules[name]).update(content)
-    spec = importlib.util.spec_from_file_location("ros2_node", NODE)
-    modules["ros2_node"] = module = importlib.util.module_from_spec(spec)
-    with mock.patch.dict(sys.modules, modules), mock.patch.multiple(Node, given={}, now=START):
-        spec.loader.exec_module(module)
-        yield module
+    path = [str(EXAMPLES), *sys.path]
+    with (
+        mock.patch.dict(sys.modules, modules),
+        mock.patch.multiple(Node, given={}, now=START),
+        mock.patch.object(sys, "path", path),
+    ):
+        yield importlib.import_module(node_name)
+
+
+def time_of(stamp):
+    return SimpleNamespace(nanoseconds=stamp.sec * 10**9 + stamp.nanosec)
 
 
 def stamp_of(when):
