@@ -25,7 +25,7 @@ def clean(results: Path) -> None:
     """Remove from the folder of all `results` what szlib wrote, and the folders that are then empty."""
     for folder in (*results.glob("*"), *results.glob("lab/*")):
         if read_purpose(folder).startswith(RUN) and not folder.is_symlink():
-            if read_purpose(folder / "days") == DAYS:  # of notebook 14
+            if read_purpose(folder / "days") == DAYS:  # of notebook 24
                 shutil.rmtree(folder / "days")
             remove(folder, OF_RUN)
     remove(results / "site", OF_SITE)

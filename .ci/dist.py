@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 EXCLUDED = shutil.ignore_patterns(".git", ".venv", "results", "dist", "__pycache__", ".*_cache", ".hyp*")
 # What the wheel holds of the notebooks.
 NOTEBOOKS = (
-    "[0-9]*.py", "laboratory/*.py", "laboratory/*.js", "studies/*.py", "exercises/*.py",
+    "[0-9]*.py", "deeper/*.py", "laboratory/*.py", "laboratory/*.js", "studies/*.py", "exercises/*.py",
     "exercises/judges/*.*", "solutions/*.py", "examples/*.py", "tables/*.csv",
     "figures/zone.png", "figures/making_room.gif",
 )  # fmt: skip

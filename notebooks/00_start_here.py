@@ -36,7 +36,7 @@
 # For students of robotics, control or pedestrian dynamics in their last year, for researchers who want to
 # use the method on their own data or robot, and for lecturers. You should read Python (NumPy, pandas) and
 # know vectors, derivatives, and what a mean and a quantile are. Control theory is explained from the
-# beginning in notebook 06. Of the tools you need only this repository: the README's two commands set it
+# beginning in notebook 07. Of the tools you need only this repository: the README's two commands set it
 # up. No data has to be fetched: by default everything runs on a synthetic plaza whose true zone is known.
 #
 # Each notebook begins with a question and an expectation, asks its data, and ends with what it means. A
@@ -81,39 +81,39 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # | [3 - Outliers](03_outliers.ipynb) | Some people brush past each other, and some tracks are wrong. Which samples say nothing about the distance that people keep? | 20 min |
 # | [4 - The hull and its slices](04_hull.ipynb) | From scattered samples to a boundary: how near did people come, in each direction, at each walking speed? | 10 min |
 # | [5 - Social zones](05_zones.ipynb) | Can a robot carry the zone along? | 15 min |
-# | [6 - Barriers](06_barriers.ipynb) | How does "stay out of the zone" become something that a controller can obey, ten times a second? | 10 min |
-# | [6b - Build the controller yourself](06b_build_a_controller.ipynb) | What does it take to turn the barrier condition of notebook 06 into a robot that drives? | 25 min |
-# | [7 - Passing a person who stands](07_passing.ipynb) | A person stands in the way and looks at the robot. When does the robot begin to go around them, and what decides that? | 25 min |
-# | [8 - Meeting in a narrow corridor](08_corridor.ipynb) | A person walks towards the robot in a corridor. There is room for both, but not much. Who slows the robot down: the person, or the wall? | 15 min |
-# | [9 - Yielding by waiting](09_waiting.ipynb) | A passage is too narrow for two, and a person is in it. No rule says who goes first. Who decides, and what does waiting look like to a solver? | 15 min |
-# | [10 - Yielding by making room](10_making_room.ipynb) | This time the robot is *in* the passage when the person comes. It wants to go ahead. What makes it go back? | 20 min |
-# | [11 - Feasibility](11_feasibility.ipynb) | A hard constraint is a promise only while the problem has a solution. When does it lose it, what happens then, and can one have a promise that is kept for ever? | 20 min |
-# | [12 - The distances, audited](12_distances.ipynb) | The barriers use *approximate* distances to zones and walls, and a margin of 5 cm "since the approximated distance function contains some errors" (sec. 4). Where do they err, to which side, and is the margin enough? | 15 min |
-# | [13 - Against everything else](13_comparison.ipynb) | Is the fitted ellipse worth its trouble? | 15 min |
-# | [14 - Data quality](14_data_quality.ipynb) | Before anything is learned from a file of tracks: can it be trusted, and which days are unlike the others? | 15 min |
-# | [15 - Respect or emptiness?](15_respect.ipynb) | Around a walking person there is a place where nobody is. Do people keep out of it, or is it only rare that two of them are anywhere near each other? | 30 min |
-# | [16 - What is true?](16_claims.ipynb) | What does the paper claim, and what of it does the data support? | 35 min |
-# | [17 - Other people's crowds](17_crowds.ipynb) | So far everybody walked as this workbook made them walk. What becomes of the robot among people who walk by somebody else's model and react to it - and among people who were recorded, and would have walked like that whatever it does? | 30 min |
-# | [18 - Eleven meetings](18_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 15 min |
-# | [19 - A sensitivity atlas](19_atlas.ipynb) | Notebooks 08 to 10 show one corridor, one passage, one pace, one zone. What would the robot have done in others? | 15 min |
-# | [20 - The laboratory](20_laboratory.ipynb) | What does the robot do if *you* put the person somewhere else, move the goal, narrow the corridor, or change gamma while it drives? | 10 min |
-# | [21 - From sentence to verdict](21_sentences.ipynb) | Which sentences of the paper say something that can be checked, and does each of them hold? | 5 min |
+# | [6 - Respect or emptiness?](06_respect.ipynb) | Around a walking person there is a place where nobody is. Do people keep out of it, or is it only rare that two of them are anywhere near each other? | 30 min |
+# | [7 - Barriers](07_barriers.ipynb) | How does "stay out of the zone" become something that a controller can obey, ten times a second? | 10 min |
+# | [8 - Build the controller yourself](08_build_a_controller.ipynb) | What does it take to turn the barrier condition of notebook 07 into a robot that drives? | 25 min |
+# | [9 - Passing a person who stands](09_passing.ipynb) | A person stands in the way and looks at the robot. When does the robot begin to go around them, and what decides that? | 25 min |
+# | [10 - Meeting in a narrow corridor](10_corridor.ipynb) | A person walks towards the robot in a corridor. There is room for both, but not much. Who slows the robot down: the person, or the wall? | 15 min |
+# | [11 - Yielding by waiting](11_waiting.ipynb) | A passage is too narrow for two, and a person is in it. No rule says who goes first. Who decides, and what does waiting look like to a solver? | 15 min |
+# | [11b - Yielding by making room](11b_making_room.ipynb) | This time the robot is *in* the passage when the person comes. It wants to go ahead. What makes it go back? | 20 min |
+# | [12 - Other people's crowds](12_among_people.ipynb) | So far everybody walked as this workbook made them walk. What becomes of the robot among people who walk by somebody else's model and react to it - and among people who were recorded, and would have walked like that whatever it does? | 35 min |
+# | [13 - The laboratory](13_laboratory.ipynb) | What does the robot do if *you* put the person somewhere else, move the goal, narrow the corridor, or change gamma while it drives? | 10 min |
+# | [21 - Feasibility](deeper/21_feasibility.ipynb) | A hard constraint is a promise only while the problem has a solution. When does it lose it, what happens then, and can one have a promise that is kept for ever? | 20 min |
+# | [22 - The distances, audited](deeper/22_distances.ipynb) | The barriers use *approximate* distances to zones and walls, and a margin of 5 cm "since the approximated distance function contains some errors" (sec. 4). Where do they err, to which side, and is the margin enough? | 15 min |
+# | [23 - Against everything else](deeper/23_comparison.ipynb) | Is the fitted ellipse worth its trouble? | 15 min |
+# | [24 - Data quality](deeper/24_data_quality.ipynb) | Before anything is learned from a file of tracks: can it be trusted, and which days are unlike the others? | 15 min |
+# | [25 - What is true?](deeper/25_claims.ipynb) | What does the paper claim, and what of it does the data support? | 35 min |
+# | [26 - Eleven meetings](deeper/26_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 15 min |
+# | [27 - A sensitivity atlas](deeper/27_atlas.ipynb) | Notebooks 10 to 11b show one corridor, one passage, one pace, one zone. What would the robot have done in others? | 15 min |
+# | [28 - From sentence to verdict](deeper/28_sentences.ipynb) | Which sentences of the paper say something that can be checked, and does each of them hold? | 5 min |
 
 # %% [markdown]
 # ## Three routes
 #
-# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [08](08_corridor.ipynb), [20](20_laboratory.ipynb): 1 h 05 min to read.
-# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [11](11_feasibility.ipynb), [16](16_claims.ipynb), [21](21_sentences.ipynb): 4 h 00 min to read.
+# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 1 h 05 min to read.
+# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb): 4 h 05 min to read.
 # - **Six weeks: the course.** One exercise sheet a week; running and looking around come on top.
 #
 # | week | topic | notebooks | to read | sheet | to do |
 # |---|---|---|---|---|---|
-# | 1 | People: who is where, who meets whom | [01](01_tracks.ipynb), [02](02_encounters.ipynb), [14](14_data_quality.ipynb) | 40 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 50 min |
-# | 2 | Which samples to believe | [03](03_outliers.ipynb) | 20 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 55 min |
-# | 3 | From samples to a zone | [04](04_hull.ipynb), [05](05_zones.ipynb) | 25 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
-# | 4 | How sure? Respect or emptiness | [15](15_respect.ipynb), [16](16_claims.ipynb) | 1 h 05 min | [sheet 4](exercises/sheet4_certainty.ipynb) | 50 min |
-# | 5 | Barriers, and a controller of your own | [06](06_barriers.ipynb), [06b](06b_build_a_controller.ipynb), [11](11_feasibility.ipynb), [12](12_distances.ipynb) | 1 h 10 min | [sheet 5](exercises/sheet5_barriers.ipynb) | 1 h 00 min |
-# | 6 | The robot among people | [07](07_passing.ipynb), [08](08_corridor.ipynb), [09](09_waiting.ipynb), [10](10_making_room.ipynb), [13](13_comparison.ipynb), [17](17_crowds.ipynb), [18](18_meetings.ipynb), [19](19_atlas.ipynb), [20](20_laboratory.ipynb), [21](21_sentences.ipynb) | 2 h 45 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
+# | 1 | People: who is where, who meets whom | [01](01_tracks.ipynb), [02](02_encounters.ipynb) | 25 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 50 min |
+# | 2 | Which samples to believe, and the nearest people | [03](03_outliers.ipynb), [04](04_hull.ipynb) | 30 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 55 min |
+# | 3 | From samples to a zone | [05](05_zones.ipynb) | 15 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
+# | 4 | Respect or emptiness; from a zone to a barrier | [06](06_respect.ipynb), [07](07_barriers.ipynb) | 40 min | [sheet 4](exercises/sheet4_certainty.ipynb), [sheet 5](exercises/sheet5_barriers.ipynb) | 1 h 50 min |
+# | 5 | A controller of your own, and its first meetings | [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb) | 1 h 05 min |  | 0 min |
+# | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 1 h 20 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
 
 # %% [markdown]
 # **The exercises** are functions that you write. `judges.check("velocity", velocity)` asks yours for cases
@@ -129,33 +129,33 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # |---|---|---|
 # | ATC | a shopping mall in Osaka whose visitors were tracked on 92 days | [01](01_tracks.ipynb) |
 # | attentional space | the 4 m by 5 m ahead of a person that are watched for others | [02](02_encounters.ipynb) |
-# | barrier function | h: 0 at the edge of what is allowed, positive inside of it | [06](06_barriers.ipynb) |
-# | bootstrap | draw people anew from those there are, many times, to see how far a result moves | [13](13_comparison.ipynb) |
-# | CBF-QP | a quadratic program for one step: as near to the wanted control as the barrier allows | [06b](06b_build_a_controller.ipynb) |
-# | class K | of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is gamma times h | [06](06_barriers.ipynb) |
+# | barrier function | h: 0 at the edge of what is allowed, positive inside of it | [07](07_barriers.ipynb) |
+# | bootstrap | draw people anew from those there are, many times, to see how far a result moves | [23](deeper/23_comparison.ipynb) |
+# | CBF-QP | a quadratic program for one step: as near to the wanted control as the barrier allows | [08](08_build_a_controller.ipynb) |
+# | class K | of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is gamma times h | [07](07_barriers.ipynb) |
 # | complementary distance | r' = r_max - r, large for who is near | [03](03_outliers.ipynb) |
 # | EWAP | the walking pedestrians recorded at ETH Zürich, and the format of their files, `obsmat` | [01](01_tracks.ipynb) |
-# | exact penalty | a price on violations so high that none is paid where a solution without violations exists | [11](11_feasibility.ipynb) |
-# | fallback | which of the controller's ways to a control was taken: hard, relaxed, shifted, braking | [11](11_feasibility.ipynb) |
+# | exact penalty | a price on violations so high that none is paid where a solution without violations exists | [21](deeper/21_feasibility.ipynb) |
+# | fallback | which of the controller's ways to a control was taken: hard, relaxed, shifted, braking | [21](deeper/21_feasibility.ipynb) |
 # | funnel | how many rows came in, went on, and why the others did not | [01](01_tracks.ipynb) |
-# | horizon | the number of steps that a plan looks ahead, N, or that obey the barrier, N_h | [06b](06b_build_a_controller.ipynb) |
+# | horizon | the number of steps that a plan looks ahead, N, or that obey the barrier, N_h | [08](08_build_a_controller.ipynb) |
 # | hull | the smallest convex body around points | [04](04_hull.ipynb) |
-# | infeasible | of a step: no plan obeys all rows, so one that violates them least is taken, and flagged | [07](07_passing.ipynb) |
-# | IPOPT | the solver for nonlinear optimisation that the paper uses | [06b](06b_build_a_controller.ipynb) |
-# | jerk | the change of acceleration by time | [13](13_comparison.ipynb) |
+# | infeasible | of a step: no plan obeys all rows, so one that violates them least is taken, and flagged | [09](09_passing.ipynb) |
+# | IPOPT | the solver for nonlinear optimisation that the paper uses | [08](08_build_a_controller.ipynb) |
+# | jerk | the change of acceleration by time | [12](12_among_people.ipynb) |
 # | line-of-sight angle | LOS: where the other person is, seen from the reference pedestrian | [02](02_encounters.ipynb) |
 # | LOF | local outlier factor: how isolated a sample is, compared with its neighbours | [03](03_outliers.ipynb) |
-# | MPC | model predictive control: plan some steps ahead, take the first, plan again | [06b](06b_build_a_controller.ipynb) |
-# | null model | the same people, each moved in time, so that they ignore each other | [15](15_respect.ipynb) |
-# | ORCA | a model of walking: each of two people takes half of what keeps them apart | [17](17_crowds.ipynb) |
+# | MPC | model predictive control: plan some steps ahead, take the first, plan again | [08](08_build_a_controller.ipynb) |
+# | null model | the same people, each moved in time, so that they ignore each other | [06](06_respect.ipynb) |
+# | ORCA | a model of walking: each of two people takes half of what keeps them apart | [12](12_among_people.ipynb) |
 # | plaza | synthetic people whose zone is known, to prove the method on | [01](01_tracks.ipynb) |
 # | precision, recall | of what was removed, the share that should be; of what should be, the share that was | [03](03_outliers.ipynb) |
 # | quantile zone | what all but a share q of encounters keep out of | [05](05_zones.ipynb) |
 # | reference pedestrian | the one of two people from whom the other is looked at | [02](02_encounters.ipynb) |
-# | respect zone | the ellipse that careful people keep out of, compared with people who ignore each other | [15](15_respect.ipynb) |
-# | slack | by how much a row is violated | [06b](06b_build_a_controller.ipynb) |
-# | social force | people who are pushed by others and by walls, and drawn to their goal | [17](17_crowds.ipynb) |
-# | SQP | sequential quadratic programming: solve quadratic problems in a row, each around the last answer | [06b](06b_build_a_controller.ipynb) |
+# | respect zone | the ellipse that careful people keep out of, compared with people who ignore each other | [06](06_respect.ipynb) |
+# | slack | by how much a row is violated | [08](08_build_a_controller.ipynb) |
+# | social force | people who are pushed by others and by walls, and drawn to their goal | [12](12_among_people.ipynb) |
+# | SQP | sequential quadratic programming: solve quadratic problems in a row, each around the last answer | [08](08_build_a_controller.ipynb) |
 # | tidy | of a table: one row for each observation, one column for each quantity | [01](01_tracks.ipynb) |
 # | window | the 3 s for which two people are watched | [02](02_encounters.ipynb) |
 
@@ -198,7 +198,7 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # | time step; N; $N_h$; speed limit (Euclidean) | 0.1 s; 8; 2; 1 m/s | paper |
 # | robot radius; margin $\epsilon$ | 0.5 m; 0.05 m, more at the ends of short walls ($r^2 / L$) | paper; measured |
 # | quantile q; encounters needed on each side | 5 %; 20 | assumed |
-# | companions; shifts of the null model | see notebook 15; 1 to 10 min | measured; assumed |
+# | companions; shifts of the null model | see notebook 06; 1 to 10 min | measured; assumed |
 # | gamma | 0.05 | tuned on the four scenarios |
 # | Q; R; P | diag(10, 10, 1, 1); I; 10 Q | assumed |
 # | acceleration limit per axis | 1 m/s2 | assumed |

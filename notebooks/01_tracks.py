@@ -89,7 +89,7 @@ raw.head(3)
 # Sensors see people at irregular times. `to_clock` interpolates to multiples of 0.1 s *within*
 # gap-free pieces - a person who vanishes behind somebody and comes back is not bridged - and
 # takes velocity from the displacement over one second. It never reads the velocity column of a file:
-# notebook 14 shows what noise does to it.
+# notebook 24 shows what noise does to it.
 
 # %%
 people = clock.to_clock(raw, max_gap=options.max_gap)

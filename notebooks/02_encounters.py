@@ -126,7 +126,7 @@ if data == "atc-1hz":
 #
 # The paper takes everybody. But two people who walk together keep near each other by choice. The kind of an
 # encounter is decided on the whole common track of the two people, and kept in the column `kind`;
-# `szlib.of_kind(samples, "strangers")` leaves companions out. Notebooks 05, 15 and 16 show both.
+# `szlib.of_kind(samples, "strangers")` leaves companions out. Notebooks 05, 06 and 25 show both.
 
 # %%
 kinds = first["kind"].value_counts()

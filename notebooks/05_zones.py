@@ -22,8 +22,9 @@
 # farther ahead than behind.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [4 - The hull and its slices](04_hull.ipynb) · next: [6 -
-# Barriers](06_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 15 min to read
+# [Start](00_start_here.ipynb) · before: [4 - The hull and its slices](04_hull.ipynb) · next: [6 - Respect
+# or emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 15 min to
+# read
 #
 # **Afterwards you can** enclose a zone in the smallest ellipse, and say how far to trust it.
 
@@ -107,10 +108,10 @@ if len(ellipse.support) > 3:
 # %% [markdown]
 # ## A zone that does not shrink
 #
-# The hull is set by the nearest people ever seen, so it shrinks with every day of data (notebook 15). The
+# The hull is set by the nearest people ever seen, so it shrinks with every day of data (notebook 06). The
 # *quantile zone*, szlib's default, is where all but a share `q` of encounters (5 %) keep out, direction by
 # direction, and an ellipse fitted to that. This one is kept for the robot. Any method finds a zone, also among
-# people who ignore each other. So the zone is tested against these (notebook 15), and its *verdict* says whether it can be used.
+# people who ignore each other. So the zone is tested against these (notebook 06), and its *verdict* says whether it can be used.
 
 # %%
 zone = record.cache.fit_zone()

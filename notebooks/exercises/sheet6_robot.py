@@ -21,10 +21,10 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 5](sheet5_barriers.ipynb) · [to
 # do](../exercises/sheet6_robot.ipynb) · [solved](../solutions/sheet6_robot.ipynb) · 1 h 20 min · belongs to
-# [07](../07_passing.ipynb), [08](../08_corridor.ipynb), [09](../09_waiting.ipynb),
-# [10](../10_making_room.ipynb), [13](../13_comparison.ipynb), [17](../17_crowds.ipynb),
-# [18](../18_meetings.ipynb), [19](../19_atlas.ipynb), [20](../20_laboratory.ipynb),
-# [21](../21_sentences.ipynb)
+# [09](../09_passing.ipynb), [10](../10_corridor.ipynb), [11](../11_waiting.ipynb),
+# [11b](../11b_making_room.ipynb), [23](../deeper/23_comparison.ipynb), [12](../12_among_people.ipynb),
+# [26](../deeper/26_meetings.ipynb), [27](../deeper/27_atlas.ipynb), [13](../13_laboratory.ipynb),
+# [28](../deeper/28_sentences.ipynb)
 
 # %%
 import judges
@@ -110,7 +110,7 @@ judges.check("next_plan", next_plan)
 # - "passing, from the front to from behind: avoidance starts": "nearer" or "farther away".
 #
 # The check makes the runs, with a zone that is drawn anew, and compares. Where you were wrong, look for
-# the reason in notebooks 06, 07 and 11.
+# the reason in notebooks 07, 09 and 21.
 
 
 # %%

@@ -21,8 +21,8 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 3](sheet3_zones.ipynb) · next: [sheet
 # 5](sheet5_barriers.ipynb) · [to do](../exercises/sheet4_certainty.ipynb) ·
-# [solved](../solutions/sheet4_certainty.ipynb) · 50 min · belongs to [15](../15_respect.ipynb),
-# [16](../16_claims.ipynb)
+# [solved](../solutions/sheet4_certainty.ipynb) · 50 min · belongs to [06](../06_respect.ipynb),
+# [07](../07_barriers.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.
@@ -79,7 +79,7 @@ judges.check("expected_nearest", expected_nearest)
 # %% [markdown]
 # **Solution.** All n keep more than x with probability exp(-x / mean)^n = exp(-n x / mean). So the
 # nearest is exponential again, with mean / n. On a real day there is no sharp edge behind it, and the
-# hull goes on shrinking: that is why notebook 15 looks at a quantile, which settles.
+# hull goes on shrinking: that is why notebook 06 looks at a quantile, which settles.
 
 # %%
 counts = np.geomspace(10, 1000, 20).astype(int)

@@ -21,8 +21,8 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 4](sheet4_certainty.ipynb) · next: [sheet
 # 6](sheet6_robot.ipynb) · [to do](../exercises/sheet5_barriers.ipynb) ·
-# [solved](../solutions/sheet5_barriers.ipynb) · 1 h 00 min · belongs to [06](../06_barriers.ipynb),
-# [06b](../06b_build_a_controller.ipynb), [11](../11_feasibility.ipynb), [12](../12_distances.ipynb)
+# [solved](../solutions/sheet5_barriers.ipynb) · 1 h 00 min · belongs to [06](../06_respect.ipynb),
+# [07](../07_barriers.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.
@@ -134,4 +134,4 @@ judges.check("end_margin", end_margin)
 
 # %% [markdown]
 # **Solution.** It comes to r^2 / L: with the paper's robot (0.5 m) and margin (5 cm) a wall must be 5
-# m long. The walls of the paper's restricted pathway are shorter; notebook 12 shows the collision.
+# m long. The walls of the paper's restricted pathway are shorter; notebook 22 shows the collision.

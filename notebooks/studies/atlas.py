@@ -1,9 +1,9 @@
 """The sensitivity atlas: the paper's scenarios over gamma, width, the person's pace and the zone's size.
 
-    python -m studies.atlas    19_atlas.csv
+    python -m studies.atlas    27_atlas.csv
 
 A row for each run, as in `szlib.simulation.atlas.chart`, with its zone `REFERENCE`; 1,384 runs,
-four minutes on one core.  Notebook 19 drives a part of it anew and holds it against the table.
+four minutes on one core.  Notebook 27 drives a part of it anew and holds it against the table.
 """
 
 from __future__ import annotations
@@ -32,4 +32,4 @@ CELLS = [
 ]
 
 if __name__ == "__main__":
-    write_table(run_atlas(CELLS, REFERENCE, n_jobs=1), "19_atlas")
+    write_table(run_atlas(CELLS, REFERENCE, n_jobs=1), "27_atlas")

@@ -1,4 +1,4 @@
-"""The paper's chain of methods and ours, with each difference alone: the table of notebook 10."""
+"""The paper's chain of methods and ours, with each difference alone: the table of notebook 11b."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The paper's claims on every data set, and what moves the zone most: the tables of notebook 16.
+"""The paper's claims on every data set, and what moves the zone most: the tables of notebook 25.
 
-python -m studies.claims claims        16_claims.csv        effect, interval, verdict: claim by data set
+python -m studies.claims claims        25_claims.csv        effect, interval, verdict: claim by data set
                                                                     (of delays: the range over scenarios)
-python -m studies.claims sensitivity   16_sensitivity.csv   the real day, each parameter varied alone
+python -m studies.claims sensitivity   25_sensitivity.csv   the real day, each parameter varied alone
 
 A claim about the shape of the zone is a difference from the null model (`paper_claims.measure_shape`); the
 quantile zone of the data, and that of the null model, are shown beside it as a contrast.
@@ -42,7 +42,7 @@ SHIFTS = 39
 """Shifts of the other null models."""
 ONE_SITE = "a mean needs two sites"
 RESAMPLES, FEW = 200, 2
-"""Resamples for the intervals, and of those that are computed again in each run of notebook 16 (`probe`)."""
+"""Resamples for the intervals, and of those that are computed again in each run of notebook 25 (`probe`)."""
 DELAYED_BY_SIZE = "a larger zone makes the robot later"
 HOURS_A_DAY = 11.0
 """That ATC is recorded (09:20 to 20:27 on the first day)."""
@@ -76,7 +76,7 @@ SITES: dict[str, tuple[Callable[[], pd.DataFrame], szlib.Square]] = {
 
 
 def of_site(name: str, asked: argparse.Namespace) -> Iterator[pd.DataFrame]:
-    """The findings of a site, method by method; `probe` is what a run of notebook 16 computes again of `low`."""
+    """The findings of a site, method by method; `probe` is what a run of notebook 25 computes again of `low`."""
     tracks = SITES[name][0]()
     samples, null = stored(asked, STORED.get(name, name), partial(find_both, name))
     plain = [claims.measure_passing_side(samples), lof(name, samples), as_many(name, samples, tracks)]

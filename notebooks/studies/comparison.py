@@ -1,6 +1,6 @@
-"""Zones, formulations and surprises in the same worlds: the tables of notebook 13.
+"""Zones, formulations and surprises in the same worlds: the tables of notebook 23.
 
-    python -m studies.comparison 50    13_comparison.csv, 13_paired.csv   (worlds)
+    python -m studies.comparison 50    23_comparison.csv, 23_paired.csv   (worlds)
 
 Everybody has the zone `REFERENCE`, that of the plaza rounded to a centimetre.
 """
@@ -23,7 +23,7 @@ RIVAL = {"zone": "equal circle"}
 """The method against which zones are compared world by world."""
 OF_ZONE = replace(WORLDS, zone=REFERENCE)
 PROBE = 3
-"""The world that is driven again in each run of notebook 13: barriers bind there, and the zones differ."""
+"""The world that is driven again in each run of notebook 23: barriers bind there, and the zones differ."""
 
 
 def recompute(row: pd.Series) -> dict[str, float]:
@@ -53,5 +53,5 @@ if __name__ == "__main__":
     rows = comparisons.compare(worlds, worlds=OF_ZONE)
     surprises = [name for name in BEHAVIOURS if name != "as expected"]
     wrong = comparisons.compare(worlds, zones=["fitted"], behaviours=surprises, worlds=OF_ZONE)
-    write_table(summarise(pd.concat([rows, wrong])), "13_comparison")
-    write_table(summarise(rows, against=RIVAL), "13_paired")
+    write_table(summarise(pd.concat([rows, wrong])), "23_comparison")
+    write_table(summarise(rows, against=RIVAL), "23_paired")

@@ -1,4 +1,4 @@
-"""Where the problem has no solution: `python -m studies.feasibility 20` writes 11_feasibility.csv.
+"""Where the problem has no solution: `python -m studies.feasibility 20` writes 21_feasibility.csv.
 
 Random worlds, the same ones for each gamma, N_h and a_max; the number of worlds is the argument.
 """
@@ -20,7 +20,7 @@ CROWD = Worlds(people=(2, 4), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_
 CELLS = tuple(product((0.05, 0.1, 0.2, 0.4, 0.8), (1, 2, 4, 8), (0.5, 1.0, 2.0)))
 """gamma, N_h, a_max [m/s2]."""
 FIRST = 3
-"""Worlds whose path is computed again in each run of notebook 11."""
+"""Worlds whose path is computed again in each run of notebook 21."""
 
 
 def drive_cells(cells: Iterable[tuple[float, int, float]], worlds: int, **more: object) -> pd.DataFrame:
@@ -43,4 +43,4 @@ def recompute(row: pd.Series) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    write_table(drive_cells(CELLS, int(sys.argv[1]), progress=False), "11_feasibility")
+    write_table(drive_cells(CELLS, int(sys.argv[1]), progress=False), "21_feasibility")

@@ -2,7 +2,7 @@
 
     python -m studies.gamma_table [--worlds 2000]
 
-Writes notebooks/tables/07_gamma.csv: a row for each gamma, all of them in the same worlds, with 95 %
+Writes notebooks/tables/09_gamma.csv: a row for each gamma, all of them in the same worlds, with 95 %
 Clopper-Pearson intervals. Finished worlds are kept in results/rollouts, so that a run that was stopped goes on.
 """
 
@@ -18,11 +18,11 @@ import szlib
 from szlib.control.settings import TOLERANCE
 from szlib.simulation.monte_carlo import rollouts
 
-TABLE = "07_gamma"
+TABLE = "09_gamma"
 SEED = 1_000_000
 """Seed of the first world: gamma was chosen on the paper's four scenarios."""
 PROBE = 3
-"""The world that is driven again in each run of notebook 07: a barrier binds for every gamma."""
+"""The world that is driven again in each run of notebook 09: a barrier binds for every gamma."""
 GAMMAS = (0.02, 0.05, 0.07, 0.1, 0.2, 0.4)
 
 

@@ -1,6 +1,6 @@
-"""Visits and standing people by the hour: `python -m studies.hours` writes 14_hours.csv.
+"""Visits and standing people by the hour: `python -m studies.hours` writes 24_hours.csv.
 
-The real ATC day, from $SZLIB_DATA_DIR, and one hour of a small plaza, which notebook 14 computes again.
+The real ATC day, from $SZLIB_DATA_DIR, and one hour of a small plaza, which notebook 24 computes again.
 """
 
 from __future__ import annotations
@@ -38,5 +38,5 @@ def recompute(row: pd.Series) -> dict[str, float]:
 if __name__ == "__main__":
     mall = sorted((Path(os.environ["SZLIB_DATA_DIR"]) / "atc-1hz").glob("*.csv"))
     write_table(
-        pd.concat([count_visits(mall).assign(site="ATC day"), of_plaza().assign(site="plaza")]), "14_hours"
+        pd.concat([count_visits(mall).assign(site="ATC day"), of_plaza().assign(site="plaza")]), "24_hours"
     )

@@ -1,11 +1,11 @@
 """Zones imposed on recorded paths: how near estimates come, and how often their intervals hold the truth.
 
-python -m studies.imposed 6      16_imposed.csv
+python -m studies.imposed 6      25_imposed.csv
 
 Takes the number of draws of each case.  The table goes to notebooks/tables.  The real data is looked for in
 $SZLIB_DATA_DIR (atc-1hz/ and gc/).  The people of a time-shifted crowd get a known zone
 (`szlib.impose_zone`); the other shifts are the null model.  Rows of the site "plaza" are computed again in each
-run of notebook 16.
+run of notebook 25.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def main() -> None:
     parser.add_argument("--cache", type=Path, default=Path("../results/null"))
     asked = parser.parse_args()
     table = pd.DataFrame(coverage(asked))
-    write_table(table, "16_imposed")
+    write_table(table, "25_imposed")
     print(table.to_string())
 
 

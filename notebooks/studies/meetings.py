@@ -1,6 +1,6 @@
-"""Eleven meetings, four controllers: the tables of notebook 18.
+"""Eleven meetings, four controllers: the tables of notebook 26.
 
-    python -m studies.meetings 12    18_meetings.csv, 18_meetings_paired.csv   (variations)
+    python -m studies.meetings 12    26_meetings.csv, 26_meetings_paired.csv   (variations)
 
 Everybody has the zone `REFERENCE`, that of the plaza rounded to a centimetre.
 """
@@ -75,5 +75,5 @@ def recompute_paired(row: pd.Series) -> dict[str, float]:
 
 if __name__ == "__main__":
     everything = pd.concat([meet(name, REFERENCE, int(sys.argv[1])) for name in METHODS])
-    write_table(summarise(everything, BY, METRICS), "18_meetings")
-    write_table(summarise(everything, BY, METRICS, against=RIVAL), "18_meetings_paired")
+    write_table(summarise(everything, BY, METRICS), "26_meetings")
+    write_table(summarise(everything, BY, METRICS, against=RIVAL), "26_meetings_paired")

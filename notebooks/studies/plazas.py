@@ -1,10 +1,10 @@
 """Plazas with a known zone: how near the respect zone and the quantile come, and whether intervals hold the truth.
 
-python -m studies.plazas      16_plazas.csv
+python -m studies.plazas      25_plazas.csv
 
 The table goes to notebooks/tables.  People are seen for 20 s, so that a time-shifted crowd has encounters
 enough; positions have 5 cm of noise, and intruders any speed.  The plaza of 150 pairs is computed again in each
-run of notebook 16.
+run of notebook 25.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def main() -> None:
     parser.add_argument("--cache", type=Path, default=Path("../results/null"), help="of null models")
     asked = parser.parse_args()
     table = pd.DataFrame(row for case in CASES for row in describe_case(case, asked))
-    write_table(table, "16_plazas")
+    write_table(table, "25_plazas")
     print(table.to_string())
 
 

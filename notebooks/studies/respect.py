@@ -1,12 +1,12 @@
-"""Respect or emptiness: the tables of notebook 15.
+"""Respect or emptiness: the tables of notebook 06.
 
-python -m studies.respect nobody      15_nobody.csv     the test without interaction, 100 seeds
-python -m studies.respect sites       15_sites.csv      radii, intervals and p-values on the real data
-python -m studies.respect n-curve     15_n_curve.csv    hull and respect zone by number of encounters
-python -m studies.respect changes     15_changes.csv    the radius at Grand Central, one thing changed
+python -m studies.respect nobody      06_nobody.csv     the test without interaction, 100 seeds
+python -m studies.respect sites       06_sites.csv      radii, intervals and p-values on the real data
+python -m studies.respect n-curve     06_n_curve.csv    hull and respect zone by number of encounters
+python -m studies.respect changes     06_changes.csv    the radius at Grand Central, one thing changed
 
 They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/ and gc/).  Rows of the
-site "plaza", a small one, are computed again in each run of notebook 15.
+site "plaza", a small one, are computed again in each run of notebook 06.
 """
 
 from __future__ import annotations

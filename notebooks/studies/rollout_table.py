@@ -2,7 +2,7 @@
 
     python -m studies.rollout_table [--blocks 4] [--worlds 500] [--paper-worlds 250]
 
-Writes notebooks/tables/11_rollouts.csv: a row for each set of worlds and formulation, over blocks of seeds
+Writes notebooks/tables/21_rollouts.csv: a row for each set of worlds and formulation, over blocks of seeds
 far apart, each share with its 95 % Clopper-Pearson interval, and the counts of the single blocks. The paper's
 controller, by IPOPT, takes ten times as long and drives in the first worlds of each block. Finished worlds are
 kept in results/rollouts, so that a run that was stopped goes on. Half an hour on one core.
@@ -23,11 +23,11 @@ from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.outcomes import Outcome
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
-TABLE = "11_rollouts"
+TABLE = "21_rollouts"
 APART = 1_000_000
 """Seeds between the first ones of two blocks; block 0 starts at this as well."""
 PROBE = 3
-"""The world of the first block that is driven again in each run of notebook 11: a barrier binds in every row."""
+"""The world of the first block that is driven again in each run of notebook 21: a barrier binds in every row."""
 FORMULATIONS = {
     "paper": szlib.MPCSettings.paper(),
     "szlib": szlib.MPCSettings(),

@@ -1,11 +1,11 @@
-"""Long studies of the estimators: the tables of notebook 16.
+"""Long studies of the estimators: the tables of notebook 25.
 
-    python -m studies.zones coverage quantile 200 centred default   16_coverage.csv    (plazas)
-    python -m studies.zones coverage hull 200 centred               16_coverage_hull.csv
-    python -m studies.zones levels 3                                16_levels.csv      (plazas a case)
-    python -m studies.zones estimators 3                            16_estimators.csv  (plazas a case)
-    python -m studies.zones sizes 8                                 16_sizes.csv       (plazas pooled)
-    python -m studies.zones subsets 20                              16_subsets.csv     (subsets of a size)
+    python -m studies.zones coverage quantile 200 centred default   25_coverage.csv    (plazas)
+    python -m studies.zones coverage hull 200 centred               25_coverage_hull.csv
+    python -m studies.zones levels 3                                25_levels.csv      (plazas a case)
+    python -m studies.zones estimators 3                            25_estimators.csv  (plazas a case)
+    python -m studies.zones sizes 8                                 25_sizes.csv       (plazas pooled)
+    python -m studies.zones subsets 20                              25_subsets.csv     (subsets of a size)
 
 They go to notebooks/tables.  Coverage: share of the 95 % intervals, from 600 pairs, that hold the truth of
 the plaza, and the limit: what the quantile gives for the people of all these plazas together (a hull has no

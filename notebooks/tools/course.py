@@ -7,6 +7,7 @@ glossary, are in this file. A test checks that the cells in the notebooks are up
 """
 
 import math
+import os
 import re
 import sys
 import textwrap
@@ -15,6 +16,8 @@ from pathlib import Path
 
 import jupytext
 import nbformat
+
+from szlib.workbook import folders
 
 HERE = Path(__file__).parents[1]
 sys.path.append(str(HERE / "exercises"))  # the judges
@@ -37,26 +40,26 @@ GIVES: dict[str, tuple[str, str]] = {
         "sec. 2, fig. 5",
         "enclose a zone in the smallest ellipse, and say how far to trust it.",
     ),
-    "06": ("sec. 3, eq. 1-7", "turn a distance into a condition on the next step, and say what gamma does."),
-    "06b": (
+    "07": ("sec. 3, eq. 1-7", "turn a distance into a condition on the next step, and say what gamma does."),
+    "08": (
         "sec. 3-4, eq. 1-2, 8",
         "write an MPC-CBF yourself, and say what each of its terms is there for.",
     ),
-    "07": ("sec. 4, fig. 6a", "say when the robot begins to avoid a person, and what chooses the side."),
-    "08": ("sec. 4, fig. 6b", "say why the robot slows down in a corridor, and speeds up beside the person."),
-    "09": ("sec. 4, fig. 6c", "say why the robot waits, although no rule tells it to."),
-    "10": ("sec. 4, fig. 6d", "say why the robot backs out of a passage, although no rule tells it to."),
-    "11": ("sec. 4", "say when a step has no solution, and prove when there always is one."),
-    "12": ("sec. 3, eq. 3-7", "say where the two distances err, and which margin makes up for it."),
-    "13": ("sec. 1, 5", "compare zones and controllers in the same worlds, with intervals."),
-    "14": ("sec. 2", "judge whether a file of tracks can be used, and find days unlike the others."),
-    "15": ("sec. 2", "tell respect from emptiness by a null model."),
-    "16": ("all", "say which claims of the paper the data supports, and with which interval."),
-    "17": ("sec. 4-5", "say which promises of the controller hold among people who react."),
-    "18": ("sec. 4-5", "say in which meetings this controller is good, and in which it is bad."),
-    "19": ("sec. 4-5", "predict from gamma, width, speed and zone what the robot will do."),
-    "20": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
-    "21": ("all", "find each sentence of the paper with its code, its cell and its verdict."),
+    "09": ("sec. 4, fig. 6a", "say when the robot begins to avoid a person, and what chooses the side."),
+    "10": ("sec. 4, fig. 6b", "say why the robot slows down in a corridor, and speeds up beside the person."),
+    "11": ("sec. 4, fig. 6c", "say why the robot waits, although no rule tells it to."),
+    "11b": ("sec. 4, fig. 6d", "say why the robot backs out of a passage, although no rule tells it to."),
+    "21": ("sec. 4", "say when a step has no solution, and prove when there always is one."),
+    "22": ("sec. 3, eq. 3-7", "say where the two distances err, and which margin makes up for it."),
+    "23": ("sec. 1, 5", "compare zones and controllers in the same worlds, with intervals."),
+    "24": ("sec. 2", "judge whether a file of tracks can be used, and find days unlike the others."),
+    "06": ("sec. 2", "tell respect from emptiness by a null model."),
+    "25": ("all", "say which claims of the paper the data supports, and with which interval."),
+    "12": ("sec. 4-5", "say which promises of the controller hold among people who react."),
+    "26": ("sec. 4-5", "say in which meetings this controller is good, and in which it is bad."),
+    "27": ("sec. 4-5", "predict from gamma, width, speed and zone what the robot will do."),
+    "13": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
+    "28": ("all", "find each sentence of the paper with its code, its cell and its verdict."),
 }
 """By number of the notebook: the section of the paper, and what a reader can do after reading it."""
 
@@ -140,25 +143,18 @@ GLOSSARY: dict[str, Word] = {
 }
 """The words that the notebooks use, and their meanings."""
 
-WEEKS: list[tuple[str, tuple[str, ...], str]] = [
-    ("People: who is where, who meets whom", ("01", "02", "14"), "sheet1_tracks"),
-    ("Which samples to believe", ("03",), "sheet2_outliers"),
-    ("From samples to a zone", ("04", "05"), "sheet3_zones"),
-    ("How sure? Respect or emptiness", ("15", "16"), "sheet4_certainty"),
-    ("Barriers, and a controller of your own", ("06", "06b", "11", "12"), "sheet5_barriers"),
-    (
-        "The robot among people",
-        ("07", "08", "09", "10", "13", "17", "18", "19", "20", "21"),
-        "sheet6_robot",
-    ),
+WEEKS: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = [
+    ("People: who is where, who meets whom", ("01", "02"), ("sheet1_tracks",)),
+    ("Which samples to believe, and the nearest people", ("03", "04"), ("sheet2_outliers",)),
+    ("From samples to a zone", ("05",), ("sheet3_zones",)),
+    ("Respect or emptiness; from a zone to a barrier", ("06", "07"), ("sheet4_certainty", "sheet5_barriers")),
+    ("A controller of your own, and its first meetings", ("08", "09", "10"), ()),
+    ("The robot yields, and drives among people", ("11", "11b", "12", "13"), ("sheet6_robot",)),
 ]
-"""Topic, notebooks and exercise sheet of each of six weeks."""
+"""Topic, chapters and exercise sheets of each of six weeks."""
 ROUTES: list[tuple[str, tuple[str, ...]]] = [
-    ("An hour: the idea", ("02", "05", "06", "08", "20")),
-    (
-        "A day: the method",
-        ("01", "02", "03", "04", "05", "06", "06b", "07", "08", "09", "10", "11", "16", "21"),
-    ),
+    ("An hour: the idea", ("02", "05", "07", "10", "13")),
+    ("A day: the method", ("01", "02", "03", "04", "05", "06", "07", "08", "09", "10", "11", "11b", "12")),
 ]
 """Shorter routes, by number of the notebook."""
 
@@ -176,7 +172,12 @@ class Page:
     @property
     def number(self) -> str:
         """The number, such as "06b"; for an exercise sheet its name."""
-        return self.source.stem.split("_")[0] if self.source.parent == HERE else self.source.stem
+        return self.source.stem.split("_")[0] if self.source.stem[0].isdigit() else self.source.stem
+
+    @property
+    def is_chapter(self) -> bool:
+        """Whether it belongs to the story; others go deeper."""
+        return self.source.parent == HERE
 
     @property
     def title(self) -> str:
@@ -206,7 +207,7 @@ class Page:
 
 def pages() -> list[Page]:
     """The notebooks in reading order."""
-    return [_page(source) for source in sorted(HERE.glob("[0-9][0-9]*_*.py"))]
+    return [_page(source) for source in folders.list_notebooks(HERE)]
 
 
 def _page(source: Path) -> Page:
@@ -233,9 +234,14 @@ def first_uses(story: list[Page]) -> dict[str, str]:
 def make_navigation(page: Page, story: list[Page], uses: dict[str, str]) -> str:
     """The navigation cell of a notebook."""
     at = [each.number for each in story].index(page.number)
-    places = [f"[Start]({START}.ipynb)"] if at > 1 else []
-    places += [f"before: {_link(each)}" for each in story[max(at - 1, 0) : at]]
-    places += [f"next: {_link(each)}" for each in story[at + 1 : at + 2]]
+    places = [f"[Start]({'' if page.is_chapter else '../'}{START}.ipynb)"] if at > 1 else []
+    beside = ("before", story[max(at - 1, 0) : at]), ("next", story[at + 1 : at + 2])
+    places += [
+        f"{word}: {_link(p, page)}"
+        for word, found in beside
+        for p in found
+        if p.is_chapter == page.is_chapter
+    ]
     section, aim = GIVES[page.number]
     places += [f"[paper]({PAPER}): {section}", f"{page.minutes} min to read"]
     paragraphs = [_wrapped(" · ".join(places)), _wrapped(HEADING + aim)]
@@ -259,7 +265,7 @@ def make_sheet_navigation(name: str) -> str:
     places += [f"before: [sheet {each[5]}]({each}.ipynb)" for each in names[max(at - 1, 0) : at]]
     places += [f"next: [sheet {each[5]}]({each}.ipynb)" for each in names[at + 1 : at + 2]]
     places += [f"[to do](../exercises/{name}.ipynb)", f"[solved](../solutions/{name}.ipynb)", _time(minutes)]
-    (numbers,) = [numbers for _, numbers, sheet in WEEKS if sheet == name]
+    (numbers,) = [numbers for _, numbers, sheets in WEEKS if name in sheets]
     links = ", ".join(f"[{p.number}](../{p.source.stem}.ipynb)" for p in pages() if p.number in numbers)
     return _wrapped(" · ".join([*places, f"belongs to {links}"]))
 
@@ -268,14 +274,21 @@ def _wrapped(text: str) -> str:
     return textwrap.fill(text, 106, break_long_words=False, break_on_hyphens=False)
 
 
-def _link(page: Page) -> str:
-    return f"[{page.title}]({page.source.stem}.ipynb)"
+def _link(page: Page, start: Page) -> str:
+    return f"[{page.title}]({_path(page, start)})"
+
+
+def _path(page: Page, start: Page) -> str:
+    """The path of a page, as a link in the page `start` names it."""
+    return Path(os.path.relpath(page.source.with_suffix(".ipynb"), start.source.parent)).as_posix()
 
 
 def make_map(story: list[Page]) -> str:
     """The cell of 00 that lists every notebook."""
     rows = ["## The map", "", "| notebook | question | to read |", "|---|---|---|"]
-    rows += [f"| {_link(p)} | {p.question} | {p.minutes} min |" for p in story if p.source.stem != START]
+    rows += [
+        f"| {_link(p, story[0])} | {p.question} | {p.minutes} min |" for p in story if p.source.stem != START
+    ]
     return "\n".join(rows)
 
 
@@ -291,10 +304,10 @@ def make_routes(story: list[Page]) -> str:
         "- **Six weeks: the course.** One exercise sheet a week; running and looking around come on top."
     )
     rows += ["", "| week | topic | notebooks | to read | sheet | to do |", "|---|---|---|---|---|---|"]
-    for week, (topic, numbers, sheet) in enumerate(WEEKS, 1):
+    for week, (topic, numbers, sheets) in enumerate(WEEKS, 1):
         links, minutes = _links_and_time(story, numbers)
-        work = _time(sum(task.minutes for task in SHEETS[sheet]))
-        to_do = f"[sheet {sheet[5]}](exercises/{sheet}.ipynb)"
+        work = _time(sum(task.minutes for sheet in sheets for task in SHEETS[sheet]))
+        to_do = ", ".join(f"[sheet {sheet[5]}](exercises/{sheet}.ipynb)" for sheet in sheets)
         rows.append(f"| {week} | {topic} | {links} | {minutes} | {to_do} | {work} |")
     return "\n".join(rows)
 
@@ -302,7 +315,7 @@ def make_routes(story: list[Page]) -> str:
 def _links_and_time(story: list[Page], numbers: tuple[str, ...]) -> tuple[str, str]:
     """Links to notebooks, and the time to read them."""
     chosen = [page for page in story if page.number in numbers]
-    links = ", ".join(f"[{page.number}]({page.source.stem}.ipynb)" for page in chosen)
+    links = ", ".join(f"[{page.number}]({_path(page, story[0])})" for page in chosen)
     return links, _time(sum(page.minutes for page in chosen))
 
 
@@ -318,7 +331,7 @@ def make_glossary(story: list[Page], uses: dict[str, str]) -> str:
     rows = ["## Words", "", "| word | meaning | first used in |", "|---|---|---|"]
     for word in sorted(uses, key=str.lower):
         page = by_number[uses[word]]
-        rows.append(f"| {word} | {GLOSSARY[word].means} | [{page.number}]({page.source.stem}.ipynb) |")
+        rows.append(f"| {word} | {GLOSSARY[word].means} | [{page.number}]({_path(page, story[0])}) |")
     return "\n".join(rows)
 
 

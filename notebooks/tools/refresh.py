@@ -18,14 +18,14 @@ PICTURES = {
     "zone.png": "05_zones-zone.png",
     "los.png": "02_encounters-los.png",
     "hull.png": "04_hull-hull.png",
-    "corridor.png": "08_corridor-scenario.png",
-    "making_room.gif": "10_making_room-run.gif",
-    "laboratory.png": "20_laboratory-strip.png",
+    "corridor.png": "10_corridor-scenario.png",
+    "making_room.gif": "11b_making_room-run.gif",
+    "laboratory.png": "13_laboratory-strip.png",
 }
 """The pictures of the README, and the figures of the notebooks from which they are copied."""
 WARNING = re.compile(r"^\S+\.py:\d+: (\w*Warning: .*\n)(  .*\n)?", re.MULTILINE)
 """A warning with the path of a file on this machine, and the line that caused it."""
-REAL_DAY = ("01", "02", "03", "04", "05", "16")
+REAL_DAY = ("01", "02", "03", "04", "05", "06")
 """Notebooks with a copy on the real day, in the folder `real_day`: `refresh.py real_day`."""
 
 
@@ -48,13 +48,13 @@ def refresh(source: Path, data: str = "") -> None:
     notebook = replace_data(source, data) if data else jupytext.read(source)
     for number, cell in enumerate(notebook.cells):  # the same identifiers at every execution
         cell.id = f"{source.stem[:2]}-{number}"
-    target = (HERE / "real_day" if data else HERE) / f"{source.stem}.ipynb"
+    target = (HERE / "real_day" if data else source.parent) / f"{source.stem}.ipynb"
     target.parent.mkdir(exist_ok=True)
     NotebookClient(
         notebook,
         kernel_name="python3",
         record_timing=False,
-        resources={"metadata": {"path": str(HERE)}},
+        resources={"metadata": {"path": str(source.parent)}},
         extra_arguments=["--log-level=CRITICAL"],
     ).execute()
     for output in (each for cell in notebook.cells for each in cell.get("outputs", ())):

@@ -84,7 +84,7 @@ class MPCSettings:
     grid : length of each step of the horizon, in multiples of `dt`, which sets N; the first is 1. Empty: N
         steps of `dt`.
     gamma : fraction of h that a step of dt may use up, 0 < gamma <= 1: with another dt it is another limit;
-        see `with_gamma_rate`. The default was tuned on the paper's four scenarios (notebook 07).
+        see `with_gamma_rate`. The default was tuned on the paper's four scenarios (notebook 09).
     Q, P : weights of the state (x, y, vx, vy) against the goal, on the way and at the end, >= 0.
     R : weights of the accelerations (ax, ay), > 0.
     jerk_weight : weight of the squared change of acceleration from step to step, >= 0.
@@ -233,7 +233,7 @@ class MPCSettings:
         It plans 3 s ahead, in 14 steps with barriers on each, follows a route around walls to a point at
         most 1 m farther than it can come, and prefers a smooth ride. Where people leave it no way, it does
         not stop for good, but gives up in the order of `Crowding`, and says so: see `Step.safe` and
-        `Step.explain`. Notebook 17 compares it with the paper's controller.
+        `Step.explain`. Notebook 12 compares it with the paper's controller.
 
         Examples
         --------

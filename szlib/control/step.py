@@ -137,7 +137,7 @@ class Step:
         that satisfies every barrier and lies in no solid wall; and the robot's disc overlaps no body and no
         wall, by Euclidean distance, and enters no zone by more than eps, from now until after the control,
         between samples too (`Scene.smallest_gap`). People who turn, stop or speed up within a step may still
-        cause h < 0 after a safe step (notebook 13 counts them); the next step then says so.
+        cause h < 0 after a safe step (notebook 23 counts them); the next step then says so.
         """
         return not self._find_danger()
 

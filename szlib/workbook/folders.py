@@ -72,8 +72,9 @@ def find_notebooks(folder: str | Path | None = None) -> Path:
 
 
 def list_notebooks(folder: Path | None = None) -> list[Path]:
-    """The scripts of the notebooks in a `folder` (None: `NOTEBOOKS`), in reading order: 06, 06b, 07 ..."""
-    return sorted((folder or NOTEBOOKS).glob("[0-9][0-9]*_*.py"))
+    """The scripts of the notebooks in a `folder` (None: `NOTEBOOKS`): the chapters, and those in `deeper`."""
+    parts = ("[0-9][0-9]*_*.py", "deeper/[0-9][0-9]*_*.py")
+    return [script for part in parts for script in sorted((folder or NOTEBOOKS).glob(part))]
 
 
 def copy_notebooks(folder: str | Path) -> Path:
@@ -108,7 +109,7 @@ def copy_notebooks(folder: str | Path) -> Path:
 
 
 def has_name(notebook: Path, name: str) -> bool:
-    """Whether `name` is the number ("06", which is not "06b") or the name ("06_barriers") of `notebook`."""
+    """Whether `name` is the number ("06", which is not "06b") or the name ("07_barriers") of `notebook`."""
     return f"{notebook.stem}_".startswith(f"{name}_")
 
 

@@ -14,7 +14,7 @@ from . import folders
 # Notebooks whose results later ones need, the encounters and the zone, and the file of each.
 PRODUCTS = {"02": "encounters.parquet", "05": "zone.json"}
 # Notebooks that read the records of all others. The others are independent of each other.
-SUMMARIES = ("21",)
+SUMMARIES = ("28",)
 
 
 def package_checksum(notebooks: Path) -> str:

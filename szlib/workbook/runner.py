@@ -35,7 +35,7 @@ from .record.parameters import METHOD_DEFAULTS, check_parameters
 
 PRODUCERS = tuple(PRODUCTS)
 # Notebooks that take longest. They start first in their batch, so that no core waits for them at its end.
-LONGEST = ("15", "16", "18")
+LONGEST = ("06", "25", "26")
 SUMMARY = "summary.json"  # file of the outcome of a run
 # Files that a process opens: a kernel, 70 to 90; this process for each kernel, about 15 (both measured).
 _FILES_OF_KERNEL, _FILES_OF_CLIENT = 96, 16

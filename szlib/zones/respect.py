@@ -26,7 +26,7 @@ power 1 / (1 + n/m) for n encounters of the data and m of the null model, becaus
 meant to contain the true zone. People differ from the model, so centre ahead and semi-axis along the motion
 have a standard deviation of at least 5 cm, the semi-axis across of at least 1.2 cm.
 
-Measured on zones imposed on real paths (`szlib.impose_zone`): notebook 16.
+Measured on zones imposed on real paths (`szlib.impose_zone`): notebook 25.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _NULL_PER_ENCOUNTER = 2  # of the data
 MIN_COMPARED = 150
 _MAX_LEFT_OUT = 5
 # What the edge of people differs from that of the model: least standard deviation of the posterior of centre
-# (ahead, left), semi-axes [m] and angle (notebook 16, plazas of other seeds).
+# (ahead, left), semi-axes [m] and angle (notebook 25, plazas of other seeds).
 _MODEL_ERROR = (0.05, 0.012, 0.05, 0.012, 0.0)
 
 

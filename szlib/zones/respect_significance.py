@@ -16,7 +16,7 @@ kinds (Mantel & Haenszel, J. Nat. Cancer Inst. 22, 1959). It is the largest valu
 Kinds are separate because a shift in time removes more than respect. People who come in a group, as from a
 train, walk in the same direction as the rest of it, and condition 3 (1 m at the opening) keeps them apart
 without any respect. Shifted alone, they meet people who cross, and these come nearer. With all kinds pooled,
-this mix looked like respect in 17 of 100 simulated crowds; with separate kinds in 1 (notebook 15).
+this mix looked like respect in 17 of 100 simulated crowds; with separate kinds in 1 (notebook 06).
 """
 
 from __future__ import annotations

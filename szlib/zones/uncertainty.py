@@ -15,7 +15,7 @@ Samples of one encounter are not independent, and two encounters of the same two
 
 An interval is meant to contain the *limit*: the zone that the same method would give for all people there
 are. Those of the quantile contain it in 90 to 98 % of 400 plazas of 600 pairs, for each quantity and speed
-(notebook 16); for 300 pairs in 91 %, for 150 in 81 %. They contain the true edge of the plaza's zones less
+(notebook 25); for 300 pairs in 91 %, for 150 in 81 %. They contain the true edge of the plaza's zones less
 often, the semi-axes in 33 to 87 %: the limit lies up to 2 cm outside of it, depending on people's clearance,
 which cannot be observed. The centre lies up to 3 cm behind, because both people's zones mix. The limit of a
 hull is the true edge. Its intervals contain it in 91 to 100 % of 200 centred plazas.

@@ -33,17 +33,17 @@ GIVEN = {
     "05_zones": f"""from szlib.zones.polar import DIRECTIONS, PolarZone
 shape = PolarZone([0.7, 1.5], DIRECTIONS, [np.full(72, 0.9), np.full(72, 1.2)])
 zone = szlib.SocialZone(shape, 2.0, {{1.1: {ELLIPSE}}})""",
-    "08_corridor": f"""controller = szlib.MPCCBF({ELLIPSE}, walls=scenario.walls, settings=settings)
+    "10_corridor": f"""controller = szlib.MPCCBF({ELLIPSE}, walls=scenario.walls, settings=settings)
 log = szlib.simulate(scenario, controller)""",
-    "20_laboratory": f"""zones = {{"quantile": {ELLIPSE}, "hull": {ELLIPSE}}}
+    "13_laboratory": f"""zones = {{"quantile": {ELLIPSE}, "hull": {ELLIPSE}}}
 first = RobotOptions(gamma, N_h, a_max, size, estimator)
 second = RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)""",
 }
 """A cell in place of those that fit the zone and simulate."""
 OPERATED = {
     "05_zones": ("show_sliders(",),
-    "08_corridor": ("record.animation(",),
-    "20_laboratory": ("scene = make_scene(", "LaboratoryWidget("),
+    "10_corridor": ("record.animation(",),
+    "13_laboratory": ("scene = make_scene(", "LaboratoryWidget("),
 }
 """Cells that are operated in the browser, and what they need; `make run` executes the whole notebooks."""
 

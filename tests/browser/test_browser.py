@@ -117,14 +117,14 @@ def test_a_slider_of_the_zones_draws_another_speed(notebook):
 
 
 def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
-    opened = notebook("08_corridor")
+    opened = notebook("10_corridor")
     opened.run()
     check_player(opened.page)
     saved = opened.save()
     assert errors(saved) == []
     check_pair(opened.file, saved)
     home = claim_folder(copy.parent / "run", "results of mine")
-    nbformat.write(saved, home / "08_corridor.ipynb")
+    nbformat.write(saved, home / "10_corridor.ipynb")
     page, messages = browser.new_page(), []
     page.on("console", lambda message: messages.append(message.text))
     page.on("pageerror", lambda error: messages.append(str(error)))
@@ -167,7 +167,7 @@ def check_player(page):
 
 
 def test_the_laboratory_is_dragged_set_run_and_shared(notebook):
-    opened = notebook("20_laboratory")
+    opened = notebook("13_laboratory")
     opened.run()
     page, status = opened.page, opened.page.locator(".szlib-status")
     page.wait_for_function("[...document.querySelectorAll('.szlib-status')].every(e => e.textContent)")

@@ -54,12 +54,12 @@ def make_hostile_results(folder: Path) -> Path:
         nbformat.v4.new_code_cell(BAD, outputs=outputs, metadata={"tags": [BAD.replace(",", "")]}),
     ]
     page = nbformat.v4.new_notebook(cells=cells, metadata={"title": BAD, "widgets": {"x": BAD}})
-    nbformat.write(page, home / f"08_corridor{BAD.replace('/', '')}.ipynb")
+    nbformat.write(page, home / f"10_corridor{BAD.replace('/', '')}.ipynb")
     rows = f"<table><th>badge<tbody><tr><td>{escape(BAD)}</td><td>{BAD}</td></tr></tbody></table>".replace(
         "<th>badge<", "<th>badge</th><"
     )
     cell = nbformat.v4.new_code_cell("", outputs=[output("display_data", {"text/html": rows})])
-    nbformat.write(nbformat.v4.new_notebook(cells=[cell]), home / "09_waiting.ipynb")
+    nbformat.write(nbformat.v4.new_notebook(cells=[cell]), home / "11_waiting.ipynb")
     kinds = ("check", "claim", "observation")
     checks = [
         {"kind": kind, "name": BAD, "passed": False, "value": {BAD: BAD}, "result": BAD} for kind in kinds
@@ -68,7 +68,7 @@ def make_hostile_results(folder: Path) -> Path:
     summary = {
         "data": BAD,
         "passed": False,
-        "notebooks": {BAD: outcome, "09_waiting": {**outcome, "status": BAD}},
+        "notebooks": {BAD: outcome, "11_waiting": {**outcome, "status": BAD}},
     }
     (home / "summary.json").write_text(json.dumps(summary))
     parameters = {"szlib": BAD, "data": BAD, "files": [[BAD, 3, BAD]], "parameters": {BAD: BAD}}

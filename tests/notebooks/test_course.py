@@ -22,7 +22,7 @@ def _course():
 course = _course()
 STORY = course.pages()
 START = (folders.NOTEBOOKS / "00_start_here.py").read_text(encoding="utf-8")
-FOLDERS = (folders.NOTEBOOKS, folders.NOTEBOOKS / "exercises", folders.NOTEBOOKS / "solutions")
+FOLDERS = tuple(folders.NOTEBOOKS / part for part in ("", "deeper", "exercises", "solutions"))
 TIME = re.compile(r"(\d+ h )?\d+\s(#\s)?min\b")
 
 
@@ -71,8 +71,8 @@ def test_every_link_has_a_target(folder):
 def test_the_course_reads_every_notebook_and_does_every_sheet_once():
     numbers = Counter(number for _, numbers, _ in course.WEEKS for number in numbers)
     assert set(numbers.values()) == {1}
-    assert {page.number for page in STORY} - {"00"} <= set(numbers)
-    assert [sheet for _, _, sheet in course.WEEKS] == list(SHEETS)
+    assert set(numbers) == {page.number for page in STORY if page.is_chapter} - {"00"}
+    assert [sheet for _, _, sheets in course.WEEKS for sheet in sheets] == list(SHEETS)
     assert len(course.WEEKS) == 6
     assert {page.number for page in STORY} <= set(course.GIVES)
 

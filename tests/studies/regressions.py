@@ -1,7 +1,7 @@
 """One deliberate regression for each committed table: does `szlib run` fail, and because of this table?
 
     python tests/studies/regressions.py                all tables (half an hour on one core)
-    python tests/studies/regressions.py 17_crowds ...  some of them
+    python tests/studies/regressions.py 12_crowds ...  some of them
 
 A regression is a change of one line in a copy of szlib.  The notebook that reads the table is executed there
 into a temporary folder.  It must end with an exit code other than 0, and the check that computes a row of
@@ -28,11 +28,11 @@ RESPECT = (
     "radius=0.9 * float(radius.flat[best])",
 )
 STANDING = "tracks/quality.py", "\nSTANDING = 0.1\n", "\nSTANDING = 0.2\n"
-DEFAULT = {"03": HULL, "14": STANDING, "15": RESPECT, "16": PATHS}
+DEFAULT = {"03": HULL, "24": STANDING, "06": RESPECT, "25": PATHS}
 """The regression for the tables of a notebook; that of the others is `BARRIER`."""
-OWN = dict.fromkeys(("16_estimators", "16_sensitivity", "16_subsets"), HULL)
-OWN |= dict.fromkeys(("16_coverage", "16_coverage_hull", "16_imposed"), LEVEL)
-CHECKS = {"19_atlas": "with the same least h, to a millimetre"}
+OWN = dict.fromkeys(("25_estimators", "25_sensitivity", "25_subsets"), HULL)
+OWN |= dict.fromkeys(("25_coverage", "25_coverage_hull", "25_imposed"), LEVEL)
+CHECKS = {"27_atlas": "with the same least h, to a millimetre"}
 """The check of a table, if its row is not computed again by `NotebookRecord.committed_table`."""
 RUN = "import sys; from szlib.workbook.cli import main; sys.exit(main(sys.argv[1:]))"
 

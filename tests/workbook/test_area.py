@@ -131,8 +131,8 @@ def test_given_area_is_used(hall, tmp_path):
 
 
 def test_data_quality_is_of_the_area_and_the_clock_of_the_run(tmp_path, monkeypatch):
-    """Notebook 14 counts the funnel in the area of the run, and hours by the clock of the file."""
-    file, notebook = tmp_path / "few.csv", folders.NOTEBOOKS / "14_data_quality.py"
+    """Notebook 24 counts the funnel in the area of the run, and hours by the clock of the file."""
+    file, notebook = tmp_path / "few.csv", folders.NOTEBOOKS / "deeper" / "24_data_quality.py"
     rows = make_hall(people=20)[["t", "id", "x", "y"]]
     rows.assign(t=rows["t"] + pd.Timestamp("2024-05-07 13:00").timestamp()).to_csv(file, index=False)
     variables = {}

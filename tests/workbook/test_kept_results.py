@@ -23,7 +23,7 @@ record.animation(b"GIF89a", "movie")"""
 def executed(notebooks: Callable[..., Path], tmp_path: Path) -> Callable[..., list[str]]:
     """Run two notebooks and the summary of all; return which of them were executed."""
     log = tmp_path / "log"
-    names = ("01_one", "03_two", "21_all")
+    names = ("01_one", "03_two", "28_all")
     notebooks(**{f"_{name}": CODE.format(log=log, name=name) for name in names})
 
     def run(*arguments: str, code: int = 0) -> list[str]:
@@ -42,7 +42,7 @@ def outputs(folder: Path) -> dict[str, bytes]:
 def test_an_identical_run_executes_nothing_and_changes_nothing(
     executed: Callable[..., list[str]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert executed("--force") == ["01_one", "03_two", "21_all"]
+    assert executed("--force") == ["01_one", "03_two", "28_all"]
     before, printed = outputs(tmp_path / "out"), capsys.readouterr().out
     assert executed() == []
     assert outputs(tmp_path / "out") == before
@@ -59,7 +59,7 @@ def test_a_changed_notebook_runs_again_with_the_summary_of_all(
 ) -> None:
     script = tmp_path / "notebooks" / "03_two.py"
     script.write_text(script.read_text() + "\n# one more line\n")
-    assert executed() == ["03_two", "21_all"]
+    assert executed() == ["03_two", "28_all"]
     assert executed() == []
 
 
@@ -77,7 +77,7 @@ def test_other_data_version_or_code_runs_everything_again(
     change: Callable[[Path, pytest.MonkeyPatch], None],
 ) -> None:  # fmt: skip
     change(tmp_path, monkeypatch)
-    assert executed() == ["01_one", "03_two", "21_all"]
+    assert executed() == ["01_one", "03_two", "28_all"]
     assert executed() == []
 
 
@@ -89,7 +89,7 @@ def test_a_damaged_result_is_made_again(
     file = tmp_path / "out" / "mine" / name
     whole = file.read_bytes()
     file.unlink() if damage == "missing" else file.write_bytes(whole[:-1])
-    assert executed() == ["01_one", "21_all"]
+    assert executed() == ["01_one", "28_all"]
     assert file.suffix == ".ipynb" or file.read_bytes() == whole  # ids of cells are random
     assert json.loads(file.read_bytes())["cells"] if file.suffix == ".ipynb" else file.exists()
 
@@ -105,9 +105,9 @@ def test_a_damaged_summary_or_report_is_made_again(
     summary = json.loads((home / "summary.json").read_text())
     summary["notebooks"]["01_one"]["checks"][0]["passed"] = False
     (home / "summary.json").write_text(json.dumps(summary))
-    assert executed() == ["01_one", "21_all"]
+    assert executed() == ["01_one", "28_all"]
     (home / "summary.json").write_text('{"notebooks": [1]}')
-    assert executed() == ["01_one", "03_two", "21_all"]
+    assert executed() == ["01_one", "03_two", "28_all"]
 
 
 def test_a_stopped_run_keeps_what_it_had_finished_and_nothing_else(
@@ -125,7 +125,7 @@ def test_a_stopped_run_keeps_what_it_had_finished_and_nothing_else(
     monkeypatch.setattr(runner, "wait", stop_at_the_second)
     assert executed("--force", code=130)[:1] == ["01_one"]
     monkeypatch.setattr(runner, "wait", whole)
-    assert executed() == ["03_two", "21_all"]
+    assert executed() == ["03_two", "28_all"]
 
 
 def test_figures_of_another_format_are_added_once(executed: Callable[..., list[str]], tmp_path: Path) -> None:
@@ -134,16 +134,16 @@ def test_figures_of_another_format_are_added_once(executed: Callable[..., list[s
         "import matplotlib.figure as m\nf = m.Figure()\nf.subplots().plot([1, 2])\nrecord.figure(f, 'line')"
     )
     script.write_text(script.read_text().replace("record.close()", f"{draw}\nrecord.close()"))
-    assert executed() == ["01_one", "21_all"]
-    assert executed("--figures", "svg") == ["01_one", "21_all"]
+    assert executed() == ["01_one", "28_all"]
+    assert executed("--figures", "svg") == ["01_one", "28_all"]
     assert (home / "01_one-line.svg").read_text().startswith("<?xml") and (home / "01_one-line.png").exists()
     assert executed("--figures", "svg") == executed() == []
-    assert executed("--figures", "pdf") == ["01_one", "21_all"]
+    assert executed("--figures", "pdf") == ["01_one", "28_all"]
     assert (home / "01_one-line.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_a_notebook_that_failed_is_repeated(executed: Callable[..., list[str]], tmp_path: Path) -> None:
     script = tmp_path / "notebooks" / "01_one.py"
     script.write_text(script.read_text().replace("record.close()", "1 / 0"))
-    assert executed(code=1) == ["01_one", "21_all"]
-    assert executed(code=1) == ["01_one", "21_all"]
+    assert executed(code=1) == ["01_one", "28_all"]
+    assert executed(code=1) == ["01_one", "28_all"]

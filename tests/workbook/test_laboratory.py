@@ -158,7 +158,7 @@ def test_a_headless_run_shows_no_sliders(monkeypatch):
     monkeypatch.delenv("JPY_SESSION_NAME", raising=False)
     assert not laboratory.is_interactive()
     laboratory.show_sliders(lambda speed: pytest.fail("drawn"), speed=(1.0, 0.5, 1.5, 0.1))
-    monkeypatch.setenv("JPY_SESSION_NAME", "20_laboratory.ipynb")
+    monkeypatch.setenv("JPY_SESSION_NAME", "13_laboratory.ipynb")
     assert laboratory.is_interactive()
     monkeypatch.setenv("SZLIB_RUN", "results")
     assert not laboratory.is_interactive()

@@ -58,7 +58,8 @@ def test_code_of_every_sentence_can_be_imported():
 def test_cell_of_every_sentence_is_in_its_notebook():
     missing = []
     for row in SENTENCES:
-        script = (folders.NOTEBOOKS / f"{row['notebook']}.py").read_text(encoding="utf-8")
+        (found,) = (s for s in folders.list_notebooks() if s.stem == row["notebook"])
+        script = found.read_text(encoding="utf-8")
         if row["cell"] not in {line.removeprefix("# ") for line in script.splitlines()}:
             missing.append((row["notebook"], row["cell"]))
     assert missing == []

@@ -195,11 +195,11 @@ def test_notebooks_wait_only_for_encounters_and_zone_and_the_summary_for_all(not
         "06_robot",
         "06b_build",
         "17_a",
-        "21_sentences",
+        "28_sentences",
     ]
     notebooks(**{f"_{name}": "" for name in names})
     stems = [[s.stem for s in batch] for batch in runner.split_batches(runner.choose_notebooks([]))]
-    assert stems == [names[:3], names[3:5], ["06_robot", "06b_build", "17_a"], ["21_sentences"]]
+    assert stems == [names[:3], names[3:5], ["06_robot", "06b_build", "17_a"], ["28_sentences"]]
     one = runner.choose_notebooks(["06"])
     assert runner.split_batches(one) == [[], [], one, []]
 

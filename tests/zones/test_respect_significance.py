@@ -46,7 +46,7 @@ def test_p_values_are_uniform_under_the_null() -> None:
 
 
 def test_noninteracting_crowd_shows_no_respect() -> None:
-    """notebooks/tables/15_nobody.csv has 100 seeds."""
+    """notebooks/tables/06_nobody.csv has 100 seeds."""
     p = []
     for seed in range(6):
         tracks = noninteracting_crowd(seed=seed, people=600, minutes=40)

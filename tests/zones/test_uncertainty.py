@@ -119,7 +119,7 @@ def test_hull_interval_lies_inside_the_hull() -> None:
 
 
 def test_intervals_contain_the_limit() -> None:
-    """In short: 25 data sets of 200 pairs; 200 plazas are in notebooks/tables/16_coverage.csv."""
+    """In short: 25 data sets of 200 pairs; 200 plazas are in notebooks/tables/25_coverage.csv."""
     limit = fit(passers(20_000, seed=99), n_resamples=0).table().iloc[0]
     held = []
     for seed in range(25):

@@ -70,8 +70,8 @@ class NotebookRecord:
         self.figures: list[str] = []
         self.key: dict[str, Any] = {}
         check_injected(variables.get("In", ()))
-        script = folders.NOTEBOOKS / f"{name}.py"
-        own_defaults = read_defaults(script) if script.exists() else {"area": "", "seed": 0}
+        script = next((each for each in folders.list_notebooks() if each.stem == name), None)
+        own_defaults = read_defaults(script) if script else {"area": "", "seed": 0}
         defaults = {**METHOD_DEFAULTS, **own_defaults}
         changed = {n: variables[n] for n, v in defaults.items() if variables.get(n, v) != v}
         self.changed = {n: v for n, v in changed.items() if n not in NEUTRAL}
