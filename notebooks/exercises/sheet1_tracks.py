@@ -21,7 +21,7 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · next: [sheet 2](sheet2_outliers.ipynb) · [to
 # do](../exercises/sheet1_tracks.ipynb) · [solved](../solutions/sheet1_tracks.ipynb) · 50 min · belongs to
-# [01](../01_tracks.ipynb), [02](../02_encounters.ipynb), [24](../deeper/24_data_quality.ipynb)
+# [01](../01_tracks.ipynb), [02](../02_encounters.ipynb)
 
 # %%
 import judges

@@ -22,7 +22,7 @@
 # [Start](../00_start_here.ipynb) · before: [sheet 3](sheet3_zones.ipynb) · next: [sheet
 # 5](sheet5_barriers.ipynb) · [to do](../exercises/sheet4_certainty.ipynb) ·
 # [solved](../solutions/sheet4_certainty.ipynb) · 50 min · belongs to [06](../06_respect.ipynb),
-# [25](../deeper/25_claims.ipynb)
+# [07](../07_barriers.ipynb)
 
 # %%
 import judges

@@ -21,10 +21,8 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 5](sheet5_barriers.ipynb) · [to
 # do](../exercises/sheet6_robot.ipynb) · [solved](../solutions/sheet6_robot.ipynb) · 1 h 20 min · belongs to
-# [09](../09_passing.ipynb), [10](../10_corridor.ipynb), [11](../11_waiting.ipynb),
-# [11b](../11b_making_room.ipynb), [23](../deeper/23_comparison.ipynb), [12](../12_among_people.ipynb),
-# [26](../deeper/26_meetings.ipynb), [27](../deeper/27_atlas.ipynb), [13](../13_laboratory.ipynb),
-# [28](../deeper/28_sentences.ipynb)
+# [11](../11_waiting.ipynb), [11b](../11b_making_room.ipynb), [12](../12_among_people.ipynb),
+# [13](../13_laboratory.ipynb)
 
 # %%
 import judges
