@@ -195,7 +195,6 @@ NO_SMALL_FILES: dict[str, Callable[[Path], object]] = {
         ("groups.txt", read_groups),
         ("run.json", SimulationLog.load),
         ("summary.json", lambda path: write_report(path.parent)),
-        ("area.txt", lambda path: write_report(path.parent)),
     ],
 )
 def test_what_is_no_small_regular_file_is_refused(

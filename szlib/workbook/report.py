@@ -17,7 +17,6 @@ from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,6 @@ from latex2mathml.converter import convert
 from nbconvert import HTMLExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 
-from ..control.settings import MPCSettings
 from ..errors import DataError, SzlibError
 from ..files import MARKER, folder_purpose, write_file
 from ..input_files import open_regular, printable, read_small
@@ -41,7 +39,9 @@ from ..tracks import datasets, funnels
 from ..zones.social_zone import SocialZone
 from . import folders
 from .figures.movies import read_scripts
+from .paper_sentences import NOT_RUN, judge, load_sentences
 from .record.display import format_value
+from .record.parameters import METHOD_DEFAULTS
 
 REPORT = folders.REPORT
 _LARGEST_NOTEBOOK = 100_000_000  # of an executed notebook, with its animations [bytes]
@@ -51,7 +51,10 @@ _OUTPUTS, _TAGS, _ATTRIBUTES = ({*_HARMLESS[name].split()} for name in ("outputs
 _SCRIPT_OR_STYLE = re.compile(r"<(script|style)\b.*?</\1>", re.DOTALL)
 # The data of a player, and its name, in the script of `static/player.html`.
 _RUN = re.compile(r"(?m)^const run = (\{.*\});\nconst figures = .*\[data-run=(szlib-[0-9a-f]{8})\]")
-_FILE_LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:|#|mailto:|data:)([^)\s]+)\)")
+# The picture of a player, which is shown on the front page only.
+_GIF = re.compile(r'<img src="data:image/gif;base64,[^"]*" alt="([^"]*)">')
+# The text of a link to another file, and the name of the file without folder and ending.
+_FILE_LINK = re.compile(r"(?<!!)\[([^]\n]+)\]\((?!https?:|#|mailto:|data:)(?:[^)\s]*/)?([^)\s/.]*)[^)\s/]*\)")
 
 
 def write_report(home: Path) -> Path:
@@ -68,28 +71,19 @@ def write_report(home: Path) -> Path:
     for name in names:
         with _reading(home / f"{name}.ipynb"):
             notebooks[name] = _read_notebook(home / f"{name}.ipynb", names, runs)
-    output = nbformat.v4.new_output("display_data", {"text/html": _render_front_page(home, notebooks)})
-    page = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("", outputs=[output])])
+    front, back = map(nbformat.v4.new_markdown_cell, _render_front_page(home, notebooks))
+    cells = [cell for notebook in notebooks.values() for cell in notebook.cells]
+    page = nbformat.v4.new_notebook(cells=[front, *cells, back])
     data = json.dumps(runs, separators=(",", ":")).replace("<", "\\u003c")
     script = f"(() => {{\n{read_scripts('scene', 'player', 'report')}\nplayAll({data});\n}})()"
     checksum = b64encode(sha256(script.encode()).digest()).decode()
-    page.metadata = nbformat.from_dict({
-        "title": f"szlib: {home.name}", "script": script, "script_checksum": f"sha256-{checksum}",
-        "language_info": {"name": "python", "pygments_lexer": "ipython3"},
-    })  # fmt: skip
-    for name, notebook in notebooks.items():
-        link = f'<a id="{escape(name)}"></a><p><a href="#top">to the front page</a></p>'
-        page.cells += [nbformat.v4.new_markdown_cell(link), *notebook.cells]
-    for i, cell in enumerate(page.cells):
-        cell["id"] = f"cell-{i}"
+    page.metadata |= {"script": script, "script_checksum": f"sha256-{checksum}"}
     exporter = HTMLExporter(
         extra_loaders=[FileSystemLoader(_STATIC)],
         extra_template_basedirs=[],  # not the current folder, which is the default
         template_file="report.html.j2",
-        exclude_input_prompt=True,
-        exclude_output_prompt=True,
     )
-    exporter.register_filter("markdown2html", lambda html: html)  # `_read_notebook` has rendered it
+    exporter.register_filter("without_gif", lambda html: _GIF.sub(r"\1", html))
     exporter.register_filter("harmless", _remove_harmful)
     write_file(home / REPORT, exporter.from_notebook_node(page)[0])
     return home / REPORT
@@ -116,7 +110,7 @@ def _read_notebook(file: Path, names: Sequence[str], runs: dict[str, Any]) -> nb
     """
     notebook = nbformat.reads(read_small(file, _LARGEST_NOTEBOOK), as_version=4)
     nbformat.validate(notebook)
-    notebook.metadata["question"] = _find_question(notebook)
+    notebook.metadata |= {"question": _find_question(notebook), "html": []}
     for cell in notebook.cells:
         cell.metadata.clear()
         if cell.cell_type == "markdown":
@@ -132,6 +126,7 @@ def _read_notebook(file: Path, names: Sequence[str], runs: dict[str, Any]) -> nb
             if "text/html" in data:
                 runs |= {found[2]: json.loads(found[1]) for found in _RUN.finditer(data["text/html"])}
                 data["text/html"] = _SCRIPT_OR_STYLE.sub("", data["text/html"])
+                notebook.metadata["html"].append(data["text/html"])
             alt = output.metadata.get("image/png", {}).get("alt", "")
             output.data, output.metadata = data, nbformat.from_dict({"image/png": {"alt": str(alt)}})
     return notebook
@@ -148,12 +143,6 @@ def _is_harmless(tag: str, name: str, value: str) -> bool:
     if name == "src":
         return tag == "img" and value.startswith("data:image/")
     return name in _ATTRIBUTES or (name == "href" and not value.startswith("data:"))
-
-
-def _local_link(link: re.Match[str], names: Sequence[str]) -> str:
-    """A link to a notebook inside the report; the text alone if the report does not hold that notebook."""
-    name = Path(link[2]).stem
-    return f"[{link[1]}](#{name})" if name in names else link[1]
 
 
 class _Renderer(IPythonRenderer):
@@ -175,56 +164,72 @@ class _Renderer(IPythonRenderer):
 def _render_markdown(source: str, names: Sequence[str]) -> str:
     """Render markdown with its pictures embedded; links to the notebooks `names` lead into the report."""
     renderer = _Renderer(escape=False, path=str(folders.NOTEBOOKS), embed_images=True)
-    source = _FILE_LINK.sub(lambda link: _local_link(link, names), source)
+    source = _FILE_LINK.sub(lambda x: f"[{x[1]}](#{x[2]})" if x[2] in names else x[1], source)
     return MarkdownWithMath(renderer=renderer).render(source)
 
 
-def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> str:
-    """The front page as HTML, made from the results in `home` and the executed `notebooks`."""
+def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str]:
+    """The pages before and after the executed `notebooks` as HTML, made from the results in `home`."""
     pages = Environment(loader=FileSystemLoader(_STATIC), autoescape=True, undefined=StrictUndefined)
-    outputs = [(name, html) for name, notebook in notebooks.items() for html in _html_outputs(notebook)]
-    area, samples, zone, funnel = home / "area.txt", home / "encounters.parquet", home / "zone.json", ""
+    outputs = [(name, html) for name, notebook in notebooks.items() for html in notebook.metadata["html"]]
+    samples, zone, funnel = home / "encounters.parquet", home / "zone.json", ""
     with _reading(home / "parameters.json"):
         run = _read_json(home / "parameters.json")
         is_synthetic = run.get("data") == datasets.SYNTHETIC
         files = [f"{name} ({size:,} bytes)" for name, size, *_ in run.get("files", ())]
-        changed = [f"{name} = {value}" for name, value in run.get("parameters", {}).items()]
+        given = dict(run.get("parameters", {}).items())
+        speed = float(given.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
     with _reading(home / "summary.json"):
         summary = _read_json(home / "summary.json")
-        outcomes = {name: _format_outcome(outcome) for name, outcome in summary.get("notebooks", {}).items()}
+        outcomes = {name: _format_outcome(name, o) for name, o in summary.get("notebooks", {}).items()}
+    for name, notebook in notebooks.items():
+        fold = {"name": name, "question": notebook.metadata["question"], "outcome": outcomes.get(name)}
+        notebook.cells[0].metadata["fold"], notebook.cells[-1].metadata["is_last"] = fold, True
     with _reading(samples):
         if samples.exists():
             with open_regular(samples) as stream:
                 stages = funnels.table(funnels.get(pd.read_parquet(stream, columns=[])))
             stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")  # each is named once
-            funnel = _to_html(stages.assign(rows=stages["rows"].map("{:,}".format)))
-    with _reading(area):
-        area_text = read_small(area).decode("utf-8") if area.exists() else ""
+            funnel = stages.to_html(index=False, border=0, formatters={"rows": "{:,}".format})
     with _reading(zone):
-        zone_texts = _show_zone(zone, is_synthetic=is_synthetic) if zone.exists() else {}
-    return pages.get_template("front_page.html.j2").render(
-        title="the synthetic plaza" if is_synthetic else summary.get("data", home.name),
+        texts = _show_zone(zone, speed, is_synthetic=is_synthetic) if zone.exists() else {}
+    checks = [check for outcome in outcomes.values() for check in outcome["checks"]]
+    named = {check["key"]: check for check in checks}
+    claims = load_sentences().query("kind == 'claim'")
+    claims["verdict"] = [judge("claim", names, named) for names in claims["held_by"]]
+    claims["checks"] = [[named[n] for n in names if n in named] for names in claims["held_by"]]
+    html = pages.get_template("front_page.html.j2").render(
+        data=str(summary.get("data", home.name)),
+        data_sets=datasets.NAMES,
+        is_synthetic=is_synthetic,
+        speed=speed,
+        verdict=str(summary.get("verdict", "")).removeprefix(f"zone at {speed:g} m/s: "),
         outcomes=outcomes,
-        checks=[c | {"notebook": name} for name, outcome in outcomes.items() for c in outcome["checks"]],
+        checks=checks,
+        not_run=NOT_RUN,
+        claims=claims.to_dict("records"),
         files=files,
-        changed=changed,
+        changed=[f"{name} = {value}" for name, value in given.items()],
         version=run.get("szlib", ""),
-        verdict=str(summary.get("verdict", "")),
-        area=area_text,
-        questions={name: notebook.metadata["question"] for name, notebook in notebooks.items()},
+        area=str(summary.get("area", "")),
+        notebooks=list(notebooks),
         funnel=funnel,
-        zone=zone_texts,
-        players={scenario.title: _find_player(scenario, outputs) for scenario in SCENARIOS.values()},
+        zone=texts,
+        players={s.name.replace("_", " "): _find_player(s, outputs) for s in SCENARIOS.values()},
         parameters=_list_parameters(outputs),
     )
+    return html.rpartition("<!-- notebooks -->")[::2]
 
 
-def _format_outcome(outcome: Mapping[str, Any]) -> dict[str, Any]:
-    """The outcome of a notebook as texts; an ordinary Python error where it is malformed."""
-    texts = {"status": str(outcome["status"]), "seconds": f"{outcome['seconds']:.0f}"}
-    names = ("kind", "name", "result", "passed")
-    checks = [{n: c[n] for n in names} | {"value": format_value(c["value"])} for c in outcome["checks"]]
-    return {**texts, "error": str(outcome.get("error", outcome["status"])), "checks": checks}
+def _format_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:
+    """The outcome of the notebook `name` as texts; an ordinary Python error where it is malformed."""
+    checks = [{part: str(check[part]) for part in ("kind", "name", "result")} for check in outcome["checks"]]
+    for text, check in zip(checks, outcome["checks"], strict=True):
+        text |= {"passed": check["passed"], "value": format_value(check["value"]), "notebook": name}
+        text["key"] = f"{name.split('_')[0]}: {text['name']}"
+    status = str(outcome["status"])
+    texts = {"status": status, "error": str(outcome.get("error", status))}
+    return {**texts, "seconds": f"{outcome['seconds']:.0f}", "checks": checks}
 
 
 def _find_question(notebook: Any) -> str:
@@ -233,24 +238,23 @@ def _find_question(notebook: Any) -> str:
     return " ".join(found[1].replace("*", "").split()) if found else ""
 
 
-def _show_zone(file: Path, *, is_synthetic: bool) -> dict[str, str]:
-    """The method, table and picture of the zone in a `file`."""
+def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any]:
+    """The method and table of the zone in a `file`; its size and picture at a `speed`, if it was fitted."""
     from matplotlib.figure import Figure
 
     from . import figures
 
     zone = SocialZone.load(file)
     table = zone.table()
-    bounds = [f"{name}{end}" for name in ("a", "b") for end in ("", "_low", "_high")]
-    shown = [c for c in ("speed", "center_x", *bounds, "encounters", "adequate", "verdict") if c in table]
-    texts = {"method": zone.method, "table": _to_html(table[shown].round(2)), "picture": ""}
-    speed = MPCSettings().zone_speed
+    shown = table.filter(regex="^(speed|center_x|[ab](_low|_high)?|encounters|adequate|verdict)$")
+    texts: dict[str, Any] = {"method": zone.method, "table": shown.round(2).to_html(index=False, border=0)}
     if speed in zone.ellipses:
-        figure, content = Figure(figsize=(6, 4.5), layout="constrained"), io.BytesIO()
+        figure, content = Figure(figsize=(4.8, 4.5), layout="constrained"), io.BytesIO()
         truth = PlazaSettings().true_zone(speed) if is_synthetic else None
         figures.plot_zone(zone, speed, truth=truth, ax=figure.subplots())
         figure.savefig(content, format="png", dpi=100)
         texts |= {"picture": b64encode(content.getvalue()).decode(), "alt": figures.alt_text(figure)}
+        texts |= {"size": table.set_index("speed").loc[speed].to_dict()}
     return texts
 
 
@@ -270,17 +274,6 @@ def _list_parameters(outputs: Sequence[tuple[str, str]]) -> dict[tuple[str, ...]
     return rows
 
 
-def _html_outputs(notebook: Any) -> Iterator[str]:
-    """The HTML of every output of a notebook."""
-    for cell in notebook.cells:
-        for output in cell.get("outputs", ()):
-            yield output.get("data", {}).get("text/html", "")
-
-
 def _read_json(file: Path) -> dict[str, Any]:
     """The object in a JSON file; empty if the file is missing."""
     return dict(json.loads(read_small(file)).items()) if file.exists() else {}
-
-
-def _to_html(table: pd.DataFrame) -> str:
-    return str(table.to_html(index=False, border=0, justify="left", classes="front"))

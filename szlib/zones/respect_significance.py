@@ -64,7 +64,7 @@ class NullTest:
     >>> result.is_significant
     False
     >>> print(result)
-    no respect shown: p = 0.25 (3 shifts, 50 encounters)
+    no respect shown (p = 0.25, 3 shifts, 50 encounters)
     """
 
     p_value: float
@@ -85,8 +85,8 @@ class NullTest:
         return self.p_value <= SIGNIFICANCE_LEVEL
 
     def __str__(self) -> str:
-        result = "respect" if self.is_significant else "no respect shown"
-        return f"{result}: p = {self.p_value:.3g} ({self.n_shifts} shifts, {self.n_encounters} encounters)"
+        result = "people avoid each other" if self.is_significant else "no respect shown"
+        return f"{result} (p = {self.p_value:.2g}, {self.n_shifts} shifts, {self.n_encounters:,} encounters)"
 
 
 def null_test(samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0) -> NullTest:

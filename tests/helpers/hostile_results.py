@@ -67,13 +67,13 @@ def make_hostile_results(folder: Path) -> Path:
     outcome = {"status": BAD, "error": BAD, "seconds": 1.2, "checks": checks, "key_figures": {BAD: BAD}}
     summary = {
         "data": BAD,
+        "area": BAD,
         "passed": False,
         "notebooks": {BAD: outcome, "11_waiting": {**outcome, "status": BAD}},
     }
     (home / "summary.json").write_text(json.dumps(summary))
     parameters = {"szlib": BAD, "data": BAD, "files": [[BAD, 3, BAD]], "parameters": {BAD: BAD}}
     (home / "parameters.json").write_text(json.dumps(parameters))
-    (home / "area.txt").write_text(BAD)
     samples = pd.DataFrame({"encounter": [0]})
     samples.attrs["funnel"] = [{"stage": BAD, "entered": 1, "kept": 0, "rejected": {BAD: 1}}]
     samples.to_parquet(home / "encounters.parquet")

@@ -16,6 +16,7 @@ from szlib.workbook.record import PAPER, parameters
 from szlib.workbook.report import write_report
 
 PIXEL = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNkYPhfDwAChwGA60e6kgAAAABJRU5ErkJggg=="
+SLOWS = "The robot slows down while passing."
 ZONE = szlib.Ellipse((0.05, 0.0), (0.95, 0.75))
 
 
@@ -55,10 +56,12 @@ def page(tmp_path_factory, movie):
     nbformat.write(nbformat.v4.new_notebook(cells=cells), home / "08_corridor.ipynb")
     checks = [
         {"kind": "check", "name": "h >= 0", "passed": False, "value": -0.25, "result": "FAILED"},
-        {"kind": "claim", "name": "It slows down.", "passed": True, "value": 0.123456, "result": "supported"},
+        {"kind": "claim", "name": SLOWS, "passed": True, "value": 0.123456, "result": "supported"},
+        {"kind": "claim", "name": "gamma is tuned", "passed": True, "value": "yes", "result": "supported"},
     ]
     record = {"status": "done", "seconds": 1.2, "checks": checks, "key_figures": {}, "figures": []}
-    summary = {"data": "mine", "passed": False, "notebooks": {"08_corridor": record}}
+    summary = {"data": "hall", "passed": False, "notebooks": {"08_corridor": record}}
+    (home / "parameters.json").write_text(json.dumps({"data": "hall", "files": [["hall.csv", 9, "x"]]}))
     (home / "summary.json").write_text(json.dumps(summary))
     return BeautifulSoup(write_report(home).read_text(encoding="utf-8"), "html.parser")
 
@@ -91,18 +94,45 @@ def test_formulas_are_drawn_by_the_browser(page):
 
 def test_front_page_lists_checks_claims_and_parameters(page):
     assert "0 of 1 checks hold" in page.text
-    assert "h >= 0 (-0.25)" in page.text
-    rows = [[cell.text for cell in row.select("td")] for row in page.select("table.front tr")]
-    assert ["08", "It slows down.", "supported", "0.1235"] in rows
+    assert "Failed in notebook 08: h >= 0: -0.25." in page.text
+    rows = [[cell.text for cell in row.select("td")] for row in page.select("tr")]
+    assert ["h >= 0: -0.25. (notebook 08)", "FAILED"] in rows
     assert ["08", "gamma", "0.05", "paper", "sec. 4"] in rows
-    assert ["08 corridor", "Does it barge past?", "0/1", "1", "done"] in rows
-    assert page.text.count("Not part of this run") == 5  # funnel, zone, three scenarios
+    (summary,) = page.select("details.notebook > summary")
+    text = " ".join(summary.text.split())
+    assert text == "08 corridor Does it barge past? 0 of 1 checks hold, 1 s, done"
+
+
+def test_claims_of_the_paper_stand_apart_from_those_of_the_workbook(page):
+    paper, own = page.select_one("#claims"), page.select_one("#checks")
+    claims = {row.td.text: row for row in paper.find_next("table").select("tbody tr")}
+    (slows,) = (row for text, row in claims.items() if text.startswith("CBF enables natural behaviors"))
+    assert [cell.text for cell in slows.select("td")][1:] == [
+        "supported",
+        "The robot slows down while passing: 0.123. (notebook 08)",
+    ]
+    assert [row.td.text for row in own.find_next("table").select("tbody tr")] == [
+        "gamma is tuned: yes. (notebook 08)"
+    ]
+
+
+def test_sections_stand_in_their_order_and_none_is_empty(page):
+    sections = [heading["id"] for heading in page.select("h2[id]")]
+    assert sections == ["claims", "checks", "notebooks", "parameters", "run"]  # no zone, no funnel
+    assert "Not part of this run" not in page.text
+    assert page.h1.text == page.title.text == "Social zones of hall.csv"
+    menus = [[link["href"] for link in menu.select("a")] for menu in page.select("nav")]
+    assert menus == [["#top", "#claims", "#checks", "#notebooks", "#08_corridor", "#parameters", "#run"]] * 2
+    order = [tag.get("id") or tag["class"][0] for tag in page.select("div.first, h2[id], details.notebook")]
+    assert order == ["first", "claims", "checks", "notebooks", "08_corridor", "parameters", "run"]
 
 
 def test_movie_is_on_the_front_page_and_in_its_notebook(page, movie):
     name = re.search("data-run=.(szlib-[0-9a-f]{8})", movie._repr_html_())[1]
-    assert [figure["data-run"] for figure in page.select("figure.szlib-player")] == [name, name]
-    assert len(page.select("figure.szlib-player img[src^='data:image/gif']")) == 2
+    first, second = page.select("figure.szlib-player")
+    assert first["data-run"] == second["data-run"] == name
+    assert first.img["src"].startswith("data:image/gif") and first.find_parent(class_="players")
+    assert second.text == first.img["alt"] and second.find_parent("details")["id"] == "08_corridor"
     (script,) = page.select("script")
     run = json.loads(re.search(r"^playAll\((.*)\);$", script.text, re.MULTILINE)[1])[name]
     assert run == json.loads(json.dumps(movie.run))

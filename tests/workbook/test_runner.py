@@ -61,8 +61,9 @@ def test_verdict_on_the_zone_ends_the_run_and_begins_the_report(notebooks, tmp_p
     last = capsys.readouterr().out.splitlines()[-1]
     assert last.startswith("zone at 1.1 m/s: undecided: no null model: ")
     page = (tmp_path / "out" / "mine" / "report.html").read_text(encoding="utf-8")
-    assert re.search(
-        r"<h1[^>]*>Results for mine.*?</h1>\s*<p><strong>zone at 1.1 m/s: undecided", page, re.DOTALL
+    answer = re.search(r"<h1>Social zones of mine.*?</h1>\s*<p class=.answer.>(.*?)</p>", page, re.DOTALL)[1]
+    assert re.match(
+        r"At 1.1 m/s the social zone has semi-axes of \d\.\d\d m and \d\.\d\d m: <strong>un", answer
     )
     assert last == summary(tmp_path)["verdict"]
 

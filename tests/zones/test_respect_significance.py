@@ -105,7 +105,7 @@ def test_people_who_keep_away_show_respect() -> None:
     assert test.statistic > max(test.null_statistics)
     assert test.is_significant
     assert test.respect.radius == pytest.approx(0.5, abs=0.15)
-    assert "respect: p = 0.025 (39 shifts" in str(test)
+    assert "people avoid each other (p = 0.025, 39 shifts" in str(test)
 
 
 def test_people_who_come_near_show_no_respect() -> None:

@@ -60,7 +60,7 @@ def careful() -> szlib.SocialZone:
 def test_careful_people_in_number_are_usable(careful: szlib.SocialZone) -> None:
     verdict = careful.verdict(SPEED)
     assert verdict == "usable", verdict.sentence
-    assert "respect: p = " in verdict.sentence
+    assert "people avoid each other (p = " in verdict.sentence
     assert careful.adequate(SPEED)
 
 

@@ -67,12 +67,14 @@ def style_table(table: pd.DataFrame) -> Styler:
 
 
 def format_value(value: Any) -> str:
-    """The `value` of a check or a claim as text: four digits of a number, all entries of a dictionary."""
+    """The `value` of a check or a claim as text: three digits of a number, all entries of a dictionary."""
     if value is None:
         return ""
     if isinstance(value, dict):
         return ", ".join(f"{k}: {format_value(v)}" for k, v in value.items())
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.0f}" if abs(value) >= 100 else f"{value + 0.0:.3g}"  # not "-0"
+    return str(value)
 
 
 def format_result(result: str, value: Any) -> str:
@@ -81,7 +83,7 @@ def format_result(result: str, value: Any) -> str:
 
 
 def show_figure(figure: Figure, picture: bytes) -> None:
-    """Show a saved `picture` of a `figure` in the notebook, smaller and in 256 colours, with its alt text.
+    """Show a saved `picture` of a `figure` in the notebook, smaller and in 64 colours, with its alt text.
 
     The figure is not drawn a second time. Nothing is shown if the backend is not inline (such as ipympl).
     """
@@ -96,7 +98,7 @@ def show_figure(figure: Figure, picture: bytes) -> None:
     drawn = Image.open(io.BytesIO(picture)).convert("RGB")
     size = round(drawn.width * _SHOWN_WIDTH), round(drawn.height * _SHOWN_WIDTH)
     shown = io.BytesIO()
-    drawn.resize(size, Image.Resampling.LANCZOS).quantize(dither=Image.Dither.NONE).save(shown, "PNG")
+    drawn.resize(size, Image.Resampling.LANCZOS).quantize(64).save(shown, "PNG", optimize=True)
     content = {"image/png": shown.getvalue(), "text/plain": repr(figure)}
     metadata = {"image/png": {"alt": alt_text(figure)}}
     display(content, raw=True, metadata=metadata)  # type: ignore[no-untyped-call]

@@ -4,7 +4,7 @@ function play(figure, run) {
   figure.style.margin = "0";
   const { layout, snapshots } = run, last = snapshots.length - 1;
   figure.textContent = "";
-  const width = Math.max(280, Math.min(figure.clientWidth || 640, 640));
+  const width = Math.max(200, Math.min(figure.clientWidth || 640, 640));
   const [x0, x1, y0, y1] = layout.limits;
   const height = Math.round(Math.min(420, (width * (y1 - y0)) / (x1 - x0)));
   const sceneCanvas = addElement(figure, "canvas", { role: "img", ariaLabel: run.alt });
@@ -26,7 +26,7 @@ function play(figure, run) {
     drawScene(scene, view, layout, snapshot, snapshots.slice(0, row + 1).map((s) => s.robot));
     drawBarriers(chart, width, 100, times, values, snapshot.t, [0, times[last]], layout.colours);
     const h = snapshot.h === null ? "" : `, least h ${snapshot.h.toFixed(2)} m`;
-    const fallback = snapshot.fallback ? `, solver: ${snapshot.fallback}` : "";
+    const fallback = !["", "warm", "cold"].includes(snapshot.fallback) ? `, solver: ${snapshot.fallback}` : "";
     const stuck = snapshot.stuck ? `, no progress for ${snapshot.stuck.toFixed(1)} s` : "";
     status.textContent = `t = ${snapshot.t.toFixed(1)} s, speed ${snapshot.speed.toFixed(2)} m/s${h}${fallback}${stuck}`;
   };
