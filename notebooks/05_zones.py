@@ -33,10 +33,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from laboratory import show_sliders
+from studies import paper_claims as claims
 
 import szlib
 from szlib.plaza.settings import PlazaSettings
-from szlib.simulation import paper_claims as claims
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
 

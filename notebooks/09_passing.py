@@ -39,10 +39,9 @@ import numpy as np
 import pandas as pd
 from IPython.display import Markdown
 from laboratory import show_sliders
-from studies import gamma_table
+from studies import gamma_table, paper_claims
 
 import szlib
-from szlib.simulation import paper_claims
 from szlib.simulation.metrics import find_avoidance_start
 from szlib.workbook import figures
 from szlib.workbook.record import NotebookRecord, settings_table

@@ -32,10 +32,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from IPython.display import Markdown
+from studies import paper_claims
+from studies.atlas import AtlasCell
 
 import szlib
-from szlib.simulation import paper_claims
-from szlib.simulation.atlas import AtlasCell
 from szlib.simulation.strategies import classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters

@@ -33,11 +33,11 @@ import numpy as np
 import pandas as pd
 from IPython.display import Markdown
 from studies import chains as chains_study
+from studies import paper_claims
+from studies.atlas import AtlasCell
 
 import szlib
 from szlib.control.acceleration_polygon import find_admissible_controls
-from szlib.simulation import paper_claims
-from szlib.simulation.atlas import AtlasCell
 from szlib.simulation.strategies import classify_strategy, compute_retreat
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters

@@ -41,13 +41,13 @@ import pandas as pd
 from IPython.display import Markdown
 from studies import claims as claims_study
 from studies import imposed as imposed_study
+from studies import paper_claims as claims
 from studies import plazas as plazas_study
 from studies import zones as zones_study
 
 import szlib
 from szlib.control.distances import compare_distances
 from szlib.plaza.accuracy import true_kinds
-from szlib.simulation import paper_claims as claims
 from szlib.workbook import figures, paper_sentences
 from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters, read_table
 from szlib.zones.outliers import is_outlier

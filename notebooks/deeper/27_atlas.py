@@ -30,11 +30,14 @@
 # **Afterwards you can** predict from gamma, width, speed and zone what the robot will do.
 
 # %%
+import sys
+
+sys.path.append("..")  # for `studies`
 import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Markdown
+from studies.atlas import REFERENCE, SCENES, AtlasCell, run_atlas
 
-from szlib.simulation.atlas import REFERENCE, SCENES, AtlasCell, run_atlas
 from szlib.simulation.strategies import STRATEGIES, classify_strategy
 from szlib.workbook import figures
 from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table

@@ -23,12 +23,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from scipy.stats import t as student_t
+from studies import paper_claims as claims
 from studies.committed import write_table
 from studies.respect import stored
 
 import szlib
 from szlib.plaza.accuracy import true_kinds
-from szlib.simulation import paper_claims as claims
 from szlib.tracks import sites
 from szlib.zones.outliers import is_outlier
 from szlib.zones.sensitivity import FIT, sensitivity

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from studies.atlas import REFERENCE
 from studies.committed import write_table
 
 from szlib.simulation import comparisons
-from szlib.simulation.atlas import REFERENCE
 from szlib.simulation.comparisons import BEHAVIOURS, FORMULATIONS, WORLDS
 
 RIVAL = {"zone": "equal circle"}

@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from studies.atlas import REFERENCE
 from studies.committed import write_table
 
 import szlib
-from szlib.simulation.atlas import REFERENCE
 from szlib.simulation.comparisons import CONTROLLERS, summarise
 from szlib.simulation.monte_carlo import rollouts
 from szlib.simulation.scenarios.meetings import Variations, VisiblePeople

@@ -14,12 +14,9 @@ closed_loop           the robot among people, step by step: `simulate`, `drive`
 baseline_controllers  controllers to compare with
 monte_carlo           thousands of random worlds, in parallel: `rollouts`
 comparisons           controllers, zones, formulations and behaviours on identical worlds: `compare`
-atlas                 the paper's scenarios with other widths, paces, zones and gamma: `run_atlas`
 replay                the robot in the place of a recorded walker: `find_replays`
-paper_claims          the paper's claims, tested on data: `Finding`
 """
 
-from .atlas import AtlasCell, run_atlas
 from .closed_loop import drive, simulate
 from .comparisons import BEHAVIOURS, CONTROLLERS, FORMULATIONS, ZONES, compare, measure_time_inside, summarise
 from .crowds import ReactingPeople
@@ -27,7 +24,6 @@ from .log import SimulationLog
 from .metrics import compute_metrics, find_avoidance_start, find_passing_side, find_yielding_steps
 from .monte_carlo import rerun_world, rollouts
 from .outcomes import classify_outcome
-from .paper_claims import Finding
 from .replay import ReplacedWalker, Replay, Replays, find_replays
 from .run import Run
 from .safety_claims import safety_violations

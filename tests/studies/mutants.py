@@ -47,7 +47,7 @@ from scipy.stats import binomtest
 
 ROOT = Path(__file__).parents[2]
 DRAWN = ["control", "encounters", "zones"]
-DRAWN += [f"simulation/{name}.py" for name in ("metrics", "social_metrics", "paper_claims")]
+DRAWN += [f"simulation/{name}.py" for name in ("metrics", "social_metrics")]
 ROOMS = [f"tests/{room}" for room in ("control", "encounters", "zones", "simulation", "plaza")]
 PRELOADED = "numpy pandas polars scipy.optimize scipy.stats sklearn.neighbors shapely casadi pytest"
 PRELOADED += " hypothesis jupytext joblib pyarrow.parquet"

@@ -213,7 +213,7 @@ def plot_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    table : one row for each claim, as from `szlib.simulation.paper_claims.tabulate_findings`: claim, effect,
+    table : one row for each claim, as from `studies.paper_claims.tabulate_findings`: claim, effect,
         low, high, verdict, and perhaps method.
     ax : axes to draw on; None makes new ones.
 

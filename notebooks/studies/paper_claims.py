@@ -20,20 +20,20 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest, chi2
 
-from ..checks import check_columns
-from ..control.mpc import MPCCBF
-from ..encounters.kinds import OPPOSITE
-from ..encounters.null_model import NullEncounters
-from ..errors import DataError, ZoneError
-from ..zones.ellipses import Ellipse
-from ..zones.outliers import R_MAX
-from ..zones.respect import MIN_COMPARED, RespectEstimator
-from ..zones.respect_likelihood import zone_ellipses
-from ..zones.social_zone import SocialZone
-from .closed_loop import simulate
-from .metrics import compute_metrics
-from .run import Run
-from .scenarios.paper import SCENARIOS
+from szlib.checks import check_columns
+from szlib.control.mpc import MPCCBF
+from szlib.encounters.kinds import OPPOSITE
+from szlib.encounters.null_model import NullEncounters
+from szlib.errors import DataError, ZoneError
+from szlib.simulation.closed_loop import simulate
+from szlib.simulation.metrics import compute_metrics
+from szlib.simulation.run import Run
+from szlib.simulation.scenarios.paper import SCENARIOS
+from szlib.zones.ellipses import Ellipse
+from szlib.zones.outliers import R_MAX
+from szlib.zones.respect import MIN_COMPARED, RespectEstimator
+from szlib.zones.respect_likelihood import zone_ellipses
+from szlib.zones.social_zone import SocialZone
 
 PAPER_RATE = 16_181 / 92  # encounters a day in the paper (sec. 2)
 LEVEL = 0.95  # level of all confidence intervals here
@@ -64,7 +64,7 @@ class Finding:
 
     Examples
     --------
-    >>> from szlib.simulation import paper_claims
+    >>> from studies import paper_claims
     >>> finding = paper_claims.measure_encounter_rate(encounters=16_181, days=92)
     >>> finding.verdict
     'supported'

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from studies.atlas import CANNOT_START, REFERENCE, SCENES, AtlasCell, run_atlas
 
 import szlib
-from szlib.simulation.atlas import CANNOT_START, REFERENCE, SCENES, AtlasCell, run_atlas
 from szlib.simulation.log import SimulationLog
 from szlib.simulation.strategies import MIN_RETREAT, STRATEGIES, classify_strategy, compute_retreat
 

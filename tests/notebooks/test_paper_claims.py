@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 from helpers.passing_pairs import null_of, passing_pairs, respecting
 from studies import chains as chains_study
+from studies import paper_claims as claims
 from studies.claims import measure_density
 
 import szlib
-from szlib.simulation import paper_claims as claims
 from szlib.zones import respect_likelihood
 from szlib.zones.sensitivity import sensitivity
 
