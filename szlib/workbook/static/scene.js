@@ -18,12 +18,12 @@ function prepareCanvas(canvas, width, height) {
   return context;
 }
 
-// Converts metres to pixels and back: as large as possible, y upwards.
-function makeView([x0, x1, y0, y1], width, height) {
-  const scale = Math.min(width / (x1 - x0), height / (y1 - y0));
-  const left = (width - scale * (x1 - x0)) / 2, top = (height - scale * (y1 - y0)) / 2;
+// Converts metres to pixels and back: as large as possible, y upwards; `axis` leaves that many pixels for numbers.
+function makeView([x0, x1, y0, y1], width, height, axis = 0) {
+  const scale = Math.min((width - 2 * axis) / (x1 - x0), (height - axis) / (y1 - y0));
+  const left = (width - scale * (x1 - x0)) / 2, top = (height - axis - scale * (y1 - y0)) / 2;
   return {
-    scale, width, height,
+    scale, width, height, axis,
     pixel: (x, y) => [left + scale * (x - x0), top + scale * (y1 - y)],
     world: (px, py) => [x0 + (px - left) / scale, y1 - (py - top) / scale],
   };
@@ -50,21 +50,24 @@ function drawDiamond(context, [x, y], size, fill) {
   context.stroke();
 }
 
-// Draws a grid in metres with numbers; the spacing depends on the scale.
+// Draws a grid in metres with numbers, beside it if the view has room for them; the spacing depends on the scale.
 function drawGrid(context, view, [x0, x1, y0, y1]) {
   const spacing = [1, 2, 5, 10, 20, 50].find((d) => d * view.scale >= 45) || 100;
+  const [left, bottom] = view.pixel(x0, y0), [right, top] = view.pixel(x1, y1), beside = view.axis > 0;
   context.font = "11px sans-serif";
   context.fillStyle = "#555555";
   for (let x = Math.ceil(x0 / spacing) * spacing; x <= x1; x += spacing) {
+    const px = view.pixel(x, y0)[0];
     drawLine(context, view, [[x, y0], [x, y1]], "#eeeeee", 1);
-    const [px, py] = view.pixel(x, y0);
-    context.fillText(x + spacing > x1 ? `x = ${x} m` : `${x}`, Math.min(px + 2, view.width - 50), py - 3);
+    if (px < right - 44) context.fillText(`${x}`, px + 2, beside ? bottom + 12 : bottom - 3);
   }
   for (let y = Math.ceil((y0 + 0.3) / spacing) * spacing; y <= y1; y += spacing) {
+    const py = view.pixel(x0, y)[1], width = context.measureText(`${y}`).width;
     drawLine(context, view, [[x0, y], [x1, y]], "#eeeeee", 1);
-    const [px, py] = view.pixel(x0, y);
-    context.fillText(y + spacing > y1 ? `y = ${y} m` : `${y}`, px + 2, Math.max(py - 2, 11));
+    if (py > top + 24) context.fillText(`${y}`, beside ? left - width - 3 : left + 2, beside ? py + 4 : py - 2);
   }
+  context.fillText("x [m]", right - 30, beside ? bottom + 12 : bottom - 3);
+  context.fillText("y [m]", beside ? Math.max(0, left - 30) : left + 2, top + 11);
 }
 
 function drawScene(context, view, layout, snapshot, path) {
@@ -145,13 +148,13 @@ function addElement(parent, name, properties = {}, style = {}) {
   return added;
 }
 
-// Adds a legend; its marks can be distinguished without colour.
-function addLegend(parent, colours) {
+// Adds a legend; its marks can be distinguished without colour. `more`: further marks, [mark, colour, name].
+function addLegend(parent, colours, more = []) {
   const row = addElement(parent, "div", {}, { fontSize: "12px", display: "flex", gap: "14px", flexWrap: "wrap" });
   const marks = [
     ["\u25cf", colours.robot, "robot"], ["\u25c6", colours.robot, "goal"], ["\u25b6", colours.person, "person"],
     ["\u25cb", colours.person, "zone"], ["\u2026", colours.plan, "plan"], ["\u2500", colours.robot, "path"],
-    ["\u2501", "black", "wall"],
+    ["\u2501", "black", "wall"], ...more,
   ];
   for (const [mark, colour, name] of marks) {
     const item = addElement(row, "span");

@@ -1,0 +1,133 @@
+"""Why the controller chose an acceleration: one sentence, and the limits that it names."""
+
+from __future__ import annotations
+
+from math import dist, hypot, inf
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+import szlib
+from szlib.control import AdmissibleControls, find_admissible_controls
+from szlib.control.acceleration_polygon import BarrierLimit
+from szlib.control.step import HOLDS
+from szlib.simulation.scenario import GOAL_RADIUS, STOPPED_SPEED
+
+_AT_LIMIT = 0.02  # a limit as near to the chosen acceleration as this share of the bound is active (assumed)
+_SLIGHT = 0.05  # below this share of the bound an acceleration, or of v_max a speed, is not named (assumed)
+_MOST_NAMED = 2  # persons and walls in one sentence
+
+
+class Explanation(NamedTuple):
+    """Why the controller chose an acceleration.
+
+    Attributes
+    ----------
+    sentence : what the robot does, and why.
+    safety : whether the step is safe, and why it is not.
+    notes : what else has to be known: a goal that cannot be reached, a robot that makes no progress.
+    found : all admissible accelerations, with the limits of persons and walls.
+    active : the limits that the sentence names.
+    """
+
+    sentence: str
+    safety: str
+    notes: tuple[str, ...]
+    found: AdmissibleControls
+    active: tuple[BarrierLimit, ...]
+
+
+def explain(step: szlib.Step) -> Explanation:
+    """Explain a step of an `MPCCBF`.
+
+    A limit is active if the chosen acceleration lies on its edge. Persons and walls are numbered as in
+    `Step.explain`, from 0.
+
+    Examples
+    --------
+    >>> import szlib
+    >>> from laboratory import explain
+    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
+    >>> step = controller.step((-2.5, 0.0, 0.8, 0.0), (4.0, 0.0), [szlib.Person((0.0, 0.0), heading=0.0)])
+    >>> explain(step).sentence.partition(":")[0]
+    'It brakes and turns right'
+    """
+    first, *rest = (line.strip() for line in step.explain().splitlines())
+    meaning, _, danger = first.removeprefix("Step: ").partition("; ")
+    notes = tuple(_as_sentence(line) for line in rest if not line.startswith(("control", "nearest")))
+    found = find_admissible_controls(step)
+    active = _find_active(step, found) if step.feasible else ()
+    if not step.feasible:
+        reason = f"no plan keeps every limit, so the plan is {meaning}"
+    elif active:
+        reason = _describe_limits(step, active)
+    else:
+        reason = _describe_freedom(step)
+    safety = _as_sentence(danger) if danger != "safe" else "Safe, if people keep their velocity."
+    return Explanation(f"It {_describe_motion(step)}: {reason}.", safety, notes, found, active)
+
+
+def _as_sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _find_active(step: szlib.Step, found: AdmissibleControls) -> tuple[BarrierLimit, ...]:
+    """The nearest limit of each person and wall on whose edge the control lies, at most `_MOST_NAMED`."""
+    control, nearest = shapely.Point(step.control), dict[tuple[str, int], BarrierLimit]()
+    distances = [(shapely.LineString(limit.curve).distance(control), limit) for limit in found.limits]
+    for distance, limit in sorted(distances, key=lambda each: each[0]):
+        if distance <= _AT_LIMIT * step.scene.settings.a_max:
+            nearest.setdefault((limit.kind, limit.number), limit)
+    return tuple(nearest.values())[:_MOST_NAMED]
+
+
+def _describe_motion(step: szlib.Step) -> str:
+    """What the robot does, as a verb."""
+    s, (x, y, vx, vy), (ax, ay) = step.scene.settings, step.scene.state, step.control.tolist()
+    speed, slight = hypot(vx, vy), _SLIGHT * s.a_max
+    if speed <= _SLIGHT * s.v_max:
+        return "stands still" if hypot(ax, ay) <= slight else "sets off"
+    along, left = (ax * vx + ay * vy) / speed, (ay * vx - ax * vy) / speed
+    gx, gy = step.scene.goal
+    is_away = (gx - x) * vx + (gy - y) * vy < 0
+    parts = ["goes back"] * is_away
+    parts += ["brakes" if along < -slight else "speeds up" if along > slight else "keeps its speed"]
+    parts += ["turns left" if left > slight else "turns right"] * (abs(left) > slight)
+    return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
+
+
+def _describe_limits(step: szlib.Step, active: tuple[BarrierLimit, ...]) -> str:
+    """The persons and walls at whose limit the control lies, and the rule that makes it a limit."""
+    scene, s, texts = step.scene, step.scene.settings, list[str]()
+    x, y, vx, vy = scene.state
+    gaps = np.array([scene.gaps(x, y), scene.gaps(x + s.dt * vx, y + s.dt * vy, s.dt)])  # now, and dt later
+    closing = -scene.spread(np.diff(gaps, axis=0)[0]) / s.dt
+    for limit in active:
+        row = limit.number if limit.kind == "person" else len(scene.people) + limit.number
+        is_closing = float(closing[row]) >= _SLIGHT
+        motion = f"comes closer at {closing[row]:.1f} m/s" if is_closing else "does not come closer"
+        when = f", at its limit in {s.times[limit.k + 1]:.1f} s" if limit.k > 1 else ""
+        texts.append(f"{limit.kind} {limit.number} {motion} (h = {step.h[row]:.2f} m{when})")
+    first = active[0]
+    gamma = scene.barriers[first.number][-2] if first.kind == "person" else s.gamma
+    return f"{', '.join(texts)}, and h may shrink by at most {100 * gamma:g} % a step"
+
+
+def _describe_freedom(step: szlib.Step) -> str:
+    """Why the robot chose a control that lies on the limit of no person and no wall."""
+    scene, s = step.scene, step.scene.settings
+    x, y, *velocity = scene.state
+    paid = np.flatnonzero(step.residual[: len(scene.people)].min(axis=1, initial=inf) < -HOLDS).tolist()
+    if dist((x, y), scene.goal) <= GOAL_RADIUS and hypot(*velocity) <= STOPPED_SPEED:
+        return "it is at its goal"
+    if paid:
+        names = " and ".join(f"person {i}" for i in paid[:_MOST_NAMED])
+        return f"in a crowd it may come nearer to {names} than gamma allows, at a price"
+    if hypot(*step.predicted[1, 2:]) >= s.v_max - _AT_LIMIT:
+        return f"{s.v_max:g} m/s is its highest speed, and no person and no wall limits it"
+    if max(abs(step.control)) >= s.a_max * (1 - _AT_LIMIT):
+        return f"only the bound of its acceleration limits it, {s.a_max:g} m/s² along x and along y"
+    if s.lookahead == inf and dist(step.target, scene.goal) > GOAL_RADIUS:
+        return f"it meets a person head-on, and aims to pass on the {s.pass_side}"
+    return f"no person and no wall limits it, and its goal is {dist((x, y), scene.goal):.1f} m away"
