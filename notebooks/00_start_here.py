@@ -80,7 +80,7 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # | [2 - Encounters of two people](02_encounters.ipynb) | When do two people meet with nobody else around, and what does each see of the other? | 15 min |
 # | [3 - Outliers](03_outliers.ipynb) | Some people brush past each other, and some tracks are wrong. Which samples say nothing about the distance that people keep? | 20 min |
 # | [4 - The hull and its slices](04_hull.ipynb) | From scattered samples to a boundary: how near did people come, in each direction, at each walking speed? | 10 min |
-# | [5 - Social zones](05_zones.ipynb) | Can a robot carry the zone along? | 15 min |
+# | [5 - Social zones](05_zones.ipynb) | Can a robot carry the zone along? | 20 min |
 # | [6 - Respect or emptiness?](06_respect.ipynb) | Around a walking person there is a place where nobody is. Do people keep out of it, or is it only rare that two of them are anywhere near each other? | 30 min |
 # | [7 - Barriers](07_barriers.ipynb) | How does "stay out of the zone" become something that a controller can obey, ten times a second? | 10 min |
 # | [8 - Build the controller yourself](08_build_a_controller.ipynb) | What does it take to turn the barrier condition of notebook 07 into a robot that drives? | 25 min |
@@ -102,15 +102,15 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # %% [markdown]
 # ## Three routes
 #
-# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 1 h 05 min to read.
-# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb): 4 h 05 min to read.
+# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 1 h 10 min to read.
+# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb): 4 h 10 min to read.
 # - **Six weeks: the course.** One exercise sheet a week; running and looking around come on top.
 #
 # | week | topic | notebooks | to read | sheet | to do |
 # |---|---|---|---|---|---|
 # | 1 | People: who is where, who meets whom | [01](01_tracks.ipynb), [02](02_encounters.ipynb) | 25 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 50 min |
 # | 2 | Which samples to believe, and the nearest people | [03](03_outliers.ipynb), [04](04_hull.ipynb) | 30 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 55 min |
-# | 3 | From samples to a zone | [05](05_zones.ipynb) | 15 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
+# | 3 | From samples to a zone | [05](05_zones.ipynb) | 20 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
 # | 4 | Respect or emptiness; from a zone to a barrier | [06](06_respect.ipynb), [07](07_barriers.ipynb) | 40 min | [sheet 4](exercises/sheet4_certainty.ipynb), [sheet 5](exercises/sheet5_barriers.ipynb) | 1 h 50 min |
 # | 5 | A controller of your own, and its first meetings | [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb) | 1 h 05 min |  | 0 min |
 # | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 1 h 20 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |

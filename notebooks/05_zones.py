@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [4 - The hull and its slices](04_hull.ipynb) · next: [6 - Respect
-# or emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 15 min to
+# or emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 20 min to
 # read
 #
 # **Afterwards you can** enclose a zone in the smallest ellipse, and say how far to trust it.
@@ -207,9 +207,16 @@ record.figure(fig, "reach")
 # %% [markdown]
 # In JupyterLab a slider for the walking speed stands here:
 
+
 # %%
+def draw_zone(speed: float) -> plt.Axes:
+    ax = figures.plot_zone(zone, speed)
+    ax.set(xlim=(-2, 2), ylim=(-2, 2))
+    return ax
+
+
 low, high = (round(v, 2) for v in zone.speed_range)
-show_sliders(lambda speed: figures.plot_zone(zone, speed), speed=(1.1, low + 0.1, high - 0.1, 0.05))
+show_sliders(draw_zone, speed=(1.1, low + 0.1, high - 0.1, 0.05))
 
 # %% [markdown]
 # ## The plaza and a real day, side by side

@@ -402,9 +402,9 @@ Markdown(
 
 
 # %%
-def run_with(gamma: float) -> None:
+def run_with(gamma: float) -> plt.Axes:
     other = szlib.MPCCBF(zone, walls=scenario.walls, settings=replace(settings, gamma=gamma))
-    szlib.simulate(scenario, other).plot()
+    return szlib.simulate(scenario, other).plot()
 
 
 show_sliders(run_with, gamma=(gamma, 0.01, max(0.2, gamma), 0.01))

@@ -17,9 +17,7 @@
 # **Question.** What does the robot do if *you* put the person somewhere else, move the goal, narrow the
 # corridor, or change gamma while it drives?
 #
-# **Expectation.** Two robots in the same scene do not see each other and differ in one setting: the one that
-# may use up a larger share of h in each step comes nearer to the zone before it gives way, and arrives
-# sooner.
+# **Expectation.** Each step has a reason: a person, a wall, or a bound that the chosen acceleration lies on.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [12 - Other people's crowds](12_among_people.ipynb) ·
@@ -27,132 +25,150 @@
 #
 # **Afterwards you can** try out a scene of your own, live, and hand its settings on.
 
-# %%
+# %% jupyter={"source_hidden": true}
 import numpy as np
 import pandas as pd
-from laboratory import Experiment, LaboratoryWidget, RobotOptions, is_interactive, make_scene
+from laboratory import PRESETS, Laboratory, RobotOptions, World, explain, is_interactive
 
 import szlib
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
+from szlib.workbook.record import NotebookRecord
 
-# %% tags=["parameters"]
+# %% tags=["parameters"] jupyter={"source_hidden": true}
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
-goal = [4.0, 0.0]  # x, y [m]
-person = [4.0, 0.0, 180.0]  # x, y [m], walks towards [deg]
-speed = 0.5  # of the person [m/s]
-walls = [-6.0, 2.3, 7.0, 2.3, -6.0, -2.3, 7.0, -2.3]  # xa, ya, xb, yb of each [m]
-gamma = 0.05
-N_h = 2
-a_max = 1.0
-size = 1.0
-estimator = "quantile"
-gamma_b = 0.2
-N_h_b = 2
-a_max_b = 1.0
-size_b = 1.0
-estimator_b = "quantile"
 
-# %%
+# %% jupyter={"source_hidden": true}
 record = NotebookRecord("13_laboratory", globals())
-parameters(
-    [
-        ("the scene", "the corridor of notebook 10", ASSUMED, "the paper gives no coordinates"),
-        ("gamma of A, of B", f"{gamma:g}, {gamma_b:g}", TUNED, "notebook 09; B is to compare with"),
-        (
-            "N_h, a_max",
-            f"{N_h} and {N_h_b} steps, {a_max:g} and {a_max_b:g} m/s2",
-            PAPER,
-            "sec. 4; a_max assumed",
-        ),
-        ("size of the zone", f"{size:g} and {size_b:g} times", ASSUMED, "1 is what was measured"),
-    ]
-)
+zone = record.cache.ellipse()
+
+# %%
+Laboratory(zone=zone) if is_interactive() else None
 
 # %% [markdown]
-# ## The scene, and two robots
+# In JupyterLab the laboratory stands here; without a kernel you see one moment of it below. Choose a scene, press *play* or
+# *step*, and move the time line to go back. Drag what you like, also while it runs: people, the tip of a person's arrow, the
+# robot, its goal, the ends of walls. The green area holds all accelerations that the robot may choose now. The orange edge is the
+# limit that the sentence names, the active one. *share* writes code that computes what is on the screen.
+
+# %%
+still = World(PRESETS["corridor"], zone)
+while still.n * still.dt < 4.0:
+    still.advance()
+fig = figures.draw_step(still.steps[0])
+fig.suptitle(explain(still.steps[0]).sentence, fontsize=11)
+record.figure(fig, "still")
+
+# %% [markdown]
+# ## Things to try
 #
-# A zone for each estimator: the quantile zone that notebook 05 kept, and the hull. Robot A is as in
-# notebook 10; robot B is set by the parameters that end in `_b`.
-
-# %%
-samples = record.cache.encounters()
-pace = record.cache.method.zone_speed
-hull = szlib.SocialZone.fit(samples, method="hull", speeds=(pace,), n_resamples=0)
-zones = {"quantile": record.cache.ellipse(), "hull": hull.ellipse(pace)}
-first = RobotOptions(gamma, N_h, a_max, size, estimator)
-second = RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)
-
-# %%
-scene = make_scene(goal, person, speed, walls, start=[-4.0, 0.0])
-logs = {}
-for name, choice in (("A", first), ("B", second)):
-    controller = szlib.MPCCBF(choice.zone(zones), walls=scene.walls, settings=choice.settings())
-    logs[f"{name}: gamma = {choice.gamma:g}"] = szlib.simulate(scene, controller)
-
-# %% [markdown]
-# ## In pictures
+# Say what you expect before you look.
 #
-# The same scene every three seconds, for who has no kernel at hand: A above, B below. The disc is the
-# robot, the diamond its goal; the triangle is the person, within their zone.
-
-# %%
-fig = figures.draw_run_grid(logs, every=3.0)
-record.figure(fig, "strip")
-
-# %%
-a, b = (log.metrics() for log in logs.values())
-shown = ["min_h", "time_to_goal", "min_speed", "infeasible_steps"]
-pd.DataFrame({name: log.metrics() for name, log in logs.items()}).loc[shown]
-
-# %%
-record.key |= {"A: min_h": a["min_h"], "B: min_h": b["min_h"]}
-record.key |= {"A: time_to_goal": a["time_to_goal"], "B: time_to_goal": b["time_to_goal"]}
-
-# %% [markdown]
-# ## Live
+# **1. Greed.** Scene *corridor*: drive once, then again with gamma = 0.5. Does the robot arrive sooner? At what price?
+# <details><summary>What to expect</summary>It arrives about three seconds sooner. In the middle it brakes too late: "not safe"
+# appears, and h of the person falls below 0.</details>
 #
-# In JupyterLab the scene stands here: press *run*, drag what you like, set what you like. Below each scene:
-# the least h over time, and all accelerations that obey every condition at this instant (green), with the one
-# chosen. *share* writes a parameter cell: put it below that of this notebook, and it begins with your scene.
+# **2. Foresight.** Keep gamma = 0.5 and raise N_h from 2 to 8. What changes?
+# <details><summary>What to expect</summary>The robot sees the person 0.8 s ahead instead of 0.2 s, and h stays about 13 cm
+# higher at its lowest.</details>
+#
+# **3. The paper's settings against `among_people()`.** Choose `MPCSettings.paper()`, and compare with
+# `MPCSettings.among_people()` in *corridor*.
+# <details><summary>What to expect</summary>Both are safe. The paper's robot meets the person head-on, and needs at least 2 s
+# longer; the other one plans 3 s ahead, and turns aside early.</details>
+#
+# **4. A narrower corridor.** Drag the four ends of its walls to y = 1.8 and -1.8 m. Who goes first?
+# <details><summary>What to expect</summary>The two do not fit side by side. The robot goes back, out of the corridor, lets
+# the person out, and then goes on. h stays above 0.</details>
+#
+# **5. A person in a hurry.** Pull the person's arrow to 2 m/s, towards the robot. Does the robot keep its promise?
+# <details><summary>What to expect</summary>For a second or two no plan keeps h from falling faster than gamma allows: "not
+# safe", although the robot escapes, and h stays above 0.</details>
+#
+# **6. A slow robot.** Scene *making_room*, v_max = 0.4 m/s, then 0.5 m/s. The person walks at 0.5 m/s.
+# <details><summary>What to expect</summary>At 0.4 m/s the person catches up with the robot, and h falls below 0. At 0.5 m/s
+# it does not.</details>
+#
+# **7. A goal that is taken.** Scene *passing*: drag the goal close to the person, and then onto a wall in *corridor*.
+# <details><summary>What to expect</summary>The robot waits beside the person, and says that the goal cannot be reached. The
+# goal on the wall is refused: it goes back to where it was.</details>
+#
+# **8. Out of nowhere.** *corridor*, at 2.5 s: drag the person to 1.5 m ahead of the robot, with an arrow of 0 m/s. Then go back
+# on the time line, and try 2 m.
+# <details><summary>What to expect</summary>At 1.5 m it is too late: h is below 0 at once. At 2 m there is no good plan either for a
+# moment, but the robot passes with h above 0.</details>
 
-# %%
-LaboratoryWidget(Experiment(scene, zones, [first, second])) if is_interactive() else None
+
+# %% jupyter={"source_hidden": true}
+def try_scene(name, constructor="MPCSettings", at=0.0, edit=None, **settings):
+    """Run a scene as the laboratory does, with one change at a time [s], for 40 s."""
+    world, steps = World(PRESETS[name], zone, [RobotOptions(constructor, settings)]), []
+    while not world.arrived and world.n < 400:
+        if edit and world.n == round(at / world.dt):
+            world.change(**edit)
+        steps.append(world.steps[0])
+        world.advance()
+    low = min(step.h.min() for step in steps)
+    unsafe, back = sum(not step.safe for step in steps), min(step.scene.state[0] for step in steps)
+    row = {"time": world.n * world.dt, "least h": low, "steps not safe": unsafe, "least x": back}
+    return row | {"arrived": world.arrived, "blocked": steps[-1].goal_blocked}
+
 
 # %% [markdown]
-# What is shown live is what `szlib.simulate` computes, step by step:
+# The notebook tries all of it, and checks what is written above:
 
-# %%
-trial = Experiment(scene, zones, [first, second])
-same = []
-for k in range(min(60, *(len(log.states) for log in logs.values()))):
-    same += [np.array_equal(x, log.states[k]) for x, log in zip(trial.states, logs.values(), strict=True)]
-    trial.step()
+# %% jupyter={"source_hidden": true}
+narrow = {"walls": [[-6.0, 1.8, 7.0, 1.8], [-6.0, -1.8, 7.0, -1.8]]}
+ahead = [{"people": {0: {"position": [x, 0.0], "speed": 0.0}}} for x in (-0.5, 0.0)]
+tried = {
+    "corridor": try_scene("corridor"),
+    "1: gamma = 0.5": try_scene("corridor", gamma=0.5),
+    "2: and N_h = 8": try_scene("corridor", gamma=0.5, N_h=8),
+    "3: paper()": try_scene("corridor", "MPCSettings.paper"),
+    "3: among_people()": try_scene("corridor", "MPCSettings.among_people"),
+    "4: narrower": try_scene("corridor", edit=narrow),
+    "5: 2 m/s": try_scene("corridor", edit={"people": {0: {"speed": 2.0}}}),
+    "6: v_max = 0.4": try_scene("making_room", v_max=0.4),
+    "6: v_max = 0.5": try_scene("making_room", v_max=0.5),
+    "7: goal taken": try_scene("passing", edit={"goal": [0.8, 0.8]}),
+    "8: 1.5 m ahead": try_scene("corridor", at=2.5, edit=ahead[0]),
+    "8: 2 m ahead": try_scene("corridor", at=2.5, edit=ahead[1]),
+}
+table = pd.DataFrame(tried).T
+table[["time", "least h", "steps not safe", "arrived"]]
+
+# %% jupyter={"source_hidden": true}
+time, low, unsafe, back = (table[name].astype(float) for name in table.columns[:4])
+held = {
+    "1: sooner, but not safe": time.iloc[1] < time.iloc[0] - 2 and low.iloc[1] < 0 < unsafe.iloc[1],
+    "2: foresight keeps h higher": low.iloc[2] > low.iloc[1] + 0.1,
+    "3: the paper's robot needs longer": time.iloc[3] > time.iloc[4] + 2 and not unsafe.iloc[3:5].any(),
+    "4: the robot leaves the corridor": back.iloc[5] < -6 and low.iloc[5] >= 0 and table["arrived"].iloc[5],
+    "5: not safe, and h stays above 0": unsafe.iloc[6] > 5 and low.iloc[6] > 0,
+    "6: a slower robot is caught": low.iloc[7] < 0 <= low.iloc[8],
+    "7: the robot waits beside its goal": table["blocked"].iloc[9] and not table["arrived"].iloc[9],
+    "8: 1.5 m is too late, 2 m is not": low.iloc[10] < 0 <= low.iloc[11] and unsafe.iloc[11] > 0,
+}
+for what, holds in held.items() if record.cache.is_synthetic else ():
+    record.check(what, bool(holds))
+
+# %% [markdown]
+# And what is shown live is what `szlib.simulate` computes, step by step:
+
+# %% jupyter={"source_hidden": true}
+log = szlib.simulate(PRESETS["corridor"], szlib.MPCCBF(zone, walls=PRESETS["corridor"].walls))
+trial, same = World(PRESETS["corridor"], zone), []
+for state in log.states:
+    same.append(np.array_equal(trial.states[0], state))
+    trial.advance()
 record.check("its steps are those of szlib.simulate", all(same), f"{len(same)} states", always=True)
+record.key |= {"gamma = 0.5: min_h": low.iloc[1], "among_people: time_to_goal": time.iloc[4]}
 
 # %% [markdown]
-# Things to try:
-#
-# 1. Put the person at rest (speed 0) in the middle of the corridor. Which robot stops, and at which gamma?
-# 2. Narrow the corridor by the ends of its walls until A waits. What happens to the green polygon?
-# 3. Give B a horizon `N_h` of 8 at gamma = 0.5, and drag the person in front of it.
-# 4. Make the zone half as large, then twice as large: what does yielding cost?
-
-# %%
-sooner = a["time_to_goal"] - b["time_to_goal"]
-nearer = a["min_h"] - b["min_h"]
-print(
-    f"With gamma = {gamma_b:g} in place of {gamma:g} the robot comes {abs(100 * nearer):.0f} cm "
-    f"{'nearer to' if nearer > 0 else 'less near to'} the edge of what is allowed, and arrives "
-    f"{abs(sooner):.1f} s {'sooner' if sooner > 0 else 'later'}."
-)
-
-# %% [markdown]
-# **What it means.** h is what is left before the zone is reached, and gamma the share of it that may be used
-# up in a step. The sentence above says what that is worth here; in your own scene it may say something else.
+# **What it means.** h is what is left before the zone is reached, and gamma the share of it that a step may use up. The
+# acceleration lies on the edge of a limit most of the time: that edge is the answer to "why did it do this?".
 
 # %%
 record.close()

@@ -73,13 +73,14 @@ def _as_sentence(text: str) -> str:
 
 
 def _find_active(step: szlib.Step, found: AdmissibleControls) -> tuple[BarrierLimit, ...]:
-    """The nearest limit of each person and wall on whose edge the control lies, at most `_MOST_NAMED`."""
+    """The nearest limit of each person and wall on whose edge the control lies, at most `_MOST_NAMED`,
+    persons first."""
     control, nearest = shapely.Point(step.control), dict[tuple[str, int], BarrierLimit]()
     distances = [(shapely.LineString(limit.curve).distance(control), limit) for limit in found.limits]
     for distance, limit in sorted(distances, key=lambda each: each[0]):
         if distance <= _AT_LIMIT * step.scene.settings.a_max:
             nearest.setdefault((limit.kind, limit.number), limit)
-    return tuple(nearest.values())[:_MOST_NAMED]
+    return tuple(sorted(list(nearest.values())[:_MOST_NAMED], key=lambda limit: limit.kind))
 
 
 def _describe_motion(step: szlib.Step) -> str:

@@ -232,7 +232,7 @@ function build(el, content) {
   const main = addElement(el, "div", {}, { display: "flex", gap: "14px", flexWrap: "wrap", alignItems: "flex-start" });
   const left = addElement(main, "div", {}, { width: `${WIDTH}px` }), right = addElement(main, "div", {}, { width: "300px", fontSize: "13px" });
   page.title = addElement(left, "div", { className: "szlib-title" }, { fontWeight: "bold", fontSize: "13px" });
-  page.scene = addElement(left, "canvas", { role: "img", ariaLabel: "the scene" }, { display: "block", touchAction: "none" });
+  page.scene = addElement(left, "canvas", { className: "szlib-lab-scene", role: "img", ariaLabel: "the scene" }, { display: "block", touchAction: "none" });
   page.time = addElement(left, "input", { type: "range", min: 0, max: 0, step: 1, className: "szlib-time", ariaLabel: "time" }, { width: "100%" });
   const charts = addElement(left, "div", {}, { display: "flex", gap: "4px" });
   page.h = addElement(charts, "canvas", { role: "img", ariaLabel: "h over time" });

@@ -20,7 +20,7 @@ PICTURES = {
     "hull.png": "04_hull-hull.png",
     "corridor.png": "10_corridor-scenario.png",
     "making_room.gif": "11b_making_room-run.gif",
-    "laboratory.png": "13_laboratory-strip.png",
+    "laboratory.png": "13_laboratory-still.png",
 }
 """The pictures of the README, and the figures of the notebooks from which they are copied."""
 WARNING = re.compile(r"^\S+\.py:\d+: (\w*Warning: .*\n)(  .*\n)?", re.MULTILINE)

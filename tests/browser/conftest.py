@@ -35,15 +35,13 @@ shape = PolarZone([0.7, 1.5], DIRECTIONS, [np.full(72, 0.9), np.full(72, 1.2)])
 zone = szlib.SocialZone(shape, 2.0, {{1.1: {ELLIPSE}}})""",
     "10_corridor": f"""controller = szlib.MPCCBF({ELLIPSE}, walls=scenario.walls, settings=settings)
 log = szlib.simulate(scenario, controller)""",
-    "13_laboratory": f"""zones = {{"quantile": {ELLIPSE}, "hull": {ELLIPSE}}}
-first = RobotOptions(gamma, N_h, a_max, size, estimator)
-second = RobotOptions(gamma_b, N_h_b, a_max_b, size_b, estimator_b)""",
+    "13_laboratory": f"zone = {ELLIPSE}",
 }
 """A cell in place of those that fit the zone and simulate."""
 OPERATED = {
     "05_zones": ("show_sliders(",),
     "10_corridor": ("record.animation(",),
-    "13_laboratory": ("scene = make_scene(", "LaboratoryWidget("),
+    "13_laboratory": ("Laboratory(zone=zone)",),
 }
 """Cells that are operated in the browser, and what they need; `make run` executes the whole notebooks."""
 

@@ -1,12 +1,15 @@
 """The notebooks in a real browser: executed, operated by hand and saved; and their report."""
 
+import json
 import subprocess
 
 import jupytext
 import nbformat
 import pytest
 from helpers.hostile_results import make_hostile_results
+from laboratory import Laboratory
 
+import szlib
 from szlib.files import claim_folder
 from szlib.workbook.report import write_report
 
@@ -101,16 +104,15 @@ def test_an_exercise_is_solved(notebook, copy):
 def test_a_slider_of_the_zones_draws_another_speed(notebook):
     opened = notebook("05_zones")
     opened.run()
-    shown = opened.page.locator(
-        ".jupyter-widgets.widget-output img, .jupyter-widgets .jp-OutputArea img"
-    ).last
+    shown = opened.page.locator("img.widget-image")
     shown.wait_for(timeout=MINUTES)
-    before = shown.get_attribute("src")
+    before, box = shown.get_attribute("src"), shown.bounding_box()
     opened.page.locator(".widget-slider .noUi-handle").last.press("ArrowRight")
     opened.page.wait_for_function(
-        "before => [...document.querySelectorAll('.jupyter-widgets img')].some((i) => i.src !== before)",
-        arg=before,
+        "before => document.querySelector('img.widget-image').src !== before", arg=before
     )
+    opened.page.wait_for_function("document.querySelector('img.widget-image').complete")
+    assert shown.count() == 1 and shown.bounding_box() == box, "one picture, which keeps its size"
     saved = opened.save()
     assert errors(saved) == []
     check_pair(opened.file, saved)
@@ -166,47 +168,144 @@ def check_player(page):
     assert "t = 0.0 s" in player.text_content()
 
 
-def test_the_laboratory_is_dragged_set_run_and_shared(notebook):
+def open_laboratory(page, lab):
+    """The page of a `Laboratory` without JupyterLab: its messages are answered by this process."""
+    page.expose_function(
+        "answer", lambda request: json.loads(json.dumps(lab.answer(request), allow_nan=False))
+    )
+    page.set_content("<div id=lab></div>")
+    page.evaluate(
+        """async ([script, content]) => {
+            const file = new Blob([script], { type: "text/javascript" });
+            const { default: widget } = await import(URL.createObjectURL(file));
+            let receive;
+            const send = (request) => answer(request).then((found) => receive(found));
+            const model = { get: () => content, on: (_, f) => { receive = f; }, off: () => {}, send };
+            widget.render({ model, el: document.getElementById("lab") });
+        }""",
+        [lab._esm, lab.content],
+    )
+    page.wait_for_function("document.querySelector('.szlib-why').textContent")
+
+
+@pytest.fixture
+def lab_page(browser):
+    """A laboratory, and its page, which must report no error."""
+    page, problems = browser.new_page(), []
+    page.set_default_timeout(MINUTES)
+    page.on("console", lambda message: problems.append(message.text))
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    lab = Laboratory(zone=szlib.Ellipse((0.05, 0.0), (0.97, 0.75)))
+    open_laboratory(page, lab)
+    yield lab, page
+    assert problems == []
+    page.close()
+
+
+def drag(page, start, end):
+    """With the mouse, from one place of the corridor to another [m]."""
+    box = page.locator(".szlib-lab-scene").bounding_box()
+    scale = (600 - 40) / 14.6  # the corridor with its margins is 14.6 m long
+    (x0, y0), (x1, y1) = (
+        (box["x"] + 300 + scale * (x - 0.5), box["y"] + (box["height"] - 20) / 2 - scale * y)
+        for x, y in (start, end)
+    )
+    page.mouse.move(x0, y0)
+    page.mouse.down()
+    page.mouse.move((x0 + x1) / 2, (y0 + y1) / 2)
+    page.mouse.move(x1, y1)
+    page.mouse.up()
+
+
+def settle(page, condition):
+    page.wait_for_function(f"() => {condition}")
+
+
+def take_steps(page, n):
+    for _ in range(n):
+        before = page.locator(".szlib-time").get_attribute("max")
+        page.locator(".szlib-step").click()
+        settle(page, f"document.querySelector('.szlib-time').max !== '{before}'")
+
+
+def test_the_laboratory_goes_back_and_on(lab_page):
+    lab, page = lab_page
+    take_steps(page, 25)
+    assert "It keeps its speed" in page.locator(".szlib-why").text_content()
+    shown = picture(page.locator(".szlib-lab-scene"))
+    page.locator(".szlib-time").fill("0")
+    settle(page, "document.querySelector('.szlib-why').textContent.startsWith('It sets off')")
+    assert lab.world.n == 25, "to look at the past changes nothing"
+    page.locator(".szlib-step").click()
+    settle(page, "document.querySelector('.szlib-status').textContent.startsWith('t = 0.1 s')")
+    page.locator(".szlib-time").fill("25")
+    settle(page, "document.querySelector('.szlib-status').textContent.startsWith('t = 2.5 s')")
+    assert picture(page.locator(".szlib-lab-scene")) == shown
+    page.locator(".szlib-time").fill("10")
+    page.locator("input[name=gamma]").fill("0.2")
+    settle(page, "document.querySelector('.szlib-time').max === '10'")
+    assert (lab.world.n, lab.world.robots[0].changes) == (10, {"gamma": 0.2})
+    page.locator(".szlib-play").click()
+    settle(page, "Number(document.querySelector('.szlib-time').max) > 14")
+    page.locator(".szlib-reset").click()
+    settle(page, "document.querySelector('.szlib-time').max === '0'")
+
+
+def test_the_laboratory_is_dragged_and_shared(lab_page):
+    lab, page = lab_page
+    take_steps(page, 3)
+    drag(page, (3.85, 0.0), (1.0, -0.5))
+    page.wait_for_timeout(300)
+    person = lab.world.people[0]
+    assert person.position == pytest.approx((1.0, -0.5), abs=0.1)
+    x, y = person.position
+    drag(page, (x - 1.0, y), (x, y + 1.5))
+    page.wait_for_timeout(300)
+    assert lab.world.people[0].velocity == pytest.approx((0.0, 1.0), abs=0.1)
+    page.locator(".szlib-add").click()
+    settle(page, "document.querySelector('.szlib-remove').textContent === 'remove person 1'")
+    page.locator(".szlib-second").select_option("MPCSettings.among_people")
+    settle(page, "document.querySelector('.szlib-rival').textContent.startsWith('Second robot')")
+    take_steps(page, 2)
+    page.locator(".szlib-share").click()
+    settle(page, "document.querySelector('.szlib-code').value.length")
+    shared = {}
+    exec(page.locator(".szlib-code").input_value(), shared)
+    controls = [shared[name].controls[-1].tolist() for name in ("log", "log_b")]
+    assert controls == [step.control.tolist() for step in lab.world.steps]
+    page.locator(".szlib-remove").click()
+    settle(page, "document.querySelector('.szlib-remove').textContent === 'remove person 0'")
+
+
+def test_a_refused_drag_of_the_laboratory_snaps_back(lab_page):
+    lab, page = lab_page
+    before = picture(page.locator(".szlib-lab-scene"))
+    drag(page, (7.0, 2.3), (7.0, 2.3))
+    page.locator(".szlib-remove").click()  # the person, who stands on the goal
+    settle(page, "document.querySelector('.szlib-remove').disabled")
+    alone = picture(page.locator(".szlib-lab-scene"))
+    assert alone != before
+    drag(page, (4.0, 0.0), (4.0, 2.2))
+    settle(page, "document.querySelector('.szlib-error').textContent.includes('too close to the wall')")
+    assert lab.world.scenario.goal[1] < 1.8
+    drag(page, lab.world.scenario.goal, (4.0, 0.0))
+    settle(page, "document.querySelector('.szlib-error').textContent === ''")
+    page.wait_for_timeout(300)
+    assert lab.world.scenario.goal == pytest.approx([4.0, 0.0], abs=0.1)
+    page.locator(".szlib-reset").click()
+    settle(page, "!document.querySelector('.szlib-remove').disabled")
+    assert picture(page.locator(".szlib-lab-scene")) == before
+
+
+def test_the_laboratory_runs_in_its_notebook(notebook):
     opened = notebook("13_laboratory")
     opened.run()
-    page, status = opened.page, opened.page.locator(".szlib-status")
-    page.wait_for_function("[...document.querySelectorAll('.szlib-status')].every(e => e.textContent)")
-    scenes = [panel.locator("canvas").first for panel in page.locator(".szlib-panel").all()]
-    before = [picture(scene) for scene in scenes]
-    scenes[0].scroll_into_view_if_needed()
-    box = scenes[0].bounding_box()
-
-    def drag(start, end):
-        """With the mouse, from one place of the scene to another [m]; 29.7 pixels are a metre."""
-        (x0, y0), (x1, y1) = (
-            (box["x"] + 200.2 + 29.7 * x, box["y"] + 90 - 29.7 * y) for x, y in (start, end)
-        )
-        page.mouse.move(x0, y0)
-        page.mouse.down()
-        page.mouse.move(x1, y1, steps=5)
-        page.mouse.up()
-
-    drag((4, 0), (1.34, -0.33))  # the person, who stands before the goal
-    drag((4, 0), (5, -1))  # the goal
-    drag((7, 2.3), (6, 1.5))  # a wall's end
-    slider = page.locator("input[name=gamma]").first
-    slider.click(position={"x": 60, "y": 8})
-    gamma = float(slider.input_value())
-    assert gamma > 0.1
-    assert all(picture(scene) != shown for scene, shown in zip(scenes, before, strict=True))
-    page.locator(".szlib-share").click()
-    page.wait_for_function("document.querySelector('.szlib-cell').value.length")
-    shared = {}
-    exec(page.locator(".szlib-cell").input_value(), shared)
-    assert shared["gamma"] == gamma
-    assert shared["person"][:2] == pytest.approx([1.34, -0.33], abs=0.1)
-    assert shared["goal"] == pytest.approx([5, -1], abs=0.1)
-    assert shared["walls"][:4] == pytest.approx([-6, 2.3, 6, 1.5], abs=0.1)
-    page.locator(".szlib-run").click()
-    page.wait_for_function("parseFloat(document.querySelector('.szlib-status').textContent.slice(4)) > 2")
-    print(page.locator(".szlib-rate").text_content())
-    page.locator(".szlib-run").click()
-    assert page.locator(".szlib-error").text_content() == "" and status.count() == 2
+    page = opened.page
+    settle(page, "document.querySelector('.szlib-why')?.textContent")
+    page.locator(".szlib-play").click()
+    settle(page, "parseFloat(document.querySelector('.szlib-status').textContent.slice(4)) > 1")
+    page.locator(".szlib-play").click()
+    assert page.locator(".szlib-error").text_content() == ""
     saved = opened.save()
     assert errors(saved) == []
     check_pair(opened.file, saved)

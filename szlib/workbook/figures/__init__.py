@@ -34,7 +34,6 @@ from .encounters import (
 from .palette import BLACK, BLUE, GREEN, GREY, ORANGE, RED, pick_colours
 from .simulation import (
     animate,
-    draw_run_grid,
     plot_barriers,
     plot_crowd,
     plot_robot_paths,

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from math import isnan
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -199,40 +198,6 @@ def plot_crowd(run: Run, *, replay: Replay | None = None, ax: Axes | None = None
     low, high = path.min(axis=0) - _CROWD_MARGIN, path.max(axis=0) + _CROWD_MARGIN
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     return label_metres(ax, run.scenario.title)
-
-
-def draw_run_grid(runs: Mapping[str, Run], *, every: float) -> Figure:
-    """Draw several runs of one scene at several times: a row for each run.
-
-    Parameters
-    ----------
-    runs : name -> run.
-    every : time between two pictures [s].
-
-    Examples
-    --------
-    >>> import szlib
-    >>> from szlib.workbook import figures
-    >>> controller = szlib.MPCCBF(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)))
-    >>> log = szlib.simulate(szlib.SCENARIOS["passing"], controller, max_time=2.0)
-    >>> len(figures.draw_run_grid({"gamma = 0.05": log}, every=1.0).axes)
-    3
-    """
-    longest = max(float(run.time[-1]) for run in runs.values())
-    times = np.arange(0.0, longest + 1e-9, every)
-    figure = plt.figure(figsize=(3.2 * len(times), 1.7 * len(runs) + 0.3), layout="constrained")
-    grid = figure.subplots(len(runs), len(times), squeeze=False, sharex=True, sharey=True)
-    for panels, (name, run) in zip(grid, runs.items(), strict=True):
-        for ax, time in zip(panels, times.tolist(), strict=True):
-            row = min(round(time / run.settings.dt), len(run.states) - 1)
-            _draw_scenery(ax, run.scenario)
-            ax.plot(*run.states[: row + 1, :2].T, color=BLUE, linewidth=1, label="robot's path")
-            _draw_moving(ax, run, row, robot=BLUE, zone=RED)
-            _set_limits(ax, [(each, np.arange(len(each.states))) for each in runs.values()])
-            title = f"{name}, {run.time[row]:g} s, h = {run.h[row].min(initial=np.inf):.2f} m"
-            label_metres(ax).set_title(title, fontsize=9)
-            ax.label_outer()
-    return figure
 
 
 def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:

@@ -24,7 +24,6 @@ from ..notebook_parameters import OPTIONS, read_defaults
 
 # Parameters that set the controller under another name, or that list values of one of its settings.
 SETTINGS = {"gammas": "gamma", "horizons": "N_h", "limits": "a_max"}
-SETTINGS |= {f"{name}_b": name for name in ("gamma", "N_h", "a_max")}
 _LARGEST = 2**31
 # Lowest and highest value of a parameter that is not a setting of the controller.
 RANGES: dict[str, tuple[float, float]] = {
@@ -32,7 +31,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "min_distance": (0, 100), "min_speed": (0.01, 10), "q": (0.001, 0.5), "zone_speed": (0.01, 10),
     "intruders": (0, 0.5), "examples": (1, _LARGEST), "worlds": (1, _LARGEST), "n_jobs": (-1, _LARGEST),
     "fraction": (1e-6, 0.5), "r_max": (0.01, 100), "speeds": (0.01, 10), "lengths": (1e-3, 1e4),
-    "eccentricities": (0, 0.999999), "size": (0.05, 20), "size_b": (0.05, 20), "speed": (0, 10),
+    "eccentricities": (0, 0.999999),
 }  # fmt: skip
 # Parameters that no check depends on: the data, the way of computing, and the amount shown.
 NEUTRAL = {*OPTIONS, "area", "reading", "n_jobs", "examples"}
