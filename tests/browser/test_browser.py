@@ -84,6 +84,10 @@ def picture(locator):
     return locator.evaluate("canvas => canvas.toDataURL()")
 
 
+def natural_size(image):
+    return image.evaluate("image => [image.naturalWidth, image.naturalHeight]")
+
+
 def test_an_exercise_is_solved(notebook, copy):
     """An answer is checked, and saved into both files of the pair."""
     solved = jupytext.read(copy / "notebooks" / "solutions" / "sheet5_barriers.py")
@@ -106,13 +110,14 @@ def test_a_slider_of_the_zones_draws_another_speed(notebook):
     opened.run()
     shown = opened.page.locator("img.widget-image")
     shown.wait_for(timeout=MINUTES)
-    before, box = shown.get_attribute("src"), shown.bounding_box()
+    opened.page.wait_for_function("document.querySelector('img.widget-image').naturalWidth > 0")
+    before, size = shown.get_attribute("src"), natural_size(shown)
     opened.page.locator(".widget-slider .noUi-handle").last.press("ArrowRight")
     opened.page.wait_for_function(
         "before => document.querySelector('img.widget-image').src !== before", arg=before
     )
-    opened.page.wait_for_function("document.querySelector('img.widget-image').complete")
-    assert shown.count() == 1 and shown.bounding_box() == box, "one picture, which keeps its size"
+    opened.page.wait_for_function("document.querySelector('img.widget-image').naturalWidth > 0")
+    assert shown.count() == 1 and natural_size(shown) == size, "one picture, which keeps its size"
     saved = opened.save()
     assert errors(saved) == []
     check_pair(opened.file, saved)
