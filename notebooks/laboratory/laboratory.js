@@ -200,8 +200,8 @@ function addButton(parent, name, text, title) {
 
 function addSelect(parent, name, options, label) {
   const row = addElement(parent, "label", {}, { display: "flex", gap: "6px", alignItems: "center", fontSize: "12px" });
-  addElement(row, "span", { textContent: label });
-  const select = addElement(row, "select", { className: `szlib-${name}` }, { flex: "1" });
+  addElement(row, "span", { textContent: label }, { whiteSpace: "nowrap" });
+  const select = addElement(row, "select", { className: `szlib-${name}` }, { flex: "1", minWidth: "0" });
   for (const [value, text] of options) addElement(select, "option", { value, textContent: text });
   return select;
 }
