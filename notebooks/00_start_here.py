@@ -108,19 +108,21 @@ record.check("and those that the paper does not give", assumed == expected, assu
 #
 # | week | topic | notebooks | to read | sheet | to do |
 # |---|---|---|---|---|---|
-# | 1 | People: who is where, who meets whom | [01](01_tracks.ipynb), [02](02_encounters.ipynb) | 25 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 50 min |
-# | 2 | Which samples to believe, and the nearest people | [03](03_outliers.ipynb), [04](04_hull.ipynb) | 30 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 55 min |
-# | 3 | From samples to a zone | [05](05_zones.ipynb) | 20 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 25 min |
-# | 4 | Respect or emptiness; from a zone to a barrier | [06](06_respect.ipynb), [07](07_barriers.ipynb) | 40 min | [sheet 4](exercises/sheet4_certainty.ipynb), [sheet 5](exercises/sheet5_barriers.ipynb) | 1 h 50 min |
-# | 5 | A controller of your own, and its first meetings | [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb) | 1 h 05 min |  | 0 min |
-# | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 1 h 20 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 20 min |
+# | 1 | People: who is where, who meets whom | [01](01_tracks.ipynb), [02](02_encounters.ipynb) | 25 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 1 h 00 min |
+# | 2 | Which samples to believe, and the nearest people | [03](03_outliers.ipynb), [04](04_hull.ipynb) | 30 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 1 h 05 min |
+# | 3 | From samples to a zone | [05](05_zones.ipynb) | 20 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 35 min |
+# | 4 | Respect or emptiness; from a zone to a barrier | [06](06_respect.ipynb), [07](07_barriers.ipynb) | 40 min | [sheet 4](exercises/sheet4_certainty.ipynb), [sheet 5](exercises/sheet5_barriers.ipynb) | 2 h 10 min |
+# | 5 | A controller of your own, and its first meetings | [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb) | 1 h 05 min | [sheet 7](exercises/sheet7_controller.ipynb) | 3 h 20 min |
+# | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 1 h 20 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 30 min |
 
 # %% [markdown]
-# **The exercises** are functions that you write. `judges.check("velocity", velocity)` asks yours for cases
-# that it draws afresh and says in words what is right or wrong; `judges.hint("velocity", 1)` gives a hint,
-# 3 is nearly the solution. The solutions lie apart, in `solutions/`. For a class,
-# `python notebooks/tools/sheets.py --class FOLDER` makes a course of [nbgrader](https://nbgrader.readthedocs.io)
-# (`pip install nbgrader`): what is handed out, and checks that give points, one for each minute.
+# **The exercises** are functions that you write. `judges.check("velocity", velocity)` asks yours for many cases
+# that it draws afresh and says in words what is right or wrong; a case that fails can be run again with its
+# seed. `judges.hint("velocity", 1)` gives a hint. On sheet 7 the check drives a robot with your controller.
+# Each sheet ends with an essay question. The solutions, with a rubric for each essay, are in `solutions/`, the
+# judges in `exercises/judges`. For a class, `python notebooks/tools/sheets.py --class FOLDER` makes a course of
+# [nbgrader](https://nbgrader.readthedocs.io) (`pip install nbgrader`), with a README for the lecturer: what is
+# handed out, checks that give points, one for each minute, and the command that grades.
 
 # %% [markdown]
 # ## Words

@@ -14,14 +14,16 @@
 # %% [markdown]
 # # Sheet 1 - Tracks and meetings
 #
-# Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `judges.hint("velocity", 1)` prints a hint, 2 the next, 3 is nearly
-# the solution. Units are metres, seconds and radians throughout.
+# Write each function, then run the cell below it: it asks your function for many fresh cases and says
+# what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
+# `judges.hint("velocity", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# pandas: an answer that calls szlib is refused, unless the task allows it. Units are metres, seconds and
+# radians throughout.
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · next: [sheet 2](sheet2_outliers.ipynb) · [to
-# do](../exercises/sheet1_tracks.ipynb) · [solved](../solutions/sheet1_tracks.ipynb) · 50 min · belongs to
-# [01](../01_tracks.ipynb), [02](../02_encounters.ipynb)
+# do](../exercises/sheet1_tracks.ipynb) · [solved](../solutions/sheet1_tracks.ipynb) · 1 h 00 min · belongs
+# to [01](../01_tracks.ipynb), [02](../02_encounters.ipynb)
 
 # %%
 import judges
@@ -119,3 +121,13 @@ def one_hertz(radius, speed, interval):
 
 # %%
 judges.check("one_hertz", one_hertz)
+
+# %% [markdown]
+# ## 1.5 In your own words (10 min)
+#
+# A tracker gives one position a second, and its positions have errors of some 5 cm. A colleague takes the
+# velocity from two samples that follow each other, and says that people in this hall turn sharply every
+# second. What do you answer, and what would you compute instead? Write five to eight sentences.
+
+# %% [markdown]
+# YOUR ANSWER HERE

@@ -14,14 +14,15 @@
 # %% [markdown]
 # # Sheet 3 - From samples to a zone
 #
-# Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `judges.hint("crossing", 1)` prints a hint, 2 the next, 3 is nearly
-# the solution.
+# Write each function, then run the cell below it: it asks your function for many fresh cases and says
+# what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
+# `judges.hint("crossing", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# pandas: an answer that calls szlib is refused, unless the task allows it.
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 2](sheet2_outliers.ipynb) · next: [sheet
 # 4](sheet4_certainty.ipynb) · [to do](../exercises/sheet3_zones.ipynb) ·
-# [solved](../solutions/sheet3_zones.ipynb) · 3 h 25 min · belongs to [05](../05_zones.ipynb)
+# [solved](../solutions/sheet3_zones.ipynb) · 3 h 35 min · belongs to [05](../05_zones.ipynb)
 
 # %%
 import judges
@@ -103,8 +104,8 @@ judges.check("triangle_ellipse", triangle_ellipse)
 # `samples` are the encounters of a fresh plaza: columns `encounter`, `los_angle` [rad], `distance`
 # [m], `speed` of the reference pedestrian [m/s]. Everybody keeps out of everybody's zone, but one in
 # a hundred walks right through it. Its size is drawn anew each time. Find the zone of people who walk
-# at 1.1 m/s, as a `szlib.Ellipse` in the person's frame, centre and semi-axes within 8 cm. Any way is
-# allowed but `szlib.SocialZone`; yours may be better.
+# at 1.1 m/s, as a `szlib.Ellipse` in the person's frame, centre and semi-axes within 10 cm. Of
+# szlib you may use `szlib.Ellipse` only. The zones of the check are narrow and wide.
 
 
 # %%
@@ -116,3 +117,13 @@ def my_zone(samples):
 
 # %%
 judges.check("my_zone", my_zone)
+
+# %% [markdown]
+# ## 3.5 In your own words (10 min)
+#
+# Your zone of 3.4 is within 10 cm on synthetic plazas. Name three reasons why it may be farther off in a
+# real hall, and for each of them what you would look at in the data to notice it. Write five to eight
+# sentences.
+
+# %% [markdown]
+# YOUR ANSWER HERE

@@ -14,14 +14,15 @@
 # %% [markdown]
 # # Sheet 4 - How sure?
 #
-# Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `judges.hint("p_value", 1)` prints a hint, 2 the next, 3 is nearly
-# the solution.
+# Write each function, then run the cell below it: it asks your function for many fresh cases and says
+# what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
+# `judges.hint("p_value", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# pandas: an answer that calls szlib is refused, unless the task allows it.
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 3](sheet3_zones.ipynb) · next: [sheet
 # 5](sheet5_barriers.ipynb) · [to do](../exercises/sheet4_certainty.ipynb) ·
-# [solved](../solutions/sheet4_certainty.ipynb) · 50 min · belongs to [06](../06_respect.ipynb),
+# [solved](../solutions/sheet4_certainty.ipynb) · 1 h 00 min · belongs to [06](../06_respect.ipynb),
 # [07](../07_barriers.ipynb)
 
 # %%
@@ -122,3 +123,13 @@ def shifted(t, person, shift, period):
 
 # %%
 judges.check("shifted", shifted)
+
+# %% [markdown]
+# ## 4.5 In your own words (10 min)
+#
+# The null model of people who ignore each other is rejected with p = 0.01. A newspaper writes that with a
+# probability of 99 % people respect each other's zone. Correct the sentence, and say what the number does
+# and does not support. Write five to eight sentences.
+
+# %% [markdown]
+# YOUR ANSWER HERE

@@ -14,14 +14,15 @@
 # %% [markdown]
 # # Sheet 5 - Barriers
 #
-# Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `judges.hint("barrier_row", 1)` prints a hint, 2 the next, 3 is
-# nearly the solution.
+# Write each function, then run the cell below it: it asks your function for many fresh cases and says
+# what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
+# `judges.hint("barrier_row", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# pandas: an answer that calls szlib is refused, unless the task allows it.
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 4](sheet4_certainty.ipynb) · next: [sheet
 # 6](sheet6_robot.ipynb) · [to do](../exercises/sheet5_barriers.ipynb) ·
-# [solved](../solutions/sheet5_barriers.ipynb) · 1 h 00 min · belongs to [06](../06_respect.ipynb),
+# [solved](../solutions/sheet5_barriers.ipynb) · 1 h 10 min · belongs to [06](../06_respect.ipynb),
 # [07](../07_barriers.ipynb)
 
 # %%
@@ -111,3 +112,12 @@ def end_margin(r_robot, length):
 
 # %%
 judges.check("end_margin", end_margin)
+
+# %% [markdown]
+# ## 5.5 In your own words (10 min)
+#
+# A colleague proposes to drop gamma and to require h >= 0 at the next step only. When is the robot still
+# safe, when not, and what does gamma cost? Use the barrier row of 5.3. Write five to eight sentences.
+
+# %% [markdown]
+# YOUR ANSWER HERE

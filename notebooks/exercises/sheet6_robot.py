@@ -14,15 +14,16 @@
 # %% [markdown]
 # # Sheet 6 - The robot
 #
-# Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `judges.hint("speed_limit", 1)` prints a hint, 2 the next, 3 is
-# nearly the solution.
+# Write each function, then run the cell below it: it asks your function for many fresh cases and says
+# what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
+# `judges.hint("speed_limit", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# pandas: an answer that calls szlib is refused, unless the task allows it.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [sheet 5](sheet5_barriers.ipynb) · [to
-# do](../exercises/sheet6_robot.ipynb) · [solved](../solutions/sheet6_robot.ipynb) · 1 h 20 min · belongs to
-# [11](../11_waiting.ipynb), [11b](../11b_making_room.ipynb), [12](../12_among_people.ipynb),
-# [13](../13_laboratory.ipynb)
+# [Start](../00_start_here.ipynb) · before: [sheet 5](sheet5_barriers.ipynb) · next: [sheet
+# 7](sheet7_controller.ipynb) · [to do](../exercises/sheet6_robot.ipynb) ·
+# [solved](../solutions/sheet6_robot.ipynb) · 1 h 30 min · belongs to [11](../11_waiting.ipynb),
+# [11b](../11b_making_room.ipynb), [12](../12_among_people.ipynb), [13](../13_laboratory.ipynb)
 
 # %%
 import judges
@@ -57,13 +58,15 @@ judges.check("speed_limit", speed_limit)
 # that it cannot brake any more: the problem has no solution, the step is *infeasible*. For the
 # scenario `szlib.SCENARIOS["passing"]`, a `zone` that you have not seen and a robot that brakes with
 # `a_max` [m/s2], give the largest of `gammas` (ascending) up to which no run has an infeasible step. A
-# run takes some 50 ms.
+# run takes some 50 ms, and szlib may be used here. The figure shows $h$ in one run; its axis is linear up to
+# 0.5 m and logarithmic above, so that both the approach and the moment near 0 can be seen.
 
 # %%
 zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 controller = szlib.MPCCBF(zone, settings=szlib.MPCSettings(gamma=0.15, a_max=0.5))
 log = szlib.simulate(szlib.SCENARIOS["passing"], controller)
 ax = figures.plot_barriers(log)
+ax.set_ylabel("h [m], logarithmic\nabove 0.5 m")
 ax.set_title(f"gamma = 0.15, a_max = 0.5: {log.metrics()['infeasible_steps']} infeasible steps")
 plt.show()
 
@@ -100,23 +103,37 @@ judges.check("next_plan", next_plan)
 # %% [markdown]
 # ## 6.4 Predict, then run (20 min)
 #
-# Before you run anything: what changes? `prediction` gives a dict with an answer to each of three
-# questions:
+# Before you run anything: what becomes larger, and what smaller? `prediction` is asked about twelve changes
+# of one parameter, from `before` to `after`, and answers "larger" or "smaller" for a `quantity`:
 #
-# - "passing, gamma from 0.05 to 0.1: the least h is": "smaller" or "larger",
-# - "waiting at gamma 0.2, N_h from 2 to 8: the infeasible steps are": "fewer" or "more",
-# - "passing, from the front to from behind: avoidance starts": "nearer" or "farther away".
+# | scenario | change | from, to (or back) | quantity |
+# |---|---|---|---|
+# | "passing" | "gamma" | about 0.04, 0.1 | "min_h": the smallest h of the run [m] |
+# | "passing" | "gamma" | about 0.04, 0.1 | "start": how far from the person avoidance starts [m] |
+# | "waiting" | "N_h" | 2, 6 to 8 | "infeasible_steps", at gamma 0.2 |
+# | "passing" | "a_max" | about 0.5, 1.2 m/s2 | "infeasible_steps", at gamma 0.15 |
+# | "passing" | "approach" | "front", "behind" | "start", as above |
+# | "passing" | "width" | shorter semi-axis of the zone, about 0.7, 0.85 m | "path_length" [m] |
 #
-# The check makes the runs, with a zone that is drawn anew, and compares. Where you were wrong, look for
-# the reason in notebooks 07, 09 and 21.
+# The check makes the runs with a zone that is drawn anew. It does not say which prediction is wrong, since
+# that would be its answer: look for the reason in notebooks 07, 09 and 21, or make the runs yourself.
 
 
 # %%
-def prediction():
-    """Your answers, made before the runs."""
+def prediction(scenario, change, before, after, quantity):
+    """Say "larger" or "smaller": what the quantity becomes with this change."""
     # YOUR CODE HERE
     raise NotImplementedError()
 
 
 # %%
 judges.check("prediction", prediction)
+
+# %% [markdown]
+# ## 6.5 In your own words (10 min)
+#
+# You must choose gamma for a robot in a hospital corridor. Which experiments of this sheet help, which do
+# not, and what would you have to measure in that corridor first? Write five to eight sentences.
+
+# %% [markdown]
+# YOUR ANSWER HERE

@@ -14,14 +14,16 @@
 # %% [markdown]
 # # Sheet 1 - Tracks and meetings
 #
-# Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `judges.hint("velocity", 1)` prints a hint, 2 the next, 3 is nearly
-# the solution. Units are metres, seconds and radians throughout.
+# Write each function, then run the cell below it: it asks your function for many fresh cases and says
+# what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
+# `judges.hint("velocity", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# pandas: an answer that calls szlib is refused, unless the task allows it. Units are metres, seconds and
+# radians throughout.
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · next: [sheet 2](sheet2_outliers.ipynb) · [to
-# do](../exercises/sheet1_tracks.ipynb) · [solved](../solutions/sheet1_tracks.ipynb) · 50 min · belongs to
-# [01](../01_tracks.ipynb), [02](../02_encounters.ipynb)
+# do](../exercises/sheet1_tracks.ipynb) · [solved](../solutions/sheet1_tracks.ipynb) · 1 h 00 min · belongs
+# to [01](../01_tracks.ipynb), [02](../02_encounters.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.
@@ -139,3 +141,20 @@ judges.check("one_hertz", one_hertz)
 # %% [markdown]
 # **Solution.** For small angles this is (speed x interval)^2 / (8 radius): a walker at 1.2 m/s who
 # turns with a radius of 3 m is off by 6 cm at 1 Hz, and by 0.06 cm at 10 Hz.
+
+# %% [markdown]
+# ## 1.5 In your own words (10 min)
+#
+# A tracker gives one position a second, and its positions have errors of some 5 cm. A colleague takes the
+# velocity from two samples that follow each other, and says that people in this hall turn sharply every
+# second. What do you answer, and what would you compute instead? Write five to eight sentences.
+
+# %% [markdown]
+# **Rubric** (10 points; a person grades this answer)
+#
+# | points | for |
+# |---|---|
+# | 3 | a velocity from two samples has an error of about 5 cm × √2 / 1 s, which turns the direction of slow people most |
+# | 3 | a longer span has less noise, and cuts corners: 1.4 says by how much; a choice is made and justified |
+# | 2 | a check on data: people who walk straight, or the same track sampled more rarely |
+# | 2 | numbers and units, and no claim about people who were not recorded |

@@ -14,14 +14,15 @@
 # %% [markdown]
 # # Sheet 2 - Inside out
 #
-# Write each function, then run the cell below it: it asks your function for fresh cases and says in
-# words what is right or wrong. `judges.hint("complementary", 1)` prints a hint, 2 the next, 3 is
-# nearly the solution.
+# Write each function, then run the cell below it: it asks your function for many fresh cases and says
+# what is right or wrong. A case that fails is printed with its seed, so that you can run it again.
+# `judges.hint("complementary", 1)` prints a hint, 2 and 3 print more. Write the functions with NumPy and
+# pandas: an answer that calls szlib is refused, unless the task allows it.
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 1](sheet1_tracks.ipynb) · next: [sheet
 # 3](sheet3_zones.ipynb) · [to do](../exercises/sheet2_outliers.ipynb) ·
-# [solved](../solutions/sheet2_outliers.ipynb) · 55 min · belongs to [03](../03_outliers.ipynb),
+# [solved](../solutions/sheet2_outliers.ipynb) · 1 h 05 min · belongs to [03](../03_outliers.ipynb),
 # [04](../04_hull.ipynb)
 
 # %%
@@ -136,3 +137,20 @@ figures.label_metres(ax, "Far from everybody, and in dense company")
 figures.add_shared_legend([ax])
 ax.set(xlabel="x' [m]", ylabel="y' [m]")
 plt.show()
+
+# %% [markdown]
+# ## 2.5 In your own words (10 min)
+#
+# LOF removes the samples that lie apart from their neighbours. Explain to somebody who has never heard of
+# LOF why it does not find the intruder of 2.4, and what you would remove instead. What may your rule do
+# wrong? Write five to eight sentences.
+
+# %% [markdown]
+# **Rubric** (10 points; a person grades this answer)
+#
+# | points | for |
+# |---|---|
+# | 3 | LOF compares densities of samples; the 31 samples of one encounter are each other's neighbours |
+# | 3 | a rule on encounters instead of samples, such as the nearest approach of each, with its parameter |
+# | 2 | an honest price: people who really come near are removed as well, and the zone becomes too large |
+# | 2 | precision or recall is named for both rules |

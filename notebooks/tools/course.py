@@ -148,7 +148,7 @@ WEEKS: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = [
     ("Which samples to believe, and the nearest people", ("03", "04"), ("sheet2_outliers",)),
     ("From samples to a zone", ("05",), ("sheet3_zones",)),
     ("Respect or emptiness; from a zone to a barrier", ("06", "07"), ("sheet4_certainty", "sheet5_barriers")),
-    ("A controller of your own, and its first meetings", ("08", "09", "10"), ()),
+    ("A controller of your own, and its first meetings", ("08", "09", "10"), ("sheet7_controller",)),
     ("The robot yields, and drives among people", ("11", "11b", "12", "13"), ("sheet6_robot",)),
 ]
 """Topic, chapters and exercise sheets of each of six weeks."""
@@ -257,9 +257,9 @@ def make_navigation(page: Page, story: list[Page], uses: dict[str, str]) -> str:
 
 def make_sheet_navigation(name: str) -> str:
     """The navigation cell of an exercise sheet, the same in both folders."""
-    from judges import SHEETS
+    from judges import SHEETS, sheet_minutes
 
-    names, minutes = list(SHEETS), sum(task.minutes for task in SHEETS[name])
+    names, minutes = list(SHEETS), sheet_minutes(name)
     at = names.index(name)
     places = [f"[Start](../{START}.ipynb)"]
     places += [f"before: [sheet {each[5]}]({each}.ipynb)" for each in names[max(at - 1, 0) : at]]
@@ -294,7 +294,7 @@ def make_map(story: list[Page]) -> str:
 
 def make_routes(story: list[Page]) -> str:
     """The cell of 00 with the three routes."""
-    from judges import SHEETS
+    from judges import sheet_minutes
 
     rows = ["## Three routes", ""]
     for name, numbers in ROUTES:
@@ -306,7 +306,7 @@ def make_routes(story: list[Page]) -> str:
     rows += ["", "| week | topic | notebooks | to read | sheet | to do |", "|---|---|---|---|---|---|"]
     for week, (topic, numbers, sheets) in enumerate(WEEKS, 1):
         links, minutes = _links_and_time(story, numbers)
-        work = _time(sum(task.minutes for sheet in sheets for task in SHEETS[sheet]))
+        work = _time(sum(sheet_minutes(sheet) for sheet in sheets))
         to_do = ", ".join(f"[sheet {sheet[5]}](exercises/{sheet}.ipynb)" for sheet in sheets)
         rows.append(f"| {week} | {topic} | {links} | {minutes} | {to_do} | {work} |")
     return "\n".join(rows)

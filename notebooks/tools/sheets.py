@@ -5,8 +5,9 @@
     python notebooks/tools/sheets.py --class FOLDER  make a course of nbgrader with its sheets
 
 The exercises are made from the solutions. The code between `### BEGIN SOLUTION` and `### END SOLUTION` is
-replaced by the stub of nbgrader, and cells that begin with "**Solution.**" are left out. nbgrader is not
-among the packages of the workbook: `pip install nbgrader` first.
+replaced by the stub of nbgrader, a cell that begins with "**Rubric**" by a place for the essay, and cells
+that begin with "**Solution.**" are left out. nbgrader is not among the packages of the workbook: `pip install
+nbgrader` first.
 """
 
 import argparse
@@ -31,6 +32,7 @@ REMARK = re.compile(
     r"\n# %% \[markdown\]\n# \*\*Solution\.\*\*.*(?:\n#.*)*\n"
     r"|\n# %%\n# Solution: (?:.*\n)*?(?=\n# %%)"
 )
+RUBRIC = re.compile(r"^# \*\*Rubric\*\*.*(?:\n#.*)*", re.MULTILINE)
 CHECK = re.compile(r'^judges\.check\("(\w+)", \w+\)$')
 CONFIG = """c = get_config()
 c.CourseDirectory.course_id = "szlib"
@@ -51,11 +53,13 @@ Run these commands in this folder; students need szlib, lecturers szlib and nbgr
 
 def make_exercise(solutions: str) -> str:
     """Remove the answers from the percent script `solutions`, and return the exercise sheet."""
-    return SOLVED.sub(STUB, REMARK.sub("", solutions))
+    return RUBRIC.sub("# YOUR ANSWER HERE", SOLVED.sub(STUB, REMARK.sub("", solutions)))
 
 
 def make_graded(solutions: str, points: dict[str, int]) -> nbformat.NotebookNode:
     """Make the source of nbgrader for a sheet: answers are cleared, checks give the `points` of their task."""
+    from judges import ESSAY_MINUTES
+
     sheet = jupytext.reads(REMARK.sub("", solutions), fmt="py:percent")
     for cell, after in zip(sheet.cells, [*sheet.cells[1:], None], strict=True):
         if after is not None and (task := CHECK.match(after.source)):
@@ -64,6 +68,9 @@ def make_graded(solutions: str, points: dict[str, int]) -> nbformat.NotebookNode
             mark = _nbgrader_metadata(f"{task[1]}-check", grade=True)
             cell.metadata["nbgrader"] = mark | {"points": points[task[1]]}
             cell.source += ".require()"
+        if cell.source.startswith("**Rubric**"):
+            mark = _nbgrader_metadata("essay", solution=True, grade=True)
+            cell.metadata["nbgrader"] = mark | {"points": ESSAY_MINUTES, "locked": False}
     return sheet
 
 

@@ -1,74 +1,31 @@
-"""The exercises: solutions pass, stubs fail, and each typical mistake gets its own message."""
+"""The exercises: solutions pass, stubs fail, and each wrong answer is refused with its own message.
 
+`tests/studies/exercises.py` does the same in 300 checks of each answer.
+"""
+
+import doctest
 import importlib.util
 import re
 import warnings
-from functools import cache
-from pathlib import Path
 
-import jupytext
+import judges
 import matplotlib.pyplot as plt
 import nbformat
 import numpy as np
 import pytest
-from judges import SHEETS, Task, check, hint, sheet6_robot
+from helpers.exercises import TASKS, cells, defined, solution
+from helpers.wrong_answers import WRONG
+from judges import SHEETS, Task, check, hint
 from judges.task import load_texts
 
 import szlib
 from szlib.workbook import folders
 
-TASKS = {
-    task.name: (sheet, number, task) for sheet, tasks in SHEETS.items() for number, task in enumerate(tasks)
-}
 SEED = 3
-
-
-def far_corner(cloud):
-    return cloud.max(axis=0) + 1.0
-
-
-def quantile_ellipse(samples, q, *, complement=False):
-    """An ellipse along the axes, from the quantile q of the nearest approaches on four sides."""
-    close = samples[(samples["distance"] <= 2.0) & (samples["speed"] - 1.1).abs().le(0.2)]
-    turn = np.radians([0, 90, 180, -90])
-    off = np.angle(np.exp(1j * (close["los_angle"].to_numpy()[:, None] - turn)))
-    radii = []
-    for side in (np.abs(off) < np.radians(15)).T:
-        approach = close[side].groupby("encounter")["distance"].min()
-        radii.append(float(np.quantile(approach, q)))
-    ahead, left, behind, right = (2.0 - r if complement else r for r in radii)
-    a, b = sorted([(ahead + behind) / 2, (left + right) / 2], reverse=True)
-    center = (ahead - behind) / 2, (left - right) / 2
-    return szlib.Ellipse(center, (a, b), np.pi / 2 if complement else 0.0)
-
-
-def predict(**wrong):
-    """The correct answers, except those in `wrong` (q0, q1, q2)."""
-    questions = enumerate(sheet6_robot.QUESTIONS.items())
-    return {question: wrong.get(f"q{i}", answers[0]) for i, (question, answers) in questions}
-
-
-WRONG_ANSWERS = {
-    "blind_spot": {
-        "an encounter has 31 samples": lambda cloud: far_corner(cloud)[None],
-        "this is not an intruder": lambda cloud: cloud[:31] + 0.01,
-        "the same point": lambda cloud: np.tile(far_corner(cloud), (31, 1)),
-        "LOF removes": lambda cloud: far_corner(cloud) + 0.02 * np.arange(31)[:, None] ** 2,
-    },
-    "my_zone": {
-        "expected a szlib.Ellipse": lambda samples: 1.0,
-        "too small; a few people walk through": lambda samples: quantile_ellipse(samples, 0.0),
-        "too large; most people keep farther away": lambda samples: quantile_ellipse(samples, 0.4),
-        "this is an ellipse around the slice": lambda s: quantile_ellipse(s, 0.05, complement=True),
-    },
-    "prediction": {
-        "'larger'; the runs give 'smaller'": lambda: predict(q0="larger"),
-        "'more'; the runs give 'fewer'": lambda: predict(q1="more"),
-        "'farther away'; the runs give 'nearer'": lambda: predict(q2="farther away"),
-        "expected a dict with an answer": lambda: "smaller",
-    },
+LONG = {"blind_spot", "my_zone", "largest_gamma", "prediction"} | {
+    t.name for t in SHEETS["sheet7_controller"]
 }
-"""Message -> answer that gets it, for each task with a judge."""
+"""Tasks whose checks take long: some tenths of a second."""
 
 
 def _sheets():
@@ -81,25 +38,12 @@ def _sheets():
 sheets = _sheets()
 
 
-@cache
-def cells(file: Path) -> list[nbformat.NotebookNode]:
-    return jupytext.read(file).cells
-
-
-def defined(sheet: str, folder: Path) -> dict[str, object]:
-    """The names that the cells of a sheet define; only cells that import or define functions are run."""
-    found: dict[str, object] = {}
-    for cell in cells(folder / f"{sheet}.py"):
-        if cell.cell_type == "code" and re.search(r"^(import|from|def) ", cell.source, re.MULTILINE):
-            exec(cell.source, found)
-    return found
-
-
 @pytest.fixture(autouse=True)
 def quiet():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)
         yield
+        plt.close("all")
 
 
 # --- the tasks ---------------------------------------------------------------------------------------
@@ -107,11 +51,16 @@ def quiet():
 
 @pytest.mark.parametrize("name", TASKS)
 class TestEach:
-    def test_the_solution_passes(self, name):
-        answer = defined(TASKS[name][0], sheets.SOLUTIONS)[name]
-        verdict = check(name, answer, seed=SEED)
-        assert verdict.passed, verdict
-        verdict.require()
+    def test_the_solution_passes_and_each_wrong_answer_gets_its_message(self, name):
+        assert len(WRONG[name]) >= 5
+        for seed in range(1 if name in LONG else 8):
+            verdict = check(name, solution(name), seed=seed)
+            assert verdict.passed, verdict
+            verdict.require()
+            for message, wrong in WRONG[name]:
+                verdict = check(name, wrong, seed=seed)
+                assert not verdict.passed, message
+                assert message in verdict.message
 
     def test_the_stub_fails_with_no_answer_yet(self, name):
         verdict = check(name, defined(TASKS[name][0], sheets.EXERCISES)[name], seed=SEED)
@@ -120,48 +69,41 @@ class TestEach:
         with pytest.raises(szlib.SzlibError, match="no answer yet"):
             verdict.require()
 
-    def test_each_typical_mistake_gets_its_message(self, name):
-        mistakes = {**TASKS[name][2].mistakes, **WRONG_ANSWERS.get(name, {})}
-        assert len(mistakes) >= 3
-        for message, wrong in mistakes.items():
-            verdict = check(name, wrong, seed=SEED)
-            assert not verdict.passed
-            assert message in verdict.message
+    def test_the_message_of_each_mistake_has_a_wrong_answer(self, name):
+        expected = [message for message, _ in WRONG[name]]
+        said = [message for message in TASKS[name][2].mistakes if any(each in message for each in expected)]
+        assert len(said) >= min(5, len(TASKS[name][2].mistakes))
 
-    def test_every_hint_up_to_the_last_can_be_read(self, name, capsys):
+    def test_hints_end_before_the_answer(self, name, capsys):
         hints = TASKS[name][2].hints
         assert len(hints) >= 3
         hint(name, len(hints))
         assert hints[-1] in capsys.readouterr().out
         with pytest.raises(szlib.DataError, match=f"hints 1 to {len(hints)}"):
             hint(name, len(hints) + 1)
+        sheet = (sheets.SOLUTIONS / f"{TASKS[name][0]}.py").read_text(encoding="utf-8")
+        answers = "".join(re.findall(r"BEGIN SOLUTION\n(.*?)### END", sheet, re.DOTALL))
+        results = re.findall(r"return (.+)", answers)
+        assert not any(len(result) > 12 and result in text for result in results for text in hints)
 
     def test_the_sheet_states_the_declared_order_and_time(self, name):
         sheet, number, task = TASKS[name]
-        (place,) = [
-            i for i, c in enumerate(cells(sheets.SOLUTIONS / f"{sheet}.py")) if f'check("{name}"' in c.source
-        ]
-        before = cells(sheets.SOLUTIONS / f"{sheet}.py")[:place]
-        (title,) = [c.source.splitlines()[0] for c in before if c.source.startswith("## ")][
-            number : number + 1
-        ]
-        assert title.startswith(f"## {sheet[5]}.{number + 1} ")
-        assert title.endswith(f"{task.minutes} min)")
+        all_cells = cells(sheets.SOLUTIONS / f"{sheet}.py")
+        (place,) = [i for i, c in enumerate(all_cells) if f'check("{name}"' in c.source]
+        titles = [c.source.splitlines()[0] for c in all_cells[:place] if c.source.startswith("## ")]
+        assert titles[number].startswith(f"## {sheet[5]}.{number + 1} ")
+        assert titles[number].endswith(f"{task.minutes} min)")
 
 
 def test_there_are_enough_tasks_for_a_course():
-    assert len(TASKS) >= 24
-    assert all(2 <= len(tasks) <= 4 for tasks in SHEETS.values())
+    assert len(TASKS) >= 30
     minutes = [task.minutes for _, _, task in TASKS.values()]
     assert min(minutes) <= 5
     assert max(minutes) >= 120
 
 
-def test_every_text_belongs_to_a_task_and_a_mistake():
-    texts = load_texts()
-    assert set(texts) == set(TASKS)
-    for name, (_, _, task) in TASKS.items():
-        assert task.judge or set(task.mistakes) == set(texts[name]["mistakes"].values())
+def test_every_text_belongs_to_a_task():
+    assert set(load_texts()) == set(TASKS) == set(WRONG)
 
 
 def test_each_check_draws_new_cases():
@@ -171,35 +113,73 @@ def test_each_check_draws_new_cases():
     assert not np.array_equal(first[0], second[0])
 
 
+def test_the_examples_of_the_judges_hold():
+    assert doctest.testmod(judges.sheets, extraglobs={"__name__": "example"}).failed == 0
+
+
 # --- invalid answers ---------------------------------------------------------------------------------
 
 
-def make_task():
+def make_task(**options):
     """A task whose correct answer is twice a number."""
-    return Task("double", 1, (), lambda rng: ((3.0,), 6.0), {"add": lambda x: x + x + 1}, unit="m")
+    mistakes = {"add": lambda x: x + x + 1}
+    given = {"solution": lambda x: 2 * x, "mistakes": mistakes, "unit": "m"} | options
+    return Task("double", 1, (), lambda rng: [(3.0,), (4.0,)], **given)
 
 
 @pytest.mark.parametrize(
     ("answer", "message"),
     [
         (lambda x: None, "does it end with `return`"),
-        (lambda x: x[0], r"stopped with TypeError .* for \(3.0\)"),
-        (lambda x: "six", "expected a number; got str"),
-        (lambda x: np.full(2, 6.0), r"expected a number; got an array of shape \(2,\)"),
-        (lambda x: np.nan, "expected 6.0 m; got nan"),
-        (lambda x: 7.0, "add: expected 6.0 m; got 7.0"),
-        (lambda x: 6.0 + 1e-5, "expected 6.0 m; got 6.0"),
+        (lambda x: x[0], r"stopped with TypeError(.|\n)*for x = 3.0"),
+        (lambda x: "six", "expected a number; got a str"),
+        (lambda x: "6.0", "expected a number; got a str"),
+        (lambda x: True, "expected a number; got a boolean"),
+        (lambda x: 6 + 0j, "expected a number; got a complex"),
+        (lambda x: [[1], [1, 2]], "a list of parts of unequal length"),
+        (lambda x: np.full(2, 6.0), r"expected a number; got numbers, shape \(2,\)"),
+        (lambda x: np.nan, "expected 6 m, got nan m"),
+        (lambda x: 2 * x + 1, r"^add\n    expected 6 m, got 7 m"),
+        (lambda x: 6.0, "the same in every case(.|\n)*expected 8 m, got 6 m"),
+        (lambda x: 2 * x + 1e-5, r"expected 6 m, got 6.00001 m"),
     ],
 )
 def test_a_wrong_answer_is_described(answer, message):
-    verdict = make_task().check(answer, np.random.default_rng(0))
+    verdict = make_task().check(answer, 0)
     assert not verdict.passed
     assert re.search(message, verdict.message), verdict.message
 
 
 def test_the_verdict_holds_the_error_of_the_answer():
-    verdict = make_task().check(lambda x: 1 / 0, np.random.default_rng(0))
-    assert isinstance(verdict.error, ZeroDivisionError)
+    assert isinstance(make_task().check(lambda x: 1 / 0, 0).error, ZeroDivisionError)
+
+
+def test_a_failing_case_can_be_run_again():
+    def wrong(points, a, b):
+        return np.abs(szlib_free_line(points, a, b))
+
+    verdict = check("wall_distance", wrong)
+    seed, number = map(int, re.search(r"seed=(\d+), number=(\d+)\)", verdict.message).groups())
+    points, a, b = judges.case("wall_distance", seed=seed, number=number)
+    assert f"b = np.array([{b[0]}, {b[1]}])" in " ".join(verdict.message.replace("[ ", "[").split())
+    assert not np.allclose(wrong(points, a, b), szlib.segment_distance(points, a, b))
+    assert str(check("wall_distance", wrong, seed=seed)) == str(verdict)
+
+
+def szlib_free_line(points, a, b):
+    return ((points - a)[:, 0] * (b - a)[1] - (points - a)[:, 1] * (b - a)[0]) / np.hypot(*(b - a))
+
+
+def test_an_answer_cannot_read_what_only_the_judge_knows():
+    assert len(judges.case("my_zone", seed=SEED, number=1)) == 1
+
+
+def test_an_answer_that_calls_szlib_or_the_judges_is_refused():
+    line = judges.sheet1_tracks._line_of_sight
+    for answer in (line, lambda *args: line(*args)):
+        assert "no answer: this calls judges.sheet1_tracks" in check("line_of_sight", answer).message
+    verdict = check("wall_distance", szlib.segment_distance)
+    assert "no answer: this calls szlib.control.barriers.segment_distance" in verdict.message
 
 
 def test_an_answer_cannot_change_the_case():
@@ -218,8 +198,40 @@ def test_a_value_instead_of_a_function_and_an_unknown_task_are_refused():
 
 
 def test_the_first_wrong_number_of_a_large_array_is_shown():
-    verdict = check("in_space", lambda ref, heading, others: np.zeros(len(others)), seed=SEED)
-    assert re.search(r"\d+ of 60 numbers are wrong; at \[\d+\] expected", verdict.message)
+    verdict = check("in_space", lambda ref, heading, others: np.zeros(len(others), bool), seed=SEED)
+    assert re.search(r"\d+ of 40 numbers are wrong; at \[\d+\] expected True, got False", verdict.message)
+
+
+# --- the closed loop ---------------------------------------------------------------------------------
+
+
+def test_a_world_that_fails_says_when_and_is_drawn():
+    def careless(x, wish, *_):
+        return min(wish, 1.0)
+
+    verdict = check("filter_1d", careless, seed=SEED)
+    assert re.search(r"after \d+\.\d s h = -0\.\d+ m: the robot is too near to a person", verdict.message)
+    number = int(re.search(rf"filter_1d, seed={SEED}, number=(\d)\)", verdict.message)[1])
+    judges.plot("filter_1d", careless, seed=SEED, number=number)
+    h = plt.gcf().axes[1].lines[0].get_ydata()
+    assert h[-1] < 0 <= h[-2]
+    judges.plot("mpc_cbf_2d", solution("mpc_cbf_2d"), seed=SEED, number=2)
+    assert plt.gcf().axes[1].lines[0].get_ydata().min() >= 0
+    with pytest.raises(szlib.DataError, match="velocity has no worlds"):
+        judges.plot("velocity", solution("velocity"), seed=SEED, number=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "answer", "message"),
+    [
+        ("filter_1d", lambda *_: 5.0, "after 0.0 s the input is"),
+        ("filter_1d", lambda x, *_: np.nan, "after 0.0 s the input is"),
+        ("filter_1d", lambda x, *_: 1e-3 * np.sin(x), "it does not arrive in time"),
+        ("mpc_1d", lambda *_: np.zeros(3), r"expected numbers, shape \(15,\)"),
+    ],
+)
+def test_what_a_closed_loop_violates_is_said(name, answer, message):
+    assert re.search(message, check(name, answer, seed=SEED).message)
 
 
 # --- the sheets --------------------------------------------------------------------------------------
@@ -233,6 +245,8 @@ class TestSheet:
         assert exercise == sheets.make_exercise(solutions)
         assert "SOLUTION" not in exercise
         assert exercise.count("raise NotImplementedError()") == len(SHEETS[sheet])
+        assert exercise.count("# YOUR ANSWER HERE") == 1
+        assert "Rubric" not in exercise
 
     @pytest.mark.parametrize("folder", [sheets.SOLUTIONS, sheets.EXERCISES], ids=lambda f: f.name)
     def test_script_and_notebook_are_equal(self, sheet, folder):
@@ -262,7 +276,10 @@ class TestSheet:
         solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
         points = {task.name: task.minutes for task in SHEETS[sheet]}
         marked = [c for c in sheets.make_graded(solutions, points).cells if "nbgrader" in c.metadata]
-        assert len(marked) == 2 * len(points)
+        assert len(marked) == 2 * len(points) + 1
+        essay = marked.pop()
+        assert essay.metadata["nbgrader"]["points"] == judges.ESSAY_MINUTES
+        assert sum(map(int, re.findall(r"^\| (\d+) \|", essay.source, re.MULTILINE))) == judges.ESSAY_MINUTES
         for answer, test in zip(marked[::2], marked[1::2], strict=True):
             assert "### BEGIN SOLUTION" in answer.source
             assert answer.metadata["nbgrader"]["solution"]

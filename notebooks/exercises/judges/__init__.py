@@ -11,5 +11,5 @@ sheet6_robot      speed limit, gamma by experiment, the terminal proof, predicti
 sheets            `check` and `hint`, over all sheets
 """
 
-from .sheets import SHEETS, check, hint
-from .task import Task, Verdict
+from .sheets import SHEETS, case, check, hint, plot, sheet_minutes
+from .task import ESSAY_MINUTES, Task, Verdict

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Any
 
@@ -14,21 +15,28 @@ from szlib.simulation.metrics import find_avoidance_start
 from szlib.simulation.scenarios.paper import SCENARIOS
 from szlib.zones.ellipses import Ellipse
 
-from .task import Case, Rng, formula, make_task
+from .task import Args, Rng, make_task, repeat
 
-_GAMMAS = (0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.12, 0.15, 0.2)  # that the experiment tries
-
-
-def _draw_approach(rng: Rng) -> tuple[Any, ...]:
-    return round(rng.uniform(1, 3), 2), round(rng.uniform(0.06, 0.2), 3), 0.2, round(rng.uniform(0.1, 0.4), 2)
+_GAMMAS = (0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1, 0.12, 0.15, 0.2, 0.3)  # that the experiment tries
+_BRAKES = ((0.3, 0.42), (0.68, 0.85))  # a_max of a weak and of a stronger robot [m/s2]
+_ANSWERS = ("smaller", "larger")
 
 
-def _draw_zone(rng: Rng) -> Ellipse:
-    b = round(rng.uniform(0.65, 0.75), 2)
+def _draw_approach(rng: Rng) -> Args:
+    h, gamma, person_speed = rng.uniform(0.5, 3), rng.uniform(0.03, 0.2), rng.uniform(0.1, 1.6)
+    return round(h, 2), round(gamma, 3), float(rng.choice([0.05, 0.1, 0.2])), round(person_speed, 2)
+
+
+def _limit(h: float, gamma: float, dt: float, person_speed: float) -> float:
+    return gamma * h / dt - person_speed
+
+
+def _draw_zone(rng: Rng, b: float = 0.7) -> Ellipse:
+    b = round(b + rng.uniform(-0.05, 0.05), 2)
     return Ellipse((round(rng.uniform(0.05, 0.12), 2), 0.0), (round(b + rng.uniform(0.2, 0.3), 2), b))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _run(name: str, zone: Ellipse, settings: MPCSettings, turned: bool = False) -> dict[str, float]:
     """Metrics of a scenario of the paper, with the distance where avoidance starts, `start` [m]."""
     scenario = SCENARIOS[name].turn_people() if turned else SCENARIOS[name]
@@ -36,8 +44,10 @@ def _run(name: str, zone: Ellipse, settings: MPCSettings, turned: bool = False) 
     return log.metrics() | {"start": find_avoidance_start(log)[0]}
 
 
-def _draw_weak_robot(rng: Rng) -> tuple[Any, ...]:
-    return _draw_zone(rng), round(rng.uniform(0.4, 0.7), 2), _GAMMAS
+def _draw_robots(rng: Rng) -> Iterator[Args]:
+    """A robot with a weak brake and one with a stronger brake, in either order: no constant fits both."""
+    for low, high in rng.permutation(_BRAKES):
+        yield _draw_zone(rng), round(rng.uniform(low, high), 2), _GAMMAS
 
 
 def _largest(zone: Ellipse, a_max: float, gammas: tuple[float, ...]) -> float:
@@ -54,69 +64,70 @@ def _next_larger(zone: Ellipse, a_max: float, gammas: tuple[float, ...]) -> floa
     return gammas[min(gammas.index(_largest(zone, a_max, gammas)) + 1, len(gammas) - 1)]
 
 
-def _draw_plan(rng: Rng) -> tuple[Any, ...]:
-    plan = rng.uniform(-1, 1, (8, 2)).round(2)
+def _by_formula(zone: Ellipse, a_max: float, gammas: tuple[float, ...]) -> float:
+    return max((gamma for gamma in gammas if gamma <= 0.1 * a_max), default=gammas[0])
+
+
+def _draw_plan(rng: Rng) -> Args:
+    plan = rng.uniform(-1, 1, (int(rng.integers(5, 11)), 2)).round(2)
     return (np.vstack([plan[:-1], plan[-1:] + 0.1]),)
 
 
-# Question -> the answers for a smaller and for a larger number.
-QUESTIONS = {
-    "passing, gamma from 0.05 to 0.1: the least h is": ("smaller", "larger"),
-    "waiting at gamma 0.2, N_h from 2 to 8: the infeasible steps are": ("fewer", "more"),
-    "passing, from the front to from behind: avoidance starts": ("nearer", "farther away"),
-}
+def _draw_changes(rng: Rng) -> Iterator[Args]:
+    """Twelve changes: six kinds, each there and back, with what two runs with a random zone give."""
+    zone, wide = _draw_zone(rng), _draw_zone(rng, 0.85)
+    low, high = round(rng.uniform(0.03, 0.05), 3), round(rng.uniform(0.08, 0.11), 3)
+    n_h, brake = int(rng.integers(6, 9)), round(rng.uniform(0.4, 0.55), 2)
+
+    def runs(name: str, *settings: MPCSettings) -> list[dict[str, float]]:
+        return [_run(name, zone, each) for each in settings]
+
+    gamma = runs("passing", MPCSettings(gamma=low), MPCSettings(gamma=high))
+    horizon = runs("waiting", MPCSettings(gamma=0.2), MPCSettings(gamma=0.2, N_h=n_h))
+    brakes = runs("passing", MPCSettings(gamma=0.15, a_max=brake), MPCSettings(gamma=0.15, a_max=1.2))
+    front = _run("passing", zone, MPCSettings())
+    behind, beside = _run("passing", zone, MPCSettings(), turned=True), _run("passing", wide, MPCSettings())
+    kinds = [
+        ("passing", "gamma", low, high, "min_h", gamma),
+        ("passing", "gamma", low, high, "start", gamma),
+        ("waiting", "N_h", 2, n_h, "infeasible_steps", horizon),
+        ("passing", "a_max", brake, 1.2, "infeasible_steps", brakes),
+        ("passing", "approach", "front", "behind", "start", [front, behind]),
+        ("passing", "width", zone.semi_axes[1], wide.semi_axes[1], "path_length", [front, beside]),
+    ]
+    changes = []
+    for scenario, change, before, after, quantity, (one, other) in kinds:
+        rises = other[quantity] > one[quantity]
+        changes += [((scenario, change, before, after, quantity), _ANSWERS[rises])]
+        changes += [((scenario, change, after, before, quantity), _ANSWERS[not rises])]
+    yield ([changes[i] for i in rng.permutation(len(changes))],)
 
 
-def _draw_runs(rng: Rng) -> Case:
-    """The correct answers, from runs with a random zone, and their numbers."""
-    zone, calm, bold = _draw_zone(rng), MPCSettings(), MPCSettings(gamma=0.2)
-    first, sooner = _run("passing", zone, calm), _run("passing", zone, MPCSettings(gamma=0.1))
-    short, long = (_run("waiting", zone, s) for s in (bold, MPCSettings(gamma=0.2, N_h=8)))
-    behind = _run("passing", zone, calm, turned=True)
-    pairs = [("min_h", first, sooner), ("infeasible_steps", short, long), ("start", first, behind)]
-    truth = {}
-    for (question, (falls, rises)), (name, one, other) in zip(QUESTIONS.items(), pairs, strict=True):
-        answer = falls if other[name] < one[name] else rises if other[name] > one[name] else "the same"
-        truth[question] = (answer, f"{one[name]:.3g}, then {other[name]:.3g}")
-    return (), truth
-
-
-def _judge_prediction(_: tuple[Any, ...], truth: dict[str, tuple[str, str]], got: Any) -> str:
-    """Accept a dict with the correct answer to each question."""
-    if not isinstance(got, dict) or set(got) != set(truth):
-        return f"expected a dict with an answer to each of {list(truth)}; got {got!r}"
-    for question, (answer, numbers) in truth.items():
-        if got[question] not in (*QUESTIONS[question], "the same"):
-            return f"{question!r}: expected one of {QUESTIONS[question]}; got {got[question]!r}"
-        if got[question] != answer:
-            return f"you predicted: {question} {got[question]!r}; the runs give {answer!r} ({numbers})"
+def _judge_predictions(ask: Callable[..., Any], args: Args) -> str:
+    """Accept correct predictions of all changes; do not say which one is wrong, since that is its answer."""
+    given: dict[Args, str] = {}
+    for change, _ in args[0]:
+        given[change] = got = ask(*change)
+        if not isinstance(got, str) or got not in _ANSWERS:
+            return f"expected one of {_ANSWERS} for {change}; got {got!r}"
+    for (scenario, change, before, after, quantity), got in given.items():
+        if got == given[scenario, change, after, before, quantity]:
+            return f"{change}, {quantity}: the same answer for {before} to {after} as for the change back"
+    if all(given[change] != truth for change, truth in args[0]):
+        return "each change is predicted the wrong way around: does `before` come first?"
+    if any(given[change] != truth for change, truth in args[0]):
+        return "at least one kind of change goes the other way; make the runs and look for the reason"
     return ""
 
 
 TASKS = (
+    make_task(globals(), "speed_limit", repeat(_draw_approach), solution=_limit),
+    make_task(globals(), "largest_gamma", _draw_robots, solution=_largest, allowed=("szlib",)),
     make_task(
-        "speed_limit",
-        formula(_draw_approach, lambda h, gamma, dt, person_speed: gamma * h / dt - person_speed),
-        no_dt=lambda h, gamma, dt, person_speed: gamma * h - person_speed,
-        no_person=lambda h, gamma, dt, person_speed: gamma * h / dt,
-        sign=lambda h, gamma, dt, person_speed: gamma * h / dt + person_speed,
-        multiplied=lambda h, gamma, dt, person_speed: gamma * h * dt - person_speed,
-    ),
-    make_task(
-        "largest_gamma",
-        formula(_draw_weak_robot, _largest),
-        next=_next_larger,
-        smallest=lambda zone, a_max, gammas: gammas[0],
-        largest=lambda zone, a_max, gammas: gammas[-1],
-        default_brake=lambda zone, a_max, gammas: _largest(zone, 1.0, gammas),
-    ),
-    make_task(
+        globals(),
         "next_plan",
-        formula(_draw_plan, lambda plan: np.vstack([plan[1:], np.zeros((1, 2))])),
-        repeated=lambda plan: np.vstack([plan[1:], plan[-1:]]),
-        unchanged=lambda plan: plan,
-        wrong_way=lambda plan: np.vstack([np.zeros((1, 2)), plan[:-1]]),
-        shorter=lambda plan: plan[1:],
+        repeat(_draw_plan),
+        solution=lambda plan: np.vstack([plan[1:], np.zeros((1, 2))]),
     ),
-    make_task("prediction", _draw_runs, judge=_judge_prediction),
+    make_task(globals(), "prediction", _draw_changes, drive=_judge_predictions),
 )

@@ -1,17 +1,21 @@
-"""A task of an exercise sheet: it asks the learner's function for fresh cases and compares the answers.
+"""A task of an exercise sheet: it asks the learner's function for fresh cases and judges the results.
 
-Each case is drawn from fresh random numbers, so nobody can look up the correct answer.  Typical mistakes are
-functions as well: if one of them gives the learner's answer in every case, the learner reads its message.
+Each check draws new cases from a seed, and a case that fails can be drawn again with that seed. Typical
+mistakes are functions as well: if one of them gives the learner's results in every case, the learner reads
+its message. An answer that calls szlib where the task is to write that function is no answer.
 """
 
 from __future__ import annotations
 
+import inspect
+import sys
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -19,14 +23,22 @@ import pandas as pd
 
 from szlib.errors import SzlibError
 
-Answer = Callable[..., Any]
-# The arguments for the learner's function, and the correct answer.
-Case = tuple[tuple[Any, ...], Any]
-# Function of the arguments, the correct answer and the learner's answer; "" accepts the answer.
-Judge = Callable[[tuple[Any, ...], Any, Any], str]
-Rng = np.random.Generator
+from .qp import Infeasible
 
-_MAX_SHOWN = 6  # numbers of an array in a message
+Answer = Callable[..., Any]
+Args = tuple[Any, ...]  # the arguments of one call
+Call = tuple[Args, Any]  # a call of the learner's function, and its result
+Rng = np.random.Generator
+# Function of the arguments and the learner's result that returns what is wrong; "" accepts the result.
+Judge = Callable[[Args, Any], str]
+
+_MANY = 40  # cases of a check: a mistake that shows in one case of three passes once in ten million checks
+_MAX_SHOWN = 130  # numbers of an array in a message
+ESSAY_MINUTES = 10  # of a sheet
+
+
+class Refusal(Exception):
+    """An answer that is wrong for a reason other than its numbers."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +51,6 @@ class Verdict:
     passed : True if the answer is correct in every case.
     message : what is correct or wrong.
     error : the exception that the learner's function raised; None if it raised none.
-
-    Examples
-    --------
-    >>> from judges import Verdict
-    >>> Verdict("velocity", True, "correct in 5 fresh cases")
-    passed - velocity: correct in 5 fresh cases
     """
 
     task: str
@@ -69,109 +75,142 @@ class Task:
     ----------
     name : name of the task and of the function that the learner writes.
     minutes : time that the task takes [min].
-    hints : hints in order; the last one is nearly the solution.
-    case : function that draws one case from a random generator.
+    hints : hints in order; they end before the answer.
+    cases : function that draws the arguments of the cases of one check.
+    solution : the correct answer. Results must equal its results up to `tolerance`.
+    judge : accepts or refuses one result, where there are many correct answers.
+    drive : function of (answer, arguments) that calls the answer many times, as in a closed loop, and returns
+        what went wrong.
+    plot : function of (answer, arguments) that draws a case.
     mistakes : message -> function that makes this typical mistake.
-    judge : function of (arguments, correct answer, learner's answer) that returns a message, "" for a correct
-        answer. Without it, the answer must equal the correct answer up to `tolerance`.
+    hidden : number of values at the end of a case that the judge sees, but not the answer.
+    allowed : modules of szlib and of the judges that an answer may call.
     tolerance : largest allowed difference of any number [unit].
-    unit : unit of the answer; "" if it has none.
-    n_cases : number of cases in a check.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from judges import Task
-    >>> double = Task("double", 1, (), lambda rng: ((3.0,), 6.0), {"you add 2": lambda x: x + 2}, unit="m")
-    >>> double.check(lambda x: x + 2, np.random.default_rng(0))
-    not yet - double: you add 2: expected 6.0 m; got 5.0 for (3.0)
+    unit : unit of the result; "" if it has none.
     """
 
     name: str
     minutes: int
     hints: Sequence[str]
-    case: Callable[[Rng], Case]
-    mistakes: Mapping[str, Answer]
+    cases: Callable[[Rng], Iterable[Args]]
+    solution: Answer | None = None
     judge: Judge | None = None
+    drive: Callable[[Answer, Args], str] | None = None
+    plot: Callable[[Answer, Args], Any] | None = None
+    mistakes: Mapping[str, Answer] = field(default_factory=dict)
+    hidden: int = 0
+    allowed: tuple[str, ...] = ()
     tolerance: float = 1e-6
     unit: str = ""
-    n_cases: int = 5
 
-    def check(self, answer: Answer, rng: Rng) -> Verdict:
-        """Check the function `answer` in fresh cases drawn from `rng`."""
-        tried = []
-        for _ in range(self.n_cases):
-            args, expected = self.case(rng)
-            try:
-                got = answer(*deepcopy(args))
-            except NotImplementedError as error:
-                return Verdict(self.name, False, "no answer yet: write it, then run this cell", error)
-            except Exception as error:
-                stopped = f"your function stopped with {type(error).__name__} ({error}) {_arguments(args)}"
-                return Verdict(self.name, False, stopped, error)
-            if got is None:
-                return Verdict(self.name, False, "your function returns None: does it end with `return`?")
-            tried.append((args, expected, got))
-        for args, expected, got in tried:
-            if fault := self._fault(args, expected, got):
-                mistake = self._mistake(tried)
-                return Verdict(self.name, False, f"{mistake}: {fault}" if mistake else fault)
-        return Verdict(self.name, True, f"correct in {self.n_cases} fresh case{'s' * (self.n_cases > 1)}")
+    def case(self, seed: int, number: int) -> Args:
+        """The arguments of one case, from 1, of the check with this seed."""
+        args = list(self.cases(np.random.default_rng(seed)))[number - 1]
+        return args[: len(args) - self.hidden]
 
-    def _fault(self, args: tuple[Any, ...], expected: Any, got: Any) -> str:
-        if self.judge:
-            return self.judge(args, expected, got)
-        fault = self._difference(expected, got)
-        return f"{fault} {_arguments(args)}" if fault else ""
-
-    def _difference(self, expected: Any, got: Any) -> str:
-        """Describe how the numbers differ; "" if they agree."""
-        want = np.asarray(expected, float)
+    def check(self, answer: Answer, seed: int) -> Verdict:
+        """Check the function `answer` in cases drawn from `seed`."""
+        calls: list[list[Call]] = []  # of each case
+        fault, number = "", 0
         try:
-            have = np.asarray(got, float)
-        except (TypeError, ValueError):
-            return f"expected {_kind(want)}; got {type(got).__name__}"
-        if have.shape != want.shape:
-            return f"expected {_kind(want)}; got {_kind(have)}"
-        wrong = np.flatnonzero(~np.isclose(have, want, rtol=0, atol=self.tolerance))
-        if not len(wrong):
+            for number, args in enumerate(self.cases(np.random.default_rng(seed)), 1):
+                calls.append([])
+                found = self._run(answer, args, calls[-1])
+                fault = fault or (f"{found}{self._replay(args, seed, number)}" if found else "")
+        except NotImplementedError as error:
+            return Verdict(self.name, False, "no answer yet: write it, then run this cell", error)
+        except Refusal as refusal:
+            return Verdict(self.name, False, f"{refusal}{self._replay(args, seed, number)}", refusal)
+        except Exception as error:
+            fault = f"your function stopped with {type(error).__name__}: {error}"
+            return Verdict(self.name, False, f"{fault}{self._replay(args, seed, number)}", error)
+        for case, made in enumerate(calls, 1):
+            if not fault and (found := self._compare(made)):
+                fault = f"{found}{self._replay(self.case(seed, case), seed, case)}"
+        if fault:
+            mistake = self._mistake([call for made in calls for call in made])
+            return Verdict(self.name, False, f"{mistake}\n    {fault}" if mistake else fault)
+        return Verdict(self.name, True, f"correct in {number} fresh case{'s' * (number > 1)}")
+
+    def _run(self, answer: Answer, args: Args, calls: list[Call]) -> str:
+        """Run the answer in one case, record its `calls`, and return what the judge refuses."""
+
+        def ask(*arguments: Any) -> Any:
+            got = _call_watched(answer, deepcopy(arguments), self.allowed)
+            if got is None:
+                raise Refusal("your function returns None: does it end with `return`?")
+            calls.append((arguments, got))
+            return got
+
+        if self.drive:
+            return self.drive(ask, args)
+        got = ask(*args[: len(args) - self.hidden])
+        return self.judge(args, got) if self.judge else ""
+
+    def _compare(self, calls: list[Call]) -> str:
+        """How the first wrong result differs from that of the solution; "" if there is none."""
+        if self.solution is None:
             return ""
-        unit = f" {self.unit}" if self.unit else ""
-        if want.size <= _MAX_SHOWN:
-            return f"expected {_shown(expected)}{unit}; got {_shown(got)}"
-        first = np.unravel_index(wrong[0], want.shape)
+        for arguments, got in calls:
+            if fault := compare(self.solution(*deepcopy(arguments)), got, self.tolerance, self.unit):
+                return fault
+        return ""
+
+    def _mistake(self, calls: list[Call]) -> str:
+        """Message of the typical mistake that gives the same results in every call; "" if there is none."""
+        for message, mistake in self.mistakes.items():
+            if calls and all(self._agrees(mistake, *call) for call in calls):
+                return message
+        constant = len(calls) > 1 and len({str(got) for _, got in calls}) == 1
         return (
-            f"{len(wrong)} of {want.size} numbers are wrong; at [{', '.join(map(str, first))}] expected "
-            f"{_shown(want[first])}{unit}, got {_shown(have[first])}"
+            "your result is the same in every case: it does not depend on the arguments" if constant else ""
         )
 
-    def _mistake(self, tried: list[tuple[tuple[Any, ...], Any, Any]]) -> str:
-        """Message of the typical mistake that gives the same answers in every case; "" if there is none."""
-        for message, mistake in self.mistakes.items():
-            if not any(self._difference(mistake(*deepcopy(args)), got) for args, _, got in tried):
-                return message
-        return ""
+    def _agrees(self, mistake: Answer, args: Args, got: Any) -> bool:
+        try:
+            return not compare(mistake(*deepcopy(args)), got, self.tolerance)
+        except Infeasible:
+            return False
+
+    def _replay(self, args: Args, seed: int, number: int) -> str:
+        """The arguments of a case, and the command that draws it again."""
+        if self.plot:
+            return f"\n    see it: judges.plot({self.name!r}, {self.name}, seed={seed}, number={number})"
+        names = (
+            [f"{name} = " for name in _argument_names(self.solution)]
+            if self.solution
+            else [""] * (len(args) - self.hidden)
+        )
+        shown = ", ".join(f"{name}{show(arg)}" for name, arg in zip(names, args, strict=False))
+        again = f"{self.name}(*judges.case({self.name!r}, seed={seed}, number={number}))"
+        return "" if self.drive else f"\n    for {shown}\n    the same case again: {again}"
 
 
 def make_task(
-    name: str, case: Callable[[Rng], Case], *, judge: Judge | None = None, **mistakes: Answer
+    names: dict[str, Any], name: str, cases: Callable[[Rng], Iterable[Args]], **options: Any
 ) -> Task:
-    """Build a task with the texts and numbers of `texts.toml`.
+    """Build a task with the texts, numbers and mistakes of `texts.toml`.
 
     Parameters
     ----------
+    names : what the expressions of the mistakes may use: `globals()` of the sheet's file.
     name : name of the task, and of its section in `texts.toml`.
-    case, judge : as for `Task`.
-    mistakes : key -> function that makes the mistake. `texts.toml` holds the message of each key.
+    cases, options : as for `Task`.
 
     Raises
     ------
-    KeyError : a task or a mistake has no text.
+    KeyError : a task has no text.
     """
-    texts = dict(load_texts()[name])
-    messages = texts.pop("mistakes", {})
-    described = {messages[key]: answer for key, answer in mistakes.items()}
-    return Task(name, case=case, mistakes=described, judge=judge, **texts)
+    texts, mistakes = dict(load_texts()[name]), {}
+    for message, expression in texts.pop("mistakes", {}).items():
+        given = ", ".join(_argument_names(options["solution"]))
+        mistakes[message] = eval(f"lambda {given}: {expression}", names)
+    return Task(name, cases=cases, mistakes=mistakes, **texts, **options)
+
+
+def _argument_names(function: Answer) -> list[str]:
+    parameters = inspect.signature(function).parameters.values()
+    return [each.name for each in parameters if each.default is each.empty and each.kind != each.VAR_KEYWORD]
 
 
 @cache
@@ -180,25 +219,83 @@ def load_texts() -> dict[str, Any]:
     return tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 
 
-def formula(draw: Callable[[Rng], tuple[Any, ...]], solution: Answer) -> Callable[[Rng], Case]:
-    """Cases with arguments from `draw` and the correct answer from the function `solution`."""
-    return lambda rng: ((args := draw(rng)), solution(*args))
+def repeat(draw: Callable[[Rng], Args], n: int = _MANY) -> Callable[[Rng], Iterator[Args]]:
+    """Cases that are all drawn by the function `draw`."""
+    return lambda rng: (draw(rng) for _ in range(n))
 
 
-def _arguments(args: tuple[Any, ...]) -> str:
-    return f"for ({', '.join(map(_shown, args))})" if args else ""
+def _call_watched(answer: Answer, arguments: Args, allowed: tuple[str, ...]) -> Any:
+    """Call the answer; refuse it if it calls szlib or the judges, except what is in `allowed` modules."""
+    called: list[str] = []
+
+    def is_in(frame: FrameType | None, *rooms: str) -> bool:
+        return frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in rooms
+
+    def note(frame: FrameType, event: str, _: Any) -> None:
+        if event == "call" and is_in(frame, "szlib", "judges") and not is_in(frame.f_back, "szlib"):
+            module, name = frame.f_globals["__name__"], frame.f_code.co_qualname
+            if name != "<module>" and not module.startswith(allowed):
+                called.append(f"{module}.{name}")
+
+    outer = sys.getprofile()
+    sys.setprofile(None if "szlib" in allowed else note)
+    try:
+        return answer(*arguments)
+    finally:
+        sys.setprofile(outer)
+        if called:
+            raise Refusal(f"no answer: this calls {called[0]}; the task is to write it yourself")
+
+
+def compare(expected: Any, got: Any, tolerance: float, unit: str = "") -> str:
+    """Describe how two results differ; "" if they agree."""
+    if form := check_form(expected, got):
+        return form
+    want, have = np.asarray(expected), np.asarray(got)
+    wrong = np.flatnonzero(~np.isclose(have.astype(float), want.astype(float), rtol=0, atol=tolerance))
+    if not len(wrong):
+        return ""
+    unit, at = (f" {unit}" if unit else ""), ""
+    if want.size > 1:
+        first = np.unravel_index(wrong[0], want.shape)
+        at = f"{len(wrong)} of {want.size} numbers are wrong; at [{', '.join(map(str, first))}] "
+        want, have = want[first], have[first]
+    texts = [str(want), str(have)]
+    for digits in (4, 8, 17) if want.dtype != bool else ():  # as many as show a difference
+        texts = [f"{float(each):.{digits}g}" for each in (want, have)]
+        if texts[0] != texts[1]:
+            break
+    return f"{at}expected {texts[0]}{unit}, got {texts[1]}{unit}"
+
+
+def check_form(expected: Any, got: Any) -> str:
+    """Describe how the type or the shape of two results differs; "" if they agree."""
+    want = np.asarray(expected)
+    try:
+        have = np.asarray(got)
+    except ValueError:
+        return f"expected {_kind(want)}; got a {type(got).__name__} of parts of unequal length"
+    if have.dtype.kind not in "biuf":
+        return f"expected {_kind(want)}; got a {type(got).__name__}"
+    if have.shape != want.shape or (have.dtype == bool) != (want.dtype == bool):
+        return f"expected {_kind(want)}; got {_kind(have)}"
+    return ""
 
 
 def _kind(array: Any) -> str:
-    return f"an array of shape {array.shape}" if array.shape else "a number"
+    what = ("a boolean", "booleans") if array.dtype == bool else ("a number", "numbers")
+    return f"{what[1]}, shape {array.shape}" if array.shape else what[0]
 
 
-def _shown(value: Any) -> str:
-    """A value in a few digits; only the size of a long one."""
+def show(value: Any) -> str:
+    """A value to copy; only the size of a long one."""
     if isinstance(value, pd.DataFrame):
-        return f"a table of {len(value)} rows"
-    if isinstance(value, np.ndarray | list | tuple) and np.size(value) > _MAX_SHOWN:
-        return _kind(np.asarray(value))
-    if isinstance(value, np.ndarray | list | tuple | float | int | np.number):
-        return str(np.round(np.asarray(value), 4).tolist())
+        columns = value.to_dict("list") if value.size <= _MAX_SHOWN else f"a table of {len(value)} rows"
+        return str(columns)
+    if isinstance(value, np.ndarray):
+        if value.size > _MAX_SHOWN:
+            return _kind(value)
+        numbers = value.astype(int) if value.dtype == bool else value
+        text = np.array2string(numbers, separator=", ", floatmode="unique")
+        return f"np.array({' '.join(text.split())}{', dtype=bool' if value.dtype == bool else ''})"
     return str(value)
