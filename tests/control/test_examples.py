@@ -38,6 +38,14 @@ def write_map(folder, middle):
     return szlib.walls_from_map(folder / "map.yaml")
 
 
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [("plain_loop", 80), ("mujoco_drive", 80), ("ros2_node", 80), ("many_days", 60), ("gymnasium_env", 120)],
+)
+def test_examples_can_be_read_at_once(name, lines):
+    assert len((EXAMPLES / f"{name}.py").read_text().splitlines()) <= lines
+
+
 def test_the_plain_loop_arrives(load, capsys):
     assert load("plain_loop").main()
     assert "arrived after" in capsys.readouterr().out
