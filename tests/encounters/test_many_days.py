@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -70,6 +71,7 @@ def test_on_this_machine(days: Path, samples: pd.DataFrame, tmp_path: Path) -> N
     check(run("local", "2", days, tmp_path / "out"), tmp_path / "out", samples)
 
 
+@pytest.mark.skipif(shutil.which("setsid") is None, reason="the scripts in place of SLURM need setsid")
 def test_on_slurm_each_job_is_a_process_and_is_cancelled(
     days: Path, samples: pd.DataFrame, tmp_path: Path
 ) -> None:
