@@ -82,7 +82,7 @@ def _plaza(seed: int, a: float, b: float) -> tuple[pd.DataFrame, Ellipse]:
     """Samples from a plaza with a random zone, and that zone."""
     slow, fast = (Ellipse((0.05, 0.0), (a + grow, b + grow)) for grow in (-0.04, 0.04))
     settings = PlazaSettings(
-        n_encounters=800, slow_zone=slow, fast_zone=fast, intruders=0.01, intruder_speeds=SLOW_INTRUDERS
+        n_encounters=1500, slow_zone=slow, fast_zone=fast, intruders=0.01, intruder_speeds=SLOW_INTRUDERS
     )
     with tempfile.TemporaryDirectory() as folder:
         file = make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings)
@@ -108,9 +108,9 @@ def _judge_zone(args: Args, got: Any) -> str:
     found = f"semi-axes {a:.2f} x {b:.2f} m, off by {off[2]:+.2f} and {off[3]:+.2f} m"
     if abs(np.sin(got.angle)) > 0.7 and a - b > 0.03:  # r_max - R' is long where R' is short
         return f"{found}: this is an ellipse around the slice; map to r_max - R' first, then enclose"
-    if max(off[2:]) < -_TOLERANCE / 2:
+    if a * b < 0.9 * true_a * true_b:
         return f"{found}: too small; a few people walk through zones, and must not determine yours"
-    if min(off[2:]) > _TOLERANCE / 2:
+    if a * b > 1.1 * true_a * true_b:
         return f"{found}: too large; most people keep farther away than the zone"
     return f"{found}, centre off by {off[0]:+.2f} and {off[1]:+.2f} m; at most {_TOLERANCE} m is allowed"
 

@@ -47,7 +47,10 @@ def _run(name: str, zone: Ellipse, settings: MPCSettings, turned: bool = False) 
 def _draw_robots(rng: Rng) -> Iterator[Args]:
     """A robot with a weak brake and one with a stronger brake, in either order: no constant fits both."""
     for low, high in rng.permutation(_BRAKES):
-        yield _draw_zone(rng), round(rng.uniform(low, high), 2), _GAMMAS
+        zone = _draw_zone(rng)
+        while _largest(zone, 1.0, _GAMMAS) == _GAMMAS[-1]:  # the default brake would give the largest of all
+            zone = _draw_zone(rng)
+        yield zone, round(rng.uniform(low, high), 2), _GAMMAS
 
 
 def _largest(zone: Ellipse, a_max: float, gammas: tuple[float, ...]) -> float:
