@@ -21,10 +21,8 @@ run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza; fails wh
 report: $(INSTALLED)  ## open what the last run on the plaza wrote: one HTML file
 	$(BIN)/szlib report --open
 
-docs: $(INSTALLED)  ## results/site: that report, and beside it what each name of szlib does
-	$(BIN)/szlib report
-	$(BIN)/pdoc --docformat numpy --output-directory results/site szlib
-	$(BIN)/python -c "import shutil; shutil.copyfile('results/synthetic/report.html', 'results/site/report.html')"
+docs: $(INSTALLED)  ## results/site: each public name of szlib, which settings to choose, the notebooks, the last report
+	$(BIN)/python notebooks/tools/docs.py results/site
 
 # Types are checked beside the tests; both must pass.  The notebooks are executed by `make run`, not here.
 test: $(INSTALLED)  ## style, types, and every test
