@@ -18,7 +18,7 @@ OF_RUN = (
     *CACHED, *(f"{name}.json" for name in CACHED),
 )  # fmt: skip
 # What `make docs` writes.
-OF_SITE = ("index.html", "search.js", "report.html", "szlib.html", "szlib/**/*.html")
+OF_SITE = ("index.html", "which_settings.html", "report.html", "szlib.*.html")
 
 
 def clean(results: Path) -> None:
@@ -28,6 +28,7 @@ def clean(results: Path) -> None:
             if read_purpose(folder / "days") == DAYS:  # of notebook 24
                 shutil.rmtree(folder / "days")
             remove(folder, OF_RUN)
+    remove(results / "site/notebooks", OF_RUN)
     remove(results / "site", OF_SITE)
     for folder in (results / "lab", results):
         if read_purpose(folder) == WORKBOOK:

@@ -254,6 +254,7 @@ record.check("and those that the paper does not give", assumed == expected, assu
 # %% [markdown]
 # **What it means.** One question, a story of notebooks in order, and an exercise sheet for each part of it. Go on with
 # [notebook 01](01_tracks.ipynb), or with the route that fits your time.
+# Tracks or a robot of your own? [Which estimator, which settings](which_settings.md) answers in tables.
 
 # %%
 record.close()

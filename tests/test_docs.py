@@ -5,12 +5,15 @@ import inspect
 import re
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from bs4 import BeautifulSoup
 
 import szlib
-from szlib.workbook import cli
+from szlib.workbook import cli, folders
+from szlib.zones import respect, verdict
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "notebooks" / "which_settings.md").read_text(encoding="utf-8")
@@ -54,6 +57,17 @@ def test_each_table_has_every_parameter_with_its_meaning(site):
     assert lacking == []
 
 
+def test_no_table_has_a_parameter_without_a_meaning(site):
+    """Of methods and of the other names of a room as well, where they have a table."""
+    rows = {
+        (name, row.get_text(" ", strip=True))
+        for name, page in site.items()
+        for row in page.select("table.parameters tbody tr")
+        if not row.select("td")[3].get_text(strip=True)
+    }
+    assert rows == set()
+
+
 def test_pages_show_examples_and_lead_to_notebooks(site):
     for name in ("read_tracks", "find_encounters", "SocialZone", "MPCCBF", "simulate"):
         page = site[f"szlib.{name}"]
@@ -62,11 +76,12 @@ def test_pages_show_examples_and_lead_to_notebooks(site):
 
 
 def test_links_lead_to_pages_and_places(site):
-    broken = []
+    """Those to notebooks too, whose page the notebooks' report is, with a place for each."""
+    broken, notebooks = [], {script.stem for script in folders.list_notebooks()}
     for name, page in site.items():
         for link in page.select("a[href]"):
             file, _, anchor = link["href"].partition("#")
-            if file.startswith(("http", "notebooks/report", "report")) or not file:
+            if file == "notebooks/report.html" and anchor in {"", *notebooks}:
                 continue
             target = site.get(file.removesuffix(".html"))
             if target is None or (anchor and not target.find(id=anchor)):
@@ -107,6 +122,59 @@ def test_the_commands_and_programs_of_the_page_of_decisions_run(tmp_path, monkey
         exec(compile(program, "which_settings.md", "exec"), found)
     assert len(found["walls"]) > 0
     assert "respect" in capsys.readouterr().out
+
+
+def table(name: str) -> pd.DataFrame:
+    return pd.read_csv(ROOT / "notebooks" / "tables" / f"{name}.csv", comment="#")
+
+
+def test_the_numbers_of_the_page_are_those_of_the_tables():
+    text = " ".join(PAGE.split())
+    radius = table("25_imposed").query("quantity == 'radius' and site != 'plaza'")
+    squares = (radius["bias"] ** 2 + radius["scatter"] ** 2).groupby([radius["method"], radius["encounters"]])
+    error = (100 * np.sqrt(squares.mean()))["respect"].map("{:.0f} cm".format)
+    pairs = f"{error[150]} off (root mean square) with 150 encounters, {error[300]} with 300"
+    assert f"{pairs}, {error[600]} with 600, {error[2400]} with 2,400" in text
+    held = 100 * radius.query("encounters >= 300").groupby(["method", "encounters"])["held"].mean()
+    low, high = held.groupby("method").min(), held.groupby("method").max()
+    assert f"in {low['respect']:.0f} to {high['respect']:.0f} % of draws" in text
+    assert f'"quantile" in {low["quantile"]:.0f} to {high["quantile"]:.0f} %' in text
+    assert f"from {verdict.MIN_TOTAL} encounters on; {respect.MIN_COMPARED} are the least" in text
+
+    sites = table("06_sites").query("min_distance == 1").set_index(["site", "kinds"])["encounters"]
+    day = f"{sites['atc-1hz', 'all']} encounters, {sites['atc-1hz', 'strangers']} of them of strangers"
+    assert f"{day}; 80 minutes of Grand Central have {sites['grand-central', 'all']:,}" in text
+
+    day = table("25_sensitivity").query("data == 'ATC day' and method == 'quantile'")
+    a = day.set_index(["parameter", "value"])["a"]
+    default, strangers = a["default"].item(), a["kinds", "strangers"]
+    assert f"quantile zone is {default:.2f} m; it is {strangers:.2f} m for strangers" in text
+    assert f"{a['min_distance', '0.5']:.2f} m with `min_distance=0.5`" in text
+    assert f"{a['duration', '4.0']:.2f} m with windows of 4 s" in text
+    moved = day[day["parameter"].isin(["r_max", "min_speed", "q"])]["a"].sub(default).abs().max()
+    assert f"moved it by {100 * moved:.0f} cm at most" in text
+
+    gamma = table("09_gamma").set_index("gamma")
+    arrived, negative = 100 * gamma["arrived"], 100 * gamma["worlds with h < 0"] / gamma["worlds"]
+    assert (
+        f"arrived in {arrived[0.02]:.0f} % with 0.02, in {arrived[0.05]:.0f} to {arrived[0.1]:.0f} %" in text
+    )
+    assert f"with 0.4, {negative[0.4]:.0f} % of worlds had h < 0" in text
+    reached = table("12_sensitivity").query("metric == 'reached'")
+    assert set(reached["n"]) == {45}
+    low, high = 100 * reached["mean"].min(), 100 * reached["mean"].max()
+    assert f"left its arrival at {low:.0f} to {high:.0f} % of 45 walkers" in text
+    walkers = table("12_walkers").query(
+        "crowd == 'all recorded' and speed == '1 m/s' and metric == 'reached'"
+    )
+    ours = walkers.set_index("controller")
+    assert set(ours["n"]) == {200}
+    assert f"reached {100 * ours['mean']['among people']:.1f} % of goals" in text
+    assert f"the defaults {100 * ours['mean']['MPC-CBF']:.0f} %" in text
+    steps = table("21_rollouts").query("set == 'all'").set_index("formulation")["infeasible_steps"]
+    assert (
+        f"{steps['rest']:,} steps of 2,000 random worlds had none, of the defaults {steps['szlib']}" in text
+    )
 
 
 def test_a_citation_has_what_bibtex_needs(site):

@@ -10,12 +10,10 @@ import inspect
 import re
 import shutil
 import sys
-import unicodedata
-from functools import cached_property
 from pathlib import Path
+from unicodedata import normalize
 
 import yaml
-from markupsafe import Markup
 from pdoc.doc import Module
 from pdoc.render import configure, env
 from pdoc.render_helpers import to_html
@@ -33,7 +31,6 @@ NOTEBOOKS = {each.stem: each.read_text(encoding="utf-8") for each in list_notebo
 SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
 ENTRY = re.compile(r"^(\*{0,2}\w+(?:, \*{0,2}\w+)*) :(?: |$)(.*(?:\n(?: +.*|$))*)", re.MULTILINE)
 MODULE = re.compile(r"^(\w[\w, ]*?) {2,}(?=\S)", re.MULTILINE)  # in the list at the top of a room
-NOTEBOOK = re.compile(r"\]\((?:deeper/)?(\d\w+)\.ipynb\)")
 CODE = re.compile(r"<code>(?:szlib\.)?(?:[a-z]+\.)?((?:\w+\.)?\w+)(?:\([^<]*\))?</code>")
 
 
@@ -46,68 +43,39 @@ def list_exports(module):
 
 def find_notebooks(name, room):
     """The notebooks that use a name most, at most three; else the one of its room."""
-    uses = {stem: len(re.findall(rf"\b{name}\b", text)) for stem, text in NOTEBOOKS.items()}
-    used = [stem for stem in sorted(uses, key=uses.get, reverse=True) if uses[stem] and stem[:2] != "00"]
-    return used[:3] or [stem for stem in NOTEBOOKS if stem.split("_")[0] == ROOMS[room]]
+    uses = {n: len(re.findall(rf"\b{name}\b", text)) for n, text in NOTEBOOKS.items() if n[:2] > "00"}
+    used = [stem for stem in sorted(uses, key=uses.get, reverse=True)[:3] if uses[stem]]
+    return used or [stem for stem in NOTEBOOKS if stem.split("_")[0] == ROOMS[room]]
 
 
 def read_docstring(value, name):
     """The docstring of a value, with that of its constructor; of a constant the text below it."""
-    if callable(value) or inspect.ismodule(value) or isinstance(value, property | cached_property):
+    if inspect.getdoc(value) != inspect.getdoc(type(value)):
         own = vars(value).get("__init__") if inspect.isclass(value) else None
-        return "\n\n".join(filter(None, (inspect.getdoc(value), own and inspect.getdoc(own))))
-    homes = [m for key, m in sys.modules.items() if key[:6] == "szlib." and vars(m).get(name) is value]
-    found = [Module(home).members[name].docstring for home in homes if name in Module(home).members]
-    return max(found, key=len, default="")
+        return f"{inspect.getdoc(value)}\n\n{inspect.cleandoc(getattr(own, '__doc__', None) or '')}"
+    homes = [Module(m) for k, m in sys.modules.items() if k[:6] == "szlib." and vars(m).get(name) is value]
+    return max((home.members[name].docstring for home in homes if name in home.members), key=len, default="")
 
 
 def describe(name, value):
     """What the template shows of a value and, of a class, its methods and properties."""
     intro, *parts = SECTION.split(MODULE.sub(r"- **\1**: ", read_docstring(value, name)))
-    entry = {"name": name, "value": value, "intro": intro, "parameters": [], "tables": {}, "members": []}
-    entry["fields"] = getattr(value, "__dataclass_fields__", {})
-    entry["sections"] = dict(zip(parts[::2], parts[1::2], strict=True))
-    for base in value.__mro__[1:] if inspect.isclass(value) and "Parameters" not in entry["sections"] else ():
-        found = SECTION.split(inspect.getdoc(base) or "") if base.__module__.startswith("szlib") else []
-        entry["sections"] |= dict(zip(found[1::2], found[2::2], strict=True)) | entry["sections"]
-    for title, text in entry["sections"].items():
+    sections, tables, members = dict(zip(parts[::2], parts[1::2], strict=True)), {}, []
+    for title, text in sections.items():
         if title == "Parameters" or not ENTRY.sub("", text).strip():
-            found = ENTRY.findall(text)
-            entry["tables"][title] = {n.strip("* "): row for names, row in found for n in names.split(",")}
-    if callable(value) and not (inspect.isclass(value) and issubclass(value, Exception)):
-        given = inspect.signature(value).parameters.values()
-        entry["parameters"] = [each for each in given if each.name not in ("self", "cls")]
+            rows = ENTRY.findall(text)
+            tables[title] = {each.strip("* "): row for names, row in rows for each in names.split(",")}
+    # An error, which has args, takes a text only.
+    given = inspect.signature(value).parameters if callable(value) and not hasattr(value, "args") else {}
     for each in inspect.classify_class_attrs(value) if inspect.isclass(value) else ():
         found = getattr(each.object, "__func__", each.object)  # of a class method
-        is_shown = inspect.isfunction(found) or isinstance(found, property | cached_property)
+        is_shown = type(found).__name__ in ("function", "property", "cached_property")
         if is_shown and each.name[0] != "_" and each.defining_class.__module__.startswith("szlib"):
-            entry["members"].append(describe(f"{name}.{each.name}", found))
-    return entry
-
-
-def make_bibtex(citation):
-    """Entries for the paper, szlib and the data, from CITATION.cff."""
-    kinds = {"article": "article", "conference-paper": "inproceedings"}
-    copied = {
-        "journal": "journal",
-        "volume": "volume",
-        "issue": "number",
-        "version": "version",
-        "doi": "doi",
-        "url": "url",
-    }
-    text = ""
-    for each in (citation["preferred-citation"], citation, *citation["references"]):
-        names = [", ".join((a["family-names"], a["given-names"])) if "given-names" in a else f"{{{a['name']}}}"
-                 for a in each["authors"]]  # fmt: skip
-        year = each.get("year") or each["date-released"].year
-        first = unicodedata.normalize("NFKD", each["authors"][0].get("family-names", "szlib"))
-        fields = {"author": " and ".join(names), "title": f"{{{each['title']}}}", "year": year}
-        fields |= {name: each[key] for key, name in copied.items() if key in each}
-        fields |= {"booktitle": each["conference"]["name"]} if "conference" in each else {}
-        lines = "".join(f",\n  {name} = {{{value}}}" for name, value in fields.items())
-        text += f"@{kinds.get(each['type'], 'misc')}{{{first.encode('ascii', 'ignore').decode()}{year}{lines}\n}}\n"
-    return text
+            members.append(describe(f"{name}.{each.name}", found))
+    return {"name": name, "value": value, "intro": intro, "sections": sections, "tables": tables,
+            "members": members, "fields": getattr(value, "__dataclass_fields__", {}),
+            "parameters": [each for key, each in given.items() if key not in ("self", "cls")],
+            "bases": [describe(b.__name__, b) for b in getattr(value, "__mro__", ())[1:] if "szlib" in b.__module__]}  # fmt: skip
 
 
 def write_site(site):
@@ -115,25 +83,20 @@ def write_site(site):
     rooms = {room: [describe(*each) for each in list_exports(getattr(szlib, room)).items()] for room in ROOMS}
     pages = {"index": ("", []), "which_settings": ("", [])}
     for room, entries in rooms.items():
-        pages |= {
-            f"szlib.{each['name']}": (room, [each]) for each in entries if each["name"] in szlib.__all__
-        }
-        others = [each for each in entries if each["name"] not in szlib.__all__]
+        pages |= {f"szlib.{e['name']}": (room, [e]) for e in entries if e["name"] in szlib.__all__}
+        others = [entry for entry in entries if entry["name"] not in szlib.__all__]
         pages[f"szlib.{room}"] = room, [describe(room, getattr(szlib, room)), *others]
-    links = {each["name"]: f"{page}.html#{each['name']}" for page, (_, entries) in pages.items()
-             for entry in entries for each in (entry, *entry["members"])}  # fmt: skip
-
-    def link(code):
-        return f'<a href="{links[code[1]]}">{code[0]}</a>' if code[1] in links else code[0]
+    links = {each["name"]: f'<a href="{page}.html#{each["name"]}">{{}}</a>' for page, (_, shown) in pages.items()
+             for entry in shown for each in (entry, *entry["members"])}  # fmt: skip
 
     def render(text):
-        return Markup(CODE.sub(link, to_html(NOTEBOOK.sub(r"](notebooks/report.html#\1)", text))))
+        text = re.sub(r"\]\((?:deeper/)?(\d\w+)\.ipynb\)", r"](notebooks/report.html#\1)", text)
+        return CODE.sub(lambda code: links.get(code[1], "{}").format(code[0]), to_html(text))
 
     configure(template_directory=Path(__file__).parent / "docs")
-    env.filters |= {"html": render}
-    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    known = {"rooms": rooms, "pages": pages, "notebooks": NOTEBOOKS, "find_notebooks": find_notebooks, "public": szlib.__all__, "citation": citation, "bibtex": make_bibtex(citation),
-             "root": ROOT, "site": site}  # fmt: skip
+    env.filters |= {"html": render, "yaml": yaml.safe_load}
+    known = {"rooms": rooms, "pages": pages, "notebooks": NOTEBOOKS, "find_notebooks": find_notebooks,
+             "public": szlib.__all__, "root": ROOT, "site": site, "normalize": normalize}  # fmt: skip
     template = env.get_template("page.html.jinja2")
     for page, (room, entries) in pages.items():
         write_file(site / f"{page}.html", template.render(known, page=page, room=room, entries=entries))

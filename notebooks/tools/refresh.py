@@ -47,7 +47,7 @@ def refresh(source: Path, data: str = "") -> None:
     """
     notebook = replace_data(source, data) if data else jupytext.read(source)
     for number, cell in enumerate(notebook.cells):  # the same identifiers at every execution
-        cell.id = f"{source.stem[:2]}-{number}"
+        cell.id = f"{source.stem.split('_')[0]}-{number}"
     target = (HERE / "real_day" if data else source.parent) / f"{source.stem}.ipynb"
     target.parent.mkdir(exist_ok=True)
     NotebookClient(

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import szlib
-from szlib.files import store_cached
+from szlib.files import claim_folder, store_cached
 from szlib.workbook import folders, runner
 from szlib.workbook.cli import main
 
@@ -136,6 +136,9 @@ def test_clean_removes_what_a_run_wrote_and_nothing_else(workbook, tmp_path):
     for name in ("encounters.parquet", "zone.json", "area.txt", "plaza-0.csv"):
         store_cached(results / "mine" / name, b"", {})
     szlib.extract_days(tmp_path / "mine.csv", out=results / "days", progress=False)
+    site = claim_folder(results / "site" / "notebooks", "results of the committed notebooks").parent
+    for name in ("index.html", "szlib.Step.html", "notebooks/report.html", "notebooks/01_one.ipynb"):
+        (site / name).write_text("of make docs")
     own = [results / "thesis.txt", results / "mine" / "notes.csv", results / "mine" / "figures" / "mine.png"]
     for file in own:
         file.write_text("mine")
@@ -143,7 +146,7 @@ def test_clean_removes_what_a_run_wrote_and_nothing_else(workbook, tmp_path):
     script["clean"](results)
     left = {file for file in results.rglob("*") if file.is_file() and not file.name.startswith(".szlib")}
     assert left == {*own, *(file for file in days if not file.name.startswith(".szlib"))}
-    assert not list(results.glob("mine-*"))
+    assert not list(results.glob("mine-*")) and not site.exists()
     for file in own:
         file.unlink()
     for file in (results / "days").iterdir():
