@@ -133,7 +133,7 @@ def my_zone(samples):
     for theta in np.radians(np.arange(-180, 180, 10)):
         off = np.angle(np.exp(1j * (close["los_angle"] - theta)))
         approach = close[np.abs(off) < np.radians(15)].groupby("encounter")["distance"].min()
-        edge.append(np.quantile(approach, 0.05) * np.array([np.cos(theta), np.sin(theta)]))
+        edge.append(np.quantile(approach, 0.07) * np.array([np.cos(theta), np.sin(theta)]))
     x, y = np.transpose(edge)
     terms = np.column_stack([x * x, x * y, y * y, x, y])
     p, q, r, s, t = np.linalg.lstsq(terms, np.ones(len(x)))[0]
