@@ -69,7 +69,11 @@ for settings in (ours, paper):
     )
 assumed = (ours.gamma, ours.Q, ours.R, ours.P, ours.a_max, ours.pass_side)
 expected = (0.05, (10, 10, 1, 1), (1, 1), (100, 100, 10, 10), 1, "right")
-record.check("and those that the paper does not give", assumed == expected, assumed)
+record.check(
+    "the table of parameters has the numbers of szlib where the paper gives none",
+    assumed == expected,
+    assumed,
+)
 
 # %% [markdown]
 # ## The map

@@ -105,7 +105,7 @@ away = f"at the opening the other person is at least {min_distance:g} m away"
 record.check(away, nearest >= min_distance, nearest, always=True)
 x, y = (first["distance"] * part(first["los_angle"]) for part in (np.cos, np.sin))
 there = (x > -1e-9) & (x < space.length + 1e-9) & (y.abs() < space.width / 2 + 1e-9)
-record.check("and inside the space ahead", there.all(), always=True)
+record.check("at the opening the other person is inside the space ahead", there.all(), always=True)
 record.check("the reference pedestrian walks throughout", slowest >= min_speed, slowest, always=True)
 
 # %% [markdown]
@@ -205,7 +205,7 @@ strict = compared.loc["ahead, inside throughout"]
 behind = int(strict["of these behind"])
 record.check("the strict reading sees nobody behind the person", behind == 0, behind, always=True)
 record.check(
-    "the chosen reading does",
+    "the chosen reading sees people behind the person",
     compared.iloc[0]["of these behind"] > 0,
     int(compared.iloc[0]["of these behind"]),
 )

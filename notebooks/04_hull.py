@@ -81,7 +81,7 @@ ax = figures.plot_hull(zone, list(zone.ellipses), points=points)
 record.figure(ax.figure, "hull")
 if record.cache.is_synthetic:
     off = accuracy.largest_error(zone, speeds=speeds)
-    record.check("the zones of these slices are the true ones (5 cm)", off < 0.05, off)
+    record.check("the zones of these slices are the true ones, to 5 cm", off < 0.05, off)
 
 # %% [markdown]
 # ## A slice, and the zone it leaves free

@@ -89,7 +89,7 @@ inside = {v: float(e.level(paper.boundary(v, 5000)).max()) for v, e in paper.ell
 most = max(inside.values())
 record.check("each ellipse encloses its zone", most <= 1 + 1e-9, most, always=True)
 few = all(3 <= len(e.support) <= 5 for e in paper.ellipses.values())
-record.check("with three to five points of support", few, always=True)
+record.check("each ellipse has three to five points of support", few, always=True)
 
 # %% [markdown]
 # Smallest? The ellipse of the support points alone is the same one, and it shrinks if any of them
@@ -98,12 +98,14 @@ record.check("with three to five points of support", few, always=True)
 # %%
 again = szlib.minimum_enclosing_ellipse(ellipse.support)
 same = np.allclose(again.semi_axes, ellipse.semi_axes, rtol=1e-6)
-record.check("the support alone determines it", same, always=True)
+record.check("the points of support alone determine the ellipse", same, always=True)
 if len(ellipse.support) > 3:
     without = [np.delete(ellipse.support, i, axis=0) for i in range(len(ellipse.support))]
     largest = max(szlib.minimum_enclosing_ellipse(points).area for points in without)
     share = largest / ellipse.area
-    record.check("and it shrinks without any one of them", share < 1, share, always=True)
+    record.check(
+        "the ellipse shrinks without any one of its points of support", share < 1, share, always=True
+    )
 
 # %% [markdown]
 # ## A zone that does not shrink

@@ -114,7 +114,7 @@ along = np.column_stack([np.linspace(-1, 1, 101), np.zeros(101)])
 off = float(np.abs(szlib.segment_distance(along, *wall)).max())
 record.check("d = 0 on the segment", off < 1e-12, off, always=True)
 beside = szlib.segment_distance(np.array([[0.0, 0.4], [0.5, -0.3]]), *wall)
-record.check("and Euclidean beside it", np.allclose(beside, [0.4, 0.3]), always=True)
+record.check("beside the segment d is the Euclidean distance", np.allclose(beside, [0.4, 0.3]), always=True)
 
 # %% [markdown]
 # ## The discrete barrier condition

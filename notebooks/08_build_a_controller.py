@@ -97,7 +97,9 @@ record.figure(fig, "point")
 # %%
 h = edge - np.array(xs)
 record.check("the point never enters the zone", h.min() > 0, h.min())
-record.check("and is always above the bound", (h >= edge * (1 - gamma) ** np.arange(120) - 1e-12).all())
+record.check(
+    "h of the point is always above the bound", (h >= edge * (1 - gamma) ** np.arange(120) - 1e-12).all()
+)
 
 # %% [markdown]
 # ## 2. A point with mass: the CBF-QP
@@ -204,9 +206,9 @@ record.figure(fig, "stages")
 # %%
 inside = {name: float(edge - run[0][0].max()) for name, run in runs.items()}
 record.check("plain MPC drives into the zone", inside["MPC"] < 0, inside["MPC"])
-record.check("MPC-CBF does not", inside["MPC-CBF"] > -1e-6, inside["MPC-CBF"])
+record.check("MPC-CBF does not drive into the zone", inside["MPC-CBF"] > -1e-6, inside["MPC-CBF"])
 calm = float(np.abs(np.diff(planned[2][-60:])).mean())
-record.check("and hardly shakes at the end", calm < 0.1 * swings, calm)
+record.check("MPC-CBF hardly shakes at the end", calm < 0.1 * swings, calm)
 
 # %% [markdown]
 # The receding horizon in a picture: each thin line is one plan, of which only the first step was driven.
@@ -385,8 +387,8 @@ table.style.format("{:.0e}").format_index("{:.0f}")
 # %%
 for solver, worst in table.max().items():
     off = dt * float(worst)
-    record.check(f"by {solver} the same velocity after the step, to 1e-5 m/s", off < 1e-5, off)
-record.check("by IPOPT the same acceleration, to 1e-5 m/s²", table["ipopt"].max() < 1e-5)
+    record.check(f"{solver} gives the same velocity after the step, to 1e-5 m/s", off < 1e-5, off)
+record.check("IPOPT gives the same acceleration, to 1e-5 m/s²", table["ipopt"].max() < 1e-5)
 record.key["largest difference of an acceleration [m/s²]"] = float(table.to_numpy().max())
 
 # %% [markdown]

@@ -84,9 +84,7 @@ ax.set_title(f"The paper's chain: passing side {side} (times in s; later is dark
 record.figure(ax.figure, "paper")
 
 # %%
-claims = {claim.text: claim.check(paper_log) for claim in scenario.claims}
-for text, result in claims.items():
-    record.claim(text, *result)
+claims = paper_claims.record_claims(record, scenario.claims, paper_log)
 honest = paper_log.metrics()["unflagged_violations"] == 0
 record.check("the paper's chain: no step that called itself safe led to h < 0", honest, always=True)
 Markdown(paper_claims.describe_run(paper_log, claims))
@@ -120,12 +118,9 @@ symmetric, sides = tilts.loc["symmetric"], tilts["side"]
 record.check("the paper's robot passes a mirrored zone on the other side", both_ways, sides.to_dict())
 slowest = symmetric["slowest [m/s]"]
 record.check("the paper's robot nearly stops before a symmetric zone", slowest < 0.2, slowest)
-late = scenario.claims[1]
-record.claim(f"symmetric zone: {late.text}", *late.check(runs["symmetric"]))
+paper_claims.record_claims(record, scenario.claims[1:], runs["symmetric"], prefix="symmetric zone: ")
 both_right = bool((sides[["as fitted", "mirrored"]] == "right").all())
-record.claim(
-    "the robot passes on the right (abstract), whatever the tilt of the zone", both_right, sides.to_dict()
-)
+record.claim("the robot passes on the right, whatever the tilt of the zone", both_right, sides.to_dict())
 Markdown(
     f"The zone is {axes[0]:.2f} m x {axes[1]:.2f} m, tilted by {np.degrees(tilt):+.1f} deg. As fitted, it is "
     f"passed on the {sides['as fitted']}; mirrored, on the {sides['mirrored']}: the smallest tilt chooses. "
@@ -173,8 +168,7 @@ record.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metric
 record.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_clearance", "min_speed")}
 
 # %%
-for claim in scenario.claims:
-    record.claim(f"ours: {claim.text}", *claim.check(log))
+paper_claims.record_claims(record, scenario.claims, log, prefix="ours: ")
 
 # %% [markdown]
 # ## What decides when it begins
@@ -265,7 +259,9 @@ record.figure(fig, "onset")
 # %%
 even = szlib.simulate(scenario, szlib.MPCCBF(others["symmetric"], settings=settings))
 gain = find_avoidance_start(even)[1] - find_avoidance_start(runs["symmetric"])[1]
-record.check("with the rule avoidance of a symmetric zone starts 0.5 m farther out", not gain < 0.5, gain)
+record.check(
+    "with the rule of the side, avoidance of a symmetric zone starts 0.5 m farther out", not gain < 0.5, gain
+)
 record.key |= {"h where avoidance starts, with the rule": at[0.25], "without it": at[0.0]}
 spans = onsets.max(axis=1) - onsets.min(axis=1)
 Markdown(
@@ -310,7 +306,9 @@ for other_gamma in (gamma, 0.4):
         run = szlib.simulate(scenario, szlib.MPCCBF(zone, walls=scenario.walls, settings=changed))
         sides[f"{side}, gamma = {other_gamma:g}"] = run
         passed = run.metrics()["passing_side"]
-        record.check(f"asked for {side}, passes on the {side}, gamma = {other_gamma:g}", passed == side)
+        record.check(
+            f"asked for {side}, the robot passes on the {side} with gamma = {other_gamma:g}", passed == side
+        )
 
 # %%
 ax = figures.plot_robot_paths(sides)

@@ -87,9 +87,7 @@ parameters(
 paper_zone = record.cache.paper_ellipse()
 paper = szlib.MPCSettings.paper(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
 paper_log = szlib.simulate(scenario, szlib.MPCCBF(paper_zone, walls=scenario.walls, settings=paper))
-claims = {claim.text: claim.check(paper_log) for claim in scenario.claims}
-for text, result in claims.items():
-    record.claim(text, *result)
+claims = paper_claims.record_claims(record, scenario.claims, paper_log)
 honest = paper_log.metrics()["unflagged_violations"] == 0
 record.check("the paper's chain: no step that called itself safe led to h < 0", honest, always=True)
 Markdown(paper_claims.describe_run(paper_log, claims))
@@ -138,8 +136,7 @@ record.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metric
 record.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_speed", "time_yielding")}
 
 # %%
-for claim in scenario.claims:
-    record.claim(f"ours: {claim.text}", *claim.check(log))
+paper_claims.record_claims(record, scenario.claims, log, prefix="ours: ")
 
 # %% [markdown]
 # ## Who is in the passage when
@@ -177,7 +174,9 @@ record.figure(figures.draw_step(step), "admissible")
 
 # %%
 ahead = find_admissible_controls(step).polygon.bounds[2]
-record.check("while it waits no admissible acceleration leads towards the passage", ahead < 0.1, ahead)
+record.check(
+    "while the robot waits, no admissible acceleration leads towards the passage", ahead < 0.1, ahead
+)
 Markdown(
     f"At {middle:.1f} s: h is {step.h[0]:.2f} m to the person, and {step.h[1:].min():.2f} m to the "
     f"nearest wall; the largest admissible acceleration ahead is {ahead:+.2f} m/s²."

@@ -302,9 +302,15 @@ means = dense.pivot(index=["metric", "crowd"], columns="controller", values="mea
 gain = means["MPC-CBF, gamma 0.2"] - means["MPC-CBF"]
 more, less = gain["reached"].to_dict(), gain["time_intruding"].to_dict()
 record.claim(
-    "gamma 0.2 on the whole horizon reaches more goals in dense crowds", min(more.values()) > 0, more
+    "gamma 0.2 on the whole horizon reaches more goals in dense crowds",
+    min(more.values()) > 0,
+    {site: f"{share:+.0%}" for site, share in more.items()},
 )
-record.claim("and is not longer in anybody's zone", max(less.values()) <= 0, less)
+record.claim(
+    "gamma 0.2 on the whole horizon is not longer in anybody's zone",
+    max(less.values()) <= 0,
+    {k: f"{s:+.2f} s" for k, s in less.items()},
+)
 means.loc[["reached", "path_efficiency", "time_intruding"]].round(2)
 
 # %% [markdown]
@@ -400,7 +406,7 @@ among_us, force, person = (
 record.claim(
     "among people: at least 97 % of the ways end at the goal",
     among_us["reached"] >= 0.97,
-    among_us["reached"],
+    f"{among_us['reached']:.1%}",
 )
 in_zones = {
     "robot": among_us["time_intruding"],
@@ -408,15 +414,16 @@ in_zones = {
     "person": person["time_intruding"],
 }
 record.claim(
-    "it is in zones for at most a third of the social force's time, and less than the person replaced",
+    "among people: the robot is in zones for at most a third of the time of the social force, and less than the "
+    "person it replaces",
     in_zones["robot"] <= min(in_zones["force"] / 3, in_zones["person"]),
-    in_zones,
+    {name: f"{seconds:.2f} s" for name, seconds in in_zones.items()},
 )
 usual = cells.loc[("1 m/s", "MPC-CBF"), "jerk"]
 record.claim(
-    "its jerk is at most half of that of the defaults",
+    "among people: the jerk is at most half of that of the defaults",
     among_us["jerk"] <= usual / 2,
-    [among_us["jerk"], usual],
+    f"{among_us['jerk']:.1f} and {usual:.1f} m/s³",
 )
 
 # %% [markdown]
@@ -428,7 +435,7 @@ arrive = sensitive["reached"].agg(["min", "max"])
 record.claim(
     "with each tuned number halved or doubled, at least 95 % of the ways end at the goal",
     arrive["min"] >= 0.95,
-    arrive.to_dict(),
+    f"{arrive['min']:.0%} to {arrive['max']:.0%}",
 )
 sensitive[[*of_ways, "time_ratio"]].sort_values("reached").round(2)
 

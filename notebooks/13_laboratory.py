@@ -163,7 +163,9 @@ trial, same = World(PRESETS["corridor"], zone), []
 for state in log.states:
     same.append(np.array_equal(trial.states[0], state))
     trial.advance()
-record.check("its steps are those of szlib.simulate", all(same), f"{len(same)} states", always=True)
+record.check(
+    "the steps of the laboratory are those of szlib.simulate", all(same), f"{len(same)} states", always=True
+)
 record.key |= {"gamma = 0.5: min_h": low.iloc[1], "among_people: time_to_goal": time.iloc[4]}
 
 # %% [markdown]

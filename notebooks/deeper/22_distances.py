@@ -97,7 +97,9 @@ points = np.random.default_rng(seed).uniform(-4, 4, (100_000, 2))
 true = distances.euclidean_to_ellipse(points, zone)
 over = distances.compute_distance_error(points, zone)[true > 0]
 most = 100 * float(over.max())
-record.check("the focal distance never over-estimates [cm]", most <= 1e-7, most, always=True)
+record.check(
+    "the focal distance never over-estimates", most <= 1e-7, f"by {most + 0.0:.2g} cm at most", always=True
+)
 
 # %%
 a = zone.semi_axes[0]
@@ -112,9 +114,13 @@ zones
 # %%
 learned = distances.compare_distances(zone, r_robot=r, eps=eps)
 beside = learned.farthest - eps
-record.claim("eps covers the error around the learned zone", learned.required <= eps, learned.required)
+record.claim(
+    "eps covers the error around the learned zone",
+    learned.required <= eps,
+    f"{100 * learned.required:.1f} cm needed",
+)
 enough = learned.nearest >= eps - 1e-6
-record.check("the gap left around it is at least eps", enough, learned.nearest, always=True)
+record.check("the gap left around the learned zone is at least eps", enough, learned.nearest, always=True)
 record.key["room given away beside the zone [cm]"] = 100 * beside
 print(f"beside the learned zone the robot keeps {100 * beside:.1f} cm more than it has to")
 
@@ -138,10 +144,11 @@ table
 
 # %%
 for length, found in walls.items():
-    record.claim(f"eps covers the error of a wall of {length:g} m", found.nearest >= -1e-9, found.nearest)
+    gap = f"{round(100 * found.nearest, 1) + 0.0} cm left"
+    record.claim(f"eps covers the error of a wall of {length:g} m", found.nearest >= -1e-9, gap)
     enough = max(eps, found.required)
     mended = distances.compare_distances([(0, 0), (length, 0)], r_robot=r, eps=enough)
-    claim = f"r^2/L is enough for it: eps = {100 * enough:.1f} cm"
+    claim = f"eps = {100 * enough:.1f} cm is enough for a wall of {length:g} m"
     record.check(claim, mended.nearest >= -1e-9, mended.nearest, always=True)
 
 # %%
@@ -171,8 +178,8 @@ paper = szlib.MPCSettings.paper()
 log = drive(scenario, szlib.MPCCBF(zone, walls=wall, settings=paper), until_arrival=False)
 nearest, lowest = float(log.clearance.min()), float(log.h.min())
 print(f"eps {eps:.2f} m: min h {100 * lowest:+.1f} cm, true gap {100 * nearest:+.1f} cm")
-record.check("the paper's barrier holds all the way", lowest >= -1e-6, lowest)
-record.claim("and keeps the robot off the wall", nearest >= 0, nearest)
+record.check("the paper's barrier is not negative all the way", lowest >= -1e-6, lowest)
+record.claim("the paper's barrier keeps the robot off the wall", nearest >= 0, f"{100 * nearest:.0f} cm left")
 overlaps = log.clearance.min(axis=1) < -1e-6
 honest = not (log.safe[:-1] & overlaps[1:]).any()
 record.check("no step into an overlap says that it is safe", honest, always=True)
@@ -184,13 +191,15 @@ try:
 except szlib.SolverError as error:
     refusal = str(error)
     print(f"margin {distances.wall_margin(wall[0], settings):.2f} m: {refusal}")
-record.check("with the required margin that goal is refused", "cannot be reached" in refusal)
+record.check(
+    "with the required margin a goal too close to the wall is refused", "cannot be reached" in refusal
+)
 
 # %%
 past = szlib.Scenario("past", start, np.array([1.0, -3.0]), walls=wall, title="Around the end of a wall")
 log = drive(past, careful, until_arrival=False)
 gap = float(log.clearance.min())
-record.check("and on the way around the end nothing is touched", gap >= 0, gap)
+record.check("on the way around the end of the wall nothing is touched", gap >= 0, gap)
 record.key["wall of 1 m, paper's eps: gap [cm]"] = 100 * nearest
 
 # %% [markdown]

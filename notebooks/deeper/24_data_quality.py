@@ -97,7 +97,7 @@ if len(both):
     ax.set_title(f"The velocity column {inflated} the speed of who stands: {slow:.2f} m/s")
     record.figure(ax.figure, "speeds")
     record.key["sensor speed of who stands [m/s]"] = round(float(slow), 3)
-    record.claim("the velocity column is inflated for who stands", slow > 0.3, f"{slow:.2f} m/s")
+    record.claim("the velocity column is inflated for people who stand", slow > 0.3, f"{slow:.2f} m/s")
 
 # %% [markdown]
 # ## Frames, gaps, lengths of tracks, ids

@@ -112,7 +112,8 @@ DECIDED = {"supported": True, "contradicted": False}  # other verdicts: not deci
 table = claims.tabulate_findings(found, data=record.out.name).assign(method=methods)
 record.table(table, "25_claims")
 for each, method in zip(found, methods, strict=True):
-    record.claim(f"{each.claim} ({method})", DECIDED.get(each.verdict), str(each))
+    name = each.claim if method == "-" else f"{each.claim} ({method})"
+    record.claim(name, DECIDED.get(each.verdict), str(each))
 
 # %%
 if record.cache.is_synthetic:
@@ -484,7 +485,7 @@ free = replace(corridor, people=())
 alone = szlib.simulate(free, szlib.MPCCBF(ellipse, walls=free.walls, settings=paper))
 middle = np.abs(alone.states[:, 0]) <= 2.0
 slow = float(alone.speed[middle].min() / alone.speed.max())
-record.claim("without the person the robot does not slow down in the corridor", slow > 0.8, slow)
+record.claim("without the person the robot does not slow down in the corridor", slow > 0.8, f"to {slow:.0%}")
 
 # %%
 atlas = read_table("27_atlas").query("scene == 'corridor' and width == 4.6 and pace == 0.5")
@@ -498,7 +499,7 @@ wrong = read_table("23_comparison").query("zone == 'fitted' and metric == 'flagg
 flagged = wrong[wrong["behaviour"] != "as expected"].groupby("formulation")["mean"].mean()
 short, whole = float(flagged["szlib"]), float(flagged["whole horizon"])
 record.claim(
-    "wrong predictions: fewer flagged steps with N_h = 2 than on the whole horizon",
+    "with wrong predictions fewer steps are flagged with N_h = 2 than on the whole horizon",
     short < whole,
     f"{short:.2f} and {whole:.2f} steps in a world",
 )
@@ -515,7 +516,9 @@ sites = read_table("06_sites").query("min_distance == 1").set_index(["site", "ki
 for name, site in {"ATC day": "atc-1hz", "Grand Central": "grand-central"}.items():
     for kinds in ("strangers", "opposite, crossing"):
         p = float(sites.loc[(site, kinds), "p_value"])
-        record.claim(f"{name}, {kinds}: fewer come near than in 95 % of the null models", p <= 0.05, p)
+        record.claim(
+            f"{name}, {kinds}: fewer come near than in 95 % of the null models", p <= 0.05, f"p = {p:.2g}"
+        )
 atc, central = (sites.loc[(site, "strangers")] for site in ("atc-1hz", "grand-central"))
 both = [f"{each['radius_low']:.2f} to {each['radius_high']:.2f} m" for each in (atc, central)]
 apart = max(atc["radius_low"], central["radius_low"]) > min(atc["radius_high"], central["radius_high"])
@@ -534,7 +537,7 @@ record.claim("nobody at Grand Central comes nearer than most strangers keep", ne
 asked = {name for names in paper_sentences.load_sentences()["held_by"] for name in names}
 for row in everywhere.to_dict("records"):
     where = row["data"] if row["method"] == "-" else f"{row['data']}, {row['method']}"
-    if f"16: {where}: {row['claim']}" in asked:
+    if f"{record.name[:2]}: {where}: {row['claim']}" in asked:
         record.claim(f"{where}: {row['claim']}", DECIDED.get(row["verdict"]), claims.format_finding(row))
 about_zones = everywhere[is_shape & by_respect]
 decided = about_zones[~about_zones["verdict"].str.startswith("not")]["data"].value_counts()

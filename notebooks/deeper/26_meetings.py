@@ -171,14 +171,23 @@ record.figure(fig, "controllers")
 # %%
 mean = full.set_index(["controller", "metric", "meeting"])["mean"]
 ran = {name: mean[name]["robot_on_person"].mean() for name in CONTROLLERS}
-record.claim("the controller runs into nobody", ran["MPC-CBF"] == 0, ran)
+record.claim(
+    "the controller runs into nobody", ran["MPC-CBF"] == 0, {k: f"{share:.0%}" for k, share in ran.items()}
+)
 steps = mean["MPC-CBF"]["violations"]
-record.claim("and enters nobody's zone, of people in sight", (steps.drop(hidden) == 0).all(), steps.to_dict())
-least = {name: mean[name]["min_h"].min() for name in CONTROLLERS}
-record.claim("the others do", max(h for name, h in least.items() if name != "MPC-CBF") < 0, least)
+record.claim(
+    "the controller enters nobody's zone, of people in sight",
+    (steps.drop(hidden) == 0).all(),
+    f"{steps.drop(hidden).max():g} steps",
+)
+least = {name: mean[name]["min_h"].min() for name in CONTROLLERS if name != "MPC-CBF"}
+value = {name: f"h down to {h:.2f} m" for name, h in least.items()}
+record.claim("the other controllers enter zones", max(least.values()) < 0, value)
 of_hidden = mean["MPC-CBF"]["unflagged_violations"][hidden]
 record.claim(
-    "it keeps its promises even where walls hide people", (of_hidden == 0).all(), of_hidden.to_dict()
+    "no step that called itself safe led to h < 0, even where walls hide people",
+    (of_hidden == 0).all(),
+    f"{of_hidden.max():g} steps",
 )
 
 # %% [markdown]
@@ -202,34 +211,62 @@ movie
 
 # %%
 lost = mean["MPC-CBF"]["time_to_goal"] / mean["social force"]["time_to_goal"]
-record.claim("it loses most time in the junction", lost.idxmax() == "intersection", lost.round(2).to_dict())
+record.claim(
+    "the controller loses most time in the junction",
+    lost.idxmax() == "intersection",
+    f"{lost.max():.1f} times as long as the social force",
+)
 gain = change[change["metric"] == "time_to_goal"].set_index(["controller", "meeting"])
+in_seconds = "{mean:+.1f} s (95 % interval {low:+.1f} to {high:+.1f})".format_map
 there = gain.loc[("MPC-CBF, bolder", "intersection"), ["mean", "low", "high"]]
-record.claim("there the larger gamma with the longer barrier saves time", there["high"] < 0, there.to_dict())
+record.claim(
+    "in the junction the larger gamma with the longer barrier saves time",
+    there["high"] < 0,
+    in_seconds(there),
+)
 alone = gain.loc[("MPC-CBF, N = 24 alone", "intersection"), ["mean", "low", "high"]]
-record.claim("which a longer horizon alone does not", alone["high"] >= 0, alone.to_dict())
+record.claim("in the junction a longer horizon alone saves no time", alone["high"] >= 0, in_seconds(alone))
+
+# %%
 steps = mean["MPC-CBF, bolder"]["unflagged_violations"]
-record.claim("and it keeps its promises as well", (steps.drop(hidden) == 0).all(), steps.to_dict())
+record.claim(
+    "no step of the bolder controller that called itself safe led to h < 0",
+    (steps.drop(hidden) == 0).all(),
+    f"{steps.drop(hidden).max():g} steps",
+)
 stuck = {name: mean[name]["success"]["robot crowding"] for name in ("MPC-CBF", "MPC-CBF, bolder")}
-record.claim("crowded in, it does not always find the gap", stuck["MPC-CBF"] < 1, stuck)
-record.claim("the bolder one more often", stuck["MPC-CBF"] < stuck["MPC-CBF, bolder"], stuck)
+record.claim(
+    "crowded in, the controller does not always find the gap",
+    stuck["MPC-CBF"] < 1,
+    f"it arrives in {stuck['MPC-CBF']:.0%}",
+)
+bolder = stuck["MPC-CBF, bolder"]
+record.claim(
+    "crowded in, the bolder controller finds the gap more often",
+    stuck["MPC-CBF"] < bolder,
+    f"in {bolder:.0%}",
+)
 
 # %%
 among = mean["MPC-CBF, among people"]
 record.claim(
     "the controller among people arrives in all variations of all meetings",
     (among["success"] == 1).all(),
-    among["success"].min(),
+    f"{among['success'].min():.0%}",
 )
 least = among["min_h"].drop(hidden).sort_values()
 entered = sorted(least.index[least < -0.01])
 record.claim(
-    "and has h < 0 only on the circle and where it is crowded in, and says so",
+    "the controller among people has h < 0 only on the circle and where it is crowded in, and says so",
     entered == ["circular crossing", "robot crowding"] and among["unflagged_violations"].max() == 0,
-    least[entered].to_dict(),
+    {name: f"{h:.2f} m" for name, h in least[entered].items()},
 )
 faster = (among["time_to_goal"] / mean["MPC-CBF"]["time_to_goal"]).median()
-record.claim("in the median meeting it is faster than the defaults", faster < 1, faster)
+record.claim(
+    "in the median meeting the controller among people is faster than the defaults",
+    faster < 1,
+    f"{faster:.0%} of their time",
+)
 
 # %% [markdown]
 # **What it means.** The barrier does what it is for: in none of these meetings does the robot come into the

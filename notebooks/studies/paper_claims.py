@@ -28,7 +28,9 @@ from szlib.errors import DataError, ZoneError
 from szlib.simulation.closed_loop import simulate
 from szlib.simulation.metrics import compute_metrics
 from szlib.simulation.run import Run
+from szlib.simulation.scenario import Claim
 from szlib.simulation.scenarios.paper import SCENARIOS
+from szlib.workbook.record import NotebookRecord
 from szlib.zones.ellipses import Ellipse
 from szlib.zones.outliers import R_MAX
 from szlib.zones.respect import MIN_COMPARED, RespectEstimator
@@ -45,6 +47,16 @@ RANGE = "range over scenarios"
 COLUMNS = ("claim", "effect", "low", "high", "interval", "unit", "n", "verdict")
 LARGER_AHEAD = "the zone reaches farther ahead than behind"
 GROWS_WITH_SPEED = "the zone grows with walking speed"
+# What the number is that decides a claim about a scenario.
+UNITS = {
+    "Avoidance starts farther away head-on than from behind.": "{:.2f} m farther",
+    "Avoidance starts well before the zone.": "at h = {:.2f} m",
+    "The robot slows down while passing.": "to {:.0%} of its greatest speed",
+    "The robot waits.": "{:.1f} s",
+    "The robot is in the way and goes back to make room.": "{:.2f} m back",
+    "The robot enters the pathway after the person has left it.": "{:.1f} s later",
+    "The robot goes on to its goal.": "{:.1f} s in all",
+}
 ENCOUNTER_RATE = "as many encounters a day as in the paper, within a factor of two"
 
 
@@ -103,15 +115,11 @@ def tabulate_findings(findings: Iterable[Finding], *, data: str) -> pd.DataFrame
 
 
 def format_finding(row: Mapping[str, Any] | pd.Series[Any]) -> str:
-    """A `row` of `tabulate_findings` in few words: effect [low, high] unit: verdict.
-
-    An interval that is not a 95 % interval is named after the unit.  Without an effect: the verdict.
-    """
+    """A `row` of `tabulate_findings` in few words: effect and unit (interval): verdict, or the verdict alone."""
     if np.isnan(row["effect"]):
         return str(row["verdict"])
-    name = "" if row["interval"] == CONFIDENCE else f" ({row['interval']})"
-    numbers = f"{row['effect']:+.2f} [{row['low']:+.2f}, {row['high']:+.2f}] {row['unit']}"
-    return f"{numbers}{name}: {row['verdict']}"
+    interval = f"{row['interval']} {row['low']:+.2f} to {row['high']:+.2f}"
+    return f"{row['effect']:+.2f} {row['unit']} ({interval}): {row['verdict']}"
 
 
 def measure_reach_ahead(zone: SocialZone, *, speed: float = 1.1) -> Finding:
@@ -267,6 +275,16 @@ def describe_run(run: Run, claims: Mapping[str, tuple[bool, float]]) -> str:
         f"Claims that do not hold: {' '.join(failed) or 'none.'}",
     ]
     return " ".join(parts)
+
+
+def record_claims(
+    record: NotebookRecord, claims: Iterable[Claim], run: Run, *, prefix: str = ""
+) -> dict[str, tuple[bool, float]]:
+    """Record which `claims` hold in a `run`, with their numbers and units; return the results by their texts."""
+    results = {claim.text: claim.check(run) for claim in claims}
+    for text, (holds, number) in results.items():
+        record.claim(prefix + text, holds, UNITS[text].format(number))
+    return results
 
 
 def _read_interval(zone: SocialZone, speed: float, quantity: str) -> tuple[float, float, float]:

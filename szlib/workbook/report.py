@@ -33,7 +33,6 @@ from ..errors import DataError, SzlibError
 from ..files import MARKER, folder_purpose, write_file
 from ..input_files import open_regular, printable, read_small
 from ..plaza.settings import PlazaSettings
-from ..simulation.scenario import Scenario
 from ..simulation.scenarios.paper import SCENARIOS
 from ..tracks import datasets, funnels
 from ..zones.social_zone import SocialZone
@@ -72,8 +71,10 @@ def write_report(home: Path) -> Path:
         with _reading(home / f"{name}.ipynb"):
             notebooks[name] = _read_notebook(home / f"{name}.ipynb", names, runs)
     front, back = map(nbformat.v4.new_markdown_cell, _render_front_page(home, notebooks))
-    cells = [cell for notebook in notebooks.values() for cell in notebook.cells]
-    page = nbformat.v4.new_notebook(cells=[front, *cells, back])
+    page = nbformat.v4.new_notebook()
+    page.cells = [front, *(cell for notebook in notebooks.values() for cell in notebook.cells), back]
+    for i, cell in enumerate(page.cells):
+        cell["id"] = f"cell-{i}"
     data = json.dumps(runs, separators=(",", ":")).replace("<", "\\u003c")
     script = f"(() => {{\n{read_scripts('scene', 'player', 'report')}\nplayAll({data});\n}})()"
     checksum = b64encode(sha256(script.encode()).digest()).decode()
@@ -118,9 +119,8 @@ def _read_notebook(file: Path, names: Sequence[str], runs: dict[str, Any]) -> nb
         for output in cell.get("outputs", ()):
             if "data" not in output:
                 continue
-            data = {kind: text for kind, text in output.data.items() if kind in _OUTPUTS} or {
-                "text/plain": ""
-            }
+            data = {kind: text for kind, text in output.data.items() if kind in _OUTPUTS}
+            data = data or {"text/plain": ""}
             if "text/markdown" in data:
                 data["text/markdown"] = _render_markdown(data["text/markdown"], names)
             if "text/html" in data:
@@ -215,7 +215,7 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str
         notebooks=list(notebooks),
         funnel=funnel,
         zone=texts,
-        players={s.name.replace("_", " "): _find_player(s, outputs) for s in SCENARIOS.values()},
+        players={s.name.replace("_", " "): _find_player(s.title, outputs) for s in SCENARIOS.values()},
         parameters=_list_parameters(outputs),
     )
     return html.rpartition("<!-- notebooks -->")[::2]
@@ -227,8 +227,7 @@ def _format_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:
     for text, check in zip(checks, outcome["checks"], strict=True):
         text |= {"passed": check["passed"], "value": format_value(check["value"]), "notebook": name}
         text["key"] = f"{name.split('_')[0]}: {text['name']}"
-    status = str(outcome["status"])
-    texts = {"status": status, "error": str(outcome.get("error", status))}
+    texts = {"status": str(outcome["status"]), "error": str(outcome.get("error", outcome["status"]))}
     return {**texts, "seconds": f"{outcome['seconds']:.0f}", "checks": checks}
 
 
@@ -258,10 +257,9 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
     return texts
 
 
-def _find_player(scenario: Scenario, outputs: Sequence[tuple[str, str]]) -> str:
-    """The first player of a `scenario` among the outputs; "" if there is none."""
-    mark = f'alt="{scenario.title}:'
-    return next((html for _, html in outputs if "szlib-player" in html and mark in html), "")
+def _find_player(title: str, outputs: Sequence[tuple[str, str]]) -> str:
+    """The first player of the scenario with a `title` among the outputs; "" if there is none."""
+    return next((h for _, h in outputs if "szlib-player" in h and f'alt="{title}:' in h), "")
 
 
 def _list_parameters(outputs: Sequence[tuple[str, str]]) -> dict[tuple[str, ...], str]:

@@ -25,7 +25,7 @@ def test_the_verdict_follows_from_the_interval() -> None:
     assert finding(-0.1, 0.2).verdict == "not decidable with n = 12"
     table = claims.tabulate_findings([finding(0.1, 0.3)], data="here")
     assert table.loc[0, ["data", "n", "verdict"]].tolist() == ["here", 12, "supported"]
-    assert claims.format_finding(table.iloc[0]) == "+0.20 [+0.10, +0.30] m: supported"
+    assert claims.format_finding(table.iloc[0]) == "+0.20 m (95 % interval +0.10 to +0.30): supported"
 
 
 def meetings(on_the_left: int, on_the_right: int) -> pd.DataFrame:
@@ -190,7 +190,7 @@ def test_delays_have_their_range_over_scenarios(monkeypatch: pytest.MonkeyPatch)
     found = claims.measure_delay_by_size(zone, scales=(1.0, 1.5, 2.0), names=times)
     assert (found.effect, found.low, found.high, found.n) == (3.0, 1.0, 5.0, 3)
     assert (found.claim, found.verdict) == ("a zone 2.0 times as large makes the robot later", "supported")
-    assert str(found) == "+3.00 [+1.00, +5.00] s (range over scenarios): supported"
+    assert str(found) == "+3.00 s (range over scenarios +1.00 to +5.00): supported"
     table = claims.tabulate_findings([found, finding(0.1, 0.3)], data="here")
     assert table["interval"].tolist() == ["range over scenarios", "95 % interval"]
     times["waiting"] = -1.0

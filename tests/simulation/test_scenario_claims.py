@@ -81,21 +81,21 @@ FAILURES: dict[tuple[str, str], Callable[[], list[Run]]] = {
         make_run("waiting", np.vstack([stand((-2.0, 0.0), 1.5), wait_and_enter(2.0)]), residual=ACTIVE),
         make_run("waiting", np.vstack([stand((-2.2, 0.0), 9.0), wait_and_enter(2.0)]), residual=ACTIVE),
     ],
-    ("waiting", "It enters the pathway after the person has left it."): lambda: [
+    ("waiting", "The robot enters the pathway after the person has left it."): lambda: [
         make_run("waiting", wait_and_enter(7.5)),  # the person leaves at 8 s
         make_run("waiting", wait_and_enter(12.0), arrives=False),
         make_run("waiting", walk((-2.0, 0.0), (6.0, 0.0), speed=2.0)),
     ],
-    ("waiting", "Then it goes on to its goal."): lambda: [
+    ("waiting", "The robot goes on to its goal."): lambda: [
         make_run("waiting", wait_and_enter(12.0), arrives=False)
     ],
     ("making_room", "The robot is in the way and goes back to make room."): lambda: [
         make_run("making_room", walk((1.2, 0.0), (0.8, 0.0), (6.0, 0.0)))
     ],
-    ("making_room", "It enters the pathway after the person has left it."): lambda: [
+    ("making_room", "The robot enters the pathway after the person has left it."): lambda: [
         make_run("making_room", np.vstack([walk((1.2, 0.0), (-1.0, 0.0)), walk((-1.0, 0.0), (6.0, 0.0))]))
     ],
-    ("making_room", "Then it goes on to its goal."): lambda: [
+    ("making_room", "The robot goes on to its goal."): lambda: [
         make_run("making_room", wait_and_enter(12.0), arrives=False)
     ],
 }
@@ -128,7 +128,7 @@ def test_well_before_the_zone_is_half_a_metre(distance: float, holds: bool) -> N
 @pytest.mark.parametrize(("entry", "holds"), [(7.5, False), (8.0, False), (8.5, True), (12.0, True)])
 def test_the_time_between_leaving_and_entering_decides(entry: float, holds: bool) -> None:
     """The person leaves the pathway at 8 s; the robot is outside until one step before it enters."""
-    found, between = check("waiting", "It enters", make_run("waiting", wait_and_enter(entry)))
+    found, between = check("waiting", "enters", make_run("waiting", wait_and_enter(entry)))
     assert found == holds
     assert between == pytest.approx(entry - 0.1 - 8.0)
 

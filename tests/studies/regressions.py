@@ -32,7 +32,7 @@ DEFAULT = {"03": HULL, "24": STANDING, "06": RESPECT, "25": PATHS}
 """The regression for the tables of a notebook; that of the others is `BARRIER`."""
 OWN = dict.fromkeys(("25_estimators", "25_sensitivity", "25_subsets"), HULL)
 OWN |= dict.fromkeys(("25_coverage", "25_coverage_hull", "25_imposed"), LEVEL)
-CHECKS = {"27_atlas": "with the same least h, to a millimetre"}
+CHECKS = {"27_atlas": "runs driven anew have the same least h, to a millimetre"}
 """The check of a table, if its row is not computed again by `NotebookRecord.committed_table`."""
 RUN = "import sys; from szlib.workbook.cli import main; sys.exit(main(sys.argv[1:]))"
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 
 import nbformat
 import pandas as pd
@@ -12,7 +13,10 @@ import szlib
 from szlib.errors import DataError
 from szlib.files import claim_folder
 from szlib.workbook.cli import main
+from szlib.workbook.folders import NOTEBOOKS
+from szlib.workbook.paper_sentences import load_sentences
 from szlib.workbook.record import PAPER, parameters
+from szlib.workbook.record.display import format_value
 from szlib.workbook.report import write_report
 
 PIXEL = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNkYPhfDwAChwGA60e6kgAAAABJRU5ErkJggg=="
@@ -34,12 +38,12 @@ def page(tmp_path_factory, movie):
     table = parameters([("gamma", 0.05, PAPER, "sec. 4")]).to_html()
     output = nbformat.v4.new_output
     cells = [
-        nbformat.v4.new_markdown_cell("# 8 - A corridor\n\n**Question.** Does it *barge* past?\n\nText."),
+        nbformat.v4.new_markdown_cell("# 10 - A corridor\n\n**Question.** Does it *barge* past?\n\nText."),
         nbformat.v4.new_markdown_cell(
             r"With $h \ge 0$:"
             "\n\n"
             r"$$\frac{r^2}{L} \tag{1}$$"
-            "\n\n[next](09_waiting.ipynb), [here](08_corridor.ipynb)"
+            "\n\n[next](11_waiting.ipynb), [here](10_corridor.ipynb)"
         ),
         nbformat.v4.new_code_cell(
             "x < 1",
@@ -53,14 +57,14 @@ def page(tmp_path_factory, movie):
             ],
         ),
     ]
-    nbformat.write(nbformat.v4.new_notebook(cells=cells), home / "08_corridor.ipynb")
+    nbformat.write(nbformat.v4.new_notebook(cells=cells), home / "10_corridor.ipynb")
     checks = [
         {"kind": "check", "name": "h >= 0", "passed": False, "value": -0.25, "result": "FAILED"},
         {"kind": "claim", "name": SLOWS, "passed": True, "value": 0.123456, "result": "supported"},
         {"kind": "claim", "name": "gamma is tuned", "passed": True, "value": "yes", "result": "supported"},
     ]
     record = {"status": "done", "seconds": 1.2, "checks": checks, "key_figures": {}, "figures": []}
-    summary = {"data": "hall", "passed": False, "notebooks": {"08_corridor": record}}
+    summary = {"data": "hall", "passed": False, "notebooks": {"10_corridor": record}}
     (home / "parameters.json").write_text(json.dumps({"data": "hall", "files": [["hall.csv", 9, "x"]]}))
     (home / "summary.json").write_text(json.dumps(summary))
     return BeautifulSoup(write_report(home).read_text(encoding="utf-8"), "html.parser")
@@ -94,13 +98,13 @@ def test_formulas_are_drawn_by_the_browser(page):
 
 def test_front_page_lists_checks_claims_and_parameters(page):
     assert "0 of 1 checks hold" in page.text
-    assert "Failed in notebook 08: h >= 0: -0.25." in page.text
+    assert "Failed in notebook 10: h >= 0: -0.25." in page.text
     rows = [[cell.text for cell in row.select("td")] for row in page.select("tr")]
-    assert ["h >= 0: -0.25. (notebook 08)", "FAILED"] in rows
-    assert ["08", "gamma", "0.05", "paper", "sec. 4"] in rows
+    assert ["h >= 0: -0.25. (notebook 10)", "FAILED"] in rows
+    assert ["10", "gamma", "0.05", "paper", "sec. 4"] in rows
     (summary,) = page.select("details.notebook > summary")
     text = " ".join(summary.text.split())
-    assert text == "08 corridor Does it barge past? 0 of 1 checks hold, 1 s, done"
+    assert text == "10 corridor Does it barge past? 0 of 1 checks hold, 1 s, done"
 
 
 def test_claims_of_the_paper_stand_apart_from_those_of_the_workbook(page):
@@ -109,10 +113,10 @@ def test_claims_of_the_paper_stand_apart_from_those_of_the_workbook(page):
     (slows,) = (row for text, row in claims.items() if text.startswith("CBF enables natural behaviors"))
     assert [cell.text for cell in slows.select("td")][1:] == [
         "supported",
-        "The robot slows down while passing: 0.123. (notebook 08)",
+        "The robot slows down while passing: 0.123. (notebook 10)",
     ]
     assert [row.td.text for row in own.find_next("table").select("tbody tr")] == [
-        "gamma is tuned: yes. (notebook 08)"
+        "gamma is tuned: yes. (notebook 10)"
     ]
 
 
@@ -122,9 +126,9 @@ def test_sections_stand_in_their_order_and_none_is_empty(page):
     assert "Not part of this run" not in page.text
     assert page.h1.text == page.title.text == "Social zones of hall.csv"
     menus = [[link["href"] for link in menu.select("a")] for menu in page.select("nav")]
-    assert menus == [["#top", "#claims", "#checks", "#notebooks", "#08_corridor", "#parameters", "#run"]] * 2
+    assert menus == [["#top", "#claims", "#checks", "#notebooks", "#10_corridor", "#parameters", "#run"]] * 2
     order = [tag.get("id") or tag["class"][0] for tag in page.select("div.first, h2[id], details.notebook")]
-    assert order == ["first", "claims", "checks", "notebooks", "08_corridor", "parameters", "run"]
+    assert order == ["first", "claims", "checks", "notebooks", "10_corridor", "parameters", "run"]
 
 
 def test_movie_is_on_the_front_page_and_in_its_notebook(page, movie):
@@ -132,7 +136,7 @@ def test_movie_is_on_the_front_page_and_in_its_notebook(page, movie):
     first, second = page.select("figure.szlib-player")
     assert first["data-run"] == second["data-run"] == name
     assert first.img["src"].startswith("data:image/gif") and first.find_parent(class_="players")
-    assert second.text == first.img["alt"] and second.find_parent("details")["id"] == "08_corridor"
+    assert second.text == first.img["alt"] and second.find_parent("details")["id"] == "10_corridor"
     (script,) = page.select("script")
     run = json.loads(re.search(r"^playAll\((.*)\);$", script.text, re.MULTILINE)[1])[name]
     assert run == json.loads(json.dumps(movie.run))
@@ -181,3 +185,51 @@ def test_pictures_of_the_notebooks_are_embedded(tmp_path):
     }
     assert shown["a zone"] == "data:image/png"
     assert shown["a robot"] == "data:image/gif"
+
+
+LONG = re.compile(r"(?<![\w.,])[-+]?(?:0\.0*)?((?:\d[\d,]*)(?:\.\d+)?)")
+"""A number without the zeros that begin it."""
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.08682, "0.0868"),
+        (-0.0, "0"),
+        (1234.567, "1235"),
+        (float("nan"), "nan"),
+        ({"a": 0.12345, "b": True}, "a: 0.123, b: True"),
+        (None, ""),
+    ],
+)
+def test_numbers_have_three_digits(value, text):
+    assert format_value(value) == text
+
+
+def test_no_claim_has_more_than_four_digits_and_each_is_a_sentence():
+    """The claims of the committed notebooks, as their last cells show them."""
+    claims = []
+    for file in (*NOTEBOOKS.glob("*.ipynb"), *NOTEBOOKS.glob("deeper/*.ipynb")):
+        for cell in nbformat.read(file, as_version=4).cells:
+            printed = "".join(each.get("text", "") for each in cell.get("outputs", ()))
+            claims += re.findall(r"^claim: (.*)", printed, re.MULTILINE)
+    assert len(claims) > 90
+    for claim in claims:
+        digits = [number.replace(",", "").replace(".", "") for number in LONG.findall(claim)]
+        assert all(len(number.rstrip("0")) <= 4 for number in digits), claim
+        assert not re.match(r"(and|so|nor|which|there|it|its|the others|then)\b", claim, re.IGNORECASE), claim
+    sentences = load_sentences().query("kind == 'claim'")["sentence"].tolist()
+    assert [s for s in sentences if not re.fullmatch(r"[A-Z].*[.]", s) or "..." in s] == []
+
+
+def test_the_report_of_all_notebooks_has_at_most_6_mb_and_four_players(tmp_path):
+    """The committed notebooks have the outputs of the default run."""
+    home = claim_folder(tmp_path, "results of mine")
+    for file in (*NOTEBOOKS.glob("*.ipynb"), *NOTEBOOKS.glob("deeper/*.ipynb")):
+        shutil.copy(file, home)
+    report = write_report(home)
+    print(f"{report.stat().st_size / 1e6:.2f} MB")
+    assert report.stat().st_size <= 6_000_000
+    assert report.read_text(encoding="utf-8").count("data:image/gif") <= 5, (
+        "four players, and one of notebook 00"
+    )

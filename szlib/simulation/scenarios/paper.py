@@ -89,8 +89,8 @@ def _goes_on(run: Run) -> tuple[bool, float]:
     return run.success, float(compute_metrics(run)["time_to_goal"])
 
 
-_OUT_FIRST = Claim("It enters the pathway after the person has left it.", _lets_person_out_first)
-_GOES_ON = Claim("Then it goes on to its goal.", _goes_on)
+_OUT_FIRST = Claim("The robot enters the pathway after the person has left it.", _lets_person_out_first)
+_GOES_ON = Claim("The robot goes on to its goal.", _goes_on)
 
 _SCENARIOS = (
     Scenario(
