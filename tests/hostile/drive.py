@@ -112,7 +112,8 @@ def faults(drive: Any, own: Any, around: Any, step: Any) -> Any:
 
 def attack_node(count: int, tally: Counter[str], seed: int = 0) -> None:
     """Ticks of nodes that hear random messages."""
-    with tempfile.TemporaryDirectory() as folder, ros.node_module() as module, warnings.catch_warnings():
+    node = ros.node_module("ros2_node_full")
+    with tempfile.TemporaryDirectory() as folder, node as module, warnings.catch_warnings():
         warnings.simplefilter("ignore", szlib.DataWarning)  # a zone of nobody's data
         zone = Path(folder) / "zone.json"
         shape = PolarZone(np.array([1.1]), DIRECTIONS, np.ones((1, len(DIRECTIONS))))
@@ -121,7 +122,7 @@ def attack_node(count: int, tally: Counter[str], seed: int = 0) -> None:
             rng = np.random.default_rng([seed, k, 3])
             Node.given = {"zone": str(zone), "walls": str(rng.choice(["", "-6 4 6 4", "2 -3 2 3; -6 4 6 4"]))}
             Node.now = ros.START
-            talk(module.SocialDrive(), rng, tally, f"seed [{seed}, {k}, 3]")
+            talk(module.FullSocialDrive(), rng, tally, f"seed [{seed}, {k}, 3]")
 
 
 def talk(node: Any, rng: np.random.Generator, tally: Counter[str], where: str) -> None:
