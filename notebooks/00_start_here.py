@@ -99,7 +99,7 @@ record.check(
 # | [23 - Against everything else](deeper/23_comparison.ipynb) | Is the fitted ellipse worth its trouble? | 15 min |
 # | [24 - Data quality](deeper/24_data_quality.ipynb) | Before anything is learned from a file of tracks: can it be trusted, and which days are unlike the others? | 15 min |
 # | [25 - What is true?](deeper/25_claims.ipynb) | What does the paper claim, and what of it does the data support? | 35 min |
-# | [26 - Eleven meetings](deeper/26_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 15 min |
+# | [26 - Eleven meetings](deeper/26_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 20 min |
 # | [27 - A sensitivity atlas](deeper/27_atlas.ipynb) | Notebooks 10 to 11b show one corridor, one passage, one pace, one zone. What would the robot have done in others? | 15 min |
 # | [28 - From sentence to verdict](deeper/28_sentences.ipynb) | Which sentences of the paper say something that can be checked, and does each of them hold? | 5 min |
 

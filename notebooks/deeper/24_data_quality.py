@@ -37,6 +37,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from IPython.display import Markdown
 from studies import hours as hours_study
 
 import szlib
@@ -46,7 +47,7 @@ from szlib.tracks import funnels, quality
 from szlib.tracks.formats import find_format
 from szlib.tracks.formats.base import CALENDAR_BEGINS
 from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters
+from szlib.workbook.record import ASSUMED, MEASURED, NotebookRecord, parameters, read_table
 
 # %% tags=["parameters"]
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
@@ -244,7 +245,26 @@ record.check("frames are at most 1 s apart (median)", usual <= 1.0, f"{usual:.3f
 # |---|---|
 # | laptop | `--jobs 2`; each process needs up to 1 GB, or 180 bytes for each row near the area where that is more |
 # | workstation | `--jobs 16`; set `POLARS_MAX_THREADS=2`, so that processes do not compete for cores |
-# | SLURM, or any Dask cluster | start `dask scheduler --scheduler-file s.json` and, by `srun`, `dask worker --scheduler-file s.json --nthreads 1` on nodes that share the data; then `szlib extract atc/ --out days --scheduler tcp://HOST:8786`. In a program: `with joblib.parallel_config("dask"):`. The extra `cluster` is needed. |
+# | machines with SSH, or SLURM | [many_days.py](../examples/many_days.py): `python many_days.py ssh HOST1,HOST2 atc/ out`, or `slurm 20 atc/ out` |
+# | any Dask scheduler | `szlib extract atc/ --out days --scheduler tcp://HOST:8786 --wait 600`: workers may come ten minutes later |
+#
+# Measured on a machine of **two cores** with raw days of 1 GB and 15 million rows, and with the samples of one day, repeated
+# as other people, for the pooled fit (`python -m studies.many_days`; the memory is that of the largest process):
+
+# %%
+measured = read_table("24_many_days")
+measured["92 days: seconds"] = np.where(
+    measured["disk_mb"] > 0, 92 * measured["seconds"] / measured["days"], np.nan
+)
+measured.style.format("{:.1f}", subset=measured.columns[3:], na_rep="").hide(axis="index")
+
+# %%
+one, four, fits = measured.iloc[0], measured.iloc[1], measured[measured["disk_mb"].isna()]
+Markdown(
+    f"So 92 days take {92 * one['seconds'] / 60:.0f} min in one process here, and {92 * four['seconds'] / four['days'] / 60:.0f} min in "
+    f"four processes on two cores. The result needs {92 * one['disk_mb']:.0f} MB of disk beside the {92:.0f} GB of raw days. The pooled fit of up "
+    f"to {fits['samples'].max():,} samples takes {fits['seconds'].min():.0f} to {fits['seconds'].max():.0f} s."
+)
 
 # %% [markdown]
 # **What it means.** Speed must come from positions. Gaps and irregular frames are ordinary: everything

@@ -1,4 +1,4 @@
-"""What 92 days cost: `SZLIB_RAW_DAYS=FOLDER python -m studies.many_days` writes 14_many_days.csv.
+"""What 92 days cost: `SZLIB_RAW_DAYS=FOLDER python -m studies.many_days` writes 24_many_days.csv.
 
 FOLDER holds raw days in the format of ATC, of about 1 GB and 15 million rows each.  Each row of the table is one task in
 a process of its own.  The pooled samples are those of a day, repeated as other people with 2 cm of noise.
@@ -93,4 +93,4 @@ if __name__ == "__main__":
         print(json.dumps({"task": task} | measure(task, files, Path(folder))))
     else:
         with tempfile.TemporaryDirectory() as folder:
-            write_table(measure_all(folder), "14_many_days")
+            write_table(measure_all(folder), "24_many_days")
