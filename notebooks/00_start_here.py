@@ -90,9 +90,9 @@ record.check(
 # | [8 - Build the controller yourself](08_build_a_controller.ipynb) | What does it take to turn the barrier condition of notebook 07 into a robot that drives? | 25 min |
 # | [9 - Passing a person who stands](09_passing.ipynb) | A person stands in the way and looks at the robot. When does the robot begin to go around them, and what decides that? | 25 min |
 # | [10 - Meeting in a narrow corridor](10_corridor.ipynb) | A person walks towards the robot in a corridor. There is room for both, but not much. Who slows the robot down: the person, or the wall? | 15 min |
-# | [11 - Yielding by waiting](11_waiting.ipynb) | A passage is too narrow for two, and a person is in it. No rule says who goes first. Who decides, and what does waiting look like to a solver? | 15 min |
+# | [11 - Yielding by waiting](11_waiting.ipynb) | A passage is too narrow for two, and a person is in it. The robot has no rule of priority. Why does it wait, and what does waiting look like to a solver? | 15 min |
 # | [11b - Yielding by making room](11b_making_room.ipynb) | This time the robot is *in* the passage when the person comes. It wants to go ahead. What makes it go back? | 20 min |
-# | [12 - Other people's crowds](12_among_people.ipynb) | So far everybody walked as this workbook made them walk. What becomes of the robot among people who walk by somebody else's model and react to it - and among people who were recorded, and would have walked like that whatever it does? | 35 min |
+# | [12 - Other people's crowds](12_among_people.ipynb) | So far people walked straight ahead. How does the robot do among simulated people, who react to it by models of walking from the literature, and among recorded people, who do not react? | 35 min |
 # | [13 - The laboratory](13_laboratory.ipynb) | What does the robot do if *you* put the person somewhere else, move the goal, narrow the corridor, or change gamma while it drives? | 10 min |
 # | [21 - Feasibility](deeper/21_feasibility.ipynb) | A hard constraint is a promise only while the problem has a solution. When does it lose it, what happens then, and can one have a promise that is kept for ever? | 20 min |
 # | [22 - The distances, audited](deeper/22_distances.ipynb) | The barriers use *approximate* distances to zones and walls, and a margin of 5 cm "since the approximated distance function contains some errors" (sec. 4). Where do they err, to which side, and is the margin enough? | 15 min |
@@ -112,7 +112,7 @@ record.check(
 #
 # | week | topic | notebooks | to read | sheet | to do |
 # |---|---|---|---|---|---|
-# | 1 | People: who is where, who meets whom | [01](01_tracks.ipynb), [02](02_encounters.ipynb) | 25 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 1 h 00 min |
+# | 1 | Tracks of people, and their encounters | [01](01_tracks.ipynb), [02](02_encounters.ipynb) | 25 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 1 h 00 min |
 # | 2 | Which samples to believe, and the nearest people | [03](03_outliers.ipynb), [04](04_hull.ipynb) | 30 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 1 h 05 min |
 # | 3 | From samples to a zone | [05](05_zones.ipynb) | 20 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 35 min |
 # | 4 | Respect or emptiness; from a zone to a barrier | [06](06_respect.ipynb), [07](07_barriers.ipynb) | 40 min | [sheet 4](exercises/sheet4_certainty.ipynb), [sheet 5](exercises/sheet5_barriers.ipynb) | 2 h 10 min |

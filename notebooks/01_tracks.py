@@ -169,7 +169,7 @@ funnels.table(stages).tail(5)
 
 # %% [markdown]
 # **What it means.** We have people on one clock, in metres, with a velocity that can be trusted,
-# and an open area to watch them in. Next: who meets whom?
+# and an open area to watch them in. Next: when do two people meet?
 
 # %%
 record.close()

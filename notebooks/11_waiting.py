@@ -14,8 +14,8 @@
 # %% [markdown]
 # # 11 - Yielding by waiting
 #
-# **Question.** A passage is too narrow for two, and a person is in it. No rule says who goes first.
-# Who decides, and what does waiting look like to a solver?
+# **Question.** A passage is too narrow for two, and a person is in it. The robot has no rule of priority.
+# Why does it wait, and what does waiting look like to a solver?
 #
 # **Expectation.** The paper: the robot waits outside until the person is through, then it goes.
 

@@ -14,9 +14,8 @@
 # %% [markdown]
 # # 12 - Other people's crowds
 #
-# **Question.** So far everybody walked as this workbook made them walk. What becomes of the robot
-# among people who walk by somebody else's model and react to it - and among people who were recorded,
-# and would have walked like that whatever it does?
+# **Question.** So far people walked straight ahead. How does the robot do among simulated people, who react
+# to it by models of walking from the literature, and among recorded people, who do not react?
 #
 # **Expectation.** The paper's people walk at 0.5 m/s and never change their mind (sec. 4). Real ones
 # walk at 1.2 m/s and do. A promise to people who keep their velocity should still be kept to the

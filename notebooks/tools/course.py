@@ -40,6 +40,7 @@ GIVES: dict[str, tuple[str, str]] = {
         "sec. 2, fig. 5",
         "enclose a zone in the smallest ellipse, and say how far to trust it.",
     ),
+    "06": ("sec. 2", "tell respect from emptiness by a null model."),
     "07": ("sec. 3, eq. 1-7", "turn a distance into a condition on the next step, and say what gamma does."),
     "08": (
         "sec. 3-4, eq. 1-2, 8",
@@ -49,16 +50,15 @@ GIVES: dict[str, tuple[str, str]] = {
     "10": ("sec. 4, fig. 6b", "say why the robot slows down in a corridor, and speeds up beside the person."),
     "11": ("sec. 4, fig. 6c", "say why the robot waits, although no rule tells it to."),
     "11b": ("sec. 4, fig. 6d", "say why the robot backs out of a passage, although no rule tells it to."),
+    "12": ("sec. 4-5", "say which promises of the controller hold among people who react."),
+    "13": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
     "21": ("sec. 4", "say when a step has no solution, and prove when there always is one."),
     "22": ("sec. 3, eq. 3-7", "say where the two distances err, and which margin makes up for it."),
     "23": ("sec. 1, 5", "compare zones and controllers in the same worlds, with intervals."),
     "24": ("sec. 2", "judge whether a file of tracks can be used, and find days unlike the others."),
-    "06": ("sec. 2", "tell respect from emptiness by a null model."),
     "25": ("all", "say which claims of the paper the data supports, and with which interval."),
-    "12": ("sec. 4-5", "say which promises of the controller hold among people who react."),
     "26": ("sec. 4-5", "say in which meetings this controller is good, and in which it is bad."),
     "27": ("sec. 4-5", "predict from gamma, width, speed and zone what the robot will do."),
-    "13": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
     "28": ("all", "find each sentence of the paper with its code, its cell and its verdict."),
 }
 """By number of the notebook: the section of the paper, and what a reader can do after reading it."""
@@ -144,7 +144,7 @@ GLOSSARY: dict[str, Word] = {
 """The words that the notebooks use, and their meanings."""
 
 WEEKS: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = [
-    ("People: who is where, who meets whom", ("01", "02"), ("sheet1_tracks",)),
+    ("Tracks of people, and their encounters", ("01", "02"), ("sheet1_tracks",)),
     ("Which samples to believe, and the nearest people", ("03", "04"), ("sheet2_outliers",)),
     ("From samples to a zone", ("05",), ("sheet3_zones",)),
     ("Respect or emptiness; from a zone to a barrier", ("06", "07"), ("sheet4_certainty", "sheet5_barriers")),
