@@ -155,11 +155,11 @@ def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
         if not forbidden.is_empty:
             style = {"fill": False, "hatch": "///", "edgecolor": colour, "lw": 0, "alpha": 0.35}
             ax.add_patch(patch_from_polygon(forbidden, **style))
-    ax.axhline(0, color=GREY, linewidth=0.6)
-    ax.axvline(0, color=GREY, linewidth=0.6)
+    ax.plot((-reach, reach, np.nan, 0, 0), (0, 0, np.nan, -reach, reach), color=GREY, linewidth=0.6)
     ax.plot(*step.control, "*", color=BLUE, markersize=15, markeredgecolor=BLACK, label="chosen")
     ax.set(xlabel="a_x [m/s²]", ylabel="a_y [m/s²]", xlim=(-reach, reach), ylim=(-reach, reach))
-    ax.set_aspect("equal")
+    what = "No acceleration is allowed" if found.polygon.is_empty else "Green: the accelerations allowed"
+    ax.set(aspect="equal", title=what)
     add_legend_below(ax, gap=0.16)
     return ax
 
@@ -179,7 +179,7 @@ def _strictest_limits(limits: tuple[BarrierLimit, ...], reach: float) -> list[tu
 
 
 def draw_step(step: Step) -> Figure:
-    """Draw the scene of a `step` beside the accelerations that it allows.
+    """Draw the scene of a `step` beside the accelerations that it allows, in two squares of one size.
 
     Examples
     --------
@@ -231,8 +231,8 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
         near = wall.interpolate(beside)
         ax.text(near.x, near.y, f" wall {j}", fontsize=8, va="bottom", clip_on=True)
     drawn = np.vstack(curves)
-    low, high = drawn.min(axis=0) - 0.2, drawn.max(axis=0) + 0.2
+    (x0, y0), half = (drawn.min(axis=0) + drawn.max(axis=0)) / 2, np.ptp(drawn, axis=0).max() / 2 + 0.2
     ax.plot(*zip((x, y), step.target, strict=True), ":", color=BLUE, label="direction to the target")
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    ax.set(xlim=(x0 - half, x0 + half), ylim=(y0 - half, y0 + half))
     add_legend_below(ax, gap=0.16, ncols=3)
     return label_metres(ax, f"least h = {step.h.min(initial=np.inf):.2f} m, speed {np.hypot(vx, vy):.2f} m/s")

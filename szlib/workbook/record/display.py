@@ -83,7 +83,7 @@ def format_result(result: str, value: Any) -> str:
 
 
 def show_figure(figure: Figure, picture: bytes) -> None:
-    """Show a saved `picture` of a `figure` in the notebook, smaller and in 64 colours, with its alt text.
+    """Show a saved `picture` of a `figure` in the notebook, smaller and in 128 colours, with its alt text.
 
     The figure is not drawn a second time. Nothing is shown if the backend is not inline (such as ipympl).
     """
@@ -98,10 +98,10 @@ def show_figure(figure: Figure, picture: bytes) -> None:
     drawn = Image.open(io.BytesIO(picture)).convert("RGB")
     size = round(drawn.width * _SHOWN_WIDTH), round(drawn.height * _SHOWN_WIDTH)
     shown = io.BytesIO()
-    drawn.resize(size, Image.Resampling.LANCZOS).quantize(64).save(shown, "PNG", optimize=True)
+    small = drawn.resize(size, Image.Resampling.LANCZOS)
+    small.quantize(128, Image.Quantize.MAXCOVERAGE, kmeans=1).save(shown, "PNG", optimize=True)
     content = {"image/png": shown.getvalue(), "text/plain": repr(figure)}
-    metadata = {"image/png": {"alt": alt_text(figure)}}
-    display(content, raw=True, metadata=metadata)  # type: ignore[no-untyped-call]
+    display(content, raw=True, metadata={"image/png": {"alt": alt_text(figure)}})  # type: ignore[no-untyped-call]
     plt.close(figure)
 
 
