@@ -25,7 +25,7 @@
 # ![A robot makes room for a person in a passage, then goes on](figures/making_room.gif)
 
 # %% [markdown]
-# next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 30 min
+# next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 35 min
 # to read
 #
 # **Afterwards you can** choose a route, and find any notebook, word or symbol again.
@@ -80,44 +80,44 @@ record.check(
 #
 # | notebook | question | to read |
 # |---|---|---|
-# | [1 - Tracks and the area](01_tracks.ipynb) | Where do people walk, how fast, and where is there open space enough to watch two of them meet without a wall or a shop in the way? | 10 min |
-# | [2 - Encounters of two people](02_encounters.ipynb) | When do two people meet with nobody else around, and what does each see of the other? | 15 min |
-# | [3 - Outliers](03_outliers.ipynb) | Some people brush past each other, and some tracks are wrong. Which samples say nothing about the distance that people keep? | 20 min |
-# | [4 - The hull and its slices](04_hull.ipynb) | From scattered samples to a boundary: how near did people come, in each direction, at each walking speed? | 10 min |
-# | [5 - Social zones](05_zones.ipynb) | Can a robot carry the zone along? | 20 min |
-# | [6 - Respect or emptiness?](06_respect.ipynb) | Around a walking person there is a place where nobody is. Do people keep out of it, or is it only rare that two of them are anywhere near each other? | 30 min |
-# | [7 - Barriers](07_barriers.ipynb) | How does "stay out of the zone" become something that a controller can obey, ten times a second? | 10 min |
-# | [8 - Build the controller yourself](08_build_a_controller.ipynb) | What does it take to turn the barrier condition of notebook 07 into a robot that drives? | 25 min |
-# | [9 - Passing a person who stands](09_passing.ipynb) | A person stands in the way and looks at the robot. When does the robot begin to go around them, and what decides that? | 25 min |
-# | [10 - Meeting in a narrow corridor](10_corridor.ipynb) | A person walks towards the robot in a corridor. There is room for both, but not much. Who slows the robot down: the person, or the wall? | 15 min |
-# | [11 - Yielding by waiting](11_waiting.ipynb) | A passage is too narrow for two, and a person is in it. The robot has no rule of priority. Why does it wait, and what does waiting look like to a solver? | 15 min |
-# | [11b - Yielding by making room](11b_making_room.ipynb) | This time the robot is *in* the passage when the person comes. It wants to go ahead. What makes it go back? | 20 min |
-# | [12 - Other people's crowds](12_among_people.ipynb) | So far people walked straight ahead. How does the robot do among simulated people, who react to it by models of walking from the literature, and among recorded people, who do not react? | 35 min |
+# | [1 - Tracks and the area](01_tracks.ipynb) | Where do people walk, how fast, and where is there open space enough to watch two of them meet without a wall or a shop in the way? | 25 min |
+# | [2 - Encounters of two people](02_encounters.ipynb) | When do two people meet with nobody else around, and what does each see of the other? | 30 min |
+# | [3 - Outliers](03_outliers.ipynb) | Some people brush past each other, and some tracks are wrong. Which samples say nothing about the distance that people keep? | 40 min |
+# | [4 - The hull and its slices](04_hull.ipynb) | From scattered samples to a boundary: how near did people come, in each direction, at each walking speed? | 25 min |
+# | [5 - Social zones](05_zones.ipynb) | Can a robot carry the zone along? | 35 min |
+# | [6 - Respect or emptiness?](06_respect.ipynb) | Around a walking person there is a place where nobody is. Do people keep out of it, or is it only rare that two of them are anywhere near each other? | 60 min |
+# | [7 - Barriers](07_barriers.ipynb) | How does "stay out of the zone" become something that a controller can obey, ten times a second? | 25 min |
+# | [8 - Build the controller yourself](08_build_a_controller.ipynb) | What does it take to turn the barrier condition of notebook 07 into a robot that drives? | 50 min |
+# | [9 - Passing a person who stands](09_passing.ipynb) | A person stands in the way and looks at the robot. When does the robot begin to go around them, and what decides that? | 65 min |
+# | [10 - Meeting in a narrow corridor](10_corridor.ipynb) | A person walks towards the robot in a corridor. There is room for both, but not much. Who slows the robot down: the person, or the wall? | 35 min |
+# | [11 - Yielding by waiting](11_waiting.ipynb) | A passage is too narrow for two, and a person is in it. The robot has no rule of priority. Why does it wait, and what does waiting look like to a solver? | 35 min |
+# | [11b - Yielding by making room](11b_making_room.ipynb) | This time the robot is *in* the passage when the person comes. It wants to go ahead. What makes it go back? | 45 min |
+# | [12 - Other people's crowds](12_among_people.ipynb) | So far people walked straight ahead. How does the robot do among simulated people, who react to it by models of walking from the literature, and among recorded people, who do not react? | 80 min |
 # | [13 - The laboratory](13_laboratory.ipynb) | What does the robot do if *you* put the person somewhere else, move the goal, narrow the corridor, or change gamma while it drives? | 10 min |
-# | [21 - Feasibility](deeper/21_feasibility.ipynb) | A hard constraint is a promise only while the problem has a solution. When does it lose it, what happens then, and can one have a promise that is kept for ever? | 20 min |
-# | [22 - The distances, audited](deeper/22_distances.ipynb) | The barriers use *approximate* distances to zones and walls, and a margin of 5 cm "since the approximated distance function contains some errors" (sec. 4). Where do they err, to which side, and is the margin enough? | 15 min |
-# | [23 - Against everything else](deeper/23_comparison.ipynb) | Is the fitted ellipse worth its trouble? | 15 min |
-# | [24 - Data quality](deeper/24_data_quality.ipynb) | Before anything is learned from a file of tracks: can it be trusted, and which days are unlike the others? | 15 min |
-# | [25 - What is true?](deeper/25_claims.ipynb) | What does the paper claim, and what of it does the data support? | 35 min |
-# | [26 - Eleven meetings](deeper/26_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 20 min |
-# | [27 - A sensitivity atlas](deeper/27_atlas.ipynb) | Notebooks 10 to 11b show one corridor, one passage, one pace, one zone. What would the robot have done in others? | 15 min |
-# | [28 - From sentence to verdict](deeper/28_sentences.ipynb) | Which sentences of the paper say something that can be checked, and does each of them hold? | 5 min |
+# | [21 - Feasibility](deeper/21_feasibility.ipynb) | A hard constraint is a promise only while the problem has a solution. When does it lose it, what happens then, and can one have a promise that is kept for ever? | 40 min |
+# | [22 - The distances, audited](deeper/22_distances.ipynb) | The barriers use *approximate* distances to zones and walls, and a margin of 5 cm "since the approximated distance function contains some errors" (sec. 4). Where do they err, to which side, and is the margin enough? | 30 min |
+# | [23 - Against everything else](deeper/23_comparison.ipynb) | Is the fitted ellipse worth its trouble? | 30 min |
+# | [24 - Data quality](deeper/24_data_quality.ipynb) | Before anything is learned from a file of tracks: can it be trusted, and which days are unlike the others? | 40 min |
+# | [25 - What is true?](deeper/25_claims.ipynb) | What does the paper claim, and what of it does the data support? | 80 min |
+# | [26 - Eleven meetings](deeper/26_meetings.ipynb) | Robots that drive among people are tried in named meetings: head-on, in a doorway, around a corner. What does the controller do in each, against what others would use - and where is it bad? | 40 min |
+# | [27 - A sensitivity atlas](deeper/27_atlas.ipynb) | Notebooks 10 to 11b show one corridor, one passage, one pace, one zone. What would the robot have done in others? | 35 min |
+# | [28 - From sentence to verdict](deeper/28_sentences.ipynb) | Which sentences of the paper say something that can be checked, and does each of them hold? | 10 min |
 
 # %% [markdown]
 # ## Three routes
 #
-# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 1 h 10 min to read.
-# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb): 4 h 10 min to read.
+# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 2 h 15 min to read.
+# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb): 9 h 10 min to read.
 # - **Six weeks: the course.** One exercise sheet a week; running and looking around come on top.
 #
 # | week | topic | notebooks | to read | sheet | to do |
 # |---|---|---|---|---|---|
-# | 1 | Tracks of people, and their encounters | [01](01_tracks.ipynb), [02](02_encounters.ipynb) | 25 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 1 h 00 min |
-# | 2 | Which samples to believe, and the nearest people | [03](03_outliers.ipynb), [04](04_hull.ipynb) | 30 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 1 h 05 min |
-# | 3 | From samples to a zone | [05](05_zones.ipynb) | 20 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 35 min |
-# | 4 | Respect or emptiness; from a zone to a barrier | [06](06_respect.ipynb), [07](07_barriers.ipynb) | 40 min | [sheet 4](exercises/sheet4_certainty.ipynb), [sheet 5](exercises/sheet5_barriers.ipynb) | 2 h 10 min |
-# | 5 | A controller of your own, and its first meetings | [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb) | 1 h 05 min | [sheet 7](exercises/sheet7_controller.ipynb) | 3 h 20 min |
-# | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 1 h 20 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 30 min |
+# | 1 | Tracks of people, and their encounters | [01](01_tracks.ipynb), [02](02_encounters.ipynb) | 55 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 1 h 00 min |
+# | 2 | Which samples to believe, and the nearest people | [03](03_outliers.ipynb), [04](04_hull.ipynb) | 1 h 05 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 1 h 05 min |
+# | 3 | From samples to a zone | [05](05_zones.ipynb) | 35 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 35 min |
+# | 4 | Respect or emptiness; from a zone to a barrier | [06](06_respect.ipynb), [07](07_barriers.ipynb) | 1 h 25 min | [sheet 4](exercises/sheet4_certainty.ipynb), [sheet 5](exercises/sheet5_barriers.ipynb) | 2 h 10 min |
+# | 5 | A controller of your own, and its first meetings | [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb) | 2 h 30 min | [sheet 7](exercises/sheet7_controller.ipynb) | 3 h 20 min |
+# | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 2 h 50 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 30 min |
 
 # %% [markdown]
 # **The exercises** are functions that you write. `judges.check("velocity", velocity)` asks yours for many cases

@@ -25,7 +25,7 @@
 
 # %% [markdown]
 # before: [Start here](00_start_here.ipynb) · next: [2 - Encounters of two people](02_encounters.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 1 · 10 min to read
+# [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 1 · 25 min to read
 #
 # **Afterwards you can** bring files of tracks to one clock, and say where two people can be watched.
 #

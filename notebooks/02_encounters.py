@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [1 - Tracks and the area](01_tracks.ipynb) · next: [3 -
-# Outliers](03_outliers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 2-3 · 15 min to
+# Outliers](03_outliers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 2-3 · 30 min to
 # read
 #
 # **Afterwards you can** say when two people meet alone, and compute where one sees the other.

@@ -25,7 +25,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [2 - Encounters of two people](02_encounters.ipynb) · next: [4 -
-# The hull and its slices](04_hull.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4a · 20
+# The hull and its slices](04_hull.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4a · 40
 # min to read
 #
 # **Afterwards you can** say whom a rule for outliers finds, whom it misses, and why.

@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [3 - Outliers](03_outliers.ipynb) · next: [5 - Social
-# zones](05_zones.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4b · 10 min to read
+# zones](05_zones.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4b · 25 min to read
 #
 # **Afterwards you can** turn samples into a hull, cut it at a speed, and read the zone off the slice.
 

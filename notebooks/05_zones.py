@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [4 - The hull and its slices](04_hull.ipynb) · next: [6 - Respect
-# or emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 20 min to
+# or emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 35 min to
 # read
 #
 # **Afterwards you can** enclose a zone in the smallest ellipse, and say how far to trust it.

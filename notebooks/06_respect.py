@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [5 - Social zones](05_zones.ipynb) · next: [7 -
-# Barriers](07_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 30 min to read
+# Barriers](07_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 60 min to read
 #
 # **Afterwards you can** tell respect from emptiness by a null model.
 

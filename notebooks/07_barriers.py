@@ -24,7 +24,7 @@
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [6 - Respect or emptiness?](06_respect.ipynb) · next: [8 - Build
 # the controller yourself](08_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3,
-# eq. 1-7 · 10 min to read
+# eq. 1-7 · 25 min to read
 #
 # **Afterwards you can** turn a distance into a condition on the next step, and say what gamma does.
 #

@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [7 - Barriers](07_barriers.ipynb) · next: [9 - Passing a person who
-# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 25 min to
+# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 50 min to
 # read
 #
 # **Afterwards you can** write an MPC-CBF yourself, and say what each of its terms is there for.

@@ -24,7 +24,7 @@
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [8 - Build the controller yourself](08_build_a_controller.ipynb) ·
 # next: [10 - Meeting in a narrow corridor](10_corridor.ipynb) · [paper](https://arxiv.org/abs/2405.15101):
-# sec. 4, fig. 6a · 25 min to read
+# sec. 4, fig. 6a · 65 min to read
 #
 # **Afterwards you can** say when the robot begins to avoid a person, and what chooses the side.
 #

@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [9 - Passing a person who stands](09_passing.ipynb) · next: [11 -
-# Yielding by waiting](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 15
+# Yielding by waiting](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 35
 # min to read
 #
 # **Afterwards you can** say why the robot slows down in a corridor, and speeds up beside the person.

@@ -22,7 +22,7 @@
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [10 - Meeting in a narrow corridor](10_corridor.ipynb) · next: [11b
 # - Yielding by making room](11b_making_room.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4,
-# fig. 6c · 15 min to read
+# fig. 6c · 35 min to read
 #
 # **Afterwards you can** say why the robot waits, although no rule tells it to.
 

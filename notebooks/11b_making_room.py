@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [11 - Yielding by waiting](11_waiting.ipynb) · next: [12 - Other
-# people's crowds](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 20
+# people's crowds](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 45
 # min to read
 #
 # **Afterwards you can** say why the robot backs out of a passage, although no rule tells it to.

@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [11b - Yielding by making room](11b_making_room.ipynb) · next: [13
-# - The laboratory](13_laboratory.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 35 min to
+# - The laboratory](13_laboratory.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 80 min to
 # read
 #
 # **Afterwards you can** say which promises of the controller hold among people who react.

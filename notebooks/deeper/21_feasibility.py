@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · next: [22 - The distances, audited](22_distances.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 4 · 20 min to read
+# [paper](https://arxiv.org/abs/2405.15101): sec. 4 · 40 min to read
 #
 # **Afterwards you can** say when a step has no solution, and prove when there always is one.
 #

@@ -24,7 +24,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [21 - Feasibility](21_feasibility.ipynb) · next: [23 - Against
-# everything else](23_comparison.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 3-7 · 15
+# everything else](23_comparison.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 3-7 · 30
 # min to read
 #
 # **Afterwards you can** say where the two distances err, and which margin makes up for it.

@@ -24,7 +24,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [22 - The distances, audited](22_distances.ipynb) · next: [24 -
-# Data quality](24_data_quality.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 1, 5 · 15 min to
+# Data quality](24_data_quality.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 1, 5 · 30 min to
 # read
 #
 # **Afterwards you can** compare zones and controllers in the same worlds, with intervals.

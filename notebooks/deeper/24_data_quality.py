@@ -23,7 +23,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [23 - Against everything else](23_comparison.ipynb) · next: [25
-# - What is true?](25_claims.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 15 min to read
+# - What is true?](25_claims.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 40 min to read
 #
 # **Afterwards you can** judge whether a file of tracks can be used, and find days unlike the others.
 

@@ -21,7 +21,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [27 - A sensitivity atlas](27_atlas.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): all · 5 min to read
+# [paper](https://arxiv.org/abs/2405.15101): all · 10 min to read
 #
 # **Afterwards you can** find each sentence of the paper with its code, its cell and its verdict.
 

@@ -23,8 +23,14 @@ HERE = Path(__file__).parents[1]
 sys.path.append(str(HERE / "exercises"))  # the judges
 START = "00_start_here"
 PAPER = "https://arxiv.org/abs/2405.15101"
-WORDS, LINES = 120, 15
-"""Words of prose, and lines of code, that are read in a minute (assumed)."""
+WORDS, LINES = 120, 8
+"""Words of prose, and lines of visible code, that are read in a minute (assumed)."""
+PER_FIGURE, PER_TABLE = 1.5, 1.0
+"""Time for a figure or an animation, and for a table or a displayed formula [min] (assumed)."""
+FOLD = re.compile(r"<details.*?</details>", re.DOTALL)
+FORMULA = re.compile(r"\$\$.+?\$\$", re.DOTALL)
+RULED = re.compile(r"^\|[ :|-]+\|$", re.MULTILINE)
+"""The line below the header of a Markdown table."""
 HEADING = "**Afterwards you can** "
 
 GIVES: dict[str, tuple[str, str]] = {
@@ -198,11 +204,34 @@ class Page:
         return [text for text in texts if HEADING not in text]
 
     @property
+    def outputs(self) -> list[dict[str, str]]:
+        """The outputs of the executed copy, by type; without a copy the figures that the code stores."""
+        copy = self.source.with_suffix(".ipynb")
+        if copy.exists():
+            cells = nbformat.read(copy, as_version=4).cells
+            return [each.get("data", {}) for cell in cells for each in cell.get("outputs", ())]
+        code = " ".join(cell.source for cell in self.cells if cell.cell_type == "code")
+        return [{"image/png": ""}] * len(re.findall(r"record\.(?:figure|animation)\(", code))
+
+    @property
     def minutes(self) -> int:
-        """Reading time, rounded up to 5 minutes [min]."""
-        words = sum(len(text.split()) for text in self.prose)
-        lines = sum(len(cell.source.splitlines()) for cell in self.cells if cell.cell_type == "code")
-        return 5 * math.ceil((words / WORDS + lines / LINES) / 5)
+        """Reading time, rounded up to 5 minutes [min]; hidden code and folded tables take none."""
+        outputs = self.outputs
+        texts = [*self.prose, *(each.get("text/markdown", "") for each in outputs)]
+        shown = [FOLD.sub("", each.get("text/html", "")) for each in outputs]
+        words = sum(len(re.findall(r"[^\W_]\S*", FORMULA.sub("", text))) for text in texts)
+        figures = sum("image/png" in each for each in outputs)
+        figures += sum(text.count("<video") + text.count("data:image/gif") for text in shown)
+        tables = sum(text.count("<table") for text in shown)
+        tables += sum(len(RULED.findall(FOLD.sub("", text))) + len(FORMULA.findall(text)) for text in texts)
+        needed = words / WORDS + self._visible_lines / LINES + PER_FIGURE * figures + PER_TABLE * tables
+        return 5 * math.ceil(needed / 5)
+
+    @property
+    def _visible_lines(self) -> int:
+        code = [cell for cell in self.cells if cell.cell_type == "code"]
+        shown = [cell.source for cell in code if not cell.metadata.get("jupyter", {}).get("source_hidden")]
+        return sum(bool(line.strip()) for text in shown for line in text.splitlines())
 
 
 def pages() -> list[Page]:

@@ -5,6 +5,7 @@ import re
 from collections import Counter
 
 import jupytext
+import nbformat
 import pytest
 from judges import SHEETS
 
@@ -75,6 +76,65 @@ def test_the_course_reads_every_notebook_and_does_every_sheet_once():
     assert sorted(sheet for _, _, sheets in course.WEEKS for sheet in sheets) == list(SHEETS)
     assert len(course.WEEKS) == 6
     assert {page.number for page in STORY} <= set(course.GIVES)
+
+
+# --- reading times -----------------------------------------------------------------------------------
+
+
+def write_page(folder, *cells, outputs=()):
+    """A page with these cells, and an executed copy whose one code cell has these outputs."""
+    script = "\n\n".join(["# %% [markdown]\n# # 1 - A", *cells])
+    (folder / "01_a.py").write_text(script, encoding="utf-8")
+    if outputs:
+        copy = nbformat.v4.new_notebook()
+        shown = [nbformat.v4.new_output("display_data", data=data) for data in outputs]
+        copy.cells = [nbformat.v4.new_code_cell("x = 1", outputs=shown)]
+        nbformat.write(copy, folder / "01_a.ipynb")
+    return course.Page(folder / "01_a.py", tuple(jupytext.reads(script, fmt="py:percent").cells))
+
+
+CODE = "\n".join(["x = 1"] * 79)
+IMAGE, TABLE = {"image/png": "aGk="}, {"text/html": "<div><table><tr><td>1</td></tr></table></div>"}
+FOLDED = {"text/html": f"<details><summary>All</summary>{TABLE['text/html']}</details>"}
+
+
+@pytest.mark.parametrize(
+    ("cell", "minutes"),
+    [
+        ("# %% [markdown]\n# " + "word " * 1190, 10),
+        (f"# %%\n{CODE}", 10),
+        (f'# %% jupyter={{"source_hidden": true}}\n{CODE}', 5),
+        ("# %%\n" + "record.figure(axes, 'a')\n" * 6, 10),
+        ("# %% [markdown]\n" + "# | a |\n# |---|\n# | 1 |\n#\n" * 9, 10),
+        ("# %% [markdown]\n# <details>\n#\n" + "# | a |\n# |---|\n# | 1 |\n#\n" * 9 + "# </details>", 5),
+        ("# %% [markdown]\n" + "# $$\n# h = d - r\n# $$\n#\n" * 9, 10),
+    ],
+    ids=["words", "code", "hidden code", "figures", "tables", "folded tables", "formulas"],
+)
+def test_reading_time_of_cells(cell, minutes, tmp_path):
+    assert write_page(tmp_path, cell).minutes == minutes
+
+
+@pytest.mark.parametrize(
+    ("output", "minutes"),
+    [
+        (IMAGE, 15),
+        ({"text/html": "<video src='a'></video>"}, 15),
+        ({"text/html": '<img src="data:image/gif;base64,R0"/>'}, 15),
+        (TABLE, 10),
+        (FOLDED, 5),
+        ({"text/markdown": "word " * 110}, 10),
+    ],
+    ids=["figure", "video", "animation", "table", "folded table", "words"],
+)
+def test_reading_time_of_nine_outputs(output, minutes, tmp_path):
+    assert write_page(tmp_path, outputs=[output] * 9).minutes == minutes
+
+
+def test_figures_are_counted_in_the_executed_copy(tmp_path):
+    code = "# %%\n" + "record.figure(axes, 'a')\n" * 8
+    assert write_page(tmp_path, code).minutes == 15
+    assert write_page(tmp_path, code, outputs=[IMAGE]).minutes == 5
 
 
 # --- words, symbols, references ----------------------------------------------------------------------
