@@ -26,7 +26,6 @@
 
 # %% [markdown]
 # next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 35 min
-# to read
 #
 # **Afterwards you can** choose a route, and find any notebook, word or symbol again.
 
@@ -108,16 +107,16 @@ record.check(
 #
 # - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 2 h 15 min to read.
 # - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb): 9 h 10 min to read.
-# - **Six weeks: the course.** One exercise sheet a week; running and looking around come on top.
+# - **Six weeks: the course.** Running and looking around come on top.
 #
-# | week | topic | notebooks | to read | sheet | to do |
+# | week | topic | notebooks | to read | exercises | to do |
 # |---|---|---|---|---|---|
-# | 1 | Tracks of people, and their encounters | [01](01_tracks.ipynb), [02](02_encounters.ipynb) | 55 min | [sheet 1](exercises/sheet1_tracks.ipynb) | 1 h 00 min |
-# | 2 | Which samples to believe, and the nearest people | [03](03_outliers.ipynb), [04](04_hull.ipynb) | 1 h 05 min | [sheet 2](exercises/sheet2_outliers.ipynb) | 1 h 05 min |
-# | 3 | From samples to a zone | [05](05_zones.ipynb) | 35 min | [sheet 3](exercises/sheet3_zones.ipynb) | 3 h 35 min |
-# | 4 | Respect or emptiness; from a zone to a barrier | [06](06_respect.ipynb), [07](07_barriers.ipynb) | 1 h 25 min | [sheet 4](exercises/sheet4_certainty.ipynb), [sheet 5](exercises/sheet5_barriers.ipynb) | 2 h 10 min |
-# | 5 | A controller of your own, and its first meetings | [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb) | 2 h 30 min | [sheet 7](exercises/sheet7_controller.ipynb) | 3 h 20 min |
-# | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 2 h 50 min | [sheet 6](exercises/sheet6_robot.ipynb) | 1 h 30 min |
+# | 1 | Tracks, encounters, and which of them to believe | [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb) | 1 h 35 min | [1.1-1.5](exercises/sheet1_tracks.ipynb#1.1-Velocity-(5-min)), [2.1-2.5](exercises/sheet2_outliers.ipynb#2.1-Complementary-coordinates-(5-min)) | 2 h 05 min |
+# | 2 | From samples to a zone; respect or emptiness | [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb) | 2 h 00 min | [3.1-3.3](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)), [4.1-4.5](exercises/sheet4_certainty.ipynb#4.1-The-quantile-zone-in-one-direction-(10-min)) | 1 h 55 min |
+# | 3 | A zone of your own, and a barrier around it | [07](07_barriers.ipynb) | 25 min | [3.4-3.5](exercises/sheet3_zones.ipynb#3.4-A-zone-of-your-own-(an-evening,-150-min)), [6.1](exercises/sheet6_robot.ipynb#6.1-The-speed-limit-(5-min)) | 2 h 45 min |
+# | 4 | A controller of your own | [08](08_build_a_controller.ipynb) | 50 min | [5.1-5.5](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)), [7.1-7.3](exercises/sheet7_controller.ipynb#7.1-A-filter-on-a-road-(15-min)) | 2 h 15 min |
+# | 5 | MPC with barriers, and the first meetings | [09](09_passing.ipynb), [10](10_corridor.ipynb) | 1 h 40 min | [7.4-7.8](exercises/sheet7_controller.ipynb#7.4-MPC-on-a-road-(25-min)) | 2 h 15 min |
+# | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 2 h 50 min | [6.2-6.5](exercises/sheet6_robot.ipynb#6.2-gamma-by-experiment-(40-min)) | 1 h 25 min |
 
 # %% [markdown]
 # **The exercises** are functions that you write. `judges.check("velocity", velocity)` asks yours for many cases

@@ -24,11 +24,12 @@
 # repeats it all on a real day.
 
 # %% [markdown]
-# before: [Start here](00_start_here.ipynb) · next: [2 - Encounters of two people](02_encounters.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 1 · 25 min to read
+# before: [00](00_start_here.ipynb) · next: [2 - Encounters of two people](02_encounters.ipynb) ·
+# [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 1 · 25 min · exercises:
+# [1.1](exercises/sheet1_tracks.ipynb#1.1-Velocity-(5-min)),
+# [1.4-1.5](exercises/sheet1_tracks.ipynb#1.4-What-one-sample-a-second-loses-(20-min))
 #
 # **Afterwards you can** bring files of tracks to one clock, and say where two people can be watched.
-#
 # **Words.** *EWAP*: the walking pedestrians recorded at ETH Zürich, and the format of their files,
 # `obsmat`; *tidy*: of a table: one row for each observation, one column for each quantity.
 

@@ -22,13 +22,12 @@
 # in 92 days, about 176 a day.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [1 - Tracks and the area](01_tracks.ipynb) · next: [3 -
-# Outliers](03_outliers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 2-3 · 30 min to
-# read
+# [Start](00_start_here.ipynb) · before: [01](01_tracks.ipynb) · next: [3 - Outliers](03_outliers.ipynb) ·
+# [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 2-3 · 30 min · needs [01](01_tracks.ipynb) ·
+# exercises: [1.2-1.3](exercises/sheet1_tracks.ipynb#1.2-The-line-of-sight-(10-min))
 #
-# **Afterwards you can** say when two people meet alone, and compute where one sees the other.
-#
-# **Words.** *reference pedestrian*: the one of two people from whom the other is looked at.
+# **Afterwards you can** say when two people meet alone, and compute where one sees the other. **Words.**
+# *reference pedestrian*: the one of two people from whom the other is looked at.
 
 # %%
 from dataclasses import replace

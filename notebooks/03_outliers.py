@@ -24,9 +24,10 @@
 # rule takes away can be counted.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [2 - Encounters of two people](02_encounters.ipynb) · next: [4 -
-# The hull and its slices](04_hull.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4a · 40
-# min to read
+# [Start](00_start_here.ipynb) · before: [02](02_encounters.ipynb) · next: [4 - The hull and its
+# slices](04_hull.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4a · 40 min · needs
+# [02](02_encounters.ipynb) · exercises:
+# [2.1-2.5](exercises/sheet2_outliers.ipynb#2.1-Complementary-coordinates-(5-min))
 #
 # **Afterwards you can** say whom a rule for outliers finds, whom it misses, and why.
 

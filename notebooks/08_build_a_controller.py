@@ -21,16 +21,17 @@
 # same as `szlib.MPCCBF`.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [7 - Barriers](07_barriers.ipynb) · next: [9 - Passing a person who
-# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 50 min to
-# read
+# [Start](00_start_here.ipynb) · before: [07](07_barriers.ipynb) · next: [9 - Passing a person who
+# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 50 min ·
+# needs [07](07_barriers.ipynb) · exercises:
+# [7.1-7.8](exercises/sheet7_controller.ipynb#7.1-A-filter-on-a-road-(15-min)) · laboratory:
+# [13](13_laboratory.ipynb)
 #
-# **Afterwards you can** write an MPC-CBF yourself, and say what each of its terms is there for.
-#
-# **Words.** *CBF-QP*: a quadratic program for one step: as near to the wanted control as the barrier
-# allows; *IPOPT*: the solver for nonlinear optimisation that the paper uses; *MPC*: model predictive
-# control: plan some steps ahead, take the first, plan again; *slack*: by how much a row is violated; *SQP*:
-# sequential quadratic programming: solve quadratic problems in a row, each around the last answer.
+# **Afterwards you can** write an MPC-CBF yourself, and say what each of its terms is there for. **Words.**
+# *CBF-QP*: a quadratic program for one step: as near to the wanted control as the barrier allows; *IPOPT*:
+# the solver for nonlinear optimisation that the paper uses; *MPC*: model predictive control: plan some
+# steps ahead, take the first, plan again; *slack*: by how much a row is violated; *SQP*: sequential
+# quadratic programming: solve quadratic problems in a row, each around the last answer.
 
 # %%
 import casadi as ca

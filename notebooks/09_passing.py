@@ -22,14 +22,13 @@
 # adds that the robot passes on the right.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [8 - Build the controller yourself](08_build_a_controller.ipynb) ·
-# next: [10 - Meeting in a narrow corridor](10_corridor.ipynb) · [paper](https://arxiv.org/abs/2405.15101):
-# sec. 4, fig. 6a · 65 min to read
+# [Start](00_start_here.ipynb) · before: [08](08_build_a_controller.ipynb) · next: [10 - Meeting in a narrow
+# corridor](10_corridor.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6a · 65 min · needs
+# [07](07_barriers.ipynb) · exercises: [6.2](exercises/sheet6_robot.ipynb#6.2-gamma-by-experiment-(40-min))
+# · laboratory: [13](13_laboratory.ipynb)
 #
-# **Afterwards you can** say when the robot begins to avoid a person, and what chooses the side.
-#
-# **Words.** *infeasible*: of a step: no plan obeys all rows, so one that violates them least is taken, and
-# flagged.
+# **Afterwards you can** say when the robot begins to avoid a person, and what chooses the side. **Words.**
+# *infeasible*: of a step: no plan obeys all rows, so one that violates them least is taken, and flagged.
 
 # %%
 from dataclasses import replace

@@ -20,9 +20,11 @@
 # **Expectation.** The paper: the robot waits outside until the person is through, then it goes.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [10 - Meeting in a narrow corridor](10_corridor.ipynb) · next: [11b
-# - Yielding by making room](11b_making_room.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4,
-# fig. 6c · 35 min to read
+# [Start](00_start_here.ipynb) · before: [10](10_corridor.ipynb) · next: [11b - Yielding by making
+# room](11b_making_room.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6c · 35 min · needs
+# [10](10_corridor.ipynb) · exercises:
+# [6.4-6.5](exercises/sheet6_robot.ipynb#6.4-Predict,-then-run-(20-min)) · laboratory:
+# [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say why the robot waits, although no rule tells it to.
 

@@ -21,9 +21,9 @@
 # afterwards.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [11 - Yielding by waiting](11_waiting.ipynb) · next: [12 - Other
-# people's crowds](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 45
-# min to read
+# [Start](00_start_here.ipynb) · before: [11](11_waiting.ipynb) · next: [12 - Other people's
+# crowds](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6d · 45 min ·
+# laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say why the robot backs out of a passage, although no rule tells it to.
 

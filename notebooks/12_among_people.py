@@ -22,14 +22,13 @@
 # letter; how often it is void, and what the robot's goal costs then, nobody has said.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [11b - Yielding by making room](11b_making_room.ipynb) · next: [13
-# - The laboratory](13_laboratory.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 80 min to
-# read
+# [Start](00_start_here.ipynb) · before: [11b](11b_making_room.ipynb) · next: [13 - The
+# laboratory](13_laboratory.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 80 min · needs
+# [09](09_passing.ipynb) · laboratory: [13](13_laboratory.ipynb)
 #
-# **Afterwards you can** say which promises of the controller hold among people who react.
-#
-# **Words.** *jerk*: the change of acceleration by time; *ORCA*: a model of walking: each of two people
-# takes half of what keeps them apart.
+# **Afterwards you can** say which promises of the controller hold among people who react. **Words.**
+# *jerk*: the change of acceleration by time; *ORCA*: a model of walking: each of two people takes half of
+# what keeps them apart.
 
 # %%
 from dataclasses import replace

@@ -20,8 +20,8 @@
 # **Expectation.** Each step has a reason: a person, a wall, or a bound that the chosen acceleration lies on.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [12 - Other people's crowds](12_among_people.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 3-4 · 10 min to read
+# [Start](00_start_here.ipynb) · before: [12](12_among_people.ipynb) ·
+# [paper](https://arxiv.org/abs/2405.15101): sec. 3-4 · 10 min · needs [07](07_barriers.ipynb)
 #
 # **Afterwards you can** try out a scene of your own, live, and hand its settings on.
 

@@ -23,13 +23,13 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · next: [22 - The distances, audited](22_distances.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 4 · 40 min to read
+# [paper](https://arxiv.org/abs/2405.15101): sec. 4 · 40 min · needs [08](../08_build_a_controller.ipynb) ·
+# exercises: [6.3](../exercises/sheet6_robot.ipynb#6.3-The-terminal-proof-(15-min))
 #
-# **Afterwards you can** say when a step has no solution, and prove when there always is one.
-#
-# **Words.** *exact penalty*: a price on violations so high that none is paid where a solution without
-# violations exists; *fallback*: which of the controller's ways to a control was taken: hard, relaxed,
-# shifted, braking.
+# **Afterwards you can** say when a step has no solution, and prove when there always is one. **Words.**
+# *exact penalty*: a price on violations so high that none is paid where a solution without violations
+# exists; *fallback*: which of the controller's ways to a control was taken: hard, relaxed, shifted,
+# braking.
 
 # %%
 import sys

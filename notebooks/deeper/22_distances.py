@@ -23,9 +23,9 @@
 # distance between the two foci is not too large"; of the segment it says nothing.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [21 - Feasibility](21_feasibility.ipynb) · next: [23 - Against
-# everything else](23_comparison.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 3-7 · 30
-# min to read
+# [Start](../00_start_here.ipynb) · before: [21](21_feasibility.ipynb) · next: [23 - Against everything
+# else](23_comparison.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 3-7 · 30 min · needs
+# [07](../07_barriers.ipynb)
 #
 # **Afterwards you can** say where the two distances err, and which margin makes up for it.
 

@@ -23,13 +23,12 @@
 # the predicted future paths of pedestrians" (sec. 1), so wrong predictions should matter little.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [22 - The distances, audited](22_distances.ipynb) · next: [24 -
-# Data quality](24_data_quality.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 1, 5 · 30 min to
-# read
+# [Start](../00_start_here.ipynb) · before: [22](22_distances.ipynb) · next: [24 - Data
+# quality](24_data_quality.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 1, 5 · 30 min · needs
+# [09](../09_passing.ipynb)
 #
-# **Afterwards you can** compare zones and controllers in the same worlds, with intervals.
-#
-# **Words.** *bootstrap*: draw people anew from those there are, many times, to see how far a result moves.
+# **Afterwards you can** compare zones and controllers in the same worlds, with intervals. **Words.**
+# *bootstrap*: draw people anew from those there are, many times, to see how far a result moves.
 
 # %%
 import sys

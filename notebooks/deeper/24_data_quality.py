@@ -22,8 +22,9 @@
 # silence: each row is used, or counted by the reason why not.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [23 - Against everything else](23_comparison.ipynb) · next: [25
-# - What is true?](25_claims.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 40 min to read
+# [Start](../00_start_here.ipynb) · before: [23](23_comparison.ipynb) · next: [25 - What is
+# true?](25_claims.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 40 min · needs
+# [03](../03_outliers.ipynb)
 #
 # **Afterwards you can** judge whether a file of tracks can be used, and find days unlike the others.
 

@@ -22,8 +22,9 @@
 # has to be chosen.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [25 - What is true?](25_claims.ipynb) · next: [27 - A
-# sensitivity atlas](27_atlas.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 40 min to read
+# [Start](../00_start_here.ipynb) · before: [25](25_claims.ipynb) · next: [27 - A sensitivity
+# atlas](27_atlas.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 40 min · needs
+# [12](../12_among_people.ipynb)
 #
 # **Afterwards you can** say in which meetings this controller is good, and in which it is bad.
 

@@ -20,8 +20,8 @@
 # claims is supported by some data and not by other data. What it says about comfort cannot be tested here.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [27 - A sensitivity atlas](27_atlas.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): all · 10 min to read
+# [Start](../00_start_here.ipynb) · before: [27](27_atlas.ipynb) ·
+# [paper](https://arxiv.org/abs/2405.15101): all · 10 min
 #
 # **Afterwards you can** find each sentence of the paper with its code, its cell and its verdict.
 

@@ -22,8 +22,8 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 5](sheet5_barriers.ipynb) · next: [sheet
 # 7](sheet7_controller.ipynb) · [to do](../exercises/sheet6_robot.ipynb) ·
-# [solved](../solutions/sheet6_robot.ipynb) · 1 h 30 min · belongs to [11](../11_waiting.ipynb),
-# [11b](../11b_making_room.ipynb), [12](../12_among_people.ipynb), [13](../13_laboratory.ipynb)
+# [solved](../solutions/sheet6_robot.ipynb) · 1 h 30 min · belongs to [07](../07_barriers.ipynb),
+# [09](../09_passing.ipynb), [11](../11_waiting.ipynb), [21](../deeper/21_feasibility.ipynb)
 
 # %%
 import judges

@@ -24,7 +24,7 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 6](sheet6_robot.ipynb) · [to
 # do](../exercises/sheet7_controller.ipynb) · [solved](../solutions/sheet7_controller.ipynb) · 3 h 20 min ·
-# belongs to [08](../08_build_a_controller.ipynb), [09](../09_passing.ipynb), [10](../10_corridor.ipynb)
+# belongs to [08](../08_build_a_controller.ipynb)
 
 # %%
 import judges

@@ -22,8 +22,7 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 1](sheet1_tracks.ipynb) · next: [sheet
 # 3](sheet3_zones.ipynb) · [to do](../exercises/sheet2_outliers.ipynb) ·
-# [solved](../solutions/sheet2_outliers.ipynb) · 1 h 05 min · belongs to [03](../03_outliers.ipynb),
-# [04](../04_hull.ipynb)
+# [solved](../solutions/sheet2_outliers.ipynb) · 1 h 05 min · belongs to [03](../03_outliers.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.

@@ -22,7 +22,8 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 2](sheet2_outliers.ipynb) · next: [sheet
 # 4](sheet4_certainty.ipynb) · [to do](../exercises/sheet3_zones.ipynb) ·
-# [solved](../solutions/sheet3_zones.ipynb) · 3 h 35 min · belongs to [05](../05_zones.ipynb)
+# [solved](../solutions/sheet3_zones.ipynb) · 3 h 35 min · belongs to [04](../04_hull.ipynb),
+# [05](../05_zones.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.

@@ -22,8 +22,8 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 3](sheet3_zones.ipynb) · next: [sheet
 # 5](sheet5_barriers.ipynb) · [to do](../exercises/sheet4_certainty.ipynb) ·
-# [solved](../solutions/sheet4_certainty.ipynb) · 1 h 00 min · belongs to [06](../06_respect.ipynb),
-# [07](../07_barriers.ipynb)
+# [solved](../solutions/sheet4_certainty.ipynb) · 1 h 00 min · belongs to [04](../04_hull.ipynb),
+# [05](../05_zones.ipynb), [06](../06_respect.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.

@@ -22,8 +22,7 @@
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [sheet 4](sheet4_certainty.ipynb) · next: [sheet
 # 6](sheet6_robot.ipynb) · [to do](../exercises/sheet5_barriers.ipynb) ·
-# [solved](../solutions/sheet5_barriers.ipynb) · 1 h 10 min · belongs to [06](../06_respect.ipynb),
-# [07](../07_barriers.ipynb)
+# [solved](../solutions/sheet5_barriers.ipynb) · 1 h 10 min · belongs to [07](../07_barriers.ipynb)
 
 # %%
 # Solution: the judges are in the folder of the sheets.

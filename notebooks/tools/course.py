@@ -9,9 +9,9 @@ glossary, are in this file. A test checks that the cells in the notebooks are up
 import math
 import os
 import re
-import sys
 import textwrap
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import jupytext
@@ -20,7 +20,6 @@ import nbformat
 from szlib.workbook import folders
 
 HERE = Path(__file__).parents[1]
-sys.path.append(str(HERE / "exercises"))  # the judges
 START = "00_start_here"
 PAPER = "https://arxiv.org/abs/2405.15101"
 WORDS, LINES = 120, 8
@@ -31,6 +30,8 @@ FOLD = re.compile(r"<details.*?</details>", re.DOTALL)
 FORMULA = re.compile(r"\$\$.+?\$\$", re.DOTALL)
 RULED = re.compile(r"^\|[ :|-]+\|$", re.MULTILINE)
 """The line below the header of a Markdown table."""
+TASK = re.compile(r"^# ## ((\d\.\d) .*\b(\d+) min\))$", re.MULTILINE)
+"""The heading of a task in an exercise sheet."""
 HEADING = "**Afterwards you can** "
 
 GIVES: dict[str, tuple[str, str]] = {
@@ -68,6 +69,28 @@ GIVES: dict[str, tuple[str, str]] = {
     "28": ("all", "find each sentence of the paper with its code, its cell and its verdict."),
 }
 """By number of the notebook: the section of the paper, and what a reader can do after reading it."""
+NEEDS: dict[str, str] = {
+    "02": "01", "03": "02", "04": "03", "05": "04", "06": "05", "07": "05", "08": "07", "09": "07", "10": "09",
+    "11": "10", "12": "09", "13": "07", "21": "08", "22": "07", "23": "09", "24": "03", "25": "06", "26": "12",
+    "27": "11",
+}  # fmt: skip
+"""By number of the notebook: the chapter that it builds on."""
+EXERCISES: dict[str, tuple[str, ...]] = {
+    "01": ("1.1", "1.4-1.5"),
+    "02": ("1.2-1.3",),
+    "03": ("2.1-2.5",),
+    "04": ("3.1-3.2", "4.2"),
+    "05": ("3.3-3.5", "4.1"),
+    "06": ("4.3-4.5",),
+    "07": ("5.1-5.5", "6.1"),
+    "08": ("7.1-7.8",),
+    "09": ("6.2",),
+    "11": ("6.4-6.5",),
+    "21": ("6.3",),
+}
+"""By number of the notebook: the tasks of the exercise sheets that belong to it."""
+LABORATORY, FIRST_SCENE = "13", "07"
+"""The laboratory, and the first chapter that links to it."""
 
 
 @dataclass(frozen=True)
@@ -150,14 +173,14 @@ GLOSSARY: dict[str, Word] = {
 """The words that the notebooks use, and their meanings."""
 
 WEEKS: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = [
-    ("Tracks of people, and their encounters", ("01", "02"), ("sheet1_tracks",)),
-    ("Which samples to believe, and the nearest people", ("03", "04"), ("sheet2_outliers",)),
-    ("From samples to a zone", ("05",), ("sheet3_zones",)),
-    ("Respect or emptiness; from a zone to a barrier", ("06", "07"), ("sheet4_certainty", "sheet5_barriers")),
-    ("A controller of your own, and its first meetings", ("08", "09", "10"), ("sheet7_controller",)),
-    ("The robot yields, and drives among people", ("11", "11b", "12", "13"), ("sheet6_robot",)),
+    ("Tracks, encounters, and which of them to believe", ("01", "02", "03"), ("1.1-1.5", "2.1-2.5")),
+    ("From samples to a zone; respect or emptiness", ("04", "05", "06"), ("3.1-3.3", "4.1-4.5")),
+    ("A zone of your own, and a barrier around it", ("07",), ("3.4-3.5", "6.1")),
+    ("A controller of your own", ("08",), ("5.1-5.5", "7.1-7.3")),
+    ("MPC with barriers, and the first meetings", ("09", "10"), ("7.4-7.8",)),
+    ("The robot yields, and drives among people", ("11", "11b", "12", "13"), ("6.2-6.5",)),
 ]
-"""Topic, chapters and exercise sheets of each of six weeks."""
+"""Topic, chapters and tasks of the exercise sheets of each of six weeks."""
 ROUTES: list[tuple[str, tuple[str, ...]]] = [
     ("An hour: the idea", ("02", "05", "07", "10", "13")),
     ("A day: the method", ("01", "02", "03", "04", "05", "06", "07", "08", "09", "10", "11", "11b", "12")),
@@ -261,42 +284,70 @@ def first_uses(story: list[Page]) -> dict[str, str]:
 
 
 def make_navigation(page: Page, story: list[Page], uses: dict[str, str]) -> str:
-    """The navigation cell of a notebook."""
+    """The navigation cell of a notebook: a line of facts, then what it gives, and its new words."""
     at = [each.number for each in story].index(page.number)
+    before, after = (
+        [p for p in part if p.is_chapter == page.is_chapter] for part in (story[:at], story[at + 1 :])
+    )
     places = [f"[Start]({'' if page.is_chapter else '../'}{START}.ipynb)"] if at > 1 else []
-    beside = ("before", story[max(at - 1, 0) : at]), ("next", story[at + 1 : at + 2])
-    places += [
-        f"{word}: {_link(p, page)}"
-        for word, found in beside
-        for p in found
-        if p.is_chapter == page.is_chapter
-    ]
+    places += [f"before: {_number_link(each, page)}" for each in before[-1:]]
+    places += [f"next: {_link(each, page)}" for each in after[:1]]
     section, aim = GIVES[page.number]
-    places += [f"[paper]({PAPER}): {section}", f"{page.minutes} min to read"]
-    paragraphs = [_wrapped(" · ".join(places)), _wrapped(HEADING + aim)]
+    places += [f"[paper]({PAPER}): {section}", f"{page.minutes} min"]
+    places += [f"needs {_number_link(p, page)}" for p in story if p.number == NEEDS.get(page.number)]
+    tasks = [_task_link(each, page) for each in EXERCISES.get(page.number, ())]
+    places += [f"exercises: {', '.join(tasks)}"] if tasks else []
+    if page.is_chapter and FIRST_SCENE <= page.number < LABORATORY:
+        places += [f"laboratory: {_number_link(p, page)}" for p in after if p.number == LABORATORY]
     new = sorted(
         (word for word, number in uses.items() if number == page.number and GLOSSARY[word].new), key=str.lower
     )
-    if new:
-        paragraphs.append(
-            _wrapped(f"**Words.** {'; '.join(f'*{word}*: {GLOSSARY[word].means}' for word in new)}.")
-        )
-    return "\n\n".join(paragraphs)
+    words = "; ".join(f"*{word}*: {GLOSSARY[word].means}" for word in new)
+    gives = f"{HEADING}{aim}" + (f" **Words.** {words}." if new else "")
+    return f"{_wrapped(' · '.join(places))}\n\n{_wrapped(gives)}"
 
 
 def make_sheet_navigation(name: str) -> str:
     """The navigation cell of an exercise sheet, the same in both folders."""
-    from judges import SHEETS, sheet_minutes
-
-    names, minutes = list(SHEETS), sheet_minutes(name)
+    names = sorted({sheet for sheet, _, _ in tasks().values()})
     at = names.index(name)
     places = [f"[Start](../{START}.ipynb)"]
     places += [f"before: [sheet {each[5]}]({each}.ipynb)" for each in names[max(at - 1, 0) : at]]
     places += [f"next: [sheet {each[5]}]({each}.ipynb)" for each in names[at + 1 : at + 2]]
-    places += [f"[to do](../exercises/{name}.ipynb)", f"[solved](../solutions/{name}.ipynb)", _time(minutes)]
-    (numbers,) = [numbers for _, numbers, sheets in WEEKS if name in sheets]
-    links = ", ".join(f"[{p.number}](../{p.source.stem}.ipynb)" for p in pages() if p.number in numbers)
-    return _wrapped(" · ".join([*places, f"belongs to {links}"]))
+    places += [f"[to do](../exercises/{name}.ipynb)", f"[solved](../solutions/{name}.ipynb)"]
+    places += [_time(sum(minutes for sheet, _, minutes in tasks().values() if sheet == name))]
+    here = _page(HERE / "solutions" / f"{name}.py")
+    owners = [p for p in pages() if any(each[0] == name[5] for each in EXERCISES.get(p.number, ()))]
+    places += [f"belongs to {', '.join(_number_link(each, here) for each in owners)}"]
+    return _wrapped(" · ".join(places))
+
+
+@cache
+def tasks() -> dict[str, tuple[str, str, int]]:
+    """The sheet, the heading and the time [min] of each task, by its number, such as "5.1"."""
+    found = {}
+    for sheet in sorted((HERE / "solutions").glob("sheet*.py")):
+        for heading, number, minutes in TASK.findall(sheet.read_text(encoding="utf-8")):
+            found[number] = sheet.stem, heading, int(minutes)
+    return found
+
+
+def expand(tasks_of: str) -> list[str]:
+    """The numbers of the tasks in a range: "5.1-5.3" is 5.1, 5.2 and 5.3."""
+    first, _, last = tasks_of.partition("-")
+    sheet, start = first.split(".")
+    return [f"{sheet}.{number}" for number in range(int(start), int((last or first).split(".")[1]) + 1)]
+
+
+def _task_link(tasks_of: str, start: Page) -> str:
+    """A range of tasks as a link to the first of them."""
+    sheet, heading, _ = tasks()[expand(tasks_of)[0]]
+    folder = Path(os.path.relpath(HERE / "exercises", start.source.parent)).as_posix()
+    return f"[{tasks_of}]({folder}/{sheet}.ipynb#{heading.replace(' ', '-')})"
+
+
+def _number_link(page: Page, start: Page) -> str:
+    return f"[{page.number}]({_path(page, start)})"
 
 
 def _wrapped(text: str) -> str:
@@ -323,20 +374,16 @@ def make_map(story: list[Page]) -> str:
 
 def make_routes(story: list[Page]) -> str:
     """The cell of 00 with the three routes."""
-    from judges import sheet_minutes
-
     rows = ["## Three routes", ""]
     for name, numbers in ROUTES:
         links, minutes = _links_and_time(story, numbers)
         rows.append(f"- **{name}.** {links}: {minutes} to read.")
-    rows.append(
-        "- **Six weeks: the course.** One exercise sheet a week; running and looking around come on top."
-    )
-    rows += ["", "| week | topic | notebooks | to read | sheet | to do |", "|---|---|---|---|---|---|"]
-    for week, (topic, numbers, sheets) in enumerate(WEEKS, 1):
+    rows.append("- **Six weeks: the course.** Running and looking around come on top.")
+    rows += ["", "| week | topic | notebooks | to read | exercises | to do |", "|---|---|---|---|---|---|"]
+    for week, (topic, numbers, ranges) in enumerate(WEEKS, 1):
         links, minutes = _links_and_time(story, numbers)
-        work = _time(sum(sheet_minutes(sheet) for sheet in sheets))
-        to_do = ", ".join(f"[sheet {sheet[5]}](exercises/{sheet}.ipynb)" for sheet in sheets)
+        work = _time(sum(tasks()[each][2] for part in ranges for each in expand(part)))
+        to_do = ", ".join(_task_link(each, story[0]) for each in ranges)
         rows.append(f"| {week} | {topic} | {links} | {minutes} | {to_do} | {work} |")
     return "\n".join(rows)
 
@@ -344,7 +391,7 @@ def make_routes(story: list[Page]) -> str:
 def _links_and_time(story: list[Page], numbers: tuple[str, ...]) -> tuple[str, str]:
     """Links to notebooks, and the time to read them."""
     chosen = [page for page in story if page.number in numbers]
-    links = ", ".join(f"[{page.number}]({_path(page, story[0])})" for page in chosen)
+    links = ", ".join(_number_link(page, story[0]) for page in chosen)
     return links, _time(sum(page.minutes for page in chosen))
 
 
@@ -360,7 +407,7 @@ def make_glossary(story: list[Page], uses: dict[str, str]) -> str:
     rows = ["## Words", "", "| word | meaning | first used in |", "|---|---|---|"]
     for word in sorted(uses, key=str.lower):
         page = by_number[uses[word]]
-        rows.append(f"| {word} | {GLOSSARY[word].means} | [{page.number}]({_path(page, story[0])}) |")
+        rows.append(f"| {word} | {GLOSSARY[word].means} | {_number_link(page, story[0])} |")
     return "\n".join(rows)
 
 

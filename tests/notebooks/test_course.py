@@ -7,7 +7,7 @@ from collections import Counter
 import jupytext
 import nbformat
 import pytest
-from judges import SHEETS
+from judges import ESSAY_MINUTES, SHEETS
 
 import szlib
 from szlib.workbook import folders
@@ -53,7 +53,7 @@ def test_navigation_and_maps_are_up_to_date(scripts):
 def test_navigation_states_reading_time_and_aim(page):
     (navigation,) = [c.source for c in page.cells if course.HEADING in c.source]
     assert page.cells[1].source == navigation
-    (minutes,) = re.findall(r"(\d+)\s+min\s+to\s+read", navigation)
+    (minutes,) = re.findall(r"·\s(\d+)\smin\b", navigation)
     assert abs(int(minutes) - page.minutes) <= 5, "python notebooks/tools/course.py"
     assert re.search(r"\[paper\]\(https://arxiv.org/abs/2405.15101\):\s(all|sec)", navigation)
 
@@ -62,20 +62,55 @@ def test_navigation_states_reading_time_and_aim(page):
 def test_every_link_has_a_target(folder):
     for source in folder.glob("*[0-9]*_*.py"):
         prose = [c.source for c in jupytext.read(source).cells if c.cell_type == "markdown"]
-        links = re.findall(r"\]\(([^)#]+)\)", "\n".join(prose))
+        links = re.findall(r"\]\(([^)#]+)[)#]", "\n".join(prose))
         files = [(folder / link) for link in links if not link.startswith("http")]
         files = [file.with_suffix(".py") if file.suffix == ".ipynb" else file for file in files]  # of a pair
         missing = [file.name for file in files if not file.exists()]
         assert missing == [], source.name
 
 
-def test_the_course_reads_every_notebook_and_does_every_sheet_once():
+def test_the_course_reads_every_notebook_and_does_every_task_once():
     numbers = Counter(number for _, numbers, _ in course.WEEKS for number in numbers)
     assert set(numbers.values()) == {1}
     assert set(numbers) == {page.number for page in STORY if page.is_chapter} - {"00"}
-    assert sorted(sheet for _, _, sheets in course.WEEKS for sheet in sheets) == list(SHEETS)
+    done = Counter(task for _, _, ranges in course.WEEKS for part in ranges for task in course.expand(part))
+    assert done == dict.fromkeys(course.tasks(), 1)
     assert len(course.WEEKS) == 6
     assert {page.number for page in STORY} <= set(course.GIVES)
+
+
+def test_every_task_belongs_to_one_notebook_and_comes_after_it():
+    owners = {n: [t for part in parts for t in course.expand(part)] for n, parts in course.EXERCISES.items()}
+    belongs = Counter(task for tasks in owners.values() for task in tasks)
+    assert belongs == dict.fromkeys(course.tasks(), 1)
+    assert set(owners) <= {page.number for page in STORY}
+    unread = {page.number for page in STORY if page.is_chapter}
+    for _, numbers, ranges in course.WEEKS:
+        unread -= set(numbers)
+        early = {n for n, tasks in owners.items() for part in ranges if set(tasks) & set(course.expand(part))}
+        assert not early & unread
+
+
+def test_tasks_and_times_are_those_of_the_judges():
+    for sheet, tasks in SHEETS.items():
+        found = [minutes for name, _, minutes in course.tasks().values() if name == sheet]
+        assert found == [*(task.minutes for task in tasks), ESSAY_MINUTES]
+
+
+def test_weeks_take_about_the_same_time():
+    minutes = {page.number: page.minutes for page in STORY}
+    times = [
+        sum(minutes[n] for n in numbers)
+        + sum(course.tasks()[task][2] for part in ranges for task in course.expand(part))
+        for _, numbers, ranges in course.WEEKS
+    ]
+    assert max(times) <= 1.6 * min(times), times
+
+
+def test_what_a_notebook_needs_is_an_earlier_chapter():
+    order = [page.number for page in STORY]
+    for number, needed in course.NEEDS.items():
+        assert order.index(needed) < order.index(number)
 
 
 # --- reading times -----------------------------------------------------------------------------------
