@@ -12,36 +12,26 @@
 # ---
 
 # %% [markdown]
-# # 7 - Barriers
+# # 7 - Barriers: how fast may the robot approach?
 #
-# **Question.** How does "stay out of the zone" become something that a controller can obey, ten
-# times a second?
+# **Question.** The zone says where the robot must not be. How fast may it come closer?
 #
-# **Expectation.** A function $h$ that is zero at the edge, positive outside, and may fall only so
-# fast. As long as each step has a solution, a robot that starts outside stays outside, and slows
-# down as it comes near.
+# **Expectation.** One line of mathematics turns a distance into a limit of the speed: none far away, and
+# zero at the edge.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [06](06_respect.ipynb) · next: [8 - Build the controller
-# yourself](08_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 1-7 · 25
-# min · needs [05](05_zones.ipynb) · exercises:
-# [5.1-5.5](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)),
-# [6.1](exercises/sheet6_robot.ipynb#6.1-The-speed-limit-(5-min)) · laboratory: [13](13_laboratory.ipynb)
+# [Start](00_start_here.ipynb) · before: [6 - Respect or emptiness?](06_respect.ipynb) · next: [8 - Build
+# the controller yourself](08_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3,
+# eq. 1-7 · 25 min to read
 #
 # **Afterwards you can** turn a distance into a condition on the next step, and say what gamma does.
-# **Words.** *class K*: of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is
-# gamma times h.
+#
+# **Words.** *CBF-QP*: a quadratic program for one step: as near to the wanted control as the barrier
+# allows; *class K*: of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is gamma
+# times h.
 
-# %%
-import matplotlib.pyplot as plt
-import numpy as np
-
-import szlib
-from szlib.control import barriers
-from szlib.workbook import figures
-from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters
-
-# %% tags=["parameters"]
+# %% jupyter={"source_hidden": true} tags=["parameters"]
+# Parameters of this notebook
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
@@ -49,110 +39,348 @@ results = "../results"
 gamma = 0.05
 zone_speed = 1.1  # whose zone the robot keeps [m/s], as in notebook 05
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Imports, and the record of the run
+import matplotlib.pyplot as plt
+import numpy as np
+from IPython.display import Markdown
+from matplotlib.patches import Circle
+
+import szlib
+from szlib.control import barriers
+from szlib.workbook import figures
+from szlib.workbook.record import PAPER, TUNED, NotebookRecord, parameters
+
 record = NotebookRecord("07_barriers", globals())
 settings = szlib.MPCSettings(gamma=gamma, zone_speed=zone_speed)
+zone = record.cache.ellipse()
 parameters(
     [
         ("robot radius", f"{settings.r_robot} m", PAPER, "a cylinder"),
         ("margin eps", f"{settings.eps} m", PAPER, "for the error of the approximate distances"),
         ("zone", f"{zone_speed:g} m/s", PAPER, "1.1 m/s: a little more than the robot's top speed"),
-        (
-            "gamma",
-            settings.gamma,
-            TUNED,
-            "on the paper's four scenarios; in 2,000 other worlds: notebook 09",
-        ),
+        ("gamma", gamma, TUNED, "on the paper's four scenarios; in 2,000 other worlds: notebook 09"),
     ]
+)
+
+# %% jupyter={"source_hidden": true}
+# Figure
+reach = zone.curve()[:, 0].max()
+keep_off = settings.r_robot + settings.eps
+v_max, steps = settings.v_max, np.linspace(0, 3, 61)
+fig, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained", width_ratios=(1.5, 1))
+left.fill(*zone.curve().T, color=figures.RED, alpha=0.2, label="zone")
+left.plot(0, 0, marker=(3, 0, -90), color=figures.RED, markersize=10, linestyle="", label="person")
+left.add_patch(Circle((reach + keep_off + 1, 0), settings.r_robot, color=figures.BLUE, label="robot"))
+left.annotate("", (reach, 0), (reach + 1 + settings.eps, 0), arrowprops={"arrowstyle": "<->"})
+left.text(reach + 0.5, 0.12, "h = 1 m", ha="center")
+left.set(xlim=(-1.3, 4.1), ylim=(-1.3, 1.3))
+figures.label_metres(left, "h: the free distance from robot to zone")
+left.legend(loc="lower right", fontsize=8)
+right.plot(steps, gamma * steps / settings.dt, color=figures.BLUE)
+right.fill_between(steps, gamma * steps / settings.dt, 2, color=figures.GREY, alpha=0.4, label="forbidden")
+right.axhline(v_max, color=figures.BLACK, linestyle=":", label="top speed of the robot")
+right.plot(1, gamma / settings.dt, "o", color=figures.BLUE, label=f"h = 1 m: {gamma / settings.dt:.2g} m/s")
+right.set(xlim=(0, 3), ylim=(0, 2), xlabel="h [m]", ylabel="speed of approach [m/s]")
+right.set_title(f"The robot slows down when h < {v_max * settings.dt / gamma:.2g} m")
+right.legend(loc="lower right", fontsize=8)
+record.figure(fig, "limit")
+
+# %% [markdown]
+# ## A number first
+#
+# The robot is $h = 1$ m away from the zone of a person who stands. We allow $h$ to shrink by at most 5 % in each
+# step of 0.1 s. How fast may the robot approach?
+#
+# 5 % of 1 m is 5 cm. 5 cm in 0.1 s are **0.5 m/s**.
+#
+# Now the person walks towards the robot at 0.5 m/s. Both together may use up 5 cm in a step. The person alone
+# uses up all of it. **0 m/s** is left for the robot.
+
+
+# %%
+def allowed_speed(h, gamma=0.05, dt=0.1, person_speed=0.0):
+    return gamma * h / dt - person_speed
+
+
+for person_speed in (0.0, 0.5, 1.0):
+    print(f"person at {person_speed:g} m/s: robot {allowed_speed(1.0, person_speed=person_speed):+.1f} m/s")
+
+# %% [markdown]
+# The last line is negative: the robot has to go **back**. Nobody programmed that. It follows from the 5 %.
+
+# %% [markdown]
+# ## The discrete barrier condition
+#
+# This is all of the paper's eq. 1:
+#
+# $$h(\mathbf{x}_{k+1}) - h(\mathbf{x}_k) \ge -\gamma\, h(\mathbf{x}_k)$$
+#
+# - $\mathbf{x}_k$ is the state in step $k$, and $h$ is the *barrier function*: 0 at the edge of what is allowed,
+#   positive inside of it [m].
+# - $\gamma$ is the share of $h$ that one step may use up, between 0 and 1; it was 5 % above.
+#
+# A controller wants some speed, for example the top speed towards its goal. It takes the allowed speed that is
+# nearest to the wanted one. That is a *quadratic program* (CBF-QP):
+#
+# $$\min_v\ (v - v_{wanted})^2 \quad\text{subject to}\quad v \le \gamma h / \Delta t - v_{person}$$
+#
+# In one dimension its solution is the smaller of two numbers.
+
+
+# %%
+def approach(gamma, h=4.0, v_wanted=1.0, dt=0.1, duration=10.0):
+    """Speed and h of a robot that drives towards a person who stands."""
+    run = []
+    for _ in range(round(duration / dt)):
+        v = min(v_wanted, allowed_speed(h, gamma, dt))
+        run.append((h, v))
+        h = h - v * dt
+    return np.array(run)
+
+
+# %% [markdown]
+# **What do you think?** The first robot may use up 2 % of $h$ in a step, the second 5 %, the third 20 %. Which
+# one slows down first? Which one ends nearest to the zone? Write it down, then look.
+
+# %% jupyter={"source_hidden": true}
+# Figure
+shares = sorted({gamma, 0.02, 0.2})
+fig, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
+for share, line, colour in zip(shares, (":", "-", "--"), figures.pick_colours(shares), strict=False):
+    h, v = approach(share).T
+    t = settings.dt * np.arange(len(h))
+    left.plot(t, v, line, color=colour, label=f"gamma = {share:g}")
+    right.plot(t, h, line, color=colour)
+starts = {share: allowed_speed(1.0, share) ** -1 for share in shares}
+left.set(xlabel="time [s]", ylabel="speed [m/s]", title="A small gamma slows the robot down early")
+right.set(xlabel="time [s]", ylabel="h [m]", title="No gamma lets h become negative", ylim=(-0.1, None))
+right.axhline(0, color=figures.RED, linewidth=1)
+left.legend()
+record.figure(fig, "gamma")
+
+# %% jupyter={"source_hidden": true}
+# Checks, and the answer
+lowest = min(approach(share)[:, 0].min() for share in shares)
+record.check("the robot of the worked example never enters the zone", lowest > 0, f"least h {lowest:.1g} m")
+Markdown(
+    "<details><summary>Answer</summary>\n\nThe robot slows down where its limit "
+    r"$\gamma h / \Delta t$ becomes smaller than the speed that it wants: at $h = v\,\Delta t / \gamma$. For 1 m/s that is "
+    + ", ".join(f"{start:.1f} m with gamma = {share:g}" for share, start in starts.items())
+    + ". All of them end at the same place, the edge of the zone. Gamma sets **when** the robot slows down, "
+    "not how near it comes.\n\n</details>"
+)
+
+# %% [markdown]
+# ## Theory: why h stays positive for ever
+#
+# **Forward invariance.** Write eq. 1 as $h_{k+1} \ge (1-\gamma)\,h_k$. After $k$ steps
+#
+# $$h_k \ge (1-\gamma)^k\, h_0 > 0$$
+#
+# A robot that starts outside the zone stays outside for ever, *if every step has a solution*. The safe set
+# $\{h \ge 0\}$ is then called forward invariant. Hold on to the *if*: it is the subject of the next figure.
+#
+# **Class K.** Instead of $\gamma h$, any function $\alpha(h)$ will do that is 0 at 0, grows, and is never larger
+# than $h$. Such functions are called *class K*. The paper takes the simplest one.
+#
+# **From continuous to discrete.** In continuous time the condition is $\dot h \ge -\alpha\,h$ with a rate
+# $\alpha$ [1/s] (Ames et al., 2019), and $h(t) \ge e^{-\alpha t} h_0$. Over one step of $\Delta t$ that is
+#
+# $$\gamma = 1 - e^{-\alpha \Delta t} \approx \alpha\, \Delta t$$
+#
+# So gamma depends on the step. A controller with half the step needs about half of gamma to drive alike:
+
+# %%
+alpha = -np.log(1 - 0.05) / 0.1
+for dt in (0.1, 0.05, 0.02):
+    print(f"dt = {dt:4g} s: gamma = {1 - np.exp(-alpha * dt):.4f}")
+
+# %% [markdown]
+# **Relative degree.** So far the robot chose its *speed*. A real robot chooses its *acceleration* $a$. In one
+# step that moves it by only
+#
+# $$\tfrac12\, a\, \Delta t^2 = \tfrac12 \cdot 1\ \mathrm{m/s^2} \cdot (0.1\ \mathrm{s})^2 = 5\ \mathrm{mm}$$
+#
+# while the speed of 1 m/s moves it by 10 cm. (In continuous time $a$ appears in the *second* derivative of $h$
+# only: the relative degree is 2.) If the robot arrives too fast, no acceleration keeps eq. 1 in the next step.
+#
+# **How large may gamma be?** On the limit, $v = \gamma h/\Delta t$. As $h$ shrinks at the rate $v$, the robot has to
+# brake at $\gamma v/\Delta t$. With gamma = 0.05 and 1 m/s that is 0.5 m/s²: half of what it can. With gamma = 0.2 it
+# is 2 m/s², and it can do 1 m/s².
+#
+# **The remedy** is to look ahead: eq. 1 for the next $N_h$ steps, not for one. In code: is there an
+# acceleration now, followed by full braking, that obeys eq. 1 in $N_h$ steps?
+
+
+# %%
+def obeys(a, h, v, gamma, N_h, dt=0.1, a_max=1.0):
+    for _ in range(N_h):
+        h_next = h - v * dt - a * dt**2 / 2
+        if h_next < (1 - gamma) * h - 1e-12:
+            return False
+        h, v = h_next, v + a * dt
+        a = max(-a_max, -v / dt)  # then brake, until the robot stands
+    return True
+
+
+def drive(gamma, N_h, h=3.0, v=1.0, dt=0.1, a_max=1.0, v_max=1.0):
+    run = []
+    for _ in range(60):
+        brake = max(-a_max, -v / dt)
+        choices = np.linspace(min(a_max, (v_max - v) / dt), brake, 401)
+        a = next((a for a in choices if obeys(a, h, v, gamma, N_h)), np.nan)
+        run.append((h, v, a))
+        a = brake if np.isnan(a) else a
+        h, v = h - v * dt - a * dt**2 / 2, v + a * dt
+    return np.array(run)
+
+
+# %% [markdown]
+# **What do you think?** With gamma = 0.2 and top speed 1 m/s: what happens to the robot that looks one step
+# ahead? How many steps are enough?
+
+# %% jupyter={"source_hidden": true}
+# Figure
+fig, ax = plt.subplots(figsize=(7.5, 4), layout="constrained")
+runs = {n: drive(0.2, n) for n in (1, 2, 8)}
+for (n, run), line, colour in zip(
+    runs.items(), ("-", "--", "-."), figures.pick_colours(list(runs)), strict=True
+):
+    h, v, a = run.T
+    ax.plot(h, v, line, color=colour, label=f"N_h = {n}: least h {100 * h.min():.0f} cm")
+    ax.plot(h[np.isnan(a)], v[np.isnan(a)], "x", color=colour)
+ax.plot([], [], "kx", label="no acceleration obeys eq. 1")
+ax.plot([0, 0.6], [0, 1.2], color=figures.RED, linewidth=1, label="limit gamma h / dt")
+ax.axvspan(-0.2, 0, color=figures.RED, alpha=0.15, lw=0, label="inside the zone")
+ax.set(xlim=(1.2, -0.2), ylim=(0, 1.1), xlabel="h [m] (the robot comes from the left)", ylabel="speed [m/s]")
+ax.set_title(
+    f"One step ahead is too late: h falls to {100 * runs[1][:, 0].min():.0f} cm; eight steps are enough"
+)
+ax.legend(loc="lower left", fontsize=8)
+record.figure(fig, "steps-ahead")
+
+# %% jupyter={"source_hidden": true}
+# Checks, and the answer
+without = {n: int(np.isnan(run[:, 2]).sum()) for n, run in runs.items()}
+lows = {n: float(run[:, 0].min()) for n, run in runs.items()}
+evidence = f"least h {lows[1]:.2f} m and {lows[8]:.2f} m"
+too_late = without[1] > 0 and lows[1] < 0
+record.check("with gamma = 0.2 and N_h = 1 the robot enters the zone", too_late, evidence, always=True)
+enough = without[8] == 0 and lows[8] >= 0
+record.check("with gamma = 0.2 and N_h = 8 every step has a solution", enough, evidence, always=True)
+Markdown(
+    "<details><summary>Answer</summary>\n\n"
+    f"With $N_h = 1$ it brakes at h = {runs[1][runs[1][:, 1] < 0.99][0, 0]:.2f} m, when it can no longer stop, and enters the zone "
+    f"by {-lows[1]:.2f} m. With $N_h = 2$, {without[2]} steps have no solution, but full braking is just in time. With "
+    "$N_h = 8$ every step has a solution. A smaller gamma helps as well: it brakes early and gently. The paper takes "
+    "$N_h = 2$; with gamma = 0.05 that is enough for one person who stands. Notebook 21 shows where it is not.\n\n</details>"
 )
 
 # %% [markdown]
 # ## Distance to a person's zone
 #
-# An ellipse with centre $(m, n)$ and angle $\theta$ (eq. 6, whose second term lacks the minus
-# sign in the paper) has the foci $\mathbf{c}_{a,b} = (m,n) \pm \sqrt{a^2-b^2}\,(\cos\theta,
-# \sin\theta)$:
+# What is $h$ in the plane? We need a distance from a point to an ellipse. The exact one has no short formula. The
+# paper takes the sum of the distances to the two foci, which is constant on the ellipse (eq. 7):
 #
-# $$\frac{[(x-m)\cos\theta+(y-n)\sin\theta]^2}{a^2} + \frac{[-(x-m)\sin\theta+(y-n)\cos\theta]^2}{b^2} = 1$$
+# $$d(\mathbf{x}) = \tfrac12\left(\|\mathbf{x}-\mathbf{c}_a\| + \|\mathbf{x}-\mathbf{c}_b\|\right) - a,
+# \qquad \mathbf{c}_{a,b} = (m,n) \pm \sqrt{a^2-b^2}\,(\cos\theta, \sin\theta)$$
 #
-# The sum of the distances to its foci is constant on the ellipse (eq. 7), so
-#
-# $$d(\mathbf{x}) = \tfrac12\left(\|\mathbf{x}-\mathbf{c}_a\| + \|\mathbf{x}-\mathbf{c}_b\|\right)
-# - a$$
-#
-# is zero there, positive outside, smooth, and cheap.
+# Here $(m, n)$ is the centre, $\theta$ the angle, $a$ and $b$ are the semi-axes of the ellipse (eq. 6, whose second
+# term lacks a minus sign in the paper). Then $h = d - r_{robot} - \epsilon$.
 
 # %%
-zone = record.cache.ellipse()
-print(
-    f"semi-axes {zone.semi_axes[0]:.2f} m and {zone.semi_axes[1]:.2f} m, centre {zone.center[0]:+.2f} m ahead"
-)
-on_zone = szlib.ellipse_distance(zone.curve(), zone)
-off = float(np.abs(on_zone).max())
-record.check("d = 0 on the zone", off < 1e-12, off, always=True)
+(a, b), direction = zone.semi_axes, np.array([np.cos(zone.angle), np.sin(zone.angle)])
+foci = [np.array(zone.center) + sign * np.sqrt(a**2 - b**2) * direction for sign in (1, -1)]
 
-# %%
+
+def distance(x):
+    return (np.linalg.norm(x - foci[0]) + np.linalg.norm(x - foci[1])) / 2 - a
+
+
+for x in ([2.0, 0.0], [0.0, 2.0]):
+    print(f"robot at {x}: d = {distance(np.array(x)):.2f} m, h = {distance(np.array(x)) - 0.55:.2f} m")
+
+# %% jupyter={"source_hidden": true}
+# Checks
+off = float(np.abs(szlib.ellipse_distance(zone.curve(), zone)).max())
+record.check("d = 0 on the zone", off < 1e-12, f"largest |d| {off:.0e} m", always=True)
+places = np.random.default_rng(seed).uniform(-3, 3, (100, 2))
+off = max(abs(distance(x) - float(szlib.ellipse_distance(x, zone))) for x in places)
+record.check("d by hand is the library's d", off < 1e-12, f"largest difference {off:.0e} m", always=True)
+
+# %% jupyter={"source_hidden": true}
+# Figure
 ax = figures.plot_distance(zone)
+ax.set_title("The robot's centre must stay outside the red line")
 record.figure(ax.figure, "ellipse")
 
 # %% [markdown]
 # ## Distance to a wall
 #
-# A segment is a line, trimmed by a disc (Shapiro & Tsukanov, 1999), eq. 3-5, where the paper's
-# $\|t\|$ is $|t|$:
+# A wall is a straight segment: a line, trimmed by a disc (Shapiro & Tsukanov, 1999), eq. 3-5. The paper writes
+# $\|t\|$ for $|t|$:
 #
 # $$g = \frac{(x-x_a)(y_b-y_a)-(y-y_a)(x_b-x_a)}{L},\quad
 #   t = \frac{(L/2)^2-\|\mathbf{x}-\mathbf{x}_c\|^2}{L},\quad
 #   d = \sqrt{g^2 + \left(\tfrac{|t|-t}{2}\right)^2}$$
+#
+# $L$ is the length of the wall, $\mathbf{x}_c$ its middle. $g$ is the distance to the endless line. $t$ is
+# positive inside the disc around the wall; there the last term is 0, and $d = |g|$.
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Figure
 wall = (np.array([-1.0, 0.0]), np.array([1.0, 0.0]))
 ax = figures.plot_distance(wall)
+ax.set_title("Around a wall the red line closes behind both ends")
 record.figure(ax.figure, "segment")
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Checks
 along = np.column_stack([np.linspace(-1, 1, 101), np.zeros(101)])
 off = float(np.abs(szlib.segment_distance(along, *wall)).max())
-record.check("d = 0 on the segment", off < 1e-12, off, always=True)
+record.check("d = 0 on the segment", off < 1e-12, f"largest |d| {off:.0e} m", always=True)
 beside = szlib.segment_distance(np.array([[0.0, 0.4], [0.5, -0.3]]), *wall)
-record.check("beside the segment d is the Euclidean distance", np.allclose(beside, [0.4, 0.3]), always=True)
+is_euclidean = np.allclose(beside, [0.4, 0.3])
+record.check("beside the segment d is the Euclidean distance", is_euclidean, "0.4 m and 0.3 m", always=True)
 
 # %% [markdown]
-# ## The discrete barrier condition
+# ## The same with the library
 #
-# $h = d - r_{robot} - \epsilon$, and each step may use up a share $\gamma$ of what is left (eq.
-# 1):
-#
-# $$h(\mathbf{x}_{k+1}) - h(\mathbf{x}_k) \ge -\gamma\, h(\mathbf{x}_k)
-#   \quad\Rightarrow\quad h(\mathbf{x}_k) \ge (1-\gamma)^k\, h(\mathbf{x}_0)$$
-#
-# A robot that drives straight at somebody is thereby given a limit to the speed at which the two
-# close in, $v \le \gamma h / \Delta t$: its own speed is that minus theirs, and where they walk
-# towards it, it may have to go back.
+# `szlib.ellipse_distance`, `barriers.barrier` and `barriers.cbf_residual` are these formulas. The residual is
+# positive where eq. 1 is obeyed:
 
 # %%
-fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
-t = np.arange(0, 81) * settings.dt
-for share, line in zip(sorted({gamma, 0.02, 0.2}), (":", "-", "--"), strict=False):
-    h = 2.0 * (1 - share) ** np.arange(81)
-    ax.plot(t, h, line, color=figures.BLUE, label=f"gamma = {share:g}")
-ax.set(xlabel="time [s]", ylabel="lowest h allowed [m]", title="A smaller gamma brakes earlier")
-ax.legend()
-record.figure(fig, "gamma")
+h = float(barriers.barrier(szlib.ellipse_distance([2.5, 0.0], zone), settings.r_robot, settings.eps))
+h_next = float(barriers.barrier(szlib.ellipse_distance([2.45, 0.0], zone), settings.r_robot, settings.eps))
+print(f"h = {h:.3f} m, then {h_next:.3f} m: residual {barriers.cbf_residual(h_next, h, gamma):+.3f} m")
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Checks
 h = 1.0
 less, more = (barriers.cbf_residual(h - share * gamma * h, h, gamma) for share in (0.6, 1.2))
 claim = f"from h = 1 m it may fall by {60 * gamma:.3g} cm in a step, and not by {120 * gamma:.3g} cm"
-record.check(claim, less > 0 > more, always=True)
-record.key |= {
-    "v limit at h = 1 m": settings.gamma * h / settings.dt,
-}
+record.check(claim, less > 0 > more, f"residuals {100 * less:+.1f} cm and {100 * more:+.1f} cm", always=True)
+record.key |= {"v limit at h = 1 m": settings.gamma * h / settings.dt}
 
 # %% [markdown]
-# **What it means.** Distance has become a speed limit that tightens as the robot comes near; what
-# is left is to find, ten times a second, the best acceleration that obeys it. Both distances are
-# approximations: notebook 22 asks where they are too long, and whether the margin is enough.
+# ## Three common mistakes
+#
+# - **"h < 0 means a collision."** No. The zone is larger than the body. At $h = 0$ the robot's side is still 5 cm
+#   outside the zone. $h < 0$ means that the robot came closer than people do.
+# - **"A smaller gamma keeps a larger distance."** No. Every gamma ends at the edge. It slows the robot down earlier.
+# - **"The barrier stops the robot."** Only if the person stands. If the person comes, $h$ falls although the robot
+#   stands still, and the condition demands that it goes back (chapter 11).
 
-# %%
+# %% jupyter={"source_hidden": true}
+# What we know now
+Markdown(
+    "**What we know now.** Distance has become a limit of the speed: at h = 1 m the robot may approach at "
+    f"{allowed_speed(1.0, gamma):.2g} m/s, at h = 0 not at all. Eq. 1 keeps h positive as long as every step has a solution, "
+    "and looking some steps ahead is what gives it one. Both distances are approximations; notebook 22 measures where "
+    "they are too long. What is left is to find, ten times a second, the best acceleration in the plane that obeys: chapter 08."
+)
+
+# %% jupyter={"source_hidden": true}
+# Summary of the checks
 record.close()

@@ -15,10 +15,16 @@ from szlib.workbook.record.parameters import METHOD_DEFAULTS, read_defaults
 
 SOURCES = folders.list_notebooks()
 MAX_LINES = 25
+"""Lines of the longest cell, and visible lines of code before the first figure."""
+SHAPED = [s for s in SOURCES if 'source_hidden": true} tags=["parameters"]' in s.read_text(encoding="utf-8")]
 
 
 def cells(source: Path) -> list[nbformat.NotebookNode]:
     return jupytext.read(source).cells
+
+
+def is_hidden(cell: nbformat.NotebookNode) -> bool:
+    return bool(cell.metadata.get("jupyter", {}).get("source_hidden"))
 
 
 def code_lines(cell: nbformat.NotebookNode) -> int:
@@ -50,8 +56,11 @@ def test_each_notebook_has_a_copy_and_no_number_is_missing():
 class TestEach:
     def test_script_and_copy_agree(self, source):
         executed = nbformat.read(source.with_suffix(".ipynb"), as_version=4)
-        found = [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in executed.cells]
-        assert found == [(c.cell_type, c.source, c.metadata.get("tags", [])) for c in cells(source)]
+        copied, written = (
+            [(c.cell_type, c.source, c.metadata.get("tags", []), is_hidden(c)) for c in each]
+            for each in (executed.cells, cells(source))
+        )
+        assert copied == written
 
     def test_every_cell_was_executed_in_order_without_error(self, source):
         code = [
@@ -81,8 +90,9 @@ class TestEach:
         assert all_cells[0].cell_type == "markdown"
         assert "**Question.**" in all_cells[0].source
         assert "**Expectation.**" in all_cells[0].source
-        assert "**What it means.**" in all_cells[-2].source
-        assert all_cells[-1].source == "record.close()"
+        ends = ("**What it means.**", "**What we know now.**")
+        assert any(end in cell.source for cell in all_cells[-3:] for end in ends)
+        assert all_cells[-1].source.endswith("record.close()")
         assert sum("parameters" in c.metadata.get("tags", []) for c in all_cells) == 1
         assert max(code_lines(c) for c in all_cells if c.cell_type == "code") <= MAX_LINES
 
@@ -91,6 +101,29 @@ class TestEach:
         assert {"data", "seed", "results"} <= {
             line.split("=")[0].strip() for line in tagged.source.splitlines()
         }
+
+
+@pytest.mark.parametrize("source", SHAPED, ids=lambda s: s.stem)
+class TestShape:
+    def test_parameters_checks_and_record_are_folded(self, source):
+        plumbing = re.compile(r"^(record = |record\.(check|claim|close)\b|import |from .* import )", re.M)
+        visible = [c.source for c in cells(source) if c.cell_type == "code" and not is_hidden(c)]
+        assert [text for text in visible if plumbing.search(text)] == []
+
+    def test_each_folded_cell_says_what_it_hides(self, source):
+        first_lines = [c.source.splitlines()[0] for c in cells(source) if is_hidden(c)]
+        assert [line for line in first_lines if not line.startswith("# ")] == []
+
+    def test_a_figure_comes_before_25_visible_lines_of_code(self, source):
+        visible = 0
+        for cell in nbformat.read(source.with_suffix(".ipynb"), as_version=4).cells:
+            if any("image/png" in out.get("data", {}) for out in cell.get("outputs", ())):
+                break
+            visible += 0 if is_hidden(cell) or cell.cell_type != "code" else code_lines(cell)
+        assert visible <= MAX_LINES
+
+    def test_the_copy_has_at_most_600_kb(self, source):
+        assert source.with_suffix(".ipynb").stat().st_size <= 600_000
 
 
 def test_method_parameters_have_the_same_default_everywhere():

@@ -49,7 +49,7 @@ def plot_distance(
     grid = _grid(extent, 241)
     name = "the zone" if isinstance(shape, Ellipse) else "the wall"
     distance = _distance(grid, shape)
-    levels = [d for d in np.arange(-0.5, 3, 0.25).tolist() if abs(d) > 0.1 and abs(d - margin) > 0.1]
+    levels = [d for d in np.arange(-0.5, 1.6, 0.25).tolist() if abs(d) > 0.1 and abs(d - margin) > 0.1]
     lines = ax.contour(*np.moveaxis(grid, -1, 0), distance, levels=levels, cmap="viridis", linewidths=0.8)
     ray = np.linspace(0, extent, 500)[:, None] * (0.6, -0.8)
     along = _distance(ray, shape)

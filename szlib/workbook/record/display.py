@@ -22,7 +22,7 @@ _SHOWN_WIDTH = 2 / 3  # width of a figure in the notebook, as a fraction of the 
 
 
 def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
-    """Make a table of parameters for a notebook.
+    """Make a table of parameters for a notebook, folded to one line until it is opened.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
     known = (PAPER, ASSUMED, MEASURED, TUNED, CHOSEN)
     if unknown := {badge for _, _, badge, _ in rows}.difference(known):
         raise ValueError(f"badges must be {', '.join(known)}; got {sorted(unknown)}")
-    return style_table(pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"]))
+    return _style(_FoldedTable, pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"]))
 
 
 def settings_table(settings: MPCSettings) -> Styler:
@@ -59,10 +59,22 @@ class _Table(Styler):
         return str(self.data.to_string(index=False))  # type: ignore[attr-defined]
 
 
+class _FoldedTable(_Table):
+    """A table in a fold that says how many rows it has."""
+
+    def _repr_html_(self) -> str:
+        table = str(super()._repr_html_())
+        return f"<details><summary>{len(self.index)} parameters, with sources</summary>\n{table}</details>"
+
+
 def style_table(table: pd.DataFrame) -> Styler:
     """Style a `table` so that long texts are shown in full, aligned to the left."""
+    return _style(_Table, table)
+
+
+def _style(kind: type[_Table], table: pd.DataFrame) -> Styler:
     left = [{"selector": "td, th", "props": "text-align: left"}]
-    styled = _Table(table, uuid="szlib", cell_ids=False).format(format_value).hide(axis="index")
+    styled = kind(table, uuid="szlib", cell_ids=False).format(format_value).hide(axis="index")
     return styled.set_table_styles(left)  # type: ignore[arg-type]
 
 
