@@ -85,7 +85,7 @@ record.check(
 # | [4 - The hull and its slices](04_hull.ipynb) | From scattered samples to a boundary: how near did people come, in each direction, at each walking speed? | 25 min |
 # | [5 - Social zones](05_zones.ipynb) | Can a robot carry the zone along? | 35 min |
 # | [6 - Respect or emptiness?](06_respect.ipynb) | Around a walking person there is a place where nobody is. Do people keep out of it, or is it only rare that two of them are anywhere near each other? | 60 min |
-# | [7 - Barriers](07_barriers.ipynb) | How does "stay out of the zone" become something that a controller can obey, ten times a second? | 25 min |
+# | [7 - Barriers: how fast may the robot approach?](07_barriers.ipynb) | The zone says where the robot must not be. How fast may it come closer? | 35 min |
 # | [8 - Build the controller yourself](08_build_a_controller.ipynb) | What does it take to turn the barrier condition of notebook 07 into a robot that drives? | 50 min |
 # | [9 - Passing a person who stands](09_passing.ipynb) | A person stands in the way and looks at the robot. When does the robot begin to go around them, and what decides that? | 65 min |
 # | [10 - Meeting in a narrow corridor](10_corridor.ipynb) | A person walks towards the robot in a corridor. There is room for both, but not much. Who slows the robot down: the person, or the wall? | 35 min |
@@ -105,15 +105,15 @@ record.check(
 # %% [markdown]
 # ## Three routes
 #
-# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 2 h 15 min to read.
-# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb): 9 h 10 min to read.
+# - **An hour: the idea.** [02](02_encounters.ipynb), [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 2 h 25 min to read.
+# - **A day: the method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb): 9 h 20 min to read.
 # - **Six weeks: the course.** Running and looking around come on top.
 #
 # | week | topic | notebooks | to read | exercises | to do |
 # |---|---|---|---|---|---|
 # | 1 | Tracks, encounters, and which of them to believe | [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb) | 1 h 35 min | [1.1-1.5](exercises/sheet1_tracks.ipynb#1.1-Velocity-(5-min)), [2.1-2.5](exercises/sheet2_outliers.ipynb#2.1-Complementary-coordinates-(5-min)) | 2 h 05 min |
 # | 2 | From samples to a zone; respect or emptiness | [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb) | 2 h 00 min | [3.1-3.3](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)), [4.1-4.5](exercises/sheet4_certainty.ipynb#4.1-The-quantile-zone-in-one-direction-(10-min)) | 1 h 55 min |
-# | 3 | A zone of your own, and a barrier around it | [07](07_barriers.ipynb) | 25 min | [3.4-3.5](exercises/sheet3_zones.ipynb#3.4-A-zone-of-your-own-(an-evening,-150-min)), [6.1](exercises/sheet6_robot.ipynb#6.1-The-speed-limit-(5-min)) | 2 h 45 min |
+# | 3 | A zone of your own, and a barrier around it | [07](07_barriers.ipynb) | 35 min | [3.4-3.5](exercises/sheet3_zones.ipynb#3.4-A-zone-of-your-own-(an-evening,-150-min)), [6.1](exercises/sheet6_robot.ipynb#6.1-The-speed-limit-(5-min)) | 2 h 45 min |
 # | 4 | A controller of your own | [08](08_build_a_controller.ipynb) | 50 min | [5.1-5.5](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)), [7.1-7.3](exercises/sheet7_controller.ipynb#7.1-A-filter-on-a-road-(15-min)) | 2 h 15 min |
 # | 5 | MPC with barriers, and the first meetings | [09](09_passing.ipynb), [10](10_corridor.ipynb) | 1 h 40 min | [7.4-7.8](exercises/sheet7_controller.ipynb#7.4-MPC-on-a-road-(25-min)) | 2 h 15 min |
 # | 6 | The robot yields, and drives among people | [11](11_waiting.ipynb), [11b](11b_making_room.ipynb), [12](12_among_people.ipynb), [13](13_laboratory.ipynb) | 2 h 50 min | [6.2-6.5](exercises/sheet6_robot.ipynb#6.2-gamma-by-experiment-(40-min)) | 1 h 25 min |
@@ -136,7 +136,7 @@ record.check(
 # | attentional space | the 4 m by 5 m ahead of a person that are watched for others | [02](02_encounters.ipynb) |
 # | barrier function | h: 0 at the edge of what is allowed, positive inside of it | [07](07_barriers.ipynb) |
 # | bootstrap | draw people anew from those there are, many times, to see how far a result moves | [23](deeper/23_comparison.ipynb) |
-# | CBF-QP | a quadratic program for one step: as near to the wanted control as the barrier allows | [08](08_build_a_controller.ipynb) |
+# | CBF-QP | a quadratic program for one step: as near to the wanted control as the barrier allows | [07](07_barriers.ipynb) |
 # | class K | of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is gamma times h | [07](07_barriers.ipynb) |
 # | complementary distance | r' = r_max - r, large for who is near | [03](03_outliers.ipynb) |
 # | EWAP | the walking pedestrians recorded at ETH Zürich, and the format of their files, `obsmat` | [01](01_tracks.ipynb) |

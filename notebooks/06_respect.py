@@ -21,9 +21,9 @@
 # need to know what chance gives: the same people on the same paths who take no notice of each other.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [05](05_zones.ipynb) · next: [7 - Barriers](07_barriers.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 60 min · needs [05](05_zones.ipynb) · exercises:
-# [4.3-4.5](exercises/sheet4_certainty.ipynb#4.3-A-p-value-(10-min))
+# [Start](00_start_here.ipynb) · before: [05](05_zones.ipynb) · next: [7 - Barriers: how fast may the robot
+# approach?](07_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 60 min · needs
+# [05](05_zones.ipynb) · exercises: [4.3-4.5](exercises/sheet4_certainty.ipynb#4.3-A-p-value-(10-min))
 #
 # **Afterwards you can** tell respect from emptiness by a null model.
 

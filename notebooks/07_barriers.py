@@ -20,12 +20,13 @@
 # zero at the edge.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [6 - Respect or emptiness?](06_respect.ipynb) · next: [8 - Build
-# the controller yourself](08_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3,
-# eq. 1-7 · 25 min to read
+# [Start](00_start_here.ipynb) · before: [06](06_respect.ipynb) · next: [8 - Build the controller
+# yourself](08_build_a_controller.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3, eq. 1-7 · 35
+# min · needs [05](05_zones.ipynb) · exercises:
+# [5.1-5.5](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)),
+# [6.1](exercises/sheet6_robot.ipynb#6.1-The-speed-limit-(5-min)) · laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** turn a distance into a condition on the next step, and say what gamma does.
-#
 # **Words.** *CBF-QP*: a quadratic program for one step: as near to the wanted control as the barrier
 # allows; *class K*: of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is gamma
 # times h.

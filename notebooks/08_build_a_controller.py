@@ -28,9 +28,8 @@
 # [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** write an MPC-CBF yourself, and say what each of its terms is there for. **Words.**
-# *CBF-QP*: a quadratic program for one step: as near to the wanted control as the barrier allows; *IPOPT*:
-# the solver for nonlinear optimisation that the paper uses; *MPC*: model predictive control: plan some
-# steps ahead, take the first, plan again; *slack*: by how much a row is violated; *SQP*: sequential
+# *IPOPT*: the solver for nonlinear optimisation that the paper uses; *MPC*: model predictive control: plan
+# some steps ahead, take the first, plan again; *slack*: by how much a row is violated; *SQP*: sequential
 # quadratic programming: solve quadratic problems in a row, each around the last answer.
 
 # %%
