@@ -63,7 +63,7 @@ class _FoldedTable(_Table):
     """A table in a fold that says how many rows it has."""
 
     def _repr_html_(self) -> str:
-        table = str(super()._repr_html_())
+        table = str(super()._repr_html_())  # type: ignore[misc]
         return f"<details><summary>{len(self.index)} parameters, with sources</summary>\n{table}</details>"
 
 
