@@ -2,9 +2,11 @@
 
 import importlib.util
 import re
+from types import SimpleNamespace
 
 import nbformat
 import pytest
+from studies import real_day
 
 from szlib.workbook import folders
 
@@ -43,6 +45,57 @@ class TestCopy:
         text = copy.read_text(encoding="utf-8")
         assert len(text) < 1_500_000
         assert not re.search(r"/(home|root|work|tmp|Users)/|at 0x", text)
+
+
+# --- numbers beside those of the plaza ---------------------------------------------------------------
+
+
+def record_of(data, name="99_none"):
+    return SimpleNamespace(name=name, cache=SimpleNamespace(is_synthetic=data == "synthetic"))
+
+
+def write_plaza_copy(folder, monkeypatch, numbers):
+    """An executed copy of the chapter 99_a, on the plaza, that shows these numbers."""
+    monkeypatch.setattr(folders, "NOTEBOOKS", folder)
+    line = real_day.compare_with_plaza(record_of("synthetic"), numbers).data
+    output = nbformat.v4.new_output("execute_result", data={"text/markdown": line})
+    cell = nbformat.v4.new_code_cell("compare", outputs=[output])
+    nbformat.write(nbformat.v4.new_notebook(cells=[cell]), folder / "99_a.ipynb")
+
+
+def test_numbers_are_shown_beside_those_of_the_plaza(tmp_path, monkeypatch):
+    write_plaza_copy(tmp_path, monkeypatch, {"people": "5,000", "speed, median": "1.02 m/s"})
+    numbers = {"people": "15,066", "speed, median": "1.11 m/s", "gaps": "221"}
+    text = real_day.compare_with_plaza(record_of("atc-1hz", "99_a"), numbers, "More people.").data
+    assert text.startswith("**On this data.** More people.\n\n|")
+    rows = [[part.strip() for part in line.strip("|").split("|")] for line in text.splitlines()[4:]]
+    assert rows == [
+        ["people", "15,066", "5,000"],
+        ["speed, median", "1.11 m/s", "1.02 m/s"],
+        ["gaps", "221", "-"],
+    ]
+
+
+def test_numbers_are_shown_without_a_copy_of_the_plaza(tmp_path, monkeypatch):
+    monkeypatch.setattr(folders, "NOTEBOOKS", tmp_path)
+    text = real_day.compare_with_plaza(record_of("atc-1hz"), {"people": "3"}).data
+    assert "| people | 3 | - |" in text
+
+
+@pytest.mark.parametrize("numbers", [{"a: b": "1"}, {"a": "1; 2"}, {"a|b": "1"}, {"a": "1\n2"}])
+def test_number_that_cannot_be_read_back_is_an_error(numbers):
+    with pytest.raises(ValueError, match="expected names and numbers without"):
+        real_day.compare_with_plaza(record_of("synthetic"), numbers)
+
+
+def test_copies_on_the_real_day_show_the_numbers_of_the_plaza_copies():
+    for copy in COPIES:
+        numbers = real_day.read_numbers(folders.NOTEBOOKS / copy.name)
+        cells = nbformat.read(copy, as_version=4).cells
+        texts = [o.get("data", {}).get("text/markdown", "") for c in cells for o in c.get("outputs", ())]
+        shown = " ".join(text for text in texts if text.startswith("**On this data.**"))
+        for name, value in numbers.items():
+            assert re.search(rf"\| {re.escape(name)} \| [^|]+ \| {re.escape(value)} \|", shown), copy.name
 
 
 def test_copy_has_other_data_and_links_from_its_folder():
