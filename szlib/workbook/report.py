@@ -31,7 +31,7 @@ from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 
 from ..errors import DataError, SzlibError
 from ..files import MARKER, folder_purpose, write_file
-from ..input_files import open_regular, printable, read_small
+from ..input_files import open_regular, printable, read_json_object, read_small
 from ..plaza.settings import PlazaSettings
 from ..simulation.scenarios.paper import SCENARIOS
 from ..tracks import datasets, funnels
@@ -59,11 +59,14 @@ _FILE_LINK = re.compile(r"(?<!!)\[([^]\n]+)\]\((?!https?:|#|mailto:|data:)(?:[^)
 def write_report(home: Path) -> Path:
     """Write the report of the notebooks that were executed in the results folder `home`, and return its path.
 
+    Notebooks that are not in the summary of the last run are left out: an earlier version wrote them.
     Raises DataError if the folder is not marked as results, holds no notebooks, or holds a damaged file.
     """
     if not (folder_purpose(home) or "").startswith(folders.RESULTS_OF):
         raise DataError(f"{printable(home / MARKER)}: does not mark results of szlib; `szlib run` makes them")
     names = [file.stem for file in sorted(home.glob("[0-9][0-9]*_*.ipynb"))]
+    if isinstance(run := read_json_object(home / "summary.json").get("notebooks"), dict):
+        names = [name for name in names if name in run]
     if not names:
         raise DataError(f"{printable(home)}: holds no executed notebooks; `szlib run` makes them")
     notebooks, runs = {}, dict[str, Any]()

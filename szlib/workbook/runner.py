@@ -104,7 +104,8 @@ def run(
         kept = [] if force else find_kept(home, scripts, stored, code, figures)
         due = [script for script in scripts if script.stem not in kept]
         names = [script.stem for script in due]
-        outcomes = {name: each for name, each in stored.items() if name not in names}
+        there = {script.stem for script in folders.list_notebooks(place)}.difference(names)
+        outcomes = {name: each for name, each in stored.items() if name in there}
         write_file(home / folders.PARAMETERS, json.dumps(source, indent=1))
         if due:
             folders.remove_outputs(home, names)

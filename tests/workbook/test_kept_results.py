@@ -94,6 +94,15 @@ def test_a_damaged_result_is_made_again(
     assert json.loads(file.read_bytes())["cells"] if file.suffix == ".ipynb" else file.exists()
 
 
+def test_a_notebook_that_is_gone_leaves_the_summary(
+    executed: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    (tmp_path / "notebooks" / "03_two.py").unlink()
+    assert executed() == []
+    summary = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
+    assert list(summary["notebooks"]) == ["01_one", "28_all"]
+
+
 def test_a_damaged_summary_or_report_is_made_again(
     executed: Callable[..., list[str]], tmp_path: Path
 ) -> None:

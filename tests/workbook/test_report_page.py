@@ -178,13 +178,23 @@ def test_pictures_of_the_notebooks_are_embedded(tmp_path):
     claim_folder(tmp_path, "results of mine")
     cells = [nbformat.v4.new_markdown_cell(f"# 0 - Pictures\n\n{text}")]
     nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "00_pictures.ipynb")
-    (tmp_path / "summary.json").write_text(json.dumps({"data": "mine", "passed": True, "notebooks": {}}))
     page = BeautifulSoup(write_report(tmp_path).read_text(encoding="utf-8"), "html.parser")
     shown = {
         picture["alt"]: picture["src"][:14] for picture in page.find_all("img") if "alt" in picture.attrs
     }
     assert shown["a zone"] == "data:image/png"
     assert shown["a robot"] == "data:image/gif"
+
+
+def test_a_notebook_of_an_earlier_version_is_left_out(tmp_path):
+    home = claim_folder(tmp_path / "old", "results of mine")
+    cell = nbformat.v4.new_markdown_cell("# 19 - Renamed since")
+    for name in ("07_now", "19_before"):
+        nbformat.write(nbformat.v4.new_notebook(cells=[cell]), home / f"{name}.ipynb")
+    record = {"status": "done", "seconds": 1.2, "checks": [], "key_figures": {}, "figures": []}
+    (home / "summary.json").write_text(json.dumps({"data": "mine", "notebooks": {"07_now": record}}))
+    text = write_report(home).read_text(encoding="utf-8")
+    assert "07_now" in text and "19_before" not in text
 
 
 LONG = re.compile(r"(?<![\w.,])[-+]?(?:0\.0*)?((?:\d[\d,]*)(?:\.\d+)?)")

@@ -102,8 +102,9 @@ def test_malformed_results_are_refused_with_the_name_of_the_file(results, name, 
 
 
 def test_a_notebook_that_never_ends_is_refused(results):
-    os.mkfifo(results / "02_b.ipynb")
-    with pytest.raises(DataError, match=r"02_b\.ipynb"):
+    (results / "01_a.ipynb").unlink()
+    os.mkfifo(results / "01_a.ipynb")
+    with pytest.raises(DataError, match=r"01_a\.ipynb"):
         write_report(results)
 
 
