@@ -23,6 +23,7 @@ EXCLUDED = shutil.ignore_patterns(".git", ".venv", "results", "dist", "__pycache
 NOTEBOOKS = (
     "[0-9]*.py", "deeper/*.py", "laboratory/*.py", "laboratory/*.js", "studies/*.py", "exercises/*.py",
     "exercises/judges/*.*", "solutions/*.py", "examples/*.py", "tables/*.csv",
+    "project/*.*", "project/rivals/*.py",
     "which_settings.md", "figures/zone.png", "figures/making_room.gif",
 )  # fmt: skip
 
