@@ -18,7 +18,7 @@ OF_RUN = (
     *CACHED, *(f"{name}.json" for name in CACHED),
 )  # fmt: skip
 # What `make docs` writes.
-OF_SITE = ("index.html", "which_settings.html", "report.html", "szlib.*.html")
+OF_SITE = ("index.html", "which_settings.html", "reference.html", "report.html", "szlib.*.html")
 
 
 def clean(results: Path) -> None:

@@ -65,6 +65,14 @@ def test_readme_can_be_read_in_five_minutes():
     assert len(whole) <= 15
 
 
+def test_it_shows_recorded_and_synthetic_people():
+    pictures = dict(re.findall(r"!\[([^\]]+)\]\(notebooks/figures/([^)]+)\)", TEXT))
+    assert {file: re.findall("synthetic|recorded", alt) for alt, file in pictures.items()} == {
+        "zone.png": ["synthetic"],
+        "mall.png": ["recorded"],
+    }
+
+
 def test_named_functions_exist():
     for name in re.findall(r"szlib\.(\w+)", TEXT):
         assert hasattr(szlib, name) or name in ("csv", "json"), name

@@ -1,4 +1,4 @@
-"""Write the navigation cell of every notebook, and the lists of notebooks and words in 00_start_here.
+"""Write the navigation cell of every notebook, the routes in 00_start_here, and lists in reference.md.
 
     python notebooks/tools/course.py
 
@@ -21,6 +21,7 @@ from szlib.workbook import folders
 
 HERE = Path(__file__).parents[1]
 START = "00_start_here"
+REFERENCE = HERE / "reference.md"
 PAPER = "https://arxiv.org/abs/2405.15101"
 WORDS, LINES = 120, 8
 """Words of prose, and lines of visible code, that are read in a minute (assumed)."""
@@ -35,7 +36,7 @@ TASK = re.compile(r"^# ## ((\d\.\d) .*\b(\d+) min\))$", re.MULTILINE)
 HEADING = "**Afterwards you can** "
 
 GIVES: dict[str, tuple[str, str]] = {
-    "00": ("all", "choose a route, and find any notebook, word or symbol again."),
+    "00": ("all", "choose a route, and take the first step."),
     "01": ("sec. 2, fig. 1", "bring files of tracks to one clock, and say where two people can be watched."),
     "02": ("sec. 2, fig. 2-3", "say when two people meet alone, and compute where one sees the other."),
     "03": ("sec. 2, fig. 4a", "say whom a rule for outliers finds, whom it misses, and why."),
@@ -182,8 +183,8 @@ WEEKS: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = [
 ]
 """Topic, chapters and tasks of the exercise sheets of each of six weeks."""
 ROUTES: list[tuple[str, tuple[str, ...]]] = [
-    ("An hour: the idea", ("02", "05", "07", "10", "13")),
-    ("A day: the method", ("01", "02", "03", "04", "05", "06", "07", "08", "09", "10", "11", "11b", "12")),
+    ("The idea", ("05", "07", "10", "13")),
+    ("The method", ("01", "02", "03", "04", "05", "06", "07", "08", "09", "10", "11", "11b", "12")),
 ]
 """Shorter routes, by number of the notebook."""
 
@@ -364,7 +365,7 @@ def _path(page: Page, start: Page) -> str:
 
 
 def make_map(story: list[Page]) -> str:
-    """The cell of 00 that lists every notebook."""
+    """The section of the reference that lists every notebook."""
     rows = ["## The map", "", "| notebook | question | to read |", "|---|---|---|"]
     rows += [
         f"| {_link(p, story[0])} | {p.question} | {p.minutes} min |" for p in story if p.source.stem != START
@@ -378,7 +379,9 @@ def make_routes(story: list[Page]) -> str:
     for name, numbers in ROUTES:
         links, minutes = _links_and_time(story, numbers)
         rows.append(f"- **{name}.** {links}: {minutes} to read.")
-    rows.append("- **Six weeks: the course.** Running and looking around come on top.")
+    rows.append(
+        "- **The course, in six weeks.** Reading and exercises; running and looking around come on top."
+    )
     rows += ["", "| week | topic | notebooks | to read | exercises | to do |", "|---|---|---|---|---|---|"]
     for week, (topic, numbers, ranges) in enumerate(WEEKS, 1):
         links, minutes = _links_and_time(story, numbers)
@@ -402,7 +405,7 @@ def _time(minutes: int) -> str:
 
 
 def make_glossary(story: list[Page], uses: dict[str, str]) -> str:
-    """The cell of 00 that lists every word in use, its meaning, and the first notebook that uses it."""
+    """The section of the reference with every word in use, its meaning, and the first notebook that uses it."""
     by_number = {page.number: page for page in story}
     rows = ["## Words", "", "| word | meaning | first used in |", "|---|---|---|"]
     for word in sorted(uses, key=str.lower):
@@ -429,18 +432,29 @@ def replace_cells(script: str, cells: dict[str, str], navigation: str) -> str:
     return "".join([header, title, _cell(navigation), *rest])
 
 
+def replace_section(text: str, section: str) -> str:
+    """Replace the section of the Markdown `text` that has the heading of the new `section`."""
+    heading = re.escape(section.partition("\n")[0])
+    old = re.compile(rf"^{heading}\n.*?(?=^## |\Z)", re.MULTILINE | re.DOTALL)
+    if len(old.findall(text)) != 1:
+        raise ValueError(f"{heading} must be a heading once in {REFERENCE.name}")
+    return old.sub(lambda _: f"{section}\n\n", text)
+
+
 def _cell(text: str) -> str:
     return "\n".join(["# %% [markdown]", *(f"# {line}".rstrip() for line in text.split("\n"))]) + "\n\n"
 
 
 def make_scripts() -> dict[Path, str]:
-    """The text of every script of the course with up-to-date navigation and lists."""
+    """The text of every script of the course, and of the reference, with up-to-date navigation and lists."""
     story = pages()
     uses, scripts = first_uses(story), {}
-    cells = {"## The map": make_map(story), "## Three routes": make_routes(story)}
-    cells["## Words"] = make_glossary(story, uses)
+    scripts[REFERENCE] = REFERENCE.read_text(encoding="utf-8")
+    for section in (make_map(story), make_glossary(story, uses)):
+        scripts[REFERENCE] = replace_section(scripts[REFERENCE], section)
+    routes = {"## Three routes": make_routes(story)}
     for page in story:
-        own = cells if page.source.stem == START else {}
+        own = routes if page.source.stem == START else {}
         text = page.source.read_text(encoding="utf-8")
         scripts[page.source] = replace_cells(text, own, make_navigation(page, story, uses))
     for source in sorted((HERE / "solutions").glob("*.py")):

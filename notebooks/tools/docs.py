@@ -1,4 +1,4 @@
-"""Write the site of `make docs`: the decision page, the notebooks, and a page for each public name of szlib.
+"""Write the site of `make docs`: the decision page, the reference, the notebooks, and a page for each public name of szlib.
 
     python notebooks/tools/docs.py FOLDER
 
@@ -81,7 +81,7 @@ def describe(name, value):
 def write_site(site):
     """Write every page but the notebooks and the report into the folder `site`."""
     rooms = {room: [describe(*each) for each in list_exports(getattr(szlib, room)).items()] for room in ROOMS}
-    pages = {"index": ("", []), "which_settings": ("", [])}
+    pages = {"index": ("", []), "which_settings": ("", []), "reference": ("", [])}
     for room, entries in rooms.items():
         pages |= {f"szlib.{e['name']}": (room, [e]) for e in entries if e["name"] in szlib.__all__}
         others = [entry for entry in entries if entry["name"] not in szlib.__all__]
@@ -91,6 +91,7 @@ def write_site(site):
 
     def render(text):
         text = re.sub(r"\]\((?:deeper/)?(\d\w+)\.ipynb\)", r"](notebooks/report.html#\1)", text)
+        text = re.sub(r"\]\((\w+)\.md\)", r"](\1.html)", text)
         return CODE.sub(lambda code: links.get(code[1], "{}").format(code[0]), to_html(text))
 
     configure(template_directory=Path(__file__).parent / "docs")

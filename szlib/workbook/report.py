@@ -53,7 +53,9 @@ _RUN = re.compile(r"(?m)^const run = (\{.*\});\nconst figures = .*\[data-run=(sz
 # The picture of a player, which is shown on the front page only.
 _GIF = re.compile(r'<img src="data:image/gif;base64,[^"]*" alt="([^"]*)">')
 # The text of a link to another file, and the name of the file without folder and ending.
-_FILE_LINK = re.compile(r"(?<!!)\[([^]\n]+)\]\((?!https?:|#|mailto:|data:)(?:[^)\s]*/)?([^)\s/.]*)[^)\s/]*\)")
+_FILE_LINK = re.compile(
+    r"(?<!!)\[([^]\n]+)\]\((?!https?:|#|mailto:|data:)(?:[^)\s]*/)?([^)\s/.]*)(?:\([^)\s]*\)|[^)\s/])*\)"
+)
 
 
 def write_report(home: Path) -> Path:

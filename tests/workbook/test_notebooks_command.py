@@ -39,7 +39,7 @@ def test_the_wheel_holds_the_workbook_and_stays_small(wheel: zipfile.ZipFile) ->
     expected = {file.relative_to(notebooks).as_posix() for part in parts for file in notebooks.glob(part)}
     assert len(expected) > 70 and expected <= inside
     assert {name for name in inside if name.startswith("figures/")} == {
-        "figures/zone.png", "figures/making_room.gif",
+        "figures/mall.png", "figures/making_room.gif",
     }  # fmt: skip
     assert not [name for name in inside if name.endswith(".ipynb") or "__pycache__" in name]
     size = sum(each.compress_size for each in wheel.infolist() if "/notebooks/" in each.filename)

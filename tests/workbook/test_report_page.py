@@ -197,6 +197,17 @@ def test_a_notebook_of_an_earlier_version_is_left_out(tmp_path):
     assert "07_now" in text and "19_before" not in text
 
 
+def test_links_to_files_outside_of_the_report_leave_their_text(tmp_path):
+    text = (
+        "exercises: [5.1](exercises/sheet5.ipynb#5.1-Focal-distance-(15-min)), [5.2](exercises/sheet5.ipynb)"
+    )
+    claim_folder(tmp_path, "results of mine")
+    cells = [nbformat.v4.new_markdown_cell(f"# 0 - Links\n\n{text}")]
+    nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "00_links.ipynb")
+    page = BeautifulSoup(write_report(tmp_path).read_text(encoding="utf-8"), "html.parser")
+    assert "exercises: 5.1, 5.2" in [paragraph.get_text() for paragraph in page.find_all("p")]
+
+
 LONG = re.compile(r"(?<![\w.,])[-+]?(?:0\.0*)?((?:\d[\d,]*)(?:\.\d+)?)")
 """A number without the zeros that begin it."""
 
