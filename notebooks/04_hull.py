@@ -17,29 +17,20 @@
 # **Question.** From scattered samples to a boundary: how near did people come, in each direction,
 # at each walking speed?
 #
-# **Expectation.** The faster somebody walks, the more room they are given. Few samples exist for
-# any one speed, so the paper borrows from neighbouring speeds: one convex hull over all of them,
-# cut at the speed of interest.
+# **Expectation.** The faster a person walks, the more room others leave. Few samples have exactly one speed. So
+# the paper borrows from neighbouring speeds: one convex hull around all samples, cut at the speed of interest.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [03](03_outliers.ipynb) · next: [5 - Social zones](05_zones.ipynb)
-# · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4b · 25 min · needs [03](03_outliers.ipynb) ·
-# exercises: [3.1-3.2](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)),
+# · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4b · 20 min · needs [03](03_outliers.ipynb) ·
+# exercises: [3.1-3.3](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)),
 # [4.2](exercises/sheet4_certainty.ipynb#4.2-Why-the-hull-shrinks-(15-min))
 #
-# **Afterwards you can** turn samples into a hull, cut it at a speed, and read the zone off the slice.
+# **Afterwards you can** turn samples into a hull, cut it at a speed, and enclose the zone in the smallest
+# ellipse.
 
-# %%
-import matplotlib.pyplot as plt
-import numpy as np
-
-import szlib
-from szlib.plaza import accuracy
-from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
-from szlib.zones import hulls, outliers
-
-# %% tags=["parameters"]
+# %% jupyter={"source_hidden": true} tags=["parameters"]
+# Parameters of this notebook
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
@@ -48,11 +39,27 @@ r_max = 2.0  # as in notebook 03 [m]
 zone_speed = 1.1  # of the slice shown [m/s]
 speeds = [0.7, 0.9, 1.1, 1.3]  # of the slices of the hull [m/s]
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Imports, and the record of the run
+import warnings
+
+import matplotlib.pyplot as plt
+import numpy as np
+from IPython.display import Markdown
+from scipy.spatial import ConvexHull
+from studies import real_day
+
+import szlib
+from szlib.plaza import PlazaSettings, accuracy
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord, parameters
+from szlib.zones import hulls, outliers
+
+warnings.simplefilter("ignore", szlib.DataWarning)  # the line below the first figure says it
 record = NotebookRecord("04_hull", globals())
 parameters(
     [
-        ("outliers", "0.2 % of the samples, 20 neighbours", PAPER, "method='paper'; ours is method='hull'"),
+        ("outliers", "0.2 % of the samples, 20 neighbours", PAPER, "as in notebook 03"),
         ("hull over", "x', y', speed", PAPER, "sec. 2, fig. 4b"),
         ("speed", "of the reference pedestrian, at the sample", PAPER, "not the mean of the encounter"),
         ("slices", f"{speeds} m/s", ASSUMED, "the paper shows a range of speeds"),
@@ -60,71 +67,186 @@ parameters(
     ]
 )
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Figure
 samples = record.cache.encounters()
 paper_rule = {"fraction": outliers.FRACTION, "n_neighbours": outliers.N_NEIGHBOURS}
 inliers = szlib.remove_outliers(samples, r_max=r_max, **paper_rule)
+fit = {"r_max": r_max, "speeds": sorted({*speeds, zone_speed}), "n_resamples": 0}
+zone = szlib.SocialZone.fit(samples, method="paper", **fit)
 points = np.column_stack([outliers.complementary_points(inliers, r_max=r_max), inliers["speed"]])
-vertices = hulls.hull_vertices(points)
-print(f"{len(points):,} inliers, {len(vertices)} of them vertices of the hull")
-record.key |= {"inliers": len(points), "vertices": len(vertices)}
+fig = plt.figure(figsize=(11, 4.1), layout="constrained")
+left, right = fig.add_subplot(1, 2, 1, projection="3d"), fig.add_subplot(1, 2, 2)
+figures.plot_hull(zone, list(zone.ellipses), points=points, ax=left)
+left.set_title(
+    "One hull around all samples, cut at four speeds" if len(zone.ellipses) == 4 else "Hull and slices"
+)
+left.legend().remove()
+left.set_yticks((-1, 0, 1))
+lines = zip(
+    zone.ellipses, figures.pick_colours(list(zone.ellipses)), ("-", "--", ":", "-.") * 9, strict=False
+)
+for v, colour, line in lines:
+    right.plot(*zone.boundary(v).T, line, color=colour, linewidth=2, label=f"{v:g} m/s")
+right.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
+right.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+figures.label_metres(right, "What each cut leaves free: the zone at that speed", person=True)
+record.figure(fig, "hull")
+
+# %% jupyter={"source_hidden": true}
+# How this data differs from the plaza
+counts = zone.side_counts.set_index("speed").loc[zone_speed]
+seen = counts.drop("encounters")
+real_day.compare_with_plaza(
+    record,
+    {
+        "encounters": f"{samples['encounter'].nunique():,}",
+        f"of them at {zone_speed:g} m/s": f"{counts['encounters']:,}",
+        "fewest on one side": f"{seen.min():,}, {seen.idxmin()}",
+        f"zone at {zone_speed:g} m/s": "{:.2f} m x {:.2f} m".format(*zone.ellipses[zone_speed].semi_axes),
+    },
+    note=f"At {zone_speed:g} m/s only {seen.min():,} encounters were seen {seen.idxmin()}. There the zone is large "
+    "because few people were watched, not because people keep a large distance.",
+)
+
+# %% [markdown]
+# ## A number first
+#
+# We look at people within $r_{max}$ = 2 m. One person passes you on the left, 0.9 m away. We draw this sample not
+# at 0.9 m but at $r' = 2 - 0.9$ = **1.1 m** to the left. Somebody who passes at 1.4 m is drawn at $r'$ = 0.6 m.
+# The nearer a person came, the *farther out* the point.
+#
+# So the outermost points are those who came nearest, and a boundary around all points has nobody beyond it. To
+# the left it ends at 1.1 m. Turned back: **nobody came nearer than 2 - 1.1 = 0.9 m**.
+#
+# Now the speeds. To your left, people came to 1.0 m when you walked at 1.0 m/s, and to 1.2 m when you walked at
+# 1.2 m/s. Nobody was watched at 1.1 m/s. What do you say about 1.1 m/s?
+#
+# The straight line between the two samples ($r'$ = 1.0 m and 0.8 m) passes $r'$ = 0.9 m at 1.1 m/s. So we say
+# 2 - 0.9 = **1.1 m**. That line is an edge of the hull, and reading it at 1.1 m/s is a slice.
 
 # %% [markdown]
 # ## The hull in three dimensions
 #
-# Each dot is a sample: the farther from the axis, the nearer the other person was. Each line is a slice.
-# `method="paper"` is the paper's chain to the letter: its rule for outliers, hull, slices, ellipses.
+# A sample is a point of three numbers: two for the place, one for the speed of the person who is looked at from.
+#
+# $$x' = (r_{max} - r)\cos\theta,\qquad y' = (r_{max} - r)\sin\theta,\qquad v$$
+#
+# - $r$ is the distance of the other person [m], $\theta$ the line-of-sight angle: 0 is ahead, 90° is left.
+# - $v$ is the speed of the reference pedestrian at that moment [m/s].
+#
+# The *convex hull* is the smallest body without dents that contains all points: a rubber skin around them. Only a
+# few points touch the skin. They are its *vertices*.
 
 # %%
-zone = szlib.SocialZone.fit(samples, method="paper", r_max=r_max, speeds=[*speeds, zone_speed], n_resamples=0)
-low, high = zone.speed_range
-print(f"slices at {list(zone.ellipses)} m/s; the data covers {low:.2f} to {high:.2f} m/s")
-ax = figures.plot_hull(zone, list(zone.ellipses), points=points)
-record.figure(ax.figure, "hull")
+nearness, angle = r_max - inliers["distance"], inliers["los_angle"]
+points = np.column_stack([nearness * np.cos(angle), nearness * np.sin(angle), inliers["speed"]])
+vertices = points[ConvexHull(points).vertices]
+low, high = vertices[:, 2].min(), vertices[:, 2].max()
+print(f"{len(points):,} samples, {len(vertices)} of them vertices; {low:.2f} to {high:.2f} m/s")
+
+# %% jupyter={"source_hidden": true}
+# Checks
+record.key |= {"inliers": len(points), "vertices": len(vertices)}
+same = np.array_equal(np.sort(vertices, axis=0), np.sort(zone.shape.vertices, axis=0))
+found = f"{len(zone.shape.vertices)} vertices"
+record.check("these lines and the library find the same vertices", same, found, always=True)
 if record.cache.is_synthetic:
     off = accuracy.largest_error(zone, speeds=speeds)
-    record.check("the zones of these slices are the true ones, to 5 cm", off < 0.05, off)
+    record.check("the zones of these slices are the true ones, to 5 cm", off < 0.05, f"{off:.3f} m")
 
 # %% [markdown]
 # ## A slice, and the zone it leaves free
 #
-# A slice is a convex polygon around the origin. With $R'(\theta)$ the distance from the origin to
-# its edge, the **minimum social zone** is
+# A slice is a polygon around the origin. Let $R'(\theta)$ be the distance from the origin to its edge. The
+# **minimum social zone** is what it leaves free:
 #
 # $$r_{zone}(\theta) = r_{max} - R'(\theta)$$
 #
-# Map first, enclose second: an ellipse around the *slice* would be no zone.
+# **What do you think?** Where somebody came nearest, the slice has a corner. What has the zone there: a dent or a
+# bulge? And what does the zone do between two corners, where nobody came as near?
 
 # %%
 section = hulls.slice_hull(vertices, zone_speed, r_max=r_max)
 theta = np.linspace(-np.pi, np.pi, 721)
+free = r_max - section.reach(theta)
+zone_x, zone_y = free * np.cos(theta), free * np.sin(theta)
+
+# %% jupyter={"source_hidden": true}
+# Figure
+fig, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained", sharex=True, sharey=True)
 corners = section.polygon
 dents = section.boundary(np.arctan2(*corners.T[::-1]))
-fig, (left, right) = plt.subplots(1, 2, figsize=(11, 6), layout="constrained", sharex=True, sharey=True)
 left.fill(*corners.T, facecolor=figures.BLUE, alpha=0.3, edgecolor=figures.BLUE, label="slice")
 left.plot(*corners.T, "o", color=figures.BLUE, markersize=4, label="its corners")
-right.fill(*section.boundary(theta).T, facecolor=figures.ORANGE, alpha=0.4, label="zone")
+right.fill(zone_x, zone_y, facecolor=figures.ORANGE, alpha=0.4, label="zone")
 right.plot(*dents.T, "o", color=figures.BLUE, markersize=4, label="the same corners")
 right.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
-titles = (f"The slice at {zone_speed:g} m/s", "The zone it leaves free")
+titles = (f"{len(corners)} corners, from those who came nearest", "Each corner dents the zone")
 for ax, title, circle in zip((left, right), titles, ("contact, r = 0", "r_max"), strict=True):
     ax.plot(r_max * np.cos(theta), r_max * np.sin(theta), ":", color=figures.BLACK, label=circle)
     figures.label_metres(ax, title, person=True)
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, fontsize=8)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8)
 left.set(xlabel="x' [m]", ylabel="y' [m]")
 record.figure(fig, "slice")
 
 # %% [markdown]
-# Corner for corner: a corner of the slice is where somebody came nearest, and dents the zone; an edge
-# between two corners is where nobody came as near, and the zone bulges there. With few people the corners
-# are far apart and the bulges large: they tell of who was not there, not of respect. (On the plaza, with
-# thousands of encounters, there are hardly any; on the real day there are.)
+# <details><summary>Answer</summary>
 #
-# The zone must be empty: each inlier lies outside, or just on the edge of, the zone of its own
-# speed. (That is a test of the code, not of people; and the outliers that were removed *are*
-# inside.)
+# A dent. The corner is a person who came near, so the zone must end before that place. Between two corners the
+# zone bulges: nobody came as near there. A bulge is a gap in the data. It does not show respect.
+#
+# </details>
 
-# %%
+# %% [markdown]
+# ## More people, a smaller zone
+#
+# **What do you think?** We forget nine of ten encounters and do the same again. Is the zone larger or smaller?
+
+# %% jupyter={"source_hidden": true}
+# Figure
+everyone = inliers["encounter"].unique()
+tenth = np.random.default_rng(seed).choice(everyone, max(len(everyone) // 10, 1), replace=False)
+shown = {}
+for name, rows in (("all", np.full(len(inliers), True)), ("a tenth", inliers["encounter"].isin(tenth))):
+    try:
+        boundary = hulls.slice_hull(points[rows], zone_speed, r_max=r_max).boundary(theta)
+    except szlib.ZoneError:  # so few people that some side has nobody
+        continue
+    x, y = boundary.T
+    shown[name] = boundary, 0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+fig, ax = plt.subplots(figsize=(7.5, 4), layout="constrained")
+looks = {"all": (figures.BLUE, "-", len(everyone)), "a tenth": (figures.ORANGE, "--", len(tenth))}
+for name, (boundary, size) in shown.items():
+    colour, line, n = looks[name]
+    ax.plot(*boundary.T, line, color=colour, linewidth=2, label=f"{n:,} encounters: {size:.2f} m$^2$")
+ax.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
+ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+gone = "a tenth" not in shown
+title = "A tenth of the people leaves no zone at all" if gone else "With fewer people the zone is larger"
+figures.label_metres(ax, title, person=True)
+record.figure(fig, "fewer")
+
+# %% jupyter={"source_hidden": true}
+# Checks, and the answer
+sizes = {name: size for name, (_, size) in shown.items()}
+larger = sizes.get("a tenth", np.inf) > sizes["all"]
+evidence = ", ".join(f"{name}: {size:.2f} m2" for name, size in sizes.items())
+record.check("a tenth of the encounters gives a larger zone, or none", larger, evidence, always=True)
+Markdown(
+    "<details><summary>Answer</summary>\n\nLarger: the hull of a part lies inside the hull of all, so its slice is "
+    f"smaller. {evidence.replace('m2', 'm²').capitalize()}. So this zone shrinks with every day of data. It says how near the "
+    "nearest people *seen* came. Chapter 05 shows an estimate that does not shrink.\n\n</details>"
+)
+
+# %% [markdown]
+# ## The zone is empty
+#
+# Each inlier must lie outside the zone of its own speed, or on its edge. This tests the code. The outliers that
+# were removed in chapter 03 do lie inside.
+
+# %% jupyter={"source_hidden": true}
+# Checks
 some = inliers.sample(min(300, len(inliers)), random_state=seed)
 some = some[some["speed"].between(low, high, inclusive="neither")]
 margins = []
@@ -133,39 +255,87 @@ for v, angle, distance in zip(some["speed"], some["los_angle"], some["distance"]
         margins.append(distance - (r_max - zone.shape.slice(v).reach(angle)))
     except szlib.ZoneError:  # of speeds at which nobody was seen on some side there is no zone
         continue
-print(f"{len(margins)} of {len(some)} samples have a zone of their own speed")
 margin = float(np.min(margins))
-record.check("no inlier is inside the zone of its own speed", margin > -1e-9, margin, always=True)
+found = f"{len(margins)} samples, the nearest {abs(1000 * margin):.1f} mm outside"
+record.check("no inlier is inside the zone of its own speed", margin > -1e-9, found, always=True)
 
 # %% [markdown]
 # ## What the hull does to speed
 #
-# A convex hull cannot be wider at both ends of its speeds than between them. So its slices
-# shrink, and the zones grow, away from some speed in the middle, whatever people do:
+# **What do you think?** Hardly anybody walks faster than 1.6 m/s. What does the hull say about the zone there: is
+# it small, large, or right but uncertain?
 
-# %%
-grid = np.linspace(low, high, 41)[2:-2]
-areas = []
+
+# %% jupyter={"source_hidden": true}
+# How large slice and zone are at each speed
+def enclosed(curve):
+    x, y = np.vstack([curve, curve[:1]]).T
+    return 0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+
+
+grid, areas, slices = np.linspace(low, high, 63)[1:-1], [], []
 for v in grid:
     try:
-        boundary = zone.boundary(v)
-        areas.append(
-            0.5 * abs(np.sum(boundary[:-1, 0] * boundary[1:, 1] - boundary[1:, 0] * boundary[:-1, 1]))
-        )
-    except szlib.ZoneError:
+        cut = hulls.slice_hull(vertices, v, r_max=r_max)
+        areas.append(enclosed(cut.boundary(theta)))
+        slices.append(enclosed(cut.polygon))
+    except szlib.ZoneError:  # nobody was seen on some side
         areas.append(np.nan)
-ax = figures.get_axes(None)
-ax.plot(grid, areas, color=figures.BLUE)
-ax.set(
-    xlabel="speed [m/s]",
-    ylabel="area of the zone [m$^2$]",
-    title=f"The zone is smallest at {grid[np.nanargmin(areas)]:.2f} m/s",
-)
-record.figure(ax.figure, "area")
-
-# %%
-areas = np.array(areas)
+        slices.append(np.nan)
+areas, slices = np.array(areas), np.array(slices)
 smallest = float(grid[np.nanargmin(areas)])
+known = grid[np.isfinite(areas)]
+tenths = np.arange(np.floor(10 * low) / 10, high + 0.1, 0.1)
+people = [inliers.loc[inliers["speed"].between(v, v + 0.1), "encounter"].nunique() for v in tenths]
+
+# %% jupyter={"source_hidden": true}
+# Figure
+fig, (above, below) = plt.subplots(
+    2, 1, figsize=(8, 5.2), layout="constrained", sharex=True, height_ratios=(2, 1)
+)
+above.plot(grid, areas, color=figures.BLUE, label="read off the hull")
+above.plot(smallest, np.nanmin(areas), "o", color=figures.BLUE, label=f"smallest: {smallest:.2f} m/s")
+if record.cache.is_synthetic:
+    walked = np.linspace(*PlazaSettings().speeds, 30)
+    truth = [PlazaSettings().true_zone(v).area for v in walked]
+    above.plot(walked, truth, ":", color=figures.RED, linewidth=2, label="truth")
+above.set(ylabel="area of the zone [m$^2$]", ylim=(0, None))
+above.set_title("Where few people were seen, the zone is large")
+above.legend(loc="upper left")
+below.bar(tenths, people, width=0.09, align="edge", color=figures.GREY)
+below.set(xlabel="walking speed [m/s]", ylabel="encounters", title="Encounters at each speed")
+record.figure(fig, "area")
+
+# %% jupyter={"source_hidden": true}
+# The answer
+place = (smallest - low) / (high - low)
+where = "near the lowest" if place < 0.25 else "near the highest" if place > 0.75 else "in the middle of the"
+Markdown(
+    f"""<details><summary>Answer</summary>
+
+Large. The zone is smallest at {smallest:.2f} m/s ({np.nanmin(areas):.1f} m²), {where} speeds of this data. It grows
+towards both ends, to {areas[np.isfinite(areas)][0]:.1f} m² at {known[0]:.2f} m/s and to
+{areas[np.isfinite(areas)][-1]:.1f} m² at {known[-1]:.2f} m/s. There the hull closes like the end of an egg: its slices
+shrink to a point, so the zone grows up to the whole circle of {np.pi * r_max**2:.1f} m². That happens whatever people do.
+Encounters in the last tenth of a m/s there: {people[int((known[-1] - tenths[0]) / 0.1)]}.
+
+</details>"""
+)
+
+# %% [markdown]
+# ### Theory: why there is one smallest zone
+#
+# The slices of a convex body obey the **Brunn-Minkowski inequality**: the square root of their area is a concave
+# function of the height at which the body is cut. A concave function rises to one maximum and falls after it. So
+# the slices have one largest, somewhere, and from there the zone grows to both sides. *Where* it lies is the
+# data's business: near the speeds at which people came nearest.
+
+# %% jupyter={"source_hidden": true}
+# Checks
+root = np.sqrt(slices)
+bend = float(np.nanmax(root[2:] - 2 * root[1:-1] + root[:-2]))
+claim = "the square root of the slice's area is concave in the speed"
+record.check(claim, bend < 1e-6, f"largest second difference {bend:.1g} m", always=True)
 between = areas[(grid >= 0.7) & (grid <= 1.3)]
 covered = grid[0] <= 0.7 and grid[-1] >= 1.3
 record.key["smallest zone at"] = smallest
@@ -176,8 +346,101 @@ record.claim(
 )
 
 # %% [markdown]
-# **What it means.** Read the zones in the middle of the data's range of speeds; near its ends
-# they say more about how few people walk so slowly or so fast than about the room they are given.
+# ## The smallest ellipse
+#
+# The zone has as many kinks as the slice has corners. A solver needs something smooth that it can move and turn
+# with the person. So the paper encloses the zone in the *smallest ellipse* (Gärtner & Schönherr, 1997).
+#
+# **A number first.** How many points fix the smallest circle around many points? Two or three: all others lie
+# inside and could be left out. An ellipse is fixed by **three to five**. They are its points of *support*.
+#
+# **What do you think?** The zone below has hundreds of points. How many of them touch the ellipse?
 
 # %%
+boundary = zone.boundary(zone_speed)
+ellipse = szlib.minimum_enclosing_ellipse(boundary)
+print(f"{len(ellipse.support)} of {len(boundary)} points touch it")
+
+# %% jupyter={"source_hidden": true}
+# Figure
+fitted = zone.ellipses[zone_speed]
+fig, ax = plt.subplots(figsize=(7.5, 4.2), layout="constrained")
+ax.fill(*boundary.T, facecolor=figures.GREY, alpha=0.4, label="zone: r_max - R'")
+ax.plot(*fitted.curve().T, color=figures.BLUE, linewidth=2, label="smallest ellipse around it")
+ax.plot(*fitted.support.T, "o", color=figures.BLUE, label=f"its {len(fitted.support)} points of support")
+ax.plot(0, 0, marker=(3, 0, -90), color=figures.BLACK, markersize=10)
+ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+title = f"{len(fitted.support)} points decide: {fitted.semi_axes[0]:.2f} m x {fitted.semi_axes[1]:.2f} m"
+figures.label_metres(ax, title, person=True)
+record.figure(fig, "ellipse")
+
+# %% jupyter={"source_hidden": true}
+# Checks
+record.key |= {
+    f"hull: a({zone_speed:g})": fitted.semi_axes[0],
+    f"hull: b({zone_speed:g})": fitted.semi_axes[1],
+}
+most = max(float(e.level(zone.boundary(v, 5000)).max()) for v, e in zone.ellipses.items())
+evidence = f"largest level of the zone {most:.6f}; 1 is the ellipse"
+record.check("each ellipse encloses its zone", most <= 1 + 1e-9, evidence, always=True)
+number = [len(e.support) for e in zone.ellipses.values()]
+ok = all(3 <= n <= 5 for n in number)
+record.check(
+    "each ellipse has three to five points of support", ok, f"{min(number)} to {max(number)}", always=True
+)
+again = szlib.minimum_enclosing_ellipse(fitted.support)
+off = float(np.abs(np.subtract(again.semi_axes, fitted.semi_axes)).max())
+ok = off < 1e-6 * fitted.semi_axes[0]
+record.check(
+    "the points of support alone determine the ellipse", ok, f"semi-axes differ by {off:.0e} m", always=True
+)
+if len(fitted.support) > 3:
+    without = [np.delete(fitted.support, i, axis=0) for i in range(len(fitted.support))]
+    largest = max(szlib.minimum_enclosing_ellipse(points).area for points in without)
+    evidence = f"largest area without one {largest:.3f} m2, with all {fitted.area:.3f} m2"
+    claim = "the ellipse shrinks without any one of its points of support"
+    record.check(claim, largest < fitted.area, evidence, always=True)
+
+# %% [markdown]
+# ## The same with the library
+#
+# `szlib.SocialZone.fit(samples, method="paper")` is all of this: outliers, hull, slices, ellipses. Its ellipse
+# encloses the whole curve, not only 361 points of it.
+
+# %%
+paper = szlib.SocialZone.fit(samples, method="paper", r_max=r_max, speeds=[zone_speed], n_resamples=0)
+print("library {:.3f} m x {:.3f} m".format(*paper.ellipse(zone_speed).semi_axes))
+print("by hand {:.3f} m x {:.3f} m".format(*ellipse.semi_axes))
+
+# %% jupyter={"source_hidden": true}
+# Checks
+off = float(np.abs(np.subtract(paper.ellipse(zone_speed).semi_axes, ellipse.semi_axes)).max())
+claim = "the library's ellipse is the one by hand, to 1 cm"
+record.check(claim, off < 0.01, f"semi-axes differ by {1000 * off:.1f} mm", always=True)
+
+# %% jupyter={"source_hidden": true}
+# Two common mistakes
+wrong = szlib.minimum_enclosing_ellipse(corners)
+Markdown(
+    f"""## Two common mistakes
+
+- **"The ellipse around the slice is the zone."** No. The slice is large where the zone is small. The ellipse around
+  this slice is {wrong.semi_axes[0]:.2f} m x {wrong.semi_axes[1]:.2f} m, the zone's
+  {fitted.semi_axes[0]:.2f} m x {fitted.semi_axes[1]:.2f} m. Map back first, then enclose.
+- **"A large zone at {high:.1f} m/s means that others leave much room to fast walkers."** No. A hull is large in the
+  middle of the data and closes at its ends, so the zone is large there for any people."""
+)
+
+# %% jupyter={"source_hidden": true}
+# What we know now
+Markdown(
+    f"""**What we know now.** {len(vertices)} of {len(points):,} samples make the hull, and its slice at
+{zone_speed:g} m/s leaves a zone whose smallest ellipse is {fitted.semi_axes[0]:.2f} m x {fitted.semi_axes[1]:.2f} m. The
+zone is smallest at {smallest:.2f} m/s; near {low:.1f} and {high:.1f} m/s it is large because few people walk so slowly
+or so fast. It shrinks with every encounter that is added: chapter 05 estimates one that does not, and says how far to
+trust it."""
+)
+
+# %% jupyter={"source_hidden": true}
+# Summary of the checks
 record.close()

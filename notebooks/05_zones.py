@@ -25,7 +25,7 @@
 # [Start](00_start_here.ipynb) · before: [04](04_hull.ipynb) · next: [6 - Respect or
 # emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 35 min · needs
 # [04](04_hull.ipynb) · exercises:
-# [3.3-3.5](exercises/sheet3_zones.ipynb#3.3-The-smallest-ellipse-(20-min)),
+# [3.4-3.5](exercises/sheet3_zones.ipynb#3.4-A-zone-of-your-own-(an-evening,-150-min)),
 # [4.1](exercises/sheet4_certainty.ipynb#4.1-The-quantile-zone-in-one-direction-(10-min))
 #
 # **Afterwards you can** enclose a zone in the smallest ellipse, and say how far to trust it.

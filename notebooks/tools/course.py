@@ -42,7 +42,7 @@ GIVES: dict[str, tuple[str, str]] = {
     "03": ("sec. 2, fig. 4a", "say whom a rule for outliers finds, whom it misses, and why."),
     "04": (
         "sec. 2, fig. 4b",
-        "turn samples into a hull, cut it at a speed, and read the zone off the slice.",
+        "turn samples into a hull, cut it at a speed, and enclose the zone in the smallest ellipse.",
     ),
     "05": (
         "sec. 2, fig. 5",
@@ -80,8 +80,8 @@ EXERCISES: dict[str, tuple[str, ...]] = {
     "01": ("1.1", "1.4-1.5"),
     "02": ("1.2-1.3",),
     "03": ("2.1-2.5",),
-    "04": ("3.1-3.2", "4.2"),
-    "05": ("3.3-3.5", "4.1"),
+    "04": ("3.1-3.3", "4.2"),
+    "05": ("3.4-3.5", "4.1"),
     "06": ("4.3-4.5",),
     "07": ("5.1-5.5", "6.1"),
     "08": ("7.1-7.8",),

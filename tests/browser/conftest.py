@@ -91,8 +91,9 @@ def shorten(script: Path) -> None:
         is_set_up = "parameters" in cell.metadata.get("tags", []) or "import" in cell.source.split()
         if is_operated or is_set_up:
             kept.append(cell)
-        elif cell.source.startswith("record = "):
-            kept += [cell, nbformat.v4.new_code_cell(GIVEN[script.stem])]
+        if "record = NotebookRecord(" in cell.source:
+            kept += [] if is_set_up else [cell]
+            kept.append(nbformat.v4.new_code_cell(GIVEN[script.stem]))
     notebook.cells = [cell for cell in kept if cell.cell_type == "code"]
     settings = load_jupytext_config(str(script))
     for suffix in (".py", ".ipynb"):
