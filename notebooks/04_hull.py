@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [03](03_outliers.ipynb) · next: [5 - Social zones](05_zones.ipynb)
-# · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4b · 20 min · needs [03](03_outliers.ipynb) ·
+# · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4b · 25 min · needs [03](03_outliers.ipynb) ·
 # exercises: [3.1-3.3](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)),
 # [4.2](exercises/sheet4_certainty.ipynb#4.2-Why-the-hull-shrinks-(15-min))
 #
