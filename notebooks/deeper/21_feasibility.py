@@ -14,43 +14,23 @@
 # %% [markdown]
 # # 21 - Feasibility
 #
-# **Question.** A hard constraint is a promise only while the problem has a solution. When does it
-# lose it, what happens then, and can one have a promise that is kept for ever?
+# **Question.** When does no plan satisfy the hard constraints, and what should the robot do then?
 #
-# **Expectation.** The paper: "despite having a shorter horizon than MPC, CBF can ensure stability"
-# (sec. 4). But $N_h = 2$ steps see 0.2 s ahead, and braking from 1 m/s takes 1 s: with a large
-# $\gamma$ the robot must find out too late.
+# **Expectation.** With $N_h = 2$ the barrier looks 0.2 s ahead, but braking from 1 m/s takes 1 s: with a
+# large $\gamma$ the robot notices a person too late.
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · next: [22 - The distances, audited](22_distances.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): sec. 4 · 40 min · needs [08](../08_build_a_controller.ipynb) ·
+# [paper](https://arxiv.org/abs/2405.15101): sec. 4 · 30 min · needs [08](../08_build_a_controller.ipynb) ·
 # exercises: [6.3](../exercises/sheet6_robot.ipynb#6.3-The-terminal-proof-(15-min))
 #
 # **Afterwards you can** say when a step has no solution, and prove when there always is one. **Words.**
 # *exact penalty*: a price on violations so high that none is paid where a solution without violations
-# exists; *fallback*: which of the controller's ways to a control was taken: hard, relaxed, shifted,
+# exists; *fallback*: which of the controller's ways to a control was taken: warm, cold, kept, relaxed,
 # braking.
 
-# %%
-import sys
-
-sys.path.append("..")  # for `studies`
-from dataclasses import replace
-from itertools import product
-
-import matplotlib.pyplot as plt
-import numpy as np
-import pandas as pd
-from studies import feasibility, rollout_table
-
-import szlib
-from szlib.control.controller import advance
-from szlib.simulation.closed_loop import drive
-from szlib.simulation.scenarios.random_worlds import ONE_PERSON
-from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters
-
-# %% tags=["parameters"]
+# %% jupyter={"source_hidden": true} tags=["parameters"]
+# Parameters of this notebook
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
@@ -61,56 +41,154 @@ horizons = [2, 8]  # N_h
 limits = [0.5, 1.0]  # a_max
 n_jobs = 1
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Imports
+import sys
+
+sys.path.append("..")  # for `studies`
+from dataclasses import replace
+from itertools import product
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from IPython.display import Markdown
+from studies import feasibility, rollout_table
+
+import szlib
+from szlib.control.controller import advance
+from szlib.simulation.closed_loop import drive
+from szlib.simulation.scenarios.random_worlds import ONE_PERSON
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, MEASURED, PAPER, NotebookRecord, parameters, read_table
+
+# %% jupyter={"source_hidden": true}
+# The record of the run
 record = NotebookRecord("21_feasibility", globals())
-crowd = feasibility.CROWD
+settings = szlib.MPCSettings()
 parameters(
     [
         ("gamma", gammas, MEASURED, "0.05 everywhere else in this workbook"),
-        ("N_h", horizons, PAPER, "2 in the paper; 8 is the whole horizon"),
-        ("a_max", limits, ASSUMED, "1 m/s2 everywhere else"),
-        ("worlds a cell", worlds, ASSUMED, "2-4 people, walls in half; the robot starts at rest, h >= 0.3 m"),
+        ("N_h", horizons, PAPER, "steps with a barrier: 2 in the paper; 8 is the whole horizon"),
+        ("a_max", limits, ASSUMED, "largest acceleration; 1 m/s² everywhere else"),
+        ("worlds", worlds, ASSUMED, "for each cell: 2-4 people, walls in half; the robot starts at rest"),
     ]
 )
+
+
+# %% jupyter={"source_hidden": true}
+# Figure
+def draw_map(what: str, worst: float) -> plt.Figure:
+    """A panel for each a_max; left of the dashed line the robot can brake as fast as the barrier asks."""
+    fig, panels = plt.subplots(1, 3, figsize=(12, 3.6), layout="constrained", sharey=True)
+    for ax, (a_max, part) in zip(panels, full.groupby("a_max"), strict=True):
+        table = part.pivot(index="N_h", columns="gamma", values=what)
+        figures.plot_sweep(table.rename_axis(index="", columns=""), worst=worst, ax=ax)
+        ax.set_title(f"brakes of {a_max:g} m/s²", fontsize=11)
+        enough = np.log2(a_max * settings.dt / settings.v_max / table.columns[0])  # gammas double
+        ax.axvline(enough + 0.5, color=figures.BLUE, linestyle="--", linewidth=2)
+    panels[0].set_ylabel("N_h: steps with a barrier")
+    fig.supxlabel(
+        "gamma; left of the dashed line the robot can brake as fast as the barrier asks", fontsize=10
+    )
+    return fig
+
+
+full = read_table("21_feasibility")
+mean = full.set_index(["gamma", "N_h", "a_max"])["infeasible_steps"]
+fig = draw_map("infeasible_steps", 8.0)
+fig.suptitle(
+    f"Steps without a solution in 15 s, mean of {full['worlds'].max()} worlds: "
+    f"{mean[0.05, 2, 1]:g} with gamma = 0.05, {mean[0.8, 2, 1]:g} with 0.8 (N_h = 2, brakes of 1 m/s²)"
+)
+record.figure(fig, "map")
+
+# %% [markdown]
+# An **infeasible step** is one where no plan satisfies all constraints. The controller flags it, and applies the plan
+# that violates them least. The figure counts such steps in random worlds, the same ones for each $\gamma$, each
+# number of steps $N_h$ with a barrier, and each largest acceleration $a_{max}$.
+#
+# ## Why a large gamma has no solution
+#
+# A robot drives at 1 m/s straight towards a person who stands. The barrier lets $h$ shrink by the share $\gamma$ in
+# each step of 0.1 s.
+#
+# - $\gamma = 0.05$: at $h = 2$ m it may shrink by 0.1 m, which is 1 m/s. From here on the robot slows down. One step
+#   later $h = 1.9$ m, and 0.95 m/s is allowed: 0.05 m/s less in 0.1 s, which is **0.5 m/s²**.
+# - $\gamma = 0.8$: nothing happens until $h = 0.125$ m. One step later $h = 0.025$ m, and 0.2 m/s is allowed:
+#   0.8 m/s less in 0.1 s, which is **8 m/s²**. The robot has 1 m/s², so this step has no solution.
+#
+# The general rule: at the limit, $h$ and with it the allowed speed $v = \gamma h / \Delta t$ shrink by the share
+# $\gamma$ in each step. So the robot needs the deceleration
+#
+# $$a = \frac{\gamma\, v}{\Delta t}, \qquad\text{and has it if}\qquad \gamma \le \frac{a_{max}\,\Delta t}{v_{max}}.$$
+#
+# $v_{max}$: largest speed [m/s]; $\Delta t$: one step [s]. The dashed lines in the figure are this limit for one step
+# ahead. People who walk, and walls beside the robot, ask for a little more.
+
+
+# %%
+def needed_deceleration(gamma, speed=1.0, dt=0.1):
+    """Deceleration [m/s²] that the barrier asks of a robot at its limit, towards a person who stands."""
+    h = speed * dt / gamma  # where the barrier begins to slow the robot down [m]
+    allowed = gamma * (h - speed * dt) / dt  # one step later [m/s]
+    return (speed - allowed) / dt
+
+
+{gamma: f"{needed_deceleration(gamma):.1f} m/s²" for gamma in (0.05, 0.1, 0.2, 0.8)}
 
 # %% [markdown]
 # ## Where the problem has no solution
 #
-# Random worlds, 150 steps each, all of them the same ones for each choice of $\gamma$, $N_h$ and
-# $a_{max}$. An *infeasible* step is one whose plan violates the hard problem: it is flagged, and the
-# relaxed plan is applied.
+# *What do you think: where steps have no solution, does the robot also enter zones? And does a longer look ahead,
+# $N_h = 8$, help as much as stronger brakes?*
 
-# %%
-long = worlds > 3  # a bar where it takes long
-cells = product(gammas, horizons, limits)
-mine = feasibility.drive_cells(cells, worlds, seed=seed, n_jobs=n_jobs, progress=long).drop(columns="probe")
-record.table(mine, "21_feasibility")
-honest = (mine["unflagged_violations"] == 0).all()
-record.check("no step that called itself safe led to h < 0", honest, len(mine), always=True)
-mine.round(3)
+# %% jupyter={"source_hidden": true}
+# Figure
+fig = draw_map("min_h", -0.5)
+lowest = full.loc[full["min_h"].idxmin()]
+fig.suptitle(
+    f"Least h of all worlds [m]: {lowest['min_h']:.2f} m with gamma = {lowest['gamma']:g}, "
+    f"N_h = {lowest['N_h']:g} and brakes of {lowest['a_max']:g} m/s²"
+)
+record.figure(fig, "least-h")
 
 # %% [markdown]
-# The full map, of 20 worlds a cell (`python -m studies.feasibility 20`), is saved beside the notebooks. Of every
-# saved table one row, drawn by the seed, is computed again in each run: a quick part of it, the column `probe`.
+# <details><summary>Answer</summary>
+#
+# Yes: in the right part of each panel, $h$ is negative. Either helps: with eight steps ahead and brakes of 1 m/s² the
+# robot keeps $h \ge 0$ for every $\gamma$ tried, since 0.8 s are nearly the second that it needs to stop. With weak
+# brakes (0.5 m/s²) even eight steps are too few for a large $\gamma$.
+#
+# </details>
+#
+# The numbers are saved beside the notebooks (`python -m studies.feasibility 20`). Each run drives a few worlds of one
+# cell again and compares. A smaller map is driven here:
 
-# %%
-full = record.committed_table("21_feasibility", feasibility.recompute)
-shown = {"infeasible_steps": ("infeasible steps a world", 8.0), "min_h": ("smallest h [m]", -0.5)}
-fig, grid = plt.subplots(2, 3, figsize=(12, 6.5), layout="constrained")
-for column, (a_max, part) in enumerate(full.groupby("a_max")):
-    for row, (what, (label, worst)) in enumerate(shown.items()):
-        table = part.pivot(index="N_h", columns="gamma", values=what)
-        title = f"{label}, a_max = {a_max:g}"
-        figures.plot_sweep(table, worst=worst, ax=grid[row, column]).set_title(title)
-record.figure(fig, "map")
-
-# %%
-paper = full[(full["N_h"] == 2) & (full["a_max"] == 1)].set_index("gamma")
-whole = full[(full["N_h"] == 8) & (full["a_max"] == 1)].set_index("gamma")
-lowest = float(paper.loc[0.05, "min_h"])
+# %% jupyter={"source_hidden": true}
+# Checks
+takes_long = worlds > 3  # show a progress bar
+options = {"seed": seed, "n_jobs": n_jobs, "progress": takes_long}
+mine = feasibility.drive_cells(product(gammas, horizons, limits), worlds, **options).drop(columns="probe")
+record.table(mine, "21_feasibility")
+violations, runs = int(mine["unflagged_violations"].sum()), worlds * len(mine)
 record.check(
-    "gamma = 0.05 keeps h >= 0 with N_h = 2", lowest >= -1e-6, f"least h {lowest:.2f} m", always=True
+    "no step reported as safe led to h < 0 m",
+    violations == 0,
+    f"{violations} violations in {runs} runs of 15 s",
+    always=True,
 )
+full = record.committed_table("21_feasibility", feasibility.recompute)
+shown = mine[mine["a_max"] == max(limits)].pivot(index="N_h", columns="gamma", values="infeasible_steps")
+print(f"Steps without a solution, mean of {worlds} worlds, brakes of {max(limits):g} m/s²:")
+shown.rename(columns=lambda each: f"gamma = {each:g}").rename_axis(columns=None).round(2)
+
+# %% jupyter={"source_hidden": true}
+# Checks
+at_1 = full[full["a_max"] == 1].set_index("gamma")
+paper, whole = at_1[at_1["N_h"] == 2], at_1[at_1["N_h"] == 8]
+least = float(paper.loc[0.05, "min_h"])
+record.check("gamma = 0.05 keeps h >= 0 with N_h = 2", least >= -1e-6, f"least h {least:.2f} m", always=True)
 for where, runs in (("with N_h = 2", paper["min_h"]), ("on the whole horizon", whole["min_h"])):
     value = ", ".join(f"{h + 0.0:.2f} m at {g:g}" for g, h in runs.round(3).items())
     record.claim(f"any gamma keeps h >= 0 {where}", (runs >= -1e-6).all(), f"least h {value}")
@@ -119,29 +197,32 @@ record.key["h at worst, N_h = 2, gamma = 0.8 [m]"] = float(paper.loc[0.8, "min_h
 # %% [markdown]
 # ## One infeasible step, three answers
 #
-# The first scenario with $\gamma = 0.8$ and, as in the paper, no side chosen beforehand (`head_on_share=0`): the
-# robot drives at full speed until, shortly before the zone, two steps can no longer hold it back. The ticks
-# are steps without a solution. Three answers:
+# The first scenario with $\gamma = 0.8$ and, as in the paper, no side chosen beforehand (`head_on_share=0`). The robot
+# drives at full speed until, shortly before the zone, no plan satisfies the barrier. It can do one of three things:
 #
-# - **dropped**: a hard solver has no answer, and what it leaves behind is nearly the plan without
-#   the barrier; passed on, it drives through the person;
-# - **relaxed**: an exact penalty violates the condition as little as possible (what szlib does);
-# - **braking**: full stop.
+# - **drop** the barrier: plan without it;
+# - **relax** the barrier: violate it as little as possible, by an *exact penalty* (this is what szlib does);
+# - **brake** as hard as it can.
+#
+# `Step.fallback` names the way that szlib took: "warm" or "cold" (a plan that satisfies all constraints), "kept" (the last
+# plan goes on), "relaxed", or "braking" (no solver found a plan).
+#
+# *Which of the three comes nearest to the person? Which one never arrives?*
 
 
 # %%
 def follow(answer: str, settings: szlib.MPCSettings) -> pd.DataFrame:
-    """The passing scenario; where a step is infeasible, the answer given instead of the relaxed plan."""
+    """The passing scenario; where a step is infeasible, the robot gives this answer."""
     scenario = szlib.SCENARIOS["passing"]
     careful, blind = (szlib.MPCCBF(zone, settings=settings) for _ in range(2))
     state, rows = scenario.start, []
     for k in range(120):
         step = careful.step(state, scenario.goal, scenario.people)
-        free = blind.step(state, scenario.goal).control
+        free = blind.step(state, scenario.goal).control  # a plan without people
         slowing = -state[2:] / max(settings.dt, np.abs(state[2:]).max() / settings.a_max)
-        control = (
-            step.control if step.feasible else {"dropped": free, "braking": slowing}.get(answer, step.control)
-        )
+        control = step.control
+        if not step.feasible:
+            control = {"dropped": free, "braking": slowing}.get(answer, step.control)
         rows.append((k * settings.dt, *state, step.h[0], step.feasible))
         state = advance(state, control, settings.dt)
     return pd.DataFrame(rows, columns=["t", "x", "y", "vx", "vy", "h", "feasible"])
@@ -150,167 +231,248 @@ def follow(answer: str, settings: szlib.MPCSettings) -> pd.DataFrame:
 zone = record.cache.ellipse()
 hasty = szlib.MPCSettings(gamma=0.8, head_on_share=0.0)
 answers = {answer: follow(answer, hasty) for answer in ("dropped", "relaxed", "braking")}
+least = {answer: float(run["h"].min()) for answer, run in answers.items()}
 
-# %%
-fig, (left, right) = plt.subplots(1, 2, figsize=(12, 4), layout="constrained")
-shades = ((figures.ORANGE, "-", 6, 0.5), (figures.BLUE, "--", 2, 1), (figures.BLACK, ":", 2, 1))
+# %% jupyter={"source_hidden": true}
+# Figure
+shades = ((figures.ORANGE, "-", 5, 0.6), (figures.BLUE, "--", 2, 1), (figures.BLACK, ":", 2, 1))
+fig, (top, below) = plt.subplots(2, 1, figsize=(9, 6.6), layout="constrained", height_ratios=(1.1, 1))
 for (answer, run), (shade, line, width, alpha) in zip(answers.items(), shades, strict=True):
     style = {"color": shade, "linestyle": line, "linewidth": width, "alpha": alpha}
-    left.plot(run["t"], run["h"], **style, label=f"{answer}: min h {run['h'].min():+.2f} m")
-    right.plot(run["x"], run["y"], **style, label=answer)
-    right.plot(*run[["x", "y"]].to_numpy()[-1], "s", color=shade, markersize=9, markeredgecolor="white")
-    broken = run[~run["feasible"]]
-    left.plot(broken["t"], broken["h"], "|", color=shade, markersize=9)
-left.axhline(0, color=figures.GREY)
-left.set(xlabel="time [s]", ylabel="h [m]", title="Ticks: infeasible steps")
-left.legend(loc="upper center", fontsize=8)
-around = szlib.SCENARIOS["passing"].people[0]
-right.plot(*zone.placed(around.position, around.heading).curve().T, color=figures.RED, label="zone")
-right.plot([], [], "s", color=figures.GREY, label="after 12 s")
-figures.label_metres(right, "Paths").legend(
-    loc="upper center", bbox_to_anchor=(0.5, -0.3), ncols=5, fontsize=8
-)
+    worst = run.loc[run["h"].idxmin()]
+    top.plot(run["x"], run["y"], **style)
+    top.add_patch(
+        plt.Circle(
+            worst[["x", "y"]].to_numpy(), settings.r_robot, fill=False, edgecolor=shade, ls=line, lw=1.5
+        )
+    )
+    below.plot(run["t"], run["h"], **style, label=f"{answer}: least h {least[answer]:+.2f} m")
+    steps = run[~run["feasible"]]
+    below.plot(steps["t"], steps["h"], "|", color=shade, markersize=11)
+person = szlib.SCENARIOS["passing"].people[0]
+top.plot(*zone.placed(person.position, person.heading).curve().T, color=figures.RED, label="zone")
+top.plot(*person.position, "<", color=figures.RED, linestyle="", label="person")
+top.plot([], [], "o", mfc="none", color=figures.GREY, markersize=12, label="robot where its h is least")
+figures.label_metres(top, "Without the barrier it runs over the person; braking, it stops for good")
+below.plot([], [], "|", color=figures.GREY, markersize=11, label="steps without a solution")
+below.axhline(0, color=figures.GREY, linewidth=1)
+below.set(xlabel="time [s]", ylabel="h [m]", title="The relaxed plan leaves the zone again and arrives")
+for ax in (top, below):
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=9)
 record.figure(fig, "answers")
 
-# %%
-lowest = {answer: float(run["h"].min()) for answer, run in answers.items()}
+# %% [markdown]
+# <details><summary>Answer</summary>
+#
+# Without the barrier the robot drives through the person. Full braking enters the zone less deeply, but then it
+# stands there: every later step has no solution either, and it never arrives. The relaxed plan enters about as far,
+# turns aside at once, and goes on.
+#
+# </details>
+#
+# **A common mistake:** "an infeasible step is a collision." No: it says that the barrier cannot be satisfied *within
+# the next steps*. $h$ may still be positive, and $h < 0$ is not a collision either, since the zone is larger than
+# the body.
+
+# %% jupyter={"source_hidden": true}
+# Checks
+in_metres = ", ".join(f"{answer}: {h:+.2f} m" for answer, h in least.items())
 planned = {answer: run["feasible"] & (run["h"] >= 0) for answer, run in answers.items()}
 entered = {name: int((planned[name] & (run["h"].shift(-1) < -1e-6)).sum()) for name, run in answers.items()}
-record.check("no step that had a plan led into the zone", not any(entered.values()), entered, always=True)
-record.check("dropping the barrier is the worst answer", lowest["dropped"] <= min(lowest.values()), lowest)
+steps = sum(int(each.sum()) for each in planned.values())
+record.check(
+    "no step that had a plan led into the zone",
+    not any(entered.values()),
+    f"{sum(entered.values())} of {steps} steps",
+    always=True,
+)
+record.check(
+    "h falls lowest [m] if the barrier is dropped", least["dropped"] <= min(least.values()), in_metres
+)
 steady = follow("relaxed", replace(hasty, N_h=hasty.N))
 record.claim(
-    "the whole horizon has no infeasible step, and needs none of the three answers",
+    "with barriers on the whole horizon every step has a solution, and h >= 0 m",
     steady["h"].min() >= -1e-6 and steady["feasible"].all(),
+    f"least h {steady['h'].min():.2f} m, {(~steady['feasible']).sum()} steps without a solution",
 )
 
 # %% [markdown]
 # ## A promise for ever
 #
-# Let the plan end at rest: barriers on the whole horizon and $\mathbf{v}_N = 0$
-# (`terminal="rest"`). **Recursive feasibility.** Let everybody stand, $h(\mathbf{x}_0) \ge 0$, and
-# let $\mathbf{u}_0,\dots,\mathbf{u}_{N-1}$ satisfy the problem. One step later take
-# $\mathbf{u}_1,\dots,\mathbf{u}_{N-1}, \mathbf{0}$:
+# Is there a formulation that *always* has a solution? Yes, if each plan ends at rest: barriers on the whole horizon
+# and $\mathbf{v}_N = 0$ (`terminal="rest"`). This property is called **recursive feasibility**. Here is the proof.
 #
-# 1. its states are $\mathbf{x}_1,\dots,\mathbf{x}_N,\mathbf{x}_N$, since $\mathbf{v}_N = 0$: bounds,
-#    speed limit and terminal condition hold;
-# 2. the barrier rows that both plans share hold; the new one is
-#    $h(\mathbf{x}_N) - (1-\gamma)\,h(\mathbf{x}_N) = \gamma\, h(\mathbf{x}_N)$;
-# 3. the old rows give $h(\mathbf{x}_N) \ge (1-\gamma)^N h(\mathbf{x}_0) \ge 0$, so it holds too.
+# Let all people stand, let $h(\mathbf{x}_0) \ge 0$, and let the controls $\mathbf{u}_0,\dots,\mathbf{u}_{N-1}$
+# satisfy the problem; $\mathbf{x}_k$ is the state after $k$ steps. One step later, take
+# $\mathbf{u}_1,\dots,\mathbf{u}_{N-1}, \mathbf{0}$: the old plan, then one step at rest.
 #
-# So a robot that has one solution in the safe set - at rest $\mathbf{u} = 0$ is one - has one at
-# every later step, and $h \ge 0$ for ever. Nothing of this holds for $N_h = 2$: there
-# $\mathbf{x}_{N_h}$ may be moving, and no $\mathbf{u}$ need exist for the next row.
+# 1. Its states are $\mathbf{x}_1,\dots,\mathbf{x}_N,\mathbf{x}_N$, since the robot rests at $\mathbf{x}_N$. The
+#    bounds, the speed limit and the terminal condition hold.
+# 2. The barrier conditions that both plans share hold. The new one, of the last step, needs
+#    $h(\mathbf{x}_N) \ge (1-\gamma)\,h(\mathbf{x}_N)$, which is true if $h(\mathbf{x}_N) \ge 0$.
+# 3. The old conditions give $h(\mathbf{x}_N) \ge (1-\gamma)^N h(\mathbf{x}_0) \ge 0$.
+#
+# So a robot that has a solution once has one at every later step, and $h \ge 0$ for ever. A robot at rest outside
+# all zones has one: $\mathbf{u} = 0$. For $N_h = 2$ the proof fails at 1: the robot may be moving after two steps,
+# and the next step may have no solution.
 
 # %%
-still = replace(crowd, standing=1.0, min_h=0.0)
-kept = szlib.rollouts(
-    4 * worlds,
-    seed=seed,
-    settings=szlib.MPCSettings(terminal="rest"),
-    worlds=still,
-    n_jobs=n_jobs,
-    progress=long,
+standing = replace(feasibility.CROWD, standing=1.0, min_h=0.0)  # worlds where all people stand
+at_rest = szlib.MPCSettings(terminal="rest")
+driven = szlib.rollouts(4 * worlds, settings=at_rest, worlds=standing, **options)
+
+# %% jupyter={"source_hidden": true}
+# Checks
+steps, none = 150 * len(driven), int(driven["infeasible_steps"].sum())
+h_min = float(driven["min_h"].min())
+record.check(
+    f"each of {steps} steps among walls and people who stand has a solution",
+    none == 0,
+    f"{none} steps without one",
+    always=True,
 )
-steps = 150 * len(kept)
-none, lowest = kept["infeasible_steps"].sum() == 0, float(kept["min_h"].min())
-record.check(f"not one infeasible step in {steps} among walls and people who stand", none, always=True)
-record.check("h >= 0 throughout among walls and people who stand", lowest >= -1e-6, lowest, always=True)
+record.check(
+    "h >= 0 throughout among walls and people who stand",
+    h_min >= -1e-6,
+    f"least h {h_min:.3f} m",
+    always=True,
+)
 
 # %% [markdown]
-# **People who walk.** Then the appended row may fail, as they come closer while the robot rests. But
-# until its plan ends the robot is safe, and it stops by then: at the first instant with $h < 0$ it
-# stands (*passive safety*). **One walking person in open space** allows more: let the plan end at
-# *their* velocity (`terminal="person"`). Seen from them all is as above, and the same proof holds.
-# From rest the first solution must exist: getting up to their speed takes room.
+# **People who walk** may come closer while the robot rests, and then step 2 fails. But the robot is safe until its
+# last plan ends, and by then it stands. So at the first moment with $h < 0$ the robot is at rest: *passive safety*.
+#
+# **One walking person in open space** allows more. Let the plan end at *the person's* velocity (`terminal="person"`).
+# In the frame of the person, this is the case of a person who stands, and the same proof holds. The robot needs a
+# first solution, though: from rest, it takes room to reach the person's speed.
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Checks
 meeting = replace(ONE_PERSON, standing=0.0)
-start_only = True
+lost_again = 0
 for each in range(seed, seed + 4 * worlds):
     controller = szlib.MPCCBF(zone, settings=szlib.MPCSettings(terminal="person"))
     log = drive(meeting(each), controller, until_arrival=False)
     feasible = log.slack <= 1e-6
-    start_only &= bool(feasible[feasible.argmax() :].all())
-record.check("once there is a solution there always is one", start_only, 4 * worlds, always=True)
+    lost_again += int((~feasible[feasible.argmax() :]).sum())
+record.check(
+    "after the first step with a solution every step has one (plans that end at the person's velocity)",
+    lost_again == 0,
+    f"{lost_again} steps without one in {4 * worlds} worlds of 15 s",
+    always=True,
+)
 
 # %% [markdown]
 # ## Thousands of worlds
 #
-# 150 steps each: 1-5 people who walk or stand, walls in half of the worlds, any start, heading and goal;
-# and one person in open space with a robot that starts at rest, $h \ge 0.3$ m. The table is saved beside
-# the notebooks; `python -m studies.rollout_table` makes it anew, from blocks of seeds far apart, with
-# 95 % Clopper-Pearson intervals (`low`, `high`). *Unflagged violations* are steps that called themselves safe
-# and led to $h < 0$, *unflagged overlaps* those that led the robot's disc into a wall or a body, by
-# Euclidean distance. "paper" is `MPCSettings.paper()`; its solver takes ten times as long, so it drives in the first
-# worlds of each block. "szlib" has our defaults; the others change one of them. "paper" and "margin = paper" have
-# the paper's eps of 5 cm around every wall, all others give each wall the margin that it requires (notebook 22).
+# Each world is driven for 15 s (150 steps). Two sets:
 #
-# With one person the few infeasible steps are first ones: somebody who walks up at 0.5 m/s takes
-# 5 cm of $h$ in a step where the condition allows $\gamma h = 1.5$ cm, and a robot at rest cannot yet
-# be under way. With $\gamma = 0.05$ a horizon of $N_h = 2$ then loses no world, with the paper's settings and with
-# ours. With larger $\gamma$ it does: it sees 0.2 s ahead, and a robot that may come closer at
-# $\gamma h / \Delta t$ needs $v / a_{max}$ to stop.
+# - **all**: 1-5 people who walk or stand, walls in half of the worlds, any start, heading and goal;
+# - **one person** in open space; the robot starts at rest with $h \ge 0.3$ m.
+#
+# "paper" is `MPCSettings.paper()`; its solver takes ten times as long, so it drives in fewer worlds. "szlib" has our
+# defaults; each other formulation changes one of them. "paper" and "margin = paper" keep the paper's margin of 5 cm
+# around every wall, all others the margin that the wall requires (notebook 22). A *flagged* step is one that the
+# controller did not report as safe. The table is saved beside the notebooks (`python -m studies.rollout_table`).
+#
+# *In which set, and with which $\gamma$, do you expect worlds with $h < 0$?*
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Figure
 thousands = record.committed_table("21_rollouts", rollout_table.recompute)
-flagged = (thousands["unflagged_violations"] == 0).all()
-record.check("each step with h < 0 was flagged before", flagged, always=True)
-apart = (thousands["unflagged_overlaps"].dropna() == 0).all()
-record.check("each step into an overlap was flagged before", apart, always=True)
-walls = thousands[thousands["set"] == "all"].set_index("formulation")["worlds overlap wall"]
-record.claim(
-    "no wall is touched with the margin it requires", walls["szlib"] == 0, f"{int(walls['szlib'])} world"
+names = thousands["set"].replace("all", "1-5 people, walls") + ": " + thousands["formulation"]
+low, high, share = (100 * thousands[each] for each in ("low h < 0", "high h < 0", "share h < 0"))
+fig, ax = plt.subplots(figsize=(9, 4), layout="constrained")
+colours = [figures.BLUE if each == "one person" else figures.GREY for each in thousands["set"]]
+ax.barh(names, share, color=colours, height=0.6)
+ax.hlines(names, low, high, color=figures.BLACK)
+for row, (part, n) in enumerate(zip(share, thousands["worlds"], strict=True)):
+    ax.text(high[row] + 0.2, row, f"{part:.2g} % of {n:,}", va="center", fontsize=9)
+ax.set(xlabel="worlds with h < 0 [%], with 95 % intervals", xlim=(0, 1.2 * high.max() + 1))
+ax.invert_yaxis()
+alone, among = (
+    thousands[thousands["set"] == each].set_index("formulation") for each in ("one person", "all")
 )
-of_paper = walls[["paper", "margin = paper"]]
-record.claim(
-    "no wall is touched with the paper's margin", of_paper.max() == 0, f"{int(of_paper.max())} worlds"
-)
-alone = thousands[thousands["set"] == "one person"].set_index("formulation")
-long = alone.loc[["whole horizon", "rest"], "min_h"]
-safe = long.min() >= -1e-6
-record.check("with one person and long horizons, h >= 0 in every world", safe, long.to_dict(), always=True)
 lost = alone.loc[["paper", "szlib", "gamma = 0.2", "gamma = 0.8"], "share h < 0"]
-value = (
-    f"h < 0 in {lost['paper']:.1%} of worlds with gamma = 0.05, in {lost['gamma = 0.8']:.1%} with gamma = 0.8"
+few, many = (f"{100 * lost[each]:.0f} %" for each in ("szlib", "gamma = 0.8"))
+ax.set_title(f"One person: h < 0 in {few} of the worlds with gamma = 0.05, in {many} with 0.8")
+record.figure(fig, "thousands")
+
+# %% [markdown]
+# <details><summary>Answer</summary>
+#
+# With one person, $\gamma = 0.05$ keeps $h \ge 0$ in every world, with the paper's settings and with ours; a larger
+# $\gamma$ does not, for it lets the robot approach faster than it can brake. Among several people and walls a few
+# worlds have $h < 0$ with every formulation: somebody walks into a robot that has nowhere to go.
+#
+# With one person a few *first* steps have no solution: a person who walks at 0.5 m/s takes 5 cm of $h$ in a step,
+# where the condition allows $\gamma h = 1.5$ cm, and a robot at rest cannot yet be on its way.
+#
+# </details>
+
+# %% jupyter={"source_hidden": true}
+# Checks
+violations, overlaps = (int(thousands[f"unflagged_{each}"].sum()) for each in ("violations", "overlaps"))
+record.check(
+    "each step with h < 0 was flagged before", violations == 0, f"{violations} not flagged", always=True
 )
+record.check(
+    "each step into an overlap was flagged before", overlaps == 0, f"{overlaps} not flagged", always=True
+)
+walls = among["worlds overlap wall"].astype(int)
+found = {each: f"in {walls[each]} of {among.loc[each, 'worlds']:,} worlds" for each in among.index}
+record.claim("no wall is touched with the margin it requires", walls["szlib"] == 0, found["szlib"])
+worst = walls[["paper", "margin = paper"]].idxmax()
+record.claim("no wall is touched with the paper's margin", walls[worst] == 0, found[worst])
+
+# %% jupyter={"source_hidden": true}
+# Checks
+h_min = alone.loc[["whole horizon", "rest"], "min_h"].min()
+record.check(
+    "with one person and long horizons, h >= 0 in every world",
+    h_min >= -1e-6,
+    f"least h {h_min:.4f} m",
+    always=True,
+)
+value = f"h < 0 in {lost['paper']:.1%} of worlds with gamma = 0.05, {lost['gamma = 0.8']:.1%} with 0.8"
 record.claim("with one person and N_h = 2, h >= 0 in every world, for any gamma", lost.max() == 0, value)
 record.key |= {"worlds driven": int(thousands["worlds"].sum())}
-thousands.set_index(["set", "formulation"]).T
 
 # %% [markdown]
-# Failures are worlds with a seed: `szlib.simulation.monte_carlo.replay(seed, settings=..., worlds=...)` shows
-# each again. The first that did not arrive here:
+# Each world has a seed: `szlib.simulation.monte_carlo.replay(seed, settings=..., worlds=...)` shows it again. The
+# first ones of this run in which the robot did not arrive:
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Table
 rows = szlib.rollouts(20, seed=seed, n_jobs=n_jobs, progress=False)
-failed = rows[rows["outcome"] != "arrived"]
-failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]]
+failed = rows[rows["outcome"] != "arrived"].head(5)
+names = {"min_h": "least h [m]", "flagged_steps": "flagged steps"}
+failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]].rename(columns=names)
 
 # %% [markdown]
-# ## What the promise says, and how it was attacked
+# ## How these statements were attacked
 #
-# `MPCSettings(terminal="rest")` adds a condition to the paper's formulation: the plan ends at rest. Once a step has a
-# solution, every later step has one, among walls and standing people. If somebody walks into the robot, the robot is
-# already at rest. Each step names the fallback that gave its plan (warm start, cold start, last plan kept, relaxed, full
-# braking), whether the plan satisfies the hard problem, and its violation.
-#
-# `Step.safe` refers to bodies, in Euclidean distance, and to people who keep their velocity. `make hostile` runs these
-# attacks (two hours):
+# `Step.safe` is a statement about bodies, in Euclidean distance, and about people who keep their velocity.
+# `make hostile` tries to disprove it, and attacks the programs around it (two hours):
 #
 # | attack | tried | result |
 # |---|---|---|
-# | random command lines: odd names, places, values, numbers | 1,000 (889 end with 2, 86 with 0, 25 with 1) | none hangs, shows a foreign traceback, or changes files of others |
+# | random command lines: odd names, places, values, numbers | 1,000 | none hangs, shows a foreign traceback, or changes other files |
 # | damaged results; disks full at each write; clocks that jump | 1,200; 21; 40 | all repaired or refused |
-# | `extract` and `run` killed at random moments, 68 by SIGKILL, 32 by SIGTERM | 100 kills, 24 of them resumed to the end | identical bytes, no process left |
-# | steps from random states, settings, people, walls | 51,995 | no step that claimed to be safe led to h < 0 or an overlap, none left its bounds |
-# | worlds, judged by independent formulas, Euclidean | 11,200 | 25 had h < 0 and 1 an overlap with a person, all flagged before |
-# | extreme states for each solver | 3,000 | 99.9th percentile of a step: 10 ms (SQP), 51 ms (IPOPT, stopped at 50) |
+# | `extract` and `run` killed at random moments | 100 | identical bytes after a restart, no process left |
+# | steps from random states, settings, people, walls | 51,995 | no step that was reported as safe led to h < 0 or an overlap |
+# | worlds, judged by independent formulas, Euclidean | 11,200 | 25 had h < 0, 1 an overlap with a person; all flagged before |
+# | extreme states for each solver | 3,000 | 99.9 % of the steps within 10 ms (SQP) or 51 ms (IPOPT, stopped at 50) |
 
-# %% [markdown]
-# **What it means.** A small $\gamma$ makes up for a short horizon, at the price of a slow robot. For a
-# plan that ends at rest there is a proof instead, as long as people stand; where they walk, the robot
-# is at rest at the first moment with $h < 0$.
+# %% jupyter={"source_hidden": true}
+# What we know now
+Markdown(f"""**What we know now.** A step has a solution as long as the robot can brake as fast as the barrier asks:
+$\\gamma \\le a_{{max}}\\Delta t / v_{{max}}$ = {settings.a_max * settings.dt / settings.v_max:g} for our robot, and
+we use {settings.gamma:g}. With one person and $\\gamma = 0.8$, h < 0 in {many} of the worlds, with
+{settings.gamma:g} in {few}: a small $\\gamma$ makes up for a short horizon, and the price is a slow
+robot. A plan that ends at rest has a proof instead: among people who stand, every later step has a solution; among
+people who walk, the robot is at rest when h becomes negative.""")
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Summary of the checks
 record.close()

@@ -160,7 +160,7 @@ GLOSSARY: dict[str, Word] = {
         "the ellipse that careful people keep out of, compared with people who ignore each other", new=False
     ),
     "fallback": Word(
-        "which of the controller's ways to a control was taken: hard, relaxed, shifted, braking"
+        "which of the controller's ways to a control was taken: warm, cold, kept, relaxed, braking"
     ),
     "slack": Word("by how much a row is violated"),
     "social force": Word("people who are pushed by others and by walls, and drawn to their goal", new=False),
