@@ -75,6 +75,8 @@
 #
 # - [Reference](reference.md): all notebooks, words, symbols and parameters; what is not in the paper; related work.
 # - [Which estimator, which settings?](which_settings.md): for tracks or a robot of your own.
+#
+# JupyterLab opens both as text: click on it with the right button, and choose *Show Markdown Preview*.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook
