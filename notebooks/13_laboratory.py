@@ -25,7 +25,15 @@
 #
 # **Afterwards you can** try out a scene of your own, live, and hand its settings on.
 
+# %% jupyter={"source_hidden": true} tags=["parameters"]
+# Parameters of this notebook
+data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
+area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
+seed = 0
+results = "../results"
+
 # %% jupyter={"source_hidden": true}
+# Imports, and the record of the run
 import numpy as np
 import pandas as pd
 from laboratory import PRESETS, Laboratory, RobotOptions, World, explain, is_interactive
@@ -34,32 +42,30 @@ import szlib
 from szlib.workbook import figures
 from szlib.workbook.record import NotebookRecord
 
-# %% tags=["parameters"] jupyter={"source_hidden": true}
-data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
-area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
-seed = 0
-results = "../results"
+record = NotebookRecord("13_laboratory", globals())
 
 # %% jupyter={"source_hidden": true}
-record = NotebookRecord("13_laboratory", globals())
+# The zone of notebook 05
 zone = record.cache.ellipse()
 
 # %%
 Laboratory(zone=zone) if is_interactive() else None
 
-# %% [markdown]
-# In JupyterLab the laboratory stands here; without a kernel you see one moment of it below. Choose a scene, press *play* or
-# *step*, and move the time line to go back. Drag what you like, also while it runs: people, the tip of a person's arrow, the
-# robot, its goal, the ends of walls. The green area holds all accelerations that the robot may choose now. The orange edge is the
-# limit that the sentence names, the active one. *share* writes code that computes what is on the screen.
-
-# %%
+# %% jupyter={"source_hidden": true}
+# Figure: one moment, for readers without a kernel
 still = World(PRESETS["corridor"], zone)
 while still.n * still.dt < 4.0:
     still.advance()
 fig = figures.draw_step(still.steps[0])
+fig.set_size_inches(9.5, 4.2)
 fig.suptitle(explain(still.steps[0]).sentence, fontsize=11)
 record.figure(fig, "still")
+
+# %% [markdown]
+# With a kernel (*Run > Run All Cells*) the laboratory stands above. The picture shows one moment of it. Choose a scene, press *play* or
+# *step*, and move the time line to go back. Drag what you like, also while it runs: people, the tip of a person's arrow, the
+# robot, its goal, the ends of walls. The green area holds all accelerations that the robot may choose now. The orange edge is the
+# limit that the sentence names, the active one. *share* writes code that computes what is on the screen.
 
 # %% [markdown]
 # ## Things to try
@@ -102,6 +108,7 @@ record.figure(fig, "still")
 
 
 # %% jupyter={"source_hidden": true}
+# A scene with one change, without a screen
 def try_scene(name, constructor="MPCSettings", at=0.0, edit=None, **settings):
     """Run a scene as the laboratory does, with one change at a time [s], for 40 s."""
     world, steps = World(PRESETS[name], zone, [RobotOptions(constructor, settings)]), []
@@ -120,6 +127,7 @@ def try_scene(name, constructor="MPCSettings", at=0.0, edit=None, **settings):
 # The notebook tries all of it, and checks what is written above:
 
 # %% jupyter={"source_hidden": true}
+# All of the above
 narrow = {"walls": [[-6.0, 1.8, 7.0, 1.8], [-6.0, -1.8, 7.0, -1.8]]}
 ahead = [{"people": {0: {"position": [x, 0.0], "speed": 0.0}}} for x in (-0.5, 0.0)]
 tried = {
@@ -140,6 +148,7 @@ table = pd.DataFrame(tried).T
 table[["time", "least h", "steps not safe", "arrived"]]
 
 # %% jupyter={"source_hidden": true}
+# Checks
 time, low, unsafe, back = (table[name].astype(float) for name in table.columns[:4])
 held = {
     "1: sooner, but not safe": time.iloc[1] < time.iloc[0] - 2 and low.iloc[1] < 0 < unsafe.iloc[1],
@@ -158,6 +167,7 @@ for what, holds in held.items() if record.cache.is_synthetic else ():
 # And what is shown live is what `szlib.simulate` computes, step by step:
 
 # %% jupyter={"source_hidden": true}
+# Checks
 log = szlib.simulate(PRESETS["corridor"], szlib.MPCCBF(zone, walls=PRESETS["corridor"].walls))
 trial, same = World(PRESETS["corridor"], zone), []
 for state in log.states:
@@ -172,5 +182,6 @@ record.key |= {"gamma = 0.5: min_h": low.iloc[1], "among_people: time_to_goal": 
 # **What it means.** h is what is left before the zone is reached, and gamma the share of it that a step may use up. The
 # acceleration lies on the edge of a limit most of the time: that edge is the answer to "why did it do this?".
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Summary of the checks
 record.close()

@@ -21,6 +21,8 @@ from jupytext.config import load_jupytext_config
 
 ROOT = Path(__file__).parents[2]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "microsoft-edge")
+CHAPTERS = "chapters"
+"""A folder of the copy with the executed chapters."""
 REQUIRED = "SZLIB_BROWSER"
 """Set where a browser is required, as in CI: the tests fail without one."""
 SETTINGS = {
@@ -74,6 +76,9 @@ def copy(browser: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("szlib", "notebooks"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", ".*"))
     shutil.copy(ROOT / "pyproject.toml", folder)
+    for chapter in (ROOT / "notebooks").glob("*.ipynb"):
+        (folder / CHAPTERS).mkdir(exist_ok=True)
+        shutil.copy(chapter, folder / CHAPTERS)
     for name in OPERATED:
         shorten(folder / "notebooks" / f"{name}.py")
     for arguments in (["init", "-q"], ["add", "-A"]):
@@ -89,10 +94,10 @@ def shorten(script: Path) -> None:
     for cell in notebook.cells:
         is_operated = any(text in cell.source for text in OPERATED[script.stem])
         is_set_up = "parameters" in cell.metadata.get("tags", []) or "import" in cell.source.split()
-        if is_operated or is_set_up:
+        is_record = "= NotebookRecord(" in cell.source
+        if is_operated or is_set_up or is_record:
             kept.append(cell)
-        if "record = NotebookRecord(" in cell.source:
-            kept += [] if is_set_up else [cell]
+        if is_record:
             kept.append(nbformat.v4.new_code_cell(GIVEN[script.stem]))
     notebook.cells = [cell for cell in kept if cell.cell_type == "code"]
     settings = load_jupytext_config(str(script))
