@@ -21,8 +21,8 @@
 # the zone the barrier leaves little speed.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [09](09_passing.ipynb) · next: [11 - Yielding by
-# waiting](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 35 min · needs
+# [Start](00_start_here.ipynb) · before: [09](09_passing.ipynb) · next: [11 - Yielding: waiting and making
+# room](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 35 min · needs
 # [09](09_passing.ipynb) · laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say why the robot slows down in a corridor, and speeds up beside the person.

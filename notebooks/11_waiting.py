@@ -12,40 +12,25 @@
 # ---
 
 # %% [markdown]
-# # 11 - Yielding by waiting
+# # 11 - Yielding: waiting and making room
 #
-# **Question.** A passage is too narrow for two, and a person is in it. The robot has no rule of priority.
-# Why does it wait, and what does waiting look like to a solver?
+# **Question.** A passage is too narrow for two, and a person is in it. Why does the robot wait outside, and why
+# does it go back if it is inside, although no rule says who goes first?
 #
-# **Expectation.** The paper: the robot waits outside until the person is through, then it goes.
+# **Expectation.** The paper: a robot outside waits until the person is through. A robot inside backs out first.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [10](10_corridor.ipynb) · next: [11b - Yielding by making
-# room](11b_making_room.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6c · 35 min · needs
-# [10](10_corridor.ipynb) · exercises:
+# [Start](00_start_here.ipynb) · before: [10](10_corridor.ipynb) · next: [12 - Other people's
+# crowds](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6c-d · 30 min ·
+# needs [10](10_corridor.ipynb) · exercises:
 # [6.4-6.5](exercises/sheet6_robot.ipynb#6.4-Predict,-then-run-(20-min)) · laboratory:
 # [13](13_laboratory.ipynb)
 #
-# **Afterwards you can** say why the robot waits, although no rule tells it to.
+# **Afterwards you can** say why the robot waits, and why it backs out of a passage, although no rule tells
+# it to.
 
-# %%
-from dataclasses import replace
-
-import matplotlib.pyplot as plt
-import numpy as np
-import pandas as pd
-from IPython.display import Markdown
-from studies import paper_claims
-from studies.atlas import AtlasCell
-
-import szlib
-from szlib.control.acceleration_polygon import find_admissible_controls
-from szlib.simulation.metrics import find_yielding_steps
-from szlib.simulation.strategies import classify_strategy
-from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
-
-# %% tags=["parameters"]
+# %% jupyter={"source_hidden": true} tags=["parameters"]
+# Parameters of this notebook
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
@@ -57,178 +42,318 @@ a_max = 1.0  # m/s2
 width = 2.0  # of the passage, m
 pace = 0.5  # of the person, m/s
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Imports, and the record of the run
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from IPython.display import Markdown
+from studies import chains, scenario_runs
+from studies.atlas import AtlasCell
+
+import szlib
+from szlib.control.acceleration_polygon import find_admissible_controls
+from szlib.simulation.metrics import find_yielding_steps
+from szlib.simulation.strategies import classify_strategy
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
+
 record = NotebookRecord("11_waiting", globals())
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
-scenario = AtlasCell("waiting", width=width, pace=pace).scenario()
-parameters(
-    [
-        ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
-        ("passage", f"{width} m", ASSUMED, "the paper shows walls without numbers"),
-        ("N, N_h, dt", f"{settings.N}, {settings.N_h}, {settings.dt} s", PAPER, "sec. 4"),
-        ("gamma", gamma, TUNED, "on these four scenarios; in 2,000 other worlds: notebook 09"),
-        ("a_max; Q, R, P", f"{a_max} m/s²; as in notebook 09", ASSUMED, "the paper gives none"),
-        (
-            "head_on_share",
-            settings.head_on_share,
-            ASSUMED,
-            "ours; 0 in the paper's chain: the rule of the side acts while the goal lies within this share of the "
-            "half-angle under which the robot sees the zone, and fades out up to twice that",
-        ),
-    ]
+scenario_runs.list_parameters(
+    settings,
+    ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
+    ("passage", f"{width} m wide", ASSUMED, "the paper shows walls without numbers"),
 )
 
+# %% jupyter={"source_hidden": true}
+# Figure
+scenes = {name: AtlasCell(name, width=width, pace=pace).scenario() for name in ("waiting", "making_room")}
+waiting, making_room = (scenario_runs.drive_both(record, scene, settings) for scene in scenes.values())
+_, between = scenes["waiting"].claims[1].check(waiting.ours)
+_, back = scenes["making_room"].claims[0].check(making_room.ours)
+titles = (
+    f"Waiting: it goes in {between:.1f} s after the person is out",
+    f"Making room: it goes back {back:.1f} m",
+)
+fig, panels = plt.subplots(1, 2, figsize=(11, 3.9), sharey=True, layout="constrained")
+for ax, runs, title in zip(panels, (waiting, making_room), titles, strict=True):
+    scenario_runs.draw_space_time(ax, runs, title)
+figures.add_shared_legend(panels)
+record.figure(fig, "space-time")
+
 # %% [markdown]
-# ## The paper's chain, as it comes out
+# Read a panel from left to right: that is the time. Upwards is the way through the passage, the grey band. The
+# person walks down through it. On the left the robot starts outside and stays below the band until the person is
+# out. On the right it starts in the band, goes down out of it, and comes back.
+
+# %% [markdown]
+# ## The paper's chain, and ours
 #
-# First everything as the paper has it: its zone (outliers by LOF, hull, slice, smallest ellipse) and its
-# controller (IPOPT, 5 cm of margin around every wall, no rule of the side). The paper does not give gamma, Q, R, P
-# and a_max: they are ours.
+# Orange is everything as the paper has it, its zone and its controller; gamma and a_max are ours, since the paper
+# gives none. Blue is our zone (notebook 05) and our controller. Here both do the same: nobody has to pass anybody
+# on a side, so our rule of the side has nothing to do. The same five numbers describe a run in notebooks 09 to 11:
 
 # %%
-paper_zone = record.cache.paper_ellipse()
-paper = szlib.MPCSettings.paper(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
-paper_log = szlib.simulate(scenario, szlib.MPCCBF(paper_zone, walls=scenario.walls, settings=paper))
-claims = paper_claims.record_claims(record, scenario.claims, paper_log)
-honest = paper_log.metrics()["unflagged_violations"] == 0
-record.check("the paper's chain: no step that called itself safe led to h < 0", honest, always=True)
-Markdown(paper_claims.describe_run(paper_log, claims))
+named = {f"waiting, {name}": run for name, run in waiting.by_name().items()}
+named |= {f"making room, {name}": run for name, run in making_room.by_name().items()}
+scenario_runs.tabulate_five(named)
 
 # %% [markdown]
-# In this scene the robot starts beside the passage, so there is no symmetry to break, and no side to choose.
+# *Yielding* is time without progress while the barrier of a person holds the robot. The *clearance* is the
+# Euclidean gap from the robot's side to a body or a wall.
 
-# %% [markdown]
-# ## The run
-#
-# From here on the robot is ours: `MPCSettings()`, and the *quantile zone* of notebook 05. Here they are beside the
-# paper's.
-
-# %%
-zone = record.cache.ellipse()
-rows = {"paper": [*paper_zone.center, *paper_zone.semi_axes], "ours": [*zone.center, *zone.semi_axes]}
-sizes = ["centre ahead [m]", "centre to the left [m]", "semi-axis a [m]", "semi-axis b [m]"]
-pd.DataFrame(rows, index=sizes).round(2)
-
-# %%
-controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
-log = szlib.simulate(scenario, controller)
-metrics = log.metrics()
-both = pd.DataFrame({"the paper's chain": paper_log.metrics(), "ours": metrics})
-both.filter(regex="^(?!solve_time)", axis="index")  # all but the machine's times
-
-# %%
-ax = log.plot()
-record.figure(ax.figure, "scenario")
-
-# %%
-record.animation(movie := log.animate(), "run")
+# %% jupyter={"source_hidden": true}
+# Animation
+record.animation(movie := making_room.ours.animate(width=9), "run")
 movie
 
 # %% [markdown]
 # ## Safe, and as the paper says?
 #
-# The promises that must hold with any zone that leaves the scene passable, and the claims of the paper for ours.
+# The checks must hold with any zone that leaves the passage open. The claims are the paper's, for its chain and
+# for ours.
 
-# %%
-record.check("the goal is reached", metrics["success"])
-record.check("h >= 0 at every step", metrics["min_h"] >= 0, metrics["min_h"])
-record.check("no infeasible step", metrics["infeasible_steps"] == 0, metrics["infeasible_steps"])
-record.check("nothing is touched (Euclidean)", metrics["min_clearance"] > 0, metrics["min_clearance"])
-record.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metrics["max_speed"])
-record.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_speed", "time_yielding")}
+# %% jupyter={"source_hidden": true}
+# Checks: waiting
+scenario_runs.record_safety(record, waiting)
+scenario_runs.record_both_claims(record, waiting)
 
-# %%
-paper_claims.record_claims(record, scenario.claims, log, prefix="ours: ")
-
-# %% [markdown]
-# ## Who is in the passage when
-#
-# Time runs to the right, the passage lies across. Where the grey band holds only one line at a time, nobody
-# met in it.
-
-# %%
-fig, ax = plt.subplots(figsize=(8, 4), layout="constrained")
-ax.axhspan(0, 3, color=figures.GREY, alpha=0.25, label="inside the passage")
-ax.plot(log.time, log.states[:, 0], color=figures.BLUE, linewidth=2, label="robot")
-x = log.people[:, 0, 0]
-ax.plot(log.time, x, "--", color=figures.RED, label="person")
-reach = zone.semi_axes[0]
-ax.fill_between(log.time, x - reach, x + reach, color=figures.RED, alpha=0.15, lw=0, label="zone")
-out_first, between = scenario.claims[1].check(log)
-title = (
-    f"The robot enters {between:.1f} s after the person has left" if out_first else "Both are inside at once"
-)
-ax.set(xlabel="time [s]", ylabel="x [m]", title=title)
-ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1))
-record.figure(fig, "space-time")
+# %% jupyter={"source_hidden": true}
+# Checks: making room
+scenario_runs.record_safety(record, making_room, "making room: ")
+scenario_runs.record_both_claims(record, making_room, "making room: ")
 
 # %% [markdown]
 # ## What waiting looks like
 #
-# `time_yielding` counts the time without progress while the person's barrier holds the robot. From the middle
-# of it, one step:
+# Ten times a second the robot chooses an acceleration that obeys every row of the problem: the person's and each
+# wall's. **What do you think?** In the middle of waiting, which accelerations are left: only zero, all that point
+# away from the passage, or some to the side?
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Figure
+log = waiting.ours
+controller = szlib.MPCCBF(log.zones[0], walls=scenes["waiting"].walls, settings=settings)
 waits = np.flatnonzero(find_yielding_steps(log))
 middle = float(log.time[waits[len(waits) // 2] if len(waits) else log.speed[10:].argmin() + 10])
 step = controller.step(*log.controller_inputs(middle))
-record.figure(figures.draw_step(step), "admissible")
-
-# %%
+fig = figures.draw_step(step)
 ahead = find_admissible_controls(step).polygon.bounds[2]
+fig.suptitle(f"Waiting at {middle:.1f} s: at most {ahead:+.2f} m/s² towards the passage (x) is allowed")
+record.figure(fig, "admissible")
+
+# %% jupyter={"source_hidden": true}
+# Checks, and the answer
+evidence = f"at most {ahead:+.2f} m/s²"
 record.check(
-    "while the robot waits, no admissible acceleration leads towards the passage", ahead < 0.1, ahead
+    "while the robot waits, no admissible acceleration leads towards the passage", ahead < 0.1, evidence
 )
 Markdown(
-    f"At {middle:.1f} s: h is {step.h[0]:.2f} m to the person, and {step.h[1:].min():.2f} m to the "
-    f"nearest wall; the largest admissible acceleration ahead is {ahead:+.2f} m/s²."
+    "<details><summary>Answer</summary>\n\nThose that point back and aside. "
+    f"h is {step.h[0]:.2f} m to the person and {step.h[1:].min():.2f} m to the nearest wall. The "
+    "person's row forbids what leads to the mouth of the passage, and the wall beside the mouth what leads straight "
+    "on. The robot takes the tip of what is left that is nearest to its goal. That is all that waiting is: a corner "
+    "near zero. So the robot hardly ever stands. It creeps up, is moved aside as the zone comes out, and comes back "
+    "behind it.\n\n</details>"
 )
 
 # %% [markdown]
-# With the default settings two edges close the way. The person's zone forbids what leads to the mouth, and
-# the wall beside the mouth what leads straight on. What is left points back and aside, and the chosen one is
-# the tip that is nearest to the goal. That is all that waiting is: a corner of the polygon near zero. The
-# robot hardly ever stands; it creeps up, is moved aside as the zone comes out, and comes back behind it.
+# ## A speed limit below zero
+#
+# Now the robot is in the passage. It is $h = 0.6$ m away from the zone of a person who walks towards it at
+# 0.5 m/s. With gamma = 0.05 a step of 0.1 s may use up 5 % of 0.6 m, that is 3 cm, or 0.3 m/s. The person alone
+# uses up 0.5 m/s. **-0.2 m/s** is left: the robot has to go back. As a formula (notebook 07):
+#
+# $$v \le \frac{\gamma h}{\Delta t} - v_{person}$$
+#
+# The limit is zero at $h = v_{person}\, \Delta t / \gamma$, here 1 m. Nearer than that a robot that stands still
+# breaks the condition.
+#
+# **What do you think?** Does the robot turn back at 1 m, earlier, or later?
+
+# %% jupyter={"source_hidden": true}
+# Figure
+log = making_room.ours
+h, until = log.h[:, 0], int(np.argmax(log.states[:, 0] < 0))
+stand = pace * settings.dt / gamma
+turn = int(np.argmax(log.states[:, 2] < -0.02))
+fig, ax = plt.subplots(figsize=(8, 3.8), layout="constrained")
+ax.plot(h[:until], log.states[:until, 2], color=figures.BLUE, linewidth=2, label="robot, until it is out")
+line = np.array([0.0, 1.2 * h[:until].max()])
+ax.plot(line, gamma * line / settings.dt - pace, "--", color=figures.RED, label="limit: gamma h / dt - pace")
+ax.axhline(0, color=figures.GREY, linewidth=0.8)
+ax.plot(stand, 0, "o", color=figures.RED, label=f"the limit is 0 at h = {stand:.2f} m")
+ax.set(xlabel="h to the person [m]", ylabel="speed ahead [m/s]", xlim=(line[1], 0), ylim=(-0.8, 0.8))
+ax.set_title(f"It drives on, slows down, and turns back at h = {h[turn]:.2f} m")
+ax.legend(loc="lower left")
+record.figure(fig, "below-zero")
+
+# %% jupyter={"source_hidden": true}
+# Checks, and the answer
+controller = szlib.MPCCBF(log.zones[0], walls=scenes["making_room"].walls, settings=settings)
+step = controller.step(*log.controller_inputs(float(log.time[turn])))
+ahead = find_admissible_controls(step).polygon.bounds[2]
+evidence = f"at most {ahead:+.2f} m/s²"
+record.check("as the robot turns back, every admissible acceleration leads back", ahead < 0, evidence)
+Markdown(
+    f"<details><summary>Answer</summary>\n\nAt h = {h[turn]:.2f} m; the formula says {stand:.2f} m. The condition "
+    "must hold in the steps to come, too, so the robot stays a little below the line. As it "
+    f"turns, the gentlest acceleration that obeys every row is {ahead:+.2f} m/s² ahead: all of them lead back.\n\n</details>"
+)
 
 # %% [markdown]
 # ## Who goes first?
 #
-# Let the person begin farther away, so that the robot is at the passage before them.
+# The robot outside wants to go in. Let the person begin farther and farther away. **What do you think?** The robot
+# needs about 7 s to the mouth, and 3 more to the other end. From which start of the person on does it go first?
+# And what if it is just too late?
 
 # %%
-rows, runs = [], {}
-for start in (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0):
-    person = szlib.Person((start, 0.0), (-pace, 0.0))
-    scene = replace(scenario, people=(person,))
-    run = runs[start] = szlib.simulate(scene, szlib.MPCCBF(zone, walls=scene.walls, settings=settings))
-    both = (run.states[:, 0] > 0) & (run.people[:, 0, 0] > 0)
-    found = run.metrics()
-    numbers = (found[name] for name in ("time_yielding", "time_to_goal", "min_h"))
-    rows.append((start, classify_strategy(run), bool(both.any()), *numbers))
-columns = ["person from x [m]", "robot", "in before they are out", "yields [s]", "to goal [s]", "least h [m]"]
-firsts = pd.DataFrame(rows, columns=columns)
-firsts.style.format(precision=2).hide(axis="index")
+starts, firsts = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0), []
+for start in starts:
+    scene = replace(scenes["waiting"], people=(szlib.Person((start, 0.0), (-pace, 0.0)),))
+    run = scenario_runs.drive(scene, record.cache.ellipse(), settings)
+    outside = run.time[run.states[:, 0] < 0]
+    entries = run.time[np.argmax(run.states[:, 0] > 0)], outside[-1]
+    firsts.append((start / pace, *entries, classify_strategy(run)))
+firsts = pd.DataFrame(firsts, index=starts, columns=["person out", "robot in", "in for good", "robot"])
 
-# %%
-fig, ax = plt.subplots(figsize=(8, 4), layout="constrained")
-ax.axhspan(0, 3, color=figures.GREY, alpha=0.25, label="inside the passage")
-for (start, run), colour in zip(runs.items(), figures.pick_colours(list(runs)), strict=True):
-    ax.plot(run.time, run.states[:, 0], color=colour, label=f"robot, person from {start:g} m")
-    ax.plot(run.time, run.people[:, 0, 0], "--", color=colour, linewidth=0.8)
-ahead = firsts.loc[firsts["robot"] == "goes ahead", "person from x [m]"]
-title = (
-    f"The robot goes first if the person starts at {ahead.min():g} m or farther"
-    if len(ahead)
-    else "It never goes first"
+# %% jupyter={"source_hidden": true}
+# Figure
+goes_first = firsts.index[firsts["in for good"] < firsts["person out"]]
+returns = firsts["in for good"] > firsts["robot in"] + 1
+fig, ax = plt.subplots(figsize=(8, 3.8), layout="constrained")
+ax.plot(starts, firsts["person out"], "--", color=figures.RED, label="the person leaves the passage")
+ax.plot(starts, firsts["in for good"], "o-", color=figures.BLUE, label="the robot goes in for good")
+first_try = firsts.loc[returns, "robot in"]
+ax.plot(first_try, "x", color=figures.BLACK, markersize=8, label="it had gone in, and must come out")
+ax.set(xlabel="start of the person, x [m]", ylabel="time [s]", ylim=(0, None))
+ax.set_title(
+    f"The robot goes first if the person starts at {goes_first.min():g} m or farther"
+    if len(goes_first)
+    else "The robot never goes first"
 )
-ax.set(xlabel="time [s]", ylabel="x [m]", title=f"{title} (person dashed)")
-ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
+ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=9)
 record.figure(fig, "who-first")
 
+# %% jupyter={"source_hidden": true}
+# The answer
+late = firsts[returns]
+Markdown(
+    "<details><summary>Answer</summary>\n\nThe robot goes in whenever nothing holds it at the mouth. It sees "
+    f"{settings.N * settings.dt:.1f} s ahead, not the length of the passage. "
+    + (
+        f"With {len(late)} of these {len(starts)} starts the person catches it inside: it goes in, comes out again, and goes in "
+        f"for good {(late['in for good'] - late['person out']).mean():.0f} s after the person is out. "
+        if len(late)
+        else "With none of these starts the person catches it inside. "
+    )
+    + "A plan over the whole passage would know better.\n\n</details>"
+)
+
 # %% [markdown]
-# **What it means.** There is no rule about who goes first. The robot has no idea of a passage; it sees 0.8 s
-# ahead, a zone and some walls. It goes in where at that moment nothing holds it, and where the person then
-# comes it has to go back (notebook 11b). A plan over the whole passage would know better.
+# ## How fast may the person come?
+#
+# The robot must go back as fast as they come, and be out of the way in time. **What do you think?** Does it
+# come nearer to a slow person or to a fast one, and with which of them does some step have no plan?
 
 # %%
+paces = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)
+rows = []
+for each in paces:
+    scene = AtlasCell("making_room", width=width, pace=each).scenario()
+    found = scenario_runs.drive(scene, record.cache.ellipse(), settings).metrics()
+    rows.append((found["min_h"], found["infeasible_steps"]))
+lows, unsolved = np.array(rows).T
+
+# %% jupyter={"source_hidden": true}
+# Figure
+fig, ax = plt.subplots(figsize=(7.5, 3.6), layout="constrained")
+ax.plot(paces, 100 * lows, "-", color=figures.GREY, linewidth=1)
+kinds = (unsolved == 0, "o", figures.BLUE, "every step has a plan"), (
+    unsolved > 0, "X", figures.RED, "some steps have none",
+)  # fmt: skip
+for chosen, marker, colour, label in kinds:
+    ax.plot(np.array(paces)[chosen], 100 * lows[chosen], marker, color=colour, markersize=9, label=label)
+ax.axhline(0, color=figures.BLACK, linewidth=0.8)
+failing = np.array(paces)[unsolved > 0]
+ax.set_title(
+    f"From {failing.min():g} m/s on some steps have no plan" if failing.size else "Every step has a plan"
+)
+ax.set(xlabel="speed of the person [m/s]", ylabel="least h [cm]")
+ax.legend(loc="lower right")
+record.figure(fig, "paces")
+
+# %% jupyter={"source_hidden": true}
+# The answer
+nearest = paces[int(lows.argmin())]
+Markdown(
+    f"<details><summary>Answer</summary>\n\nIt comes nearest to the person who walks at {nearest:g} m/s: "
+    f"{100 * lows.min():.1f} cm. The limit is zero at h = speed x dt / gamma: the slower the person, the nearer the robot "
+    "may come before it has to go back. "
+    + (
+        f"At {failing.min():g} m/s some steps have no plan ({unsolved[unsolved > 0][0]:.0f} of the run). The robot itself "
+        f"cannot go back faster than {settings.v_max:g} m/s."
+        if failing.size
+        else "No speed that was tried left it without a plan."
+    )
+    + "\n\n</details>"
+)
+
+# %% [markdown]
+# ## All four scenarios: what is due to what?
+#
+# Notebooks 09 to 11 drive each scenario twice. Four things differ between the paper's chain and ours: the solver,
+# the zone, the margin around walls, and the rule of the side. **What do you think?** Which of them changes a run,
+# and in which scenario? In the table each is switched on alone, from the paper's chain.
+
+# %% jupyter={"source_hidden": true}
+# Table
+own = record.cache.ellipse(), settings
+papers = record.cache.paper_ellipse(), scenario_runs.paper_settings(settings)
+compared = chains.compare_chains(papers, own)
+record.table(compared, "10_chains")
+found = compared.set_index(["chain", "scenario"])
+singles, names = ("solver", "zone", "margin", "side rule"), list(szlib.SCENARIOS)
+effects = {name: [each for each in singles if found.loc[(each, name), "changed"]] for name in names}
+cells = [[chains.describe_change(found, each, name) for name in names] for each in singles]
+pd.DataFrame(cells, index=list(singles), columns=[name.replace("_", " ") for name in names]).style
+
+# %% jupyter={"source_hidden": true}
+# Checks
+changed = ", ".join(f"{name}: {' and '.join(which) or 'nothing'}" for name, which in effects.items())
+record.check("the solver alone changes no scenario", not found.loc["solver", "changed"].any(), changed)
+ruled = found.loc["side rule", "passing_side"][["passing", "corridor"]]
+on_side = bool((ruled == settings.pass_side).all())
+record.check("the rule alone makes the robot pass on the chosen side", on_side, ruled.to_dict())
+lowest = compared.groupby("chain", sort=False)["min_h"].min()
+record.check("h >= 0 with every chain of settings", lowest.min() >= 0, f"least h {lowest.min():.2f} m")
+
+# %% [markdown]
+# A dash means: no change of more than 0.25 s, 2 cm of h or 5 cm/s, and the same side and claims. So what the rule
+# of the side changes in ours does not come from the barrier.
+
+# %% [markdown]
+# ## Three common mistakes
+#
+# - **"The robot knows that the person goes first."** No. It knows a zone, some walls and 0.8 s. Who goes first
+#   follows from who is at the mouth.
+# - **"A robot that stands is safe."** No. The zone moves with the person, and $h$ falls for a robot at rest, too.
+# - **"Going back means that the controller has failed."** No. It is the only control that obeys the barrier.
+
+# %% jupyter={"source_hidden": true}
+# What we know now
+Markdown(
+    "**What we know now.** Waiting and making room need no rule of their own: the robot waits where no acceleration that "
+    f"obeys leads into the passage ({between:.1f} s after the person is out it goes in), and goes back where the limit of its "
+    f"speed is negative, which is nearer than h = {stand:.2f} m. "
+    "Because it sees less than a second ahead, it goes in where it has to come out again. "
+    "In all this the person walked on and did not mind the robot: chapter 12."
+)
+
+# %% jupyter={"source_hidden": true}
+# Summary of the checks
 record.close()

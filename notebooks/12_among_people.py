@@ -22,7 +22,7 @@
 # letter; how often it is void, and what the robot's goal costs then, nobody has said.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [11b](11b_making_room.ipynb) · next: [13 - The
+# [Start](00_start_here.ipynb) · before: [11](11_waiting.ipynb) · next: [13 - The
 # laboratory](13_laboratory.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 80 min · needs
 # [09](09_passing.ipynb) · laboratory: [13](13_laboratory.ipynb)
 #
@@ -492,7 +492,7 @@ two_wheels.set_index(["set", "robot"])[shown].round(3)
 # ## Two wheels, and numbers to compare with
 #
 # **Differential drive**: random worlds of `python -m studies.differential_table`. The disc grows by the distance ahead
-# of the axle, 25 cm at 4 rad/s. That is too much for the passages of notebooks 11 and 11b, which need 8 rad/s.
+# of the axle, 25 cm at 4 rad/s. That is too much for the passages of notebook 11, which need 8 rad/s.
 # **All crowds**: trials of `python -m studies.crowd_trials` among ORCA, social forces, JuPedSim's speed model and
 # recorded people, without an exception.
 

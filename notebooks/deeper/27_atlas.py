@@ -14,7 +14,7 @@
 # %% [markdown]
 # # 27 - A sensitivity atlas
 #
-# **Question.** Notebooks 10 to 11b show one corridor, one passage, one pace, one zone. What would the robot
+# **Question.** Notebooks 10 and 11 show one corridor, one passage, one pace, one zone. What would the robot
 # have done in others?
 #
 # **Expectation.** The paper: "the degree to which the robot yields can be adjusted by varying the size of the

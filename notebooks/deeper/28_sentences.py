@@ -46,7 +46,7 @@ record = NotebookRecord("28_sentences", globals())
 #
 # Each verdict is computed from the checks and claims that the notebooks of this run recorded; none is typed. A
 # sentence whose notebook was not run, or was run with other data, says so. Sentences about fig. 6 are judged by the
-# paper's zone and settings; ours are in notebooks 09 to 11b beside them.
+# paper's zone and settings; ours are in notebooks 09 to 11 beside them.
 
 # %%
 sentences = paper_sentences.judge_sentences(record)

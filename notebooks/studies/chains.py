@@ -1,4 +1,4 @@
-"""The paper's chain of methods and ours, with each difference alone: the table of notebook 11b."""
+"""The paper's chain of methods and ours, with each difference alone: the table of notebook 11."""
 
 from __future__ import annotations
 
@@ -71,3 +71,26 @@ def differs(row: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     a, b = (np.array([each[name] for name in RESOLUTION]) for each in (row, other))
     is_same = (np.abs(a - b) <= list(RESOLUTION.values())) | (np.isnan(a) & np.isnan(b))
     return not is_same.all()
+
+
+def describe_change(found: pd.DataFrame, chain: str, name: str) -> str:
+    """What a `chain` changes in the scenario `name`; `found`: `compare_chains`, indexed by chain and scenario.
+
+    Numbers that change by more than `RESOLUTION`, the side, and the claims that hold; a dash for none.
+    """
+    old, new = found.loc[("paper", name)], found.loc[(chain, name)]
+    if not new["changed"]:
+        return "-"
+    units = {"time_to_goal": "to goal {:.1f} to {:.1f} s", "min_h": "least h {:.2f} to {:.2f} m"}
+    units["min_speed"] = "slowest {:.2f} to {:.2f} m/s"
+    parts = [
+        text.format(old[key], new[key])
+        for key, text in units.items()
+        if not abs(new[key] - old[key]) <= RESOLUTION[key]
+    ]
+    parts += [
+        f"{label} {old[key]} to {new[key]}"
+        for key, label in {"passing_side": "side", "claims_held": "claims that hold"}.items()
+        if old[key] != new[key]
+    ]
+    return "; ".join(parts)

@@ -19,7 +19,7 @@ PICTURES = {
     "los.png": "02_encounters-los.png",
     "hull.png": "04_hull-hull.png",
     "corridor.png": "10_corridor-scenario.png",
-    "making_room.gif": "11b_making_room-run.gif",
+    "making_room.gif": "11_waiting-run.gif",
     "laboratory.png": "13_laboratory-still.png",
 }
 """The pictures of the README, and the figures of the notebooks from which they are copied."""

@@ -109,7 +109,7 @@ def copy_notebooks(folder: str | Path) -> Path:
 
 
 def has_name(notebook: Path, name: str) -> bool:
-    """Whether `name` is the number ("11", which is not "11b") or the name ("07_barriers") of `notebook`."""
+    """Whether `name` is the number ("1", which is not "11") or the name ("07_barriers") of `notebook`."""
     return f"{notebook.stem}_".startswith(f"{name}_")
 
 

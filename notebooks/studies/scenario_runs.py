@@ -1,0 +1,153 @@
+"""One scenario of the paper, driven by the paper's chain and by ours, for notebooks 09 to 11."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from pandas.io.formats.style import Styler
+from studies import paper_claims
+
+import szlib
+from szlib.simulation.metrics import ACTIVE_RESIDUAL
+from szlib.simulation.run import Run
+from szlib.simulation.scenario import Scenario
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
+
+FIVE_NUMBERS = {
+    "time_to_goal": "time to goal [s]",
+    "min_h": "least h [m]",
+    "min_speed": "slowest [m/s]",
+    "min_clearance": "least clearance [m]",
+    "time_yielding": "time yielding [s]",
+}
+"""The five numbers that the chapters show of a run: the metric, and its name with the unit."""
+PAPERS, OURS = "the paper's chain", "ours"
+STYLES = {PAPERS: ("--", figures.ORANGE), OURS: ("-", figures.BLUE)}
+PASSAGE = (0.0, 3.0)
+"""Both ends of the passage of the scenarios "waiting" and "making_room" [m]."""
+
+
+@dataclass(frozen=True)
+class ScenarioRuns:
+    """Both runs of a scenario: `paper`, with the paper's zone and settings, and `ours`."""
+
+    paper: Run
+    ours: Run
+
+    def by_name(self) -> dict[str, Run]:
+        """Both runs, by the names that figures and tables show."""
+        return {PAPERS: self.paper, OURS: self.ours}
+
+
+def paper_settings(settings: szlib.MPCSettings) -> szlib.MPCSettings:
+    """The paper's controller with gamma, N, N_h and a_max of ours: the paper gives none of gamma and a_max."""
+    same = {name: getattr(settings, name) for name in ("gamma", "N", "N_h", "a_max")}
+    return szlib.MPCSettings.paper(**same)
+
+
+def drive(scenario: Scenario, zone: szlib.Ellipse, settings: szlib.MPCSettings) -> Run:
+    """The run of a `scenario` with the controller of szlib."""
+    return szlib.simulate(scenario, szlib.MPCCBF(zone, walls=scenario.walls, settings=settings))
+
+
+def drive_both(record: NotebookRecord, scenario: Scenario, settings: szlib.MPCSettings) -> ScenarioRuns:
+    """Drive a `scenario` with the paper's chain, and with our zone and `settings`."""
+    paper = drive(scenario, record.cache.paper_ellipse(), paper_settings(settings))
+    return ScenarioRuns(paper, drive(scenario, record.cache.ellipse(), settings))
+
+
+def list_parameters(settings: szlib.MPCSettings, *more: tuple[str, object, str, str]) -> Styler:
+    """The parameters of a notebook with their sources, folded: those of all three chapters, and `more`."""
+    differences = (
+        "IPOPT, 5 cm of margin around walls, no rule of the side, the zone by LOF and hull: "
+        "gamma and a_max are ours there, too"
+    )
+    return parameters(
+        [
+            *more,
+            ("N, N_h, dt", f"{settings.N}, {settings.N_h}, {settings.dt} s", PAPER, "sec. 4"),
+            ("gamma", settings.gamma, TUNED, "on these four scenarios; in 2,000 other worlds: notebook 09"),
+            ("a_max; Q, R, P", f"{settings.a_max} m/s²; as in notebook 08", ASSUMED, "the paper gives none"),
+            ("head_on_share", settings.head_on_share, ASSUMED, "ours: where the rule of the side acts"),
+            ("the paper's chain", "", PAPER, differences),
+        ]
+    )
+
+
+def tabulate_five(runs: Mapping[str, Run]) -> pd.DataFrame:
+    """The five numbers of each run, one row a run."""
+    found = {name: run.metrics() for name, run in runs.items()}
+    rows = {name: [metrics[key] for key in FIVE_NUMBERS] for name, metrics in found.items()}
+    return pd.DataFrame.from_dict(rows, orient="index", columns=list(FIVE_NUMBERS.values())).round(2)
+
+
+def record_safety(record: NotebookRecord, runs: ScenarioRuns, prefix: str = "") -> None:
+    """Record what must hold for our run with any zone that leaves the scene passable, and for the paper's."""
+    found, honest = runs.ours.metrics(), runs.paper.metrics()["unflagged_violations"]
+    checks = {
+        "the goal is reached": (found["success"], f"after {found['time_to_goal']:.1f} s"),
+        "h >= 0 at every step": (found["min_h"] >= 0, f"least h {found['min_h']:.2f} m"),
+        "no infeasible step": (found["infeasible_steps"] == 0, f"{found['infeasible_steps']} steps"),
+        "nothing is touched (Euclidean)": (
+            found["min_clearance"] > 0,
+            f"least clearance {found['min_clearance']:.2f} m",
+        ),
+        "never faster than 1 m/s": (
+            found["max_speed"] <= 1 + 1e-6,
+            f"greatest speed {found['max_speed']:.2f} m/s",
+        ),
+    }
+    for text, (holds, evidence) in checks.items():
+        record.check(prefix + text, holds, evidence)
+    text = f"{prefix}the paper's chain: no step that called itself safe led to h < 0"
+    record.check(text, honest == 0, f"{honest} steps", always=True)
+    record.key |= {f"{prefix}{key}": found[key] for key in FIVE_NUMBERS}
+
+
+def record_both_claims(record: NotebookRecord, runs: ScenarioRuns, prefix: str = "") -> None:
+    """Record the claims of the paper about a scenario, for the paper's chain and for ours."""
+    claims = runs.ours.scenario.claims
+    paper_claims.record_claims(record, claims, runs.paper, prefix=prefix)
+    paper_claims.record_claims(record, claims, runs.ours, prefix=f"{prefix}ours: ")
+
+
+def draw_paths_and_speeds(runs: ScenarioRuns, title: str, *, height: float = 3.9) -> Figure:
+    """Draw the paths of both robots above their speeds over time; the `title` says the result."""
+    figure, (above, below) = plt.subplots(
+        2, 1, figsize=(9, height), layout="constrained", height_ratios=(1.5, 1)
+    )
+    figures.plot_robot_paths(runs.by_name(), ax=above)
+    above.get_legend().remove()
+    above.set_title(title)
+    for name, run in runs.by_name().items():
+        line, colour = STYLES[name]
+        below.plot(run.time, run.speed, line, color=colour, label=name)
+    below.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, 1.1))
+    below.legend(loc="lower center", ncols=2, fontsize=8)
+    return figure
+
+
+def draw_space_time(ax: Axes, runs: ScenarioRuns, title: str) -> None:
+    """Draw x over time of both robots and of the person with the zone, and the passage as a band."""
+    ax.axhspan(*PASSAGE, color=figures.GREY, alpha=0.25, lw=0, label="inside the passage")
+    for name, run in runs.by_name().items():
+        line, colour = STYLES[name]
+        ax.plot(run.time, run.states[:, 0], line, color=colour, linewidth=2, label=f"robot, {name}")
+    time, x, reach = runs.ours.time, runs.ours.people[:, 0, 0], runs.ours.zones[0].semi_axes[0]
+    ax.plot(time, x, ":", color=figures.RED, linewidth=2, label="person")
+    ax.fill_between(time, x - reach, x + reach, color=figures.RED, alpha=0.15, lw=0, label="zone")
+    ax.set(xlabel="time [s]", ylabel="x [m]", title=title, ylim=(-4, 6.5))
+
+
+def find_holding_times(run: Run) -> dict[str, np.ndarray]:
+    """The times [s] at which the person, and each wall of a corridor, holds the robot back."""
+    holds = run.residual.min(axis=2) <= ACTIVE_RESIDUAL
+    rows = ("person", "wall to its left", "wall to its right")
+    return {name: run.time[row] for name, row in zip(rows, holds.T, strict=True)}

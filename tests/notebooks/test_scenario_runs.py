@@ -1,0 +1,53 @@
+"""Both runs of a scenario for the chapters 09 to 11, and the five numbers that they show."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from studies import chains, scenario_runs
+from studies.atlas import REFERENCE
+
+import szlib
+
+SETTINGS = szlib.MPCSettings(gamma=0.08, N=6)
+
+
+@pytest.fixture(scope="module")
+def corridor():
+    return scenario_runs.drive(szlib.SCENARIOS["corridor"], REFERENCE, SETTINGS)
+
+
+def test_the_papers_settings_take_our_gamma_and_horizon_and_no_rule_of_the_side():
+    paper = scenario_runs.paper_settings(SETTINGS)
+    assert (paper.gamma, paper.N, paper.head_on_share) == (0.08, 6, 0.0)
+
+
+def test_five_numbers_are_those_of_the_metrics_and_have_units(corridor):
+    table = scenario_runs.tabulate_five({"ours": corridor})
+    assert len(table.columns) == 5
+    assert all(name.endswith(("[s]", "[m]", "[m/s]")) for name in table.columns)
+    assert table.loc["ours", "least h [m]"] == pytest.approx(corridor.metrics()["min_h"], abs=0.005)
+
+
+def test_a_row_holds_the_robot_only_where_its_residual_is_zero(corridor):
+    holding = scenario_runs.find_holding_times(corridor)
+    assert list(holding) == ["person", "wall to its left", "wall to its right"]
+    at = np.isin(corridor.time, holding["person"])
+    assert at.any() and not at.all()
+    assert corridor.residual[at, 0].min(axis=1).max() <= 1e-4 < corridor.residual[~at, 0].min()
+
+
+def test_a_change_is_described_by_what_changed():
+    rows = [
+        {"scenario": "passing", "chain": chain, "time_to_goal": 11.0, "min_h": h, "min_speed": 0.5}
+        | {"passing_side": side, "claims_held": 2, "changed": chain == "side rule"}
+        for chain, h, side in (
+            ("paper", 0.17, "left"),
+            ("solver", 0.17, "left"),
+            ("side rule", 0.21, "right"),
+        )
+    ]
+    found = pd.DataFrame(rows).set_index(["chain", "scenario"])
+    assert chains.describe_change(found, "solver", "passing") == "-"
+    assert (
+        chains.describe_change(found, "side rule", "passing") == "least h 0.17 to 0.21 m; side left to right"
+    )
