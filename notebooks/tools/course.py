@@ -56,8 +56,10 @@ GIVES: dict[str, tuple[str, str]] = {
     ),
     "09": ("sec. 4, fig. 6a", "say when the robot begins to avoid a person, and what chooses the side."),
     "10": ("sec. 4, fig. 6b", "say why the robot slows down in a corridor, and speeds up beside the person."),
-    "11": ("sec. 4, fig. 6c", "say why the robot waits, although no rule tells it to."),
-    "11b": ("sec. 4, fig. 6d", "say why the robot backs out of a passage, although no rule tells it to."),
+    "11": (
+        "sec. 4, fig. 6c-d",
+        "say why the robot waits, and why it backs out of a passage, although no rule tells it to.",
+    ),
     "12": ("sec. 4-5", "say which promises of the controller hold among people who react."),
     "13": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
     "21": ("sec. 4", "say when a step has no solution, and prove when there always is one."),
@@ -179,12 +181,12 @@ WEEKS: list[tuple[str, tuple[str, ...], tuple[str, ...]]] = [
     ("A zone of your own, and a barrier around it", ("07",), ("3.4-3.5", "6.1")),
     ("A controller of your own", ("08",), ("5.1-5.5", "7.1-7.3")),
     ("MPC with barriers, and the first meetings", ("09", "10"), ("7.4-7.8",)),
-    ("The robot yields, and drives among people", ("11", "11b", "12", "13"), ("6.2-6.5",)),
+    ("The robot yields, and drives among people", ("11", "12", "13"), ("6.2-6.5",)),
 ]
 """Topic, chapters and tasks of the exercise sheets of each of six weeks."""
 ROUTES: list[tuple[str, tuple[str, ...]]] = [
     ("The idea", ("05", "07", "10", "13")),
-    ("The method", ("01", "02", "03", "04", "05", "06", "07", "08", "09", "10", "11", "11b", "12")),
+    ("The method", ("01", "02", "03", "04", "05", "06", "07", "08", "09", "10", "11", "12")),
 ]
 """Shorter routes, by number of the notebook."""
 
