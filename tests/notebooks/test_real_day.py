@@ -101,7 +101,7 @@ def test_copies_on_the_real_day_show_the_numbers_of_the_plaza_copies():
 def test_copy_has_other_data_and_links_from_its_folder():
     notebook = refresh.replace_data(folders.NOTEBOOKS / "01_tracks.py", "atc-1hz")
     (tagged,) = (c.source for c in notebook.cells if "parameters" in c.metadata.get("tags", []))
-    assert tagged.startswith('data = "atc-1hz"')
+    assert re.search('^data = "atc-1hz"', tagged, re.M)
     links = re.findall(r"\]\(([^)]+)\)", notebook.cells[1].source)
     assert links
     assert all(link.startswith(("../", "http")) for link in links)
