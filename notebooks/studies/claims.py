@@ -14,14 +14,17 @@ from __future__ import annotations
 import argparse
 import os
 import tempfile
+import textwrap
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 from scipy.stats import t as student_t
 from studies import paper_claims as claims
 from studies.committed import write_table
@@ -30,6 +33,7 @@ from studies.respect import stored
 import szlib
 from szlib.plaza.accuracy import true_kinds
 from szlib.tracks import sites
+from szlib.workbook import figures
 from szlib.zones.outliers import is_outlier
 from szlib.zones.sensitivity import FIT, sensitivity
 
@@ -246,6 +250,45 @@ def move_zone(name: str, methods: Iterable[str] = tuple(VARIED)) -> Iterator[pd.
     for method in methods:
         table = sensitivity(tracks, area=square, method=method, fit=VARIED[method])
         yield table.assign(method=method, data=name)
+
+
+VERDICTS = {
+    "supported": (figures.GREEN, "o", "full"),
+    "contradicted": (figures.RED, "X", "full"),
+    "not decidable": ("#666666", "s", "none"),
+}
+"""Colour, marker and its fill for each verdict."""
+
+
+def select_answers(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of 25_claims.csv that decide a claim: of the shape those of the respect zone; no means."""
+    decides = ~table["claim"].isin(CLAIMS) | table["method"].str.startswith("respect")
+    return table[decides & (table["data"] != "mean of sites")]
+
+
+def draw_verdicts(answers: pd.DataFrame) -> Figure:
+    """Draw the verdict and the effect for each claim and each data set of `answers`, as of `select_answers`."""
+    names, places = list(dict.fromkeys(answers["claim"])), list(dict.fromkeys(answers["data"]))
+    figure, ax = plt.subplots(figsize=(11, 4.2), layout="constrained")
+    for row in answers.to_dict("records"):
+        x, y = places.index(row["data"]), names.index(row["claim"])
+        text = f"too few people: {row['n']}" if row["n"] else "not asked here"
+        if np.isfinite(row["effect"]):
+            text = f"{row['effect']:+.2f} {row['unit']}".replace("m2", "m²")
+            colour, marker, fill = VERDICTS[row["verdict"].partition(" with")[0]]
+            ax.plot(x - 0.4, y, marker, color=colour, markersize=10, fillstyle=fill)
+        ax.text(x - 0.3, y, text, va="center", color="black" if np.isfinite(row["effect"]) else "#777777")
+    for name, (colour, marker, fill) in VERDICTS.items():
+        ax.plot([], [], marker, color=colour, markersize=10, fillstyle=fill, label=name)
+    ax.set_xticks(range(len(places)), places)
+    ax.set_yticks(range(len(names)), [textwrap.fill(name, 42) for name in names], fontsize=9)
+    ax.set(xlim=(-0.55, len(places) - 0.45), ylim=(len(names) - 0.5, -0.5))
+    ax.xaxis.tick_top()
+    ax.tick_params(length=0)
+    ax.set_yticks(np.arange(1, len(names)) - 0.5, minor=True)
+    ax.grid(axis="y", which="minor", color=figures.GREY, alpha=0.4)
+    figures.add_shared_legend([ax])
+    return figure
 
 
 def main() -> None:

@@ -274,21 +274,32 @@ def test_the_largest_sensitivity_is_on_top():
     assert [label.get_text() for label in ax.get_yticklabels()] == ["r_max\n1.5", "speed\n0.9; 1.3"]
 
 
-def test_a_map_of_strategies_has_a_letter_for_each_cell():
+def test_a_map_of_strategies_has_the_fill_of_its_strategy_in_each_cell():
     cells = pd.DataFrame({"gamma": [0.1, 0.1, 0.2, 0.2], "width": [1.0, 2.0] * 2, "strategy": list("xyyz")})
     ax = figures.plot_strategies(cells, names=["x", "y", "z"], rows="gamma", columns="width")
-    assert [text.get_text() for text in ax.texts] == ["B", "C", "A", "B"]  # the largest gamma on top
-    assert ax.get_xlabel() == "width" and [each.get_text() for each in ax.get_yticklabels()] == ["0.2", "0.1"]
+    handles, names = ax.get_legend_handles_labels()
+    fills = {handle.get_facecolor(): name for handle, name in zip(handles, names, strict=True)}
+    found = {
+        tuple(patch.get_center()): fills[patch.get_facecolor()] for bars in ax.containers for patch in bars
+    }
+    assert found == {(0, 0): "x", (1, 0): "y", (0, 1): "y", (1, 1): "z"}
+    assert ax.get_xlabel() == "width" and [each.get_text() for each in ax.get_yticklabels()] == ["0.1", "0.2"]
 
 
-def test_claims_differ_by_more_than_colour():
+def test_claims_differ_by_more_than_colour_and_keep_their_units():
     table = pd.DataFrame(
-        {"claim": list("abc"), "effect": [1.0, -1.0, 0.1], "low": [0.5, -2, -1], "high": [2.0, -0.5, 1],
-         "verdict": ["supported", "contradicted", "not decidable with n = 3"]}
+        {"claim": list("abcd"), "effect": [1.0, -1.0, 0.1, np.nan], "low": [0.5, -2, -1, np.nan],
+         "high": [2.0, -0.5, 1, np.nan], "unit": ["m", "m2", "s", "m"],
+         "verdict": ["supported", "contradicted", *["not decidable with n = 3"] * 2]}
     )  # fmt: skip
-    ax = figures.plot_claims(table)
-    assert len({line.get_marker() for line in ax.lines if line.get_marker() != "None"}) == 3
-    assert [label.get_text() for label in ax.get_yticklabels()] == list("abc")
+    panels = figures.draw_claims(table).axes
+    assert len({ax.lines[0].get_marker() for ax in panels}) == 3
+    assert [ax.get_title(loc="left") for ax in panels] == list("abcd")
+    assert [ax.get_title(loc="right") for ax in panels[1:3]] == ["contradicted", "not decidable"]
+    assert [ax.get_xlabel() for ax in panels] == ["m", "m2", "s", "m"]
+    assert panels[1].get_xlim() == pytest.approx(
+        (-2.3, 2.3)
+    )  # the interval fills the panel, and 0 is in the middle
 
 
 def test_a_forest_plot_has_a_row_for_each_site_the_mean_and_a_new_site():

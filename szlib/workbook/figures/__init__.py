@@ -14,8 +14,8 @@ comparisons  many runs or fits: sweeps, strategies, intervals, claims, sites
 """
 
 from .comparisons import (
+    draw_claims,
     draw_interval_grid,
-    plot_claims,
     plot_forest,
     plot_safety_claims,
     plot_sensitivity,

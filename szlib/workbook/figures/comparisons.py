@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -24,6 +24,9 @@ _BARS = {
     "sped up": (ORANGE, "xxx"),
     "faced elsewhere": (BLUE, "|||"),
 }
+# Fill of each strategy in a map: colour and hatching, so that they differ in grey as well.
+_FILLS = (("#F0F0F0", ""), ("#A9D5F0", ""), (BLUE, ""), (BLACK, ""), (ORANGE, "//"), (RED, "xxx"))
+_VERDICTS = {"supported": (GREEN, "o"), "contradicted": (RED, "X"), "not": (GREY, "s")}
 
 
 def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> Axes:
@@ -43,20 +46,22 @@ def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> 
     >>> ax = figures.plot_sweep(pd.DataFrame([[0, 0.1], [0.2, 0.4]], index, columns), worst=0.4)
     """
     values = table.to_numpy(float)
-    labels = [f"{round(value, 3) + 0.0:.3g}" for value in values.flat]
     ax = get_axes(ax, size=(5, 3.5))
-    return _draw_heat_map(ax, table, np.clip(values / worst, 0, 1), labels, "Oranges")
+    ax.imshow(np.clip(values / worst, 0, 1), cmap="Oranges", vmin=0, vmax=1.3, aspect="auto")
+    for (row, column), value in np.ndenumerate(values):
+        ax.text(column, row, f"{round(value, 3) + 0.0:.3g}", ha="center", va="center", fontsize=9)
+    return _label_cells(ax, table)
 
 
 def plot_strategies(
     table: pd.DataFrame, *, names: Sequence[str], rows: str, columns: str, ax: Axes | None = None
 ) -> Axes:
-    """Plot which strategy a robot used for each pair of parameters, as a letter.
+    """Plot which strategy a robot used for each pair of parameters, as the fill of a cell.
 
     Parameters
     ----------
     table : one row for each pair, with the column "strategy".
-    names : all strategies, from pale to dark; the first has the letter A.
+    names : all strategies, at most six; each has a fill and a name in the legend.
     rows : parameter of the rows.
     columns : parameter of the columns.
     ax : axes to draw on; None makes new ones.
@@ -68,18 +73,18 @@ def plot_strategies(
     >>> table = pd.DataFrame({"gamma": [0.1, 0.2], "width": [1.0, 1.0], "strategy": ["passes", "waits"]})
     >>> ax = figures.plot_strategies(table, names=["passes", "waits"], rows="gamma", columns="width")
     """
-    found = table.pivot(index=rows, columns=columns, values="strategy").sort_index(ascending=False)
-    number = found.map(list(names).index).to_numpy()
-    labels = [chr(ord("A") + n) for n in number.flat]
-    return _draw_heat_map(get_axes(ax, size=(4, 3.2)), found, number / len(names), labels, "YlOrBr")
+    found = table.pivot(index=rows, columns=columns, values="strategy").sort_index()
+    ax = get_axes(ax, size=(5, 3.5))
+    for name, (colour, hatch) in zip(names, _FILLS, strict=False):
+        style = {"color": colour, "hatch": hatch, "edgecolor": "white"}
+        row, column = np.nonzero((found == name).to_numpy())
+        ax.bar(column, 1, bottom=row - 0.5, width=1, **style)
+        ax.fill([], [], label=name, **style)  # for the legend
+    ax.set(xlim=(-0.5, found.shape[1] - 0.5), ylim=(-0.5, found.shape[0] - 0.5))
+    return _label_cells(ax, found)
 
 
-def _draw_heat_map(
-    ax: Axes, table: pd.DataFrame, shade: np.ndarray, labels: Iterable[str], colours: str
-) -> Axes:
-    ax.imshow(shade, cmap=colours, vmin=0, vmax=1.3, aspect="auto")
-    for (row, column), label in zip(np.ndindex(shade.shape), labels, strict=True):
-        ax.text(column, row, label, ha="center", va="center", fontsize=9)
+def _label_cells(ax: Axes, table: pd.DataFrame) -> Axes:
     ax.set_xticks(range(table.shape[1]), [f"{value:g}" for value in table.columns])
     ax.set_yticks(range(table.shape[0]), [f"{value:g}" for value in table.index])
     ax.set(xlabel=str(table.columns.name), ylabel=str(table.index.name))
@@ -200,7 +205,7 @@ def plot_sensitivity(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
         ax.plot(values["area"], np.full(len(values), row), "o", color=BLUE, markersize=5)
         names.append(f"{name}\n{'; '.join(map(str, values['value']))}")  # beside the axis: no overlap
     ax.axvline(default, color=BLACK, linewidth=1.2, label=f"defaults: {default:.2f} m$^2$")
-    ax.set_yticks(range(len(width)), names, fontsize=8)
+    ax.set_yticks(range(len(width)), names)
     ax.set(xlabel="area of the zone [m$^2$]; values from left to right", ylim=(-0.6, len(width) - 0.2))
     ax.use_sticky_edges = False
     ax.margins(x=0.1)
@@ -208,39 +213,35 @@ def plot_sensitivity(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def plot_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
-    """Plot the effect of each claim with its interval, scaled to the largest end of the interval.
+def draw_claims(table: pd.DataFrame, *, title: str = "") -> Figure:
+    """Draw the effect of each claim with its interval: a panel for each claim, in the unit of the claim.
 
     Parameters
     ----------
     table : one row for each claim, as from `studies.paper_claims.tabulate_findings`: claim, effect,
-        low, high, verdict, and perhaps method.
-    ax : axes to draw on; None makes new ones.
+        low, high, unit and verdict. An effect above 0 is as the paper says.
+    title : title of the figure.
 
     Examples
     --------
     >>> import pandas as pd
     >>> from szlib.workbook import figures
-    >>> claim = {"claim": "zones grow with speed", "effect": 0.1, "low": 0.05, "high": 0.2}
-    >>> ax = figures.plot_claims(pd.DataFrame([claim | {"verdict": "supported"}]))
+    >>> claim = {"claim": "zones grow with speed", "effect": 0.1, "low": 0.05, "high": 0.2, "unit": "m2"}
+    >>> figure = figures.draw_claims(pd.DataFrame([claim | {"verdict": "supported"}]))
     """
-    ax = get_axes(ax, size=(9, 0.45 * len(table) + 1.2))
-    styles = {"supported": (GREEN, "o"), "contradicted": (RED, "X"), "not": (GREY, "s")}
-    numbers = table[["effect", "low", "high", "verdict"]].itertuples(index=False)
-    for at, (effect, low, high, verdict) in enumerate(numbers):
-        scale = max(abs(low), abs(high), 1e-9)
-        colour, marker = styles[verdict.split()[0]]
-        ax.hlines(at, low / scale, high / scale, color=colour, linewidth=2)
-        ax.plot(effect / scale, at, marker, color=colour)
-    ax.axvline(0, color=BLACK, linewidth=1)
-    names = table["claim"] + (" (" + table["method"] + ")" if "method" in table else "")
-    ax.set_yticks(range(len(table)), list(names), fontsize=8)
-    ax.set_ylim(len(table) - 0.5, -0.5)  # also rows without an effect
-    for name, (colour, marker) in styles.items():
-        ax.plot([], [], marker, color=colour, label="not decidable" if name == "not" else name)
-    ax.set(xlabel="against the paper < 0 < as the paper says (each scaled to its interval)", xlim=(-1.1, 1.1))
-    add_legend_below(ax, gap=0.6 / (0.45 * len(table) + 0.4), ncols=3)  # 0.6 inch below the axes
-    return ax
+    size = (8, 0.95 * len(table) + 0.5)
+    figure, grid = plt.subplots(len(table), figsize=size, layout="constrained", squeeze=False)
+    for ax, row in zip(grid.flat, table.to_dict("records"), strict=True):
+        colour, marker = _VERDICTS[row["verdict"].split()[0]]
+        ax.hlines(0, row["low"], row["high"], color=colour, linewidth=3)
+        ax.plot(row["effect"], 0, marker, color=colour, markersize=9)
+        ax.axvline(0, color=BLACK, linewidth=1)
+        reach = 1.15 * max(abs(row["low"]), abs(row["high"])) or 1.0
+        ax.set(yticks=[], xlabel=row["unit"], xlim=(-reach, reach) if np.isfinite(reach) else (-1, 1))
+        ax.set_title(row["claim"], loc="left", fontsize=10)
+        ax.set_title(row["verdict"].partition(" with")[0], loc="right", fontsize=10, color=colour)
+    figure.suptitle(title)
+    return figure
 
 
 def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
@@ -249,7 +250,7 @@ def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     pooled : result of `szlib.pool`. The mean is a diamond as wide as its interval, and the prediction
-        interval of a new site a line below it; it may leave the axes where few sites are known.
+        interval of a new site a line below it. With two sites both say nothing, and only the mean is drawn.
     ax : axes to draw on; None makes new ones.
 
     Examples
@@ -259,22 +260,22 @@ def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
     >>> ax = figures.plot_forest(szlib.pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4)}))
     """
     n, sites = pooled.n_sites, pooled.table.set_index("site")[["value", "low", "high"]]
-    sites.loc["mean"] = [pooled.mean, pooled.low, pooled.high]
-    labels = [
-        f"{name}: {value:.2f} ({low:.2f} to {high:.2f})" for name, value, low, high in sites.itertuples()
-    ]
+    labels = [f"{name}: {mid:.2f} ({low:.2f} to {high:.2f})" for name, mid, low, high in sites.itertuples()]
+    labels.append(f"mean: {pooled.mean:.2f}")
     ax = get_axes(ax, size=(7.5, 0.35 * n + 1.9))
     if pooled.quantity in POSITIVE:
         ax.set_xscale("log")
         ax.xaxis.set(major_locator=LogLocator(subs=(1, 2, 5)), major_formatter="{x:g}")
         ax.minorticks_off()
-    ax.hlines(range(n), sites["low"][:-1], sites["high"][:-1], color=BLACK, linewidth=1.5)
-    ax.scatter(sites["value"][:-1], range(n), 25 + 150 * pooled.table["weight"], color=BLACK, marker="s")
-    ax.fill([pooled.low, pooled.mean, pooled.high, pooled.mean], n + np.array([0, -0.3, 0, 0.3]), color=BLUE)
+    ax.hlines(range(n), sites["low"], sites["high"], color=BLACK, linewidth=1.5)
+    ax.scatter(sites["value"], range(n), 25 + 150 * pooled.table["weight"], color=BLACK, marker="s")
     ax.axvline(pooled.mean, color=GREY, linestyle="--", linewidth=1)
     ax.margins(x=0.4)
     ax.set_xlim(ax.get_xlim())  # also where the next interval is wider
     if np.isfinite(pooled.new_high):
+        diamond = [pooled.low, pooled.mean, pooled.high, pooled.mean]
+        ax.fill(diamond, n + np.array([0, -0.3, 0, 0.3]), color=BLUE)
+        labels[-1] += f" ({pooled.low:.2f} to {pooled.high:.2f})"
         ax.plot([pooled.new_low, pooled.new_high], [n + 1, n + 1], "-|", color=ORANGE, linewidth=3, ms=12)
         labels.append(f"a new site: {pooled.new_low:.2f} to {pooled.new_high:.2f}")
     ax.set_yticks(range(len(labels)), labels)
