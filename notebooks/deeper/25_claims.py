@@ -27,6 +27,7 @@
 # **Afterwards you can** say which claims of the paper the data supports, and with which interval.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
+# Parameters of this notebook
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
@@ -37,6 +38,7 @@ zone_speed = 1.1  # as in notebook 05 [m/s]
 resamples = 200  # for the intervals
 
 # %% jupyter={"source_hidden": true}
+# Imports
 import sys
 
 sys.path.append("..")  # for `studies`
@@ -60,6 +62,7 @@ from studies import zones as zones_study
 from studies.folds import fold_table
 
 # %% jupyter={"source_hidden": true}
+# Imports, and the record of the run
 import szlib
 from szlib.control.distances import compare_distances
 from szlib.plaza.accuracy import true_kinds
@@ -85,19 +88,19 @@ parameters(
 )
 
 # %% jupyter={"source_hidden": true}
+# Figure
 answers = claims_study.select_answers(read_table("25_claims"))
 fig = claims_study.draw_verdicts(answers)
 verdicts = answers[answers["n"] > 0]["verdict"].str.partition(" with")[0].value_counts()
 said, against, undecided = (verdicts.get(name, 0) for name in claims_study.VERDICTS)
-fig.suptitle(
-    f"{said} answers support the paper, {against} contradicts it, {undecided} are open: too few people"
-)
+fig.suptitle(f"{said} answers support the paper, {against} speaks against it, {undecided} are open")
 record.figure(fig, "verdicts")
 
 # %% [markdown]
 # A row is a claim, a column a place. The *plaza* is synthetic: there the truth is known. The other four are real.
 # An effect above 0 is as the paper says; a hollow square means that the 95 % interval contains 0.
-# Units: *share* is the share of cases less one half, one *doubling* is a factor of two.
+# "too few" gives the number of encounters. Units: *share* is the share of cases less one half, one *doubling* is a
+# factor of two.
 #
 # ## The claims, on this data
 #
@@ -111,6 +114,7 @@ record.figure(fig, "verdicts")
 # the prior would decide, so the claim stays open.
 
 # %% jupyter={"source_hidden": true}
+# Computation
 samples = record.cache.encounters()
 null = record.cache.null_model(few_shifts=4)  # two encounters for each of the data are enough
 speeds = (0.7, zone_speed, 1.3)
@@ -129,6 +133,7 @@ methods += ["respect", "respect"]
 table = claims.tabulate_findings(found, data=record.out.name).assign(method=methods)
 
 # %% jupyter={"source_hidden": true}
+# Figure
 UNITS = {"share": "share of pairs - 0.5", "m": "reach ahead - reach behind [m]"}
 UNITS |= {"m2": "area at 1.3 m/s - area at 0.7 m/s [m²]"}
 fig = figures.draw_claims(
@@ -139,6 +144,7 @@ fig = figures.draw_claims(
 record.figure(fig, "claims")
 
 # %% jupyter={"source_hidden": true}
+# Checks
 DECIDED = {"supported": True, "contradicted": False}  # other verdicts: not decidable
 record.table(table, "25_claims")
 for each, method in zip(found, methods, strict=True):
@@ -160,6 +166,7 @@ if record.cache.is_synthetic:
 # interval of the robot's delay is the range over the four scenarios, because the runs are deterministic.
 
 # %% jupyter={"source_hidden": true}
+# Table
 of_plaza = "data == 'plaza' and effect == effect"
 everywhere = record.committed_table("25_claims", claims_study.recompute, where=of_plaza)
 answers = claims_study.select_answers(everywhere)
@@ -178,12 +185,13 @@ fold_table(
 # What do you think the quantile zone alone would have said there?
 
 # %% jupyter={"source_hidden": true}
+# Figure
 ahead = everywhere[everywhere["claim"] == claims.LARGER_AHEAD]
 central = ahead[ahead["data"] == "Grand Central"].set_index("method")
 LABELS = {
     "quantile, strangers": "quantile zone of the strangers",
     "quantile, null model": "quantile zone of people who ignore each other",
-    "respect, strangers": "respect zone: the difference of the two",
+    "respect, strangers": "respect zone: it compares the two",
 }
 fig, ax = plt.subplots(figsize=(9, 2.6), layout="constrained")
 for at, name in enumerate(LABELS):
@@ -194,7 +202,7 @@ for at, name in enumerate(LABELS):
 ax.axvline(0, color=figures.BLACK, linewidth=1)
 ax.set_yticks(range(len(LABELS)), LABELS.values())
 ax.set(ylim=(2.5, -0.5), xlabel="Grand Central: reach ahead - reach behind [m], with 95 % intervals")
-ax.set_title("Even people who ignore each other have a zone that reaches farther ahead")
+fig.suptitle("Even people who ignore each other have a zone that reaches farther ahead")
 record.figure(fig, "null-model")
 
 # %% [markdown]
@@ -206,6 +214,7 @@ record.figure(fig, "null-model")
 # </details>
 
 # %% jupyter={"source_hidden": true}
+# Checks
 by_chance, by_people = (float(central["effect"][f"quantile, {each}"]) for each in ("null model", "strangers"))
 record.check(
     "at Grand Central the quantile zone of people who ignore each other reaches farther ahead as well",
@@ -233,14 +242,15 @@ record.check(
 # On plazas the truth is known. How far off is each estimator at worst (`python -m studies.zones estimators 3`)?
 
 # %% jupyter={"source_hidden": true}
+# Figure
 saved = record.committed_table("25_estimators", zones_study.recompute_estimators)
 errors = 100 * saved.pivot_table("error_m", "case", "method", aggfunc="max")
 errors = errors.loc[["default", "5 cm of noise", "2 % intruders", "2 % intruders, 5 cm of noise"]]
 off = float(errors["quantile"].max())
-looks = {"quantile": (figures.BLUE, "s"), "hull": (figures.ORANGE, "^"), "paper": (figures.RED, "D")}
+looks = {"quantile": (figures.BLUE, "s"), "hull": (figures.GREEN, "^"), "paper": (figures.RED, "D")}
 fig, ax = plt.subplots(figsize=(8, 3), layout="constrained")
 for name, (shade, marker) in looks.items():
-    ax.plot(errors[name], range(len(errors)), marker, color=shade, markersize=9, alpha=0.8, label=name)
+    ax.plot(errors[name], range(len(errors)), marker, color=shade, markersize=9, label=name)
 ax.set_yticks(range(len(errors)), ["default plaza", *errors.index[1:]])
 ax.set(xscale="log", ylim=(len(errors) - 0.5, -0.5), xlabel="largest error of centre and semi-axes [cm]")
 ax.set_xticks([3, 5, 10, 20, 50], ["3", "5", "10", "20", "50"])
@@ -251,6 +261,7 @@ ax.set_title(f"Only the quantile zone is within {np.ceil(off):.0f} cm of the tru
 record.figure(fig, "estimators")
 
 # %% jupyter={"source_hidden": true}
+# Checks
 record.check("the quantile zone is within 4 cm in every case", off <= 4, f"{off:.1f} cm", always=True)
 pooled = record.committed_table("25_sizes", zones_study.recompute_sizes, where="plazas == 1")
 largest = 100 * float(pooled["error_m"].max())
@@ -259,6 +270,7 @@ record.check(
 )
 
 # %% jupyter={"source_hidden": true}
+# Table
 with warnings.catch_warnings():
     warnings.simplefilter("ignore", szlib.DataWarning)  # small shares of a day: that is what is asked
     subsets = record.committed_table("25_subsets", zones_study.recompute_subsets, where="site == 'plaza'")
@@ -279,6 +291,7 @@ fold_table(
 # What do you think: in how many of 200 plazas does the interval contain the truth?
 
 # %% jupyter={"source_hidden": true}
+# Figure
 again, names = zones_study.recompute_coverage, ("25_coverage", "25_coverage_hull")
 coverage = pd.concat([record.committed_table(name, again) for name in names])
 of_quantile = 100 * coverage[coverage["method"] == "quantile"].groupby("quantity")[["limit", "truth"]].mean()
@@ -309,6 +322,7 @@ record.figure(fig, "coverage")
 # </details>
 
 # %% jupyter={"source_hidden": true}
+# Checks
 limit = 100 * coverage["limit"].dropna()
 record.check(
     "95 % intervals of the quantile hold its limit in 90 to 98 % of plazas, each quantity at each speed",
@@ -334,6 +348,7 @@ fold_table(
 # Which of the two estimators finds it (`python -m studies.imposed 6`)?
 
 # %% jupyter={"source_hidden": true}
+# Figure
 imposed = record.committed_table("25_imposed", imposed_study.recompute, where="site == 'plaza'")
 imposed = imposed[imposed["site"] != "plaza"]
 errors = imposed.assign(
@@ -354,11 +369,12 @@ for ax, name in zip(panels, ("error of the semi-axis b [cm]", "intervals with th
     ax.set(xscale="log", xlabel="encounters", ylabel=name, ylim=(0, None))
     ax.set_xticks(sizes, [f"{n:,}" for n in sizes])
     ax.minorticks_off()
-panels[0].legend()
+panels[0].legend(loc="center right")
 fig.suptitle("Grand Central: the respect zone is nearer to the known zone, and its intervals contain it")
 record.figure(fig, "imposed")
 
 # %% jupyter={"source_hidden": true}
+# Checks
 by_estimator = errors.groupby(["quantity", "method"])[["held", "error"]].mean()
 held = by_estimator["held"].unstack()
 for method in ("respect", "quantile"):
@@ -378,6 +394,7 @@ fold_table("The same for each quantity", by_estimator.rename(columns=columns).un
 # things of the respect zone: an error of at most 3.5 cm, and an interval that contains the truth in 90 to 98 % of cases.
 
 # %% jupyter={"source_hidden": true}
+# Checks
 with contextlib.redirect_stderr(io.StringIO()):  # the table of the row that is computed again
     on_plazas = record.committed_table("25_plazas", plazas_study.recompute, where="pairs == 150")
 on_plazas = on_plazas[on_plazas["pairs"] > 150]
@@ -395,6 +412,9 @@ record.check(
     both,
     always=True,
 )
+
+# %% jupyter={"source_hidden": true}
+# Table
 lines = [
     f"| {NAMES[name]} | {row['within']:.0f} of {row['cases']:.0f} cases | {row['held']:.0f} % |"
     for name, row in bars.loc["respect"].iterrows()
@@ -420,6 +440,7 @@ Markdown(
 # random-effects model (`szlib.pool`) adds the mean over sites, and from three sites on what to expect at a new one.
 
 # %% jupyter={"source_hidden": true}
+# Figure
 radii = read_table("06_sites").query("kinds == 'strangers' and site != 'plaza'").set_index("site")
 radii = radii.rename({"atc-1hz": "ATC mall", "grand-central": "Grand Central"})
 sites = {name: tuple(row) for name, row in radii[["radius", "radius_low", "radius_high"]].iterrows()}
@@ -427,7 +448,10 @@ pooled = szlib.pool(sites)
 ax = figures.plot_forest(pooled)
 ax.set(xlim=(0.4, 2), xlabel="radius that strangers respect [m], with 95 % intervals")
 ax.set_xticks([0.5, 0.75, 1, 1.5, 2], ["0.5", "0.75", "1", "1.5", "2"])
-ax.set_title("Strangers at the mall keep about twice the distance of those at Grand Central")
+mall, station = (value for value, *_ in sites.values())
+ax.figure.suptitle(
+    f"Strangers at the mall keep {mall / station:.1f} times the distance of those at Grand Central"
+)
 record.figure(ax.figure, "forest")
 Markdown(
     f"The two intervals do not overlap. The mean of {pooled.n_sites} sites, {pooled.mean:.2f} m, says little: its own 95 % "
@@ -443,6 +467,7 @@ Markdown(
 # Which one do you expect to move the zone most?
 
 # %% jupyter={"source_hidden": true}
+# Computation
 tracks = record.cache.tracks()
 space = {"area": record.cache.find_area(tracks), "has_walls": record.cache.method.has_walls}
 moved = sensitivity(tracks, **space, speed=zone_speed)
@@ -462,6 +487,7 @@ saved = record.committed_table("25_sensitivity", moved_again, where=quick)
 saved = saved[saved["data"] == "ATC day"]
 
 # %% jupyter={"source_hidden": true}
+# Computation
 PLAIN = {
     "min_distance": "first distance at least [m]",
     "min_speed": "walking speed at least [m/s]",
@@ -483,6 +509,7 @@ def find_strongest(table: pd.DataFrame) -> tuple[str, float]:
 
 
 # %% jupyter={"source_hidden": true}
+# Figure
 of_day = {method: part.reset_index(drop=True) for method, part in saved.groupby("method")}
 shown = {"this data, the paper's zone": moved, "ATC day, quantile zone": of_day["quantile"]}
 fig, panels = plt.subplots(1, 2, figsize=(12, 5), layout="constrained")
@@ -495,6 +522,7 @@ fig.suptitle("Which parameter moves the area of the zone most")
 record.figure(fig, "tornado")
 
 # %% jupyter={"source_hidden": true}
+# Table
 strongest, most = find_strongest(moved)
 record.key |= {"moves the zone most": strongest, "by": f"{most:.0f} %"}
 fold_table(
@@ -516,6 +544,7 @@ fold_table(
 # and the high end of the quantile zone, and, to compare, with a zone of 0.8 and 1.2 times the size.
 
 # %% jupyter={"source_hidden": true}
+# Computation
 zone.ellipse(zone_speed)  # the notebook ends here where the data is too little for this zone
 kept = zone.ellipses[zone_speed]
 line = zone.table().set_index("speed").loc[zone_speed]
@@ -530,6 +559,7 @@ driven = pd.DataFrame(
 later = driven.sub(driven["middle"], axis=0)
 
 # %% jupyter={"source_hidden": true}
+# Figure
 ends = later[["low", "middle", "high"]]
 times, wide = ends.max(axis=1) - ends.min(axis=1), 100 * (line["a_high"] - line["a_low"])
 fig, ax = plt.subplots(figsize=(9, 3), layout="constrained")
@@ -541,9 +571,7 @@ ax.plot([], [], "o", color=figures.BLUE, label="ends of the zone's 95 % interval
 ax.set_yticks(range(len(later)), [name.replace("_", " ") for name in later.index])
 ax.set(ylim=(len(later) - 0.5, -0.5), xlabel="arrives later than with the zone itself [s]")
 ax.grid(axis="x", color=figures.GREY, alpha=0.3)
-ax.set_title(
-    f"An uncertainty of {wide:.1f} cm changes no arrival by more than {times.max():.1f} s; the size does"
-)
+ax.set_title(f"An uncertainty of {wide:.1f} cm changes no arrival by more than {times.max():.1f} s")
 figures.add_shared_legend([ax])
 record.figure(fig, "robot")
 
@@ -560,6 +588,7 @@ record.claim(trade.claim, trade.low > 0, str(trade))
 # $N_h$ = 1 to 8, by IPOPT and by our solver. Whether $N_h$ = 2 is safe enough: notebook 21.
 
 # %% jupyter={"source_hidden": true}
+# Computation
 corridor, paper, ellipse = szlib.SCENARIOS["corridor"], szlib.MPCSettings.paper(), zone.ellipses[zone_speed]
 way = szlib.simulate(corridor, szlib.MPCCBF(ellipse, walls=corridor.walls))
 moments = [way.controller_inputs(t) for t in way.time[30:55]]
@@ -574,6 +603,7 @@ for solver, N_h in product(("ipopt", "sqp"), range(1, paper.N + 1)):
     solve_times[solver, N_h] = 1000 * np.diff(clock)  # without the first step, which builds the problem
 
 # %% jupyter={"source_hidden": true}
+# Checks
 costs = pd.DataFrame({key: [np.median(values)] for key, values in solve_times.items()}).T[0].unstack(0)
 for solver, cost in costs.items():
     factor = float(cost[paper.N] / cost[2])
@@ -591,6 +621,7 @@ costs.loc[[1, 2, 4, 8]].rename_axis(index="N_h", columns="median time of a step 
 # Notebook 28 lists every sentence with its verdict.
 
 # %% jupyter={"source_hidden": true}
+# Checks
 free = replace(corridor, people=())
 alone = szlib.simulate(free, szlib.MPCCBF(ellipse, walls=free.walls, settings=paper))
 middle = np.abs(alone.states[:, 0]) <= 2.0
@@ -598,6 +629,7 @@ slow = float(alone.speed[middle].min() / alone.speed.max())
 record.claim("without the person the robot does not slow down in the corridor", slow > 0.8, f"to {slow:.0%}")
 
 # %% jupyter={"source_hidden": true}
+# Checks
 atlas = read_table("27_atlas").query("scene == 'corridor' and width == 4.6 and pace == 0.5")
 arrives = atlas[atlas["size"] == 1.0].set_index("gamma")["time_to_goal"]
 record.claim(
@@ -615,6 +647,7 @@ record.claim(
 )
 
 # %% jupyter={"source_hidden": true}
+# Checks
 gap = compare_distances(ellipse, r_robot=paper.r_robot, eps=paper.eps)
 uneven = 100 * (gap.farthest - gap.nearest)
 record.claim(
@@ -622,6 +655,7 @@ record.claim(
 )
 
 # %% jupyter={"source_hidden": true}
+# Checks
 sites = read_table("06_sites").query("min_distance == 1").set_index(["site", "kinds"])
 for name, site in {"ATC day": "atc-1hz", "Grand Central": "grand-central"}.items():
     for kinds in ("strangers", "opposite, crossing"):
@@ -644,6 +678,7 @@ record.claim("Grand Central: some come nearer than most strangers keep", nearest
 record.claim("nobody at Grand Central comes nearer than most strangers keep", nearest >= usual, value)
 
 # %% jupyter={"source_hidden": true}
+# Checks
 asked = {name for names in paper_sentences.load_sentences()["held_by"] for name in names}
 for row in everywhere.to_dict("records"):
     where = row["data"] if row["method"] == "-" else f"{row['data']}, {row['method']}"
@@ -659,6 +694,7 @@ for name, site in {
     record.claim(name, number == 0, f"{number} decided")
 
 # %% jupyter={"source_hidden": true}
+# What we know now
 (of_day_by, by_day), supported = find_strongest(of_day["quantile"]), (table["verdict"] == "supported").sum()
 Markdown(f"""**What it means.** {supported} of {len(table)} claims are supported by this data; on the real sites most stay open,
 because one day has too few people. Of the method's own parameters the *{strongest}* moves the paper's zone most on this
@@ -667,4 +703,5 @@ uncertainty about people counts for at most {times.max():.1f} s: a zone should b
 people that count, and with its null model.""")
 
 # %% jupyter={"source_hidden": true}
+# Summary of the checks
 record.close()

@@ -272,7 +272,7 @@ def draw_verdicts(answers: pd.DataFrame) -> Figure:
     figure, ax = plt.subplots(figsize=(11, 4.2), layout="constrained")
     for row in answers.to_dict("records"):
         x, y = places.index(row["data"]), names.index(row["claim"])
-        text = f"too few people: {row['n']}" if row["n"] else "not asked here"
+        text = f"too few: {row['n']}" if row["n"] else "not asked here"
         if np.isfinite(row["effect"]):
             text = f"{row['effect']:+.2f} {row['unit']}".replace("m2", "m²")
             colour, marker, fill = VERDICTS[row["verdict"].partition(" with")[0]]

@@ -76,7 +76,7 @@ def plot_strategies(
     found = table.pivot(index=rows, columns=columns, values="strategy").sort_index()
     ax = get_axes(ax, size=(5, 3.5))
     for name, (colour, hatch) in zip(names, _FILLS, strict=False):
-        style = {"color": colour, "hatch": hatch, "edgecolor": "white"}
+        style = {"facecolor": colour, "hatch": hatch, "edgecolor": "white"}
         row, column = np.nonzero((found == name).to_numpy())
         ax.bar(column, 1, bottom=row - 0.5, width=1, **style)
         ax.fill([], [], label=name, **style)  # for the legend
