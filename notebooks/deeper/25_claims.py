@@ -21,7 +21,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [24](24_data_quality.ipynb) · next: [26 - Eleven
-# meetings](26_meetings.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 80 min · needs
+# meetings](26_meetings.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 35 min · needs
 # [06](../06_respect.ipynb)
 #
 # **Afterwards you can** say which claims of the paper the data supports, and with which interval.

@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [25](25_claims.ipynb) · next: [27 - A sensitivity
-# atlas](27_atlas.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 40 min · needs
+# atlas](27_atlas.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 15 min · needs
 # [12](../12_among_people.ipynb)
 #
 # **Afterwards you can** say in which meetings this controller is good, and in which it is bad.

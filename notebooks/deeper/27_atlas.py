@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](../00_start_here.ipynb) · before: [26](26_meetings.ipynb) · next: [28 - From sentence to
-# verdict](28_sentences.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 35 min · needs
+# verdict](28_sentences.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4-5 · 20 min · needs
 # [11](../11_waiting.ipynb)
 #
 # **Afterwards you can** predict from gamma, width, speed and zone what the robot will do.

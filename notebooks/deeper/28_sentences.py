@@ -88,8 +88,6 @@ record.key |= {f"sentences {verdict}": int(number) for verdict, number in counts
 # ## Every sentence
 #
 # Open a verdict to see its sentences, each with our code, the cell that shows it, and the numbers that decide it.
-#
-# What do you expect among "not supported": sentences about people, or about the robot?
 
 # %% jupyter={"source_hidden": true}
 # Computation
