@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -76,7 +77,7 @@ def plot_strategies(
     found = table.pivot(index=rows, columns=columns, values="strategy").sort_index()
     ax = get_axes(ax, size=(5, 3.5))
     for name, (colour, hatch) in zip(names, _FILLS, strict=False):
-        style = {"facecolor": colour, "hatch": hatch, "edgecolor": "white"}
+        style: Any = {"facecolor": colour, "hatch": hatch, "edgecolor": "white"}
         row, column = np.nonzero((found == name).to_numpy())
         ax.bar(column, 1, bottom=row - 0.5, width=1, **style)
         ax.fill([], [], label=name, **style)  # for the legend
@@ -229,8 +230,9 @@ def draw_claims(table: pd.DataFrame, *, title: str = "") -> Figure:
     >>> claim = {"claim": "zones grow with speed", "effect": 0.1, "low": 0.05, "high": 0.2, "unit": "m2"}
     >>> figure = figures.draw_claims(pd.DataFrame([claim | {"verdict": "supported"}]))
     """
-    size = (8, 0.95 * len(table) + 0.5)
-    figure, grid = plt.subplots(len(table), figsize=size, layout="constrained", squeeze=False)
+    figure, grid = plt.subplots(
+        len(table), figsize=(8, len(table) + 0.4), layout="constrained", squeeze=False
+    )
     for ax, row in zip(grid.flat, table.to_dict("records"), strict=True):
         colour, marker = _VERDICTS[row["verdict"].split()[0]]
         ax.hlines(0, row["low"], row["high"], color=colour, linewidth=3)
