@@ -230,9 +230,7 @@ def draw_claims(table: pd.DataFrame, *, title: str = "") -> Figure:
     >>> claim = {"claim": "zones grow with speed", "effect": 0.1, "low": 0.05, "high": 0.2, "unit": "m2"}
     >>> figure = figures.draw_claims(pd.DataFrame([claim | {"verdict": "supported"}]))
     """
-    figure, grid = plt.subplots(
-        len(table), figsize=(8, len(table) + 0.4), layout="constrained", squeeze=False
-    )
+    figure, grid = plt.subplots(n := len(table), figsize=(8, 1.1 * n), layout="constrained", squeeze=False)
     for ax, row in zip(grid.flat, table.to_dict("records"), strict=True):
         colour, marker = _VERDICTS[row["verdict"].split()[0]]
         ax.hlines(0, row["low"], row["high"], color=colour, linewidth=3)
@@ -275,8 +273,7 @@ def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
     ax.margins(x=0.4)
     ax.set_xlim(ax.get_xlim())  # also where the next interval is wider
     if np.isfinite(pooled.new_high):
-        diamond = [pooled.low, pooled.mean, pooled.high, pooled.mean]
-        ax.fill(diamond, n + np.array([0, -0.3, 0, 0.3]), color=BLUE)
+        ax.fill([pooled.low, pooled.mean, pooled.high, pooled.mean], [n, n - 0.3, n, n + 0.3], color=BLUE)
         labels[-1] += f" ({pooled.low:.2f} to {pooled.high:.2f})"
         ax.plot([pooled.new_low, pooled.new_high], [n + 1, n + 1], "-|", color=ORANGE, linewidth=3, ms=12)
         labels.append(f"a new site: {pooled.new_low:.2f} to {pooled.new_high:.2f}")
