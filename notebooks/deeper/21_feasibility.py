@@ -466,8 +466,8 @@ failed[["seed", "people", "walls", "outcome", "min_h", "flagged_steps"]].rename(
 
 # %% jupyter={"source_hidden": true}
 # What we know now
-Markdown(f"""**What we know now.** A step has a solution as long as the robot can brake as fast as the barrier asks:
-$\\gamma \\le a_{{max}}\\Delta t / v_{{max}}$ = {settings.a_max * settings.dt / settings.v_max:g} for our robot, and
+Markdown(f"""**What we know now.** Towards a person who stands, a step has a solution as long as the robot can brake as fast
+as the barrier asks: $\\gamma \\le a_{{max}}\\Delta t / v_{{max}}$ = {settings.a_max * settings.dt / settings.v_max:g} for our robot, and
 we use {settings.gamma:g}. With one person and $\\gamma = 0.8$, h < 0 in {many} of the worlds, with
 {settings.gamma:g} in {few}: a small $\\gamma$ makes up for a short horizon, and the price is a slow
 robot. A plan that ends at rest has a proof instead: among people who stand, every later step has a solution; among

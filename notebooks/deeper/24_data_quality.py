@@ -254,8 +254,8 @@ rows = sum(stage["entered"] for stage in read)
 ax.set_title(f"{rows:,} rows of {len(files)} files hold {n_encounters:,} encounters")
 record.figure(ax.figure, "funnel")
 record.key |= {"rows": rows, "encounters": n_encounters}
-done = len(extraction.table)
-record.check("every file was read", len(extraction.failed) == 0, f"{done} days, 0 failed", always=True)
+done, failed = len(extraction.table), len(extraction.failed)
+record.check("every file was read", failed == 0, f"{failed} of {done} days failed", always=True)
 if record.cache.is_synthetic:
     lines = sum(len(Path(file).read_text().splitlines()) for file in files)
     found_rows = f"{rows:,} rows of {lines:,} lines"
