@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # The notebooks show their figures in every verb, and their kernels are those of .venv.
 unexport MPLBACKEND JUPYTER_PATH
 
-.PHONY: run report docs test lab bench lock lowest audit hostile notebooks dist clean
+.PHONY: run report docs slides test lab bench lock lowest audit hostile notebooks dist clean
 
 run: $(INSTALLED)  ## every notebook, headless, on the synthetic plaza; fails where a check does not hold
 	$(BIN)/szlib run
@@ -23,6 +23,9 @@ report: $(INSTALLED)  ## open what the last run on the plaza wrote: one HTML fil
 
 docs: $(INSTALLED)  ## results/site: each public name of szlib, which settings to choose, the notebooks, the last report
 	$(BIN)/python notebooks/tools/docs.py results/site
+
+slides: $(INSTALLED)  ## results/slides: a deck of each notebook, and all figures; SLIDES_FLAGS="--reveal FOLDER" needs no network
+	$(BIN)/python notebooks/tools/slides.py $(SLIDES_FLAGS)
 
 # Types are checked beside the tests; both must pass.  The notebooks are executed by `make run`, not here.
 test: $(INSTALLED)  ## style, types, and every test

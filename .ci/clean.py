@@ -19,6 +19,8 @@ OF_RUN = (
 )  # fmt: skip
 # What `make docs` writes.
 OF_SITE = ("index.html", "which_settings.html", "reference.html", "report.html", "szlib.*.html")
+# What `make slides` writes.
+OF_SLIDES = (f"{NOTEBOOK}.html", f"figures/{NOTEBOOK}.png")
 
 
 def clean(results: Path) -> None:
@@ -30,6 +32,7 @@ def clean(results: Path) -> None:
             remove(folder, OF_RUN)
     remove(results / "site/notebooks", OF_RUN)
     remove(results / "site", OF_SITE)
+    remove(results / "slides", OF_SLIDES)
     for folder in (results / "lab", results):
         if read_purpose(folder) == WORKBOOK:
             remove(folder, ())

@@ -150,7 +150,7 @@ def _is_harmless(tag: str, name: str, value: str) -> bool:
     return name in _ATTRIBUTES or (name == "href" and not value.startswith("data:"))
 
 
-class _Renderer(IPythonRenderer):
+class MathRenderer(IPythonRenderer):
     """Markdown with formulas as MathML, which browsers draw without a script."""
 
     def block_math(self, body: str) -> str:
@@ -168,7 +168,7 @@ class _Renderer(IPythonRenderer):
 
 def _render_markdown(source: str, names: Sequence[str]) -> str:
     """Render markdown with its pictures embedded; links to the notebooks `names` lead into the report."""
-    renderer = _Renderer(escape=False, path=str(folders.NOTEBOOKS), embed_images=True)
+    renderer = MathRenderer(escape=False, path=str(folders.NOTEBOOKS), embed_images=True)
     source = _FILE_LINK.sub(lambda x: f"[{x[1]}](#{x[2]})" if x[2] in names else x[1], source)
     return MarkdownWithMath(renderer=renderer).render(source)
 

@@ -139,6 +139,10 @@ def test_clean_removes_what_a_run_wrote_and_nothing_else(workbook, tmp_path):
     site = claim_folder(results / "site" / "notebooks", "results of the committed notebooks").parent
     for name in ("index.html", "szlib.Step.html", "notebooks/report.html", "notebooks/01_one.ipynb"):
         (site / name).write_text("of make docs")
+    slides = claim_folder(results / "slides", "slides of the notebooks")
+    (slides / "figures").mkdir()
+    for name in ("01_one.html", "figures/01_one-map.png"):
+        (slides / name).write_text("of make slides")
     own = [results / "thesis.txt", results / "mine" / "notes.csv", results / "mine" / "figures" / "mine.png"]
     for file in own:
         file.write_text("mine")
@@ -146,7 +150,7 @@ def test_clean_removes_what_a_run_wrote_and_nothing_else(workbook, tmp_path):
     script["clean"](results)
     left = {file for file in results.rglob("*") if file.is_file() and not file.name.startswith(".szlib")}
     assert left == {*own, *(file for file in days if not file.name.startswith(".szlib"))}
-    assert not list(results.glob("mine-*")) and not site.exists()
+    assert not list(results.glob("mine-*")) and not site.exists() and not slides.exists()
     for file in own:
         file.unlink()
     for file in (results / "days").iterdir():
