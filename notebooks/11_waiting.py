@@ -20,9 +20,9 @@
 # **Expectation.** The paper: a robot outside waits until the person is through. A robot inside backs out first.
 
 # %% [markdown]
-# [Start](00_start_here.ipynb) · before: [10](10_corridor.ipynb) · next: [12 - Other people's
-# crowds](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6c-d · 25 min ·
-# needs [10](10_corridor.ipynb) · exercises:
+# [Start](00_start_here.ipynb) · before: [10](10_corridor.ipynb) · next: [12 - Among people: routes, crowds,
+# and limits](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6c-d · 25 min
+# · needs [10](10_corridor.ipynb) · exercises:
 # [6.4-6.5](exercises/sheet6_robot.ipynb#6.4-Predict,-then-run-(20-min)) · laboratory:
 # [13](13_laboratory.ipynb)
 #

@@ -161,11 +161,11 @@ def test_the_numbers_of_the_page_are_those_of_the_tables():
         f"arrived in {arrived[0.02]:.0f} % with 0.02, in {arrived[0.05]:.0f} to {arrived[0.1]:.0f} %" in text
     )
     assert f"with 0.4, {negative[0.4]:.0f} % of worlds had h < 0" in text
-    reached = table("12_sensitivity").query("metric == 'reached'")
+    reached = table("29_sensitivity").query("metric == 'reached'")
     assert set(reached["n"]) == {45}
     low, high = 100 * reached["mean"].min(), 100 * reached["mean"].max()
     assert f"left its arrival at {low:.0f} to {high:.0f} % of 45 walkers" in text
-    walkers = table("12_walkers").query(
+    walkers = table("29_walkers").query(
         "crowd == 'all recorded' and speed == '1 m/s' and metric == 'reached'"
     )
     ours = walkers.set_index("controller")

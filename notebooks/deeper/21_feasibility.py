@@ -25,9 +25,7 @@
 # exercises: [6.3](../exercises/sheet6_robot.ipynb#6.3-The-terminal-proof-(15-min))
 #
 # **Afterwards you can** say when a step has no solution, and prove when there always is one. **Words.**
-# *exact penalty*: a price on violations so high that none is paid where a solution without violations
-# exists; *fallback*: which of the controller's ways to a control was taken: warm, cold, kept, relaxed,
-# braking.
+# *fallback*: which of the controller's ways to a control was taken: warm, cold, kept, relaxed, braking.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook

@@ -340,7 +340,7 @@ record.claim(
 # may stop before one of them although there is a gap: it plans no route, and only the choice of a side
 # (notebook 09) leads it out. With `among_people()` it arrives in all variations. The price is $h < 0$ for some time where
 # five or more people are near: half a metre inside a zone on the circle, with a gap to all bodies. People here do not
-# react; those of notebook 12 do.
+# react; those of notebook 29 do.
 
 # %% jupyter={"source_hidden": true}
 # Summary of the checks

@@ -20,8 +20,8 @@
 # supported by some data and not by other data. Comfort cannot be tested here.
 
 # %% [markdown]
-# [Start](../00_start_here.ipynb) · before: [27](27_atlas.ipynb) ·
-# [paper](https://arxiv.org/abs/2405.15101): all · 10 min
+# [Start](../00_start_here.ipynb) · before: [27](27_atlas.ipynb) · next: [29 - Crowds and recorded
+# people](29_crowds.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 10 min
 #
 # **Afterwards you can** find each sentence of the paper with its code, its cell and its verdict.
 

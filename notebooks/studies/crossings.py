@@ -1,4 +1,4 @@
-"""CrowdNav's circle crossings, for which other people publish results: the table 12_crossings.csv.
+"""CrowdNav's circle crossings, for which other people publish results: the table 29_crossings.csv.
 
 python -m studies.crossings           the table as it is saved: some 15 min on one core
 python -m studies.crossings --n 20    the first 20 worlds
@@ -177,7 +177,7 @@ def main(n: int) -> None:
             row |= {name: hits / n, f"{name}_low": low, f"{name}_high": high}
         table.append(row | {"mean_time": times[ends == "success"].mean(), "n": n, "probe": times[0]})
         print(*by, row["success"], row["collision"], flush=True)
-    write_table(pd.DataFrame(table), "12_crossings", seed=FIRST)
+    write_table(pd.DataFrame(table), "29_crossings", seed=FIRST)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""Robots among other people's crowds, real and simulated: the tables of notebook 12.
+"""Robots among other people's crowds, real and simulated: the tables of notebook 29.
 
 python -m studies.crowd_trials           both tables, as they are saved: some 15 min on one core
 python -m studies.crowd_trials --n 10    at most 10 trials of each kind
 
-12_crowds.csv     means with 95 % intervals: crowd by what people see by controller
-12_safety_claims.csv   steps that said they were safe, how many led to h < 0, and what the people did
+29_crowds.csv     means with 95 % intervals: crowd by what people see by controller
+29_safety_claims.csv   steps that said they were safe, how many led to h < 0, and what the people did
 
 They go to notebooks/tables.  The real data is looked for in $SZLIB_DATA_DIR (atc-1hz/, gc/, eth/).  The speed
 model is left out where JuPedSim is not installed (`INSTALL_JUPEDSIM` in tests/helpers/speed_model.py).  An exception in any trial ends the run.
@@ -66,7 +66,7 @@ SETTINGS = {
 """szlib's defaults; plans that end at rest; barriers on the whole horizon that may be used up faster; and the
 controller that is recommended in crowds."""
 PROBE = 1
-"""The trial that is driven again in each run of notebook 12: barriers bind there."""
+"""The trial that is driven again in each run of notebook 29: barriers bind there."""
 BY = ("crowd", "sees", "controller")
 PROBED = ("claimed_safe_steps", "path_efficiency")
 """Columns of the trial `PROBE` in the table of safety claims."""
@@ -255,8 +255,8 @@ def main(n: int, work: Path | None) -> None:
         parts.append(rows)
         print(*rows[list(BY)].iloc[0], len(rows), flush=True)
     table = promises(pd.concat(parts, ignore_index=True))
-    write_table(pd.concat(map(means, parts), ignore_index=True), "12_crowds")
-    write_table(table, "12_safety_claims")
+    write_table(pd.concat(map(means, parts), ignore_index=True), "29_crowds")
+    write_table(table, "29_safety_claims")
     print(table.to_string())
 
 

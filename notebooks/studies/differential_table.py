@@ -2,7 +2,7 @@
 
     python -m studies.differential_table [--worlds 2000]
 
-Writes notebooks/tables/12_differential.csv: a row for each robot, all of them in the same worlds, by
+Writes notebooks/tables/29_differential.csv: a row for each robot, all of them in the same worlds, by
 `szlib.rollouts`. Beside its metrics, which are about the robot's disc at the samples, the disc is followed
 along its arcs, ten times within each step, and Euclidean distances to zones, bodies and walls are taken
 there. Finished worlds are kept in results/rollouts, so that a run that was stopped goes on.
@@ -28,7 +28,7 @@ from szlib.simulation.scenario import GOAL_RADIUS
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 from szlib.zones.ellipses import BODY_RADIUS
 
-TABLE = "12_differential"
+TABLE = "29_differential"
 FIRST = 1_000_000
 """Seed of the first world: that of the first block of rollout_table."""
 SUBSTEPS = 10

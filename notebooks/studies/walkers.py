@@ -1,10 +1,10 @@
-"""Robots in the place of recorded walkers, all on the same ways: two tables of notebook 12.
+"""Robots in the place of recorded walkers, all on the same ways: two tables of notebook 29.
 
 python -m studies.walkers            both tables, as they are saved: some 25 min on one core
 python -m studies.walkers --n 5      at most 5 ways at each site
 
-12_walkers.csv      site by speed by controller: means with 95 % intervals
-12_sensitivity.csv  the controller among people with one number doubled or halved
+29_walkers.csv      site by speed by controller: means with 95 % intervals
+29_sensitivity.csv  the controller among people with one number doubled or halved
 
 Sites are those of `studies.claims`, Grand Central also with ways through the whole hall. The robot has a limit
 of 1 m/s, or drives at most at the mean speed of the walker whom it replaces. Each trial has no time limit for
@@ -156,14 +156,14 @@ def main(n: int) -> None:
         crowd="all recorded", seed=recorded["seed"] + 1000 * recorded["crowd"].map(PLACES.index)
     )
     tables = [means(rows, BY) for rows in parts]
-    write_table(pd.concat([*tables, means(pooled, BY)], ignore_index=True), "12_walkers", seed=SEED)
+    write_table(pd.concat([*tables, means(pooled, BY)], ignore_index=True), "29_walkers", seed=SEED)
     sensitive = []
     for name, settings in changed().items():
         places = [pd.DataFrame(trials(place, min(n, 15), "1 m/s", name, settings)) for place in CROWDED]
         rows = pd.concat(places, ignore_index=True).assign(change=name)
         sensitive.append(rows.assign(seed=rows.index))
         print(name, rows[list(METRICS)].mean().round(2).to_dict(), flush=True)
-    write_table(means(pd.concat(sensitive), ("change",)), "12_sensitivity", seed=SEED)
+    write_table(means(pd.concat(sensitive), ("change",)), "29_sensitivity", seed=SEED)
 
 
 if __name__ == "__main__":

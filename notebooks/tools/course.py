@@ -60,7 +60,10 @@ GIVES: dict[str, tuple[str, str]] = {
         "sec. 4, fig. 6c-d",
         "say why the robot waits, and why it backs out of a passage, although no rule tells it to.",
     ),
-    "12": ("sec. 4-5", "say which promises of the controller hold among people who react."),
+    "12": (
+        "sec. 4-5",
+        "choose settings for a robot among people and walls, and say where it will not arrive.",
+    ),
     "13": ("sec. 3-4", "try out a scene of your own, live, and hand its settings on."),
     "21": ("sec. 4", "say when a step has no solution, and prove when there always is one."),
     "22": ("sec. 3, eq. 3-7", "say where the two distances err, and which margin makes up for it."),
@@ -70,12 +73,13 @@ GIVES: dict[str, tuple[str, str]] = {
     "26": ("sec. 4-5", "say in which meetings this controller is good, and in which it is bad."),
     "27": ("sec. 4-5", "predict from gamma, width, speed and zone what the robot will do."),
     "28": ("all", "find each sentence of the paper with its code, its cell and its verdict."),
+    "29": ("sec. 4-5", "say which safety claims of the controller hold among people who react."),
 }
 """By number of the notebook: the section of the paper, and what a reader can do after reading it."""
 NEEDS: dict[str, str] = {
     "02": "01", "03": "02", "04": "03", "05": "04", "06": "05", "07": "05", "08": "07", "09": "07", "10": "09",
     "11": "10", "12": "09", "13": "07", "21": "08", "22": "07", "23": "09", "24": "03", "25": "06", "26": "12",
-    "27": "11",
+    "27": "11", "29": "12",
 }  # fmt: skip
 """By number of the notebook: the chapter that it builds on."""
 EXERCISES: dict[str, tuple[str, ...]] = {

@@ -1,7 +1,7 @@
 """One deliberate regression for each committed table: does `szlib run` fail, and because of this table?
 
     python tests/studies/regressions.py                all tables (half an hour on one core)
-    python tests/studies/regressions.py 12_crowds ...  some of them
+    python tests/studies/regressions.py 29_crowds ...  some of them
 
 A regression is a change of one line in a copy of szlib.  The notebook that reads the table is executed there
 into a temporary folder.  It must end with an exit code other than 0, and the check that computes a row of
