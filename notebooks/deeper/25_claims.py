@@ -514,7 +514,7 @@ of_day = {method: part.reset_index(drop=True) for method, part in saved.groupby(
 shown = {"this data, the paper's zone": moved, "ATC day, quantile zone": of_day["quantile"]}
 fig, panels = plt.subplots(1, 2, figsize=(12, 5), layout="constrained")
 for ax, (name, part) in zip(panels, shown.items(), strict=True):
-    plain = part.replace({"parameter": PLAIN, "value": {"opposite, crossing": "no company"}})
+    plain = part.replace({"parameter": PLAIN})
     figures.plot_sensitivity(plain, ax=ax)
     what, much = find_strongest(part)
     ax.set_title(f"{name}: {much:.0f} % by the\n{what}")
