@@ -154,15 +154,15 @@ class MathRenderer(IPythonRenderer):
     """Markdown with formulas as MathML, which browsers draw without a script."""
 
     def block_math(self, body: str) -> str:
-        """Draw a formula on a line of its own."""
+        """Draw the formula `body` on a line of its own."""
         return f"<p>{convert(body, display='block')}</p>"
 
     def multiline_math(self, text: str) -> str:
-        """Draw a formula of several lines, which includes its marks."""
+        """Draw a formula of several lines; `text` includes its marks."""
         return self.block_math(text.strip("$"))
 
     def inline_math(self, body: str) -> str:
-        """Draw a formula within a line."""
+        """Draw the formula `body` within a line."""
         return convert(body)
 
 
