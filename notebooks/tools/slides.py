@@ -89,7 +89,8 @@ def split_text(text: str) -> Iterator[tuple[str, NotebookNode]]:
     for block in split_blocks(outside):
         yield ("slide" if block.startswith(("# ", "## ")) else "-"), new_markdown_cell(block)
     for summary, inside, after in zip(folds[::3], folds[1::3], folds[2::3], strict=True):
-        yield "fragment", new_markdown_cell(f"**{summary.strip()}.** {inside.strip()}")
+        gap = " " if inside.strip()[:1].isalnum() else "\n\n"  # before a table, a list or a formula
+        yield "fragment", new_markdown_cell(f"**{summary.strip()}.**{gap}{inside.strip()}")
         yield from split_text(after)
 
 

@@ -88,6 +88,12 @@ def test_the_text_of_a_fold_appears_at_a_key_press():
     assert [(kind, cell.source) for kind, cell in parts] == expected, "also where a hidden cell has made it"
 
 
+def test_the_table_of_a_fold_stays_a_table():
+    table = "| a |\n|---|\n| 1 |"
+    ((_, cell),) = make(new_markdown_cell(f"<details><summary>Answer</summary>\n\n{table}\n\n</details>"))
+    assert cell.source == f"**Answer.**\n\n{table}"
+
+
 def test_the_navigation_is_a_note():
     assert make(new_markdown_cell("35 min\n\n**Afterwards you can** see."))[0][0] == "notes"
 
