@@ -17,30 +17,17 @@
 # **Question.** A person walks towards the robot in a corridor. There is room for both, but not much. Who
 # slows the robot down: the person, or the wall?
 #
-# **Expectation.** The paper: the robot slows down while it passes, because between the wall and
-# the zone the barrier leaves little speed.
+# **Expectation.** The paper: it slows down while it passes, as wall and zone together leave little speed.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [09](09_passing.ipynb) · next: [11 - Yielding: waiting and making
-# room](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 35 min · needs
+# room](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 20 min · needs
 # [09](09_passing.ipynb) · laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say why the robot slows down in a corridor, and speeds up beside the person.
 
-# %%
-import matplotlib.pyplot as plt
-import numpy as np
-import pandas as pd
-from IPython.display import Markdown
-from studies import paper_claims
-from studies.atlas import AtlasCell
-
-import szlib
-from szlib.simulation.strategies import classify_strategy
-from szlib.workbook import figures
-from szlib.workbook.record import ASSUMED, PAPER, TUNED, NotebookRecord, parameters
-
-# %% tags=["parameters"]
+# %% jupyter={"source_hidden": true} tags=["parameters"]
+# Parameters of this notebook
 data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
@@ -52,169 +39,251 @@ a_max = 1.0  # m/s2
 width = 4.6  # of the corridor, m
 pace = 0.5  # of the person, m/s
 
-# %%
+# %% jupyter={"source_hidden": true}
+# Imports, and the record of the run
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
+import numpy as np
+from IPython.display import Markdown
+from studies import scenario_runs
+from studies.atlas import AtlasCell
+
+import szlib
+from szlib.simulation.strategies import classify_strategy
+from szlib.workbook import figures
+from szlib.workbook.record import ASSUMED, PAPER, NotebookRecord
+
 record = NotebookRecord("10_corridor", globals())
 settings = szlib.MPCSettings(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
 scenario = AtlasCell("corridor", width=width, pace=pace).scenario()
-parameters(
-    [
-        ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
-        ("corridor", f"{width} m", ASSUMED, "the paper shows walls without numbers"),
-        ("N, N_h, dt", f"{settings.N}, {settings.N_h}, {settings.dt} s", PAPER, "sec. 4"),
-        ("gamma", gamma, TUNED, "on these four scenarios; in 2,000 other worlds: notebook 09"),
-        ("a_max; Q, R, P", f"{a_max} m/s²; as in notebook 09", ASSUMED, "the paper gives none"),
-        (
-            "head_on_share",
-            settings.head_on_share,
-            ASSUMED,
-            "ours; 0 in the paper's chain: the rule of the side acts while the goal lies within this share of the "
-            "half-angle under which the robot sees the zone, and fades out up to twice that",
-        ),
-    ]
+scenario_runs.list_parameters(
+    settings,
+    ("person's speed", f"{pace} m/s", PAPER, "constant, known exactly, unaffected by the robot"),
+    ("corridor", f"{width} m wide", ASSUMED, "the paper shows walls without numbers"),
 )
 
-# %% [markdown]
-# ## The paper's chain, as it comes out
-#
-# First everything as the paper has it: its zone (outliers by LOF, hull, slice, smallest ellipse) and its
-# controller (IPOPT, 5 cm of margin around every wall, no rule of the side). The paper does not give gamma, Q, R, P
-# and a_max: they are ours.
-
-# %%
-paper_zone = record.cache.paper_ellipse()
-paper = szlib.MPCSettings.paper(gamma=gamma, N=N, N_h=N_h, a_max=a_max)
-paper_log = szlib.simulate(scenario, szlib.MPCCBF(paper_zone, walls=scenario.walls, settings=paper))
-claims = paper_claims.record_claims(record, scenario.claims, paper_log)
-honest = paper_log.metrics()["unflagged_violations"] == 0
-record.check("the paper's chain: no step that called itself safe led to h < 0", honest, always=True)
-Markdown(paper_claims.describe_run(paper_log, claims))
-
-# %% [markdown]
-# The side, again, is that of the zone's tilt (notebook 09): nothing in the paper's problem prefers one. That it slows
-# down is due to the barriers, of the person and of the wall.
-
-# %% [markdown]
-# ## The run
-#
-# From here on the robot is ours: `MPCSettings()`, and the *quantile zone* of notebook 05. Here they are beside the
-# paper's.
-
-# %%
-zone = record.cache.ellipse()
-rows = {"paper": [*paper_zone.center, *paper_zone.semi_axes], "ours": [*zone.center, *zone.semi_axes]}
-sizes = ["centre ahead [m]", "centre to the left [m]", "semi-axis a [m]", "semi-axis b [m]"]
-pd.DataFrame(rows, index=sizes).round(2)
-
-# %%
+# %% jupyter={"source_hidden": true}
+# Figure
+runs = scenario_runs.drive_both(record, scenario, settings)
+log, zone = runs.ours, record.cache.ellipse()
 controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=settings)
-log = szlib.simulate(scenario, controller)
 metrics = log.metrics()
-both = pd.DataFrame({"the paper's chain": paper_log.metrics(), "ours": metrics})
-both.filter(regex="^(?!solve_time)", axis="index")  # all but the machine's times
+sides = [run.metrics()["passing_side"] for run in (runs.paper, log)]
+lowest = max(run.metrics()["min_speed"] for run in (runs.paper, log))
+title = f"Both slow down to {lowest:.2f} m/s or less (the paper's: {sides[0]}, ours: {sides[1]})"
+record.figure(scenario_runs.draw_paths_and_speeds(runs, title), "chains")
+
+# %% [markdown]
+# ## The paper's chain, and ours
+#
+# Orange is everything as the paper has it, its zone and its controller; gamma and a_max are ours, since the paper
+# gives none. Blue is our zone (notebook 05) and our controller. They pass on different sides: in the paper's chain
+# the tilt of the zone chooses the side, in ours a rule (notebook 09). Both slow down.
 
 # %%
-ax = log.plot()
-record.figure(ax.figure, "scenario")
+scenario_runs.tabulate_five(runs.by_name())
 
-# %%
-record.animation(movie := log.animate(), "run")
+# %% [markdown]
+# Ours, step by step. The numbers are times: where the robot is at 4, the person is at 4, too. Later is darker.
+
+# %% jupyter={"source_hidden": true}
+# Figure
+fig, ax = plt.subplots(figsize=(9, 4.2), layout="constrained")
+figures.plot_scenario(log, ax=ax)
+ax.set_title(f"Between zone and wall the robot slows down to {metrics['min_speed']:.2f} m/s (times in s)")
+record.figure(fig, "scenario")
+
+# %% jupyter={"source_hidden": true}
+# Animation
+record.animation(movie := log.animate(width=9), "run")
 movie
 
 # %% [markdown]
 # ## Safe, and as the paper says?
 #
-# The promises that must hold with any zone that leaves the scene passable, and the claims of the paper for ours.
+# The checks must hold with any zone that leaves the corridor passable. The claims are the paper's, for its chain
+# and for ours.
+
+# %% jupyter={"source_hidden": true}
+# Checks
+scenario_runs.record_safety(record, runs)
+scenario_runs.record_both_claims(record, runs)
+record.check("our robot passes on the chosen side", sides[1] == settings.pass_side, f"side: {sides[1]}")
+
+# %% [markdown]
+# ## A number first
+#
+# How much room is there beside the person? They walk in the middle of the corridor. To each side are half its
+# width, less the zone, less the robot with its margin on both sides:
+
 
 # %%
-record.check("the goal is reached", metrics["success"])
-record.check("h >= 0 at every step", metrics["min_h"] >= 0, metrics["min_h"])
-record.check("no infeasible step", metrics["infeasible_steps"] == 0, metrics["infeasible_steps"])
-record.check("nothing is touched (Euclidean)", metrics["min_clearance"] > 0, metrics["min_clearance"])
-record.check("never faster than 1 m/s", metrics["max_speed"] <= 1 + 1e-6, metrics["max_speed"])
-record.key |= {name: metrics[name] for name in ("time_to_goal", "min_h", "min_speed", "time_yielding")}
+def free_room(width, zone_sideways=0.75, robot=0.5, margin=0.05):
+    return width / 2 - zone_sideways - 2 * (robot + margin)
 
-# %%
-paper_claims.record_claims(record, scenario.claims, log, prefix="ours: ")
-passed = metrics["passing_side"]
-record.check("our robot passes on the chosen side", passed == settings.pass_side, passed)
+
+room = free_room(4.6)
+print(f"{100 * room:.0f} cm; in the middle of it h is {100 * room / 2:.0f} cm to the zone and to the wall")
+print(f"with gamma = 0.05 it may approach either of them at {0.05 * room / 2 / 0.1:.2f} m/s")
+
+# %% [markdown]
+# Compare the last number with the slowest speed in the table above.
+
+# %% [markdown]
+# ## Person or wall?
+#
+# **What do you think?** Take the walls away: how slow does the robot become beside the person? Put them back, and
+# take the person away: how slow is it now? Write down two speeds.
+
+# %% jupyter={"source_hidden": true}
+# Figure
+cases = {
+    "person and walls": scenario,
+    "person alone": replace(scenario, walls=scenario.walls[:0]),
+    "walls alone": replace(scenario, people=()),
+}
+alone = {name: scenario_runs.drive(scene, zone, settings) for name, scene in cases.items()}
+slowest = {name: run.metrics()["min_speed"] for name, run in alone.items()}
+fig, ax = plt.subplots(figsize=(8.5, 3.6), layout="constrained")
+styles = ("-", figures.BLUE), ("--", figures.ORANGE), (":", figures.BLACK)
+for (name, run), (line, colour) in zip(alone.items(), styles, strict=True):
+    ax.plot(run.time, run.speed, line, color=colour, label=f"{name}: slowest {slowest[name]:.2f} m/s")
+both, least_alone = slowest["person and walls"], min(slowest["person alone"], slowest["walls alone"])
+ax.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, 1.1))
+ax.set_title(f"Neither alone slows it below {least_alone:.2f} m/s; both together: {both:.2f} m/s")
+ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=9)
+record.figure(fig, "person-or-wall")
+
+# %% jupyter={"source_hidden": true}
+# Checks, and the answer
+record.check(
+    "the robot is more than twice as slow between person and wall as beside either alone",
+    least_alone > 2 * both,
+    f"{both:.2f} m/s, and {least_alone:.2f} m/s alone",
+)
+Markdown(
+    f"<details><summary>Answer</summary>\n\nBeside the person alone {slowest['person alone']:.2f} m/s, between the walls alone "
+    f"{slowest['walls alone']:.2f} m/s. In the open the robot swings out as far as it needs, and a wall that it drives along "
+    "takes nothing from its speed ahead. Only both together leave it no way that is fast: nearer to the wall the wall's "
+    "row limits it, nearer to the zone the person's.\n\n</details>"
+)
 
 # %% [markdown]
 # ## Who holds it, and when
 #
-# A row of the problem *holds* the robot where it leaves nothing over: then the acceleration would be another
-# without it. Above the robot's speed; below, who holds it when.
+# A row of the problem *holds* the robot where it leaves nothing over: without that row the acceleration would be
+# another. **What do you think?** Who holds the robot first? And does it speed up before, at, or after the moment when
+# both are abeam?
 
-# %%
-holds = {"person": log.residual[:, 0], "wall to its left": log.residual[:, 1]}
-holds["wall to its right"] = log.residual[:, 2]
+# %% jupyter={"source_hidden": true}
+# Figure
+holds = scenario_runs.find_holding_times(log)
+ahead = log.people[:, 0, 0] - log.states[:, 0]
+abeam = float(log.time[np.abs(ahead).argmin()])
+together = np.intersect1d(holds["person"], np.union1d(*list(holds.values())[1:]))
 fig, (upper, lower) = plt.subplots(
-    2, 1, figsize=(8, 4.5), sharex=True, layout="constrained", height_ratios=[2, 1]
+    2, 1, figsize=(8.5, 4.2), sharex=True, layout="constrained", height_ratios=[2, 1]
 )
-figures.plot_speed(log, ax=upper).set(xlabel="")
-for y, left in enumerate(holds.values()):
-    when = log.time[left.min(axis=1) <= 1e-4]
+upper.plot(log.time, log.speed, color=figures.BLUE)
+upper.set(ylabel="speed [m/s]", ylim=(0, 1.1))
+upper.set_title(
+    f"From {together.min():.1f} to {together.max():.1f} s person and wall hold it at once"
+    if together.size
+    else "Person and wall never hold it at once"
+)
+for y, when in enumerate(holds.values()):
     lower.plot(when, np.full(len(when), y), "s", color=figures.BLACK, markersize=4)
-lower.set(xlabel="time [s]", ylim=(-0.5, 2.5), title="Who holds it back")
-lower.set_yticks(range(3), holds)
+for ax in (upper, lower):
+    ax.axvline(abeam, color=figures.GREY, linestyle=":")
+upper.text(abeam + 0.1, 0.05, "abeam")
+lower.set(xlabel="time [s]", ylim=(-0.5, 2.5))
+lower.set_yticks(range(3), [f"held by the {name}" for name in holds])
 record.figure(fig, "holds")
 
-# %%
-slow = int(log.speed[10 : np.abs(log.people[:, 0, 0] - log.states[:, 0]).argmin()].argmin()) + 10
-step = controller.step(*log.controller_inputs(float(log.time[slow])))
-record.figure(figures.draw_step(step), "admissible")
+# %% jupyter={"source_hidden": true}
+# Figure
+row = int(log.speed[10 : max(11, round(abeam / settings.dt))].argmin()) + 10
+step = controller.step(*log.controller_inputs(float(log.time[row])))
+fig = figures.draw_step(step)
+fig.suptitle(f"Slowest before abeam, at {log.time[row]:.1f} s: it chooses a corner of what is allowed")
+record.figure(fig, "admissible")
 
-# %% [markdown]
-# The instant at which it is slowest before they are abeam. With the default settings person and wall leave a
-# corner of the accelerations between them, and the chosen one sits in its tip: the person's row forbids what
-# leads nearer to the zone, the wall's what leads aside, and of the way ahead little is left.
-
-# %%
-share = {name: float(np.mean(left.min(axis=1) <= 1e-4)) for name, left in holds.items()}
+# %% jupyter={"source_hidden": true}
+# The answer
+shares = ", ".join(f"the {name} {100 * len(when) / len(log.time):.0f} %" for name, when in holds.items())
+again = float(log.time[row + np.argmax(log.speed[row:] > 0.5)])
 Markdown(
-    f"Slowest at {log.time[slow]:.1f} s with {log.speed[slow]:.2f} m/s; h is {step.h[0]:.2f} m to the "
-    f"person and {step.h[1:].min():.2f} m to the nearer wall. Share of the run in which each holds it: "
-    + ", ".join(f"{name} {100 * part:.0f} %" for name, part in share.items())
-    + "."
+    f"<details><summary>Answer</summary>\n\nShares of the run in which each holds it: {shares}. It is slowest at "
+    f"{log.time[row]:.1f} s, when h is {step.h[0]:.2f} m to the person and {step.h[1:].min():.2f} m to the nearer wall; faster "
+    f"than 0.5 m/s again from {again:.1f} s on; abeam at {abeam:.1f} s. So it speeds up "
+    f"{'before' if again < abeam else 'after'} both are abeam: the barrier limits how fast h falls, not how fast the robot "
+    "drives. On the right of the last figure the two rows leave a corner, and the robot sits in its tip: the person's row "
+    "forbids what leads nearer to the zone, the wall's what leads aside.\n\n</details>"
 )
 
 # %% [markdown]
 # ## How wide must a corridor be?
 #
-# The same meeting in other corridors.
+# Both fit side by side if the room that is left is positive, that is, if the corridor is wider than
+# 2 x (0.75 m + 1.1 m) = 3.7 m. **What do you think?** Does the robot pass in a corridor of 3.8 m? From which width on
+# does it no longer notice the walls?
 
 # %%
-WIDTHS = (3.4, 3.8, 4.2, 4.6, 5.0, 5.6, 6.4, 8.0)
-runs = {}
-for each in WIDTHS:
+widths, meetings = (3.4, 3.8, 4.2, 4.6, 5.0, 5.6, 6.4, 8.0), {}
+for each in widths:
     scene = AtlasCell("corridor", width=each, pace=pace).scenario()
-    runs[each] = szlib.simulate(scene, szlib.MPCCBF(zone, walls=scene.walls, settings=settings))
-rows = [
-    (classify_strategy(run), run.metrics()["min_speed"], run.metrics()["time_to_goal"])
-    for run in runs.values()
-]
-table = pd.DataFrame(rows, index=list(runs), columns=["robot", "slowest [m/s]", "to goal [s]"])
-table.rename_axis("width [m]").style.format(precision=2).format_index("{:.1f}")
+    meetings[each] = scenario_runs.drive(scene, zone, settings)
 
-# %%
-fig, ax = plt.subplots(figsize=(7, 3.5), layout="constrained")
-ax.plot(table.index, table["slowest [m/s]"], "o-", color=figures.BLUE, label="slowest [m/s]")
-other = ax.twinx()
-other.plot(table.index, table["to goal [s]"], "s--", color=figures.ORANGE, label="time to goal [s]")
-ax.axvline(width, color=figures.GREY, linestyle=":")
-ax.set(
-    xlabel="width of the corridor [m]",
-    ylabel="slowest speed [m/s]",
-    title="The wider the corridor, the faster the robot",
-)
-other.set_ylabel("time to goal [s]")
-fig.legend(loc="outside lower center", ncols=2)
+# %% jupyter={"source_hidden": true}
+# Figure
+found = {each: run.metrics() for each, run in meetings.items()}
+strategies = {each: classify_strategy(run) for each, run in meetings.items()}
+fig, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+for ax, key, name in (
+    (left, "min_speed", "slowest speed [m/s]"),
+    (right, "time_to_goal", "time to goal [s]"),
+):
+    ax.plot(widths, [each[key] for each in found.values()], "-", color=figures.GREY, linewidth=1)
+    kinds = zip(dict.fromkeys(strategies.values()), "Xso^D", figures.pick_colours(range(5)), strict=False)
+    for strategy, marker, colour in kinds:
+        shown = [each for each in widths if strategies[each] == strategy]
+        values = [found[each][key] for each in shown]
+        ax.plot(shown, values, marker, color=colour, markersize=8, label=strategy)
+    ax.axvline(width, color=figures.GREY, linestyle=":")
+    ax.set(xlabel="width of the corridor [m]", ylabel=name, ylim=(0, None))
+left.set_title("The wider, the faster")
+right.set_title("Going back costs more time than squeezing by")
+left.legend(loc="lower right")
 record.figure(fig, "widths")
 
-# %% [markdown]
-# **What it means.** The robot slows down because two rows hold at once, the person's and the wall's, in the
-# paper's chain and in ours. Neither alone would slow it so much: beside a person in the open it is faster
-# (notebook 09), and a wall lets it drive along. Together they leave it a slow way, and once abeam, the way opens
-# and it drives on. The side on which it passes is another matter: in ours a rule decides it.
+# %% jupyter={"source_hidden": true}
+# The answer
+narrow = [each for each in widths if strategies[each] == "backs out"]
+text = "none of these corridors" if not narrow else f"corridors up to {max(narrow):g} m wide"
+Markdown(
+    f"<details><summary>Answer</summary>\n\nIn {text} the robot goes back and lets the person through. At 3.8 m both would fit, with "
+    f"{100 * free_room(3.8):.0f} cm of room: with so little h the robot may hardly move, and the person is there before it has "
+    f"squeezed by. In the widest corridor it goes {found[8.0]['min_speed']:.2f} m/s at the slowest, as beside a person in the "
+    f"open ({slowest['person alone']:.2f} m/s).\n\n</details>"
+)
 
-# %%
+# %% [markdown]
+# ## A common mistake
+#
+# **"The barrier of the wall stops the robot."** No. A wall limits how fast the robot comes *nearer to the wall*.
+# Along it the robot may be as fast as it likes. It takes a second row to close the way ahead.
+
+# %% jupyter={"source_hidden": true}
+# What we know now
+Markdown(
+    f"**What we know now.** Neither the person nor the wall alone slows the robot much: each leaves it at least {least_alone:.2f} "
+    f"m/s, both together {both:.2f} m/s (the paper's chain: {runs.paper.metrics()['min_speed']:.2f} m/s). It speeds up beside "
+    "the person, because h no longer falls there. "
+    f"{f'In corridors up to {max(narrow):g} m wide it goes back, although nobody told it to' if narrow else 'It passes in each width'}: "
+    "chapter 11 asks why."
+)
+
+# %% jupyter={"source_hidden": true}
+# Summary of the checks
 record.close()

@@ -118,19 +118,19 @@ def record_both_claims(record: NotebookRecord, runs: ScenarioRuns, prefix: str =
     paper_claims.record_claims(record, claims, runs.ours, prefix=f"{prefix}ours: ")
 
 
-def draw_paths_and_speeds(runs: ScenarioRuns, title: str, *, height: float = 3.9) -> Figure:
-    """Draw the paths of both robots above their speeds over time; the `title` says the result."""
-    figure, (above, below) = plt.subplots(
-        2, 1, figsize=(9, height), layout="constrained", height_ratios=(1.5, 1)
-    )
-    figures.plot_robot_paths(runs.by_name(), ax=above)
-    above.get_legend().remove()
-    above.set_title(title)
+def draw_paths_and_speeds(runs: ScenarioRuns, title: str) -> Figure:
+    """Draw the paths of both robots beside their speeds over time; the `title` says the result."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained", width_ratios=(1.5, 1))
+    # plot_robot_paths draws the first run as STYLES has ours, and the second as the paper's.
+    figures.plot_robot_paths({OURS: runs.ours, PAPERS: runs.paper}, ax=left)
+    left.get_legend().remove()
+    figures.add_shared_legend((left,))
+    left.set_title("Paths, and the zone at the start")
     for name, run in runs.by_name().items():
         line, colour = STYLES[name]
-        below.plot(run.time, run.speed, line, color=colour, label=name)
-    below.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, 1.1))
-    below.legend(loc="lower center", ncols=2, fontsize=8)
+        right.plot(run.time, run.speed, line, color=colour)
+    right.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, 1.1), title="Speeds")
+    figure.suptitle(title)
     return figure
 
 
