@@ -24,6 +24,7 @@ from pathlib import Path
 import joblib
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from studies.committed import write_table
 from studies.noninteracting_crowd import noninteracting_crowd
 
@@ -31,6 +32,7 @@ import szlib
 from szlib.parallel import run_tasks
 from szlib.tracks.clock import to_clock
 from szlib.tracks.sites import GRAND_CENTRAL_RATE, read_grand_central
+from szlib.workbook import figures
 
 Encounters = tuple[pd.DataFrame, szlib.NullEncounters]
 """Samples of a site and its null model."""
@@ -119,6 +121,58 @@ def load(site: str) -> tuple[pd.DataFrame, szlib.Square, int]:
     if site == "atc-1hz":
         return szlib.read_tracks(sorted((root / "atc-1hz").glob("*.csv"))), szlib.ATC_SQUARE, 100
     return read_grand_central(root / "gc" / "Annotation.zip"), GRAND_CENTRAL, 20
+
+
+def make_busy_plaza(seed: int) -> pd.DataFrame:
+    """Tracks of a plaza whose people are watched for 20 s: shifted in time, they meet often enough."""
+    settings = szlib.PlazaSettings(n_encounters=700, tracked=20.0, intruders=0.02)
+    with tempfile.TemporaryDirectory() as folder:
+        return szlib.read_tracks(szlib.make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings))
+
+
+def shift_a_pair(
+    tracks: pd.DataFrame, strangers: pd.DataFrame, around: float = 1.5
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Find two strangers who cross, and the delay of one of them at which they come nearest.
+
+    Parameters
+    ----------
+    tracks : of everybody, as from `szlib.read_tracks`.
+    strangers : samples of their encounters, as from `szlib.find_encounters`.
+    around : time before and after the encounter [s].
+
+    Returns
+    -------
+    Paths of both every 0.1 s, that of the second with the delay, shape (n, 2) [m]; and the delay [s].
+    """
+    near = strangers[strangers["distance"] < 2.0]
+    crossing = near[near["kind"] == "crossing"]
+    nearest = (crossing if len(crossing) else near).groupby("encounter")["distance"].min()
+    pick = (nearest - nearest.median()).abs().idxmin()
+    one = strangers[strangers["encounter"] == pick]
+    t = np.arange(one["t"].min() - around, one["t"].max() + around + 0.05, 0.1)
+    people = [tracks[tracks["id"] == one[who].iloc[0]] for who in ("ref_id", "other_id")]
+
+    def walk(person: pd.DataFrame, delay: float = 0.0) -> np.ndarray:
+        seen = person[person["t"].between(t[0] - 6, t[-1] + 6)]
+        return np.column_stack([np.interp(t - delay, seen["t"], seen[axis]) for axis in "xy"])
+
+    mine = walk(people[0])
+    delays = np.arange(-40, 41) / 10
+    gaps = [np.hypot(*(mine - walk(people[1], delay)).T).min() for delay in delays]
+    delay = float(delays[int(np.argmin(gaps))])
+    return mine, walk(people[1]), walk(people[1], delay), delay
+
+
+def draw_pair(ax: Axes, mine: np.ndarray, other: np.ndarray, name: str) -> None:
+    """Draw two paths (n, 2) [m], a dot every 0.5 s, and the line between the two when they are nearest."""
+    gap = np.hypot(*(mine - other).T)
+    for path, colour in ((mine, figures.BLUE), (other, figures.ORANGE)):
+        ax.plot(*path.T, color=colour, linewidth=1)
+        ax.plot(*path[::5].T, "o", color=colour, markersize=3)
+        ax.annotate("", path[-1], path[-3], arrowprops={"arrowstyle": "-|>", "color": colour})
+    ax.plot(*np.transpose([mine[gap.argmin()], other[gap.argmin()]]), "k-", linewidth=2)
+    figures.label_metres(ax, f"{name}: {gap.min():.2f} m apart")
 
 
 def stored(asked: argparse.Namespace, name: str, find: Callable[[], Encounters]) -> Encounters:

@@ -46,7 +46,7 @@ GIVES: dict[str, tuple[str, str]] = {
     ),
     "05": (
         "sec. 2, fig. 5",
-        "enclose a zone in the smallest ellipse, and say how far to trust it.",
+        "estimate a zone that does not shrink with more data, and say how far to trust it.",
     ),
     "06": ("sec. 2", "tell respect from emptiness by a null model."),
     "07": ("sec. 3, eq. 1-7", "turn a distance into a condition on the next step, and say what gamma does."),
