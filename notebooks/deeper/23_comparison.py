@@ -25,8 +25,7 @@
 # [09](../09_passing.ipynb)
 #
 # **Afterwards you can** compare zones and controllers in the same worlds, with intervals. **Words.**
-# *bootstrap*: draw people anew from those there are, many times, to see how far a result moves; *jerk*: the
-# change of acceleration by time.
+# *jerk*: the change of acceleration by time.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook
