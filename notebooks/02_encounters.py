@@ -244,7 +244,7 @@ record.figure(fig, "windows")
 # <details><summary>Answer</summary>
 #
 # A longer window finds fewer. The conditions have to hold longer: both people must be tracked, the space must stay in the
-# area, and nobody else may enter. Also one meeting gives fewer windows that do not overlap: a meeting of 6 s is
+# area, and nobody else may enter. Also one meeting gives fewer windows that do not overlap: a meeting of 7 s is
 # six encounters of 1 s, two of 3 s, and one of 5 s. So a number of encounters says nothing without the length of the window.
 # (The plaza of this figure has 500 pairs who are seen for 8 s.)
 #
