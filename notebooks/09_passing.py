@@ -119,13 +119,13 @@ record.figure(fig, "sides")
 
 # %% jupyter={"source_hidden": true}
 # Checks: the paper's chain
-told = ", ".join(f"{name}: {side}" for name, side in sides.items())
-record.check("the paper's robot passes a mirrored zone on the other side", both_ways, told)
+evidence = ", ".join(f"{name}: {side}" for name, side in sides.items())
+record.check("the paper's robot passes a mirrored zone on the other side", both_ways, evidence)
 slowest = tilted["symmetric"].metrics()["min_speed"]
 record.check("the paper's robot nearly stops before a symmetric zone", slowest < 0.2, f"{slowest:.2f} m/s")
 paper_claims.record_claims(record, scenario.claims[1:], tilted["symmetric"], prefix="symmetric zone: ")
 both_right = sides["as fitted"] == sides["mirrored"] == "right"
-record.claim("the robot passes on the right, whatever the tilt of the zone", both_right, told)
+record.claim("the robot passes on the right, whatever the tilt of the zone", both_right, evidence)
 
 # %% jupyter={"source_hidden": true}
 # Checks: ours

@@ -280,7 +280,7 @@ Markdown(
     f"**What we know now.** Neither the person nor the wall alone slows the robot much: each leaves it at least {least_alone:.2f} "
     f"m/s, both together {both:.2f} m/s (the paper's chain: {runs.paper.metrics()['min_speed']:.2f} m/s). It speeds up beside "
     "the person, because h no longer falls there. "
-    f"{f'In corridors up to {max(narrow):g} m wide it goes back, although nobody told it to' if narrow else 'It passes in each width'}: "
+    f"{f'In corridors up to {max(narrow):g} m wide it goes back, although no rule says so' if narrow else 'It passes in each width'}: "
     "chapter 11 asks why."
 )
 

@@ -93,8 +93,8 @@ record.figure(fig, "space-time")
 # ## The paper's chain, and ours
 #
 # Orange is everything as the paper has it, its zone and its controller; gamma and a_max are ours, since the paper
-# gives none. Blue is our zone (notebook 05) and our controller. Here both do the same: nobody has to pass anybody
-# on a side, so our rule of the side has nothing to do. The same five numbers describe a run in notebooks 09 to 11:
+# gives none. Blue is our zone (notebook 05) and our controller. Here both do nearly the same: our rule of
+# the side changes only where the robot steps aside. The same five numbers describe a run in notebooks 09 to 11:
 
 # %%
 named = {f"waiting, {name}": run for name, run in waiting.by_name().items()}
