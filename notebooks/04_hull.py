@@ -103,7 +103,7 @@ real_day.compare_with_plaza(
         "encounters": f"{samples['encounter'].nunique():,}",
         f"of them at {zone_speed:g} m/s": f"{counts['encounters']:,}",
         "fewest on one side": f"{seen.min():,}, {seen.idxmin()}",
-        f"zone at {zone_speed:g} m/s": "{:.2f} m x {:.2f} m".format(*zone.ellipses[zone_speed].semi_axes),
+        f"zone at {zone_speed:g} m/s": "{:.2f} m x {:.2f} m".format(*zone.ellipse(zone_speed).semi_axes),
     },
     note=f"At {zone_speed:g} m/s only {seen.min():,} encounters were seen {seen.idxmin()}. There the zone is large "
     "because few people were watched, not because people keep a large distance.",
@@ -363,7 +363,7 @@ print(f"{len(ellipse.support)} of {len(boundary)} points touch it")
 
 # %% jupyter={"source_hidden": true}
 # Figure
-fitted = zone.ellipses[zone_speed]
+fitted = zone.ellipse(zone_speed)
 fig, ax = plt.subplots(figsize=(7.5, 4.2), layout="constrained")
 ax.fill(*boundary.T, facecolor=figures.GREY, alpha=0.4, label="zone: r_max - R'")
 ax.plot(*fitted.curve().T, color=figures.BLUE, linewidth=2, label="smallest ellipse around it")

@@ -435,7 +435,7 @@ person who is behind me has me ahead. People who respect each other's zone ahead
 
 # %% jupyter={"source_hidden": true}
 # Table
-hull = paper.ellipses[zone_speed]
+hull = paper.ellipse(zone_speed)
 atc = read_table("06_sites").query("site == 'atc-1hz' and kinds == 'all'").iloc[0]
 name = "plaza" if truth else "this data"
 Markdown(

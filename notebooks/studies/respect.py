@@ -130,6 +130,10 @@ def make_busy_plaza(seed: int) -> pd.DataFrame:
         return szlib.read_tracks(szlib.make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings))
 
 
+CANDIDATES = 12
+"""Pairs of a typical distance, of which the one that comes nearest with a delay is shown."""
+
+
 def shift_a_pair(
     tracks: pd.DataFrame, strangers: pd.DataFrame, around: float = 1.5
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
@@ -148,20 +152,26 @@ def shift_a_pair(
     near = strangers[strangers["distance"] < 2.0]
     crossing = near[near["kind"] == "crossing"]
     nearest = (crossing if len(crossing) else near).groupby("encounter")["distance"].min()
-    pick = (nearest - nearest.median()).abs().idxmin()
-    one = strangers[strangers["encounter"] == pick]
-    t = np.arange(one["t"].min() - around, one["t"].max() + around + 0.05, 0.1)
-    people = [tracks[tracks["id"] == one[who].iloc[0]] for who in ("ref_id", "other_id")]
-
-    def walk(person: pd.DataFrame, delay: float = 0.0) -> np.ndarray:
-        seen = person[person["t"].between(t[0] - 6, t[-1] + 6)]
-        return np.column_stack([np.interp(t - delay, seen["t"], seen[axis]) for axis in "xy"])
-
-    mine = walk(people[0])
+    typical = (nearest - nearest.median()).abs().sort_values().index[:CANDIDATES]
+    samples = strangers[strangers["encounter"].isin(typical)]
+    people = tracks[tracks["id"].isin(np.unique(samples[["ref_id", "other_id"]]))]
     delays = np.arange(-40, 41) / 10
-    gaps = [np.hypot(*(mine - walk(people[1], delay)).T).min() for delay in delays]
-    delay = float(delays[int(np.argmin(gaps))])
-    return mine, walk(people[1]), walk(people[1], delay), delay
+    found = []
+    for _, one in samples.groupby("encounter"):
+        t = np.arange(one["t"].min() - around, one["t"].max() + around + 0.05, 0.1)
+        me, other = (people[people["id"] == one[who].iloc[0]] for who in ("ref_id", "other_id"))
+        mine = _walk(me, t)
+        gaps = [np.hypot(*(mine - _walk(other, t - delay)).T).min() for delay in delays]
+        delay = float(delays[int(np.argmin(gaps))])
+        found.append((min(gaps), mine, _walk(other, t), _walk(other, t - delay), delay))
+    return min(found, key=lambda pair: pair[0])[1:]
+
+
+def _walk(person: pd.DataFrame, t: np.ndarray) -> np.ndarray:
+    """Positions of a person at the times `t` (n,) [s], shape (n, 2) [m]."""
+    seen = person[person["t"].between(t[0] - 1, t[-1] + 1)]
+    seen = seen if len(seen) else person
+    return np.column_stack([np.interp(t, seen["t"], seen[axis]) for axis in "xy"])
 
 
 def draw_pair(ax: Axes, mine: np.ndarray, other: np.ndarray, name: str) -> None:
