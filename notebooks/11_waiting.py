@@ -21,7 +21,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [10](10_corridor.ipynb) · next: [12 - Among people: routes, crowds,
-# and limits](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6c-d · 25 min
+# and limits](12_among_people.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6c-d · 30 min
 # · needs [10](10_corridor.ipynb) · exercises:
 # [6.4-6.5](exercises/sheet6_robot.ipynb#6.4-Predict,-then-run-(20-min)) · laboratory:
 # [13](13_laboratory.ipynb)
@@ -106,8 +106,13 @@ scenario_runs.tabulate_five(named)
 # Euclidean gap from the robot's side to a body or a wall.
 
 # %% jupyter={"source_hidden": true}
-# Animation
-record.animation(movie := making_room.ours.animate(width=9), "run")
+# Animation: waiting
+record.animation(movie := waiting.ours.animate(width=9, every=1.0), "waiting")
+movie
+
+# %% jupyter={"source_hidden": true}
+# Animation: making room
+record.animation(movie := making_room.ours.animate(width=9, every=1.0), "run")
 movie
 
 # %% [markdown]

@@ -9,6 +9,7 @@ from pathlib import Path
 import jupytext
 import nbformat
 from nbclient import NotebookClient
+from PIL import Image
 
 from szlib.workbook import folders, runner
 
@@ -63,21 +64,32 @@ def refresh(source: Path, data: str = "") -> None:
     jupytext.write(notebook, target, fmt="ipynb")
 
 
+def copy_picture(figure: Path, name: str) -> None:
+    """Copy a `figure` of the last run to the pictures of the README, with fewer colours, so that it is small."""
+    target = HERE / "figures" / name
+    target.parent.mkdir(exist_ok=True)
+    if figure.suffix == ".gif":
+        shutil.copyfile(figure, target)
+    else:
+        few = Image.open(figure).convert("RGB").quantize(128, Image.Quantize.MAXCOVERAGE, kmeans=1)
+        few.save(target, optimize=True)
+
+
 def main(names: list[str]) -> None:
     if names == ["real_day"]:
         for source in folders.list_notebooks():
             if any(folders.has_name(source, name) for name in REAL_DAY):
                 print(source.stem, flush=True)
                 refresh(source, "atc-1hz")
-        shutil.copyfile(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", HERE / "figures" / "mall.png")
+        copy_picture(LAB / "atc-1hz" / "figures" / "01_tracks-map.png", "mall.png")
         return
     for source in chain(*runner.split_batches(folders.list_notebooks())):
         if not names or any(folders.has_name(source, name) for name in names):
             print(source.stem, flush=True)
             refresh(source)
-    (HERE / "figures").mkdir(exist_ok=True)
     for name, figure in PICTURES.items():
-        shutil.copyfile(LAB / "synthetic" / "figures" / figure, HERE / "figures" / name)
+        if not names or any(folders.has_name(Path(figure.partition("-")[0]), number) for number in names):
+            copy_picture(LAB / "synthetic" / "figures" / figure, name)
 
 
 if __name__ == "__main__":
