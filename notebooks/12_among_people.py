@@ -103,13 +103,7 @@ record.figure(fig, "crowd")
 # Eight people in two streams cross the way of the robot at 1.2 m/s. They are faster than the robot, which drives
 # at most at 1 m/s, and they do not see it. The paper's settings keep every zone free, and take a long time.
 # `MPCSettings.among_people()` is sooner at the goal, and closer to people for a moment. It says so: each of
-# these steps has `Step.safe = False`. Here is its run as a film:
-
-# %% jupyter={"source_hidden": true}
-# Animation
-movie = streams["among people"].animate(width=8.0, every=0.5)
-record.animation(movie, "crowd")
-display(movie)
+# these steps has `Step.safe = False`.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -209,7 +203,7 @@ print(f"needed by the robot:     {robot:.1f} m, and {2 * among.eps:.1f} m of mar
 # %% jupyter={"source_hidden": true}
 # Figure
 front = tuple(szlib.Person((7.0, y), (-1.0, 0.0)) for y in (-4.4, -2.2, 0.0, 2.2, 4.4))
-fronts = drive_both((8.0, 0.0), front)
+fronts = drive_both((8.0, 0.0), front, title="Five people side by side")
 fig, panels = plt.subplots(2, 1, figsize=(10, 6.4), layout="constrained", sharex=True, sharey=True)
 for ax, (name, log) in zip(panels, fronts.items(), strict=True):
     figures.plot_crowd(log, ax=ax).set(xlim=(-16, 10), ylim=(-5.5, 5.5))
@@ -235,6 +229,12 @@ Markdown(
     f"{among.dt * entered:.1f} s, with a gap of {wide:.2f} m to the nearest body. By its own words these steps are not "
     "safe.\n\n</details>"
 )
+
+# %% jupyter={"source_hidden": true}
+# Animation
+movie = fronts["among people"].animate(width=8.0, every=0.4)
+record.animation(movie, "front")
+display(movie)
 
 # %% [markdown]
 # **Theory: when is a price exact?** Of a hard constraint the solver computes a *multiplier* $\lambda$: by how much
