@@ -79,6 +79,35 @@ def check_pair(file, saved):
     assert changed.stdout == ""
 
 
+WIDTH, HEIGHT = 1300, 900
+FIRST_PICTURE = """async (path) => {
+    const { commands, shell } = window.jupyterapp;
+    const kernelPreference = { shouldStart: false, canStart: false, autoStartDefault: false };
+    const { node, content } = await commands.execute("docmanager:open", { path, kernelPreference });
+    const shown = () => [...node.querySelectorAll(".jp-Notebook img, .jp-Notebook canvas")]
+        .filter((each) => (each.complete ?? true) && each.getBoundingClientRect().width > 100);
+    for (let i = 0; i < 100 && !shown().length; i++) await new Promise((done) => setTimeout(done, 100));
+    await new Promise((done) => setTimeout(done, 500));
+    const [top, bottom] = [shown()[0].getBoundingClientRect(), node.getBoundingClientRect()];
+    const place = [top.top, top.bottom, bottom.bottom];
+    await commands.execute("application:close");
+    return place;
+}"""
+
+
+def test_the_first_picture_of_each_chapter_is_in_the_first_screen(browser, lab, copy):
+    """At 1300 x 900, with the file browser open, the first picture or control is seen without scrolling."""
+    page = browser.new_page()
+    page.set_viewport_size({"width": WIDTH, "height": HEIGHT})
+    page.goto(f"{lab}/lab/tree/chapters?token=szlib")
+    page.wait_for_function("window.jupyterapp?.shell.currentWidget", timeout=2 * MINUTES)
+    chapters = sorted((copy / "chapters").glob("*.ipynb"))
+    places = {each.stem: page.evaluate(FIRST_PICTURE, f"chapters/{each.name}") for each in chapters}
+    print({name: [round(at) for at in place] for name, place in places.items()})
+    page.close()
+    assert [name for name, (_, bottom, screen) in places.items() if bottom > screen] == []
+
+
 def picture(locator):
     """The picture on a canvas."""
     return locator.evaluate("canvas => canvas.toDataURL()")
