@@ -14,10 +14,10 @@
 # %% [markdown]
 # # Start here
 #
-# **Question.** How near do people let each other come, and how does a robot keep out of that place?
+# **Question.** How near do people let each other come, and how does a robot keep that distance?
 #
-# **Expectation.** J. Jang and M. Ghaffari learn a *minimum social zone* from recorded people, and put a barrier around
-# each person whom the robot meets. This workbook rebuilds their method step by step, and measures each claim.
+# **Expectation.** J. Jang and M. Ghaffari learn a *minimum social zone* from recorded people. Their controller keeps a robot
+# out of the zone of each person. This workbook rebuilds the method step by step, and measures each claim of the paper.
 
 # %% [markdown]
 # next: [1 - Tracks and the area](01_tracks.ipynb) · [paper](https://arxiv.org/abs/2405.15101): all · 10 min
@@ -29,31 +29,34 @@
 # |---|---|
 # | <img src="figures/making_room.gif" alt="A robot in a passage makes room for a person, then goes on" width="520"> | <img src="figures/mall.png" alt="Where people walked in the mall on one day, and the area in which encounters are found" width="520"> |
 #
-# By default everything runs on a synthetic plaza. The mall is a real place, recorded on 2012-10-24, and differs from it: the true
-# zone is unknown, each person has one position a second, and 101 of the 252 encounters are of companions, who walk close by
-# choice. 252 encounters are too few: the verdict on the zone is *undecided*. Notebooks 01 to 06 are in `real_day` a second time,
-# executed on that day: [tracks](real_day/01_tracks.ipynb), [zone](real_day/05_zones.ipynb), [respect or
+# By default everything runs on a *synthetic plaza*: its people are computed, and we know the zone that they keep. The mall is a
+# real place, recorded on 2012-10-24. Nobody knows the true zone there, and each person has one position a second. In an
+# *encounter* two people meet, and nobody else is near. The day has 252 encounters; 101 are of *companions*, who walk close by
+# choice. 252 are too few: the verdict on the zone is *undecided*. The folder `real_day` holds chapters 01 to 06, executed on that day: [tracks](real_day/01_tracks.ipynb), [zone](real_day/05_zones.ipynb), [respect or
 # emptiness](real_day/06_respect.ipynb).
 
 # %% [markdown]
 # ## For whom, and what you need
 #
 # For final-year students of robotics, control or pedestrian dynamics, for researchers with tracks or a robot, and for lecturers.
-# You read Python (NumPy, pandas), and know vectors, derivatives, means and quantiles. Control theory begins in notebook 07. No
-# data has to be fetched. A *check* must hold, or the run fails; a *claim* of the paper is measured, and may be "not supported
-# here". Code that only draws or records is hidden: click on the bar left of a cell to see it.
+# You read Python (NumPy, pandas), and know vectors, derivatives, means and quantiles. No data has to be fetched.
+#
+# - Notebooks 01 to 13 are the *chapters*: each builds on earlier ones. Control theory begins in chapter 07. Notebooks 21 to 29,
+#   in the folder `deeper`, answer further questions.
+# - A *check* must hold, or the run fails. A *claim* of the paper is measured, and may be "not supported here".
+# - Code that only draws or records is hidden: click on the bar left of a cell to see it.
 
 # %% [markdown]
 # ## Three routes
 #
-# - **The idea.** [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 1 h 30 min to read.
-# - **The method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [12](12_among_people.ipynb): 5 h 10 min to read.
+# - **The idea.** [05](05_zones.ipynb), [07](07_barriers.ipynb), [10](10_corridor.ipynb), [13](13_laboratory.ipynb): 1 h 35 min to read.
+# - **The method.** [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb), [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb), [07](07_barriers.ipynb), [08](08_build_a_controller.ipynb), [09](09_passing.ipynb), [10](10_corridor.ipynb), [11](11_waiting.ipynb), [12](12_among_people.ipynb): 5 h 25 min to read.
 # - **The course, in six weeks.** Reading and exercises; running and looking around come on top.
 #
 # | week | topic | notebooks | to read | exercises | to do |
 # |---|---|---|---|---|---|
-# | 1 | Tracks, encounters, and which of them to believe | [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb) | 1 h 05 min | [1.1-1.5](exercises/sheet1_tracks.ipynb#1.1-Velocity-(5-min)), [2.1-2.5](exercises/sheet2_outliers.ipynb#2.1-Complementary-coordinates-(5-min)) | 2 h 05 min |
-# | 2 | From samples to a zone; respect or emptiness | [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb) | 1 h 15 min | [3.1-3.3](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)), [4.1-4.5](exercises/sheet4_certainty.ipynb#4.1-The-quantile-zone-in-one-direction-(10-min)) | 1 h 55 min |
+# | 1 | Tracks, encounters, and which of them to believe | [01](01_tracks.ipynb), [02](02_encounters.ipynb), [03](03_outliers.ipynb) | 1 h 10 min | [1.1-1.5](exercises/sheet1_tracks.ipynb#1.1-Velocity-(5-min)), [2.1-2.5](exercises/sheet2_outliers.ipynb#2.1-Complementary-coordinates-(5-min)) | 2 h 05 min |
+# | 2 | From samples to a zone; respect or emptiness | [04](04_hull.ipynb), [05](05_zones.ipynb), [06](06_respect.ipynb) | 1 h 25 min | [3.1-3.3](exercises/sheet3_zones.ipynb#3.1-A-slice-by-hand-(10-min)), [4.1-4.5](exercises/sheet4_certainty.ipynb#4.1-The-quantile-zone-in-one-direction-(10-min)) | 1 h 55 min |
 # | 3 | A zone of your own, and a barrier around it | [07](07_barriers.ipynb) | 35 min | [3.4-3.5](exercises/sheet3_zones.ipynb#3.4-A-zone-of-your-own-(an-evening,-150-min)), [6.1](exercises/sheet6_robot.ipynb#6.1-The-speed-limit-(5-min)) | 2 h 45 min |
 # | 4 | A controller of your own | [08](08_build_a_controller.ipynb) | 30 min | [5.1-5.5](exercises/sheet5_barriers.ipynb#5.1-Focal-distance-(15-min)), [7.1-7.3](exercises/sheet7_controller.ipynb#7.1-A-filter-on-a-road-(15-min)) | 2 h 15 min |
 # | 5 | MPC with barriers, and the first meetings | [09](09_passing.ipynb), [10](10_corridor.ipynb) | 45 min | [7.4-7.8](exercises/sheet7_controller.ipynb#7.4-MPC-on-a-road-(25-min)) | 2 h 15 min |
@@ -62,11 +65,11 @@
 # %% [markdown]
 # ## The first step
 #
-# Open [1 - Tracks](01_tracks.ipynb), and choose *Run > Run All Cells*. Then change `seed` in the cell of parameters below its
-# navigation, and run again: nothing that you do there changes what `szlib run` has recorded.
+# Open [1 - Tracks](01_tracks.ipynb), and choose *Run > Run All Cells*. Then open the hidden cell *Parameters of this
+# notebook* near its top, change `seed`, and run again. This does not change what `szlib run` has recorded.
 #
-# An exercise is a function that you write. `judges.check("velocity", velocity)` asks it for cases that are drawn anew, and says
-# in words what is wrong; `judges.hint("velocity", 1)` gives a hint. Each sheet ends with an essay. Solutions and rubrics are in
+# An exercise is a function that you write. `judges.check("velocity", velocity)` tests it on random cases, and says in words
+# what is wrong; `judges.hint("velocity", 1)` gives a hint. Each sheet ends with an essay. Solutions and rubrics are in
 # `solutions`. In the [final project](project/README.md) a controller of yours meets people in hidden worlds. For a class, `python notebooks/tools/sheets.py --class FOLDER` makes a course of
 # [nbgrader](https://nbgrader.readthedocs.io), with a README for the lecturer.
 
@@ -103,8 +106,8 @@ found = f"{companions} of {sites['all']} encounters"
 record.check("the text states the encounters of the recorded day", found == "101 of 252 encounters", found)
 
 # %% [markdown]
-# **What it means.** One question, a story of notebooks in order, and exercises for each of them. Go on with
-# [notebook 01](01_tracks.ipynb), or with the route that fits your time.
+# **What it means.** The workbook follows one question from tracks to a robot, one step in each chapter. Go on with
+# [chapter 01](01_tracks.ipynb), or with the route that fits your time.
 
 # %% jupyter={"source_hidden": true}
 # Summary of the checks

@@ -16,8 +16,8 @@
 #
 # **Question.** What can go wrong with tracks of people, and where can two of them be watched?
 #
-# **Expectation.** Everybody on one clock, with a speed that noise does not inflate, and an area without
-# obstacles.
+# **Expectation.** We can put all people on one clock, measure a speed that noise does not inflate, and find
+# an area without obstacles.
 
 # %% [markdown]
 # before: [00](00_start_here.ipynb) · next: [2 - Encounters of two people](02_encounters.ipynb) ·
@@ -110,8 +110,8 @@ real_day.compare_with_plaza(record, numbers, note)
 
 # %% [markdown]
 # The paper uses 92 days of the ATC mall in Osaka (Brščić et al., 2013). By default this workbook uses a
-# *synthetic plaza*: artificial people who keep a distance that we know, so that every later step can be
-# proved. `szlib run --data atc-1hz` repeats all of it on a real day.
+# *synthetic plaza*: artificial people who keep a distance that we know. So each later result can be compared
+# with the truth. `szlib run --data atc-1hz` repeats all of it on a real day.
 
 # %% [markdown]
 # ## A number first
@@ -179,7 +179,8 @@ print(f"Anna at 2.00 s: x = {np.interp(2.00, [1.97, 2.01], [4.96, 5.00]):.2f} m"
 
 # %% [markdown]
 # `szlib.read_tracks(file)` does this for everybody at all multiples of 0.1 s, and takes the velocity over 1 s. It reads ATC raw
-# files, the public day at 1 Hz, EWAP `obsmat`, tidy tables and others. A person is a pair *(day, id)*.
+# files, the public day at 1 Hz, EWAP `obsmat`, tidy tables and others. A person is a pair *(day, id)*; `t` is in seconds
+# since 1970, `x` and `y` are in m, `vx` and `vy` in m/s.
 
 # %%
 people[["day", "id", "t", "x", "y", "vx", "vy"]].head(3).round(2)
@@ -288,7 +289,7 @@ Markdown(
 # Two people can only be watched where nothing is in their way: no pillar, no shop, no queue. The paper names "the
 # rectangular central square" without coordinates (fig. 1). In the mall the largest open rectangle is x from -18.5
 # to -7.5 m, y from -10 to 8 m. The plaza has the same. For other data `auto` takes the largest rectangle in
-# which at least three people walked on each spot of 0.5 m.
+# which at least three people walked on each square of 0.5 m x 0.5 m.
 #
 # A test of openness that needs no map: do people walk on each square metre of it?
 
@@ -322,7 +323,7 @@ record.key["area [m2]"] = round(square.area, 1)
 # What we know now
 Markdown(
     f"**What we know now.** {n_people:,} people are on one clock, in metres, for {person_hours:.0f} person-hours. Their median walking "
-    f"speed is {walking.median():.2f} m/s, measured over 1 s, where noise of 1 cm makes {100 * spread[1.0]:.1f} cm/s. They spend "
+    f"speed is {walking.median():.2f} m/s, measured over 1 s, where noise of 1 cm makes an error of {100 * spread[1.0]:.1f} cm/s. They spend "
     f"{inside.mean():.0%} of their time in an open area of {square.area:.0f} m². When do two of them meet there? That is chapter 02."
 )
 

@@ -16,7 +16,7 @@
 #
 # **Question.** When do two people meet with nobody else around, and what does each see of the other?
 #
-# **Expectation.** Around a walking person remains a place that others do not enter.
+# **Expectation.** Around a walking person there is a place that others do not enter.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [01](01_tracks.ipynb) · next: [3 - Outliers](03_outliers.ipynb) ·
@@ -24,7 +24,7 @@
 # exercises: [1.2-1.3](exercises/sheet1_tracks.ipynb#1.2-The-line-of-sight-(10-min))
 #
 # **Afterwards you can** say when two people meet alone, and compute where one sees the other. **Words.**
-# *reference pedestrian*: the one of two people from whom the other is looked at.
+# *reference pedestrian*: the person of an encounter from whom we look at the other.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook
@@ -152,7 +152,8 @@ print(f"LOS {np.degrees(angle):.0f} deg, distance {distance:.2f} m")
 # 4. the reference pedestrian walks at 0.4 m/s or faster, all the time.
 #
 # Try it on two people in an empty hall. Anna walks to the right at 1.2 m/s, Ben comes towards her at 1.0 m/s, 0.8 m to
-# her left. They start 6 m apart. (Condition 1 holds everywhere in a large hall, 2 has no third person.)
+# her left. He starts 6 m ahead of her. (Condition 1 holds everywhere in a large hall, and there is no third person who
+# could enter the space.)
 
 # %%
 t = np.arange(0, 6, 0.1)
@@ -167,8 +168,8 @@ print(f"opens at {t[start]:.1f} s: LOS {np.degrees(los[start]):.0f} deg, {r[star
 print(f"nearest: {r[window].min():.2f} m; at the end LOS {np.degrees(los[window][-1]):.0f} deg")
 
 # %% [markdown]
-# Ben leaves the space after 2.3 s, when he is beside Anna. The window goes on, so that we see him pass. At its end he is
-# behind her. For Ben the same meeting is a second encounter, with himself as the reference pedestrian.
+# Ben leaves the space 2.2 s after the window opens, when he is beside Anna. The window goes on, so that we see him pass.
+# At its end he is behind her. For Ben the same meeting is a second encounter, with himself as the reference pedestrian.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -253,7 +254,8 @@ record.figure(fig, "windows")
 # %% [markdown]
 # ## Distance and line of sight
 #
-# Now put every sample of every encounter around one person who walks to the right.
+# A *sample* is one line of the table above: one position of the other person, as the reference pedestrian sees it. Now put
+# every sample of every encounter around one person who walks to the right.
 #
 # **What do you think?** Where is it empty? Is the empty place a circle?
 
@@ -281,8 +283,9 @@ record.figure(ax.figure, "los-distance")
 # ## Who they are to each other
 #
 # The paper takes everybody. But two people who walk together stay near each other by choice: their distance says nothing
-# about respect between strangers. The column `kind` says who they are, from their whole common track.
-# `szlib.of_kind(samples, "strangers")` leaves companions out. Chapters 05 and 06 show both.
+# about respect between strangers. The column `kind` marks such pairs as *companions*, from their whole common track. All
+# others are *strangers*: their kind says how the two walk at the opening. `szlib.of_kind(samples, "strangers")` leaves
+# companions out. Chapter 05 takes everybody, chapter 06 shows both.
 
 # %%
 first["kind"].value_counts().to_frame("encounters")
@@ -333,7 +336,7 @@ record.check(what, behind[1] == 0, evidence, always=True)
 record.check("the chosen reading sees people behind the person", behind[0] > 0, f"{behind[0]:,} samples")
 Markdown(
     f"<details><summary>Answer</summary>\n\n{strict['encounter'].nunique():,} of {count:,} encounters remain. Two people who walk "
-    "towards each other close in at about 2.4 m/s: in 2 s they are past each other, and the other person has left the "
+    "towards each other close in at 2.4 m/s, if each walks at 1.2 m/s: in 2 s they are past each other, and the other person has left the "
     "space. The strict reading never sees a pass, and never an angle beyond 90°. A zone needs a back, so we take the "
     "other reading.\n\n</details>"
 )
@@ -344,7 +347,7 @@ Markdown(
 # - **"The line-of-sight angle is measured on the map."** No. It is measured from the direction in which the reference pedestrian
 #   walks at that moment. Someone who stands still has no direction of motion, so condition 4 asks for a speed.
 # - **"One meeting is one encounter."** No. Each of the two may be the reference pedestrian, and a long meeting has several windows.
-#   Samples of one meeting are not independent: chapter 05 draws whole people, not samples.
+#   Samples of one meeting are not independent. So chapter 05 draws pairs of people for its intervals, not samples.
 # - **"A busy place gives more encounters."** Not without end: where a third person is always near, nobody is alone with another.
 
 # %% jupyter={"source_hidden": true}
@@ -352,8 +355,8 @@ Markdown(
 lost = {reason: n for stage in funnels.get(samples)[-2:] for reason, n in stage["rejected"].items()}
 reason = max(lost, key=lost.get)
 Markdown(
-    f"**What we know now.** There are {count:,} encounters, {per_day:,.0f} a day; the paper has 176 a day. Most other moments of "
-    f"people open none for this reason: {reason}. One encounter in twenty comes nearer than {near:.2f} m; around a walking person "
+    f"**What we know now.** There are {count:,} encounters, {per_day:,.0f} a day; the paper has 176 a day. At most other moments no "
+    f"encounter opens. The main reason: {reason}. One encounter in twenty comes nearer than {near:.2f} m; around a walking person "
     f"there is a place where few others are. The nearest of all came to {samples['distance'].min():.2f} m: is that true? Chapter 03 asks."
 )
 

@@ -20,7 +20,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [02](02_encounters.ipynb) · next: [4 - The hull and its
-# slices](04_hull.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4a · 20 min · needs
+# slices](04_hull.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 4a · 25 min · needs
 # [02](02_encounters.ipynb) · exercises:
 # [2.1-2.5](exercises/sheet2_outliers.ipynb#2.1-Complementary-coordinates-(5-min))
 #
@@ -131,9 +131,10 @@ for r_example, los_example in ((0.5, 0), (1.9, 0), (0.5, 90)):
 # Five people stand in a row, at 0, 1, 2, 3 and 10 m. Which one is alone? For us it is easy. The *local outlier
 # factor* (LOF, Breunig et al., 2000) puts it into a number:
 #
-# 1. How far are my two nearest neighbours? For the one at 10 m: 7 m and 8 m, in the mean **7.5 m**.
-# 2. How far are *their* two nearest? For the ones at 3 m and at 2 m: in the mean **1.5 m**. (A neighbour never counts as
-#    nearer than that neighbour's own second neighbour. So the one at 2 m has 1 m and 2 m, not 1 m and 1 m.)
+# 1. How far away are the two nearest neighbours? For the person at 10 m: 7 m and 8 m, on average **7.5 m**.
+# 2. How far away are *their* two nearest neighbours? For the people at 3 m and at 2 m: on average **1.5 m**. (One rule:
+#    a neighbour counts as at least as far away as their own second neighbour is from them. Seen from 2 m, the person at
+#    3 m counts as 2 m away, because the second neighbour of that person stands at 1 m. So the person at 2 m has 1 m and 2 m.)
 # 3. LOF is the ratio: 7.5 m / 1.5 m = **5**. For a point in a crowd it is about 1.
 
 
@@ -152,7 +153,7 @@ five = np.array([[0.0], [1.0], [2.0], [3.0], [10.0]])
 print("LOF:", lof(five, k=2))
 
 # %% [markdown]
-# **What do you think?** Now two friends join the one at 10 m: they stand at 10.1 and 10.2 m. What is the LOF of the
+# **What do you think?** Now two friends join the person at 10 m: they stand at 10.1 and 10.2 m. What is the LOF of the
 # three?
 
 # %% jupyter={"source_hidden": true}
@@ -196,7 +197,8 @@ record.check(
 # ## Why inside out?
 #
 # The paper says that LOF on plain positions cuts away the edge of the zone, because people are sparse there. Is that
-# so? Count the outliers that are nearer than 1 m, with both coordinates.
+# so? The paper's rule removes the 0.2 % of all samples that have the largest LOF. Such a fixed share is a *quota*. Count
+# the removed samples that are nearer than 1 m, with both coordinates.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -210,13 +212,13 @@ record.claim(
 )
 
 # %% [markdown]
-# The difference is small. A part of the quota goes to $r_{max}$, where all directions shrink to one point and the density changes
-# fast. Those samples never touch the hull.
+# The difference is small. The rest of the removed samples lie near $r_{max}$, where all directions shrink to one point and the
+# density changes fast. Those samples never touch the hull.
 
 # %% [markdown]
 # ## Whom does the quota find?
 #
-# To judge a rule one must know the truth. So we make a plaza on which a few people slowly cross the zones of others.
+# To judge a rule one must know the truth. So we make a plaza on which a few *intruders* slowly cross the zones of others.
 # Two numbers say how good a rule is. A rule removes 10 samples, of which 8 are of intruders: its *precision* is 80 %. There are 40
 # samples of intruders, and it removed 8 of them: its *recall* is 20 %.
 #
@@ -250,16 +252,16 @@ record.claim(what, recall > 0.5, evidence)
 Markdown(
     f"<details><summary>Answer</summary>\n\nThe recall: {recall:.0%}. What the rule removes is mostly right ({precision:.0%}). But it may "
     f"remove {quota.sum()} samples, and the intruders have {intruder.sum():,}. A quota cannot grow with the number of intruders; "
-    "and it does not stop where there are none. Nor are the samples of a slow intruder alone: see the three friends.\n\n</details>"
+    "and it does not stop where there are none. Nor are the samples of a slow intruder alone: they hide each other, as the group of three does.\n\n</details>"
 )
 
 # %% [markdown]
 # ## Whole encounters
 #
-# The remedy: let each encounter be **one** point, its nearest approach. Then an intruder has no friends from the own
-# track. Compare it with the 2 % of all encounters that are most like it. Remove it if its LOF is above 2 *and* it is nearer
-# than half of the others: those who stay far away may be alone. No quota. (Many intruders hide each other, so the rule is
-# repeated until it finds nobody.)
+# The remedy: let each encounter be **one** point, its nearest approach. Then the samples of an intruder cannot hide each
+# other. The neighbours of the point are the 2 % of all encounters that are nearest to it. Remove the encounter if its LOF is
+# above 2 *and* it is nearer than half of all encounters: a person who stays far away may be alone. This rule has no quota.
+# (Many intruders hide each other, so the rule is repeated until it finds nobody.)
 
 # %%
 nearest = outliers.nearest_approaches(people)
@@ -320,15 +322,15 @@ what = "without the encounters of intruders the zone is the true one, to 5 cm"
 record.check(what, by_whole < 0.05, f"off by {100 * by_whole:.1f} cm")
 record.claim("with the paper's quota the zone is the true one", by_quota < 0.05, f"off by {by_quota:.2f} m")
 Markdown(
-    f"What it does to the zone of chapter 05: with the rule of 0.2 % its centre or an axis is off by up to **{100 * by_quota:.0f} cm**, "
+    f"What each rule does to the zone of chapter 04: with the rule of 0.2 % its centre or an axis is off by up to **{100 * by_quota:.0f} cm**, "
     f"with the rule for whole encounters by **{100 * by_whole:.0f} cm**."
 )
 
 # %% [markdown]
 # ## At the size of the paper
 #
-# The paper has 16,181 encounters. Perhaps the rule of 0.2 % works with so many? Plazas of several seeds in one table come as
-# far. (That takes half an hour, `python -m studies.pooled_plazas`, so the results are saved; one row is computed again.)
+# The paper has 16,181 encounters. Perhaps the rule of 0.2 % works with so many? Several plazas together have as many
+# encounters. (That takes half an hour, `python -m studies.pooled_plazas`, so the results are saved; one row is computed again.)
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -370,7 +372,7 @@ record.claim(what, paper.max() <= 0.05, f"off by {paper.min():.2f} to {paper.max
 # %% [markdown]
 # ## Three common mistakes
 #
-# - **"LOF found 0.2 % outliers."** No. It was told to remove 0.2 %. It removes as many from perfect data.
+# - **"LOF found 0.2 % outliers."** No. The rule removes 0.2 % of any data. It removes as many from perfect data.
 # - **"An outlier is an error."** No. A person who brushes past is real. We remove the encounter because it does not show the
 #   distance that people *keep*, not because it is false. Write down what was removed.
 # - **"Near means outlier."** No. Near *and* alone. If many come as near, that is how near people come.
@@ -379,10 +381,10 @@ record.claim(what, paper.max() <= 0.05, f"off by {paper.min():.2f} to {paper.max
 # What we know now
 left_by_whole = r[~whole_rule].min()
 Markdown(
-    f"**What we know now.** LOF compares a point with its neighbours; three friends are enough to hide. Therefore the rule of 0.2 % finds "
-    f"{record.key['quota: recall']:.0%} of the samples of slow intruders, and whole encounters {recall:.0%}. In this data "
+    f"**What we know now.** LOF compares a point with its neighbours; a group of three is enough to hide. Therefore the rule of 0.2 % finds "
+    f"{record.key['quota: recall']:.0%} of the samples of slow intruders, and the rule for whole encounters {recall:.0%}. In this data "
     f"({all_near:,} encounters within {r_max:g} m) the rule for encounters removes {close.loc[whole_rule, 'encounter'].nunique()}, and the nearest sample is "
-    f"then at {left_by_whole:.2f} m. With few encounters hardly any is removed, and the nearest stay in. Chapter 04 puts a hull around the rest."
+    f"then at {left_by_whole:.2f} m. With few encounters hardly any is removed, and the nearest stay in. Chapter 04 puts a hull around what the paper's rule leaves."
 )
 
 # %% jupyter={"source_hidden": true}

@@ -35,7 +35,7 @@ data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
-r_max = 2.0  # as in notebook 03 [m]
+r_max = 2.0  # as in chapter 03 [m]
 zone_speed = 1.1  # of the slice shown [m/s]
 speeds = [0.7, 0.9, 1.1, 1.3]  # of the slices of the hull [m/s]
 
@@ -59,7 +59,7 @@ warnings.simplefilter("ignore", szlib.DataWarning)  # the line below the first f
 record = NotebookRecord("04_hull", globals())
 parameters(
     [
-        ("outliers", "0.2 % of the samples, 20 neighbours", PAPER, "as in notebook 03"),
+        ("outliers", "0.2 % of the samples, 20 neighbours", PAPER, "as in chapter 03"),
         ("hull over", "x', y', speed", PAPER, "sec. 2, fig. 4b"),
         ("speed", "of the reference pedestrian, at the sample", PAPER, "not the mean of the encounter"),
         ("slices", f"{speeds} m/s", ASSUMED, "the paper shows a range of speeds"),
@@ -128,7 +128,8 @@ real_day.compare_with_plaza(
 # %% [markdown]
 # ## The hull in three dimensions
 #
-# A sample is a point of three numbers: two for the place, one for the speed of the person who is looked at from.
+# This chapter follows the paper: its rule of 0.2 % removes outliers, and the samples that are left are the *inliers*. Each
+# is a point of three numbers: two for the place, one for the speed of the reference pedestrian.
 #
 # $$x' = (r_{max} - r)\cos\theta,\qquad y' = (r_{max} - r)\sin\theta,\qquad v$$
 #
@@ -242,8 +243,8 @@ Markdown(
 # %% [markdown]
 # ## The zone is empty
 #
-# Each inlier must lie outside the zone of its own speed, or on its edge. This tests the code. The outliers that
-# were removed in chapter 03 do lie inside.
+# Each inlier must lie outside the zone of its own speed, or on its edge. This tests the code. The zone is empty
+# of inliers only: an outlier that came near lies inside.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -262,8 +263,8 @@ record.check("no inlier is inside the zone of its own speed", margin > -1e-9, fo
 # %% [markdown]
 # ## What the hull does to speed
 #
-# **What do you think?** Hardly anybody walks faster than 1.6 m/s. What does the hull say about the zone there: is
-# it small, large, or right but uncertain?
+# **What do you think?** Few people walk very fast. How large is the zone at the highest speeds of the data: too
+# small, too large, or right but uncertain?
 
 
 # %% jupyter={"source_hidden": true}
@@ -317,7 +318,7 @@ Large. The zone is smallest at {smallest:.2f} m/s ({np.nanmin(areas):.1f} m²), 
 towards both ends, to {areas[np.isfinite(areas)][0]:.1f} m² at {known[0]:.2f} m/s and to
 {areas[np.isfinite(areas)][-1]:.1f} m² at {known[-1]:.2f} m/s. There the hull closes like the end of an egg: its slices
 shrink to a point, so the zone grows up to the whole circle of {np.pi * r_max**2:.1f} m². That happens whatever people do.
-Encounters in the last tenth of a m/s there: {people[int((known[-1] - tenths[0]) / 0.1)]}.
+Number of encounters in the last 0.1 m/s: {people[int((known[-1] - tenths[0]) / 0.1)]}.
 
 </details>"""
 )
@@ -326,9 +327,9 @@ Encounters in the last tenth of a m/s there: {people[int((known[-1] - tenths[0])
 # ### Theory: why there is one smallest zone
 #
 # The slices of a convex body obey the **Brunn-Minkowski inequality**: the square root of their area is a concave
-# function of the height at which the body is cut. A concave function rises to one maximum and falls after it. So
-# the slices have one largest, somewhere, and from there the zone grows to both sides. *Where* it lies is the
-# data's business: near the speeds at which people came nearest.
+# function of the height at which the body is cut (here: of the speed). A concave function rises to one maximum and falls
+# after it. So one slice is the largest, and from its speed on the zone grows to both sides. The data decides *which*
+# speed that is: it is near the speeds at which people came nearest.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -348,8 +349,8 @@ record.claim(
 # %% [markdown]
 # ## The smallest ellipse
 #
-# The zone has as many kinks as the slice has corners. A solver needs something smooth that it can move and turn
-# with the person. So the paper encloses the zone in the *smallest ellipse* (Gärtner & Schönherr, 1997).
+# The zone has as many kinks as the slice has corners. The controller of later chapters needs a smooth shape, which
+# it can move and turn with the person. So the paper encloses the zone in the *smallest ellipse* (Gärtner & Schönherr, 1997).
 #
 # **A number first.** How many points fix the smallest circle around many points? Two or three: all others lie
 # inside and could be left out. An ellipse is fixed by **three to five**. They are its points of *support*.

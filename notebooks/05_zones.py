@@ -21,13 +21,14 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [04](04_hull.ipynb) · next: [6 - Respect or
-# emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 25 min · needs
+# emptiness?](06_respect.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2, fig. 5 · 30 min · needs
 # [04](04_hull.ipynb) · exercises:
 # [3.4-3.5](exercises/sheet3_zones.ipynb#3.4-A-zone-of-your-own-(an-evening,-150-min)),
 # [4.1](exercises/sheet4_certainty.ipynb#4.1-The-quantile-zone-in-one-direction-(10-min))
 #
 # **Afterwards you can** estimate a zone that does not shrink with more data, and say how far to trust it.
-# **Words.** *bootstrap*: draw people anew from those there are, many times, to see how far a result moves.
+# **Words.** *bootstrap*: draw people from the data at random, with repetition, and estimate again: how far
+# a result moves.
 
 # %% jupyter={"source_hidden": true} tags=["parameters"]
 # Parameters of this notebook
@@ -35,7 +36,7 @@ data = "synthetic"  # "synthetic", "atc-1hz", or files of tracks
 area = ""  # "": the data's own; or "X0 X1 Y0 Y1" [m], "auto", a polygon (WKT, or its file)
 seed = 0
 results = "../results"
-r_max = 2.0  # as in notebook 03 [m]
+r_max = 2.0  # as in chapter 03 [m]
 q = 0.05  # share of encounters that may enter the quantile zone
 zone_speed = 1.1  # whose zone the robot keeps [m/s]
 
@@ -65,7 +66,7 @@ parameters(
         ("sector", "35 deg", ASSUMED, "25 to 45 deg do as well"),
         ("speeds pooled", "0.2 m/s slower to faster", ASSUMED, "few people walk at exactly one speed"),
         ("the robot's zone", f"that of {zone_speed:g} m/s", PAPER, "sec. 4: 1.1 m/s"),
-        ("r_max", f"{r_max:g} m", PAPER, "see notebook 03"),
+        ("r_max", f"{r_max:g} m", PAPER, "see chapter 03"),
     ]
 )
 
@@ -192,7 +193,7 @@ noise = np.random.default_rng(seed).normal(0, 0.05, (10_000, 30)).min(axis=1).me
 Markdown(
     f"""<details><summary>Answer</summary>
 
-Too near: the nearest of several noisy positions is the one with the most fortunate error. With an error of 5 cm and
+Too near: the nearest of several noisy positions has an error that points towards the person. With an error of 5 cm and
 30 independent positions it is {-100 * noise:.0f} cm too near. So the library first smooths each path, over 0.7 s before
 and after. The largest difference between the ten lines and the library, both on smoothed paths: {1000 * off:.1f} mm.
 
@@ -279,7 +280,7 @@ record.figure(fig, "interval")
 # ## A zone that does not shrink
 #
 # **What do you think?** We estimate the zone from few encounters, then from more and more. Which one levels out, the
-# hull of chapter 04 or the quantile? And does each interval hold its own value?
+# hull of chapter 04 or the quantile? And does each interval contain its own estimate?
 
 # %% jupyter={"source_hidden": true}
 # The zone by number of encounters, with both methods
@@ -327,8 +328,9 @@ record.figure(fig, "sizes")
 # <details><summary>Answer</summary>
 #
 # With some hundred encounters the quantile levels out, and its interval lies around it. The hull is an *extreme*: the
-# nearest people who ever came. More people can only bring nearer ones. So its interval, which is meant to hold the hull
-# of *all* people there are, lies below the value itself. The robot keeps the quantile zone.
+# nearest people who ever came. More people can only bring nearer ones. So its interval, which should contain the hull
+# of *all* people there are, lies below the estimate itself. The robot keeps the quantile zone, unless the data is rich
+# enough for the estimate of chapter 06.
 #
 # </details>
 
@@ -337,17 +339,20 @@ record.figure(fig, "sizes")
 #
 # Any method finds a zone, in any data. So the library states in words whether it can be used:
 #
-# - **usable**: people avoid each other more than by chance (chapter 06), at least 600 encounters, 20 on each side, and
-#   the intervals are sound;
+# - **usable**: people avoid each other more than by chance, there are at least 600 encounters and 20 on each side, and
+#   every interval can be given;
 # - **undecided**: something is missing, and the reasons say what;
 # - **no respect shown**: people came as near as people who ignore each other.
+#
+# Chapter 06 explains the test against chance, its *p* and its shifts. In the table, `a` and `b` are the longer and the
+# shorter semi-axis [m]; `a_low` and `a_high` are the ends of the interval of `a`.
 
 # %%
 print(zone.verdict(zone_speed).sentence)
 zone.table()[["speed", "a", "a_low", "a_high", "b", "verdict"]].round(2)
 
 # %% [markdown]
-# ## By speed
+# ## The zone at each walking speed
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -387,8 +392,9 @@ show_sliders(draw_zone, speed=(1.1, low + 0.1, high - 0.1, 0.05))
 # %% [markdown]
 # ## Is it true?
 #
-# On the plaza we know the zone that everybody, except a few intruders, respected. Sensor noise, gaps, clock, conditions,
-# outliers and estimate lie in between. Both methods must find it again. On other data nobody knows the truth.
+# On the plaza we know the zone that everybody respects, except a few intruders. Between this truth and our estimate lie the
+# noise of the sensor, gaps, the clock, the conditions of an encounter, and outliers. Both methods must still find the true
+# zone. On other data nobody knows the truth.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -406,8 +412,8 @@ for name, method in (("quantile", zone), ("the paper's zone", paper)) if truth e
 # %% [markdown]
 # ## Is it larger in front?
 #
-# The paper says so. But where few people were in view, a zone is uncertain. So look at the interval: does the
-# difference between ahead and behind exclude 0?
+# The paper says so. But where few people were in view, a zone is uncertain. So subtract the reach behind from the reach
+# ahead, and look at the interval of this difference: does it exclude 0?
 
 # %% jupyter={"source_hidden": true}
 # Checks, and the answer
@@ -420,8 +426,9 @@ Markdown(
     f"""<details><summary>Answer</summary>
 
 The reach ahead minus the reach behind is {ahead.effect:+.2f} m, with an interval from {ahead.low:+.2f} to {ahead.high:+.2f} m; {few:,} encounters
-were in view behind. {"On the plaza it is so by construction: the true zone reaches 0.10 m farther ahead. The data shows only a part. " * bool(truth)}A
-person who is behind me has me ahead. People who respect each other's zone ahead rarely touch the zone behind.
+were in view behind. {"On the plaza it is so by construction: the true zone reaches 0.10 m farther ahead. The data shows only a part of it. " * bool(truth)}A
+person who is behind me has me ahead of them. If their zone ahead is larger than mine behind, the larger one keeps us apart, and
+few people come to the edge of my zone behind.
 
 </details>"""
 )
@@ -430,7 +437,7 @@ person who is behind me has me ahead. People who respect each other's zone ahead
 # ## The plaza and a real day, side by side
 #
 # The plaza is made of people whose zone we know. The real day is 2012-10-24 in the ATC mall in Osaka, thinned to 1 Hz
-# (hour 12 with a tenth of its people). The paper has 92 days of 10 to 40 Hz. A copy of this chapter on the real day is in
+# (from 12 to 13 h with a tenth of the people). The paper has 92 days of 10 to 40 Hz. A copy of this chapter on the real day is in
 # [real_day/05_zones.ipynb](real_day/05_zones.ipynb).
 
 # %% jupyter={"source_hidden": true}
@@ -442,7 +449,7 @@ Markdown(
     f"""| | {name} | ATC day | paper |
 |---|---|---|---|
 | encounters | {len(everyone):,} | {atc["encounters"]:.0f} | 16,181 |
-| hull at {zone_speed:g} m/s, longer semi-axis | {hull.semi_axes[0]:.2f} m | {atc["hull_a"]:.2f} m (1.1 m/s) | a figure |
+| hull at {zone_speed:g} m/s, longer semi-axis | {hull.semi_axes[0]:.2f} m | {atc["hull_a"]:.2f} m (1.1 m/s) | only a figure, no number |
 
 With {atc["encounters"]:.0f} encounters, no zone of the real day is usable at any speed: too few people were seen behind."""
 )
@@ -473,9 +480,9 @@ first, last = (found["quantile"][n]["a"] for n in (min(found["quantile"]), max(f
 Markdown(
     f"""**What we know now.** At {zone_speed:g} m/s all but {100 * q:g} % of the encounters stay outside of
 {kept.semi_axes[0]:.2f} m x {kept.semi_axes[1]:.2f} m, and other people would have given {row["a_low"]:.2f} to
-{row["a_high"]:.2f} m for the longer semi-axis. From {min(found["quantile"]):,} to {max(found["quantile"]):,} encounters it
-changed by {100 * (last - first):+.0f} cm. The verdict is *{verdict}*, and the zone is stored in `zone.json`: the robot of
-the next chapters reads it there."""
+{row["a_high"]:.2f} m for the longer semi-axis. From {min(found["quantile"]):,} to {max(found["quantile"]):,} encounters this
+semi-axis changed by {100 * (last - first):+.0f} cm. The verdict is *{verdict}*, and the zone is stored in `zone.json`: the robot of
+chapters 07 to 13 reads it there. Do people keep out of this zone, or is it only empty? Chapter 06 asks."""
 )
 
 # %% jupyter={"source_hidden": true}

@@ -22,7 +22,7 @@
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [05](05_zones.ipynb) · next: [7 - Barriers: how fast may the robot
-# approach?](07_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 25 min · needs
+# approach?](07_barriers.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 2 · 30 min · needs
 # [05](05_zones.ipynb) · exercises: [4.3-4.5](exercises/sheet4_certainty.ipynb#4.3-A-p-value-(10-min))
 #
 # **Afterwards you can** tell respect from emptiness by a null model.
@@ -68,7 +68,7 @@ parameters(
 is_plaza = record.cache.is_synthetic
 tracks = respect.make_busy_plaza(seed) if is_plaza else record.cache.tracks()
 square = szlib.ATC_SQUARE if is_plaza else record.cache.find_area(tracks)
-conditions = record.cache.method.encounter_settings()  # as in notebook 02
+conditions = record.cache.method.encounter_settings()  # as in chapter 02
 r_max = record.cache.method.r_max
 samples = szlib.find_encounters(tracks, square=square, settings=conditions)
 options = {"square": square, "settings": conditions, "r_max": r_max, "progress": shifts > 20}
@@ -123,14 +123,15 @@ real_day.compare_with_plaza(
 # %% [markdown]
 # ## The null model
 #
-# The picture shows one pair. They cross, and keep their distance. Now let one of them walk the same path a little
-# earlier or later: they come nearer. Nobody could swerve, because the two never met.
+# The picture shows one pair. They cross, and keep their distance. Now let one of them walk the same path a few
+# seconds earlier or later: they come nearer. Neither swerves, because at these times the two never met.
 #
-# The **null model** does this with everybody: each person is moved in time, alone, by some minutes. Every path, every
-# speed and the density of the crowd stay. Only the chance to take notice of each other is lost.
+# The **null model** does this with everybody, by minutes: each person is moved in time, independently of all others.
+# Every path, every speed and the density of the crowd stay. Only the chance to take notice of each other is lost.
 #
 # (The plaza of this chapter is a busier one: its people are watched for 20 s, not 3.4 s, so that shifted people meet.
-# And 2 % of them walk through others' zones.)
+# So some walk beside each other long enough to count as companions. And 2 % of the people are *careless*: they walk
+# through the zones of others.)
 #
 # ```python
 # samples = szlib.find_encounters(tracks)
@@ -166,10 +167,10 @@ for R in (0.3, 0.5, 0.7, 0.9):
     print(f"within {R} m: {near:4d} of {n}, by chance {n * np.mean(chance['nearest'] < R):4.0f}: z = {z:.1f}")
 
 # %% [markdown]
-# Nobody tells us which $R$ to take. So we take the largest $z$ over all $R$ from 0.2 to 1.5 m.
+# Which $R$ should we take? We do not choose: we take the largest $z$ over 27 values of $R$, from 0.2 to 1.5 m.
 #
-# The library does this for each *kind* of encounter and adds up: people who cross are compared with people who cross.
-# For a shift in time changes the mix of kinds as well: a group that walks in one direction is torn apart.
+# The library counts for each *kind* of encounter, and adds up: people who cross are compared with people who cross.
+# The reason: a shift in time changes the share of each kind as well. It tears people apart who walk in one direction.
 
 # %% [markdown]
 # ## Is it respect at all?
@@ -177,10 +178,11 @@ for R in (0.3, 0.5, 0.7, 0.9):
 # A large number alone proves nothing: the largest of many is large by chance, too. So we compare with what chance
 # gives. Each shifted crowd is treated as if it were the data, and has a statistic of its own.
 #
-# The **p-value** is the share of crowds with a statistic at least as large, the data among them. With 20 shifted crowds,
-# all of them smaller: p = (1 + 0) / (1 + 20) = 0.048.
+# Count the crowds whose statistic is at least as large as that of the data. The data is one of the crowds, too. Their share
+# is the **p-value**. If all of 20 shifted crowds have a smaller one: p = (1 + 0) / (1 + 20) = 0.048. We call p up to 0.05
+# significant.
 #
-# **What do you think?** How large do the statistics of people become who cannot take notice of each other: about 0, 3 or 10?
+# **What do you think?** How large is the statistic of a shifted crowd: about 0, 3 or 10?
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -203,8 +205,8 @@ Markdown(
     f"""<details><summary>Answer</summary>
 
 From {min(test.null_statistics):.1f} to {max(test.null_statistics):.1f}: the largest of 27 numbers is mostly above 0,
-even by chance. The data has {test.statistic:.1f}. {"So it is respect." if found else "So respect is not shown."} That p is not
-smaller says nothing: with {shifts} shifted crowds 1/{shifts + 1} is the smallest possible.
+even by chance. The data has {test.statistic:.1f}. {"So it is respect." if found else "So respect is not shown."} With
+{shifts} shifted crowds the smallest possible p is 1/{shifts + 1}.
 
 </details>"""
 )
@@ -213,7 +215,7 @@ smaller says nothing: with {shifts} shifted crowds 1/{shifts + 1} is the smalles
 # ### Does the test find nothing where there is nothing?
 #
 # It was tried on crowds of people who ignore each other: they walk straight on, singly or in bunches of ten as from a
-# train (`python -m studies.respect nobody`). At a level of 5 %, five false alarms in 100 crowds are allowed.
+# train (`python -m studies.respect nobody`). A p up to 0.05 is a false alarm here. Five in 100 crowds are allowed.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -236,7 +238,7 @@ record.check(
 #
 # **A number first.** Between 0.5 and 0.6 m the shifted pairs would have 40 encounters. There are 2. So people are there
 # 2 / 40 = 0.05 times as often as by chance. At 1.5 m the ratio is about 1. The **radius of the respect zone** is where
-# it passes one half.
+# careful people are half as frequent as by chance.
 #
 # $$g(r) = f + \frac{1 - f}{1 + e^{-(r - R) / w}}$$
 #
@@ -278,7 +280,7 @@ staged = ""
 if is_plaza:
     staged = (
         f" People mostly pass at the side, where the true zone reaches {side:.2f} m at {zone_speed:g} m/s. Just outside "
-        f"of it the ratio is far above 1, up to {ratio.max():.0f}: the pairs of the plaza are sent past each other there."
+        f"of it the ratio is far above 1, up to {ratio.max():.0f}, because the plaza makes most pairs pass there."
     )
 careless, most = 100 * respected.careless, 100 * respected.careless_high
 Markdown(
@@ -292,8 +294,8 @@ Markdown(
 # ## Three zones of the same people
 #
 # **What do you think?** A few careless people walk through others' zones. Which of these is misled: the hull of chapter
-# 04, the quantile of chapter 05, or the **respect zone**? The latter is the same model as above with an ellipse in
-# place of the circle: both people of an encounter carry it, each turned with the own motion.
+# 04, the quantile of chapter 05, or the **respect zone**? The respect zone is the model above with an ellipse in
+# place of the circle. Both people of an encounter carry this ellipse, turned to the direction in which they walk.
 
 # %%
 zones = {}
@@ -396,8 +398,8 @@ record.figure(fig, "n-curve")
 # %% [markdown]
 # <details><summary>Answer</summary>
 #
-# The hull: an extreme shrinks with every person added, until one careless person sets it. The radius of the respect zone
-# stays, and its band becomes narrower. In the null model it goes to 0, as it should.
+# The hull: it shrinks as people are added, because the nearest of more people is nearer. The radius of the respect zone
+# stays, and its interval becomes narrower. In the null model this radius goes to 0, as it should.
 #
 # </details>
 
@@ -435,7 +437,8 @@ Markdown(
 # - **"p = 0.048: people ignore each other with a probability of 4.8 %."** No. *If* they ignored each other, so large a
 #   statistic would come up in 4.8 % of all cases.
 # - **"A small p means a large distance."** No. p says how clear the distance is, $R$ how large. A million encounters make
-#   p small for a distance of 10 cm.
+#   p small for a distance of 10 cm. Nor does a small p make a zone usable: on the ATC day p is small, but chapter 05 has
+#   too few encounters for a zone, and its verdict is *undecided*.
 
 # %% jupyter={"source_hidden": true}
 # What we know now
@@ -444,7 +447,7 @@ Markdown(
     f"""**What we know now.** Emptiness alone makes a zone, and the hull cannot tell it from respect. Compared with {shifts}
 crowds of the same people who cannot take notice of each other, {kept if found else "no distance is shown here"}
 (p = {test.p_value:.3f}). Companions are near by choice and are left out, and {100 * respected.careless:.1f} % of the
-encounters are of careless people. So there is a zone to keep: chapter 07 turns it into a limit of the speed."""
+encounters are of careless people. The robot keeps the zone of chapter 05: chapter 07 turns it into a limit of its speed."""
 )
 
 # %% jupyter={"source_hidden": true}

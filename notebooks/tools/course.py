@@ -118,22 +118,32 @@ class Word:
 
 GLOSSARY: dict[str, Word] = {
     "ATC": Word("a shopping mall in Osaka whose visitors were tracked on 92 days", new=False),
-    "attentional space": Word("the 4 m by 5 m ahead of a person that are watched for others", new=False),
+    "attentional space": Word("the 4 m by 5 m ahead of a person in which others are counted", new=False),
     "barrier function": Word(
-        "h: 0 at the edge of what is allowed, positive inside of it", "barrier", new=False
+        "h: positive where the robot may be, 0 at the edge, negative where it must not be",
+        "barrier",
+        new=False,
     ),
-    "bootstrap": Word("draw people anew from those there are, many times, to see how far a result moves"),
+    "bootstrap": Word(
+        "draw people from the data at random, with repetition, and estimate again: how far a result moves"
+    ),
+    "companions": Word("two people who walk together", "companions out", new=False),
     "class K": Word(
         "of a function, as gamma in the paper's eq. 1: it is 0 at 0 and grows; here it is gamma times h",
         r"class[ -](K\b|\$\\mathcal)|eq\. 1\b",
     ),
     "CBF-QP": Word("a quadratic program for one step: as near to the wanted control as the barrier allows"),
-    "complementary distance": Word("r' = r_max - r, large for who is near", new=False),
+    "complementary distance": Word("r' = r_max - r, large for a person who is near", new=False),
     "EWAP": Word("the walking pedestrians recorded at ETH Zürich, and the format of their files, `obsmat`"),
+    "encounter": Word(
+        "3 s in which two people meet, and nobody else is in the attentional space",
+        "An \\*encounter",
+        new=False,
+    ),
     "exact penalty": Word(
         "a price on violations so high that none is paid where a solution without violations exists"
     ),
-    "funnel": Word("how many rows came in, went on, and why the others did not", new=False),
+    "funnel": Word("a count of the rows that came in and went on, and why the others did not", new=False),
     "horizon": Word(
         "the number of steps that a plan looks ahead, N, or that obey the barrier, N_h", new=False
     ),
@@ -154,14 +164,14 @@ GLOSSARY: dict[str, Word] = {
     "ORCA": Word(
         "a model of walking: each of two people takes half of what keeps them apart", r"\b(ORCA|orca)\b"
     ),
-    "plaza": Word("synthetic people whose zone is known, to prove the method on", r"\bplaza\b", new=False),
+    "plaza": Word("synthetic people whose zone is known, to test the method", r"\bplaza\b", new=False),
     "precision, recall": Word(
-        "of what was removed, the share that should be; of what should be, the share that was",
+        "the share of intruders among what was removed; the share of the intruders that was removed",
         "precision",
         new=False,
     ),
-    "quantile zone": Word("what all but a share q of encounters keep out of", new=False),
-    "reference pedestrian": Word("the one of two people from whom the other is looked at"),
+    "quantile zone": Word("the zone that all but a share q of the encounters stay outside of", new=False),
+    "reference pedestrian": Word("the person of an encounter from whom we look at the other"),
     "respect zone": Word(
         "the ellipse that careful people keep out of, compared with people who ignore each other", new=False
     ),
