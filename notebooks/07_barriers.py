@@ -14,10 +14,10 @@
 # %% [markdown]
 # # 7 - Barriers: how fast may the robot approach?
 #
-# **Question.** The zone says where the robot must not be. How fast may it come closer?
+# **Question.** The zone says where the robot must not be. How fast may the robot approach it?
 #
-# **Expectation.** One line of mathematics turns a distance into a limit of the speed: none far away, and
-# zero at the edge.
+# **Expectation.** One line of mathematics turns the distance to the zone into a limit of the speed. Far away
+# the limit does not matter. At the edge of the zone it is zero.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [06](06_respect.ipynb) · next: [8 - Build the controller
@@ -95,8 +95,8 @@ record.figure(fig, "limit")
 #
 # 5 % of 1 m is 5 cm. 5 cm in 0.1 s are **0.5 m/s**.
 #
-# Now the person walks towards the robot at 0.5 m/s. Both together may use up 5 cm in a step. The person alone
-# uses up all of it. **0 m/s** is left for the robot.
+# Now the person walks towards the robot at 0.5 m/s. Robot and person together may shorten $h$ by 5 cm in a step.
+# The person alone shortens it by 5 cm. **0 m/s** is left for the robot.
 
 
 # %%
@@ -108,7 +108,7 @@ for person_speed in (0.0, 0.5, 1.0):
     print(f"person at {person_speed:g} m/s: robot {allowed_speed(1.0, person_speed=person_speed):+.1f} m/s")
 
 # %% [markdown]
-# The last line is negative: the robot has to go **back**. Nobody programmed that. It follows from the 5 %.
+# The last line is negative: the robot has to go **back**. No rule says "go back". It follows from the 5 %.
 
 # %% [markdown]
 # ## The discrete barrier condition
@@ -180,17 +180,18 @@ Markdown(
 # $$h_k \ge (1-\gamma)^k\, h_0 > 0$$
 #
 # A robot that starts outside the zone stays outside for ever, *if every step has a solution*. The safe set
-# $\{h \ge 0\}$ is then called forward invariant. Hold on to the *if*: it is the subject of the next figure.
+# $\{h \ge 0\}$ is then called *forward invariant*. Remember the *if*: the next figure shows a robot without one.
 #
-# **Class K.** Instead of $\gamma h$, any function $\alpha(h)$ will do that is 0 at 0, grows, and is never larger
-# than $h$. Such functions are called *class K*. The paper takes the simplest one.
+# **Class K.** A function is of *class K* if it is 0 at 0 and grows. Instead of $\gamma h$, any such function
+# $\kappa(h)$ may stand in eq. 1 if it is never larger than $h$: then $h_{k+1} \ge h_k - \kappa(h_k) \ge 0$. The
+# paper takes the simplest one, $\gamma h$.
 #
 # **From continuous to discrete.** In continuous time the condition is $\dot h \ge -\alpha\,h$ with a rate
-# $\alpha$ [1/s] (Ames et al., 2019), and $h(t) \ge e^{-\alpha t} h_0$. Over one step of $\Delta t$ that is
+# $\alpha$ [1/s] (Ames et al., 2019). It gives $h(t) \ge e^{-\alpha t} h_0$. Over one step of $\Delta t$ that is
 #
 # $$\gamma = 1 - e^{-\alpha \Delta t} \approx \alpha\, \Delta t$$
 #
-# So gamma depends on the step. A controller with half the step needs about half of gamma to drive alike:
+# So gamma depends on $\Delta t$. A controller with half the $\Delta t$ needs about half the gamma to drive alike:
 
 # %%
 alpha = -np.log(1 - 0.05) / 0.1
@@ -204,14 +205,18 @@ for dt in (0.1, 0.05, 0.02):
 # $$\tfrac12\, a\, \Delta t^2 = \tfrac12 \cdot 1\ \mathrm{m/s^2} \cdot (0.1\ \mathrm{s})^2 = 5\ \mathrm{mm}$$
 #
 # while the speed of 1 m/s moves it by 10 cm. (In continuous time $a$ appears in the *second* derivative of $h$
-# only: the relative degree is 2.) If the robot arrives too fast, no acceleration keeps eq. 1 in the next step.
+# only: the *relative degree* is 2.) If the robot arrives too fast, no acceleration obeys eq. 1 in the next step.
 #
 # **How large may gamma be?** On the limit, $v = \gamma h/\Delta t$. As $h$ shrinks at the rate $v$, the robot has to
-# brake at $\gamma v/\Delta t$. With gamma = 0.05 and 1 m/s that is 0.5 m/s²: half of what it can. With gamma = 0.2 it
-# is 2 m/s², and it can do 1 m/s².
+# brake at $\gamma v/\Delta t$. With gamma = 0.05 and 1 m/s that is 0.5 m/s². The robot can brake at
+# $a_{max}$ = 1 m/s², so this is possible. With gamma = 0.2 it is 2 m/s², which is impossible. For a person who
+# stands, the rule is
 #
-# **The remedy** is to look ahead: eq. 1 for the next $N_h$ steps, not for one. In code: is there an
-# acceleration now, followed by full braking, that obeys eq. 1 in $N_h$ steps?
+# $$\gamma \le \frac{a_{max}\,\Delta t}{v_{max}} = \frac{1 \cdot 0.1}{1} = 0.1$$
+#
+# **With a larger gamma** the robot has to look ahead: it obeys eq. 1 not only in the next step, but in the next
+# $N_h$ steps. Then it finds out earlier that it must brake. In code: is there an acceleration now, followed by
+# full braking, that obeys eq. 1 in $N_h$ steps?
 
 
 # %%
@@ -238,7 +243,7 @@ def drive(gamma, N_h, h=3.0, v=1.0, dt=0.1, a_max=1.0, v_max=1.0):
 
 
 # %% [markdown]
-# **What do you think?** With gamma = 0.2 and top speed 1 m/s: what happens to the robot that looks one step
+# **What do you think?** With gamma = 0.2 and a top speed of 1 m/s: what happens to a robot that looks one step
 # ahead? How many steps are enough?
 
 # %% jupyter={"source_hidden": true}
@@ -272,8 +277,8 @@ enough = without[8] == 0 and lows[8] >= 0
 record.check("with gamma = 0.2 and N_h = 8 every step has a solution", enough, evidence, always=True)
 Markdown(
     "<details><summary>Answer</summary>\n\n"
-    f"With $N_h = 1$ it brakes at h = {runs[1][runs[1][:, 1] < 0.99][0, 0]:.2f} m, when it can no longer stop, and enters the zone "
-    f"by {-lows[1]:.2f} m. With $N_h = 2$, {without[2]} steps have no solution, but full braking is just in time. With "
+    f"With $N_h = 1$ it begins to brake at h = {runs[1][np.isnan(runs[1][:, 2])][0, 0]:.2f} m. From 1 m/s it needs 0.50 m to stop, "
+    f"so it enters the zone by {-lows[1]:.2f} m. With $N_h = 2$, {without[2]} steps have no solution, but full braking is just in time. With "
     "$N_h = 8$ every step has a solution. A smaller gamma helps as well: it brakes early and gently. The paper takes "
     "$N_h = 2$; with gamma = 0.05 that is enough for one person who stands. Notebook 21 shows where it is not.\n\n</details>"
 )
@@ -282,7 +287,7 @@ Markdown(
 # ## Distance to a person's zone
 #
 # What is $h$ in the plane? We need a distance from a point to an ellipse. The exact one has no short formula. The
-# paper takes the sum of the distances to the two foci, which is constant on the ellipse (eq. 7):
+# paper takes the sum of the distances to the two foci (the *focal distance*). It is constant on the ellipse (eq. 7):
 #
 # $$d(\mathbf{x}) = \tfrac12\left(\|\mathbf{x}-\mathbf{c}_a\| + \|\mathbf{x}-\mathbf{c}_b\|\right) - a,
 # \qquad \mathbf{c}_{a,b} = (m,n) \pm \sqrt{a^2-b^2}\,(\cos\theta, \sin\theta)$$
@@ -367,19 +372,20 @@ record.key |= {"v limit at h = 1 m": settings.gamma * h / settings.dt}
 # %% [markdown]
 # ## Three common mistakes
 #
-# - **"h < 0 means a collision."** No. The zone is larger than the body. At $h = 0$ the robot's side is still 5 cm
-#   outside the zone. $h < 0$ means that the robot came closer than people do.
+# - **"h < 0 means a collision."** No. The zone is larger than the body. At $h = 0$ the robot's side is still at
+#   least 5 cm outside the zone. $h < 0$ means that the robot comes closer than people do.
 # - **"A smaller gamma keeps a larger distance."** No. Every gamma ends at the edge. It slows the robot down earlier.
 # - **"The barrier stops the robot."** Only if the person stands. If the person comes, $h$ falls although the robot
-#   stands still, and the condition demands that it goes back (chapter 11).
+#   stands still, and the condition requires that it goes back (chapter 11).
 
 # %% jupyter={"source_hidden": true}
 # What we know now
 Markdown(
     "**What we know now.** Distance has become a limit of the speed: at h = 1 m the robot may approach at "
-    f"{allowed_speed(1.0, gamma):.2g} m/s, at h = 0 not at all. Eq. 1 keeps h positive as long as every step has a solution, "
-    "and looking some steps ahead is what gives it one. Both distances are approximations; notebook 22 measures where "
-    "they are too long. What is left is to find, ten times a second, the best acceleration in the plane that obeys: chapter 08."
+    f"{allowed_speed(1.0, gamma):.2g} m/s, at h = 0 not at all. Eq. 1 keeps h positive as long as every step has a solution. "
+    "A small gamma, or a look some steps ahead, gives it one. Both distances are approximations; notebook 22 measures "
+    "their errors. Next: a controller that finds, ten times a second, the best acceleration in the plane that obeys eq. 1: "
+    "chapter 08."
 )
 
 # %% jupyter={"source_hidden": true}

@@ -16,12 +16,12 @@
 #
 # **Question.** What does it take to turn the barrier condition of chapter 07 into a robot that drives in the plane?
 #
-# **Expectation.** Three matrices, a cost, and one row for each barrier and step. The result should decide the same
-# as `szlib.MPCCBF`.
+# **Expectation.** A model of the robot, a cost, limits, and one inequality (a *row*) for each barrier and step. The
+# result should choose the same accelerations as `szlib.MPCCBF`.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [07](07_barriers.ipynb) · next: [9 - Passing a person who
-# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 30 min ·
+# stands](09_passing.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 3-4, eq. 1-2, 8 · 35 min ·
 # needs [07](07_barriers.ipynb) · exercises:
 # [7.1-7.8](exercises/sheet7_controller.ipynb#7.1-A-filter-on-a-road-(15-min)) · laboratory:
 # [13](13_laboratory.ipynb)
@@ -125,7 +125,7 @@ for u in ([1.0, 0.0], [0.0, 0.0]):
 # $$\mathbf x_k = A^k\,\mathbf x_0 + \sum_{j<k} A^{k-1-j} B\,\mathbf u_j
 #   \qquad\text{or}\qquad \mathbf X = F\,\mathbf x_0 + G\,\mathbf z$$
 #
-# The states are no unknowns any more: the problem is *condensed*.
+# The states are no longer unknowns, only the accelerations are: the problem is *condensed*.
 
 # %%
 power = np.linalg.matrix_power
@@ -156,7 +156,7 @@ record.check("F and G give the states of one step after the other", off < 1e-12,
 # %% [markdown]
 # ## The cost
 #
-# What is a good plan? One that is soon near the goal, without large accelerations. With the error $\mathbf e_k =
+# What is a good plan? One that comes near the goal soon, without large accelerations. With the error $\mathbf e_k =
 # \mathbf x_k - \mathbf x_{goal}$ (eq. 2):
 #
 # $$\mathbf e_N^\top P\,\mathbf e_N + \sum_{k=1}^{N-1}\mathbf e_k^\top Q\,\mathbf e_k
@@ -167,7 +167,7 @@ record.check("F and G give the states of one step after the other", off < 1e-12,
 # - $R$: the price of an acceleration. 1 m/s² costs 1. Only the ratios of the prices matter.
 #
 # $\mathbf X$ is linear in $\mathbf z$, so the cost is a parabola in 16 dimensions, $\tfrac12 \mathbf z^\top H\,\mathbf z +
-# \mathbf f^\top \mathbf z$. Its lowest point is one linear system of equations, $H\,\mathbf z = -\mathbf f$.
+# \mathbf f^\top \mathbf z$ and a constant. Its lowest point solves a linear system of equations, $H\,\mathbf z = -\mathbf f$.
 
 
 # %%
@@ -202,8 +202,9 @@ def solve_qp(H, f, rows, least):
 
 
 # %% [markdown]
-# The limit of the speed is a circle, and no straight line. So draw the tangent where the last plan was, solve,
-# and repeat. Each limit becomes a *value* (positive: obeyed) and its *row*, the slope of the value over the plan.
+# The limit of the speed is a circle, not a straight line. So replace the circle by its tangent at the last plan, solve
+# the QP, and repeat with the new plan. Each limit becomes a *value* (positive: obeyed) and a *row*: how the value
+# changes with each number of the plan.
 
 
 # %%
@@ -215,8 +216,8 @@ def speed_rows(states):
 # %% [markdown]
 # ## The barrier rows
 #
-# For a person, $h$ is the distance of chapter 07 (eq. 6-7), to the zone at the place to which the person will have
-# walked by step $k$. For a wall it is eq. 3-5.
+# For a person, $h$ comes from the distance of chapter 07 (eq. 6-7). In step $k$ the zone is where the person will be
+# then. For a wall, $h$ comes from eq. 3-5.
 
 
 # %%
@@ -235,7 +236,7 @@ def keep_off_wall(wall):
 
 
 # %% [markdown]
-# The condition (eq. 1) for the steps below $N_h$, as value and row:
+# The condition (eq. 1) for the first $N_h$ steps, as value and row:
 #
 # $$h(\mathbf x_{k+1}) - (1 - \gamma)\,h(\mathbf x_k) \ge 0, \qquad k = 0, \dots, N_h - 1$$
 
@@ -257,8 +258,10 @@ def barrier_rows(h, states, n_h):
 # %% [markdown]
 # ## The controller
 #
-# Rows around the last plan, a QP, again, until nothing changes: *sequential quadratic programming* (SQP). `bend` is the
-# curvature of the circle, times its price: without it the plan would jump to and fro along the tangents.
+# Compute the rows around the last plan, solve a QP, and repeat until the plan no longer changes. This is *sequential
+# quadratic programming* (SQP). The solver gives a *price* for each row, its multiplier: by how much the cost would fall
+# if the row gave way a little. `bend` is the curvature of the circle times this price. Without it the plan would jump
+# back and forth along the tangents.
 
 
 # %%
@@ -280,8 +283,8 @@ def decide(x, goal, barriers, z, n_h, cost):
 
 
 # %% [markdown]
-# And the loop around it, the *receding horizon*: plan $N$ steps, drive the first, plan again. The rest of a plan is the
-# first guess of the next one.
+# The loop around it is called *receding horizon*: plan $N$ steps, drive the first, plan again. The rest of a plan is
+# the first guess for the next one.
 
 
 # %%
@@ -301,8 +304,8 @@ def drive(x, goal, people=(), walls=(), n_h=N_h, steps=140, cost=COST):
 # %% [markdown]
 # ## What P and R do
 #
-# **What do you think?** The goal is 3 m ahead, nothing is in the way. What happens if accelerations become dearer
-# ($R$ = 1, 30, 100)? And if the end of the plan costs nothing ($P = 0$)?
+# **What do you think?** The goal is 3 m ahead, nothing is in the way. What happens if accelerations become *dearer*,
+# that is, cost more ($R$ = 1, 30, 100)? And if the end of the plan costs nothing ($P = 0$)?
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -329,7 +332,7 @@ record.check(
     ", ".join(f"{label}: {way:.1f} cm" for label, way in past.items() if label[0] == "R"),
 )
 Markdown(
-    "<details><summary>Answer</summary>\n\nIf accelerations are dear, so is braking: the robot brakes late and gently, and "
+    "<details><summary>Answer</summary>\n\nIf accelerations cost much, so does braking: the robot brakes late and gently, and "
     f"drives {past['R = 100']:.0f} cm past the goal with R = 100. P makes it slow down for a goal that it reaches only "
     f"after the plan ends; without it the robot drives {past['P = 0 Q']:.0f} cm past.\n\n</details>"
 )
@@ -365,7 +368,7 @@ record.check("MPC-CBF does not drive into the zone", least[2] > 0, f"least h {le
 evidence = f"mean change of a in a step: {shake[1]:.2f} and {shake[2]:.2f} m/s²"
 record.check("rows for two steps shake less than half as much as for one", shake[2] < shake[1] / 2, evidence)
 Markdown(
-    "<details><summary>Answer</summary>\n\nThe cost knows no people: without rows the robot drives straight through the zone. "
+    "<details><summary>Answer</summary>\n\nThe cost contains no people: without rows the robot drives straight through the zone. "
     "With rows for one step it keeps out, but in one step an acceleration of 1 m/s² moves it by 5 mm only, so it needs large "
     "accelerations to correct its place, and shakes. Two steps are enough to see what an acceleration does to the "
     "*speed* of approach.\n\n</details>"
@@ -414,8 +417,9 @@ record.check("your controller arrives in 14 s", left < 0.2, f"{left:.2f} m from 
 # %% [markdown]
 # ## The same as szlib's?
 #
-# `szlib.MPCCBF` with `MPCSettings.paper()` and either of its solvers, asked in states along this run. Its SQP
-# stops where it expects no more than 1e-4 m/s² from going on. IPOPT stops a little inside of the limits.
+# `szlib.MPCCBF` with `MPCSettings.paper()` computes its control in seven states of this run, once with each of its two
+# solvers. Its SQP stops when it expects that more iterations change the acceleration by less than 1e-4 m/s². IPOPT
+# stops a little inside the limits.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -438,39 +442,40 @@ record.key["largest difference of an acceleration [m/s²]"] = float(table.to_num
 # %% [markdown]
 # ## Theory: one plan, or several?
 #
-# **The QP has one solution.** $H = 2\,(G^\top \bar Q\, G + \bar R)$ is positive definite, because $R$ is: a bowl has one
-# lowest point, with linear limits as well.
+# **The QP has at most one solution.** $H = 2\,(G^\top \bar Q\, G + \bar R)$ is positive definite, because $R$ is. ($\bar Q$ and
+# $\bar R$ repeat $Q$, $P$ and $R$ for each step.) The cost is a bowl: it has one lowest point, also inside linear limits.
 #
 # **The problem has several.** The outside of a zone is not convex: there are plans on the left and on the right of the
-# person. SQP finds the best one near its first guess, the last plan. `MPCSettings()` adds a rule for the side (chapter
-# 09); in the paper there is none.
+# person. SQP finds the best one near its first guess, the last plan. `MPCSettings()` adds the *rule of the side*
+# (chapter 09); the paper has no such rule.
 #
-# **A plan need not exist** (chapter 07). This robot then goes on with its last plan. The library solves again with a
+# **A plan need not exist** (chapter 07). Your robot then goes on with its last plan. The library solves again with a
 # penalised *slack*, and flags the step (notebook 21).
 
 # %% [markdown]
 # ## The paper's eq. 2 next to ours
 #
-# - *The errors.* The paper writes $\mathbf x_k^\top Q\,\mathbf x_k$; here it is $\mathbf e_k$, or every robot would
-#   drive to the origin.
+# - *The errors.* The paper writes $\mathbf x_k^\top Q\,\mathbf x_k$; here it is $\mathbf e_k$. With $\mathbf x_k$ every
+#   robot would drive to the origin.
 # - *The sum over $\mathbf u$* begins at $k = 1$ there and at $k = 0$ here: $\mathbf u_0$ is the one that is applied.
 # - *The limits.* The paper's "maximum speed 1 m/s" is the Euclidean speed here. It gives no limit of $\mathbf u$.
-# - *$\Delta h$* takes the zone where it will be then: the paper's robot knows the person's velocity (sec. 4).
+# - *$\Delta h$* is computed with the zone where it will be in that step: the paper's robot knows the person's velocity
+#   (sec. 4).
 #
 # ## Three common mistakes
 #
 # - **"A limit of 1 m/s on $v_x$ and on $v_y$ is a limit of the speed."** No. On a diagonal the robot drives 1.41 m/s.
 # - **"The plan is what the robot will do."** No. Only its first step is driven. Beyond $N_h$ the plan may lead through a
 #   person.
-# - **"A longer plan is always safer."** Only if the barrier rows are longer too: $N_h$ counts, not $N$.
+# - **"A longer plan is always safer."** No. Only if it has more barrier rows, too: $N_h$ counts, not $N$.
 
 # %% jupyter={"source_hidden": true}
 # What we know now
 Markdown(
     f"**What we know now.** The method is a page of code: {2 * N} unknowns, a cost, {N} rows for the speed, and "
-    f"{N_h} rows for each person and wall. In the corridor your controller kept h >= {hs.min():.2f} m, and decided as "
-    f"`szlib.MPCCBF` to {dt * float(table.to_numpy().max()):.0e} m/s. What the library adds is speed, proof, and a decent answer where "
-    "no plan obeys all rows."
+    f"{N_h} rows for each person and wall. In the corridor your controller kept h >= {hs.min():.2f} m, and gave the same velocity as "
+    f"`szlib.MPCCBF`, to {dt * float(table.to_numpy().max()):.0e} m/s. The library is faster, and it has an answer where no plan obeys "
+    "all rows. Next, the controller meets a person who stands in its way: chapter 09."
 )
 
 # %% jupyter={"source_hidden": true}

@@ -72,10 +72,11 @@ record.figure(scenario_runs.draw_paths_and_speeds(runs, title), "chains")
 # %% [markdown]
 # ## The paper's chain, and ours
 #
-# Orange is everything as the paper has it: its zone (outliers by LOF, hull, smallest ellipse) and its controller.
-# gamma and a_max are ours, since the paper gives none. Blue is our zone (notebook 05) and our controller. Our
-# controller has one thing more, the *rule of the side*: while the goal lies behind a person, the robot is drawn to a
-# point beside them.
+# A *chain* is a zone together with a controller. Orange is the paper's chain: its zone (outliers by LOF, hull, smallest
+# ellipse) and its controller. gamma and a_max are ours, since the paper gives none. Blue is our chain: our zone
+# (chapter 05) and our controller. What matters here is that our controller has the *rule of the side*: while the
+# goal lies behind a person, the robot drives towards a point beside the person. Chapter 11 lists the other
+# differences.
 
 # %%
 scenario_runs.tabulate_five(runs.by_name())
@@ -95,7 +96,7 @@ scenario_runs.record_both_claims(record, runs)
 #
 # Exactly head-on, both ways around are equally long. Nothing in the paper's problem prefers a side. In ours the side
 # is a setting, `pass_side`. **What do you think?** Mirror the paper's zone, left for right: does its robot change the
-# side? And what does it do before a zone that is quite straight?
+# side? And what does it do before a *symmetric* zone, which is neither tilted nor shifted to a side?
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -140,8 +141,8 @@ for each in (gamma, 0.4):
 # The answer
 Markdown(
     f"<details><summary>Answer</summary>\n\nAs fitted, the paper's zone is passed on the {sides['as fitted']}; mirrored, on the "
-    f"{sides['mirrored']}. Before the straight zone the robot slows down to {slowest:.2f} m/s, and leaves the line when rounding "
-    "errors have grown. So the side is no property of the paper's formulation. Its abstract says: on the right."
+    f"{sides['mirrored']}. Before the symmetric zone the robot slows down to {slowest:.2f} m/s, and leaves the straight line only when "
+    "rounding errors have grown. So the side is no property of the paper's formulation. Its abstract says: on the right."
     "\n\n</details>"
 )
 
@@ -149,7 +150,7 @@ Markdown(
 # ## What decides when it begins
 #
 # A number first. At 1 m/s the robot comes 10 cm nearer in a step of 0.1 s. With gamma = 0.05 a step may use up 5 %
-# of $h$. So the barrier is felt where 5 % of $h$ are 10 cm: at $h = v\, \Delta t / \gamma = 2$ m.
+# of $h$. So the barrier begins to limit the speed where 5 % of $h$ are 10 cm: at $h = v\, \Delta t / \gamma = 2$ m.
 #
 # The rule of the side begins there, too. **What do you think?** Without the rule, does the robot turn aside at
 # $h = 2$ m, or does it brake?
@@ -187,14 +188,14 @@ record.figure(fig, "admissible")
 # %% [markdown]
 # <details><summary>Answer</summary>
 #
-# It brakes first. The barrier limits how fast $h$ falls, and does not say how. With the goal straight behind the person
-# a plan of 0.8 s sees nothing to gain aside. On the right of the last figure are all accelerations that obey every row: what leads to the person is
-# gone, aside is as free as ever. The rule of the side only makes the robot want it. (A curved edge is the limit of
-# the speed.)
+# It brakes first. The barrier limits how fast $h$ falls; braking and turning aside both obey it. With the goal straight
+# behind the person, a plan of 0.8 s gains nothing by turning aside. The right panel of the last figure shows all
+# accelerations that obey every row. Those that lead to the person are excluded. Those to the side are not. The rule of
+# the side makes the robot choose them. (A curved edge is the limit of the speed.)
 #
 # </details>
 #
-# How much of "in good time" is gamma, and how much is the rule? *Avoidance starts* where the robot is 10 cm off the
+# How much of "in good time" is due to gamma, and how much to the rule? *Avoidance starts* where the robot is 10 cm off the
 # straight line. **What do you think?** At which $h$ does it start with gamma = 0.2, with the rule and without?
 
 # %%
@@ -257,7 +258,7 @@ for name, scene in (("from the front", scenario), ("from behind", scenario.turn_
 # ## Where gamma = 0.05 comes from
 #
 # The paper gives no gamma. Ours was chosen on the paper's four scenarios. **What do you think?** What goes wrong with
-# a gamma that is too small, and what with one that is too large? (The dotted line is ours.)
+# a gamma that is too small, and what with one that is too large? (The dotted line marks our gamma.)
 
 # %% jupyter={"source_hidden": true}
 # Runs
@@ -304,9 +305,9 @@ Markdown(
 )
 
 # %% [markdown]
-# The four scenarios were used to choose, so something else has to judge: 2,000 random worlds, with one to five people
-# and walls in half of them (notebook 21; made by `python -m studies.gamma_table`). One world of a row is driven
-# again here. **What do you think?** Is 0.05 the best there, too?
+# The four scenarios were used to choose gamma, so they cannot test the choice. 2,000 random worlds can, with one to
+# five people, and with walls in half of them (notebook 21; made by `python -m studies.gamma_table`). This notebook drives
+# one of these worlds again, to test the table. **What do you think?** Is 0.05 the best there, too?
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -359,16 +360,16 @@ show_sliders(run_with, gamma=(gamma, 0.01, max(0.2, gamma), 0.01))
 # %% [markdown]
 # ## A common mistake
 #
-# **"The barrier makes the robot go around."** No. It makes the robot slow. A way around must be wanted, by a goal, a
-# rule, or a plan that is long enough to see what it gains.
+# **"The barrier makes the robot go around."** No. It makes the robot slow. The robot goes around only if something else
+# makes it: a goal to the side, a rule, or a plan that is long enough to see what it gains.
 
 # %% jupyter={"source_hidden": true}
 # What we know now
 Markdown(
-    "**What we know now.** The barrier turns distance into a limit of the speed, and gamma says how far away that begins: at "
+    "**What we know now.** The barrier turns distance into a limit of the speed, and gamma says where the limit begins to act: at "
     f"h = {settings.v_max * settings.dt / gamma:.2g} m. To turn aside early ({added:.2f} m farther out), on a chosen side and "
-    f"without braking ({slow[0]:.2f} instead of {slow[1]:.2f} m/s), is not in the paper's formulation: the rule of the side does "
-    "that. Next the person walks, and there are walls: chapter 10."
+    f"with little braking ({slow[0]:.2f} instead of {slow[1]:.2f} m/s), is not in the paper's formulation: the rule of the side does "
+    "that. Next, the person walks, and there are walls: chapter 10."
 )
 
 # %% jupyter={"source_hidden": true}

@@ -17,11 +17,11 @@
 # **Question.** A person walks towards the robot in a corridor. There is room for both, but not much. Who
 # slows the robot down: the person, or the wall?
 #
-# **Expectation.** The paper: it slows down while it passes, as wall and zone together leave little speed.
+# **Expectation.** The paper: the robot slows down while it passes, because wall and zone together leave little speed.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [09](09_passing.ipynb) · next: [11 - Yielding: waiting and making
-# room](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 20 min · needs
+# room](11_waiting.ipynb) · [paper](https://arxiv.org/abs/2405.15101): sec. 4, fig. 6b · 25 min · needs
 # [09](09_passing.ipynb) · laboratory: [13](13_laboratory.ipynb)
 #
 # **Afterwards you can** say why the robot slows down in a corridor, and speeds up beside the person.
@@ -77,15 +77,16 @@ record.figure(scenario_runs.draw_paths_and_speeds(runs, title), "chains")
 # %% [markdown]
 # ## The paper's chain, and ours
 #
-# Orange is everything as the paper has it, its zone and its controller; gamma and a_max are ours, since the paper
-# gives none. Blue is our zone (notebook 05) and our controller. They pass on different sides: in the paper's chain
-# the tilt of the zone chooses the side, in ours a rule (notebook 09). Both slow down.
+# As in chapter 09, orange is the paper's chain, its zone and its controller; gamma and a_max are ours, since the paper
+# gives none. Blue is our zone (chapter 05) and our controller. They pass on different sides: in the paper's chain
+# the tilt of the zone chooses the side, in ours the rule of the side (chapter 09). Both slow down.
 
 # %%
 scenario_runs.tabulate_five(runs.by_name())
 
 # %% [markdown]
-# Ours, step by step. The numbers are times: where the robot is at 4, the person is at 4, too. Later is darker.
+# Our run, step by step. The numbers are times in seconds: a 4 marks where the robot and the person are at 4 s. Later is
+# darker.
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -114,8 +115,8 @@ record.check("our robot passes on the chosen side", sides[1] == settings.pass_si
 # %% [markdown]
 # ## A number first
 #
-# How much room is there beside the person? They walk in the middle of the corridor. To each side are half its
-# width, less the zone, less the robot with its margin on both sides:
+# How much room is left beside the person, when the robot is there? The person walks in the middle of the corridor. On
+# each side there is half the width of the corridor, minus the zone, minus the robot with a margin on both of its sides:
 
 
 # %%
@@ -164,17 +165,18 @@ record.check(
 )
 Markdown(
     f"<details><summary>Answer</summary>\n\nBeside the person alone {slowest['person alone']:.2f} m/s, between the walls alone "
-    f"{slowest['walls alone']:.2f} m/s. In the open the robot swings out as far as it needs, and a wall that it drives along "
-    "takes nothing from its speed ahead. Only both together leave it no way that is fast: nearer to the wall the wall's "
+    f"{slowest['walls alone']:.2f} m/s. Without walls the robot goes around as far as it needs, and a wall that it drives along "
+    "does not limit its speed ahead. Only both together leave it no fast way: nearer to the wall the wall's "
     "row limits it, nearer to the zone the person's.\n\n</details>"
 )
 
 # %% [markdown]
 # ## Who holds it, and when
 #
-# A row of the problem *holds* the robot where it leaves nothing over: without that row the acceleration would be
-# another. **What do you think?** Who holds the robot first? And does it speed up before, at, or after the moment when
-# both are abeam?
+# A row of the problem *holds* the robot when the chosen acceleration lies on the limit of this row (the row is
+# *active*): without the row the robot would choose another acceleration. Robot and person are *abeam* when they are
+# side by side. **What do you think?** Who holds the robot first? And does it speed up before, at, or after the moment
+# when both are abeam?
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -218,8 +220,8 @@ Markdown(
     f"{log.time[row]:.1f} s, when h is {step.h[0]:.2f} m to the person and {step.h[1:].min():.2f} m to the nearer wall; faster "
     f"than 0.5 m/s again from {again:.1f} s on; abeam at {abeam:.1f} s. So it speeds up "
     f"{'before' if again < abeam else 'after'} both are abeam: the barrier limits how fast h falls, not how fast the robot "
-    "drives. On the right of the last figure the two rows leave a corner, and the robot sits in its tip: the person's row "
-    "forbids what leads nearer to the zone, the wall's what leads aside.\n\n</details>"
+    "drives. On the right of the last figure the two rows leave a corner, and the robot chooses its tip: the person's "
+    "row forbids accelerations nearer to the zone, the wall's row those to the side.\n\n</details>"
 )
 
 # %% [markdown]
@@ -272,7 +274,7 @@ Markdown(
 # ## A common mistake
 #
 # **"The barrier of the wall stops the robot."** No. A wall limits how fast the robot comes *nearer to the wall*.
-# Along it the robot may be as fast as it likes. It takes a second row to close the way ahead.
+# Along the wall the robot may drive at its top speed. Only a second row, here the person's, limits the way ahead.
 
 # %% jupyter={"source_hidden": true}
 # What we know now

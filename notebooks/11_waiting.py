@@ -85,16 +85,17 @@ figures.add_shared_legend(panels)
 record.figure(fig, "space-time")
 
 # %% [markdown]
-# Read a panel from left to right: that is the time. Upwards is the way through the passage, the grey band. The
-# person walks down through it. On the left the robot starts outside and stays below the band until the person is
-# out. On the right it starts in the band, goes down out of it, and comes back.
+# The horizontal axis of a panel is the time. The vertical axis is the way through the passage, which is the grey band.
+# The person walks down through the band. In the left panel the robot starts outside, and stays below the band until the
+# person is out. In the right panel it starts in the band, goes down out of it, and comes back. The *mouth* is the end
+# of the passage on the robot's side.
 
 # %% [markdown]
 # ## The paper's chain, and ours
 #
-# Orange is everything as the paper has it, its zone and its controller; gamma and a_max are ours, since the paper
-# gives none. Blue is our zone (notebook 05) and our controller. Here both do nearly the same: our rule of
-# the side changes only where the robot steps aside. The same five numbers describe a run in notebooks 09 to 11:
+# As in chapter 09, orange is the paper's chain, its zone and its controller; gamma and a_max are ours, since the paper
+# gives none. Blue is our zone (chapter 05) and our controller. Here both do nearly the same: our rule of
+# the side changes only where the robot steps aside. The same five numbers describe a run in chapters 09 to 11:
 
 # %%
 named = {f"waiting, {name}": run for name, run in waiting.by_name().items()}
@@ -157,12 +158,12 @@ record.check(
     "while the robot waits, no admissible acceleration leads towards the passage", ahead < 0.1, evidence
 )
 Markdown(
-    "<details><summary>Answer</summary>\n\nThose that point back and aside. "
+    "<details><summary>Answer</summary>\n\nThose that point back, and some to the side. "
     f"h is {step.h[0]:.2f} m to the person and {step.h[1:].min():.2f} m to the nearest wall. The "
-    "person's row forbids what leads to the mouth of the passage, and the wall beside the mouth what leads straight "
-    "on. The robot takes the tip of what is left that is nearest to its goal. That is all that waiting is: a corner "
-    "near zero. So the robot hardly ever stands. It creeps up, is moved aside as the zone comes out, and comes back "
-    "behind it.\n\n</details>"
+    "person's row forbids accelerations to the mouth of the passage, and the row of the wall beside the mouth those straight "
+    "on. The robot takes the corner of what is left that is nearest to its goal. Waiting is nothing else: this corner lies "
+    "near zero. So the robot hardly ever stands still. It comes slowly nearer, goes aside as the zone comes out, and comes "
+    "back behind the zone.\n\n</details>"
 )
 
 # %% [markdown]
@@ -170,7 +171,7 @@ Markdown(
 #
 # Now the robot is in the passage. It is $h = 0.6$ m away from the zone of a person who walks towards it at
 # 0.5 m/s. With gamma = 0.05 a step of 0.1 s may use up 5 % of 0.6 m, that is 3 cm, or 0.3 m/s. The person alone
-# uses up 0.5 m/s. **-0.2 m/s** is left: the robot has to go back. As a formula (notebook 07):
+# uses up 0.5 m/s. **-0.2 m/s** is left: the robot has to go back. As a formula (chapter 07):
 #
 # $$v \le \frac{\gamma h}{\Delta t} - v_{person}$$
 #
@@ -262,8 +263,8 @@ Markdown(
 # %% [markdown]
 # ## How fast may the person come?
 #
-# The robot must go back as fast as they come, and be out of the way in time. **What do you think?** Does it
-# come nearer to a slow person or to a fast one, and with which of them does some step have no plan?
+# The robot must go back as fast as the person comes, and be out of the passage in time. **What do you think?** Does
+# the robot come nearer to a slow person or to a fast one? With which of them do some steps have no plan?
 
 # %%
 paces = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)
@@ -300,7 +301,7 @@ Markdown(
     f"{100 * lows.min():.1f} cm. The limit is zero at h = speed x dt / gamma: the slower the person, the nearer the robot "
     "may come before it has to go back. "
     + (
-        f"At {failing.min():g} m/s some steps have no plan ({unsolved[unsolved > 0][0]:.0f} of the run). The robot itself "
+        f"At {failing.min():g} m/s the run has steps without a plan: {unsolved[unsolved > 0][0]:.0f}. The robot itself "
         f"cannot go back faster than {settings.v_max:g} m/s."
         if failing.size
         else "No speed that was tried left it without a plan."
@@ -311,9 +312,10 @@ Markdown(
 # %% [markdown]
 # ## All four scenarios: what is due to what?
 #
-# Notebooks 09 to 11 drive each scenario twice. Four things differ between the paper's chain and ours: the solver,
-# the zone, the margin around walls, and the rule of the side. **What do you think?** Which of them changes a run,
-# and in which scenario? In the table each is switched on alone, from the paper's chain.
+# Chapters 09 to 11 drive each scenario twice. Four things differ between the paper's chain and ours: the solver,
+# the zone, the margin around walls, and the rule of the side (*side rule* in the table). **What do you think?** Which
+# of them changes a run, and in which scenario? Each row of the table is the paper's chain with one of the four changed.
+# (From the second row on, our solver is used, because it is faster.)
 
 # %% jupyter={"source_hidden": true}
 # Table
@@ -338,8 +340,8 @@ lowest = compared.groupby("chain", sort=False)["min_h"].min()
 record.check("h >= 0 with every chain of settings", lowest.min() >= 0, f"least h {lowest.min():.2f} m")
 
 # %% [markdown]
-# A dash means: no change of more than 0.25 s, 2 cm of h or 5 cm/s, and the same side and claims. So what the rule
-# of the side changes in ours does not come from the barrier.
+# A dash means: no change of more than 0.25 s, 2 cm of h or 5 cm/s, and the same side and claims. So the barrier is not
+# the reason why our robot passes on the right: the rule of the side is.
 
 # %% [markdown]
 # ## Three common mistakes
@@ -347,16 +349,16 @@ record.check("h >= 0 with every chain of settings", lowest.min() >= 0, f"least h
 # - **"The robot knows that the person goes first."** No. It knows a zone, some walls and 0.8 s. Who goes first
 #   follows from who is at the mouth.
 # - **"A robot that stands is safe."** No. The zone moves with the person, and $h$ falls for a robot at rest, too.
-# - **"Going back means that the controller has failed."** No. It is the only control that obeys the barrier.
+# - **"Going back means that the controller has failed."** No. In the passage only going back obeys the barrier.
 
 # %% jupyter={"source_hidden": true}
 # What we know now
 Markdown(
     "**What we know now.** Waiting and making room need no rule of their own: the robot waits where no acceleration that "
-    f"obeys leads into the passage ({between:.1f} s after the person is out it goes in), and goes back where the limit of its "
+    f"obeys eq. 1 leads into the passage ({between:.1f} s after the person is out it goes in), and goes back where the limit of its "
     f"speed is negative, which is nearer than h = {stand:.2f} m. "
-    "Because it sees less than a second ahead, it goes in where it has to come out again. "
-    "In all this the person walked on and did not mind the robot: chapter 12."
+    "Because it plans less than a second ahead, it sometimes goes in and has to come out again. "
+    "So far there was one person. Many people, and walls that form a dead end, need more: chapter 12."
 )
 
 # %% jupyter={"source_hidden": true}

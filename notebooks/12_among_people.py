@@ -16,8 +16,8 @@
 #
 # **Question.** What does a robot need besides the paper's controller where walls and many people are in its way?
 #
-# **Expectation.** A route around walls, and something that it may give up where people leave it no way. Then it
-# arrives sooner, and comes closer to people.
+# **Expectation.** A route around walls, and barriers that it may break, at a price, where people leave it no way. Then
+# it arrives sooner, and comes closer to people.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [11](11_waiting.ipynb) · next: [13 - The
@@ -102,8 +102,8 @@ record.figure(fig, "crowd")
 # %% [markdown]
 # Eight people in two streams cross the way of the robot at 1.2 m/s. They are faster than the robot, which drives
 # at most at 1 m/s, and they do not see it. The paper's settings keep every zone free, and take a long time.
-# `MPCSettings.among_people()` is sooner at the goal, and closer to people for a moment. It says so: each of
-# these steps has `Step.safe = False`.
+# With `MPCSettings.among_people()` the robot is sooner at the goal, and is in a zone for a moment. The controller
+# reports this: each of these steps has `Step.safe = False`.
 
 # %% jupyter={"source_hidden": true}
 # Checks
@@ -118,13 +118,12 @@ record.check(what, unsaid == 0, f"{unsaid} steps of {sum(len(log.states) - 1 for
 # ## A route around walls
 #
 # **A number first.** The paper's plan has 8 steps of 0.1 s. At 1 m/s it reaches **0.8 m** ahead. A dead end is
-# 3 m deep. To leave it, the robot has to drive 3 m *away* from its goal, and within 0.8 m each of these metres
-# only costs. So no plan leaves the dead end, however well it is solved.
+# 3 m deep. To leave it, the robot has to drive 3 m *away* from its goal. A plan of 0.8 m sees only the cost of
+# driving away, and not what it gains later. So no plan leaves the dead end, however well it is solved.
 #
-# What helps is a *route*: the shortest way around the walls, which are grown by the room that the robot needs.
-# It consists of straight pieces between corners, so there are few candidates: take all corners, connect those
-# that see each other, and find the shortest path in this graph (a *visibility graph*: Lozano-Pérez and Wesley,
-# 1979).
+# A *route* helps: the shortest way around the walls, after the walls are enlarged by the room that the robot needs.
+# It consists of straight pieces between corners. So take all corners, connect those with a free straight line between
+# them, and find the shortest path in this graph (a *visibility graph*: Lozano-Pérez and Wesley, 1979).
 
 # %%
 walls = np.array([[(6.0, -2.5), (6.0, 2.5)], [(3.0, 2.5), (6.0, 2.5)], [(3.0, -2.5), (6.0, -2.5)]])
@@ -135,8 +134,8 @@ print(f"{length:.1f} m around the walls, 10 m through them")
 
 # %% [markdown]
 # The controller drives towards the point of the route that lies `lookahead` = 4 m ahead, and not towards the
-# goal. That is all. The rows of the walls and of the people stay in the problem: the route attracts, and
-# promises nothing.
+# goal. Nothing else changes. The rows of the walls and of the people stay in the problem: the route gives a
+# direction, the rows give safety.
 #
 # **What do you think?** Where does the robot with the paper's settings end? Does the other one touch the corners?
 
@@ -180,7 +179,8 @@ print(f"free between two zones:  {spacing - 2 * zone.semi_axes[1]:.1f} m")
 print(f"needed by the robot:     {robot:.1f} m, and {2 * among.eps:.1f} m of margin")
 
 # %% [markdown]
-# It fits between the bodies, and not between the zones. With hard barriers there is no way. What can be given up?
+# It fits between the bodies, and not between the zones. With *hard* barriers, which every plan must obey, there is no
+# way. What can be given up?
 # `among_people()` replaces the hard condition by one with a *slack* $s_k \ge 0$ that has a price:
 #
 # $$h_{k+1} \ge (1-\gamma)\, h_k - s_k, \qquad \text{cost} + p \sum_k s_k$$
@@ -191,10 +191,10 @@ print(f"needed by the robot:     {robot:.1f} m, and {2 * among.eps:.1f} m of mar
 #
 # What may be bought depends on the number of people within 4 m of the robot:
 #
-# | people near | the decay of $h$ | $h \ge 0$ | a gap of 0.2 m to bodies |
+# | people near | eq. 1 (how fast $h$ may fall) | $h \ge 0$ | a gap of 0.2 m to bodies |
 # |---|---|---|---|
-# | 0 or 1 | hard | hard | hard (it lies in the zone) |
-# | 2 or 3 | has a price | hard | hard (it lies in the zone) |
+# | 0 or 1 | hard | hard | hard (follows from $h \ge 0$) |
+# | 2 or 3 | has a price | hard | hard (follows from $h \ge 0$) |
 # | 4 or more | has a price | has a price | hard |
 #
 # **What do you think?** The five people walk at 1 m/s towards both robots. What does the robot with hard barriers
@@ -225,8 +225,8 @@ record.check(what, entered > 0 and through["unflagged_violations"] == 0, f"{ente
 record.key |= {"front: least gap [m]": wide, "front: time to goal [s]": through["time_to_goal"]}
 Markdown(
     f"<details><summary>Answer</summary>\n\nIt backs away as fast as the people come, {backs:.0f} m in 40 s, and would go on. "
-    "The other one counts five people within 4 m, pays, and passes between two of them: h < 0 for "
-    f"{among.dt * entered:.1f} s, with a gap of {wide:.2f} m to the nearest body. By its own words these steps are not "
+    "The other one counts five people within 4 m, pays the price, and passes between two of them: h < 0 for "
+    f"{among.dt * entered:.1f} s, with a gap of {wide:.2f} m to the nearest body. It reports these steps as not "
     "safe.\n\n</details>"
 )
 
@@ -237,17 +237,18 @@ record.animation(movie, "front")
 display(movie)
 
 # %% [markdown]
-# **Theory: when is a price exact?** Of a hard constraint the solver computes a *multiplier* $\lambda$: by how much
-# the cost falls if the constraint gives way by 1 m. If the price is higher, $p > \lambda$, giving way does not
-# pay: the plan with a price is the plan with the hard constraint, wherever there is one (Nocedal & Wright,
-# *Numerical Optimization*, ch. 17). The hard rows of this library have such a price in the end, 100,000. In a
-# crowd it is 50: the robot gives way where waiting would cost more.
+# **Theory: when is a price exact?** For each hard constraint the solver computes a *multiplier* $\lambda$ (the "price" of
+# a row in chapter 08): how much the cost falls per metre by which the constraint gives way. If $p > \lambda$, giving way
+# costs more than it saves. Then the plan with a price is the plan with the hard constraint, wherever there is one
+# (Nocedal & Wright, *Numerical Optimization*, ch. 17). If no plan obeys all hard rows, this library gives these rows a
+# price as well, 100,000. In a crowd the price is 50: the robot enters a zone where waiting would cost more.
 
 # %% [markdown]
 # ## Among 200 recorded people
 #
 # Is one crowd typical? Notebook [29](deeper/29_crowds.ipynb) puts robots in the place of 200 recorded walkers,
-# 40 ways at each of five sites. Nobody sees the robot. Means of all ways at up to 1 m/s:
+# 40 at each of five sites. The recorded people do not see the robot. The robot drives at most at 1 m/s. Means of
+# all 200 ways:
 
 # %% jupyter={"source_hidden": true}
 # Table
@@ -267,8 +268,9 @@ shown.rename_axis(None).rename_axis(None, axis=1).style.format("{:.2f}").format(
 )
 
 # %% [markdown]
-# The *social force* is a controller without barriers: it is pushed by people, and goes on. It arrives as often, and
-# is in zones for much longer. The last row is what people did themselves.
+# The *social force* is a controller without barriers: people push the robot away, and its goal attracts it. It arrives
+# about as often as `among_people()`, and is in zones for much longer. The last row is what the recorded people did
+# themselves.
 
 # %% [markdown]
 # ## What the robot is bad at
@@ -317,14 +319,14 @@ lowest = overtaken.query("robot == 'among people' and pace == 2.0")["h"].item()
 Markdown(
     f"<details><summary>Answer</summary>\n\nThe longer plan: it goes aside and keeps {fast[1]:.2f} m at 1.5 m/s. The paper's "
     f"robot sees the person too late; the person walks into it by {max(-fast[0], 0):.2f} m. At 2 m/s even the longer plan "
-    f"ends with h = {lowest:.2f} m. In all these runs the people do not see the robot; a person who does would "
+    f"does not keep the zone free: h falls to {lowest:.2f} m. In all these runs the people do not see the robot; a person who does would "
     "help.\n\n</details>"
 )
 
 # %% [markdown]
-# Two more situations have no solution with either of the settings. The goal lies in the middle of four people who
-# stand and talk. And somebody stands in the near one of two doors: the route knows walls, and no people, so the
-# robot does not take the other door.
+# In two more situations the robot does not arrive with either of the settings. In the first, the goal lies in the
+# middle of four people who stand and talk. In the second, somebody stands in the nearer one of two doors. The route
+# contains walls and no people, so the robot does not take the other door.
 
 # %% jupyter={"source_hidden": true}
 # Figure
@@ -384,20 +386,22 @@ pd.DataFrame({name: {key: describe(log) for key, log in logs.items()} for name, 
 # ## Three common mistakes
 #
 # - **"`among_people()` is the safer one."** No. It arrives more often, and it enters zones that the paper's settings
-#   keep free. In a crowd it promises 0.2 m to bodies, to people who keep their velocity.
+#   keep free. In a crowd it keeps only 0.2 m to the bodies of people, if they keep their velocity.
 # - **"`Step.safe = False` means a collision."** No. It means that the robot enters a zone, or that no plan obeys
 #   every hard row. `Step.explain()` says which.
-# - **"The route keeps the robot off people."** No. It knows walls only. Doors that people block stay in it.
+# - **"The route keeps the robot away from people."** No. It is made from walls only. It may lead through a door that
+#   people block.
 
 # %% jupyter={"source_hidden": true}
 # What we know now
 Markdown(
     f"**What we know now.** In one crowd `among_people()` took {sooner:.1f} s and the paper's settings {later:.1f} s; it paid with "
     f"h < 0 for {within['among people']:.1f} s, and each of these steps was flagged. A route leads out of dead ends, and "
-    "prices through crowds: among 200 recorded people the goal was reached in "
-    f"{means.loc['among people', 'reached']:.1%} instead of {means.loc['MPC-CBF', 'reached']:.0%} of the ways. The robot "
+    "prices lead through crowds: in the place of 200 recorded people the goal was reached in "
+    f"{means.loc['among people', 'reached']:.1%} of the ways, with szlib's defaults in {means.loc['MPC-CBF', 'reached']:.0%}. The robot "
     "performs poorly around people who are faster than itself and do not see it, and it never arrives at a goal amid "
-    "a standing group or behind a door that somebody blocks. People who react, and all the tables: notebook 29."
+    "a standing group or behind a door that somebody blocks. Notebook 29 has people who react, and all the tables. In "
+    "chapter 13 you try such scenes yourself."
 )
 
 # %% jupyter={"source_hidden": true}

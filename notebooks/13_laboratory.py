@@ -17,7 +17,8 @@
 # **Question.** What does the robot do if *you* put the person somewhere else, move the goal, narrow the
 # corridor, or change gamma while it drives?
 #
-# **Expectation.** Each step has a reason: a person, a wall, or a bound that the chosen acceleration lies on.
+# **Expectation.** Each step has a reason: the chosen acceleration lies on the limit of a person, of a wall, or of the
+# robot itself.
 
 # %% [markdown]
 # [Start](00_start_here.ipynb) · before: [12](12_among_people.ipynb) ·
@@ -62,10 +63,11 @@ fig.suptitle(explain(still.steps[0]).sentence, fontsize=11)
 record.figure(fig, "still")
 
 # %% [markdown]
-# With a kernel (*Run > Run All Cells*) the laboratory stands above. The picture shows one moment of it. Choose a scene, press *play* or
-# *step*, and move the time line to go back. Drag what you like, also while it runs: people, the tip of a person's arrow, the
-# robot, its goal, the ends of walls. The green area holds all accelerations that the robot may choose now. The orange edge is the
-# limit that the sentence names, the active one. *share* writes code that computes what is on the screen.
+# If you run this notebook (*Run > Run All Cells*), the laboratory appears above. The picture shows one moment of it. Choose a
+# scene, press *play* or *step*, and move the time line to go back. Drag what you like, also while it runs: people, the tip of
+# a person's arrow, the robot, its goal, the ends of walls. The green area holds all accelerations that the robot may choose
+# now. The sentence over the picture names the *active* limit, the one that holds the robot (chapter 10): it is the orange edge. *share*
+# writes code that computes what is on the screen.
 
 # %% [markdown]
 # ## Things to try
@@ -77,8 +79,8 @@ record.figure(fig, "still")
 # appears, and h of the person falls below 0.</details>
 #
 # **2. Foresight.** Keep gamma = 0.5 and raise N_h from 2 to 8. What changes?
-# <details><summary>What to expect</summary>The robot sees the person 0.8 s ahead instead of 0.2 s, and h stays about 13 cm
-# higher at its lowest.</details>
+# <details><summary>What to expect</summary>The robot obeys the barrier 0.8 s ahead instead of 0.2 s. The lowest h is about
+# 13 cm higher, but still a little below 0: gamma = 0.5 is too large for this look ahead.</details>
 #
 # **3. The paper's settings against `among_people()`.** Choose `MPCSettings.paper()`, and compare with
 # `MPCSettings.among_people()` in *corridor*.
@@ -89,7 +91,7 @@ record.figure(fig, "still")
 # <details><summary>What to expect</summary>The two do not fit side by side. The robot goes back, out of the corridor, lets
 # the person out, and then goes on. h stays above 0.</details>
 #
-# **5. A person in a hurry.** Pull the person's arrow to 2 m/s, towards the robot. Does the robot keep its promise?
+# **5. A person in a hurry.** Pull the person's arrow to 2 m/s, towards the robot. Are all steps safe?
 # <details><summary>What to expect</summary>For a second or two no plan keeps h from falling faster than gamma allows: "not
 # safe", although the robot escapes, and h stays above 0.</details>
 #
@@ -179,8 +181,9 @@ record.check(
 record.key |= {"gamma = 0.5: min_h": low.iloc[1], "among_people: time_to_goal": time.iloc[4]}
 
 # %% [markdown]
-# **What it means.** h is what is left before the zone is reached, and gamma the share of it that a step may use up. The
-# acceleration lies on the edge of a limit most of the time: that edge is the answer to "why did it do this?".
+# **What it means.** h is the distance that is left to the zone, and gamma is the share of it that a step may use up. Most
+# of the time the chosen acceleration lies on the edge of a limit: this edge answers the question "why did the robot do this?".
+# This is the last chapter. You can now build a controller of your own: the [final project](project/README.md).
 
 # %% jupyter={"source_hidden": true}
 # Summary of the checks

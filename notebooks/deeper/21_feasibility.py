@@ -404,7 +404,7 @@ record.figure(fig, "thousands")
 # worlds have $h < 0$ with every formulation: somebody walks into a robot that has nowhere to go.
 #
 # With one person a few *first* steps have no solution: a person who walks at 0.5 m/s takes 5 cm of $h$ in a step,
-# where the condition allows $\gamma h = 1.5$ cm, and a robot at rest cannot yet be on its way.
+# where the condition allows $\gamma h = 1.5$ cm, and a robot at rest cannot move away fast enough in one step.
 #
 # </details>
 

@@ -110,7 +110,7 @@ record.figure(fig, "verdicts")
 #
 # The shape of a zone needs more care. Every zone has some shape, also that of people who ignore each other. So a
 # claim about the shape is a difference from the *null model*, which is made of such people: it is measured with the
-# respect zone (notebook 06). With fewer than 150 encounters of people who cross or come towards each other,
+# respect zone (chapter 06). With fewer than 150 encounters of people who cross or come towards each other,
 # the prior would decide, so the claim stays open.
 
 # %% jupyter={"source_hidden": true}
@@ -234,7 +234,7 @@ record.check(
 #
 # Without `method`, szlib takes the respect zone if the data has 150 encounters, if the null model has twice as many, and if
 # they show respect. Else it takes the quantile zone, as on the plaza, where few people would meet by chance.
-# `"paper"` is the hull after LOF with 20 neighbours removed 0.2 % of the samples (notebook 03).
+# `"paper"` is the hull after LOF with 20 neighbours removed 0.2 % of the samples (chapter 03).
 #
 # Each zone has 95 % intervals from resampled pairs of people. With fewer than 20 encounters on some side, using it
 # gives a warning, and it is drawn dashed. `zone.adequate(speed)` says the same in code.
@@ -426,17 +426,17 @@ Markdown(
 
 # %% [markdown]
 # The semi-axis b, to the sides, is known well. How far the zone reaches behind a person is not: if you are behind me, I am
-# ahead of you, so a zone that reaches farther ahead hides its own back. Then the centre and the semi-axis a are wrong by several
+# ahead of you. So the longer front of your zone hides the back of mine. Then the centre and the semi-axis a are wrong by several
 # centimetres in opposite directions, and their sum, the reach ahead, is nearly right. The posterior alone was too narrow
 # for this. So it carries an error of the model as well, measured on other plazas: a standard deviation of at least 5 cm
 # along the motion, and 1.2 cm across.
 #
 # **A common mistake:** "the 95 % interval contains the true zone with 95 %". No: it does so only if the method aims at
-# the true zone. A quantile aims at a quantile.
+# the true zone. The quantile zone aims at a quantile, not at the true edge.
 #
 # ## Several sites
 #
-# How near do strangers come elsewhere? Below are the radii of respect of notebook 06, all directions pooled. A
+# How near do strangers come elsewhere? Below are the radii of respect of chapter 06, all directions pooled. A
 # random-effects model (`szlib.pool`) adds the mean over sites, and from three sites on what to expect at a new one.
 
 # %% jupyter={"source_hidden": true}

@@ -149,14 +149,14 @@ record.check(
 # %% [markdown]
 # ## What it is bad at, and what helps
 #
-# **A worked number.** With $\gamma = 0.05$ in steps of 0.1 s, $h$ may shrink by half of itself in a second. A person
-# who is 2 m away and comes at 0.5 m/s uses up 0.5 m of the 1 m that is allowed. So the robot gives way early, whatever
-# the person does next. In the intersection, the person walks up the hall, and the robot goes up the hall ahead of them.
+# **A worked number.** With $\gamma = 0.05$ in steps of 0.1 s, $h$ may shrink at the rate $0.5\,h$ per second: at
+# $h = 2$ m that is 1 m/s. A person who comes at 0.5 m/s uses up half of it. At $h = 1$ m the person uses up all of it.
+# So the robot gives way early, whatever the person does next. In the intersection, the person walks up the hall, and the robot goes up the hall ahead of them.
 #
 # A larger $\gamma$ lets the robot come closer before it gives way. That is safe if the robot looks so far ahead that it
 # can stop: with $\gamma = 0.2$ it needs $N = N_h = 24$ steps, which is 2.4 s. We call this "bolder".
 # `MPCSettings.among_people()` has more: a route around walls, and, where several people are near, prices instead
-# of hard barriers (notebook 12).
+# of hard barriers (chapter 12).
 
 # %% jupyter={"source_hidden": true}
 # Table
@@ -338,7 +338,7 @@ record.claim(
 # intersection it is pushed up the hall, because with $\gamma = 0.05$ it gives way long before it has to; a
 # larger $\gamma$ with the barrier on a horizon in which the robot can stop mends this. Among people who stand around it, it
 # may stop before one of them although there is a gap: it plans no route, and only the choice of a side
-# (notebook 09) leads it out. With `among_people()` it arrives in all variations. The price is $h < 0$ for some time where
+# (chapter 09) leads it out. With `among_people()` it arrives in all variations. The price is $h < 0$ for some time where
 # five or more people are near: half a metre inside a zone on the circle, with a gap to all bodies. People here do not
 # react; those of notebook 29 do.
 

@@ -255,11 +255,11 @@ record.figure(ax.figure, "promises")
 # ## A larger gamma
 #
 # The condition $h_{k+1} \ge (1 - \gamma) h_k$ lets $h$ fall by $\gamma h / \Delta t$ metres a second, and not more. A
-# person who comes at speed $w$ takes as much by themselves where $h = w \Delta t / \gamma$: nearer than that, the
-# robot must go backwards or aside to leave them their pace. With $\gamma = 0.05$ that is 1 m for the paper's
+# person who comes at speed $w$ uses up all of it at $h = w \Delta t / \gamma$. If $h$ is smaller, the robot must go
+# backwards or to the side. With $\gamma = 0.05$ that is 1 m for the paper's
 # people, who walk at 0.5 m/s, and 3 m for somebody at 1.5 m/s.
 #
-# **What do you think?** Somebody comes head-on, who does not see the robot. At which $h$ does it begin to turn, with
+# **What do you think?** A person who does not see the robot comes head-on. At which $h$ does the robot begin to turn, with
 # $\gamma = 0.05$ and with $0.2$?
 
 # %% jupyter={"source_hidden": true}
@@ -370,7 +370,7 @@ order.loc[list(dict.fromkeys(chosen))].round(2)
 #
 # Five people walk across a circle of 4 m by ORCA, at 1 m/s, and do not see the robot, which crosses it as well: a
 # benchmark with published results (C. Chen et al., ICRA 2019; five people, 500 tests), where an ORCA robot is
-# reported to succeed in .43 and to collide in .57 of them. `python -m studies.crossings` builds it anew. Its own
+# reported to succeed in 43 % and to collide in 57 % of them. `python -m studies.crossings` builds it anew. Its own
 # ORCA robot must come near those numbers, or the rest means nothing.
 
 # %% jupyter={"source_hidden": true}

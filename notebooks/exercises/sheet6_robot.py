@@ -116,7 +116,7 @@ judges.check("next_plan", next_plan)
 # | "passing" | "width" | shorter semi-axis of the zone, about 0.7, 0.85 m | "path_length" [m] |
 #
 # The check makes the runs with a zone that is drawn anew. It does not say which prediction is wrong, since
-# that would be its answer: look for the reason in notebooks 07, 09 and 21, or make the runs yourself.
+# that would be its answer: look for the reason in chapters 07 and 09 and in notebook 21, or make the runs yourself.
 
 
 # %%

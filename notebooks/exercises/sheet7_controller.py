@@ -149,7 +149,8 @@ judges.check("mpc_1d", mpc_1d)
 #
 # $$h_k \ge (1-\gamma)^k\,h_0, \quad k = 1, \dots, N_h .$$
 #
-# Add these rows to the program of 7.4, and give its plan, shape (N,).
+# Add these rows to the program of 7.4, and give its plan, shape (N,). (Chapter 08 requires eq. 1 in each step, which
+# is a little stricter.)
 
 
 # %%

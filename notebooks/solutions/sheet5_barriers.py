@@ -147,7 +147,7 @@ judges.check("end_margin", end_margin)
 #
 # | points | for |
 # |---|---|
-# | 3 | with gamma = 1 the row holds until the step in which braking would have had to begin |
+# | 3 | with gamma = 1 the row limits the robot only when it is too late to brake |
 # | 3 | inertia or limits on the input are the reason; a robot that obeys at once is safe |
 # | 2 | a small gamma slows the robot down early, far from anybody |
 # | 2 | a calculation or a sketch with numbers |
