@@ -122,7 +122,7 @@ for r_example, los_example in ((0.5, 0), (1.9, 0), (0.5, 90)):
 
 # %% [markdown]
 # The many people who keep away gather around the origin. The few who come near lie outside, on the rim: see the right
-# picture above. In chapter 04 a hull is put around these points, so that one wrong point on the rim moves the hull.
+# picture above. Chapter 04 puts a tight skin, the *hull*, around these points. One wrong point on the rim moves the hull.
 # Therefore outliers have to go first.
 
 # %% [markdown]
@@ -189,7 +189,7 @@ record.check(
 # from inside a small group, everything is dense.
 #
 # Remember this. An encounter has 31 samples, 0.1 s apart. LOF with 20 neighbours compares a sample with 20 others of
-# the *same person*. A slow intruder is such a small group.
+# the *same encounter*. The samples of a slow intruder are such a small group.
 #
 # </details>
 

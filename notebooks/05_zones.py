@@ -390,7 +390,7 @@ low, high = (round(v, 2) for v in zone.speed_range)
 show_sliders(draw_zone, speed=(1.1, low + 0.1, high - 0.1, 0.05))
 
 # %% [markdown]
-# ## Is it true?
+# ## Does it find the true zone?
 #
 # On the plaza we know the zone that everybody respects, except a few intruders. Between this truth and our estimate lie the
 # noise of the sensor, gaps, the clock, the conditions of an encounter, and outliers. Both methods must still find the true

@@ -130,8 +130,8 @@ real_day.compare_with_plaza(
 # Every path, every speed and the density of the crowd stay. Only the chance to take notice of each other is lost.
 #
 # (The plaza of this chapter is a busier one: its people are watched for 20 s, not 3.4 s, so that shifted people meet.
-# So some walk beside each other long enough to count as companions. And 2 % of the people are *careless*: they walk
-# through the zones of others.)
+# So some walk beside each other long enough to count as companions. And 2 % of the encounters have an intruder, as in
+# chapter 03. We call people who walk through the zones of others *careless*.)
 #
 # ```python
 # samples = szlib.find_encounters(tracks)
@@ -212,9 +212,9 @@ even by chance. The data has {test.statistic:.1f}. {"So it is respect." if found
 )
 
 # %% [markdown]
-# ### Does the test find nothing where there is nothing?
+# ### How often does the test give a false alarm?
 #
-# It was tried on crowds of people who ignore each other: they walk straight on, singly or in bunches of ten as from a
+# The test was tried on crowds of people who ignore each other: they walk straight on, singly or in bunches of ten as from a
 # train (`python -m studies.respect nobody`). A p up to 0.05 is a false alarm here. Five in 100 crowds are allowed.
 
 # %% jupyter={"source_hidden": true}
@@ -245,6 +245,9 @@ record.check(
 # - $r$ is the nearest approach of an encounter [m], $g$ the ratio.
 # - $R$ is the radius of the respect zone [m], $w$ the softness of its edge [m].
 # - $f$ is the share of careless people, who enter the zones of others.
+#
+# Beyond 1.2 m the figure takes reactions to be small: it scales the counts by chance to agree with the data there.
+# Ratios above 3 are not drawn.
 #
 # **What do you think?** Will the ratio be 0 close to the person?
 
@@ -294,7 +297,7 @@ Markdown(
 # ## Three zones of the same people
 #
 # **What do you think?** A few careless people walk through others' zones. Which of these is misled: the hull of chapter
-# 04, the quantile of chapter 05, or the **respect zone**? The respect zone is the model above with an ellipse in
+# 04 (*paper* in the figure), the quantile of chapter 05, or the **respect zone**? The respect zone is the model above with an ellipse in
 # place of the circle. Both people of an encounter carry this ellipse, turned to the direction in which they walk.
 
 # %%
@@ -357,10 +360,10 @@ Markdown(
 )
 
 # %% jupyter={"source_hidden": true}
-# Who meets whom
+# Strangers and companions
 with_companions = f"{record.key['companions']:,} of {counts.sum():,} encounters"
 Markdown(
-    f"""## Who meets whom
+    f"""## Strangers and companions
 
 Two people who walk together keep a distance as well, but another one, for another reason. So *companions* are found
 first, on the whole common track of the two, and left out: {with_companions} here. In a shifted crowd it is
