@@ -60,7 +60,7 @@ parameters(
         ("robot radius", f"{settings.r_robot} m", PAPER, "a cylinder"),
         ("margin eps", f"{settings.eps} m", PAPER, "for the error of the approximate distances"),
         ("zone", f"{zone_speed:g} m/s", PAPER, "1.1 m/s: a little more than the robot's top speed"),
-        ("gamma", gamma, TUNED, "on the paper's four scenarios; in 2,000 other worlds: notebook 09"),
+        ("gamma", gamma, TUNED, "on the paper's four scenarios; in 2,000 other worlds: chapter 09"),
     ]
 )
 
@@ -212,7 +212,7 @@ for dt in (0.1, 0.05, 0.02):
 # $a_{max}$ = 1 m/s², so this is possible. With gamma = 0.2 it is 2 m/s², which is impossible. For a person who
 # stands, the rule is
 #
-# $$\gamma \le \frac{a_{max}\,\Delta t}{v_{max}} = \frac{1 \cdot 0.1}{1} = 0.1$$
+# $$\gamma \le \frac{a_{max}\,\Delta t}{v_{max}} = \frac{1\ \mathrm{m/s^2} \cdot 0.1\ \mathrm{s}}{1\ \mathrm{m/s}} = 0.1$$
 #
 # **With a larger gamma** the robot has to look ahead: it obeys eq. 1 not only in the next step, but in the next
 # $N_h$ steps. Then it finds out earlier that it must brake. In code: is there an acceleration now, followed by

@@ -66,7 +66,7 @@ parameters(
     [
         ("dt, top speed", "0.1 s, 1 m/s", PAPER, "sec. 4"),
         ("N, N_h", f"{N}, {N_h}", PAPER, "sec. 4: steps of the plan, and those under the barrier condition"),
-        ("gamma", gamma, TUNED, "on these four scenarios: notebook 09"),
+        ("gamma", gamma, TUNED, "on these four scenarios: chapter 09"),
         ("a_max", f"{a_max} m/s²", ASSUMED, "the paper gives none"),
         ("Q, R, P", "diag(10, 10, 1, 1), I, 10 Q", ASSUMED, "the paper gives none"),
     ]

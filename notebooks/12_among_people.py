@@ -59,7 +59,7 @@ among = replace(szlib.MPCSettings.among_people(), time_limit=np.inf)
 crowding = among.crowding
 parameters(
     [
-        ("paper: N, N_h", f"{paper.N}, {paper.N_h}", PAPER, "0.8 s ahead; gamma = 0.05: notebook 09"),
+        ("paper: N, N_h", f"{paper.N}, {paper.N_h}", PAPER, "0.8 s ahead; gamma = 0.05: chapter 09"),
         ("among people: plan", f"{among.times[-1]:g} s", TUNED, f"{among.N} steps, a barrier on each"),
         ("among people: gamma", among.gamma, TUNED, "halved and doubled in notebook 29"),
         ("price, gap", f"{crowding.price:g}, {crowding.gap:g} m", TUNED, "halved and doubled in notebook 29"),

@@ -55,7 +55,7 @@ record = NotebookRecord("27_atlas", globals())
 size = "{:.2f} m x {:.2f} m".format(*REFERENCE.semi_axes)
 parameters(
     [
-        ("gamma of the maps", "0.02 to 0.2", MEASURED, "0.05 elsewhere: notebook 09"),
+        ("gamma of the maps", "0.02 to 0.2", MEASURED, "0.05 elsewhere: chapter 09"),
         ("widths of corridor, passage", "3.0 to 6.4 m, 1.4 to 3.0 m", ASSUMED, "4.6 m and 2.0 m elsewhere"),
         ("speed of the person", "0.3 to 1.1 m/s", ASSUMED, "0.5 m/s in the paper"),
         ("size of the zone", "0.5 to 1.25 times", ASSUMED, f"1 is {size}"),

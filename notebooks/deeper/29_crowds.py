@@ -71,7 +71,7 @@ record.key["models of walking"] = ", ".join(models) or "none"
 parameters(
     [
         ("N, N_h", f"{ours.N}, {ours.N_h}", PAPER, "sec. 4"),
-        ("gamma", ours.gamma, TUNED, "on the paper's four scenarios: notebook 09"),
+        ("gamma", ours.gamma, TUNED, "on the paper's four scenarios: chapter 09"),
         ("people in a world", crowded.people, ASSUMED, f"in {crowded.size:g} m x {crowded.size:g} m"),
         ("their pace", crowded.pace, ASSUMED, "m/s; a fifth of them stand; the paper has 0.5"),
         ("sight", sight, ASSUMED, "recorded people farther away are not given"),

@@ -73,8 +73,8 @@ def list_parameters(settings: szlib.MPCSettings, *more: tuple[str, object, str, 
         [
             *more,
             ("N, N_h, dt", f"{settings.N}, {settings.N_h}, {settings.dt} s", PAPER, "sec. 4"),
-            ("gamma", settings.gamma, TUNED, "on these four scenarios; in 2,000 other worlds: notebook 09"),
-            ("a_max; Q, R, P", f"{settings.a_max} m/s²; as in notebook 08", ASSUMED, "the paper gives none"),
+            ("gamma", settings.gamma, TUNED, "on these four scenarios; in 2,000 other worlds: chapter 09"),
+            ("a_max; Q, R, P", f"{settings.a_max} m/s²; as in chapter 08", ASSUMED, "the paper gives none"),
             ("head_on_share", settings.head_on_share, ASSUMED, "ours: where the rule of the side acts"),
             ("the paper's chain", "", PAPER, differences),
         ]
