@@ -294,7 +294,7 @@ def drive(x, goal, people=(), walls=(), n_h=N_h, steps=140, cost=COST):
         barriers = [keep_off(p.after(k * dt)) for p in people] + [keep_off_wall(w) for w in walls]
         new = decide(x, goal, barriers, z, n_h, cost)
         unsolved += new is None
-        z = np.r_[z[2:], 0, 0] if new is None else new  # else: go on with the last plan
+        z = z if new is None else new  # without a plan, go on with the last one
         run.append(np.r_[x, z])
         x, z = A @ x + B @ z[:2], np.r_[z[2:], z[-2:]]
     run = np.array(run)

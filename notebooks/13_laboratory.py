@@ -58,7 +58,7 @@ still = World(PRESETS["corridor"], zone)
 while still.n * still.dt < 4.0:
     still.advance()
 fig = figures.draw_step(still.steps[0])
-fig.set_size_inches(9.5, 4.0)
+fig.set_size_inches(9.5, 3.8)
 fig.suptitle(explain(still.steps[0]).sentence, fontsize=11)
 record.figure(fig, "still")
 

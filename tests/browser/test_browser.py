@@ -86,17 +86,25 @@ FIRST_PICTURE = """async (path) => {
     const { node, content } = await commands.execute("docmanager:open", { path, kernelPreference });
     const shown = () => [...node.querySelectorAll(".jp-Notebook img, .jp-Notebook canvas")]
         .filter((each) => (each.complete ?? true) && each.getBoundingClientRect().width > 100);
-    for (let i = 0; i < 100 && !shown().length; i++) await new Promise((done) => setTimeout(done, 100));
-    await new Promise((done) => setTimeout(done, 500));
-    const [top, bottom] = [shown()[0].getBoundingClientRect(), node.getBoundingClientRect()];
-    const place = [top.top, top.bottom, bottom.bottom];
+    const wait = () => new Promise((done) => setTimeout(done, 150));
+    const measure = () => [shown()[0], node].flatMap((each) => {
+        const { top, bottom } = each.getBoundingClientRect();
+        return [top, bottom];
+    });
+    for (let i = 0; i < 100 && !shown().length; i++) await wait();
+    let place = measure();
+    for (let i = 0, before = []; i < 50 && String(place) !== String(before); i++) {
+        before = place;
+        await wait();
+        place = measure();
+    }
     await commands.execute("application:close");
     return place;
 }"""
 
 
 def test_the_first_picture_of_each_chapter_is_in_the_first_screen(browser, lab, copy):
-    """At 1300 x 900, with the file browser open, the first picture or control is seen without scrolling."""
+    """At 1300 x 900, with the file browser open, 95 % of the first picture are seen without scrolling."""
     page = browser.new_page()
     page.set_viewport_size({"width": WIDTH, "height": HEIGHT})
     page.goto(f"{lab}/lab/tree/chapters?token=szlib")
@@ -105,7 +113,8 @@ def test_the_first_picture_of_each_chapter_is_in_the_first_screen(browser, lab, 
     places = {each.stem: page.evaluate(FIRST_PICTURE, f"chapters/{each.name}") for each in chapters}
     print({name: [round(at) for at in place] for name, place in places.items()})
     page.close()
-    assert [name for name, (_, bottom, screen) in places.items() if bottom > screen] == []
+    shown = {name: (screen - top) / (bottom - top) for name, (top, bottom, _, screen) in places.items()}
+    assert {name: round(share, 2) for name, share in shown.items() if share < 0.95} == {}
 
 
 def picture(locator):

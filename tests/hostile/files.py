@@ -35,6 +35,7 @@ from szlib.simulation.scenarios.random_worlds import Worlds
 from szlib.workbook.record import NotebookRecord, ZoneMethod
 
 DAMAGES = {False: 2, True: 300}
+STRIDE = 4  # of the writes at which the disk is full, in the short form
 JUMPS = {False: 1, True: 40}
 
 
@@ -50,7 +51,7 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
             make_plaza(place / "data" / f"day{number}.csv", seed=number, settings=settings)
         for name, work in WORKS.items():
             reference = _reference(work, place, name)
-            fill_disks(name, work, place, reference, tally)
+            fill_disks(name, work, place, reference, tally, 1 if long else STRIDE)
             damage(name, work, place, reference, random.Random(seed), DAMAGES[long], tally)
         jump(place, _reference(_extract, place, "jumps"), random.Random(seed), JUMPS[long], tally)
     return dict(tally)
@@ -62,8 +63,9 @@ def fill_disks(
     place: Path,
     reference: dict[str, bytes],
     tally: Counter[str],
+    stride: int,
 ) -> None:
-    """Let the disk be full at each write in turn."""
+    """Let the disk be full at each write in turn, or at each `stride`-th."""
     full = 0
     while True:
         out = place / f"{name}-full-{full}"
@@ -82,7 +84,7 @@ def fill_disks(
             print(f"{name}, full at write {full}: refused {refused}, whole {whole}", file=sys.stderr)
             tally["broken after a full disk"] += 1
         tally["disks full at a write"] += 1
-        full += 1
+        full += stride
 
 
 def is_open(content: bytes) -> bool:

@@ -34,6 +34,12 @@ def make_controller(walls, zone):
     return Mine()
 """
 STRAIGHT = OWN.format(control="10 * ((goal - state[:2]) / max(1, np.hypot(*(goal - state[:2]))) - state[2:])")
+PLAIN = """
+import szlib
+
+def make_controller(walls, zone):
+    return szlib.MPCCBF(zone, walls=walls)
+"""
 BOLDER = """
 import math, szlib
 
@@ -172,7 +178,7 @@ def test_the_motors_have_limits(tmp_path):
 
 def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(judging, "RIVALS", [])
-    for name, source in {"straight": STRAIGHT, "crash": "1 / 0", "bolder": BOLDER}.items():
+    for name, source in {"straight": STRAIGHT, "crash": "1 / 0", "plain": PLAIN}.items():
         (tmp_path / f"{name}.py").write_text(source)
     files = [str(file) for file in sorted(tmp_path.glob("*.py"))]
     boards = []
@@ -183,10 +189,10 @@ def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(tmp_p
         boards.append((out / "board.csv").read_bytes() + (out / "board.md").read_bytes())
     assert boards[0] == boards[1] != boards[2]
     printed = capsys.readouterr().out
-    assert printed.splitlines()[2].startswith(f"| {tmp_path.name}/bolder |")
+    assert printed.splitlines()[2].startswith(f"| {tmp_path.name}/plain |")
     assert 'Worlds: --seed 8 --worlds 1, --meeting "overtaking".' in printed
     table = pd.read_csv(tmp_path / "out0" / "board.csv")
-    assert sorted(Path(name).name for name in table["controller"]) == ["bolder", "crash", "straight"]
+    assert sorted(Path(name).name for name in table["controller"]) == ["crash", "plain", "straight"]
     assert "line 1: ZeroDivisionError" in table["refused"].dropna().str.cat()
 
 
