@@ -271,19 +271,20 @@ paces = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)
 rows = []
 for each in paces:
     scene = AtlasCell("making_room", width=width, pace=each).scenario()
-    found = scenario_runs.drive(scene, record.cache.ellipse(), settings).metrics()
-    rows.append((found["min_h"], found["infeasible_steps"]))
-lows, unsolved = np.array(rows).T
+    run = scenario_runs.drive(scene, record.cache.ellipse(), settings)
+    rows.append((run.h[:, 0].min(), run.h[:, 1:].min(), run.metrics()["infeasible_steps"]))
+to_person, to_wall, unsolved = np.array(rows).T
 
 # %% jupyter={"source_hidden": true}
 # Figure
 fig, ax = plt.subplots(figsize=(7.5, 3.6), layout="constrained")
-ax.plot(paces, 100 * lows, "-", color=figures.GREY, linewidth=1)
-kinds = (unsolved == 0, "o", figures.BLUE, "every step has a plan"), (
-    unsolved > 0, "X", figures.RED, "some steps have none",
+ax.plot(paces, 100 * to_person, "-", color=figures.BLUE, linewidth=1)
+ax.plot(paces, 100 * to_wall, "s:", color=figures.BLACK, markersize=4, label="to the nearest wall")
+kinds = (unsolved == 0, "o", figures.BLUE, "to the person; every step has a plan"), (
+    unsolved > 0, "X", figures.RED, "to the person; some steps have none",
 )  # fmt: skip
 for chosen, marker, colour, label in kinds:
-    ax.plot(np.array(paces)[chosen], 100 * lows[chosen], marker, color=colour, markersize=9, label=label)
+    ax.plot(np.array(paces)[chosen], 100 * to_person[chosen], marker, color=colour, markersize=9, label=label)
 ax.axhline(0, color=figures.BLACK, linewidth=0.8)
 failing = np.array(paces)[unsolved > 0]
 ax.set_title(
@@ -295,10 +296,10 @@ record.figure(fig, "paces")
 
 # %% jupyter={"source_hidden": true}
 # The answer
-nearest = paces[int(lows.argmin())]
+nearest = paces[int(to_person.argmin())]
 Markdown(
     f"<details><summary>Answer</summary>\n\nIt comes nearest to the person who walks at {nearest:g} m/s: "
-    f"{100 * lows.min():.1f} cm. The limit is zero at h = speed x dt / gamma: the slower the person, the nearer the robot "
+    f"{100 * to_person.min():.1f} cm. The limit is zero at h = speed x dt / gamma: the slower the person, the nearer the robot "
     "may come before it has to go back. "
     + (
         f"At {failing.min():g} m/s the run has steps without a plan: {unsolved[unsolved > 0][0]:.0f}. The robot itself "

@@ -178,7 +178,7 @@ def test_the_motors_have_limits(tmp_path):
 
 def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(judging, "RIVALS", [])
-    for name, source in {"straight": STRAIGHT, "crash": "1 / 0", "plain": PLAIN}.items():
+    for name, source in {"crash": "1 / 0", "plain": PLAIN}.items():
         (tmp_path / f"{name}.py").write_text(source)
     files = [str(file) for file in sorted(tmp_path.glob("*.py"))]
     boards = []
@@ -192,7 +192,7 @@ def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(tmp_p
     assert printed.splitlines()[2].startswith(f"| {tmp_path.name}/plain |")
     assert 'Worlds: --seed 8 --worlds 1, --meeting "overtaking".' in printed
     table = pd.read_csv(tmp_path / "out0" / "board.csv")
-    assert sorted(Path(name).name for name in table["controller"]) == ["crash", "plain", "straight"]
+    assert sorted(Path(name).name for name in table["controller"]) == ["crash", "plain"]
     assert "line 1: ZeroDivisionError" in table["refused"].dropna().str.cat()
 
 
