@@ -36,7 +36,7 @@
 # emptiness](real_day/06_respect.ipynb).
 
 # %% [markdown]
-# ## For whom, and what you need
+# ## Readers, and what you need to know
 #
 # For final-year students of robotics, control or pedestrian dynamics, for researchers with tracks or a robot, and for lecturers.
 # You read Python (NumPy, pandas), and know vectors, derivatives, means and quantiles. No data has to be fetched.

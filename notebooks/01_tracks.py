@@ -84,7 +84,7 @@ right.hist(
 )
 right.axvline(walking.median(), color=figures.RED, linestyle="--")
 right.set(
-    xlabel="speed [m/s]", ylabel="person-hours", title=f"Those who walk: {walking.median():.2f} m/s (median)"
+    xlabel="speed [m/s]", ylabel="person-hours", title=f"People who walk: {walking.median():.2f} m/s (median)"
 )
 record.figure(fig, "map")
 
@@ -314,7 +314,7 @@ record.key["area [m2]"] = round(square.area, 1)
 #
 # - **"The file has a column with the velocity, so I use it."** It may come from the noise of the sensor. People who stand still
 #   then move at 0.3 m/s and more. Take the displacement over a second.
-# - **"One id is one person."** A person who is lost behind somebody comes back with a new id. Numbers of people are numbers of
+# - **"One id is one person."** A person who disappears behind another comes back with a new id. Numbers of people are numbers of
 #   tracks.
 # - **"Nobody walks there, so there is a wall."** Perhaps nobody had a reason to. And the other way round: a map of people shows no
 #   low shelf between two paths. Look at the place.
