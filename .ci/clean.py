@@ -10,7 +10,13 @@ ROOT = Path(__file__).resolve().parents[1]
 # The purpose of a folder of results, as its marker file `.szlib` states it.
 WORKBOOK, RUN, DAYS = "results of the workbook", "results of ", "encounters by day"
 # What the notebooks write into the folder of a run. Each cached file has a checksum NAME.json beside it.
-CACHED = ("encounters.parquet", "zone.json", "paper_zone.json", "area.txt", "plaza-*.csv")
+CACHED = (
+    "encounters.parquet",
+    "zone.json",
+    "paper_zone.json",
+    "area.txt",
+    "plaza-*.csv",
+)
 NOTEBOOK = "[0-9][0-9]*_*"
 OF_RUN = (
     "report.html", "report.html.json", "summary.json", "parameters.json",
@@ -18,7 +24,13 @@ OF_RUN = (
     *CACHED, *(f"{name}.json" for name in CACHED),
 )  # fmt: skip
 # What `make docs` writes.
-OF_SITE = ("index.html", "which_settings.html", "reference.html", "report.html", "szlib.*.html")
+OF_SITE = (
+    "index.html",
+    "which_settings.html",
+    "reference.html",
+    "report.html",
+    "szlib.*.html",
+)
 # What `make slides` writes.
 OF_SLIDES = (f"{NOTEBOOK}.html", f"figures/{NOTEBOOK}.png")
 
@@ -46,7 +58,9 @@ def remove(folder: Path, patterns: tuple[str, ...]) -> None:
     for inside in sorted({file.parent for file in files} - {folder}, reverse=True):
         if not any(inside.iterdir()):
             inside.rmdir()
-    if folder.is_dir() and all(path.name.startswith(".szlib") for path in folder.iterdir()):
+    if folder.is_dir() and all(
+        path.name.startswith(".szlib") for path in folder.iterdir()
+    ):
         shutil.rmtree(folder)
 
 

@@ -14,11 +14,22 @@ from contextlib import chdir, contextmanager
 from pathlib import Path
 
 from flit_core import buildapi
-from flit_core.buildapi import build_editable, build_sdist, prepare_metadata_for_build_editable
+from flit_core.buildapi import (
+    build_editable,
+    build_sdist,
+    prepare_metadata_for_build_editable,
+)
 
-__all__ = ["build_editable", "build_sdist", "build_wheel", "prepare_metadata_for_build_editable"]
+__all__ = [
+    "build_editable",
+    "build_sdist",
+    "build_wheel",
+    "prepare_metadata_for_build_editable",
+]
 ROOT = Path(__file__).resolve().parents[1]
-EXCLUDED = shutil.ignore_patterns(".git", ".venv", "results", "dist", "__pycache__", ".*_cache", ".hyp*")
+EXCLUDED = shutil.ignore_patterns(
+    ".git", ".venv", "results", "dist", "__pycache__", ".*_cache", ".hyp*"
+)
 # What the wheel holds of the notebooks.
 NOTEBOOKS = (
     "[0-9]*.py", "deeper/*.py", "laboratory/*.py", "laboratory/*.js", "studies/*.py", "exercises/*.py",
@@ -38,12 +49,16 @@ def copy_tree() -> Iterator[Path]:
 
 
 def build_wheel(
-    wheel_directory: str, config_settings: object = None, metadata_directory: object = None
+    wheel_directory: str,
+    config_settings: object = None,
+    metadata_directory: object = None,
 ) -> str:
     """Build the wheel into `wheel_directory` and return its name, as PEP 517 says; the others are unused."""
     place = Path(wheel_directory).resolve()
     with copy_tree() as copy:
-        for file in (file for part in NOTEBOOKS for file in (copy / "notebooks").glob(part)):
+        for file in (
+            file for part in NOTEBOOKS for file in (copy / "notebooks").glob(part)
+        ):
             target = copy / "szlib" / "workbook" / file.relative_to(copy)
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(file, target)
@@ -58,11 +73,16 @@ def make_links_absolute(text: str, home: str) -> str:
 def main(home: str) -> None:
     """Build from a copy of the repository, whose README gets links that start with `home`."""
     if not home.startswith("https://"):
-        sys.exit("make dist needs HOME_URL=https://..., the address of the repository's files")
+        sys.exit(
+            "make dist needs HOME_URL=https://..., the address of the repository's files"
+        )
     (ROOT / "dist").mkdir(exist_ok=True)
     with chdir(ROOT), copy_tree() as copy:
         readme = copy / "README.md"
-        readme.write_text(make_links_absolute(readme.read_text(encoding="utf-8"), home), encoding="utf-8")
+        readme.write_text(
+            make_links_absolute(readme.read_text(encoding="utf-8"), home),
+            encoding="utf-8",
+        )
         for build in (build_sdist, build_wheel):
             print(build(str(ROOT / "dist")))
 

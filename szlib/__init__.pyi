@@ -1,4 +1,16 @@
-from . import control, encounters, errors, files, memory, parallel, plaza, simulation, tracks, workbook, zones
+from . import (
+    control,
+    encounters,
+    errors,
+    files,
+    memory,
+    parallel,
+    plaza,
+    simulation,
+    tracks,
+    workbook,
+    zones,
+)
 from .control import (
     MPCCBF,
     DifferentialDrive,
@@ -27,7 +39,15 @@ from .encounters import (
     time_shifted,
     walked_area,
 )
-from .errors import DataError, DataWarning, MemoryLimitError, SolverError, StorageError, SzlibError, ZoneError
+from .errors import (
+    DataError,
+    DataWarning,
+    MemoryLimitError,
+    SolverError,
+    StorageError,
+    SzlibError,
+    ZoneError,
+)
 from .plaza import PlazaSettings, make_plaza
 from .simulation import (
     MEETINGS,

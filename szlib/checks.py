@@ -21,7 +21,11 @@ _DOUBLE = np.dtype(float)
 
 
 def require(
-    holds: object, name: str, value: object, expected: str, error: type[SzlibError] = DataError
+    holds: object,
+    name: str,
+    value: object,
+    expected: str,
+    error: type[SzlibError] = DataError,
 ) -> None:
     """Raise `error` if the check of an argument does not hold: "`name` must be `expected`; got `value`".
 
@@ -48,7 +52,9 @@ def check_columns(table: pd.DataFrame, needed: Sequence[str]) -> None:
         raise DataError(f"the table is empty; expected rows of {list(needed)}")
 
 
-def check_rows(table: pd.DataFrame, is_valid: ArrayLike, columns: Sequence[str], expected: str) -> None:
+def check_rows(
+    table: pd.DataFrame, is_valid: ArrayLike, columns: Sequence[str], expected: str
+) -> None:
     """Raise DataError with the first row of a table that is not valid.
 
     Parameters
@@ -90,7 +96,9 @@ def check_array(name: str, value: ArrayLike, shape: tuple[Any, ...]) -> Array:
     if not np.abs(array).max(initial=0.0) <= LARGEST:
         if not np.isfinite(array).all():
             raise SolverError(f"{name} must be finite; got {array.tolist()}")
-        raise SolverError(f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin")
+        raise SolverError(
+            f"{name} must lie within +-{LARGEST:g}; got {array.tolist()}; move the origin"
+        )
     return array
 
 
@@ -110,7 +118,12 @@ def check_point(name: str, value: ArrayLike) -> tuple[float, float]:
     """The two numbers of `value` as Python floats; checks and `name` as in `check_array`, but faster."""
     if isinstance(value, tuple) and len(value) == 2:
         x, y = value
-        if type(x) is float and type(y) is float and abs(x) <= LARGEST and abs(y) <= LARGEST:
+        if (
+            type(x) is float
+            and type(y) is float
+            and abs(x) <= LARGEST
+            and abs(y) <= LARGEST
+        ):
             return x, y
     x, y = check_vector(name, value, 2)
     return x, y

@@ -29,7 +29,8 @@ from .input_files import open_regular, read_small
 
 MARKER = ".szlib"  # name of the file that marks a folder as szlib's
 _LOCK, _UNFINISHED, _TEMPORARY = ".szlib-lock", ".szlib-part-", "szlib-"
-_ABANDONED = 3600.0  # age at which an unfinished file is removed [s]: no write takes so long
+# age at which an unfinished file is removed [s]: no write takes so long
+_ABANDONED = 3600.0
 
 
 @contextmanager
@@ -52,12 +53,18 @@ def write_file(path: str | Path, content: bytes | str, *, durable: bool = True) 
     advice = "make room, or choose a folder that is writable; files that were finished before are intact"
     with _explain_errors(f"{path}: cannot be written", advice):
         try:
-            _fill(unfinished, content.encode() if isinstance(content, str) else content, durable)
+            _fill(
+                unfinished,
+                content.encode() if isinstance(content, str) else content,
+                durable,
+            )
             unfinished.replace(path)
             if durable:
                 _sync(path.parent)
         except BaseException:
-            with suppress(OSError):  # a file that could not be created cannot be removed
+            with suppress(
+                OSError
+            ):  # a file that could not be created cannot be removed
                 unfinished.unlink()
             raise
 
@@ -79,7 +86,10 @@ def _sync(folder: Path) -> None:
     try:
         os.fsync(handle)
     except OSError as error:
-        if error.errno not in (None, errno.EINVAL):  # a file system that does not sync folders
+        if error.errno not in (
+            None,
+            errno.EINVAL,
+        ):  # a file system that does not sync folders
             raise
     finally:
         os.close(handle)
@@ -104,12 +114,18 @@ def load_cached(path: Path, made_of: Any) -> bytes | None:
         with open_regular(path) as stream:
             content = stream.read()
         matches = record["made_of"] == json.loads(json.dumps(made_of))
-        return content if matches and record["sha256"] == hashlib.sha256(content).hexdigest() else None
+        return (
+            content
+            if matches and record["sha256"] == hashlib.sha256(content).hexdigest()
+            else None
+        )
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
-def claim_folder(folder: str | Path, purpose: str, *, inputs: Iterable[Path] = ()) -> Path:
+def claim_folder(
+    folder: str | Path, purpose: str, *, inputs: Iterable[Path] = ()
+) -> Path:
     """Make `folder`, or reuse it if it is empty or was claimed for the same `purpose`; return its path.
 
     Parameters
@@ -131,7 +147,9 @@ def claim_folder(folder: str | Path, purpose: str, *, inputs: Iterable[Path] = (
             )
         folder.mkdir(parents=True, exist_ok=True)
         owner = folder_purpose(folder)
-        foreign = sorted(entry.name for entry in folder.iterdir() if not _is_ours(entry))
+        foreign = sorted(
+            entry.name for entry in folder.iterdir() if not _is_ours(entry)
+        )
         if owner is None and foreign:
             raise StorageError(
                 f"{folder}: holds files that szlib did not write, such as {foreign[0]!r}; choose a new or "
@@ -147,7 +165,10 @@ def claim_folder(folder: str | Path, purpose: str, *, inputs: Iterable[Path] = (
 
 
 def _mark(folder: Path, purpose: str) -> str:
-    write_file(folder / MARKER, f"{purpose}\nWritten by szlib, which may replace every file here.\n")
+    write_file(
+        folder / MARKER,
+        f"{purpose}\nWritten by szlib, which may replace every file here.\n",
+    )
     return purpose
 
 
@@ -200,7 +221,9 @@ def temporary_folder() -> Iterator[Path]:
     Raises StorageError where there is no room for it, or the umask forbids its use.
     """
     remove_abandoned_temporary()
-    with _explain_errors("no temporary folder", "make room, or name another one in $TMPDIR"):
+    with _explain_errors(
+        "no temporary folder", "make room, or name another one in $TMPDIR"
+    ):
         while (locked := _make_temporary()) is None:
             pass
         folder, lock = locked
@@ -217,11 +240,15 @@ def _make_temporary() -> tuple[Path, FileLock] | None:
     mode = folder.stat().st_mode
     if mode & 0o700 != 0o700:
         folder.rmdir()
-        raise StorageError("new files may not be used by their owner (umask); call umask 022 first")
+        raise StorageError(
+            "new files may not be used by their owner (umask); call umask 022 first"
+        )
     lock = FileLock(folder / _LOCK)
     with suppress(FileNotFoundError):
         lock.acquire()
-        if (folder / _LOCK).is_file() and folder.stat().st_mode == mode:  # the lock makes a missing folder
+        if (
+            (folder / _LOCK).is_file() and folder.stat().st_mode == mode
+        ):  # the lock makes a missing folder
             return folder, lock
         lock.release()
         shutil.rmtree(folder, ignore_errors=True)
@@ -232,7 +259,8 @@ def _make_temporary() -> tuple[Path, FileLock] | None:
 def process_folder() -> Path:
     """The `temporary_folder` of this process, removed when the process ends."""
     stack = ExitStack()
-    Finalize(None, stack.close, exitpriority=-200)  # after multiprocessing has removed its own folder inside
+    # after multiprocessing has removed its own folder inside
+    Finalize(None, stack.close, exitpriority=-200)
     return stack.enter_context(temporary_folder())
 
 
@@ -248,7 +276,11 @@ def remove_abandoned_temporary() -> None:
 
 def _remove_semaphores(number: str) -> None:
     """Remove the semaphores that joblib left in shared memory when the process `number` was killed."""
-    if number.isdecimal() and Path("/proc/self").exists() and not Path("/proc", number).exists():
+    if (
+        number.isdecimal()
+        and Path("/proc/self").exists()
+        and not Path("/proc", number).exists()
+    ):
         for semaphore in Path("/dev/shm").glob(f"sem.loky-{number}-*"):
             with suppress(OSError):
                 semaphore.unlink()

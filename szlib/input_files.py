@@ -26,7 +26,8 @@ _OPEN: ContextVar[Mapping[Path, BinaryIO]] = ContextVar("open")
 
 def open_regular(path: Path) -> BinaryIO:
     """Open the regular file `path` to read it; OSError for anything else, such as a FIFO without end."""
-    at_once = getattr(os, "O_NONBLOCK", 0)  # do not wait for a process that writes the file
+    # do not wait for a process that writes the file
+    at_once = getattr(os, "O_NONBLOCK", 0)
     stream = open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once))  # noqa: SIM115
     if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
         return stream
@@ -65,7 +66,9 @@ def unchanged_files(paths: Iterable[Path]) -> Iterator[None]:
             try:
                 opened[path] = stack.enter_context(open_regular(path))
             except OSError as error:
-                raise DataError(f"{printable(path)}: cannot be opened ({error.strerror or error})") from error
+                raise DataError(
+                    f"{printable(path)}: cannot be opened ({error.strerror or error})"
+                ) from error
         before = {path: _states(path, stream) for path, stream in opened.items()}
         token = _OPEN.set({**_OPEN.get({}), **opened})
         try:
@@ -96,13 +99,19 @@ def _states(path: Path, stream: BinaryIO) -> list[tuple[float, ...]]:
     found = [os.fstat(stream.fileno())]
     with suppress(OSError):
         found.append(path.stat())
-    return [(s.st_dev, s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for s in found]
+    return [
+        (s.st_dev, s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for s in found
+    ]
 
 
-def _require_unchanged(opened: Mapping[Path, BinaryIO], before: Mapping[Path, object]) -> None:
+def _require_unchanged(
+    opened: Mapping[Path, BinaryIO], before: Mapping[Path, object]
+) -> None:
     for path, stream in opened.items():
         if _states(path, stream) != before[path]:
-            raise DataError(f"{printable(path)}: changed while it was read; try again when it is complete")
+            raise DataError(
+                f"{printable(path)}: changed while it was read; try again when it is complete"
+            )
 
 
 def file_content(file: Path) -> tuple[int, str]:
@@ -113,7 +122,9 @@ def file_content(file: Path) -> tuple[int, str]:
 
 
 @contextmanager
-def reading(path: Path, what: str, expected: str, error: type[SzlibError] = DataError) -> Iterator[None]:
+def reading(
+    path: Path, what: str, expected: str, error: type[SzlibError] = DataError
+) -> Iterator[None]:
     """Raise `error` if the block cannot read the file `path`.
 
     Parameters
@@ -127,11 +138,25 @@ def reading(path: Path, what: str, expected: str, error: type[SzlibError] = Data
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise OSError(errno.EINVAL, "it is no regular file", str(path))
         yield
-    except (OSError, ValueError, KeyError, TypeError, RecursionError, BadZipFile, zlib.error) as fault:
-        raise error(f"{printable(path)}: cannot be read {what} ({fault}); expected {expected}") from fault
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        RecursionError,
+        BadZipFile,
+        zlib.error,
+    ) as fault:
+        raise error(
+            f"{printable(path)}: cannot be read {what} ({fault}); expected {expected}"
+        ) from fault
 
 
 def printable(name: object) -> str:
     """The file name `name` as text for any file and any terminal: bytes that are not UTF-8 are escaped."""
-    text = str(name).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
-    return "".join(c if c.isprintable() or c in _JOINERS else ascii(c)[1:-1] for c in text)
+    text = (
+        str(name).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    )
+    return "".join(
+        c if c.isprintable() or c in _JOINERS else ascii(c)[1:-1] for c in text
+    )

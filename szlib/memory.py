@@ -25,11 +25,15 @@ _granted: ContextVar[int | None] = ContextVar("granted", default=None)
 
 def parse_size(text: str) -> int:
     """Bytes of `text`, such as "4GB", "512 MiB" or "2g"; raises MemoryLimitError for other text."""
-    found = re.fullmatch(r"(\d{1,15}(?:\.\d{1,9})?) ?([KMGT]?)(I?)B?", text.strip().upper(), re.ASCII)
+    found = re.fullmatch(
+        r"(\d{1,15}(?:\.\d{1,9})?) ?([KMGT]?)(I?)B?", text.strip().upper(), re.ASCII
+    )
     number, prefix, binary = found.groups() if found else ("0", "", "")
     size = float(number) * (1024 if binary else 1000) ** " KMGT".index(prefix or " ")
     if not 1 <= size < 1e18:
-        raise MemoryLimitError(f"memory {text!r}: expected an amount such as 4GB or 512MB")
+        raise MemoryLimitError(
+            f"memory {text!r}: expected an amount such as 4GB or 512MB"
+        )
     return int(size)
 
 
@@ -75,9 +79,15 @@ def _available() -> float:
         try:
             allowed = float(Path(folder, limit_file).read_text(encoding="ascii"))
             cached = re.search(
-                r"^(?:total_)?inactive_file (\d+)", Path(folder, "memory.stat").read_text(), re.M
+                r"^(?:total_)?inactive_file (\d+)",
+                Path(folder, "memory.stat").read_text(),
+                re.M,
             )
-            free = allowed - float(Path(folder, used_file).read_text()) + float(cached[1] if cached else 0)
+            free = (
+                allowed
+                - float(Path(folder, used_file).read_text())
+                + float(cached[1] if cached else 0)
+            )
             return min(available, max(0.0, free))
         except (OSError, ValueError):  # "max": no limit
             continue

@@ -24,7 +24,8 @@ from . import memory
 from .errors import SzlibError
 from .files import process_folder
 
-_CONNECT_TIMEOUT = 10.0  # longest wait for the answer of a scheduler, and for its first worker [s]
+# longest wait for the answer of a scheduler, and for its first worker [s]
+_CONNECT_TIMEOUT = 10.0
 _MAX_PER_CORE = 4  # more processes than this for each core slow each other down
 _HEARTBEAT = 0.5  # interval at which a process checks that its parent lives [s]
 
@@ -106,7 +107,9 @@ def limit_jobs(n_jobs: int, n_tasks: int) -> int:
     Raises SzlibError for 0.
     """
     if n_jobs == 0:
-        raise SzlibError("n_jobs must be a number of processes, or -1 for every core; got 0")
+        raise SzlibError(
+            "n_jobs must be a number of processes, or -1 for every core; got 0"
+        )
     if n_jobs < 0:
         return n_jobs
     largest = _MAX_PER_CORE * (os.cpu_count() or 1)
@@ -135,10 +138,14 @@ def end_with(parent: int) -> None:
 
     if os.getppid() != parent:
         os._exit(1)
-    threading.Thread(target=watch_parent, name="ends with its parent", daemon=True).start()
+    threading.Thread(
+        target=watch_parent, name="ends with its parent", daemon=True
+    ).start()
 
 
-def _run_in_share(parent: int, share: int, task: tuple[Callable[..., Any], Any, Any]) -> Any:
+def _run_in_share(
+    parent: int, share: int, task: tuple[Callable[..., Any], Any, Any]
+) -> Any:
     """Run one task, within `share` bytes of memory on the machine of `parent`, else within its limit."""
     function, positional, named = task
     with memory.granted(share if parent in (os.getpid(), os.getppid()) else None):
@@ -158,7 +165,9 @@ def cluster(address: str | None, *, wait: float = _CONNECT_TIMEOUT) -> Iterator[
     try:
         from distributed import Client
     except ImportError as error:
-        raise SzlibError("a scheduler needs Dask; install it with: pip install -e '.[cluster]'") from error
+        raise SzlibError(
+            "a scheduler needs Dask; install it with: pip install -e '.[cluster]'"
+        ) from error
     try:
         client = Client(address, timeout=max(wait, _CONNECT_TIMEOUT))
     except (OSError, ValueError) as error:

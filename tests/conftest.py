@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: threads of BLAS that wait take a core
+# before NumPy is loaded: threads of BLAS that wait take a core
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import hypothesis
 import pandas as pd
@@ -65,7 +66,11 @@ def notebooks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., 
 
     def write(**codes: str) -> Path:
         for name, code in codes.items():
-            text = NOTEBOOK.format(name=f"{name[1:]}") + code + "\n\n# %%\nrecord.close()\n"
+            text = (
+                NOTEBOOK.format(name=f"{name[1:]}")
+                + code
+                + "\n\n# %%\nrecord.close()\n"
+            )
             (folder / f"{name[1:]}.py").write_text(text)
         return folder
 
@@ -79,7 +84,9 @@ def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
 
     from szlib.workbook import notebook_execution
 
-    def run_cells(script: Path, given: dict[str, Any], folder: Path, environment: dict[str, str]) -> None:
+    def run_cells(
+        script: Path, given: dict[str, Any], folder: Path, environment: dict[str, str]
+    ) -> None:
         notebook, variables = jupytext.read(script), dict[str, Any]()
         try:
             with (

@@ -22,19 +22,24 @@ PAGE = (ROOT / "notebooks" / "which_settings.md").read_text(encoding="utf-8")
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> dict[str, BeautifulSoup]:
     """Every page but the report, by name."""
-    spec = importlib.util.spec_from_file_location("docs", ROOT / "notebooks" / "tools" / "docs.py")
+    spec = importlib.util.spec_from_file_location(
+        "docs", ROOT / "notebooks" / "tools" / "docs.py"
+    )
     docs = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(docs)
     folder = tmp_path_factory.mktemp("site")
     docs.write_site(folder)
     return {
-        file.stem: BeautifulSoup(file.read_text("utf-8"), "html.parser") for file in folder.glob("*.html")
+        file.stem: BeautifulSoup(file.read_text("utf-8"), "html.parser")
+        for file in folder.glob("*.html")
     }
 
 
 def test_each_public_name_has_a_page_in_the_index(site):
     linked = {link["href"] for link in site["index"].select("main table a")}
-    for name in (each for each in szlib.__all__ if not inspect.ismodule(getattr(szlib, each))):
+    for name in (
+        each for each in szlib.__all__ if not inspect.ismodule(getattr(szlib, each))
+    ):
         assert f"szlib.{name}" in site, name
         assert f"szlib.{name}.html" in linked, name
 
@@ -43,10 +48,18 @@ def test_each_table_has_every_parameter_with_its_meaning(site):
     lacking = []
     for name in szlib.__all__:
         value = getattr(szlib, name)
-        if not callable(value) or (inspect.isclass(value) and issubclass(value, Exception)):
+        if not callable(value) or (
+            inspect.isclass(value) and issubclass(value, Exception)
+        ):
             continue
-        expected = [each for each in inspect.signature(value).parameters if each not in ("self", "cls")]
-        rows = site[f"szlib.{name}"].select_one("section").select("table.parameters")[:1]
+        expected = [
+            each
+            for each in inspect.signature(value).parameters
+            if each not in ("self", "cls")
+        ]
+        rows = (
+            site[f"szlib.{name}"].select_one("section").select("table.parameters")[:1]
+        )
         cells = [
             [cell.get_text(strip=True) for cell in row.select("td")]
             for table in rows
@@ -91,8 +104,16 @@ def test_links_lead_to_pages_and_places(site):
 
 
 def test_no_page_asks_a_server(site):
-    asked = [tag for page in site.values() for tag in page.select("script[src], link[href], img[src]")]
-    assert [tag for tag in asked if str(tag.get("src") or tag.get("href")).startswith(("http", "//"))] == []
+    asked = [
+        tag
+        for page in site.values()
+        for tag in page.select("script[src], link[href], img[src]")
+    ]
+    assert [
+        tag
+        for tag in asked
+        if str(tag.get("src") or tag.get("href")).startswith(("http", "//"))
+    ] == []
 
 
 def test_the_page_of_decisions_links_files_and_names_what_exists():
@@ -103,12 +124,25 @@ def test_the_page_of_decisions_links_files_and_names_what_exists():
 
 
 @pytest.mark.filterwarnings("ignore:.*fewer than 20 encounters:szlib.DataWarning")
-def test_the_commands_and_programs_of_the_page_of_decisions_run(tmp_path, monkeypatch, capsys):
+def test_the_commands_and_programs_of_the_page_of_decisions_run(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
-    tracks = szlib.read_tracks(szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=120)))
-    hall = tracks.assign(Frame=(25 * (tracks["t"] - tracks["t"].min())).round().astype(int))
+    tracks = szlib.read_tracks(
+        szlib.make_plaza("plaza.csv", settings=szlib.PlazaSettings(n_encounters=120))
+    )
+    hall = tracks.assign(
+        Frame=(25 * (tracks["t"] - tracks["t"].min())).round().astype(int)
+    )
     hall = hall.assign(X=1000 * hall["x"], Y=1000 * hall["y"], Ped=hall["id"])
-    columns = ["--columns", "frame=Frame,id=Ped,x=X,y=Y", "--frame-rate", "25", "--unit", "mm"]
+    columns = [
+        "--columns",
+        "frame=Frame,id=Ped,x=X,y=Y",
+        "--frame-rate",
+        "25",
+        "--unit",
+        "mm",
+    ]
     hall[["Frame", "Ped", "X", "Y"]].to_csv("hall.csv", index=False)
     (tmp_path / "map.pgm").write_bytes(b"P5 10 10 255\n" + bytes(50) + b"\xfe" * 50)
     text = "image: map.pgm\nresolution: 0.1\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
@@ -116,7 +150,10 @@ def test_the_commands_and_programs_of_the_page_of_decisions_run(tmp_path, monkey
     for command in re.findall(r"```sh\nszlib (.*?)\n```", PAGE):
         given = command.split()
         assert cli.main(given if "--columns" in given else [*given, *columns]) == 0
-    found = {"szlib": szlib, "zone": szlib.reference_zone("grand-central-strangers").ellipse}
+    found = {
+        "szlib": szlib,
+        "zone": szlib.reference_zone("grand-central-strangers").ellipse,
+    }
     for program in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL):
         if "tracks" in found:
             found["samples"] = szlib.find_encounters(found["tracks"])
@@ -132,33 +169,62 @@ def table(name: str) -> pd.DataFrame:
 def test_the_numbers_of_the_page_are_those_of_the_tables():
     text = " ".join(PAGE.split())
     radius = table("25_imposed").query("quantity == 'radius' and site != 'plaza'")
-    squares = (radius["bias"] ** 2 + radius["scatter"] ** 2).groupby([radius["method"], radius["encounters"]])
+    squares = (radius["bias"] ** 2 + radius["scatter"] ** 2).groupby(
+        [radius["method"], radius["encounters"]]
+    )
     error = (100 * np.sqrt(squares.mean()))["respect"].map("{:.0f} cm".format)
     pairs = f"{error[150]} off (root mean square) with 150 encounters, {error[300]} with 300"
     assert f"{pairs}, {error[600]} with 600, {error[2400]} with 2,400" in text
-    held = 100 * radius.query("encounters >= 300").groupby(["method", "encounters"])["held"].mean()
+    held = (
+        100
+        * radius.query("encounters >= 300")
+        .groupby(["method", "encounters"])["held"]
+        .mean()
+    )
     low, high = held.groupby("method").min(), held.groupby("method").max()
     assert f"in {low['respect']:.0f} to {high['respect']:.0f} % of draws" in text
     assert f'"quantile" in {low["quantile"]:.0f} to {high["quantile"]:.0f} %' in text
-    assert f"from {verdict.MIN_TOTAL} encounters on; {respect.MIN_COMPARED} are the least" in text
+    assert (
+        f"from {verdict.MIN_TOTAL} encounters on; {respect.MIN_COMPARED} are the least"
+        in text
+    )
 
-    sites = table("06_sites").query("min_distance == 1").set_index(["site", "kinds"])["encounters"]
+    sites = (
+        table("06_sites")
+        .query("min_distance == 1")
+        .set_index(["site", "kinds"])["encounters"]
+    )
     day = f"{sites['atc-1hz', 'all']} encounters, {sites['atc-1hz', 'strangers']} of them of strangers"
-    assert f"{day}; 80 minutes of Grand Central have {sites['grand-central', 'all']:,}" in text
+    assert (
+        f"{day}; 80 minutes of Grand Central have {sites['grand-central', 'all']:,}"
+        in text
+    )
 
     day = table("25_sensitivity").query("data == 'ATC day' and method == 'quantile'")
     a = day.set_index(["parameter", "value"])["a"]
     default, strangers = a["default"].item(), a["kinds", "strangers"]
-    assert f"quantile zone is {default:.2f} m; it is {strangers:.2f} m for strangers" in text
+    assert (
+        f"quantile zone is {default:.2f} m; it is {strangers:.2f} m for strangers"
+        in text
+    )
     assert f"{a['min_distance', '0.5']:.2f} m with `min_distance=0.5`" in text
     assert f"{a['duration', '4.0']:.2f} m with windows of 4 s" in text
-    moved = day[day["parameter"].isin(["r_max", "min_speed", "q"])]["a"].sub(default).abs().max()
+    moved = (
+        day[day["parameter"].isin(["r_max", "min_speed", "q"])]["a"]
+        .sub(default)
+        .abs()
+        .max()
+    )
     assert f"moved it by {100 * moved:.0f} cm at most" in text
 
     gamma = table("09_gamma").set_index("gamma")
-    arrived, negative = 100 * gamma["arrived"], 100 * gamma["worlds with h < 0"] / gamma["worlds"]
+    arrived, negative = (
+        100 * gamma["arrived"],
+        100 * gamma["worlds with h < 0"] / gamma["worlds"],
+    )
     assert (
-        f"arrived in {arrived[0.02]:.0f} % with 0.02, in {arrived[0.05]:.0f} to {arrived[0.1]:.0f} %" in text
+        f"arrived in {arrived[0.02]:.0f} % with 0.02, in {arrived[0.05]:.0f} to {arrived[0.1]:.0f} %"
+        in text
     )
     assert f"with 0.4, {negative[0.4]:.0f} % of worlds had h < 0" in text
     reached = table("29_sensitivity").query("metric == 'reached'")
@@ -172,20 +238,31 @@ def test_the_numbers_of_the_page_are_those_of_the_tables():
     assert set(ours["n"]) == {200}
     assert f"reached {100 * ours['mean']['among people']:.1f} % of goals" in text
     assert f"the defaults {100 * ours['mean']['MPC-CBF']:.0f} %" in text
-    steps = table("21_rollouts").query("set == 'all'").set_index("formulation")["infeasible_steps"]
+    steps = (
+        table("21_rollouts")
+        .query("set == 'all'")
+        .set_index("formulation")["infeasible_steps"]
+    )
     assert (
-        f"{steps['rest']:,} steps of 2,000 random worlds had none, of the defaults {steps['szlib']}" in text
+        f"{steps['rest']:,} steps of 2,000 random worlds had none, of the defaults {steps['szlib']}"
+        in text
     )
 
 
 def test_a_citation_has_what_bibtex_needs(site):
     """Each entry, of szlib, the paper and the data, has a key, a title, authors, a year and an address."""
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    entries = re.findall(r"^@(\w+)\{([^,\s]+),\n(.*?)^\}$", site["index"].get_text(), flags=re.M | re.S)
+    entries = re.findall(
+        r"^@(\w+)\{([^,\s]+),\n(.*?)^\}$", site["index"].get_text(), flags=re.M | re.S
+    )
     assert len(entries) == 2 + len(citation["references"])
     assert len({key for _, key, _ in entries}) == len(entries)
     for kind, key, fields in entries:
         assert kind in ("article", "inproceedings", "misc")
         assert re.fullmatch(r"[A-Za-z]+\d{4}", key)
-        assert {"author", "title", "year"} <= set(re.findall(r"^  (\w+) = \{", fields, flags=re.M))
-        assert kind == "misc" or re.search(r"^  (url|doi) = \{", fields, flags=re.M), key
+        assert {"author", "title", "year"} <= set(
+            re.findall(r"^  (\w+) = \{", fields, flags=re.M)
+        )
+        assert kind == "misc" or re.search(r"^  (url|doi) = \{", fields, flags=re.M), (
+            key
+        )

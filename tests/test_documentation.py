@@ -51,17 +51,29 @@ def sections(docstring: str) -> dict[str, str]:
 def entries(docstring: str, *names: str) -> set[str]:
     """The names that have an entry in one of these sections."""
     text = "\n".join(sections(docstring).get(name, "") for name in names)
-    return {name.strip(" *") for match in ENTRY.finditer(text) for name in match[1].split(",")}
+    return {
+        name.strip(" *")
+        for match in ENTRY.finditer(text)
+        for name in match[1].split(",")
+    }
 
 
 def quoted(docstring: str) -> set[str]:
     """Every word in backticks."""
-    return {word for match in QUOTED.finditer(docstring) for word in re.findall(r"\w+", match[2])}
+    return {
+        word
+        for match in QUOTED.finditer(docstring)
+        for word in re.findall(r"\w+", match[2])
+    }
 
 
 def parameters(function: Callable[..., object]) -> set[str]:
     names = inspect.signature(function).parameters
-    return {name for name in names if name not in ("self", "cls") and not name.startswith("_")}
+    return {
+        name
+        for name in names
+        if name not in ("self", "cls") and not name.startswith("_")
+    }
 
 
 def constructor_parameters(kind: type) -> set[str]:
@@ -69,7 +81,9 @@ def constructor_parameters(kind: type) -> set[str]:
     if dataclasses.is_dataclass(kind) or hasattr(kind, "_fields"):
         return parameters(kind)
     written = next((base for base in kind.__mro__ if "__init__" in vars(base)), object)
-    is_ours = written.__module__.startswith("szlib") and not getattr(kind, "_is_protocol", False)
+    is_ours = written.__module__.startswith("szlib") and not getattr(
+        kind, "_is_protocol", False
+    )
     return parameters(kind) if is_ours else set()
 
 
@@ -93,7 +107,11 @@ def described(module: str) -> Iterator[tuple[str, str, set[str], set[str]]]:
             text = f"{inspect.getdoc(found) or ''}\n{vars(found).get('__init__', object).__doc__ or ''}"
             yield name, text, constructor_parameters(found), attributes(found)
             for method, value in vars(found).items():
-                called = value.__func__ if isinstance(value, classmethod | staticmethod) else value
+                called = (
+                    value.__func__
+                    if isinstance(value, classmethod | staticmethod)
+                    else value
+                )
                 if not method.startswith("_") and inspect.isfunction(called):
                     text = inspect.getdoc(getattr(found, method)) or ""
                     yield f"{name}.{method}", text, parameters(called), set()
@@ -108,10 +126,17 @@ def test_every_parameter_is_described() -> None:
         for name, docstring, given, fields in described(module):
             known = entries(docstring, "Parameters", "Attributes", "Other Parameters")
             missing = given - known - quoted(docstring)
-            stray = entries(docstring, "Parameters", "Other Parameters", "Attributes") - given - fields
-            problems += [f"{module}.{name}: {each} is not described" for each in sorted(missing)]
+            stray = (
+                entries(docstring, "Parameters", "Other Parameters", "Attributes")
+                - given
+                - fields
+            )
             problems += [
-                f"{module}.{name}: {each} is described, but is no parameter" for each in sorted(stray)
+                f"{module}.{name}: {each} is not described" for each in sorted(missing)
+            ]
+            problems += [
+                f"{module}.{name}: {each} is described, but is no parameter"
+                for each in sorted(stray)
             ]
     fail_with(problems)
 
@@ -120,11 +145,21 @@ def test_everything_public_has_a_docstring() -> None:
     """Functions within functions as well."""
     silent = []
     for module in MODULES:
-        tree = ast.parse(Path(importlib.import_module(module).__file__ or "").read_text(encoding="utf-8"))
+        tree = ast.parse(
+            Path(importlib.import_module(module).__file__ or "").read_text(
+                encoding="utf-8"
+            )
+        )
         silent += [] if ast.get_docstring(tree) else [module]
         for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
-                silent += [] if ast.get_docstring(node) else [f"{module}: {node.name}, line {node.lineno}"]
+            if isinstance(
+                node, ast.FunctionDef | ast.ClassDef
+            ) and not node.name.startswith("_"):
+                silent += (
+                    []
+                    if ast.get_docstring(node)
+                    else [f"{module}: {node.name}, line {node.lineno}"]
+                )
     assert silent == []
 
 
@@ -135,14 +170,22 @@ def examples(module: str) -> list[doctest.DocTest]:
     """The examples of a module's docstrings; `szlib` and `np` are there without an import."""
     finder = doctest.DocTestFinder(exclude_empty=True)
     names = {"szlib": szlib, "np": np}
-    return [each for each in finder.find(importlib.import_module(module), extraglobs=names) if each.examples]
+    return [
+        each
+        for each in finder.find(importlib.import_module(module), extraglobs=names)
+        if each.examples
+    ]
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_every_example_runs(module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_example_runs(
+    module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     matplotlib.use("Agg")
-    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS, verbose=False)
+    runner = doctest.DocTestRunner(
+        optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS, verbose=False
+    )
     report: list[str] = []
     for example in examples(module):
         runner.run(example, out=report.append)
@@ -152,13 +195,18 @@ def test_every_example_runs(module: str, tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_every_exported_name_has_an_example() -> None:
     """A section in its docstring; a constant is used in an example of its module or another one."""
-    text, problems = "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")), []
+    text, problems = (
+        "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")),
+        [],
+    )
     for name in sorted(szlib.__all__):
         found = getattr(szlib, name)
         if inspect.isclass(found) or inspect.isfunction(found):
             examples = sections(inspect.getdoc(found) or "").get("Examples", "")
             problems += [] if ">>>" in examples else [f"{name} has no Examples"]
         elif not inspect.ismodule(found):
-            used = re.search(rf"^\s*(?:>>>|\.\.\.) .*\bszlib\.{name}\b", text, re.MULTILINE)
+            used = re.search(
+                rf"^\s*(?:>>>|\.\.\.) .*\bszlib\.{name}\b", text, re.MULTILINE
+            )
             problems += [] if used else [f"szlib.{name} is used in no example"]
     fail_with(problems)

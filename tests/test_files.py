@@ -33,7 +33,9 @@ def test_only_files_py_writes_files() -> None:
     found = []
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
+            if not isinstance(node, ast.Call) or not isinstance(
+                node.func, ast.Attribute
+            ):
                 continue
             name, first = node.func.attr, ast.unparse(node.args[0]) if node.args else ""
             opens = name == "open" and first.strip("'\"").startswith(("w", "a", "x"))
@@ -42,12 +44,18 @@ def test_only_files_py_writes_files() -> None:
                 found.append(f"{path.relative_to(PACKAGE)}: {ast.unparse(node)[:60]}")
     unpacked = [each for each in found if each.endswith("unpacked.open('wb')")]
     appended = [each for each in found if "Path(file).open('a'" in each]
-    assert [each for each in found if each not in unpacked + appended] == ["files.py: unfinished.open('xb')"]
+    assert [each for each in found if each not in unpacked + appended] == [
+        "files.py: unfinished.open('xb')"
+    ]
     assert len(unpacked) == 1, "a compressed file is unpacked into a temporary folder"
-    assert len(appended) == 1, "the summary that GitHub shows has entries of other programs"
+    assert len(appended) == 1, (
+        "the summary that GitHub shows has entries of other programs"
+    )
 
 
-def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_write_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / "a.txt"
     files.write_file(file, "first")
 
@@ -55,13 +63,19 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", fail)
-    with pytest.raises(StorageError, match=r"a\.txt: cannot be written \(No space left"):
+    with pytest.raises(
+        StorageError, match=r"a\.txt: cannot be written \(No space left"
+    ):
         files.write_file(file, "second")
     assert file.read_text() == "first"
-    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"], "no unfinished file is left"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"], (
+        "no unfinished file is left"
+    )
 
 
-def test_durable_files_are_synced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_durable_files_are_synced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     synced: list[int] = []
     monkeypatch.setattr(os, "fsync", lambda handle: synced.append(handle))
     files.write_file(tmp_path / "a", "x")
@@ -70,13 +84,20 @@ def test_durable_files_are_synced(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert len(synced) == 2
 
 
-def test_a_folder_with_foreign_files_other_results_or_input_data_is_refused(tmp_path: Path) -> None:
+def test_a_folder_with_foreign_files_other_results_or_input_data_is_refused(
+    tmp_path: Path,
+) -> None:
     foreign = tmp_path / "foreign"
     foreign.mkdir()
     (foreign / "thesis.txt").write_text("x")
-    with pytest.raises(StorageError, match=r"holds files that szlib did not write, such as 'thesis\.txt'"):
+    with pytest.raises(
+        StorageError,
+        match=r"holds files that szlib did not write, such as 'thesis\.txt'",
+    ):
         files.claim_folder(foreign, "days")
-    assert [path.name for path in foreign.iterdir()] == ["thesis.txt"], "nothing is written into it"
+    assert [path.name for path in foreign.iterdir()] == ["thesis.txt"], (
+        "nothing is written into it"
+    )
     ours = files.claim_folder(tmp_path / "ours", "days")
     (ours / "2012.json").write_text("{}")
     assert files.claim_folder(ours, "days") == ours
@@ -86,22 +107,37 @@ def test_a_folder_with_foreign_files_other_results_or_input_data_is_refused(tmp_
     with pytest.raises(StorageError, match=r"holds input data, a\.csv"):
         files.claim_folder(ours, "days", inputs=[ours / "deep" / "a.csv"])
     files.claim_folder(tmp_path / "all" / "days", "days")
-    files.claim_folder(tmp_path / "all", "results"), "claimed folders in it are not foreign"
+    (
+        files.claim_folder(tmp_path / "all", "results"),
+        "claimed folders in it are not foreign",
+    )
 
 
 def test_one_process_at_a_time_holds_the_lock_of_a_folder(tmp_path: Path) -> None:
     folder = files.claim_folder(tmp_path / "results", "results")
-    program = f"from szlib.files import folder_lock\nwith folder_lock({str(folder)!r}): pass"
+    program = (
+        f"from szlib.files import folder_lock\nwith folder_lock({str(folder)!r}): pass"
+    )
     with files.folder_lock(folder):
-        refused = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert refused.returncode == 1 and "another process is writing there" in refused.stderr
-    assert subprocess.run([sys.executable, "-c", program]).returncode == 0, "the lock ends with the block"
+        refused = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True
+        )
+    assert (
+        refused.returncode == 1 and "another process is writing there" in refused.stderr
+    )
+    assert subprocess.run([sys.executable, "-c", program]).returncode == 0, (
+        "the lock ends with the block"
+    )
 
 
 def test_a_folder_of_another_user_is_refused_by_name(tmp_path: Path) -> None:
     folder = files.claim_folder(tmp_path / "results", "results")
-    (folder / ".szlib-lock-run").mkdir()  # the lock cannot be opened, whoever runs the test
-    refused = pytest.raises(StorageError, match=r"results: cannot be written .*; choose another folder")
+    (
+        folder / ".szlib-lock-run"
+    ).mkdir()  # the lock cannot be opened, whoever runs the test
+    refused = pytest.raises(
+        StorageError, match=r"results: cannot be written .*; choose another folder"
+    )
     with refused, files.folder_lock(folder):
         pass
 
@@ -127,7 +163,9 @@ def test_a_temporary_folder_that_another_process_takes_for_abandoned_is_made_aga
     monkeypatch.setattr(files.tempfile, "tempdir", str(tmp_path))
     acquire, removed = files.FileLock.acquire, list[Path]()
 
-    def acquire_late(lock: files.FileLock, *arguments: object, **named: object) -> object:
+    def acquire_late(
+        lock: files.FileLock, *arguments: object, **named: object
+    ) -> object:
         folder = Path(lock.lock_file).parent
         if removed:
             return acquire(lock, *arguments, **named)
@@ -153,10 +191,14 @@ def test_temporary_folders_are_removed_once_their_process_has_ended(
         "with temporary_folder() as folder:\n    print(folder, flush=True)\n    time.sleep(60)"
     )
     other = subprocess.Popen(
-        [sys.executable, "-c", program], env=os.environ | {"TMPDIR": str(tmp_path)}, stdout=subprocess.PIPE
+        [sys.executable, "-c", program],
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        stdout=subprocess.PIPE,
     )
     with other:
-        folder = Path((other.stdout.readline() if other.stdout else b"").decode().strip())
+        folder = Path(
+            (other.stdout.readline() if other.stdout else b"").decode().strip()
+        )
         with files.temporary_folder() as own:
             assert own.parent == tmp_path
             assert folder.is_dir(), "its process lives"
@@ -168,7 +210,9 @@ def test_temporary_folders_are_removed_once_their_process_has_ended(
         assert not folder.exists()
 
 
-def test_a_cached_file_is_known_by_its_content_and_what_it_was_made_of(tmp_path: Path) -> None:
+def test_a_cached_file_is_known_by_its_content_and_what_it_was_made_of(
+    tmp_path: Path,
+) -> None:
     file = tmp_path / "a.bin"
     files.store_cached(file, b"content", {"seed": 1})
     assert files.load_cached(file, {"seed": 1}) == b"content"
@@ -202,7 +246,10 @@ def test_what_is_no_small_regular_file_is_refused(
 ) -> None:
     NO_SMALL_FILES[reason](tmp_path / name)
     (tmp_path / files.MARKER).write_text("results of mine\n")
-    nbformat.write(nbformat.v4.new_notebook(cells=[nbformat.v4.new_markdown_cell()]), tmp_path / "01_a.ipynb")
+    nbformat.write(
+        nbformat.v4.new_notebook(cells=[nbformat.v4.new_markdown_cell()]),
+        tmp_path / "01_a.ipynb",
+    )
     with pytest.raises(szlib.SzlibError, match=reason) as refused:
         read(tmp_path / name)
     assert str(tmp_path) in str(refused.value) and "\n" not in str(refused.value)
@@ -230,25 +277,33 @@ def test_file_names_that_are_not_text_are_escaped() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "size"), [("4GB", 4e9), ("1 KiB", 1024), ("2g", 2e9), ("1.5mb", 1.5e6), ("300", 300)]
+    ("text", "size"),
+    [("4GB", 4e9), ("1 KiB", 1024), ("2g", 2e9), ("1.5mb", 1.5e6), ("300", 300)],
 )
 def test_amounts_of_memory(text: str, size: float) -> None:
     assert memory.parse_size(text) == size
 
 
-@pytest.mark.parametrize("text", ["", "much", "-1", "0", "nan", "1e9", "9" * 40, "4 XB"])
+@pytest.mark.parametrize(
+    "text", ["", "much", "-1", "0", "nan", "1e9", "9" * 40, "4 XB"]
+)
 def test_text_that_is_not_an_amount_of_memory_is_refused(text: str) -> None:
     with pytest.raises(MemoryLimitError, match="expected an amount such as 4GB"):
         memory.parse_size(text)
 
 
-def test_memory_limit_is_the_amount_granted_or_the_environments(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_limit_is_the_amount_granted_or_the_environments(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.delenv(memory.VARIABLE, raising=False)
     assert 1e7 < memory.limit() < 1e15
     monkeypatch.setenv(memory.VARIABLE, "2GB")
     assert memory.limit() == 2e9
     with memory.granted(1000):
         assert memory.limit() == 1000
-        with pytest.raises(MemoryLimitError, match=r"it takes about 5\.0 GB of memory, and the limit is 0"):
+        with pytest.raises(
+            MemoryLimitError,
+            match=r"it takes about 5\.0 GB of memory, and the limit is 0",
+        ):
             memory.require(5e9, "it")
     assert memory.limit() == 2e9

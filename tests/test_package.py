@@ -28,7 +28,10 @@ ROOMS = [
 ]  # fmt: skip
 """From the ground up: a room imports only from rooms before it."""
 CASADI = "control"
-DRAWN = {("simulation.log", "workbook.figures.simulation"), ("zones.social_zone", "workbook.figures.zones")}
+DRAWN = {
+    ("simulation.log", "workbook.figures.simulation"),
+    ("zones.social_zone", "workbook.figures.zones"),
+}
 """Methods that draw (`plot`, `animate`) import their figures when they are called; nothing else looks up."""
 
 PUBLIC = [
@@ -60,7 +63,9 @@ MODULES = sorted(
 
 @cache
 def source(module: str) -> ast.Module:
-    return ast.parse((PACKAGE / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8"))
+    return ast.parse(
+        (PACKAGE / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
+    )
 
 
 def nodes(tree: ast.Module, *, lazy: bool = True, types: bool = False) -> list[ast.AST]:
@@ -75,11 +80,17 @@ def nodes(tree: ast.Module, *, lazy: bool = True, types: bool = False) -> list[a
             for child in ast.walk(node)
         }
     )
-    return [node for node in (ast.walk(tree) if lazy else tree.body) if node not in for_types]
+    return [
+        node
+        for node in (ast.walk(tree) if lazy else tree.body)
+        if node not in for_types
+    ]
 
 
 @cache
-def imports(module: str, *, lazy: bool = True, types: bool = False) -> tuple[set[str], set[str]]:
+def imports(
+    module: str, *, lazy: bool = True, types: bool = False
+) -> tuple[set[str], set[str]]:
     """What a module imports: modules (or rooms) of szlib, and other packages."""
     own, foreign = set(), set()
     for node in nodes(source(module), lazy=lazy, types=types):
@@ -97,7 +108,9 @@ def imports(module: str, *, lazy: bool = True, types: bool = False) -> tuple[set
 
 
 def test_the_top_level_is_fixed() -> None:
-    done = subprocess.run(["git", "ls-files"], cwd=PACKAGE.parent, capture_output=True, text=True)
+    done = subprocess.run(
+        ["git", "ls-files"], cwd=PACKAGE.parent, capture_output=True, text=True
+    )
     if done.returncode:
         pytest.skip("this is no checkout")
     top = {name.split("/")[0] for name in done.stdout.splitlines()}
@@ -109,7 +122,9 @@ def test_the_top_level_is_fixed() -> None:
 
 def test_the_version_is_the_same_everywhere() -> None:
     root = PACKAGE.parent
-    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))[
+        "project"
+    ]
     citation = (root / "CITATION.cff").read_text(encoding="utf-8")
     changes = (root / "CHANGELOG.md").read_text(encoding="utf-8")
     assert project["version"] == szlib.__version__
@@ -128,8 +143,14 @@ def test_names_of_test_modules_are_unique() -> None:
 
 def test_no_test_module_imports_another() -> None:
     names = "|".join(["conftest", *(path.stem for path in TESTS.rglob("test_*.py"))])
-    imported = re.compile(rf"^\s*(?:from|import) (?:[\w.]+\.)?(?:{names})\b", re.MULTILINE)
-    wrong = [path.name for path in TESTS.rglob("*.py") if imported.search(path.read_text(encoding="utf-8"))]
+    imported = re.compile(
+        rf"^\s*(?:from|import) (?:[\w.]+\.)?(?:{names})\b", re.MULTILINE
+    )
+    wrong = [
+        path.name
+        for path in TESTS.rglob("*.py")
+        if imported.search(path.read_text(encoding="utf-8"))
+    ]
     assert wrong == [], "code that several test modules use belongs to tests/helpers"
 
 
@@ -147,17 +168,24 @@ def test_every_module_is_in_a_room() -> None:
 def test_a_room_imports_only_from_rooms_above_it() -> None:
     place = {name: number for number, name in enumerate(ROOMS)}
     imported = {(module, name) for module in MODULES for name in imports(module)[0]}
-    assert {(a, b) for a, b in imported if place[room(b)] > place[room(a)]} - DRAWN == set()
+    assert {
+        (a, b) for a, b in imported if place[room(b)] > place[room(a)]
+    } - DRAWN == set()
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
-    graph = {module: imports(module, types=True)[0] & set(MODULES) for module in MODULES}
+    graph = {
+        module: imports(module, types=True)[0] & set(MODULES) for module in MODULES
+    }
     while outside := [
         module
         for module, names in graph.items()
-        if not names & set(graph) or not any(module in names for names in graph.values())
+        if not names & set(graph)
+        or not any(module in names for names in graph.values())
     ]:
-        graph = {module: names for module, names in graph.items() if module not in outside}
+        graph = {
+            module: names for module, names in graph.items() if module not in outside
+        }
     assert {module: names & set(graph) for module, names in graph.items()} == {}
 
 
@@ -166,17 +194,27 @@ def test_each_library_has_its_room() -> None:
         foreign, at_import = imports(module)[1], imports(module, lazy=False)[1]
         assert "casadi" not in foreign or room(module) == CASADI, module
         assert "matplotlib" not in foreign or module.startswith("workbook."), module
-        assert "matplotlib" not in at_import or module.startswith("workbook.figures."), module
+        assert "matplotlib" not in at_import or module.startswith(
+            "workbook.figures."
+        ), module
         assert "sklearn" not in at_import, module
-        assert "szlib" not in foreign, f"{module}: relative, or the order above is not seen"
+        assert "szlib" not in foreign, (
+            f"{module}: relative, or the order above is not seen"
+        )
 
 
 def test_a_module_does_nothing_when_imported() -> None:
     for module in MODULES:
         tree = source(module)
-        calls = [n for n in tree.body if isinstance(n, ast.Expr) and isinstance(n.value, ast.Call)]
+        calls = [
+            n
+            for n in tree.body
+            if isinstance(n, ast.Expr) and isinstance(n.value, ast.Call)
+        ]
         assert calls == [], module
-        assert not [node for node in ast.walk(tree) if isinstance(node, ast.Assert)], module
+        assert not [node for node in ast.walk(tree) if isinstance(node, ast.Assert)], (
+            module
+        )
 
 
 def test_the_tests_have_the_same_rooms() -> None:
@@ -189,9 +227,13 @@ def test_the_tests_have_the_same_rooms() -> None:
 
 def loaded_after(*codes: str) -> list[set[str]]:
     """Modules in memory after each of these codes, which run one after another in one new interpreter."""
-    program = "".join(["import sys\n", *(f"{code}\nprint(*sys.modules)\n" for code in codes)])
+    program = "".join(
+        ["import sys\n", *(f"{code}\nprint(*sys.modules)\n" for code in codes)]
+    )
     command = [sys.executable, "-c", program]
-    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    lines = subprocess.run(
+        command, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
     return [set(line.split()) for line in lines]
 
 
@@ -202,7 +244,16 @@ def test_each_way_into_the_package_loads_only_what_it_needs() -> None:
         "szlib.read_tracks, szlib.find_encounters, szlib.SocialZone",
         "szlib.simulate, szlib.SCENARIOS, szlib.MPCCBF, szlib.rollouts",
     )
-    heavy = {"casadi", "matplotlib", "sklearn", "scipy", "pandas", "polars", "numpy", "nbclient"}
+    heavy = {
+        "casadi",
+        "matplotlib",
+        "sklearn",
+        "scipy",
+        "pandas",
+        "polars",
+        "numpy",
+        "nbclient",
+    }
     assert heavy.isdisjoint(szlib_alone)
     assert {"casadi", "matplotlib", "sklearn"}.isdisjoint(zones)
     assert "szlib.zones.social_zone" in zones
@@ -211,8 +262,17 @@ def test_each_way_into_the_package_loads_only_what_it_needs() -> None:
 
 
 def test_the_command_line_loads_neither_numbers_nor_notebooks() -> None:
-    (loaded,) = loaded_after("from szlib.workbook.cli import build_parser; build_parser()")
-    assert {"numpy", "pandas", "matplotlib", "nbclient", "jupytext", "casadi"}.isdisjoint(loaded)
+    (loaded,) = loaded_after(
+        "from szlib.workbook.cli import build_parser; build_parser()"
+    )
+    assert {
+        "numpy",
+        "pandas",
+        "matplotlib",
+        "nbclient",
+        "jupytext",
+        "casadi",
+    }.isdisjoint(loaded)
 
 
 # --- names -------------------------------------------------------------------------------------------
@@ -237,8 +297,14 @@ def test_every_scenario_is_there() -> None:
 
 
 def test_an_object_that_users_hold_cannot_be_changed() -> None:
-    held = [value for name in szlib.__all__ if dataclasses.is_dataclass(value := getattr(szlib, name))]
-    changeable = [value.__name__ for value in held if not value.__dataclass_params__.frozen]
+    held = [
+        value
+        for name in szlib.__all__
+        if dataclasses.is_dataclass(value := getattr(szlib, name))
+    ]
+    changeable = [
+        value.__name__ for value in held if not value.__dataclass_params__.frozen
+    ]
     assert len(held) > 20 and not changeable
 
 
@@ -270,9 +336,15 @@ def test_ready_made_environments_name_what_exists() -> None:
     assert "\nINSTALLED := $(VENV)/installed\n" in (root / "Makefile").read_text()
     binder = root / ".binder"
     (line,) = (binder / "requirements.txt").read_text().splitlines()
-    assert (binder / line.removeprefix("-r ")).resolve() == (root / "environment.lock").resolve()
-    workflow = yaml.safe_load((root / "notebooks" / "examples" / "github_actions.yml").read_text())
-    commands = [step["run"] for step in workflow["jobs"]["zones"]["steps"] if "run" in step]
+    assert (binder / line.removeprefix("-r ")).resolve() == (
+        root / "environment.lock"
+    ).resolve()
+    workflow = yaml.safe_load(
+        (root / "notebooks" / "examples" / "github_actions.yml").read_text()
+    )
+    commands = [
+        step["run"] for step in workflow["jobs"]["zones"]["steps"] if "run" in step
+    ]
     (run,) = [command for command in commands if "szlib" in command]
     options = build_parser().parse_args(run.split()[1:])
     assert (options.area, Path(options.out)) == ("auto", Path("../results").resolve())

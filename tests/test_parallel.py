@@ -20,12 +20,16 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize(("parent", "code"), [("os.getppid()", 0), ("10**9", 1)])
-def test_a_worker_whose_parent_ended_before_it_was_up_ends_as_well(parent: str, code: int) -> None:
+def test_a_worker_whose_parent_ended_before_it_was_up_ends_as_well(
+    parent: str, code: int
+) -> None:
     program = f"import os; from szlib.parallel import end_with; end_with({parent})"
     assert subprocess.run([sys.executable, "-c", program]).returncode == code
 
 
-@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="finds processes in /proc")
+@pytest.mark.skipif(
+    not Path("/proc/self/environ").exists(), reason="finds processes in /proc"
+)
 @pytest.mark.parametrize("delay", [0.05, 1.5])
 def test_no_worker_outlives_a_killed_parent(delay: float, tmp_path: Path) -> None:
     """Killed while workers start, wait, and are at work; nothing is imported from the folder."""
@@ -60,14 +64,20 @@ def _carriers(word: str) -> list[str]:
     for process in Path("/proc").glob("[0-9]*"):
         try:
             alive = "\nState:\tZ" not in (process / "status").read_text()
-            if alive and f"CARRIED={word}\0".encode() in (process / "environ").read_bytes() + b"\0":
+            if (
+                alive
+                and f"CARRIED={word}\0".encode()
+                in (process / "environ").read_bytes() + b"\0"
+            ):
                 found.append((process / "cmdline").read_text())
         except OSError:
             continue
     return found
 
 
-@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="finds semaphores in /dev/shm")
+@pytest.mark.skipif(
+    not Path("/dev/shm").is_dir(), reason="finds semaphores in /dev/shm"
+)
 def test_a_closed_terminal_leaves_no_semaphores(tmp_path: Path) -> None:
     """Every process of the group gets SIGHUP; the process that removes the semaphores must outlive it."""
     program = tmp_path / "program.py"
@@ -84,12 +94,18 @@ def test_a_closed_terminal_leaves_no_semaphores(tmp_path: Path) -> None:
     assert wait_until(lambda: not semaphores())
 
 
-@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="finds semaphores in /dev/shm")
-def test_the_next_run_removes_the_semaphores_of_a_group_that_was_killed(tmp_path: Path) -> None:
+@pytest.mark.skipif(
+    not Path("/dev/shm").is_dir(), reason="finds semaphores in /dev/shm"
+)
+def test_the_next_run_removes_the_semaphores_of_a_group_that_was_killed(
+    tmp_path: Path,
+) -> None:
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     place = os.environ | {"TMPDIR": str(tmp_path)}
-    parent = subprocess.Popen([sys.executable, str(program)], start_new_session=True, env=place)
+    parent = subprocess.Popen(
+        [sys.executable, str(program)], start_new_session=True, env=place
+    )
 
     def semaphores() -> list[Path]:
         return list(Path("/dev/shm").glob(f"sem.loky-{parent.pid}-*"))

@@ -19,7 +19,9 @@ WHOLE, OWN_DATA, OWN_ROBOT = (compile(text, "README.md", "exec") for text in PRO
 
 
 @pytest.mark.filterwarnings("ignore:.*fewer than 20 encounters:szlib.DataWarning")
-def test_the_program_goes_from_tracks_to_a_robot_that_respects_the_zone(tmp_path, monkeypatch, capsys):
+def test_the_program_goes_from_tracks_to_a_robot_that_respects_the_zone(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     found: dict[str, object] = {}
     exec(WHOLE, found)
@@ -27,13 +29,21 @@ def test_the_program_goes_from_tracks_to_a_robot_that_respects_the_zone(tmp_path
     assert float(capsys.readouterr().out.splitlines()[-1]) >= 0
     true, fitted = PlazaSettings().true_zone(1.1), found["zone"].ellipse(1.1)
     assert fitted.semi_axes == pytest.approx(true.semi_axes, abs=0.04)
-    assert {path.name for path in tmp_path.iterdir()} == {"plaza.csv", "zone.png", "corridor.png"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "plaza.csv",
+        "zone.png",
+        "corridor.png",
+    }
 
 
 @pytest.mark.filterwarnings("ignore:.*fewer than 20 encounters:szlib.DataWarning")
-def test_a_file_with_other_columns_frames_and_origin_gives_the_zone(tmp_path, monkeypatch, capsys):
+def test_a_file_with_other_columns_frames_and_origin_gives_the_zone(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
-    plaza = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=1000))
+    plaza = make_plaza(
+        tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=1000)
+    )
     tracks = szlib.read_tracks(plaza)
     hall = pd.DataFrame(
         {
@@ -48,7 +58,9 @@ def test_a_file_with_other_columns_frames_and_origin_gives_the_zone(tmp_path, mo
     exec(OWN_DATA, found)
     assert found["samples"]["encounter"].nunique() > 500
     true = PlazaSettings().true_zone(1.1)
-    assert found["zone"].ellipse(1.1).semi_axes == pytest.approx(true.semi_axes, abs=0.1)
+    assert found["zone"].ellipse(1.1).semi_axes == pytest.approx(
+        true.semi_axes, abs=0.1
+    )
     assert "Ellipse" in capsys.readouterr().out
 
 
@@ -67,7 +79,9 @@ def test_readme_can_be_read_in_five_minutes():
 
 def test_it_shows_recorded_and_synthetic_people():
     pictures = dict(re.findall(r"!\[([^\]]+)\]\(notebooks/figures/([^)]+)\)", TEXT))
-    assert {file: re.findall("synthetic|recorded", alt) for alt, file in pictures.items()} == {
+    assert {
+        file: re.findall("synthetic|recorded", alt) for alt, file in pictures.items()
+    } == {
         "zone.png": ["synthetic"],
         "mall.png": ["recorded"],
     }
@@ -78,13 +92,21 @@ def test_named_functions_exist():
         assert hasattr(szlib, name) or name in ("csv", "json"), name
 
 
-@pytest.mark.parametrize("target", sorted(set(re.findall(r"\]\((?!http)([^)#]+)\)", TEXT))))
+@pytest.mark.parametrize(
+    "target", sorted(set(re.findall(r"\]\((?!http)([^)#]+)\)", TEXT)))
+)
 def test_links_lead_somewhere(target):
     assert (ROOT / target).exists()
 
 
 def test_make_verbs_exist():
-    known = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE))
+    known = set(
+        re.findall(
+            r"^(\w+):",
+            (ROOT / "Makefile").read_text(encoding="utf-8"),
+            flags=re.MULTILINE,
+        )
+    )
     assert set(re.findall(r"make (\w+)", TEXT)) - {"are"} <= known
 
 

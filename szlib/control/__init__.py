@@ -21,8 +21,19 @@ mpc                   the controller: `MPCCBF`
 differential_drive    a robot with two wheels: `DifferentialDrive`
 """
 
-from .acceleration_polygon import AdmissibleControls, BarrierLimit, find_admissible_controls
-from .barriers import barrier, cbf_residual, compute_h, ellipse_distance, read_walls, segment_distance
+from .acceleration_polygon import (
+    AdmissibleControls,
+    BarrierLimit,
+    find_admissible_controls,
+)
+from .barriers import (
+    barrier,
+    cbf_residual,
+    compute_h,
+    ellipse_distance,
+    read_walls,
+    segment_distance,
+)
 from .controller import Controller, DoubleIntegrator, Robot, advance, as_controller
 from .differential_drive import DifferentialDrive, DriveStep, Unicycle
 from .distances import (

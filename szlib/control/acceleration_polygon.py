@@ -84,7 +84,9 @@ def find_admissible_controls(step: Step) -> AdmissibleControls:
     polygon, limits = free, []
     for row, (curve, inward) in enumerate(_edges(step)):
         i, k = divmod(row, s.N_h)
-        allowed = shapely.Polygon(np.vstack([curve, curve[::-1] + 2 * _REACH * s.a_max * inward]))
+        allowed = shapely.Polygon(
+            np.vstack([curve, curve[::-1] + 2 * _REACH * s.a_max * inward])
+        )
         if not allowed.covers(free):
             limits.append(BarrierLimit(*step.scene.obstacle(i), k, curve))
             polygon = polygon.intersection(allowed)
@@ -100,7 +102,9 @@ def _edges(step: Step) -> list[tuple[Array, Array]]:
     right, left, up, down = np.moveaxis(_residuals(step, at), -1, 0)
     inward = np.stack([right - left, up - down], axis=-1)
     steepest = np.hypot(inward[..., :1], inward[..., 1:])
-    inward = np.where(steepest > 0, inward / np.where(steepest > 0, steepest, 1.0), (1.0, 0.0))
+    inward = np.where(
+        steepest > 0, inward / np.where(steepest > 0, steepest, 1.0), (1.0, 0.0)
+    )
     across = np.stack([inward[..., 1], -inward[..., 0]], axis=-1)
     along = u0 + np.linspace(-reach, reach, _POINTS)[:, None] * across[..., None, :]
     low, high = np.full((*rows, _POINTS), -reach), np.full((*rows, _POINTS), reach)
@@ -115,14 +119,24 @@ def _edges(step: Step) -> list[tuple[Array, Array]]:
 def _residuals(step: Step, first: Array) -> Array:
     """Residual of each barrier row for other first accelerations, (obstacles, N_h, n, 2) to (.., n)."""
     s, n_people = step.scene.settings, len(step.scene.people)
-    times, lengths = np.array(s.times[: s.N_h + 1])[:, None], np.array(s.step_lengths[: s.N_h])[:, None]
-    gammas = [gamma for *_, gamma, _ in step.scene.barriers[:n_people]] + [s.gamma] * len(step.scene.walls)
+    times, lengths = (
+        np.array(s.times[: s.N_h + 1])[:, None],
+        np.array(s.step_lengths[: s.N_h])[:, None],
+    )
+    gammas = [gamma for *_, gamma, _ in step.scene.barriers[:n_people]] + [
+        s.gamma
+    ] * len(step.scene.walls)
     keeps = (1 - np.reshape(gammas, (-1, 1, 1))) ** lengths
     moved = s.dt * np.maximum(times - 0.5 * s.dt, 0)[..., None]
     left = []
     for i, change in enumerate(first - step.control):
         now, after = (
-            _barrier(step, i, step.predicted[rows, None, :2] + moved[rows] * change, times[rows])
+            _barrier(
+                step,
+                i,
+                step.predicted[rows, None, :2] + moved[rows] * change,
+                times[rows],
+            )
             for rows in (slice(s.N_h), slice(1, s.N_h + 1))
         )
         left.append(after - keeps[i] * now)
@@ -132,6 +146,9 @@ def _residuals(step: Step, first: Array) -> Array:
 def _barrier(step: Step, i: int, points: Array, time: Any) -> Any:
     """h of row `i` of `Step.h` at points (..., 2), `time` seconds from now, shape (...) [m]."""
     scene, s, people = step.scene, step.scene.settings, len(step.scene.people)
-    zones, walls = scene.zones[i : i + 1], scene.walls[i - people :][:1] if i >= people else ()
+    zones, walls = (
+        scene.zones[i : i + 1],
+        scene.walls[i - people :][:1] if i >= people else (),
+    )
     x, y = np.moveaxis(points, -1, 0)
     return compute_h(x, y, zones, walls, r_robot=s.r_robot, eps=s.eps, time=time)[0]

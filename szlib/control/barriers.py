@@ -32,11 +32,15 @@ def segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
     """Approximate distance of (`x`, `y`) to the segment (`xa`, `ya`) to (`xb`, `yb`) [m] (paper, eq. 3-5)."""
     length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
     g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
-    t = ((length / 2) ** 2 - (x - (xa + xb) / 2) ** 2 - (y - (ya + yb) / 2) ** 2) / length
+    t = (
+        (length / 2) ** 2 - (x - (xa + xb) / 2) ** 2 - (y - (ya + yb) / 2) ** 2
+    ) / length
     return (g**2 + ((abs(t) - t) / 2) ** 2) ** 0.5
 
 
-def euclidean_segment_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any) -> Any:
+def euclidean_segment_formula(
+    x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any
+) -> Any:
     """Euclidean distance of (`x`, `y`) to the segment from (`xa`, `ya`) to (`xb`, `yb`) [m]."""
     length = ((xb - xa) ** 2 + (yb - ya) ** 2) ** 0.5
     g = ((x - xa) * (yb - ya) - (y - ya) * (xb - xa)) / length
@@ -50,7 +54,9 @@ def ellipse_formula(x: Any, y: Any, xa: Any, ya: Any, xb: Any, yb: Any, a: Any) 
 
     The foci are (`xa`, `ya`) and (`xb`, `yb`), the semi-major axis is `a`.
     """
-    return (((x - xa) ** 2 + (y - ya) ** 2) ** 0.5 + ((x - xb) ** 2 + (y - yb) ** 2) ** 0.5) / 2 - a
+    return (
+        ((x - xa) ** 2 + (y - ya) ** 2) ** 0.5 + ((x - xb) ** 2 + (y - yb) ** 2) ** 0.5
+    ) / 2 - a
 
 
 def barrier(distance: Any, radius: float, margin: Any) -> Any:
@@ -204,7 +210,11 @@ def find_near_walls(walls: Array, x: float, y: float, reach: float) -> list[int]
     """
     length = np.hypot(*(walls[:, 1] - walls[:, 0]).T)
     d = np.asarray(segment_formula(x, y, *walls.reshape(-1, 4).T))
-    return [*map(int, np.flatnonzero(length / 2 * (np.sqrt(1 + 4 * d / length) - 1) <= reach))]
+    return [
+        *map(
+            int, np.flatnonzero(length / 2 * (np.sqrt(1 + 4 * d / length) - 1) <= reach)
+        )
+    ]
 
 
 def check_wall(wall: ArrayLike) -> Array:
@@ -212,7 +222,9 @@ def check_wall(wall: ArrayLike) -> Array:
     ends = check_array("wall", wall, (2, 2))
     length = np.hypot(*(ends[1] - ends[0]))
     if length == 0:
-        raise SolverError(f"a wall needs two different end points; got {ends[0].tolist()} twice")
+        raise SolverError(
+            f"a wall needs two different end points; got {ends[0].tolist()} twice"
+        )
     if length < SHORTEST_WALL:
         raise SolverError(
             f"a wall must be at least {SHORTEST_WALL} m long; got {length:.3g} m from {ends[0].tolist()}; "
@@ -242,7 +254,11 @@ def read_walls(walls: Any) -> Array:
     >>> read_walls([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0)]).shape  # a polyline of two segments
     (2, 2, 2)
     """
-    segments = [check_wall(segment) for line in _find_lines(walls) for segment in _split_line(line)]
+    segments = [
+        check_wall(segment)
+        for line in _find_lines(walls)
+        for segment in _split_line(line)
+    ]
     return np.reshape(np.array(segments, float), (-1, 2, 2))
 
 
@@ -261,7 +277,9 @@ def find_solids(walls: Any) -> Any:
     """The union of the polygons among `walls`, and of `Walls.solids`; None if there are none."""
     if hasattr(walls, "exterior"):
         return shapely.make_valid(
-            shapely.Polygon(walls.exterior.coords, [hole.coords for hole in walls.interiors])
+            shapely.Polygon(
+                walls.exterior.coords, [hole.coords for hole in walls.interiors]
+            )
         )
     parts = getattr(walls, "geoms", walls)
     if isinstance(parts, np.ndarray) or not isinstance(parts, Iterable):
@@ -281,7 +299,9 @@ def _find_lines(walls: Any) -> Iterator[Any]:
     elif isinstance(walls, Iterable) and not isinstance(walls, str):
         parts = list(walls)
     else:
-        raise SolverError(f"a wall must be a segment, a line, or one of Shapely's; got {walls!r}")
+        raise SolverError(
+            f"a wall must be a segment, a line, or one of Shapely's; got {walls!r}"
+        )
     if parts and all(_is_corner(part) for part in parts):
         yield parts
     else:
@@ -290,7 +310,9 @@ def _find_lines(walls: Any) -> Iterator[Any]:
 
 
 def _is_corner(part: Any) -> bool:
-    return isinstance(part, Sequence | np.ndarray) and all(np.isscalar(number) for number in part)
+    return isinstance(part, Sequence | np.ndarray) and all(
+        np.isscalar(number) for number in part
+    )
 
 
 def _split_line(line: Any) -> list[Array]:

@@ -48,7 +48,9 @@ def advance(state: Array, control: Array, dt: float) -> Array:
     [3.0, 0.0, 2.0, 0.0]
     """
     (x, y, vx, vy), (ax, ay), half = state.tolist(), control.tolist(), 0.5 * dt**2
-    return np.array([x + dt * vx + half * ax, y + dt * vy + half * ay, vx + dt * ax, vy + dt * ay])
+    return np.array(
+        [x + dt * vx + half * ax, y + dt * vy + half * ay, vx + dt * ax, vy + dt * ay]
+    )
 
 
 class DoubleIntegrator:
@@ -128,7 +130,9 @@ class Controller:
         """
         raise NotImplementedError
 
-    def check_start(self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person]) -> None:
+    def check_start(
+        self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person]
+    ) -> None:
         """Raise SolverError if no run can start from `state` to `goal` among `people`; here: never."""
 
 

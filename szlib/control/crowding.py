@@ -25,22 +25,38 @@ from .settings import MPCSettings
 Level = Literal["alone", "few", "crowd"]
 
 
-def count_near(position: Sequence[float], people: Iterable[Person], radius: float) -> int:
+def count_near(
+    position: Sequence[float], people: Iterable[Person], radius: float
+) -> int:
     """Number of `people` within `radius` of a `position`, (x, y, ...) [m]."""
-    offsets = ((person.position[0] - position[0], person.position[1] - position[1]) for person in people)
+    offsets = (
+        (person.position[0] - position[0], person.position[1] - position[1])
+        for person in people
+    )
     return sum(hypot(*offset) <= radius for offset in offsets)
 
 
-def find_level(position: Sequence[float], people: Iterable[Person], settings: MPCSettings) -> Level:
+def find_level(
+    position: Sequence[float], people: Iterable[Person], settings: MPCSettings
+) -> Level:
     """How many `people` are near a `position`, (x, y, ...) [m]; "alone" without `settings.crowding`."""
     if settings.crowding is None:
         return "alone"
     near = count_near(position, people, settings.crowding.radius)
-    return "alone" if near < settings.crowding.few else "few" if near < settings.crowding.many else "crowd"
+    return (
+        "alone"
+        if near < settings.crowding.few
+        else "few"
+        if near < settings.crowding.many
+        else "crowd"
+    )
 
 
 def list_barriers(
-    level: Level, zones: Sequence[PlacedZone], people: Sequence[Person], settings: MPCSettings
+    level: Level,
+    zones: Sequence[PlacedZone],
+    people: Sequence[Person],
+    settings: MPCSettings,
 ) -> Sequence[Sequence[float]]:
     """Foci, a, velocity, gamma and price of each barrier of people: first one for each zone, then the others.
 
@@ -58,5 +74,8 @@ def list_barriers(
         return around_zones + [(*zone, 1.0, hard) for zone in zones]
     radius = BODY_RADIUS + s.crowding.gap - s.eps  # the barrier adds eps
     centres = [person.position * 2 for person in people]
-    bodies = [(*at, radius, *zone[5:], 1.0, hard) for at, zone in zip(centres, zones, strict=True)]
+    bodies = [
+        (*at, radius, *zone[5:], 1.0, hard)
+        for at, zone in zip(centres, zones, strict=True)
+    ]
     return around_zones + bodies

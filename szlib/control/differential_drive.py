@@ -69,8 +69,13 @@ from .step_report import StepReport, verify_disc
 from .tracker import People, Tracker
 
 _NEAR = 3.0  # distance of the goal, as a multiple of `ahead`, at which a turn on the spot may begin
-_TURNS = np.array(sorted(np.linspace(-pi, pi, 33), key=abs))  # turns that are tried, in this order [rad]
-_TURN, _ALIGNED = 1.0, 0.2  # largest turn that is asked for at once, and where a turn ends [rad]
+_TURNS = np.array(
+    sorted(np.linspace(-pi, pi, 33), key=abs)
+)  # turns that are tried, in this order [rad]
+_TURN, _ALIGNED = (
+    1.0,
+    0.2,
+)  # largest turn that is asked for at once, and where a turn ends [rad]
 _FREE = 0.02  # h that the point needs [m]
 
 
@@ -158,7 +163,9 @@ class DriveStep:
 
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified, as `Step.explain` does for the point."""
-        faults = [f"\n  WRONG: {fault}" for fault in self.verify().faults if "disc" in fault]
+        faults = [
+            f"\n  WRONG: {fault}" for fault in self.verify().faults if "disc" in fault
+        ]
         return f"{self!r}{''.join(faults)}\nThe point ahead of the axle: {self.point.explain()}"
 
 
@@ -168,10 +175,16 @@ class _Point(MPCCBF):
     def _check_goal(self, goal: tuple[float, float]) -> None:
         pass
 
-    def _look_ahead(self, at: Point, goal: Point, route: ArrayLike | None) -> tuple[Point, float]:
+    def _look_ahead(
+        self, at: Point, goal: Point, route: ArrayLike | None
+    ) -> tuple[Point, float]:
         """As of `MPCCBF`, but straight to a `goal` so close that no wall lies between, as in a turn."""
         away = dist(at, goal)
-        return (goal, away) if away < self.settings.r_robot else super()._look_ahead(at, goal, route)
+        return (
+            (goal, away)
+            if away < self.settings.r_robot
+            else super()._look_ahead(at, goal, route)
+        )
 
 
 class DifferentialDrive(Controller):
@@ -233,17 +246,29 @@ class DifferentialDrive(Controller):
         self.robot = Unicycle()
         self.omega_max = float(check_array("omega_max", omega_max, ()))
         if not 0 < self.omega_max * s.dt < pi:
-            raise SolverError(f"omega_max must lie in (0, pi/dt) = (0, {pi / s.dt:g}); got {omega_max}")
+            raise SolverError(
+                f"omega_max must lie in (0, pi/dt) = (0, {pi / s.dt:g}); got {omega_max}"
+            )
         turn = 2 * sin(self.omega_max * s.dt / 2) / s.dt
-        self.ahead = s.v_max / turn if ahead is None else float(check_array("ahead", ahead, ()))
+        self.ahead = (
+            s.v_max / turn if ahead is None else float(check_array("ahead", ahead, ()))
+        )
         if not self.ahead > 0:
-            raise SolverError(f"ahead must be positive: the axle itself cannot move sideways; got {ahead}")
+            raise SolverError(
+                f"ahead must be positive: the axle itself cannot move sideways; got {ahead}"
+            )
         self.v_max = min(s.v_max, self.ahead * turn)
-        self.chord_error = self.v_max * s.dt / 2 * tan(asin(self.v_max * s.dt / 2 / self.ahead) / 2)
+        self.chord_error = (
+            self.v_max * s.dt / 2 * tan(asin(self.v_max * s.dt / 2 / self.ahead) / 2)
+        )
         radius = s.r_robot + s.eps + self.ahead + self.chord_error
-        grown = replace(s, r_robot=radius, eps=0.0, margin="euclidean", v_max=self.v_max)
+        grown = replace(
+            s, r_robot=radius, eps=0.0, margin="euclidean", v_max=self.v_max
+        )
         self.goal_clearance = radius + self.ahead
-        self._point = _Point(zone, walls=walls, settings=grown, max_people=max_people, tracker=tracker)
+        self._point = _Point(
+            zone, walls=walls, settings=grown, max_people=max_people, tracker=tracker
+        )
         self.zone = self._point.zone
         self._take_walls()
         self.reset()
@@ -292,12 +317,19 @@ class DifferentialDrive(Controller):
         SolverError : as of `MPCCBF.step`.
         """
         began = perf_counter()
-        own = check_array("state", state, (5,) if np.asarray(state, object).size == 5 else (3,)).tolist()
+        own = check_array(
+            "state", state, (5,) if np.asarray(state, object).size == 5 else (3,)
+        ).tolist()
         self._clock.tick(now, stamps)
         old = np.array([*own[:3], *(own[3:] or self._command or (0.0, 0.0))])
-        own = self._clock.bring_forward(self.robot, old, check_number("state_age", state_age), old[3:])
+        own = self._clock.bring_forward(
+            self.robot, old, check_number("state_age", state_age), old[3:]
+        )
         x, y, theta, *speeds = own.tolist()
-        centre, lever = check_array("goal", goal, (2,)), self.ahead * np.array([cos(theta), sin(theta)])
+        centre, lever = (
+            check_array("goal", goal, (2,)),
+            self.ahead * np.array([cos(theta), sin(theta)]),
+        )
         if not self._command and min(self.barriers(centre), default=0.0) < 0:
             raise SolverError(
                 f"the goal {centre.tolist()} cannot be reached: it lies too close to a wall; choose one at "
@@ -305,14 +337,26 @@ class DifferentialDrive(Controller):
             )
         start = (*(own[:2] + lever).tolist(), *self._velocity(theta, *speeds))
         turn = self._find_turn(own[:3].tolist(), centre)
-        at_end = own[:2] if turn else centre  # of the axle: it turns where it stands, or drives to the goal
+        at_end = (
+            own[:2] if turn else centre
+        )  # of the axle: it turns where it stands, or drives to the goal
         towards = at_end + self.ahead * np.array([cos(theta + turn), sin(theta + turn)])
-        point = self._point.step(start, towards, people, ids=ids, stamps=stamps, now=now, route=route)
+        point = self._point.step(
+            start, towards, people, ids=ids, stamps=stamps, now=now, route=route
+        )
         self._seen = point.scene
         states, controls = self._follow(own, point.predicted[1:, :2])
-        self._command, self._planned_velocity = controls[0].tolist(), point.predicted[1, 2:].tolist()
-        scene, dt = point.scene._replace(settings=self.settings, walls=self._wall_rows), self.settings.dt
-        scene = scene._replace(state=tuple(states[0].tolist()), goal=tuple(centre.tolist()))
+        self._command, self._planned_velocity = (
+            controls[0].tolist(),
+            point.predicted[1, 2:].tolist(),
+        )
+        scene, dt = (
+            point.scene._replace(settings=self.settings, walls=self._wall_rows),
+            self.settings.dt,
+        )
+        scene = scene._replace(
+            state=tuple(states[0].tolist()), goal=tuple(centre.tolist())
+        )
         self._clock.hold(controls[0])
         h, (x1, y1), (v, omega) = scene.h(x, y), states[1][:2].tolist(), self._command
         gap = scene.smallest_gap((x, y), (x1, y1), abs(v * omega))
@@ -325,7 +369,10 @@ class DifferentialDrive(Controller):
             heading=theta,
             scene=scene,
             point=point,
-            **{name: getattr(point, name) for name in ("fallback", "slack", "residual", "stuck", "clock")},
+            **{
+                name: getattr(point, name)
+                for name in ("fallback", "slack", "residual", "stuck", "clock")
+            },
             solve_time=perf_counter() - began,
         )
 
@@ -333,7 +380,9 @@ class DifferentialDrive(Controller):
         """h of all `people` and then of all walls, for the disc at `position`, shape (n,) [m]."""
         (x, y), s = check_point("position", position), self.settings
         zones = [place_zone(person, self._point.zone_of(person)) for person in people]
-        return np.array(compute_h(x, y, zones, self._wall_rows, r_robot=s.r_robot, eps=s.eps))
+        return np.array(
+            compute_h(x, y, zones, self._wall_rows, r_robot=s.r_robot, eps=s.eps)
+        )
 
     def _find_turn(self, own: list[float], goal: Array) -> float:
         """Angle by which the robot turns where it stands, close to its `goal` [rad]; 0: it drives on.
@@ -342,23 +391,38 @@ class DifferentialDrive(Controller):
         wall or a person who stands. It turns its back to the goal, or as far as the point could be there
         then, and goes backwards.
         """
-        (x, y, theta), (gx, gy), s, scene = own, goal.tolist(), self._point.settings, self._seen
-        if scene is None or hypot(gx - x, gy - y) > (1.5 if self._turns else 1.0) * _NEAR * self.ahead:
+        (x, y, theta), (gx, gy), s, scene = (
+            own,
+            goal.tolist(),
+            self._point.settings,
+            self._seen,
+        )
+        if (
+            scene is None
+            or hypot(gx - x, gy - y)
+            > (1.5 if self._turns else 1.0) * _NEAR * self.ahead
+        ):
             self._turns = False
             return 0.0
         headings = np.array([theta, *(atan2(y - gy, x - gx) + _TURNS)])
         px, py = gx + self.ahead * np.cos(headings), gy + self.ahead * np.sin(headings)
-        standing = [zone for zone in scene.zones if hypot(zone.vx, zone.vy) < STANDING_SPEED]
+        standing = [
+            zone for zone in scene.zones if hypot(zone.vx, zone.vy) < STANDING_SPEED
+        ]
         h = compute_h(px, py, standing, scene.near_walls, r_robot=s.r_robot, eps=s.eps)
         free = np.min(np.vstack([*h, np.full(len(px), inf)]), axis=0) >= _FREE
         turn = remainder(float(headings[1:][free[1:].argmax()]) - theta, 2 * pi)
-        self._turns = bool(free[1:].any()) and (abs(turn) > _ALIGNED if self._turns else not free[0])
+        self._turns = bool(free[1:].any()) and (
+            abs(turn) > _ALIGNED if self._turns else not free[0]
+        )
         return max(-_TURN, min(turn, _TURN)) if self._turns else 0.0
 
     def _velocity(self, theta: float, v: float, omega: float) -> list[float]:
         """Velocity of the point: as planned, unless the robot does not follow its command."""
         if self._command:
-            deviation = hypot(v - self._command[0], self.ahead * (omega - self._command[1]))
+            deviation = hypot(
+                v - self._command[0], self.ahead * (omega - self._command[1])
+            )
             if deviation <= self.settings.a_max * self.settings.dt:
                 return self._planned_velocity
         c, s, sideways = cos(theta), sin(theta), self.ahead * omega
@@ -367,14 +431,18 @@ class DifferentialDrive(Controller):
     def _follow(self, own: Array, points: Array) -> tuple[list[Array], list[Array]]:
         """States of the disc, and the commands that bring the point to `points`, shape (up to N, 2)."""
         at, states, controls = own, [self.robot.body(own)], list[Array]()
-        for (px, py), length in zip(points.tolist(), self.settings.step_lengths, strict=False):
+        for (px, py), length in zip(
+            points.tolist(), self.settings.step_lengths, strict=False
+        ):
             (x, y, theta), dt = at[:3].tolist(), length * self.settings.dt
             c, s = cos(theta), sin(theta)
             dx, dy = px - x - self.ahead * c, py - y - self.ahead * s
             share = min(1.0, self.v_max * dt / (hypot(dx, dy) or 1.0))
             xi, eta = share * (dx * c + dy * s), share * (dy * c - dx * s)
             beta = atan2(eta, 2 * self.ahead + xi)
-            speed = (xi * cos(beta) + eta * sin(beta)) / (dt * float(np.sinc(beta / pi)))
+            speed = (xi * cos(beta) + eta * sin(beta)) / (
+                dt * float(np.sinc(beta / pi))
+            )
             controls.append(np.array([speed, 2 * beta / dt]))
             at = self.robot.advance(at, controls[-1], dt)
             states.append(self.robot.body(at))

@@ -28,7 +28,12 @@ from numpy.typing import ArrayLike
 
 from ..checks import Array, check_array
 from ..zones.ellipses import Ellipse
-from .barriers import check_wall, ellipse_distance, euclidean_segment_formula, segment_distance
+from .barriers import (
+    check_wall,
+    ellipse_distance,
+    euclidean_segment_formula,
+    segment_distance,
+)
 from .settings import MPCSettings
 
 _BISECTIONS = 60  # halvings of a quarter turn that reach double precision
@@ -80,10 +85,17 @@ def euclidean_to_ellipse(points: ArrayLike, ellipse: Ellipse) -> Array:
     low, high = np.zeros_like(p), np.full_like(p, np.pi / 2)
     for _ in range(_BISECTIONS):
         t = (low + high) / 2
-        below = a * p * np.sin(t) - b * q * np.cos(t) - (a**2 - b**2) * np.sin(t) * np.cos(t) < 0
+        below = (
+            a * p * np.sin(t)
+            - b * q * np.cos(t)
+            - (a**2 - b**2) * np.sin(t) * np.cos(t)
+            < 0
+        )
         low, high = np.where(below, t, low), np.where(below, high, t)
     inside = (p / a) ** 2 + (q / b) ** 2 < 1
-    return np.asarray(np.hypot(p - a * np.cos(low), q - b * np.sin(low)) * np.where(inside, -1, 1))
+    return np.asarray(
+        np.hypot(p - a * np.cos(low), q - b * np.sin(low)) * np.where(inside, -1, 1)
+    )
 
 
 def required_margin(of: Ellipse | ArrayLike, r_robot: float) -> float:
@@ -117,7 +129,11 @@ def wall_margin(wall: ArrayLike, settings: MPCSettings) -> float:
     >>> szlib.control.wall_margin([(0.0, 0.0), (1.0, 0.0)], szlib.MPCSettings(r_robot=0.5))
     0.25
     """
-    needed = required_margin(wall, settings.r_robot) if settings.margin == "euclidean" else 0.0
+    needed = (
+        required_margin(wall, settings.r_robot)
+        if settings.margin == "euclidean"
+        else 0.0
+    )
     return max(settings.eps, needed)
 
 
@@ -167,11 +183,17 @@ def compare_distances(
     -0.11
     """
     points = find_safe_boundary(of, r_robot + eps, n)
-    gap = eps - compute_distance_error(points, of)  # the approximate distance is r_robot + eps
-    return DistanceComparison(float(gap.min()), float(gap.max()), required_margin(of, r_robot))
+    gap = eps - compute_distance_error(
+        points, of
+    )  # the approximate distance is r_robot + eps
+    return DistanceComparison(
+        float(gap.min()), float(gap.max()), required_margin(of, r_robot)
+    )
 
 
-def find_safe_boundary(of: Ellipse | ArrayLike, distance: float, n: int = 2001) -> Array:
+def find_safe_boundary(
+    of: Ellipse | ArrayLike, distance: float, n: int = 2001
+) -> Array:
     """Find points where the approximate distance is `distance` > 0, shape (m, 2) [m].
 
     Parameters
@@ -187,7 +209,9 @@ def find_safe_boundary(of: Ellipse | ArrayLike, distance: float, n: int = 2001) 
     """
     if isinstance(of, Ellipse):
         (a, b), reach = of.semi_axes, of.semi_axes[0] + distance
-        across = min(reach, float(np.sqrt(reach**2 - a**2 + b**2)))  # a circle stays one, without rounding
+        across = min(
+            reach, float(np.sqrt(reach**2 - a**2 + b**2))
+        )  # a circle stays one, without rounding
         return replace(of, semi_axes=(reach, across), support=None).curve(n)
     start, end = check_wall(of)
     length, psi = float(np.hypot(*(end - start))), np.linspace(0, np.pi / 2, n)
@@ -195,9 +219,15 @@ def find_safe_boundary(of: Ellipse | ArrayLike, distance: float, n: int = 2001) 
     y = distance * np.sin(psi)
     squared = length**2 / 4 + length * distance * np.cos(psi) - y**2
     x, y = np.sqrt(squared[squared >= 0]), y[squared >= 0]
-    quarters = np.array([(sx * x, sy * y) for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
-    local = np.concatenate([q.T if i % 2 == 0 else q.T[::-1] for i, q in enumerate(quarters)])
-    return np.asarray((start + end) / 2 + local @ np.array([along, [-along[1], along[0]]]))
+    quarters = np.array(
+        [(sx * x, sy * y) for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+    )
+    local = np.concatenate(
+        [q.T if i % 2 == 0 else q.T[::-1] for i, q in enumerate(quarters)]
+    )
+    return np.asarray(
+        (start + end) / 2 + local @ np.array([along, [-along[1], along[0]]])
+    )
 
 
 def compute_distance_error(points: ArrayLike, of: Ellipse | ArrayLike) -> Array:

@@ -58,10 +58,18 @@ def find_target(
     nearest, target = inf, goal
     for zone in zones:
         speed = hypot(zone.vx, zone.vy)
-        if abs(way[0] * zone.vy - way[1] * zone.vx) > s.head_on_share * speed * distance:
+        if (
+            abs(way[0] * zone.vy - way[1] * zone.vx)
+            > s.head_on_share * speed * distance
+        ):
             continue
-        h, closing = barrier(zone.distance(x, y), s.r_robot, s.eps), (s.v_max + speed) * s.dt
-        if h > min(nearest, distance, max(closing / s.gamma, closing * sum(s.step_lengths))):
+        h, closing = (
+            barrier(zone.distance(x, y), s.r_robot, s.eps),
+            (s.v_max + speed) * s.dt,
+        )
+        if h > min(
+            nearest, distance, max(closing / s.gamma, closing * sum(s.step_lengths))
+        ):
             continue
         angles = _find_angles(zone, position, way, s)
         if angles is None:
@@ -75,7 +83,10 @@ def find_target(
 
 
 def _find_angles(
-    zone: PlacedZone, position: tuple[float, float], way: tuple[float, float], s: MPCSettings
+    zone: PlacedZone,
+    position: tuple[float, float],
+    way: tuple[float, float],
+    s: MPCSettings,
 ) -> tuple[float, float] | None:
     """w, half the angle between the tangents, and b, that of the way from their middle; None on a focus."""
     x, y = position
@@ -116,7 +127,11 @@ def _unsafe_semi_axis(zone: PlacedZone, s: MPCSettings) -> float:
 
 
 def _is_side_free(
-    zone: PlacedZone, way: tuple[float, float], left: bool, walls: _Walls, s: MPCSettings
+    zone: PlacedZone,
+    way: tuple[float, float],
+    left: bool,
+    walls: _Walls,
+    s: MPCSettings,
 ) -> bool:
     """True if no wall stands between the zone's centre and where the robot passes on that side.
 
@@ -137,7 +152,10 @@ def _is_side_free(
         if offset <= (hypot(xb - xa, yb - ya) + width) / 2 + s.r_robot + margin:
             near.append(wall)
     points = x + along[0] * _ALONG, y + along[1] * _ALONG
-    return all(bool((h >= 0).all()) for h in compute_h(*points, (), near, r_robot=s.r_robot, eps=s.eps))
+    return all(
+        bool((h >= 0).all())
+        for h in compute_h(*points, (), near, r_robot=s.r_robot, eps=s.eps)
+    )
 
 
 def _cross(u: tuple[float, float], v: tuple[float, float]) -> float:

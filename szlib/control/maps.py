@@ -36,7 +36,11 @@ Circle = tuple[float, float, float]
 
 
 def walls_from_map(
-    path: str | Path, *, simplify: float = 0.05, near: Circle | None = None, unknown: bool = False
+    path: str | Path,
+    *,
+    simplify: float = 0.05,
+    near: Circle | None = None,
+    unknown: bool = False,
 ) -> Walls:
     """Read the map of ROS map_server in the YAML file `path`: the outlines of what is occupied.
 
@@ -77,27 +81,47 @@ def walls_from_map(
     """
     what = "the map"
     try:
-        given = {"negate": 0, "mode": "trinary", **yaml.safe_load(read_small(Path(path)))}
+        given = {
+            "negate": 0,
+            "mode": "trinary",
+            **yaml.safe_load(read_small(Path(path))),
+        }
         missing = {"image", *_NUMBERS} - set(given)
         require(not missing, "a map", f"one without {sorted(missing)}", "complete")
-        origin, side, free, occupied = (check_array(key, given[key], _NUMBERS[key]) for key in _NUMBERS)
+        origin, side, free, occupied = (
+            check_array(key, given[key], _NUMBERS[key]) for key in _NUMBERS
+        )
         below = f"from 0 to below occupied_thresh = {occupied}, which is at most 1"
         for key, holds, expected in (
             ("resolution", side > 0, "a positive number of metres"),
             ("free_thresh", 0 <= free < occupied <= 1, below),
             ("negate", given["negate"] in (0, 1), "0 or 1"),
-            ("mode", given["mode"] in ("trinary", "scale", "raw"), "'trinary', 'scale' or 'raw'"),
+            (
+                "mode",
+                given["mode"] in ("trinary", "scale", "raw"),
+                "'trinary', 'scale' or 'raw'",
+            ),
             ("image", isinstance(given["image"], str), "the name of a picture"),
         ):
             require(holds, key, given[key], expected)
         what = f"image {given['image']!r}"
         picture = Image.open(io.BytesIO(read_small(Path(path).parent / given["image"])))
-        fits = picture.mode in _EIGHT_BITS and picture.width * picture.height <= _MOST_PIXELS
-        require(fits, "it", (picture.mode, picture.size), f"of 8 bits, and at most {_MOST_PIXELS} pixels")
+        fits = (
+            picture.mode in _EIGHT_BITS
+            and picture.width * picture.height <= _MOST_PIXELS
+        )
+        require(
+            fits,
+            "it",
+            (picture.mode, picture.size),
+            f"of 8 bits, and at most {_MOST_PIXELS} pixels",
+        )
         grey, alpha = np.moveaxis(np.asarray(picture.convert("LA"), np.float32), -1, 0)
     except _FAULTS as fault:
         expected = "a YAML file of map_server with a PGM or PNG picture"
-        raise DataError(f"{printable(path)}: {what} cannot be read: {fault}; expected {expected}") from fault
+        raise DataError(
+            f"{printable(path)}: {what} cannot be read: {fault}; expected {expected}"
+        ) from fault
     if given["mode"] == "raw":
         is_solid, is_unknown = (grey >= 100 * occupied) & (grey <= 100), grey > 100
     else:
@@ -139,19 +163,41 @@ def walls_from_grid(
     >>> walls_from_grid(np.ones((20, 40), bool), resolution=0.05).shape  # a block of 2 m by 1 m
     (4, 2, 2)
     """
-    side, within = check_number("resolution", resolution), check_number("simplify", simplify)
-    require(side > 0 and within >= 0, "resolution, simplify", (side, within), "positive", SolverError)
-    (x, y, yaw), cells = check_array("origin", origin, (3,)).tolist(), np.asarray(occupied, bool)
-    require(cells.ndim == 2, "occupied", cells.shape, "of shape (rows, columns)", SolverError)
+    side, within = (
+        check_number("resolution", resolution),
+        check_number("simplify", simplify),
+    )
+    require(
+        side > 0 and within >= 0,
+        "resolution, simplify",
+        (side, within),
+        "positive",
+        SolverError,
+    )
+    (x, y, yaw), cells = (
+        check_array("origin", origin, (3,)).tolist(),
+        np.asarray(occupied, bool),
+    )
+    require(
+        cells.ndim == 2,
+        "occupied",
+        cells.shape,
+        "of shape (rows, columns)",
+        SolverError,
+    )
     edges = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     (row, begin), end = (edges > 0).nonzero(), (edges < 0).nonzero()[1]
-    solids = shapely.simplify(shapely.union_all(shapely.box(begin, row, end, row + 1)), within / side)
+    solids = shapely.simplify(
+        shapely.union_all(shapely.box(begin, row, end, row + 1)), within / side
+    )
     turn = side * np.array([[cos(yaw), sin(yaw)], [-sin(yaw), cos(yaw)]])
     solids = shapely.transform(solids, lambda points: points @ turn + (x, y))
     segments = read_walls(solids)
     if near is not None:
         px, py, r = check_array("near", near, (3,)).tolist()
-        segments = segments[euclidean_segment_formula(px, py, *segments.reshape(-1, 4).T) <= r]
+        segments = segments[
+            euclidean_segment_formula(px, py, *segments.reshape(-1, 4).T) <= r
+        ]
     walls = segments.view(Walls)
     walls.solids = solids
     return walls

@@ -35,7 +35,14 @@ from warnings import catch_warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Array, check_array, check_number, check_point, check_vector, require
+from ..checks import (
+    Array,
+    check_array,
+    check_number,
+    check_point,
+    check_vector,
+    require,
+)
 from ..errors import DataWarning, SolverError, warn
 from ..zones.ellipses import Ellipse, circle_around
 from .barriers import find_near_walls, find_solids, read_walls
@@ -53,7 +60,9 @@ from .step_clock import StepClock
 from .tracker import People, TrackedPeople, Tracker
 
 _MOST_PEOPLE = 1000  # greatest number for which solvers are prepared: those for 10,000 take 1.5 GB of memory
-_FEW_WALLS = 24  # up to this number all walls are in the problem, of more those that are near
+_FEW_WALLS = (
+    24  # up to this number all walls are in the problem, of more those that are near
+)
 
 
 class MPCCBF(Controller):
@@ -114,22 +123,35 @@ class MPCCBF(Controller):
         self.settings = settings or MPCSettings()
         speed = self.settings.zone_speed
         if hasattr(zone, "verdict") and (verdict := zone.verdict(speed)) != "usable":
-            warn(f"the zone at {speed:g} m/s should not be relied on: {verdict.sentence}")
-        with catch_warnings(action="ignore", category=DataWarning):  # the verdict states the same
+            warn(
+                f"the zone at {speed:g} m/s should not be relied on: {verdict.sentence}"
+            )
+        with catch_warnings(
+            action="ignore", category=DataWarning
+        ):  # the verdict states the same
             self.zone = as_ellipse(zone, speed)
-        is_number = max_people is None or (isinstance(max_people, int) and 0 <= max_people <= _MOST_PEOPLE)
+        is_number = max_people is None or (
+            isinstance(max_people, int) and 0 <= max_people <= _MOST_PEOPLE
+        )
         expected = f"a whole number from 0 to {_MOST_PEOPLE}, or None"
         require(is_number, "max_people", max_people, expected, SolverError)
         self.tracker, self._thread = tracker or Tracker(), dict[str, int]()
         self._take_walls(walls)
-        self._pool = SolverPool(self.settings, max_people, min(len(self.walls), _FEW_WALLS))
+        self._pool = SolverPool(
+            self.settings, max_people, min(len(self.walls), _FEW_WALLS)
+        )
         self.reset()
 
     def _take_walls(self, walls: Any) -> None:
         segments = read_walls(walls)
         if self.settings.terminal == "person" and len(segments):
-            raise SolverError(f"terminal='person' is for open space; got {len(segments)} walls; use 'rest'")
-        self.walls, self._wall_rows = segments, walls_with_margins(segments, self.settings)
+            raise SolverError(
+                f"terminal='person' is for open space; got {len(segments)} walls; use 'rest'"
+            )
+        self.walls, self._wall_rows = (
+            segments,
+            walls_with_margins(segments, self.settings),
+        )
         self._solids, self._planner = find_solids(walls), None
         self._near_from, self._near_reach, self._slots = (0.0, 0.0), 0.0, 0
 
@@ -151,7 +173,9 @@ class MPCCBF(Controller):
 
     def _check_thread(self) -> None:
         if self._thread.setdefault("first", get_ident()) != get_ident():
-            raise SolverError("this controller belongs to another thread; build one in each thread")
+            raise SolverError(
+                "this controller belongs to another thread; build one in each thread"
+            )
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the thread: a copy continues from the same plan, in another thread."""
@@ -233,7 +257,9 @@ class MPCCBF(Controller):
         self._pool.budget.begin(perf_counter() - began)
         size = solver.evaluate.size
         parameters = self._parameters(x, ahead, scene, barriers, size)
-        fallback, plan, timed_out = solve_with_fallbacks(solver, self._plan, self._change, parameters)
+        fallback, plan, timed_out = solve_with_fallbacks(
+            solver, self._plan, self._change, parameters
+        )
         self._change = np.zeros(plan.inputs.size) if first else plan.inputs - self._plan
         self._plan, rows = plan.inputs, active_rows(len(scene.zones), n_walls, size)
         clock.hold(self._plan[:2])
@@ -242,7 +268,9 @@ class MPCCBF(Controller):
             predicted=plan.states,
             fallback=fallback,
             slack=plan.slack,
-            residual=scene.spread(plan.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h)[rows]),
+            residual=scene.spread(
+                plan.rows[: solver.evaluate.n_cbf].reshape(-1, self.settings.N_h)[rows]
+            ),
             h=scene.spread(plan.h[rows, 0]),
             target=parameters[4:6],
             cost=plan.cost,
@@ -254,7 +282,9 @@ class MPCCBF(Controller):
             clock=clock.describe(stamps, self.tracker.memory),
         )
 
-    def _find_near(self, x: float, y: float, vx: float, vy: float) -> Sequence[int] | None:
+    def _find_near(
+        self, x: float, y: float, vx: float, vy: float
+    ) -> Sequence[int] | None:
         """Numbers of the walls that can matter: see `Scene.near`. They are looked for once a metre."""
         s, speed = self.settings, max(self.settings.v_max, hypot(vx, vy))
         if len(self.walls) <= _FEW_WALLS:
@@ -268,25 +298,48 @@ class MPCCBF(Controller):
             self._slots = max(_FEW_WALLS, self._slots, len(self._near))
         return self._near
 
-    def _look_ahead(self, at: Point, goal: Point, route: ArrayLike | None) -> tuple[Point, float]:
+    def _look_ahead(
+        self, at: Point, goal: Point, route: ArrayLike | None
+    ) -> tuple[Point, float]:
         """The point of the route that attracts the plan, and the length of the way to the `goal` [m]."""
         s = self.settings
         if route is None and s.lookahead == np.inf:
             return goal, dist(at, goal)
         if self._planner is None:
-            self._planner = RoutePlanner(self.walls, find_boxes(self._wall_rows, s.r_robot))
+            self._planner = RoutePlanner(
+                self.walls, find_boxes(self._wall_rows, s.r_robot)
+            )
         if route is None:
             return self._planner.aim(at, goal, s.lookahead)
-        return self._planner.follow(check_array("route", route, (..., 2)), at, goal, s.lookahead)
+        return self._planner.follow(
+            check_array("route", route, (..., 2)), at, goal, s.lookahead
+        )
 
     def _scene(
-        self, state: Sequence[float], goal: Point, tracked: TrackedPeople, near: Sequence[int] | None = None
+        self,
+        state: Sequence[float],
+        goal: Point,
+        tracked: TrackedPeople,
+        near: Sequence[int] | None = None,
     ) -> Scene:
         """What the step is asked, with the zone of every person."""
         zones = [self.zone_of(person) for person in tracked.people]
-        placed = [place_zone(person, zone) for person, zone in zip(tracked.people, zones, strict=True)]
+        placed = [
+            place_zone(person, zone)
+            for person, zone in zip(tracked.people, zones, strict=True)
+        ]
         walls, solids = self._wall_rows, self._solids
-        return Scene(tuple(state), goal, tracked, zones, placed, walls, self.settings, solids, near)
+        return Scene(
+            tuple(state),
+            goal,
+            tracked,
+            zones,
+            placed,
+            walls,
+            self.settings,
+            solids,
+            near,
+        )
 
     def _parameters(
         self,
@@ -299,9 +352,14 @@ class MPCCBF(Controller):
         """Parameters of the problem of this size: see `Problem.parameters`."""
         if scene.tracked.unknown:
             time = max(abs(x[2]), abs(x[3])) / self.settings.a_max
-            target = x[0] + x[2] * time / 2, x[1] + x[3] * time / 2  # where full braking ends
+            target = (
+                x[0] + x[2] * time / 2,
+                x[1] + x[3] * time / 2,
+            )  # where full braking ends
         else:
-            target = find_target((x[0], x[1]), ahead, scene.zones, scene.near_walls, self.settings)
+            target = find_target(
+                (x[0], x[1]), ahead, scene.zones, scene.near_walls, self.settings
+            )
         end_velocity = scene.zones[0][5:] if scene.terminal == "person" else (0.0, 0.0)
         numbers = padded_parameters(x, barriers, scene.near_walls, size)
         return np.array([*x, *target, *end_velocity, *self._plan[:2], *numbers])
@@ -325,9 +383,13 @@ class MPCCBF(Controller):
     def goal_blocked(self, goal: ArrayLike, people: Sequence[Person] = ()) -> bool:
         """True if h < 0 at the `goal`, because of a wall or of one of `people` who stands."""
         x, y = point = check_point("goal", goal)
-        return self._scene((x, y, 0.0, 0.0), point, TrackedPeople(tuple(people))).goal_blocked
+        return self._scene(
+            (x, y, 0.0, 0.0), point, TrackedPeople(tuple(people))
+        ).goal_blocked
 
-    def check_start(self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()) -> None:
+    def check_start(
+        self, state: ArrayLike, goal: ArrayLike, people: Sequence[Person] = ()
+    ) -> None:
         """Raise SolverError if no run can start in this state.
 
         Parameters
@@ -351,7 +413,9 @@ class MPCCBF(Controller):
                 "person who stands; choose one where h >= 0"
             )
         if (speed := float(np.hypot(vx, vy))) > limit:
-            raise SolverError(f"the run starts at {speed:.3f} m/s; the limit is {limit} m/s")
+            raise SolverError(
+                f"the run starts at {speed:.3f} m/s; the limit is {limit} m/s"
+            )
 
     def _check_goal(self, goal: tuple[float, float]) -> None:
         h = self.barriers(goal)

@@ -32,14 +32,20 @@ def as_ellipse(zone: Ellipse | SpeedZone, speed: float) -> Ellipse:
     """
     if not isinstance(zone, Ellipse):
         if not hasattr(zone, "ellipse"):
-            raise ZoneError(f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}")
+            raise ZoneError(
+                f"a zone must be an Ellipse or have .ellipse(speed); got {type(zone).__name__}"
+            )
         zone = zone.ellipse(speed)
     (m, n), (a, _) = zone.center, zone.semi_axes
     if not max(abs(m), abs(n), a) <= LARGEST:
-        raise ZoneError(f"a zone must lie within {LARGEST:g} m of its person; got {zone}")
+        raise ZoneError(
+            f"a zone must lie within {LARGEST:g} m of its person; got {zone}"
+        )
     xa, ya, xb, yb, a = zone.foci_and_axis
     if hypot(xa, ya) + hypot(xb, yb) > 2 * a * (1 + 1e-9):
-        raise ZoneError(f"a zone must contain its person, who is at (0, 0) of its frame; got {zone}")
+        raise ZoneError(
+            f"a zone must contain its person, who is at (0, 0) of its frame; got {zone}"
+        )
     return zone
 
 
@@ -88,7 +94,9 @@ class Person:
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "velocity", velocity)
         if self.heading is not None:
-            object.__setattr__(self, "heading", check_number("a person's heading", self.heading))
+            object.__setattr__(
+                self, "heading", check_number("a person's heading", self.heading)
+            )
             if self.heading_unknown:
                 raise SolverError(
                     f"a heading is given or unknown; got {self.heading} and heading_unknown for {(x, y)}"
@@ -113,7 +121,9 @@ class Person:
     def at(self, position: tuple[float, float]) -> Person:
         """The same person at another `position` [m]; only the position is checked, for speed."""
         moved = object.__new__(type(self))
-        moved.__dict__.update(self.__dict__, position=check_point("a person's position", position))
+        moved.__dict__.update(
+            self.__dict__, position=check_point("a person's position", position)
+        )
         return moved
 
 
@@ -142,7 +152,9 @@ class PlacedZone(NamedTuple):
     def blocks(self, goal: tuple[float, float], settings: MPCSettings) -> bool:
         """True if a person slower than `STANDING_SPEED` has the `goal` in their zone: h < 0 by `settings`."""
         stands = hypot(self.vx, self.vy) < STANDING_SPEED
-        return stands and bool(barrier(self.distance(*goal), settings.r_robot, settings.eps) < 0)
+        return stands and bool(
+            barrier(self.distance(*goal), settings.r_robot, settings.eps) < 0
+        )
 
 
 def place_zone(person: Person, zone: Ellipse) -> PlacedZone:
@@ -151,6 +163,11 @@ def place_zone(person: Person, zone: Ellipse) -> PlacedZone:
     if heading is None:
         zone, heading = circle_around(zone), 0.0
     c, s, (ma, na, mb, nb, a) = cos(heading), sin(heading), zone.foci_and_axis
-    xa, ya, xb, yb = x + ma * c - na * s, y + ma * s + na * c, x + mb * c - nb * s, y + mb * s + nb * c
+    xa, ya, xb, yb = (
+        x + ma * c - na * s,
+        y + ma * s + na * c,
+        x + mb * c - nb * s,
+        y + mb * s + nb * c,
+    )
     # The constructor of a named tuple would take as long as all of this.
     return tuple.__new__(PlacedZone, (xa, ya, xb, yb, a, vx, vy))

@@ -88,21 +88,34 @@ class Problem:
 
     def is_hard(self, settings: MPCSettings) -> Any:
         """1 for hard rows and the terminal condition, 0 for rows with a price below that of `settings`."""
-        return ca.vertcat(self.prices >= settings.slack_weight, ca.SX.ones(self.terminal.numel()))
+        return ca.vertcat(
+            self.prices >= settings.slack_weight, ca.SX.ones(self.terminal.numel())
+        )
 
 
 @lru_cache(maxsize=256)
 def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem:
     """Build the problem of this module's docstring for `settings`, `n_people` and `n_walls`, or reuse it."""
     s = settings
-    inputs, start, target = ca.SX.sym("u", 2, s.N), ca.SX.sym("x0", 4), ca.SX.sym("target", 2)
+    inputs, start, target = (
+        ca.SX.sym("u", 2, s.N),
+        ca.SX.sym("x0", 4),
+        ca.SX.sym("target", 2),
+    )
     people, walls = ca.SX.sym("person", 9, n_people), ca.SX.sym("wall", 5, n_walls)
     w, last = ca.SX.sym("w", 2), ca.SX.sym("last", 2)
 
     states = [start]
     for k, length in enumerate(s.step_lengths):
-        position, velocity, a, dt = states[-1][:2], states[-1][2:], inputs[:, k], length * s.dt
-        states.append(ca.vertcat(position + dt * velocity + 0.5 * dt**2 * a, velocity + dt * a))
+        position, velocity, a, dt = (
+            states[-1][:2],
+            states[-1][2:],
+            inputs[:, k],
+            length * s.dt,
+        )
+        states.append(
+            ca.vertcat(position + dt * velocity + 0.5 * dt**2 * a, velocity + dt * a)
+        )
     x = ca.horzcat(*states)
 
     lengths = np.array(s.step_lengths, float)
@@ -111,9 +124,13 @@ def build_problem(settings: MPCSettings, n_people: int, n_walls: int) -> Problem
     cost = ca.dot(weights, error**2) + ca.dot(ca.DM(np.outer(s.R, lengths)), inputs**2)
     if s.jerk_weight:
         change = inputs - ca.horzcat(last, inputs[:, :-1])
-        cost += ca.dot(ca.DM(np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)), change**2)
+        cost += ca.dot(
+            ca.DM(np.outer((s.jerk_weight, s.jerk_weight), 1 / lengths)), change**2
+        )
 
-    h, h_x, h_y, h_xx, h_xy, h_yy = _barriers(s, x[:2, : s.N_h + 1], people[:7, :], walls)
+    h, h_x, h_y, h_xx, h_xy, h_yy = _barriers(
+        s, x[:2, : s.N_h + 1], people[:7, :], walls
+    )
     kept, prices = _kept_and_prices(s, people[7:, :], n_walls)
     cbf = ca.vec((h[:, 1:] - kept * h[:, :-1]).T)
     speed = s.v_max**2 - ca.sum1(x[2:, 1:] ** 2).T
@@ -141,7 +158,10 @@ def _kept_and_prices(s: MPCSettings, given: Any, n_walls: int) -> tuple[Any, Any
     keep = ca.vertcat(1 - given[0, :].T, ca.SX(1 - s.gamma) * ca.SX.ones(n_walls))
     price = ca.vertcat(given[1, :].T, s.slack_weight * ca.SX.ones(n_walls))
     kept = [keep if m == 1 else keep**m for m in s.step_lengths[: s.N_h]]
-    prices = [ca.if_else(price < s.slack_weight, m * price, price) for m in s.step_lengths[: s.N_h]]
+    prices = [
+        ca.if_else(price < s.slack_weight, m * price, price)
+        for m in s.step_lengths[: s.N_h]
+    ]
     return ca.horzcat(*kept), ca.horzcat(*prices)
 
 
@@ -151,9 +171,15 @@ def _barriers(s: MPCSettings, at: Any, people: Any, walls: Any) -> list[Any]:
     xa, ya, xb, yb, a, vx, vy = person = ca.vertsplit(ca.SX.sym("person", 7))
     distance = ellipse_formula(x - time * vx, y - time * vy, xa, ya, xb, yb, a)
     *ends, margin = wall = ca.vertsplit(ca.SX.sym("wall", 5))
-    of_person, of_wall = barrier(distance, s.r_robot, s.eps), segment_formula(x, y, *ends)
+    of_person, of_wall = (
+        barrier(distance, s.r_robot, s.eps),
+        segment_formula(x, y, *ends),
+    )
     n, found = at.shape[1], [[ca.SX(0, at.shape[1])] for _ in range(6)]
-    for h, of, numbers in ((of_person, person, people), (barrier(of_wall, s.r_robot, margin), wall, walls)):
+    for h, of, numbers in (
+        (of_person, person, people),
+        (barrier(of_wall, s.r_robot, margin), wall, walls),
+    ):
         if count := numbers.shape[1]:
             once = _differentiated(h, x, y, time, of, s.times, n)
             values = once.map(count)(ca.repmat(at, 1, count), numbers)
@@ -168,11 +194,22 @@ def _differentiated(
     """A function of n positions at these times and of numbers: h and its derivatives, each (1, n)."""
     # One variable at a time: these are a fifth fewer instructions than those of `ca.hessian`.
     h_x, h_y = (ca.jacobian(h, by) for by in (x, y))
-    outputs = [h, h_x, h_y, ca.jacobian(h_x, x), ca.jacobian(h_x, y), ca.jacobian(h_y, y)]
+    outputs = [
+        h,
+        h_x,
+        h_y,
+        ca.jacobian(h_x, x),
+        ca.jacobian(h_x, y),
+        ca.jacobian(h_y, y),
+    ]
     numbers, at = ca.vertcat(*of), ca.SX.sym("at", 2, n)
     once = ca.Function("h", [ca.vertcat(x, y), numbers, time], outputs)
-    everywhere = zip(*(once(at[:, k], numbers, times[k]) for k in range(n)), strict=True)
-    return ca.Function("h", [at, numbers], ca.cse([ca.horzcat(*values) for values in everywhere]))
+    everywhere = zip(
+        *(once(at[:, k], numbers, times[k]) for k in range(n)), strict=True
+    )
+    return ca.Function(
+        "h", [at, numbers], ca.cse([ca.horzcat(*values) for values in everywhere])
+    )
 
 
 def remaining_distance(x: Any, y: Any, gx: Any, gy: Any) -> Any:
@@ -186,7 +223,9 @@ def remaining_distance(x: Any, y: Any, gx: Any, gy: Any) -> Any:
 
 def dense_function(name: str, arguments: Sequence[Any], outputs: Sequence[Any]) -> Any:
     """A CasADi function `name` from `arguments` to dense `outputs`."""
-    return ca.Function(name, list(arguments), [ca.densify(output) for output in outputs])
+    return ca.Function(
+        name, list(arguments), [ca.densify(output) for output in outputs]
+    )
 
 
 class BufferedFunction:
@@ -201,9 +240,14 @@ class BufferedFunction:
     last_results : arrays for its last results; for the others it makes some.
     """
 
-    def __init__(self, function: Any, *arguments: Array, last_results: Sequence[Array] = ()) -> None:
+    def __init__(
+        self, function: Any, *arguments: Array, last_results: Sequence[Array] = ()
+    ) -> None:
         n_made = function.n_out() - len(last_results)
-        self.results = [*(np.zeros(function.nnz_out(i)) for i in range(n_made)), *last_results]
+        self.results = [
+            *(np.zeros(function.nnz_out(i)) for i in range(n_made)),
+            *last_results,
+        ]
         buffer, call = function.buffer()
         for i, array in enumerate(arguments):
             buffer.set_arg(i, array.data)
@@ -248,14 +292,24 @@ class PlanEvaluator:
 
     def __init__(self, settings: MPCSettings, n_people: int, n_walls: int) -> None:
         with CASADI_LOCK:
-            evaluate, self.find_prices, self.n_cbf = _evaluation(settings, n_people, n_walls)
+            evaluate, self.find_prices, self.n_cbf = _evaluation(
+                settings, n_people, n_walls
+            )
             self.n_rows = evaluate.nnz_out(1)
-            self._inputs, self._parameters = np.zeros(evaluate.nnz_in(0)), np.zeros(evaluate.nnz_in(1))
+            self._inputs, self._parameters = (
+                np.zeros(evaluate.nnz_in(0)),
+                np.zeros(evaluate.nnz_in(1)),
+            )
             self.function = BufferedFunction(evaluate, self._inputs, self._parameters)
-        self.size, self._shape = (n_people, n_walls), (n_people + n_walls, settings.N_h + 1)
+        self.size, self._shape = (
+            (n_people, n_walls),
+            (n_people + n_walls, settings.N_h + 1),
+        )
         self._numbers = (self._inputs, *self.shaped(*self.function.results[1:]))
 
-    def shaped(self, rows: Array, states: Array, h: Array) -> tuple[Array, Array, Array]:
+    def shaped(
+        self, rows: Array, states: Array, h: Array
+    ) -> tuple[Array, Array, Array]:
         """Views of the buffers `rows`, `states` and `h`, shaped as in `PlanEvaluation`."""
         return rows[: self.n_rows], states.reshape(-1, 4), h.reshape(self._shape)
 
@@ -267,12 +321,18 @@ class PlanEvaluator:
 
 
 @lru_cache(maxsize=256)
-def _evaluation(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any, int]:
+def _evaluation(
+    settings: MPCSettings, n_people: int, n_walls: int
+) -> tuple[Any, Any, int]:
     p = build_problem(settings, n_people, n_walls)
     slack = ca.mmax(p.violations * p.is_hard(settings))
     outputs = [ca.vertcat(p.cost, slack), p.rows, p.states, p.h.T]
     prices = dense_function("prices", [p.parameters], [p.prices])
-    return dense_function("evaluate", [p.inputs, p.parameters], outputs), prices, p.n_cbf
+    return (
+        dense_function("evaluate", [p.inputs, p.parameters], outputs),
+        prices,
+        p.n_cbf,
+    )
 
 
 class TimeBudget:

@@ -29,18 +29,24 @@ from ..errors import SolverError
 from .barriers import read_walls
 
 Point = tuple[float, float]
-_MANY = 64  # walls that are in the graph from the beginning: its building takes some 0.1 s
-_CORNER = (
-    1e-3  # distance of a corner of a route from its box [m]: more than rounding, less than a robot feels
+_MANY = (
+    64  # walls that are in the graph from the beginning: its building takes some 0.1 s
 )
+_CORNER = 1e-3  # distance of a corner of a route from its box [m]: larger than rounding
 _DETOUR = 0.5  # a route is kept until it is this much longer than it was at its best [m] (assumed)
-_GOAL_MOVED = 0.5  # distances from the goal are kept until it has moved this far [m] (assumed)
-_SAMPLES = 33  # points of a user's route of which the farthest visible one is the target
+_GOAL_MOVED = (
+    0.5  # distances from the goal are kept until it has moved this far [m] (assumed)
+)
+_SAMPLES = (
+    33  # points of a user's route of which the farthest visible one is the target
+)
 _SEEN = 1 - 1e-9  # share of the way to a point that must be free: all but rounding
 _SIGNS = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])  # of the corners of a box
 
 
-def find_route(start: ArrayLike, goal: ArrayLike, walls: Any, clearance: float) -> Array:
+def find_route(
+    start: ArrayLike, goal: ArrayLike, walls: Any, clearance: float
+) -> Array:
     """Find the shortest way from `start` to `goal` around `walls`: a polyline, shape (m, 2) [m].
 
     Parameters
@@ -69,9 +75,15 @@ def find_route(start: ArrayLike, goal: ArrayLike, walls: Any, clearance: float) 
     require(c >= 0, "clearance", clearance, "a number >= 0", SolverError)
     segments = read_walls(walls)
     length = np.hypot(*(segments[:, 1] - segments[:, 0]).T)
-    planner = RoutePlanner(segments, np.column_stack([length / 2 + c, np.full(len(segments), c)]))
+    planner = RoutePlanner(
+        segments, np.column_stack([length / 2 + c, np.full(len(segments), c)])
+    )
     planner.aim(at, check_point("goal", goal), inf)
-    return np.vstack([at, planner.points[planner.turns]]) if planner.turns else np.zeros((0, 2))
+    return (
+        np.vstack([at, planner.points[planner.turns]])
+        if planner.turns
+        else np.zeros((0, 2))
+    )
 
 
 def find_boxes(walls: ArrayLike, r_robot: float) -> Array:
@@ -104,11 +116,17 @@ class RoutePlanner:
 
     def __init__(self, walls: Array, half: Array) -> None:
         way = walls[:, 1] - walls[:, 0]
-        self._half_length, self._middle, self._half = np.hypot(*way.T) / 2, walls.mean(axis=1), half
+        self._half_length, self._middle, self._half = (
+            np.hypot(*way.T) / 2,
+            walls.mean(axis=1),
+            half,
+        )
         along = way / (2 * self._half_length[:, None])
         self._axes = np.stack([along, along[:, ::-1] * (-1, 1)], axis=1)
         reach = np.hypot(*half.T)[:, None]
-        self._tree = shapely.STRtree(shapely.box(*(self._middle - reach).T, *(self._middle + reach).T))
+        self._tree = shapely.STRtree(
+            shapely.box(*(self._middle - reach).T, *(self._middle + reach).T)
+        )
         self._build_graph(np.arange(len(walls) if len(walls) <= _MANY else 0))
 
     def reset(self) -> None:
@@ -126,14 +144,22 @@ class RoutePlanner:
         out = self._half[boxes]
         out[:, 0] = np.maximum(out[:, 0], self._half_length[boxes] + out[:, 1])
         outward = _SIGNS[:, :, None] * self._axes[boxes, None]
-        corners = self._middle[boxes, None] + np.einsum("nkij,ni->nkj", outward, out + _CORNER)
+        corners = self._middle[boxes, None] + np.einsum(
+            "nkij,ni->nkj", outward, out + _CORNER
+        )
         corners, outward = corners.reshape(-1, 2), outward.reshape(-1, 2, 2)
-        inside = np.any(np.all(np.abs(self._to_boxes(corners, boxes)) < self._half[boxes], axis=2), axis=1)
+        inside = np.any(
+            np.all(np.abs(self._to_boxes(corners, boxes)) < self._half[boxes], axis=2),
+            axis=1,
+        )
         self._corners, outward = corners[~inside], outward[~inside]
         pairs: NDArray[np.intp] = np.array(np.triu_indices(len(outward), 1))
         for end in (0, 1):
             way = self._corners[pairs[1]] - self._corners[pairs[0]]
-            pairs = pairs[:, np.einsum("nij,nj->ni", outward[pairs[end]], way).prod(axis=1) <= 1e-9]
+            pairs = pairs[
+                :,
+                np.einsum("nij,nj->ni", outward[pairs[end]], way).prod(axis=1) <= 1e-9,
+            ]
         for box in boxes[:, None]:
             start, stop = self._corners[pairs]
             pairs = pairs[:, self._enter(start, stop, self._half, box)[:, 0] >= _SEEN]
@@ -145,7 +171,9 @@ class RoutePlanner:
         offset = points[..., None, :] - self._middle[boxes]
         return np.asarray(np.einsum("...nj,nij->...ni", offset, self._axes[boxes]))
 
-    def _enter(self, start: Array, ends: Array, half: Array, boxes: NDArray[np.intp]) -> Array:
+    def _enter(
+        self, start: Array, ends: Array, half: Array, boxes: NDArray[np.intp]
+    ) -> Array:
         """Where ways from `start` through `ends`, shape (m, 2), enter n `boxes`, shape (m, n).
 
         As a multiple of the distance to each end; inf if a way does not enter a box.
@@ -154,8 +182,13 @@ class RoutePlanner:
         way = self._to_boxes(ends, boxes) - at
         way = np.where(way == 0, 1e-200, way)
         first, second = (-half[boxes] - at) / way, (half[boxes] - at) / way
-        enter, leave = np.minimum(first, second).max(axis=-1), np.maximum(first, second).min(axis=-1)
-        return np.where((enter < leave) & (leave > 1 - _SEEN), np.maximum(enter, 0.0), inf)
+        enter, leave = (
+            np.minimum(first, second).max(axis=-1),
+            np.maximum(first, second).min(axis=-1),
+        )
+        return np.where(
+            (enter < leave) & (leave > 1 - _SEEN), np.maximum(enter, 0.0), inf
+        )
 
     def _measure_free(self, start: Array, ends: Array, half: Array) -> Array:
         """How far ways from `start` through `ends` lead outside of boxes, at most to the ends.
@@ -176,8 +209,13 @@ class RoutePlanner:
                 continue
             half = half.copy()
             at = np.abs(self._to_boxes(np.array(point), near))
-            inside, beyond = (at < half[near]).all(axis=1), at[:, 0] > self._half_length[near]
-            half[near] = np.where(np.column_stack([inside & beyond, inside & ~beyond]), at, half[near])
+            inside, beyond = (
+                (at < half[near]).all(axis=1),
+                at[:, 0] > self._half_length[near],
+            )
+            half[near] = np.where(
+                np.column_stack([inside & beyond, inside & ~beyond]), at, half[near]
+            )
         return half
 
     def _take_goal(self, goal: Point) -> None:
@@ -188,10 +226,16 @@ class RoutePlanner:
         seen = np.flatnonzero(free.all(axis=1))
         i, j = np.hstack([self._pairs, [seen, np.full(len(seen), n)]]).astype(np.intc)
         self.points = points = np.vstack([self._corners, goal])
-        graph = coo_array((np.hypot(*(points[i] - points[j]).T), (i, j)), shape=(n + 1, n + 1))
-        self._far, self._next = dijkstra(graph.tocsr(), directed=False, indices=n, return_predecessors=True)
+        graph = coo_array(
+            (np.hypot(*(points[i] - points[j]).T), (i, j)), shape=(n + 1, n + 1)
+        )
+        self._far, self._next = dijkstra(
+            graph.tocsr(), directed=False, indices=n, return_predecessors=True
+        )
 
-    def aim(self, position: Point, goal: Point, lookahead: float) -> tuple[Point, float]:
+    def aim(
+        self, position: Point, goal: Point, lookahead: float
+    ) -> tuple[Point, float]:
         """The point to head for from `position` on the way to the `goal`, and the length of that way [m].
 
         It lies in sight, at most `lookahead` [m] away: on the way, or straight behind its first corner, so
@@ -202,7 +246,9 @@ class RoutePlanner:
         self.points[-1] = goal
         p, half = np.array(position), self._cut_boxes(position, goal)
         corners = np.array(self.turns[3::-1], int)
-        if not self._choose(p, corners, self._measure_free(p, self.points[corners], half)[:, None]):
+        if not self._choose(
+            p, corners, self._measure_free(p, self.points[corners], half)[:, None]
+        ):
             self._search(p, goal, half)
         if not self.turns:
             return goal, inf
@@ -215,9 +261,14 @@ class RoutePlanner:
         while True:
             self.turns, self._shortest = [], inf
             order = np.argsort(np.hypot(*(self.points - p).T) + self._far)
-            self._choose(p, order, self._enter(p, self.points[order], half, self._boxes))
+            self._choose(
+                p, order, self._enter(p, self.points[order], half, self._boxes)
+            )
             legs = pairwise([p, *self.points[self.turns]])
-            enters = [self._enter(a, b[None], half, np.arange(len(half)))[0] < _SEEN for a, b in legs]
+            enters = [
+                self._enter(a, b[None], half, np.arange(len(half)))[0] < _SEEN
+                for a, b in legs
+            ]
             crossed = np.setdiff1d(np.flatnonzero(np.any(enters, axis=0)), self._boxes)
             if not len(crossed):
                 return
@@ -247,7 +298,9 @@ class RoutePlanner:
         x, y = (p + self._measure_free(p, p + way[None], half)[0] * way).tolist()
         return x, y
 
-    def follow(self, route: Array, position: Point, goal: Point, lookahead: float) -> tuple[Point, float]:
+    def follow(
+        self, route: Array, position: Point, goal: Point, lookahead: float
+    ) -> tuple[Point, float]:
         """As `aim`, with `position` and `lookahead`, on a given `route` to the `goal`, shape (m, 2) [m].
 
         It begins at the point of the route nearest to the robot. Where no point of it is in sight, the robot

@@ -63,12 +63,16 @@ class Scene(NamedTuple):
         """True if h < 0 at the goal, because of a wall or of a person who stands there."""
         s = self.settings
         at_walls = compute_h(*self.goal, (), self.walls, r_robot=s.r_robot, eps=s.eps)
-        return any(zone.blocks(self.goal, s) for zone in self.zones) or any(h < 0 for h in at_walls)
+        return any(zone.blocks(self.goal, s) for zone in self.zones) or any(
+            h < 0 for h in at_walls
+        )
 
     @property
     def is_in_solid(self) -> bool:
         """True if the robot's centre lies inside of a solid wall."""
-        return self.solids is not None and bool(shapely.contains_xy(self.solids, *self.state[:2]))
+        return self.solids is not None and bool(
+            shapely.contains_xy(self.solids, *self.state[:2])
+        )
 
     @property
     def near_walls(self) -> Sequence[Sequence[float]]:
@@ -80,7 +84,9 @@ class Scene(NamedTuple):
         if self.near is None:
             return rows
         spread = np.full((len(self.people) + len(self.walls), *rows.shape[1:]), inf)
-        spread[[*range(len(self.people)), *(len(self.people) + i for i in self.near)]] = rows
+        spread[
+            [*range(len(self.people)), *(len(self.people) + i for i in self.near)]
+        ] = rows
         return spread
 
     @property
@@ -101,17 +107,26 @@ class Scene(NamedTuple):
     def h(self, x: float, y: float, time: float = 0.0) -> list[float]:
         """h of people and then of near walls for the robot at (`x`, `y`), `time` seconds from now [m]."""
         s = self.settings
-        return compute_h(x, y, self.zones, self.near_walls, r_robot=s.r_robot, eps=s.eps, time=time)
+        return compute_h(
+            x, y, self.zones, self.near_walls, r_robot=s.r_robot, eps=s.eps, time=time
+        )
 
     def gaps(self, x: float, y: float, time: float = 0.0) -> list[float]:
         """Euclidean gaps of the disc at (`x`, `y`) to bodies and near walls, `time` seconds from now [m]."""
         gaps, radius = [], self.settings.r_robot
         for person in self.people:
             (px, py), (vx, vy) = person.position, person.velocity
-            gaps.append(hypot(x - px - time * vx, y - py - time * vy) - BODY_RADIUS - radius)
-        return gaps + [euclidean_segment_formula(x, y, *wall[:4]) - radius for wall in self.near_walls]
+            gaps.append(
+                hypot(x - px - time * vx, y - py - time * vy) - BODY_RADIUS - radius
+            )
+        return gaps + [
+            euclidean_segment_formula(x, y, *wall[:4]) - radius
+            for wall in self.near_walls
+        ]
 
-    def smallest_gap(self, start: Sequence[float], end: Sequence[float], acceleration: float) -> float:
+    def smallest_gap(
+        self, start: Sequence[float], end: Sequence[float], acceleration: float
+    ) -> float:
         """Lower bound of the disc's gaps to bodies and walls, and of h + eps of people, within a step [m].
 
         Parameters
@@ -131,20 +146,31 @@ class Scene(NamedTuple):
             return -inf
         (x, y), s = start, self.settings
         dx, dy, bow = end[0] - x, end[1] - y, acceleration * s.dt**2 / 8
-        reach = hypot(dx, dy) + s.dt * max([hypot(*person.velocity) for person in self.people], default=0.0)
+        reach = hypot(dx, dy) + s.dt * max(
+            [hypot(*person.velocity) for person in self.people], default=0.0
+        )
 
         def gaps_after(share: float) -> list[float]:
             """These distances after a share of the step, without the acceleration."""
             at = x + share * dx, y + share * dy
-            h = compute_h(*at, self.zones, (), r_robot=s.r_robot, eps=0.0, time=share * s.dt)
+            h = compute_h(
+                *at, self.zones, (), r_robot=s.r_robot, eps=0.0, time=share * s.dt
+            )
             return self.gaps(*at, share * s.dt) + h
 
         gaps = gaps_after(0.0)
         if min(gaps, default=inf) >= reach + bow:
             return min(gaps, default=inf) - reach - bow
-        for i, rows in enumerate(zip(gaps, *map(gaps_after, (_INSTANT, 1 - _INSTANT, 1.0)), strict=True)):
-            slope, slope_at_end = (rows[1] - rows[0]) / _INSTANT, (rows[3] - rows[2]) / _INSTANT
+        for i, rows in enumerate(
+            zip(gaps, *map(gaps_after, (_INSTANT, 1 - _INSTANT, 1.0)), strict=True)
+        ):
+            slope, slope_at_end = (
+                (rows[1] - rows[0]) / _INSTANT,
+                (rows[3] - rows[2]) / _INSTANT,
+            )
             gaps[i] = min(rows)
             if slope < 0 < slope_at_end:
-                gaps[i] = rows[0] + slope * (rows[3] - slope_at_end - rows[0]) / (slope - slope_at_end)
+                gaps[i] = rows[0] + slope * (rows[3] - slope_at_end - rows[0]) / (
+                    slope - slope_at_end
+                )
         return min(gaps) - _INSTANT * reach - bow

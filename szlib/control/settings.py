@@ -28,10 +28,16 @@ def _setting(badge: str, default: Any, **paper: Any) -> Any:
     return field(default=default, metadata={"badge": badge, **paper})
 
 
-def _check_numbers(settings: Any, expected: str, holds: Callable[[float], bool], *names: str) -> None:
+def _check_numbers(
+    settings: Any, expected: str, holds: Callable[[float], bool], *names: str
+) -> None:
     """Make the settings of these names floats; SolverError unless each `holds` what is `expected`."""
     for name in names:
-        object.__setattr__(settings, name, value := float(check_array(name, getattr(settings, name), ())))
+        object.__setattr__(
+            settings,
+            name,
+            value := float(check_array(name, getattr(settings, name), ())),
+        )
         _require(holds(value), name, value, expected)
 
 
@@ -61,11 +67,18 @@ class Crowding:
     gap: float = 0.2
 
     def __post_init__(self) -> None:
-        _check_numbers(self, "a positive number", lambda v: v > 0, "radius", "price", "gap")
+        _check_numbers(
+            self, "a positive number", lambda v: v > 0, "radius", "price", "gap"
+        )
         _check_numbers(self, "in (0, 1]", lambda v: 0 < v <= 1, "gamma")
         for name, least in (("few", 1), ("many", self.few)):
             value = getattr(self, name)
-            _require(isinstance(value, int) and value >= least, name, value, f"a whole number >= {least}")
+            _require(
+                isinstance(value, int) and value >= least,
+                name,
+                value,
+                f"a whole number >= {least}",
+            )
 
 
 @dataclass(frozen=True)
@@ -139,7 +152,9 @@ class MPCSettings:
     gamma: float = _setting("tuned", 0.05)
     Q: tuple[float, float, float, float] = _setting("assumed", (10.0, 10.0, 1.0, 1.0))
     R: tuple[float, float] = _setting("assumed", (1.0, 1.0))
-    P: tuple[float, float, float, float] = _setting("assumed", (100.0, 100.0, 10.0, 10.0))
+    P: tuple[float, float, float, float] = _setting(
+        "assumed", (100.0, 100.0, 10.0, 10.0)
+    )
     jerk_weight: float = _setting("paper", 0.0)
     a_max: float = _setting("assumed", 1.0)
     v_max: float = _setting("paper", 1.0)
@@ -162,32 +177,58 @@ class MPCSettings:
         for name, length in (("Q", 4), ("R", 2), ("P", 4)):
             weights = check_array(name, getattr(self, name), (length,))
             object.__setattr__(self, name, tuple(weights.tolist()))
-        object.__setattr__(self, "grid", grid := tuple(operator.index(length) for length in self.grid))
+        object.__setattr__(
+            self, "grid", grid := tuple(operator.index(length) for length in self.grid)
+        )
         if grid:
             is_grid = grid[0] == 1 and min(grid) >= 1 and self.terminal == "none"
-            _require(is_grid, "grid", grid, "whole numbers >= 1, the first 1, and no terminal condition")
+            _require(
+                is_grid,
+                "grid",
+                grid,
+                "whole numbers >= 1, the first 1, and no terminal condition",
+            )
             object.__setattr__(self, "N", len(grid))
             object.__setattr__(self, "N_h", len(grid))
         if isinstance(self.crowding, dict):  # of a saved run
             object.__setattr__(self, "crowding", Crowding(**self.crowding))
         for name in ("N", "N_h", "max_iterations"):
             value = getattr(self, name)
-            _require(isinstance(value, int | np.integer) and value >= 1, name, value, "a whole number >= 1")
+            _require(
+                isinstance(value, int | np.integer) and value >= 1,
+                name,
+                value,
+                "a whole number >= 1",
+            )
         positive = "dt", "a_max", "v_max", "zone_speed", "slack_weight"
         _check_numbers(self, "a positive number", lambda v: v > 0, *positive)
-        _check_numbers(self, "a number >= 0", lambda v: v >= 0, "r_robot", "eps", "jerk_weight")
+        _check_numbers(
+            self, "a number >= 0", lambda v: v >= 0, "r_robot", "eps", "jerk_weight"
+        )
         _check_numbers(self, "in (0, 1]", lambda v: 0 < v <= 1, "gamma")
         _check_numbers(self, "in [0, 0.5]", lambda v: 0 <= v <= 0.5, "head_on_share")
         _require(self.N_h <= self.N, "N_h", self.N_h, f"at most N = {self.N}")
         _require(min(self.Q) >= 0, "Q", self.Q, "weights >= 0")
         _require(min(self.P) >= 0, "P", self.P, "weights >= 0")
         _require(min(self.R) > 0, "R", self.R, "weights > 0")
-        choices = {"margin": Margin, "pass_side": Side, "terminal": Terminal, "solver": Solver}
+        choices = {
+            "margin": Margin,
+            "pass_side": Side,
+            "terminal": Terminal,
+            "solver": Solver,
+        }
         for name, literal in choices.items():
             given, allowed = getattr(self, name), get_args(literal)
             _require(given in allowed, name, given, " or ".join(map(repr, allowed)))
-        for name, unit in (("time_limit", "seconds"), ("deadline", "seconds"), ("lookahead", "metres")):
-            is_positive = isinstance(value := getattr(self, name), int | float | np.number) and value > 0
+        for name, unit in (
+            ("time_limit", "seconds"),
+            ("deadline", "seconds"),
+            ("lookahead", "metres"),
+        ):
+            is_positive = (
+                isinstance(value := getattr(self, name), int | float | np.number)
+                and value > 0
+            )
             _require(is_positive, name, value, f"a positive number of {unit}, or inf")
         if self.terminal != "none":
             object.__setattr__(self, "N_h", self.N)
@@ -206,7 +247,9 @@ class MPCSettings:
         >>> szlib.MPCSettings.paper(gamma=0.1).solver
         'ipopt'
         """
-        differing = {f.name: f.metadata["paper"] for f in fields(cls) if "paper" in f.metadata}
+        differing = {
+            f.name: f.metadata["paper"] for f in fields(cls) if "paper" in f.metadata
+        }
         return cls(**{**differing, **changes})
 
     @property
@@ -244,7 +287,12 @@ class MPCSettings:
         """
         grid = (1,) * 4 + (2,) * 4 + (3,) * 6
         reach = sum(grid) * changes.get("dt", cls.dt) * changes.get("v_max", cls.v_max)
-        ahead = {"gamma": 0.08, "grid": grid, "jerk_weight": 8.0, "lookahead": reach + 1.0}
+        ahead = {
+            "gamma": 0.08,
+            "grid": grid,
+            "jerk_weight": 8.0,
+            "lookahead": reach + 1.0,
+        }
         return cls(**{**ahead, "crowding": Crowding(), **changes})
 
     @cached_property
@@ -265,7 +313,9 @@ class MPCSettings:
         badges = {}
         for each in fields(self):
             value = getattr(self, each.name)
-            badges[each.name] = each.metadata["badge"] if value == each.default else "chosen"
+            badges[each.name] = (
+                each.metadata["badge"] if value == each.default else "chosen"
+            )
             if value == each.metadata.get("paper", object()):
                 badges[each.name] = "paper"
         return badges

@@ -17,7 +17,9 @@ from .step_report import ProblemRow, StepReport, verify_plan
 Fallback = Literal["warm", "cold", "kept", "relaxed", "braking"]
 FALLBACKS: tuple[Fallback, ...] = get_args(Fallback)
 """The ways to a control, in the order in which they are tried: see `szlib.control.solvers.fallbacks`."""
-HOLDS = 2e-3  # a barrier condition whose residual is smaller than this holds the robot [m]
+HOLDS = (
+    2e-3  # a barrier condition whose residual is smaller than this holds the robot [m]
+)
 Status = Literal["optimal", "kept", "relaxed", "braking"]
 _MEANING = {
     "warm": "optimal, from the last plan",
@@ -126,7 +128,10 @@ class Step:
         keep their velocity. Negative is an overlap.
         """
         states, times = self.predicted[:, :2].tolist(), self.scene.settings.times
-        gaps = [self.scene.gaps(x, y, time) for (x, y), time in zip(states, times, strict=True)]
+        gaps = [
+            self.scene.gaps(x, y, time)
+            for (x, y), time in zip(states, times, strict=True)
+        ]
         return self.scene.spread(np.reshape(np.array(gaps, float), (len(gaps), -1)).T)
 
     @property
@@ -169,58 +174,84 @@ class Step:
 
     def __repr__(self) -> str:
         ax, ay = self.control.tolist()
-        safe, h = "safe" if self.safe else "not safe", min(self.h.tolist(), default=np.inf)
+        safe, h = (
+            "safe" if self.safe else "not safe",
+            min(self.h.tolist(), default=np.inf),
+        )
         return f"Step({self.fallback}, {safe}, control=({ax:.3g}, {ay:.3g}) m/s2, min h={h:.3g} m)"
 
     def explain(self) -> str:
         """Explain the step in sentences, after it is verified: what happened, and why no plan is feasible."""
         scene, s, (ax, ay) = self.scene, self.scene.settings, self.control.tolist()
         report, danger = self.verify(), self._find_danger()
-        lines = [f"Step: {_MEANING[self.fallback]}; {f'not safe: {danger}' if danger else 'safe'}"]
-        lines.append(f"  control ({ax:.3g}, {ay:.3g}) m/s2 after {1e3 * self.solve_time:.2g} ms")
+        lines = [
+            f"Step: {_MEANING[self.fallback]}; {f'not safe: {danger}' if danger else 'safe'}"
+        ]
+        lines.append(
+            f"  control ({ax:.3g}, {ay:.3g}) m/s2 after {1e3 * self.solve_time:.2g} ms"
+        )
         if len(self.h):
             i = int(np.argmin(self.h))
             lines.append(f"  nearest is {self._obstacle(i)}: h = {self.h[i]:.3g} m")
         if s.crowding and scene.level != "alone":
             lines.append(f"  {self._describe_crowd(s.crowding)}")
         if not self.feasible:
-            lines.append(f"  the plan violates {self._name_row(report.worst)} by {report.slack:.2g}")
+            lines.append(
+                f"  the plan violates {self._name_row(report.worst)} by {report.slack:.2g}"
+            )
             lines.append(f"  what helps: {self._advise(report.worst)}")
         if self.timed_out:
             limit = min(s.time_limit, s.deadline)
-            lines.append(f"  time was up after {limit} s; what helps: a larger time_limit or deadline")
+            lines.append(
+                f"  time was up after {limit} s; what helps: a larger time_limit or deadline"
+            )
         if self.goal_blocked:
-            lines.append(f"  the goal {scene.goal} cannot be reached: h < 0 there; the robot waits beside it")
+            lines.append(
+                f"  the goal {scene.goal} cannot be reached: h < 0 there; the robot waits beside it"
+            )
         if self.way_length == np.inf:
-            lines.append("  walls leave no way to the goal; the plan heads straight for it")
+            lines.append(
+                "  walls leave no way to the goal; the plan heads straight for it"
+            )
         if self.rejected:
             lines.append(
                 f"  {self.rejected} measurements of people were rejected; {self.unknown} are unknown"
             )
         if self.stuck:
-            lines.append(f"  no progress for {self.stuck:.1f} s, {self._explain_stuck()}")
+            lines.append(
+                f"  no progress for {self.stuck:.1f} s, {self._explain_stuck()}"
+            )
         lines += [f"  {self.clock}"] * bool(self.clock)
         return "\n".join(lines + [f"  WRONG: {fault}" for fault in report.faults])
 
     def _explain_stuck(self) -> str:
         """How far the goal is, and who and what holds the robot: the barriers that are at their limit."""
         holding = np.flatnonzero(self.residual.min(axis=1, initial=np.inf) <= HOLDS)
-        names = " and ".join(self._obstacle(i) for i in holding.tolist()) or "no person and no wall"
+        names = (
+            " and ".join(self._obstacle(i) for i in holding.tolist())
+            or "no person and no wall"
+        )
         return f"{dist(self.scene.state[:2], self.scene.goal):.1f} m from the goal; held by {names}"
 
     def _describe_crowd(self, crowding: Crowding) -> str:
         near = count_near(self.scene.state, self.scene.people, crowding.radius)
         meaning = "a fast decay of h has a price, h >= 0 is hard"
         if self.scene.level == "crowd":
-            inside = sum(h < -TOLERANCE for h in self._h_after[: len(self.scene.people)])
-            meaning = f"in a crowd; {inside} zones overlap here, keeps {crowding.gap:g} m"
+            inside = sum(
+                h < -TOLERANCE for h in self._h_after[: len(self.scene.people)]
+            )
+            meaning = (
+                f"in a crowd; {inside} zones overlap here, keeps {crowding.gap:g} m"
+            )
         return f"{near} people are within {crowding.radius:g} m: {meaning}"
 
     def _obstacle(self, i: int) -> str:
         """Name of the person or wall of row `i` of `h`."""
         kind, number = self.scene.obstacle(i)
         if kind == "wall":
-            return "wall {} ({:g}, {:g})-({:g}, {:g})".format(number, *self.scene.walls[number][:4])
+            return "wall {} ({:g}, {:g})-({:g}, {:g})".format(
+                number, *self.scene.walls[number][:4]
+            )
         known = self.scene.people[i].id
         return f"{kind} {number}" + ("" if known is None else f" (id {known!r})")
 
@@ -238,7 +269,10 @@ class Step:
 
     def _advise(self, row: ProblemRow) -> str:
         s = self.scene.settings
-        if row.kind in ("person", "body", "wall") and self.h[self._row_of_h(row)] < -TOLERANCE:
+        if (
+            row.kind in ("person", "body", "wall")
+            and self.h[self._row_of_h(row)] < -TOLERANCE
+        ):
             return "nothing now, because the robot is already too close; the plan leads out again"
         if row.kind == "speed":
             return f"start at v_max = {s.v_max:g} m/s or slower, or raise v_max"

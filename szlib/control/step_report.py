@@ -80,7 +80,9 @@ def verify_plan(step: Any) -> StepReport:
     lengths, level = np.array(s.grid or [1] * s.N), _find_level(scene)
     dt, times = s.dt * lengths[:, None], s.dt * np.r_[0, np.cumsum(lengths)]
     u = np.diff(x[:, 2:], axis=0) / dt
-    moved = np.vstack([scene.state, np.c_[x[:-1, :2] + dt * x[:-1, 2:] + dt**2 / 2 * u, x[1:, 2:]]])
+    moved = np.vstack(
+        [scene.state, np.c_[x[:-1, :2] + dt * x[:-1, 2:] + dt**2 / 2 * u, x[1:, 2:]]]
+    )
     at = list(zip(x[:, :2], times, strict=True))
     h = np.reshape([_compute_h(scene, *each) for each in at], (len(x), -1)).T
     gaps = np.reshape([_compute_gaps(scene, *each) for each in at], (len(x), -1)).T
@@ -94,13 +96,21 @@ def verify_plan(step: Any) -> StepReport:
     worst = min(_list_rows(scene, x, h, gaps, residual), key=lambda row: row.value)
     # In a crowd no row demands h >= 0, so that of people is checked after the control as well.
     after = h[: len(scene.people) if level == "crowd" else 0, 1]
-    slack, min_h = max(0.0, -worst.value), float(np.r_[h[:, 0], after].min(initial=np.inf))
+    slack, min_h = (
+        max(0.0, -worst.value),
+        float(np.r_[h[:, 0], after].min(initial=np.inf)),
+    )
     feasible = slack <= TOLERANCE
     safe = feasible and not scene.tracked.unknown and min(min_h, gap) >= -TOLERANCE
     beyond = max(0.0, float(np.abs([*u, control]).max()) - s.a_max)
-    size, scale = max(1.0, float(np.abs(x).max())), max(1.0, float(np.abs(h).max(initial=0.0)))
+    size, scale = (
+        max(1.0, float(np.abs(x).max())),
+        max(1.0, float(np.abs(h).max(initial=0.0))),
+    )
     differences = {
-        "motion": float(max(np.abs(moved - x).max(), s.dt * np.abs(u[0] - control).max())),
+        "motion": float(
+            max(np.abs(moved - x).max(), s.dt * np.abs(u[0] - control).max())
+        ),
         "h": _differ(h[:, 0], step.h),
         "residual": _differ(residual, step.residual),
         "slack": abs(slack - step.slack),
@@ -116,8 +126,14 @@ def verify_plan(step: Any) -> StepReport:
     claims = step.feasible, step.safe
     undecided |= _is_undecided(scene, path, min(min_h, gap), claims[1])
     if not undecided and (feasible, safe) != claims:
-        faults.append("the step says feasible {}, safe {}; found {}, {}".format(*claims, feasible, safe))
-    return StepReport(tuple(faults), differences, beyond, worst, slack, min_h, gap, feasible, safe)
+        faults.append(
+            "the step says feasible {}, safe {}; found {}, {}".format(
+                *claims, feasible, safe
+            )
+        )
+    return StepReport(
+        tuple(faults), differences, beyond, worst, slack, min_h, gap, feasible, safe
+    )
 
 
 def verify_disc(scene: Scene, heading: float, step: Any) -> StepReport:
@@ -144,7 +160,9 @@ def verify_disc(scene: Scene, heading: float, step: Any) -> StepReport:
         "h": _differ(np.array(now), step.h) <= rounding,
         "safe": safe == step.safe or _is_undecided(scene, path, worst, step.safe),
     }
-    faults = [f"{name} of the disc is wrong" for name, holds in is_right.items() if not holds]
+    faults = [
+        f"{name} of the disc is wrong" for name, holds in is_right.items() if not holds
+    ]
     return replace(found, faults=(*found.faults, *faults), h=min_h, gap=gap, safe=safe)
 
 
@@ -155,9 +173,13 @@ def _differ(found: Array, claimed: Array) -> float:
 
 def _is_undecided(scene: Scene, path: Array, worst: float, claimed: bool) -> bool:
     """True if rounding decides whether the step is safe, or a loose bound may say (`claimed`) unsafe."""
-    speed = max([float(np.hypot(*person.velocity)) for person in scene.people], default=0.0)
+    speed = max(
+        [float(np.hypot(*person.velocity)) for person in scene.people], default=0.0
+    )
     reach = scene.settings.dt * speed + 2 * np.abs(path - path[0]).sum(axis=1).max()
-    is_rounded = abs(worst + TOLERANCE) <= ROUNDING * max(1.0, float(np.abs(path).max()))
+    is_rounded = abs(worst + TOLERANCE) <= ROUNDING * max(
+        1.0, float(np.abs(path).max())
+    )
     return bool(is_rounded or (not claimed and worst <= reach))
 
 
@@ -169,7 +191,9 @@ def _find_gap(scene: Scene, path: Array) -> float:
     if scene.solids is not None and scene.solids.distance(shapely.Point(path[0])) == 0:
         return -np.inf
     found, n = [np.inf], len(scene.people)
-    for point, time in zip(path, np.linspace(0.0, scene.settings.dt, len(path)), strict=True):
+    for point, time in zip(
+        path, np.linspace(0.0, scene.settings.dt, len(path)), strict=True
+    ):
         h = _compute_h(scene, point, time)[:n]
         found += [*_compute_gaps(scene, point, time), *np.add(h, scene.settings.eps)]
     return float(min(found))
@@ -182,10 +206,14 @@ def _find_level(scene: Scene) -> str:
         return "alone"
     offsets = np.array([person.position for person in scene.people]) - scene.state[:2]
     near = (np.hypot(*offsets.T) <= crowding.radius).sum()
-    return "crowd" if near >= crowding.many else "few" if near >= crowding.few else "alone"
+    return (
+        "crowd" if near >= crowding.many else "few" if near >= crowding.few else "alone"
+    )
 
 
-def _list_rows(scene: Scene, x: Array, h: Array, gaps: Array, residual: Array) -> list[ProblemRow]:
+def _list_rows(
+    scene: Scene, x: Array, h: Array, gaps: Array, residual: Array
+) -> list[ProblemRow]:
     """Every row of the hard problem."""
     s, level, rows = scene.settings, _find_level(scene), list[ProblemRow]()
     for (i, k), value in np.ndenumerate(residual):
@@ -193,14 +221,22 @@ def _list_rows(scene: Scene, x: Array, h: Array, gaps: Array, residual: Array) -
         if kind == "person" and level == "few":
             rows.append(ProblemRow(kind, number, k, float(h[i, k + 1])))
         elif kind == "person" and level == "crowd" and s.crowding:
-            rows.append(ProblemRow("body", number, k, float(gaps[i, k + 1]) - s.crowding.gap))
+            rows.append(
+                ProblemRow("body", number, k, float(gaps[i, k + 1]) - s.crowding.gap)
+            )
         else:
             rows.append(ProblemRow(kind, number, k, float(value)))
     speed = s.v_max**2 - (x[1:, 2:] ** 2).sum(axis=1)
-    rows += [ProblemRow("speed", 0, k + 1, float(value)) for k, value in enumerate(speed)]
+    rows += [
+        ProblemRow("speed", 0, k + 1, float(value)) for k, value in enumerate(speed)
+    ]
     if scene.terminal != "none":
-        expected = scene.people[0].velocity if scene.terminal == "person" else (0.0, 0.0)
-        rows.append(ProblemRow("end", 0, s.N, -float(np.abs(x[-1, 2:] - expected).max())))
+        expected = (
+            scene.people[0].velocity if scene.terminal == "person" else (0.0, 0.0)
+        )
+        rows.append(
+            ProblemRow("end", 0, s.N, -float(np.abs(x[-1, 2:] - expected).max()))
+        )
     return rows
 
 
@@ -208,19 +244,30 @@ def _compute_h(scene: Scene, point: Array, time: float) -> list[float]:
     """h of every person, `time` seconds from now, and of every wall (paper, eq. 3-7) [m]."""
     s, found = scene.settings, []
     for person, zone in zip(scene.people, scene.person_zones, strict=True):
-        position, heading = np.add(person.position, np.multiply(time, person.velocity)), person.heading or 0.0
+        position, heading = (
+            np.add(person.position, np.multiply(time, person.velocity)),
+            person.heading or 0.0,
+        )
         c, n, tilt = np.cos(heading), np.sin(heading), heading + zone.angle
         offset = point - position - np.array([[c, -n], [n, c]]) @ np.array(zone.center)
-        along, across = offset @ (np.cos(tilt), np.sin(tilt)), offset @ (-np.sin(tilt), np.cos(tilt))
+        along, across = (
+            offset @ (np.cos(tilt), np.sin(tilt)),
+            offset @ (-np.sin(tilt), np.cos(tilt)),
+        )
         (a, b) = zone.semi_axes
         f = np.sqrt((a - b) * (a + b))
         distance = (np.hypot(along - f, across) + np.hypot(along + f, across)) / 2 - a
         found.append(float(distance) - s.r_robot - s.eps)
-    start, end, margin = np.hsplit(np.reshape(np.array(scene.walls, float), (-1, 5)), (2, 4))
+    start, end, margin = np.hsplit(
+        np.reshape(np.array(scene.walls, float), (-1, 5)), (2, 4)
+    )
     length = np.hypot(*(end - start).T)
     (ux, uy), (px, py) = (end - start).T / length, (point - (start + end) / 2).T
     t = length / 4 - (px**2 + py**2) / length
-    return [*found, *(np.hypot(px * uy - py * ux, np.minimum(t, 0.0)) - s.r_robot - margin[:, 0])]
+    return [
+        *found,
+        *(np.hypot(px * uy - py * ux, np.minimum(t, 0.0)) - s.r_robot - margin[:, 0]),
+    ]
 
 
 def _compute_gaps(scene: Scene, point: Array, time: float) -> list[float]:
@@ -228,8 +275,12 @@ def _compute_gaps(scene: Scene, point: Array, time: float) -> list[float]:
     found = []
     for person in scene.people:
         position = np.add(person.position, np.multiply(time, person.velocity))
-        found.append(float(np.hypot(*(point - position))) - BODY_RADIUS - scene.settings.r_robot)
+        found.append(
+            float(np.hypot(*(point - position))) - BODY_RADIUS - scene.settings.r_robot
+        )
     start, end, _ = np.hsplit(np.reshape(np.array(scene.walls, float), (-1, 5)), (2, 4))
-    along = ((point - start) * (end - start)).sum(axis=1) / ((end - start) ** 2).sum(axis=1)
+    along = ((point - start) * (end - start)).sum(axis=1) / ((end - start) ** 2).sum(
+        axis=1
+    )
     nearest = start + np.clip(along, 0.0, 1.0)[:, None] * (end - start)
     return [*found, *(np.hypot(*(point - nearest).T) - scene.settings.r_robot)]

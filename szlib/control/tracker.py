@@ -116,22 +116,38 @@ class Tracker:
         now = check_time(now)
         if now < self._now:
             back = self._now + self._interval - now
-            self._last_seen = {k: (person, time - back) for k, (person, time) in self._last_seen.items()}
+            self._last_seen = {
+                k: (person, time - back)
+                for k, (person, time) in self._last_seen.items()
+            }
         elif now - self._now <= self.memory:
             self._interval = now - self._now
         self._now = now
-        if ids is None and stamps is None and not self._last_seen and _have_no_ids(people):
+        if (
+            ids is None
+            and stamps is None
+            and not self._last_seen
+            and _have_no_ids(people)
+        ):
             return TrackedPeople(tuple(people))
         rows = _split_rows(people)
         try:
-            names = [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
+            names = (
+                [getattr(row, "id", None) for row in rows] if ids is None else list(ids)
+            )
             given = Counter(names)
         except TypeError as error:
-            raise SolverError(f"ids must be a list of hashable values; got {ids!r:.200}") from error
+            raise SolverError(
+                f"ids must be a list of hashable values; got {ids!r:.200}"
+            ) from error
         if len(names) != len(rows):
-            raise SolverError(f"ids must be one for each of {len(rows)} people; got {len(names)}")
+            raise SolverError(
+                f"ids must be one for each of {len(rows)} people; got {len(names)}"
+            )
         times = _check_stamps(stamps, len(rows), now)
-        self._last_seen = {k: v for k, v in self._last_seen.items() if abs(now - v[1]) <= self.memory}
+        self._last_seen = {
+            k: v for k, v in self._last_seen.items() if abs(now - v[1]) <= self.memory
+        }
         present: list[Person | None] = []
         rejected = unknown = 0
         row: Person | list[float]
@@ -139,39 +155,69 @@ class Tracker:
             if given[name] > 1 or name != name:  # NaN
                 name = None
             last = None if name is None else self._last_seen.get(name)
-            if last is not None and last[1] <= time <= now + self.memory and _is_elsewhere(row, time, *last):
-                self._last_seen[Tracker, name], last = last, None  # may be hidden, and has no id any more
+            if (
+                last is not None
+                and last[1] <= time <= now + self.memory
+                and _is_elsewhere(row, time, *last)
+            ):
+                self._last_seen[Tracker, name], last = (
+                    last,
+                    None,
+                )  # may be hidden, and has no id any more
             found, usable = self._update(row, name, time, now, last)
             if found is not None and name is not None and (usable or last is not None):
                 self._last_seen[name] = found
             present.append(None if found is None else _move_forward(*found, now))
             rejected += not usable or present[-1] is None
             unknown += (not usable and last is None) or present[-1] is None
-        present += [_move_forward(*seen, now) for name, seen in self._last_seen.items() if name not in given]
-        return TrackedPeople(tuple(person for person in present if person is not None), rejected, unknown)
+        present += [
+            _move_forward(*seen, now)
+            for name, seen in self._last_seen.items()
+            if name not in given
+        ]
+        return TrackedPeople(
+            tuple(person for person in present if person is not None), rejected, unknown
+        )
 
     def _update(
-        self, row: Person | list[float], name: Hashable, time: float, now: float, last: _LastSeen | None
+        self,
+        row: Person | list[float],
+        name: Hashable,
+        time: float,
+        now: float,
+        last: _LastSeen | None,
     ) -> tuple[_LastSeen | None, bool]:
         """The last known state of a person, if any, and True if all numbers of the measurement are usable."""
         if isinstance(row, Person) and name is None and time == now:
             return (row, now), True
-        x, y, vx, vy = (*row.position, *row.velocity) if isinstance(row, Person) else row
+        x, y, vx, vy = (
+            (*row.position, *row.velocity) if isinstance(row, Person) else row
+        )
         if not _are_usable(x, y):
             return last, False
-        heading, zone = (row.heading, row.zone) if isinstance(row, Person) else (None, None)
+        heading, zone = (
+            (row.heading, row.zone) if isinstance(row, Person) else (None, None)
+        )
         if not abs(now - time) <= self.memory:
             return last or (Person((x, y), zone=zone, id=name), now), False
         if last is not None and time < last[1]:
             return last, True
         if not _are_usable(vx, vy):
-            return (Person((x, y), id=name), now) if last is None else (last[0].at((x, y)), time), False
-        is_given = heading is not None and (vx == vy == 0 or name is None or heading != atan2(vy, vx))
+            return (Person((x, y), id=name), now) if last is None else (
+                last[0].at((x, y)),
+                time,
+            ), False
+        is_given = heading is not None and (
+            vx == vy == 0 or name is None or heading != atan2(vy, vx)
+        )
         if not is_given and hypot(vx, vy) >= self.walking_speed:
             heading = atan2(vy, vx)
         elif not is_given:
             heading = None if last is None else last[0].heading
-        return (Person((x, y), (vx, vy), heading, zone, name, heading is None), time), True
+        return (
+            Person((x, y), (vx, vy), heading, zone, name, heading is None),
+            time,
+        ), True
 
 
 def _move_forward(person: Person, time: float, now: float) -> Person | None:
@@ -183,11 +229,15 @@ def _move_forward(person: Person, time: float, now: float) -> Person | None:
     return person.at(position) if _are_usable(*position) else None
 
 
-def _is_elsewhere(row: Person | list[float], time: float, person: Person, seen: float) -> bool:
+def _is_elsewhere(
+    row: Person | list[float], time: float, person: Person, seen: float
+) -> bool:
     """True if the measurement of this `time` is too far from a `person` who was `seen` before."""
     x, y = row.position if isinstance(row, Person) else row[:2]
     expected = _move_forward(person, seen, time)
-    return bool(expected and _are_usable(x, y) and dist((x, y), expected.position) > SAME_PERSON)
+    return bool(
+        expected and _are_usable(x, y) and dist((x, y), expected.position) > SAME_PERSON
+    )
 
 
 def _are_usable(x: float, y: float) -> bool:
@@ -217,7 +267,9 @@ def _split_rows(people: People) -> Sequence[Person | list[float]]:
             f"people must be Persons, or numbers of shape (n, 4); got {people!r:.200}"
         ) from error
     if numbers.size and (numbers.ndim != 2 or numbers.shape[1] != 4):
-        raise SolverError(f"people as an array must have shape (n, 4): x, y, vx, vy; got {numbers.shape}")
+        raise SolverError(
+            f"people as an array must have shape (n, 4): x, y, vx, vy; got {numbers.shape}"
+        )
     return cast(list[list[float]], numbers.reshape(-1, 4).tolist())
 
 
@@ -227,7 +279,9 @@ def _check_stamps(stamps: ArrayLike | None, n: int, now: float) -> list[float]:
         return [now] * n
     times = _as_floats("stamps", stamps)
     if times.shape not in ((), (n,)):
-        raise SolverError(f"stamps must be one time, or one for each of {n} people; got shape {times.shape}")
+        raise SolverError(
+            f"stamps must be one time, or one for each of {n} people; got shape {times.shape}"
+        )
     return cast(list[float], np.broadcast_to(times, n).tolist())
 
 

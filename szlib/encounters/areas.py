@@ -33,7 +33,8 @@ _CELL, _PEOPLE = 0.5, 3
 # a cell is empty by chance (measured on plazas of 100 to 2,600 encounters).
 _SPARSE, _WIDEST = 4 * _PEOPLE, 2.0
 _WALKING = 0.4  # a slower person [m/s] stands, queues or sits (paper: 0.4 for a reference pedestrian)
-_BEHIND = 3 * 1.2  # 3 s of walking [m], for which a rectangle is longer than the attentional space
+# 3 s of walking [m], for which a rectangle is longer than the attentional space
+_BEHIND = 3 * 1.2
 # A rectangle that is narrower than this number of lengths of the space, and smaller than this share of the
 # place, wastes encounters (assumed; measured on small rooms and oblique views).
 _WIDE, _MAIN = 2.0, 2 / 3
@@ -78,17 +79,25 @@ def as_area(area: object) -> Area:
         text = area.strip()
         if text[0] == "{":
             return _from_geojson(text)
-        return Region(text).simplest() if text[0].isalpha() else _from_numbers(text.replace(",", " ").split())
+        return (
+            Region(text).simplest()
+            if text[0].isalpha()
+            else _from_numbers(text.replace(",", " ").split())
+        )
     if hasattr(area, "polygon"):
         area = area.polygon
     if hasattr(area, "geom_type"):
         return _from_shape(area)
     if isinstance(area, list | tuple | np.ndarray):
         return _from_numbers(area)
-    raise DataError(f"{type(area).__name__} is no area; {EXPECTED}, a Square, a Shapely polygon or PedPy's")
+    raise DataError(
+        f"{type(area).__name__} is no area; {EXPECTED}, a Square, a Shapely polygon or PedPy's"
+    )
 
 
-def area_for(tracks: pd.DataFrame, area: object, space: AttentionalSpace = PAPER_SPACE) -> Area:
+def area_for(
+    tracks: pd.DataFrame, area: object, space: AttentionalSpace = PAPER_SPACE
+) -> Area:
     """Convert `area` as `as_area` does; "auto" stands for the `walked_area` of the `tracks` for a `space`."""
     if not (isinstance(area, str) and area.strip() == AUTO):
         return as_area(area)
@@ -97,10 +106,16 @@ def area_for(tracks: pd.DataFrame, area: object, space: AttentionalSpace = PAPER
         return walked_area(tracks, space=space)
     groups = tracks.groupby(tracks["day"].astype(str).map(places))
     found = {name: walked_area(part, space=space) for name, part in groups}
-    shapes = [a.polygon if isinstance(a, Region) else shapely.Polygon(*a.outlines) for a in found.values()]
-    reasons = "; ".join(f"{name or 'days'}: {each.reason}" for name, each in found.items())
+    shapes = [
+        a.polygon if isinstance(a, Region) else shapely.Polygon(*a.outlines)
+        for a in found.values()
+    ]
+    reasons = "; ".join(
+        f"{name or 'days'}: {each.reason}" for name, each in found.items()
+    )
     return replace(
-        _from_shape(shapely.union_all(shapes)), reason=f"for each recording, side by side along x: {reasons}"
+        _from_shape(shapely.union_all(shapes)),
+        reason=f"for each recording, side by side along x: {reasons}",
     )
 
 
@@ -128,7 +143,10 @@ def has_calendar(day: object) -> bool:
 
 def _find_places(tracks: pd.DataFrame) -> dict[str, str]:
     """The name of the place of each day: that of a recording; empty for days of a calendar."""
-    return {str(day): "" if has_calendar(day) else str(day) for day in tracks["day"].unique()}
+    return {
+        str(day): "" if has_calendar(day) else str(day)
+        for day in tracks["day"].unique()
+    }
 
 
 def walked_area(
@@ -175,27 +193,50 @@ def walked_area(
     """
     check_columns(tracks, COLUMNS)
     if not ((cell is None or 0.05 <= cell < np.inf) and n_people >= 1):
-        raise DataError(f"expected cell >= 0.05 m and n_people >= 1; got {cell} m, {n_people}")
+        raise DataError(
+            f"expected cell >= 0.05 m and n_people >= 1; got {cell} m, {n_people}"
+        )
     walks = tracks[np.hypot(*tracks[["vx", "vy"]].to_numpy(float).T) >= _WALKING]
     if len(walks) == 0:
-        raise DataError(f"nobody walks at {_WALKING} m/s or faster in these tracks: no area can be found")
+        raise DataError(
+            f"nobody walks at {_WALKING} m/s or faster in these tracks: no area can be found"
+        )
     count, corner, fine = _count_people(walks, cell or _CELL)
     seen = _find_seen_parts(tracks, corner, fine, count.shape)
-    middle, lowest, width = corner[:, None, None] + fine * (np.indices(count.shape) + 0.5), corner, fine
-    while (is_sparse := cell is None and np.median(count[count > 0]) <= _SPARSE) and 2 * width <= _WIDEST:
+    middle, lowest, width = (
+        corner[:, None, None] + fine * (np.indices(count.shape) + 0.5),
+        corner,
+        fine,
+    )
+    while (
+        is_sparse := cell is None and np.median(count[count > 0]) <= _SPARSE
+    ) and 2 * width <= _WIDEST:
         count, lowest, width = _count_people(walks, 2 * width)
-    walked = (count >= n_people)[tuple(((middle - lowest[:, None, None]) // width).astype(int))]
-    first, end = _largest_rectangle(walked, int(np.ceil(np.hypot(space.length, space.width) / fine)))
+    walked = (count >= n_people)[
+        tuple(((middle - lowest[:, None, None]) // width).astype(int))
+    ]
+    first, end = _largest_rectangle(
+        walked, int(np.ceil(np.hypot(space.length, space.width) / fine))
+    )
     first, end = _trim(seen, _PARTS * first, _PARTS * end)
     part, sides = fine / _PARTS, fine / _PARTS * (end - first)
-    is_main = sides.min() >= _WIDE * space.length or sides.prod() >= _MAIN * part**2 * seen.sum()
+    is_main = (
+        sides.min() >= _WIDE * space.length
+        or sides.prod() >= _MAIN * part**2 * seen.sum()
+    )
     if not is_sparse and is_main and sides.max() >= space.length + _BEHIND:
-        (x0, x1), (y0, y1) = (corner + part * np.stack([first, end])).round(6).T.tolist()
+        (x0, x1), (y0, y1) = (
+            (corner + part * np.stack([first, end])).round(6).T.tolist()
+        )
         everywhere = f"on each cell of {width:g} m at least {n_people} people walked"
-        return Square((x0, x1), (y0, y1), f"the largest rectangle in which {everywhere}")
+        return Square(
+            (x0, x1), (y0, y1), f"the largest rectangle in which {everywhere}"
+        )
     outline = _outline(seen, corner, part, space)
     if outline.is_empty:
-        implausible = "".join(f"{text}; " for text in funnels.warnings(funnels.get(tracks)))
+        implausible = "".join(
+            f"{text}; " for text in funnels.warnings(funnels.get(tracks))
+        )
         raise DataError(
             f"{implausible}no area was found: people were seen in no place as wide as the attentional "
             f"space, {space.width:g} m x {space.length:g} m; use more data, pass a smaller space, or give "
@@ -207,8 +248,15 @@ def walked_area(
             f"in {share:.0%} of the area found ({outline.area:.0f} m2) fewer than {n_people} people walked, "
             "perhaps for furniture, pillars or walls: look at the map, and give a better area if you know one"
         )
-    why = "few people walked" if is_sparse else "there is no large rectangle in which people walked"
-    return replace(_from_shape(outline), reason=f"the outline of the place where people were seen, as {why}")
+    why = (
+        "few people walked"
+        if is_sparse
+        else "there is no large rectangle in which people walked"
+    )
+    return replace(
+        _from_shape(outline),
+        reason=f"the outline of the place where people were seen, as {why}",
+    )
 
 
 def _find_seen_parts(
@@ -216,7 +264,9 @@ def _find_seen_parts(
 ) -> np.ndarray:
     """Whether people can be seen on each part of the cells, of which `_PARTS` x `_PARTS` make one."""
     size, empty = _PARTS * np.array(shape), int(_EMPTY * _PARTS / cell)
-    place = ((tracks[["x", "y"]].to_numpy(float) - corner) // (cell / _PARTS)).astype(np.int64)
+    place = ((tracks[["x", "y"]].to_numpy(float) - corner) // (cell / _PARTS)).astype(
+        np.int64
+    )
     place = place[((place >= 0) & (place < size)).all(axis=1)]
     parts = np.zeros(size + 2 * empty + 2, bool)
     parts[tuple(place.T + empty + 1)] = True
@@ -225,7 +275,9 @@ def _find_seen_parts(
     return np.asarray(closed[empty + 1 : -empty - 1, empty + 1 : -empty - 1])
 
 
-def _trim(seen: np.ndarray, first: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _trim(
+    seen: np.ndarray, first: np.ndarray, end: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The rectangle from `first` to `end` without the lines of its border that are `seen` least."""
     first, end = first.copy(), end.copy()
     while not (inside := seen[first[0] : end[0], first[1] : end[1]]).all():
@@ -236,18 +288,31 @@ def _trim(seen: np.ndarray, first: np.ndarray, end: np.ndarray) -> tuple[np.ndar
     return first, end
 
 
-def _outline(seen: np.ndarray, corner: np.ndarray, part: float, space: AttentionalSpace) -> BaseGeometry:
+def _outline(
+    seen: np.ndarray, corner: np.ndarray, part: float, space: AttentionalSpace
+) -> BaseGeometry:
     """The outline of `seen` parts, without strips narrower than 1 m and pieces narrower than the space."""
     ends = np.diff(np.pad(seen, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     (column, low), high = np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
-    whole, strip = shapely.union_all(shapely.box(column, low, column + 1, high)), 0.5 / part
-    wide = whole.buffer(-strip, join_style="mitre").buffer(strip, join_style="mitre").intersection(whole)
-    shapes = shapely.transform(shapely.get_parts(wide.simplify(1)), lambda points: corner + part * points)
+    whole, strip = (
+        shapely.union_all(shapely.box(column, low, column + 1, high)),
+        0.5 / part,
+    )
+    wide = (
+        whole.buffer(-strip, join_style="mitre")
+        .buffer(strip, join_style="mitre")
+        .intersection(whole)
+    )
+    shapes = shapely.transform(
+        shapely.get_parts(wide.simplify(1)), lambda points: corner + part * points
+    )
     has_room = ~shapely.is_empty(shapely.buffer(shapes, -space.width / 2))
     return shapely.set_precision(shapely.union_all(shapes[has_room]), 0.01)
 
 
-def _count_people(walks: pd.DataFrame, cell: float) -> tuple[np.ndarray, np.ndarray, float]:
+def _count_people(
+    walks: pd.DataFrame, cell: float
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Number of people who walked on each cell, (nx, ny); the lowest corner [m]; the width of a cell [m]."""
     at = walks[["x", "y"]].to_numpy(float)
     low, high = np.quantile(at, [_OUTLYING, 1 - _OUTLYING], axis=0)
@@ -275,29 +340,40 @@ def _largest_rectangle(walked: np.ndarray, side: int) -> tuple[np.ndarray, np.nd
     total = np.zeros((walked.shape[0] + 1, walked.shape[1] + 1))
     total[1:, 1:] = np.where(walked, 1.0, -walked.size).cumsum(axis=0).cumsum(axis=1)
     for top in range(walked.shape[0] - side + 1):
-        strips = total[top + side :] - total[top]  # by last row: sums over columns from the first
+        # by last row: sums over columns from the first
+        strips = total[top + side :] - total[top]
         least = np.minimum.accumulate(strips[:, :-side], axis=1)
         gain = strips[:, side:] - least
         row, column = np.unravel_index(int(gain.argmax()), gain.shape)
         if gain[row, column] > best:
             best = gain[row, column]
             left = int(np.argmax(strips[row] == least[row, column]))
-            found = np.array([top, left]), np.array([top + side + int(row), int(column) + side])
+            found = (
+                np.array([top, left]),
+                np.array([top + side + int(row), int(column) + side]),
+            )
     return found
 
 
 def _is_area(text: str) -> bool:
     """Whether a text is an area itself, not the path of a file."""
     number = r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?"
-    numbers, polygon = rf"[\s,]*{number}([\s,]+{number})*[\s,]*", r"\s*((MULTI)?POLYGON\b.*|\{.*)"
-    return bool(re.fullmatch(f"{numbers}|{polygon}", text, flags=re.IGNORECASE | re.DOTALL))
+    numbers, polygon = (
+        rf"[\s,]*{number}([\s,]+{number})*[\s,]*",
+        r"\s*((MULTI)?POLYGON\b.*|\{.*)",
+    )
+    return bool(
+        re.fullmatch(f"{numbers}|{polygon}", text, flags=re.IGNORECASE | re.DOTALL)
+    )
 
 
 def _from_numbers(numbers: Any) -> Square:
     try:
         x0, x1, y0, y1 = map(float, numbers)
     except (TypeError, ValueError) as error:
-        raise DataError(f"{printable(str(numbers)[:80])}: is no area; {EXPECTED}") from error
+        raise DataError(
+            f"{printable(str(numbers)[:80])}: is no area; {EXPECTED}"
+        ) from error
     return Square((x0, x1), (y0, y1))
 
 
@@ -306,7 +382,9 @@ def _from_file(path: Path) -> Area:
     with reading(path, "as an area", EXPECTED.removeprefix("expected ")):
         text = read_small(path).decode("utf-8-sig").strip()
     if not text or not _is_area(text):
-        raise DataError(f"{printable(path)}: begins with {printable(text[:40])!r}; {EXPECTED}")
+        raise DataError(
+            f"{printable(path)}: begins with {printable(text[:40])!r}; {EXPECTED}"
+        )
     try:
         return as_area(text)
     except DataError as error:
@@ -318,7 +396,9 @@ def _from_geojson(text: str) -> Area:
     try:
         shape = shapely.from_geojson(text)
     except shapely.errors.ShapelyError as error:
-        raise DataError(f"{printable(text[:40])!r}: is no GeoJSON ({error}); {EXPECTED}") from error
+        raise DataError(
+            f"{printable(text[:40])!r}: is no GeoJSON ({error}); {EXPECTED}"
+        ) from error
     if shape.geom_type == "GeometryCollection":
         parts = shapely.get_parts(shape)
         shape = shapely.union_all(parts) if len(parts) != 1 else parts[0]
@@ -326,4 +406,6 @@ def _from_geojson(text: str) -> Area:
 
 
 def _from_shape(shape: BaseGeometry) -> Area:
-    return Region(shapely.to_wkt(shapely.force_2d(shape), rounding_precision=-1)).simplest()
+    return Region(
+        shapely.to_wkt(shapely.force_2d(shape), rounding_precision=-1)
+    ).simplest()

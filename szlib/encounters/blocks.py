@@ -42,7 +42,9 @@ class UsableBlocks:
     def __iter__(self) -> Iterator[pl.DataFrame]:
         read = 0  # line numbers of the scan take long
         columns = self.scan.select("ragged", "exact_id", *NUMBERS)
-        for block in columns.collect_batches(chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming"):
+        for block in columns.collect_batches(
+            chunk_size=_BLOCK_ROWS, maintain_order=True, engine="streaming"
+        ):
             lines = block.with_row_index("line", offset=read + 1)
             good, reasons, first = reject_rows(lines, self.layout, self.plain)
             read += block.height
@@ -50,5 +52,7 @@ class UsableBlocks:
             self.first_fault = self.first_fault or first
             if good.height:
                 self.n_usable += good.height
-                self.farthest = max(self.farthest, *good.select(pl.col("x", "y").abs().max()).row(0))
+                self.farthest = max(
+                    self.farthest, *good.select(pl.col("x", "y").abs().max()).row(0)
+                )
                 yield good.select(NUMBERS)

@@ -38,7 +38,8 @@ from .geometry import Square
 _SLOTS = 1 << 16  # of the hash table
 # Fibonacci hashing (Knuth, TAOCP 3, 6.4) spreads ids over the table, also regular ones.
 _MIXER, _SHIFT = np.int64(-7_046_029_254_386_353_131), 40
-_TIME_ROUNDING, _POSITION_ROUNDING = 0.1, 1e-6  # larger than every rounding error of a time [s], position [m]
+# larger than every rounding error of a time [s], position [m]
+_TIME_ROUNDING, _POSITION_ROUNDING = (0.1, 1e-6)
 
 
 class UnsortedError(Exception):
@@ -75,7 +76,10 @@ class Cells:
     @property
     def after(self) -> int:
         """Number of cells needed after one with a tick inside."""
-        return ceil((max(self.duration, VELOCITY_SPAN) + self.max_gap + _TIME_ROUNDING) / self.width)
+        return ceil(
+            (max(self.duration, VELOCITY_SPAN) + self.max_gap + _TIME_ROUNDING)
+            / self.width
+        )
 
     def number(self, t: np.ndarray) -> np.ndarray:
         """Number of the cell in time, for times `t` [s]."""
@@ -89,7 +93,9 @@ class Cells:
         pair |= np.roll(pair, -1, axis=1)
         inside = np.asarray(pair.all(axis=0))
         needed = inside.copy()
-        for cell in range(-self.before, self.after + 2):  # the tick may be in the pair's second cell
+        for cell in range(
+            -self.before, self.after + 2
+        ):  # the tick may be in the pair's second cell
             needed |= np.roll(inside, cell)
         return np.asarray(needed[slot])
 
@@ -98,7 +104,12 @@ class Cells:
         (x0, x1), (y0, y1) = np.divide([self.square.x, self.square.y], self.metres)
         rounding = _POSITION_ROUNDING / self.metres
         x, y = rows["x"].to_numpy(), rows["y"].to_numpy()
-        within = (x >= x0 - rounding, x <= x1 + rounding, y >= y0 - rounding, y <= y1 + rounding)
+        within = (
+            x >= x0 - rounding,
+            x <= x1 + rounding,
+            y >= y0 - rounding,
+            y <= y1 + rounding,
+        )
         sides = np.zeros((len(within), _SLOTS), bool)
         for side, is_within in zip(sides, within, strict=True):
             side[slot[is_within]] = True
@@ -117,7 +128,9 @@ def select_near(cells: Cells, blocks: Iterable[pl.DataFrame]) -> Iterator[pl.Dat
         known = pl.concat([waiting, block], rechunk=True)
         number = cells.number(known["t"].to_numpy())
         complete = newest - cells.before - 2
-        yield known.filter(cells.needed(known, number) & (number > decided) & (number <= complete))
+        yield known.filter(
+            cells.needed(known, number) & (number > decided) & (number <= complete)
+        )
         decided = max(decided, complete)
         waiting = known.filter(number >= decided - cells.after)
     number = cells.number(waiting["t"].to_numpy())

@@ -42,7 +42,8 @@ from .one_day import (
 )
 from .settings import EncounterSettings
 
-PURPOSE = "encounters by day"  # purpose of an extraction's folder, as its marker states it
+# purpose of an extraction's folder, as its marker states it
+PURPOSE = "encounters by day"
 _READ = "read all files"  # the first stage of the funnel of many days
 
 
@@ -91,18 +92,28 @@ class Extraction:
         """
         folder, excluded = Path(out), sorted(map(str, exclude))
         if folder_purpose(folder) != PURPOSE:
-            raise DataError(f"{folder}: holds no extracted days; expected a folder of `szlib extract`")
-        stored = {file.name.removesuffix(".parquet.json"): file for file in folder.glob("*.parquet.json")}
+            raise DataError(
+                f"{folder}: holds no extracted days; expected a folder of `szlib extract`"
+            )
+        stored = {
+            file.name.removesuffix(".parquet.json"): file
+            for file in folder.glob("*.parquet.json")
+        }
         sources: dict[str, dict[str, Any]] = {}
         for day in sorted(stored.keys() - set(excluded)):
             sources[day] = read_json_object(stored[day]).get("made_of") or {}
             if "parameters" not in sources[day]:
                 raise DataError(f"{stored[day]}: is damaged; extract the day again")
         if not sources:
-            raise DataError(f"{folder}: no day is left; all of {', '.join(sorted(stored))} are excluded")
+            raise DataError(
+                f"{folder}: no day is left; all of {', '.join(sorted(stored))} are excluded"
+            )
         first = next(iter(sources))
         made_by = [{**source, "files": None} for source in sources.values()]
-        if other := next((day for day, of in zip(sources, made_by, strict=True) if of != made_by[0]), None):
+        if other := next(
+            (day for day, of in zip(sources, made_by, strict=True) if of != made_by[0]),
+            None,
+        ):
             raise DataError(
                 f"{folder}: {other} was extracted with other settings than {first}, or another version; "
                 "extract all days again, or exclude it"
@@ -140,18 +151,27 @@ class Extraction:
                     "data or parameters, or damage); extract again, into another folder"
                 )
             stages.append(
-                [s | {"stage": _READ} if s["stage"].startswith("read ") else s for s in funnels.get(part)]
+                [
+                    s | {"stage": _READ} if s["stage"].startswith("read ") else s
+                    for s in funnels.get(part)
+                ]
             )
             part = part[~part["day"].isin(self.exclude)]
             numbers, found = pd.factorize(part["encounter"])
-            parts.append(part.assign(encounter=numbers + count, day=part["day"].astype(str), file=day))
+            parts.append(
+                part.assign(
+                    encounter=numbers + count, day=part["day"].astype(str), file=day
+                )
+            )
             count += len(found)
         shared = Counter(name for part in parts for name in part["day"].unique())
         for k, part in enumerate(parts):
             ambiguous = part["day"].map(shared) > 1
             day = part["day"].where(~ambiguous, part["day"] + " (" + part["file"] + ")")
             parts[k] = part.assign(day=day).drop(columns="file")
-        samples = pd.concat([part for part in parts if len(part)] or parts[:1], ignore_index=True)
+        samples = pd.concat(
+            [part for part in parts if len(part)] or parts[:1], ignore_index=True
+        )
         return funnels.attach(samples.astype({"day": "category"}), funnels.add(stages))
 
     def __str__(self) -> str:
@@ -208,22 +228,37 @@ def extract_days(
     True
     """
     read_names = {each.name for each in fields(ReadOptions)}
-    options = replace(options or ReadOptions(), **{k: v for k, v in parameters.items() if k in read_names})
-    others = {name: value for name, value in parameters.items() if name not in read_names}
+    options = replace(
+        options or ReadOptions(),
+        **{k: v for k, v in parameters.items() if k in read_names},
+    )
+    others = {
+        name: value for name, value in parameters.items() if name not in read_names
+    }
     settings = (settings or EncounterSettings()).with_parameters(others)
     folder = Path(out)
-    excluded = (exclude,) if isinstance(exclude, str) else tuple(sorted(map(str, exclude)))
+    excluded = (
+        (exclude,) if isinstance(exclude, str) else tuple(sorted(map(str, exclude)))
+    )
     files = sorted({file.resolve() for file in datasets.find(paths)})
     claim_folder(folder, PURPOSE, inputs=files)
     days = _group_by_day(files, options)
-    included = [(day, of_day) for day, of_day in sorted(days.items()) if day not in excluded]
+    included = [
+        (day, of_day) for day, of_day in sorted(days.items()) if day not in excluded
+    ]
     given, contents = settings, {}
     shared = [each for each in included if has_calendar(each[0]) or len(included) == 1]
     for day, of_day in shared:
-        with suppress(SzlibError):  # the first day with an area; computing a day that fails says why
+        with suppress(
+            SzlibError
+        ):  # the first day with an area; computing a day that fails says why
             settings, contents[day] = find_area(of_day, settings, options)
             break
-    rows = [_row(day, of_day, status="excluded") for day, of_day in days.items() if day in excluded]
+    rows = [
+        _row(day, of_day, status="excluded")
+        for day, of_day in days.items()
+        if day in excluded
+    ]
     tasks = [
         joblib.delayed(extract_day)(
             day,
@@ -252,7 +287,9 @@ def _group_by_day(files: Sequence[Path], options: ReadOptions) -> dict[str, list
     """The files of each day, or of each recording that has no calendar day."""
     days: dict[str, list[str]] = {}
     for file, name in zip(files, name_recordings(files), strict=True):
-        days.setdefault(find_day(file, options) or printable(name), []).append(str(file))
+        days.setdefault(find_day(file, options) or printable(name), []).append(
+            str(file)
+        )
     return days
 
 
@@ -270,11 +307,17 @@ def extract_day(
     in which the area was found, if they are given.  Days share nothing but `out`.
     """
     start = time.perf_counter()
-    row, folder, paths = _row(day, files, status="failed"), Path(out), [Path(file) for file in files]
+    row, folder, paths = (
+        _row(day, files, status="failed"),
+        Path(out),
+        [Path(file) for file in files],
+    )
     try:
         # Checksums are computed while the files are read.
         with unchanged_files(paths), ThreadPoolExecutor(1) as thread:
-            source = thread.submit(copy_context().run, describe_source, files, settings, options)
+            source = thread.submit(
+                copy_context().run, describe_source, files, settings, options
+            )
             is_stored, status = (folder / f"{day}.parquet").is_file(), "kept"
             samples = load_day(folder, day, source.result()) if is_stored else None
             if samples is None:
@@ -284,11 +327,17 @@ def extract_day(
                     samples = find_encounters_in_files(paths, settings, options)
             begins = {find_day(path, options) or day for path in paths}
         if begins != {day} or contents not in (None, source.result()["files"]):
-            raise DataError(f"{paths[0]}: changed after its day or the area was found; extract the day again")
+            raise DataError(
+                f"{paths[0]}: changed after its day or the area was found; extract the day again"
+            )
         row["source"] = source.result()
         if status == "done":
             store_day(folder, day, samples, source.result())
-        read = [stage for stage in funnels.get(samples) if stage["stage"].startswith("read ")]
+        read = [
+            stage
+            for stage in funnels.get(samples)
+            if stage["stage"].startswith("read ")
+        ]
         row |= {
             "status": status,
             "rows": sum(stage["entered"] for stage in read),

@@ -86,7 +86,11 @@ def find_encounters(
     kind = kinds_of_pairs(rows.person[ref], rows.person[other], rows, counts)
     samples["kind"] = kind.repeat(settings.steps + 1)
     samples.attrs |= {"area": str(area), "area_reason": area.reason}
-    n_rows, n_openings, opening = len(rows), len(openings.rows), "encounters: ticks that open a window"
+    n_rows, n_openings, opening = (
+        len(rows),
+        len(openings.rows),
+        "encounters: ticks that open a window",
+    )
     stages = [
         funnels.stage(opening, n_rows, n_openings, openings.reasons),
         funnels.stage("encounters: windows", n_openings, len(chosen), reasons),
@@ -94,7 +98,9 @@ def find_encounters(
     return of_kind(funnels.attach(samples, [*funnels.get(tracks), *stages]), kinds)
 
 
-def find_place(tracks: pd.DataFrame, settings: EncounterSettings) -> tuple[pd.DataFrame, Area]:
+def find_place(
+    tracks: pd.DataFrame, settings: EncounterSettings
+) -> tuple[pd.DataFrame, Area]:
     """The `tracks`, and the area in which the `settings` find encounters.
 
     With "auto" recordings without a calendar get each their own area, and are placed side by side.
@@ -102,7 +108,9 @@ def find_place(tracks: pd.DataFrame, settings: EncounterSettings) -> tuple[pd.Da
     if settings.area == AUTO:
         clock_index(tracks)  # raises DataError for a table that is no track table
         tracks = place_apart(tracks)
-    return tracks, area_for(tracks, ATC_SQUARE if settings.area is None else settings.area, settings.space)
+    return tracks, area_for(
+        tracks, ATC_SQUARE if settings.area is None else settings.area, settings.space
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,13 +135,18 @@ class _Openings:
     reasons: dict[str, int]
 
 
-def _find_openings(rows: TrackRows, area: Area, settings: EncounterSettings) -> _Openings:
+def _find_openings(
+    rows: TrackRows, area: Area, settings: EncounterSettings
+) -> _Openings:
     """Find the ticks that meet the four conditions by themselves."""
     inside = area.contains(rows.x, rows.y)
     at = np.flatnonzero(inside)
     cos, sin = np.cos(rows.heading[at]), np.sin(rows.heading[at])
     ahead, side = settings.space.corners.T[..., None]
-    corners = rows.x[at] + ahead * cos - side * sin, rows.y[at] + ahead * sin + side * cos
+    corners = (
+        rows.x[at] + ahead * cos - side * sin,
+        rows.y[at] + ahead * sin + side * cos,
+    )
     space_inside = inside.copy()
     space_inside[at] = settings.has_walls or area.covers(*corners)
     ready = space_inside & (rows.speed >= settings.min_speed)
@@ -162,26 +175,42 @@ def _find_windows(
 ) -> tuple[np.ndarray, dict[str, int]]:
     """Find the openings whose window meets the conditions throughout, and count the others by reason."""
     steps, first, partner = settings.steps, openings.rows, openings.other[openings.rows]
-    last, partner_last = (np.minimum(row + steps, len(rows) - 1) for row in (first, partner))
+    last, partner_last = (
+        np.minimum(row + steps, len(rows) - 1) for row in (first, partner)
+    )
     tracked = np.ones(len(first), bool)
     for start, end in ((first, last), (partner, partner_last)):
-        tracked &= (rows.piece[end] == rows.piece[start]) & (rows.tick[end] - rows.tick[start] == steps)
+        tracked &= (rows.piece[end] == rows.piece[start]) & (
+            rows.tick[end] - rows.tick[start] == steps
+        )
     one = openings.people == 1
     third_person = occupant_changes(rows, openings.other, one) | (openings.people > 1)
     conditions = [
         ("a track ends within the window", tracked),
-        ("a corner leaves the area within the window", _holds_throughout(openings.space_inside, first, last)),
+        (
+            "a corner leaves the area within the window",
+            _holds_throughout(openings.space_inside, first, last),
+        ),
         ("too slow within the window", _holds_throughout(openings.ready, first, last)),
-        ("somebody else enters the space", _holds_throughout(~third_person, first + 1, last)),
+        (
+            "somebody else enters the space",
+            _holds_throughout(~third_person, first + 1, last),
+        ),
     ]
     if settings.throughout:
-        conditions.append(("the other person leaves the space", _holds_throughout(one, first, last)))
+        conditions.append(
+            ("the other person leaves the space", _holds_throughout(one, first, last))
+        )
     valid = np.logical_and.reduce([condition for _, condition in conditions])
-    conditions.append(("overlaps an earlier window", _drop_overlaps(first, valid, steps)))
+    conditions.append(
+        ("overlaps an earlier window", _drop_overlaps(first, valid, steps))
+    )
     return _apply_conditions(np.arange(len(first)), conditions)
 
 
-def _holds_throughout(condition: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+def _holds_throughout(
+    condition: np.ndarray, first: np.ndarray, last: np.ndarray
+) -> np.ndarray:
     """Whether the condition holds at every row from `first` to `last` (inclusive)."""
     failures = np.r_[0, np.cumsum(~condition)]
     return np.asarray(failures[last + 1] == failures[np.minimum(first, last + 1)])
@@ -191,7 +220,9 @@ def _drop_overlaps(first: np.ndarray, valid: np.ndarray, steps: int) -> np.ndarr
     """Which valid windows are taken: the earliest one, then the next that begins after its end, and so on."""
     taken = np.zeros(len(first), bool)
     candidates = np.flatnonzero(valid)
-    following = np.searchsorted(first[candidates], first[candidates] + steps, side="right")
+    following = np.searchsorted(
+        first[candidates], first[candidates] + steps, side="right"
+    )
     at = 0
     while at < len(candidates):
         taken[candidates[at]] = True

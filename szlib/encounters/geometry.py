@@ -42,8 +42,17 @@ class Square:
     reason: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        is_square = np.isfinite([*self.x, *self.y]).all() and self.x[0] < self.x[1] and self.y[0] < self.y[1]
-        require(is_square, "x and y of a square", (self.x, self.y), "finite, each (lowest, highest)")
+        is_square = (
+            np.isfinite([*self.x, *self.y]).all()
+            and self.x[0] < self.x[1]
+            and self.y[0] < self.y[1]
+        )
+        require(
+            is_square,
+            "x and y of a square",
+            (self.x, self.y),
+            "finite, each (lowest, highest)",
+        )
 
     def __str__(self) -> str:
         return " ".join(repr(float(value)) for value in (*self.x, *self.y))
@@ -66,7 +75,9 @@ class Square:
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Whether each point (arrays `x`, `y` of one shape) lies inside or on the border."""
-        return np.asarray((x >= self.x[0]) & (x <= self.x[1]) & (y >= self.y[0]) & (y <= self.y[1]))
+        return np.asarray(
+            (x >= self.x[0]) & (x <= self.x[1]) & (y >= self.y[0]) & (y <= self.y[1])
+        )
 
     def covers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Whether each quadrilateral lies inside; `x`, `y` of its corners in order, each (4, n) [m]."""
@@ -115,7 +126,9 @@ class Region:
         try:
             polygon = shapely.from_wkt(self.wkt)
         except (shapely.errors.ShapelyError, TypeError) as error:
-            raise DataError(f"{str(self.wkt)[:80]!r}: is no well-known text ({error})") from error
+            raise DataError(
+                f"{str(self.wkt)[:80]!r}: is no well-known text ({error})"
+            ) from error
         if polygon.geom_type not in ("Polygon", "MultiPolygon") or polygon.is_empty:
             raise DataError(
                 f"{self.wkt[:80]!r}: an area must be a polygon with an inside; got a {polygon.geom_type}"
@@ -157,7 +170,9 @@ class Region:
         inside = np.asarray(self.contains(x, y).all(axis=0))
         if not self.convex:
             at = np.flatnonzero(inside)
-            shapes = shapely.polygons(np.stack([x[:, at], y[:, at]], axis=-1).transpose(1, 0, 2))
+            shapes = shapely.polygons(
+                np.stack([x[:, at], y[:, at]], axis=-1).transpose(1, 0, 2)
+            )
             inside[at] = shapely.covers(self.polygon, shapes)
         return inside
 
@@ -168,7 +183,11 @@ class Region:
 
     def simplest(self) -> Area:
         """The same area, as a `Square` where it is a rectangle along the axes."""
-        return self.box if self.convex and self.polygon.equals(self.polygon.envelope) else self
+        return (
+            self.box
+            if self.convex and self.polygon.equals(self.polygon.envelope)
+            else self
+        )
 
     def grown(self, margin: float) -> Region:
         """The area with a `margin` [m] on each side, corners kept; smaller where it is negative."""
@@ -209,12 +228,19 @@ class AttentionalSpace:
 
     def __post_init__(self) -> None:
         for name, side in (("length", self.length), ("width", self.width)):
-            require(0 < side < np.inf, f"{name} of an attentional space", side, "positive [m]")
+            require(
+                0 < side < np.inf,
+                f"{name} of an attentional space",
+                side,
+                "positive [m]",
+            )
 
     @property
     def ahead(self) -> tuple[float, float]:
         """Extent along the direction of motion, (nearest, farthest) [m]."""
-        return (-self.length / 2, self.length / 2) if self.centred else (0.0, self.length)
+        return (
+            (-self.length / 2, self.length / 2) if self.centred else (0.0, self.length)
+        )
 
     @property
     def corners(self) -> np.ndarray:
@@ -224,7 +250,9 @@ class AttentionalSpace:
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Whether points `x` ahead and `y` to the left of the person [m] lie inside or on the border."""
-        return np.asarray((x >= self.ahead[0]) & (x <= self.ahead[1]) & (np.abs(y) <= self.width / 2))
+        return np.asarray(
+            (x >= self.ahead[0]) & (x <= self.ahead[1]) & (np.abs(y) <= self.width / 2)
+        )
 
 
 PAPER_SPACE = AttentionalSpace()

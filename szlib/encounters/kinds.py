@@ -46,12 +46,15 @@ REACH = 5.0
 TOGETHER, NEAR, NEAR_SHARE = 5.0, 2.0, 0.8
 # Companions: largest relative velocity [m/s], for this share of the time (measured).
 EQUAL_VELOCITY, EQUAL_SHARE = 0.4, 0.5
-WALKING = 0.4  # a slower person [m/s] is standing (paper: 0.4 for a reference pedestrian)
+# a slower person [m/s] is standing (paper: 0.4 for a reference pedestrian)
+WALKING = 0.4
 # Directions at most this far apart [rad] are the same, from pi less this on opposite (assumed).
 ALONG = np.pi / 4
 
 
-def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, area: object = None) -> pd.Categorical:
+def encounter_kinds(
+    tracks: pd.DataFrame, pairs: pd.DataFrame, *, area: object = None
+) -> pd.Categorical:
     """Decide the kind of each pair of people, one of `KINDS`.
 
     Parameters
@@ -83,13 +86,21 @@ def encounter_kinds(tracks: pd.DataFrame, pairs: pd.DataFrame, *, area: object =
     people = tracks.iloc[rows.order[np.flatnonzero(np.diff(rows.person, prepend=-1))]]
     known = pd.MultiIndex.from_arrays([people["day"].astype(str), people["id"]])
     ref, other = (
-        known.get_indexer(pd.MultiIndex.from_arrays([pairs["day"].astype(str), pairs[column]]))
+        known.get_indexer(
+            pd.MultiIndex.from_arrays([pairs["day"].astype(str), pairs[column]])
+        )
         for column in ("ref_id", "other_id")
     )
     expected = "not in these tracks; pass the tracks in which the pairs were found"
-    check_rows(pairs, (ref >= 0) & (other >= 0), ["day", "ref_id", "other_id"], expected)
+    check_rows(
+        pairs, (ref >= 0) & (other >= 0), ["day", "ref_id", "other_id"], expected
+    )
     everywhere = np.ones(len(rows), bool)
-    counts = everywhere if area is None else as_area(area).grown(REACH).contains(rows.x, rows.y)
+    counts = (
+        everywhere
+        if area is None
+        else as_area(area).grown(REACH).contains(rows.x, rows.y)
+    )
     return kinds_of_pairs(ref, other, rows, counts)
 
 
@@ -122,7 +133,9 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
     names = [kinds] if isinstance(kinds, str) else list(kinds)
     wanted = {k for name in names for k in (KINDS[1:] if name == STRANGERS else [name])}
     if not wanted or not wanted <= set(KINDS):
-        raise DataError(f"unknown kinds {kinds!r}; expected some of {list(KINDS)}, or {STRANGERS!r}")
+        raise DataError(
+            f"unknown kinds {kinds!r}; expected some of {list(KINDS)}, or {STRANGERS!r}"
+        )
     if "kind" not in samples.columns:
         raise DataError(
             f"the samples have no column kind; found {list(samples.columns)}; find_encounters gives it"
@@ -130,7 +143,9 @@ def of_kind(samples: pd.DataFrame, kinds: str | Iterable[str] | None) -> pd.Data
     selected = samples[samples["kind"].isin(wanted)].copy()
     counts = samples["kind"].value_counts()
     rejected = {kind: int(counts[kind]) for kind in KINDS if kind not in wanted}
-    stage = funnels.stage(f"samples: {', '.join(names)}", len(samples), len(selected), rejected)
+    stage = funnels.stage(
+        f"samples: {', '.join(names)}", len(samples), len(selected), rejected
+    )
     return funnels.attach(selected, [*funnels.get(samples), stage])
 
 
@@ -141,11 +156,15 @@ def kinds_of_pairs(
 
     `first` and `second` are the numbers of the two people of each pair, (n,).
     """
-    pairs, index = np.unique(np.sort(np.column_stack([first, second]), axis=1), axis=0, return_inverse=True)
+    pairs, index = np.unique(
+        np.sort(np.column_stack([first, second]), axis=1), axis=0, return_inverse=True
+    )
     pair, a, b = _common_track(pairs, rows.person, rows.tick, counts)
     apart = np.hypot(rows.x[a] - rows.x[b], rows.y[a] - rows.y[b])
     relative = np.hypot(rows.vx[a] - rows.vx[b], rows.vy[a] - rows.vy[b])
-    (ax, ay), (bx, by) = (np.nan_to_num([rows.vx[each], rows.vy[each]]) for each in (a, b))
+    (ax, ay), (bx, by) = (
+        np.nan_to_num([rows.vx[each], rows.vy[each]]) for each in (a, b)
+    )
 
     def over_time(values: np.ndarray) -> np.ndarray:
         """Sum of the `values` of each pair over its common track."""
@@ -155,12 +174,19 @@ def kinds_of_pairs(
     together = ticks >= TOGETHER * TICKS_PER_SECOND
     together &= over_time(apart <= NEAR) >= NEAR_SHARE * ticks
     together &= over_time(relative <= EQUAL_VELOCITY) >= EQUAL_SHARE * ticks
-    stands = np.maximum(*(over_time(rows.speed[each] < WALKING) for each in (a, b))) > ticks / 2
-    angle = np.abs(np.arctan2(over_time(ax * by - ay * bx), over_time(ax * bx + ay * by)))
+    stands = (
+        np.maximum(*(over_time(rows.speed[each] < WALKING) for each in (a, b)))
+        > ticks / 2
+    )
+    angle = np.abs(
+        np.arctan2(over_time(ax * by - ay * bx), over_time(ax * bx + ay * by))
+    )
     rules = [ticks == 0, together, stands, angle <= ALONG, angle >= np.pi - ALONG]
     found = [-1, *map(KINDS.index, (COMPANIONS, STANDING, SAME, OPPOSITE))]
     codes = np.select(rules, found, KINDS.index(CROSSING)).astype(np.int8)
-    return pd.Categorical(np.array([*KINDS, None])[codes[index.ravel()]], categories=list(KINDS))
+    return pd.Categorical(
+        np.array([*KINDS, None])[codes[index.ravel()]], categories=list(KINDS)
+    )
 
 
 def _common_track(

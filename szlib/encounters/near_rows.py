@@ -39,12 +39,16 @@ def select_near_rows(tracks: pd.DataFrame, area: Area, duration: float) -> pd.Da
     """
     rows = TrackRows.from_tracks(tracks)
     near = is_near(rows.x, rows.y, rows.person, area, duration)
-    stage = funnels.stage("near the area", len(near), near.sum(), {"elsewhere": (~near).sum()})
+    stage = funnels.stage(
+        "near the area", len(near), near.sum(), {"elsewhere": (~near).sum()}
+    )
     table = tracks.iloc[rows.order[near]].reset_index(drop=True)
     return funnels.attach(table, [*funnels.get(tracks), stage])
 
 
-def is_near(x: np.ndarray, y: np.ndarray, person: np.ndarray, area: Area, duration: float) -> np.ndarray:
+def is_near(
+    x: np.ndarray, y: np.ndarray, person: np.ndarray, area: Area, duration: float
+) -> np.ndarray:
     """Whether encounters in the `area` can depend on each row at `x`, `y` [m]; shape (n,).
 
     Rows are sorted by `person` (numbered from 0) and time.  Of each person who is in the area at all, these
@@ -57,7 +61,9 @@ def is_near(x: np.ndarray, y: np.ndarray, person: np.ndarray, area: Area, durati
     count, row = np.r_[0, np.cumsum(inside)], np.arange(len(inside))
     after = row + round(VELOCITY_SPAN * TICKS_PER_SECOND)
     before = row - round(max(duration, VELOCITY_SPAN) * TICKS_PER_SECOND)
-    return np.asarray(count[np.minimum(after + 1, len(row))] > count[np.maximum(before, 0)])
+    return np.asarray(
+        count[np.minimum(after + 1, len(row))] > count[np.maximum(before, 0)]
+    )
 
 
 def read_near_area(
@@ -88,7 +94,12 @@ def read_near_area(
     options = options or ReadOptions()
     files = [Path(paths)] if isinstance(paths, str | Path) else list(paths)
     path = files[0]
-    if area is not None and len(files) == 1 and path.is_file() and find_format(path, options).is_streamed:
+    if (
+        area is not None
+        and len(files) == 1
+        and path.is_file()
+        and find_format(path, options).is_streamed
+    ):
         with open_file(path, options) as (layout, scan, plain), suppress(UnsortedError):
             max_gap = options.max_gap or layout.max_gap or 0.0
             cells = Cells(area.grown(REACH).box, duration, max_gap, layout.metres)
@@ -97,7 +108,8 @@ def read_near_area(
                 parts.append(rows)
                 n_near += rows.height
                 memory.require(
-                    n_near * _ROW_BYTES, f"{path}: to hold {n_near:,} rows near the area, or more,"
+                    n_near * _ROW_BYTES,
+                    f"{path}: to hold {n_near:,} rows near the area, or more,",
                 )
             near = pl.concat(parts, rechunk=True)
             near = near[order_by_person(near["id"].to_numpy())]
@@ -106,16 +118,24 @@ def read_near_area(
 
 
 def _as_table(
-    near: pl.DataFrame, blocks: UsableBlocks, path: Path, layout: TrackFormat, options: ReadOptions
+    near: pl.DataFrame,
+    blocks: UsableBlocks,
+    path: Path,
+    layout: TrackFormat,
+    options: ReadOptions,
 ) -> pd.DataFrame:
     """The rows as a table as from `read_raw`, with the funnel of the whole file."""
-    stage = read_stage(path, layout, blocks.n_usable, dict(blocks.reasons), blocks.first_fault)
+    stage = read_stage(
+        path, layout, blocks.n_usable, dict(blocks.reasons), blocks.first_fault
+    )
     if options.metres is None:
         check_unit(pl.DataFrame({"x": [blocks.farthest], "y": [0.0]}), layout, path)
     far = {"never near the area": blocks.n_usable - near.height}
     stages = [stage, funnels.stage("near the area", blocks.n_usable, near.height, far)]
     if near.height == 0:
         empty = {"day": pd.Categorical([]), "id": np.zeros(0, np.int64)}
-        return funnels.attach(pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages)
+        return funnels.attach(
+            pd.DataFrame(empty | dict.fromkeys("txy", np.zeros(0))), stages
+        )
     rows = layout.to_metres(near, path, options.tz)
     return merge([LoadedFile(path, rows, stages, layout)], copy=False)

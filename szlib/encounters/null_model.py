@@ -60,13 +60,19 @@ class NullEncounters:
 
     def one(self, shift: int) -> pd.DataFrame:
         """The samples of one `shift` (its number), to be treated like those of the data."""
-        require(0 <= shift < self.shifts, "shift", shift, f"from 0 to {self.shifts - 1}")
+        require(
+            0 <= shift < self.shifts, "shift", shift, f"from 0 to {self.shifts - 1}"
+        )
         return self.samples[self.samples["shift"] == shift]
 
     def of_kind(self, kinds: str | Iterable[str] | None) -> NullEncounters:
         """The encounters of some `kinds`, as `szlib.of_kind`: treat data and null model alike."""
         kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
-        return replace(self, samples=of_kind(self.samples, kinds), encounters=of_kind(self.encounters, kinds))
+        return replace(
+            self,
+            samples=of_kind(self.samples, kinds),
+            encounters=of_kind(self.encounters, kinds),
+        )
 
 
 def null_encounters(
@@ -121,19 +127,32 @@ def null_encounters(
     settings = replace(settings, area=area)
     kinds = kinds if kinds is None or isinstance(kinds, str) else list(kinds)
     everyone = ShiftableTracks.from_tracks(tracks)
-    everyone.draw_shifts(seed, minutes)  # an impossible shift raises its error here, not in a worker
-    people, companions = everyone.near(area, settings.duration), len(everyone.companions)
+    # an impossible shift raises its error here, not in a worker
+    everyone.draw_shifts(seed, minutes)
+    people, companions = (
+        everyone.near(area, settings.duration),
+        len(everyone.companions),
+    )
     del everyone  # from here on only the rows near the area are needed
     find = partial(_find_shifted, people, seed, minutes, r_max, settings, kinds)
-    batches = [range(k, min(k + _TASK_SHIFTS, shifts)) for k in range(0, shifts, _TASK_SHIFTS)]
+    batches = [
+        range(k, min(k + _TASK_SHIFTS, shifts)) for k in range(0, shifts, _TASK_SHIFTS)
+    ]
     found: dict[int, tuple[pd.DataFrame, pd.DataFrame]] = {}
     with tqdm(total=shifts, unit="shift", disable=None if progress else True) as bar:
-        for part in run_tasks([joblib.delayed(find)(batch) for batch in batches], n_jobs=n_jobs):
+        for part in run_tasks(
+            [joblib.delayed(find)(batch) for batch in batches], n_jobs=n_jobs
+        ):
             found |= part
             bar.update(len(part))
     by_day = people.minutes_by_day(minutes)
     of_all = [float(by_day[:, 0].min()), float(by_day[:, 1].max())]
-    made_by = {"shifts": shifts, "seed": seed, "minutes": of_all, "companions": companions}
+    made_by = {
+        "shifts": shifts,
+        "seed": seed,
+        "minutes": of_all,
+        "companions": companions,
+    }
     parameters = {**made_by, "kinds": kinds, **settings.as_json()}
     return NullEncounters(*_concatenate(found), shifts, float(r_max), parameters)
 
@@ -151,16 +170,26 @@ def _find_shifted(
     found = {}
     for k in batch:
         shifted = people.shift(people.draw_shifts((seed, k), minutes))
-        samples = find_encounters(shifted, settings=settings, kinds=kinds).assign(shift=k)
+        samples = find_encounters(shifted, settings=settings, kinds=kinds).assign(
+            shift=k
+        )
         groups = samples.groupby("encounter", sort=False)
-        encounters = groups.agg(shift=("shift", "first"), kind=("kind", "first"), nearest=("distance", "min"))
+        encounters = groups.agg(
+            shift=("shift", "first"),
+            kind=("kind", "first"),
+            nearest=("distance", "min"),
+        )
         is_near = samples["distance"] <= r_max
-        close = funnels.select(samples, is_near, "samples: close", f"farther than {r_max} m")
+        close = funnels.select(
+            samples, is_near, "samples: close", f"farther than {r_max} m"
+        )
         found[k] = close, encounters.reset_index()
     return found
 
 
-def _concatenate(found: dict[int, tuple[pd.DataFrame, pd.DataFrame]]) -> tuple[pd.DataFrame, pd.DataFrame]:
+def _concatenate(
+    found: dict[int, tuple[pd.DataFrame, pd.DataFrame]],
+) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Samples and encounters of all shifts, numbered consecutively; their funnels are added up."""
     first, samples, encounters = 0, [], []
     for _, (close, every) in sorted(found.items()):

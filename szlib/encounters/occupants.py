@@ -11,8 +11,10 @@ import pandas as pd
 from ..tracks.clock import clock_index
 from .geometry import AttentionalSpace
 
-_PAIRS_AT_ONCE = 250_000  # pairs of people held in memory at a time: they fit into a cache
-_ROUNDING = 1e-3  # larger than every rounding error of a position, for any number of ticks [m]
+# pairs of people held in memory at a time: they fit into a cache
+_PAIRS_AT_ONCE = 250_000
+# larger than every rounding error of a position, for any number of ticks [m]
+_ROUNDING = 1e-3
 
 Range = tuple[np.ndarray, np.ndarray]  # low and high end, for each row
 
@@ -47,10 +49,27 @@ class TrackRows:
     def from_tracks(cls, tracks: pd.DataFrame) -> TrackRows:
         """The rows of the table `tracks`.  Raises DataError as `clock_index`."""
         order, tick, piece = clock_index(tracks)
-        x, y, vx, vy = (tracks[name].to_numpy(float)[order] for name in ("x", "y", "vx", "vy"))
-        day, ids = pd.factorize(tracks["day"], sort=True)[0][order], tracks["id"].to_numpy()[order]
+        x, y, vx, vy = (
+            tracks[name].to_numpy(float)[order] for name in ("x", "y", "vx", "vy")
+        )
+        day, ids = (
+            pd.factorize(tracks["day"], sort=True)[0][order],
+            tracks["id"].to_numpy()[order],
+        )
         person = np.cumsum(np.r_[False, (np.diff(day) != 0) | (ids[1:] != ids[:-1])])
-        return cls(order, tick, piece, day, person, x, y, vx, vy, np.hypot(vx, vy), np.arctan2(vy, vx))
+        return cls(
+            order,
+            tick,
+            piece,
+            day,
+            person,
+            x,
+            y,
+            vx,
+            vy,
+            np.hypot(vx, vy),
+            np.arctan2(vy, vx),
+        )
 
     def __len__(self) -> int:
         return len(self.x)
@@ -68,7 +87,9 @@ def find_occupants(
     cosines, sines = np.cos(rows.heading), np.sin(rows.heading)
     ahead, side = space.corners.T[..., None]
     x, y = ahead * cosines - side * sines, ahead * sines + side * cosines
-    for ref, oth in _simultaneous(rows, inside, ready, (x.min(0), x.max(0)), (y.min(0), y.max(0))):
+    for ref, oth in _simultaneous(
+        rows, inside, ready, (x.min(0), x.max(0)), (y.min(0), y.max(0))
+    ):
         dx, dy = rows.x[oth] - rows.x[ref], rows.y[oth] - rows.y[ref]
         cos, sin = cosines[ref], sines[ref]
         within = space.contains(cos * dx + sin * dy, cos * dy - sin * dx) & (ref != oth)
@@ -87,12 +108,18 @@ def occupant_changes(rows: TrackRows, other: np.ndarray, one: np.ndarray) -> np.
     row = np.flatnonzero(one)
     person = rows.person[other[row]]
     changed = np.zeros(len(other), bool)
-    changed[row[1:]] = (rows.piece[row[1:]] == rows.piece[row[:-1]]) & (person[1:] != person[:-1])
+    changed[row[1:]] = (rows.piece[row[1:]] == rows.piece[row[:-1]]) & (
+        person[1:] != person[:-1]
+    )
     return changed
 
 
 def _simultaneous(
-    rows: TrackRows, inside: np.ndarray, ready: np.ndarray, along_x: Range, along_y: Range
+    rows: TrackRows,
+    inside: np.ndarray,
+    ready: np.ndarray,
+    along_x: Range,
+    along_y: Range,
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield blocks of pairs (ready row, row inside the area) that share a tick.
 
@@ -108,14 +135,24 @@ def _simultaneous(
     low, high = low_y[at[ready_rows]] - _ROUNDING, high_y[at[ready_rows]] + _ROUNDING
     beyond = max(-low.min(initial=0), high.max(initial=0))
     place = rows.y[at] - rows.y[at].min()
-    place += (np.cumsum(new_tick) - 1) * (place.max() + 2 * beyond)  # ticks lie out of reach of each other
+    # ticks lie out of reach of each other
+    place += (np.cumsum(new_tick) - 1) * (place.max() + 2 * beyond)
     first = np.searchsorted(place, place[ready_rows] + low)
     count = np.searchsorted(place, place[ready_rows] + high, side="right") - first
     block = np.cumsum(count) // _PAIRS_AT_ONCE
-    for chosen in map(slice, starts := np.flatnonzero(np.diff(block, prepend=-1)), [*starts[1:], len(block)]):
+    for chosen in map(
+        slice,
+        starts := np.flatnonzero(np.diff(block, prepend=-1)),
+        [*starts[1:], len(block)],
+    ):
         size = count[chosen]
         offset = np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
-        one, other = np.repeat(at[ready_rows[chosen]], size), at[np.repeat(first[chosen], size) + offset]
+        one, other = (
+            np.repeat(at[ready_rows[chosen]], size),
+            at[np.repeat(first[chosen], size) + offset],
+        )
         difference = x[other] - x[one]
-        near = (difference >= low_x[one] - _ROUNDING) & (difference <= high_x[one] + _ROUNDING)
+        near = (difference >= low_x[one] - _ROUNDING) & (
+            difference <= high_x[one] + _ROUNDING
+        )
         yield one[near], other[near]

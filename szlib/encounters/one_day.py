@@ -41,7 +41,8 @@ _ADVICE = {
     "nearer": "people came into view late: pass a smaller min_distance",
     "somebody else": "more data, or other conditions (szlib.find_encounters)",
 }
-_VERSION = 8  # of the cached result of a day; a result of another version is computed again
+# of the cached result of a day; a result of another version is computed again
+_VERSION = 8
 
 
 def find_encounters_in_files(
@@ -54,7 +55,9 @@ def find_encounters_in_files(
     """
     with unchanged_files(files):
         area = known_area(settings, files, options)
-        raw = read_near_area(files, area=area, duration=settings.duration, options=options)
+        raw = read_near_area(
+            files, area=area, duration=settings.duration, options=options
+        )
     tracks = to_clock(raw, max_gap=options.max_gap) if len(raw) else raw
     if len(tracks) == 0:
         return funnels.attach(no_samples(), funnels.get(tracks))
@@ -91,11 +94,15 @@ def find_area(
     paths = [Path(file) for file in files]
     with unchanged_files(paths):
         is_known = known_area(settings, paths, options) is not None
-        contents = None if is_known else describe_source(files, settings, options)["files"]
+        contents = (
+            None if is_known else describe_source(files, settings, options)["files"]
+        )
         return with_area(settings, paths, options), contents
 
 
-def known_area(settings: EncounterSettings, files: Sequence[Path], options: ReadOptions) -> Area | None:
+def known_area(
+    settings: EncounterSettings, files: Sequence[Path], options: ReadOptions
+) -> Area | None:
     """The area of the `settings`, or that of the ATC mall; None where it must be found.
 
     The mall's `files` are recognised as `options` say.
@@ -107,29 +114,49 @@ def known_area(settings: EncounterSettings, files: Sequence[Path], options: Read
     return Square(*known) if known else None
 
 
-def relax_conditions(samples: pd.DataFrame, tracks: pd.DataFrame, settings: EncounterSettings) -> str:
+def relax_conditions(
+    samples: pd.DataFrame, tracks: pd.DataFrame, settings: EncounterSettings
+) -> str:
     """What relaxing one condition of an encounter would give, where few are found: a sentence.
 
     `samples` were found in the `tracks` with the `settings`.  The first condition named costs most.
     """
     count, area = samples["encounter"].nunique(), as_area(samples.attrs["area"])
-    settings, near = replace(settings, area=area), select_near_rows(tracks, area, settings.duration)
+    settings, near = (
+        replace(settings, area=area),
+        select_near_rows(tracks, area, settings.duration),
+    )
     space, half = settings.space, max(settings.steps // 2 / 10, 0.1)
-    small = replace(space, width=round(space.width / 2, 1), length=round(0.6 * space.length, 1))
+    small = replace(
+        space, width=round(space.width / 2, 1), length=round(0.6 * space.length, 1)
+    )
     size = f"{small.width:g} m x {small.length:g} m"
     relaxed: dict[str, dict[str, Any]] = {
         f"an attentional space of {size} (space_width, space_length)": {"space": small},
-        "a space that may reach beyond the outline, if this is a wall (has_walls)": {"has_walls": True},
+        "a space that may reach beyond the outline, if this is a wall (has_walls)": {
+            "has_walls": True
+        },
         f"windows of {half:g} s (duration)": {"duration": half},
         "any distance at the opening (min_distance)": {"min_distance": 0.0},
-        f"people of {settings.min_speed / 2:g} m/s (min_speed)": {"min_speed": settings.min_speed / 2},
+        f"people of {settings.min_speed / 2:g} m/s (min_speed)": {
+            "min_speed": settings.min_speed / 2
+        },
     }
     found = [
-        (find_encounters(near, settings=replace(settings, **change))["encounter"].nunique(), name)
+        (
+            find_encounters(near, settings=replace(settings, **change))[
+                "encounter"
+            ].nunique(),
+            name,
+        )
         for name, change in relaxed.items()
         if len(near)
     ]
-    more = "; ".join(f"{name}: {n:,} encounters" for n, name in sorted(found, reverse=True) if n > count)
+    more = "; ".join(
+        f"{name}: {n:,} encounters"
+        for n, name in sorted(found, reverse=True)
+        if n > count
+    )
     return f"{count} encounters are few; one condition relaxed gives {f'more: {more}' if more else 'no more'}"
 
 
@@ -141,10 +168,17 @@ def require_encounters(samples: pd.DataFrame, advice: str = "") -> pd.DataFrame:
     stages = [stage for stage in funnels.get(samples) if stage["entered"]]
     emptied = next((stage for stage in stages if not stage["kept"]), None)
     if emptied is None:
-        raise DataError("the table of samples is empty, and has no funnel that says why")
-    rows = ", ".join(f"{count:,} {reason}" for reason, count in emptied["rejected"].items())
+        raise DataError(
+            "the table of samples is empty, and has no funnel that says why"
+        )
+    rows = ", ".join(
+        f"{count:,} {reason}" for reason, count in emptied["rejected"].items()
+    )
     last = list(emptied["rejected"])[-1]
-    usual = next((text for words, text in _ADVICE.items() if words in last), _ADVICE["somebody else"])
+    usual = next(
+        (text for words, text in _ADVICE.items() if words in last),
+        _ADVICE["somebody else"],
+    )
     raise DataError(
         f"there is no encounter in the area {samples.attrs.get('area', '')}: of {emptied['entered']:,} "
         f"({emptied['stage']}) none is left: {rows}.  The last condition: {last}; {usual}"
@@ -161,10 +195,17 @@ def describe_source(
     """
     content = sorted([Path(file).name, *file_content(Path(file))] for file in files)
     parameters = settings.as_json() | asdict(options)
-    return {"version": _VERSION, "szlib": __version__, "files": content, "parameters": parameters}
+    return {
+        "version": _VERSION,
+        "szlib": __version__,
+        "files": content,
+        "parameters": parameters,
+    }
 
 
-def read_parameters(parameters: Mapping[str, Any]) -> tuple[EncounterSettings, ReadOptions]:
+def read_parameters(
+    parameters: Mapping[str, Any],
+) -> tuple[EncounterSettings, ReadOptions]:
     """Settings and options from the `parameters` of `describe_source`; a missing one has its default."""
     values = {**parameters, "space": AttentionalSpace(**parameters["space"])}
     settings, options = (
@@ -174,14 +215,18 @@ def read_parameters(parameters: Mapping[str, Any]) -> tuple[EncounterSettings, R
     return EncounterSettings(**settings), ReadOptions(**options)
 
 
-def store_day(folder: Path, day: str, samples: pd.DataFrame, source: Mapping[str, Any]) -> None:
+def store_day(
+    folder: Path, day: str, samples: pd.DataFrame, source: Mapping[str, Any]
+) -> None:
     """Write the `samples` of a `day` to `folder`, with the `source` they are made of."""
     content = io.BytesIO()
     samples.to_parquet(content, index=False)
     store_cached(folder / f"{day}.parquet", content.getvalue(), source)
 
 
-def load_day(folder: Path, day: str, source: Mapping[str, Any] | None) -> pd.DataFrame | None:
+def load_day(
+    folder: Path, day: str, source: Mapping[str, Any] | None
+) -> pd.DataFrame | None:
     """The samples of a `day` in `folder`; None if missing, damaged, or made of another `source`."""
     content = load_cached(folder / f"{day}.parquet", source)
     return None if content is None else pd.read_parquet(io.BytesIO(content))

@@ -20,12 +20,18 @@ SAMPLE_COLUMNS = [
 
 
 def sample_windows(
-    tracks: pd.DataFrame, order: np.ndarray, ref: np.ndarray, other: np.ndarray, steps: int
+    tracks: pd.DataFrame,
+    order: np.ndarray,
+    ref: np.ndarray,
+    other: np.ndarray,
+    steps: int,
 ) -> pd.DataFrame:
     """The samples of windows of `steps` that open at rows `ref` and `other` of `tracks` in `order`."""
     window = np.arange(steps + 1)
     of_ref = tracks.iloc[order[(ref[:, None] + window).ravel()]].reset_index(drop=True)
-    of_other = tracks.iloc[order[(other[:, None] + window).ravel()]].reset_index(drop=True)
+    of_other = tracks.iloc[order[(other[:, None] + window).ravel()]].reset_index(
+        drop=True
+    )
     dx, dy = of_other["x"] - of_ref["x"], of_other["y"] - of_ref["y"]
     bearing = np.arctan2(dy, dx) - np.arctan2(of_ref["vy"], of_ref["vx"])
     from_other = np.arctan2(-dy, -dx) - np.arctan2(of_other["vy"], of_other["vx"])
@@ -92,7 +98,9 @@ def reference_frame(tracks: pd.DataFrame, samples: pd.DataFrame) -> pd.DataFrame
     return pd.DataFrame(out)
 
 
-def match_rows(tracks: pd.DataFrame, samples: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+def match_rows(
+    tracks: pd.DataFrame, samples: pd.DataFrame
+) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The rows of `tracks` of the reference pedestrian and of the other person, for each of `samples`.
 
     Both tables have the columns encounter, tick, x, y [m], vx, vy [m/s], in the order of the samples.  Raises
@@ -100,7 +108,9 @@ def match_rows(tracks: pd.DataFrame, samples: pd.DataFrame) -> tuple[pd.DataFram
     """
     check_columns(tracks, COLUMNS)
     check_columns(samples, SAMPLE_COLUMNS[:5])
-    people = tracks[tracks["id"].isin(samples["ref_id"]) | tracks["id"].isin(samples["other_id"])]
+    people = tracks[
+        tracks["id"].isin(samples["ref_id"]) | tracks["id"].isin(samples["other_id"])
+    ]
     people = people[["day", "id", "x", "y", "vx", "vy"]].assign(
         tick=nearest_tick(people["t"].to_numpy(float))
     )
@@ -108,7 +118,12 @@ def match_rows(tracks: pd.DataFrame, samples: pd.DataFrame) -> tuple[pd.DataFram
         tick=nearest_tick(samples["t"].to_numpy(float))
     )
     ref, oth = (
-        keys.merge(people, how="left", left_on=["day", column, "tick"], right_on=["day", "id", "tick"])
+        keys.merge(
+            people,
+            how="left",
+            left_on=["day", column, "tick"],
+            right_on=["day", "id", "tick"],
+        )
         for column in ("ref_id", "other_id")
     )
     is_known = ref["x"].notna() & oth["x"].notna()

@@ -67,10 +67,22 @@ class EncounterSettings:
         duration = self.duration
         expected = f"positive and shorter than {_LONGEST_WINDOW:g} s"
         require(0 < duration < _LONGEST_WINDOW, "duration", duration, expected)
-        require(0 <= self.min_distance < np.inf, "min_distance", self.min_distance, "at least 0 m")
-        require(0 < self.min_speed < np.inf, "min_speed", self.min_speed, "positive [m/s]")
+        require(
+            0 <= self.min_distance < np.inf,
+            "min_distance",
+            self.min_distance,
+            "at least 0 m",
+        )
+        require(
+            0 < self.min_speed < np.inf, "min_speed", self.min_speed, "positive [m/s]"
+        )
         is_multiple = abs(duration * TICKS_PER_SECOND - self.steps) <= 1e-6
-        require(is_multiple, "duration", duration, "a multiple of 0.1 s, the step of the clock")
+        require(
+            is_multiple,
+            "duration",
+            duration,
+            "a multiple of 0.1 s, the step of the clock",
+        )
 
     @classmethod
     def paper(cls, area: object = None) -> EncounterSettings:
@@ -78,7 +90,9 @@ class EncounterSettings:
 
         They are the defaults: a space of 4 m x 5 m ahead, windows of 3 s, 1 m, 0.4 m/s.
         """
-        return cls(area=area, space=PAPER_SPACE, duration=3.0, min_distance=1.0, min_speed=0.4)
+        return cls(
+            area=area, space=PAPER_SPACE, duration=3.0, min_distance=1.0, min_speed=0.4
+        )
 
     @property
     def steps(self) -> int:
@@ -94,8 +108,16 @@ class EncounterSettings:
         if unknown := sorted(set(parameters) - {*known, "square"}):
             raise DataError(f"unknown parameter {unknown}; expected some of {known}")
         if {"area", "square"} <= set(parameters):
-            raise DataError("both area and square are given; they mean the same: give area alone")
-        return replace(self, **{"area" if name == "square" else name: v for name, v in parameters.items()})
+            raise DataError(
+                "both area and square are given; they mean the same: give area alone"
+            )
+        return replace(
+            self,
+            **{
+                "area" if name == "square" else name: v
+                for name, v in parameters.items()
+            },
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Every setting as a JSON value; the area as text from which `szlib.as_area` gives it again."""

@@ -41,7 +41,10 @@ _ATTEMPTS = 1000  # number of times that shifts of companions are drawn again wh
 
 
 def time_shifted(
-    tracks: pd.DataFrame, *, seed: int | Sequence[int] = 0, minutes: tuple[float, float] | None = None
+    tracks: pd.DataFrame,
+    *,
+    seed: int | Sequence[int] = 0,
+    minutes: tuple[float, float] | None = None,
 ) -> pd.DataFrame:
     """Move each person in time by an amount of their own: paths and density stay, interaction is removed.
 
@@ -111,9 +114,13 @@ class ShiftableTracks:
         """The rows that encounters in the `area`, in windows of `duration` [s], can depend on."""
         x, y = self.table["x"].to_numpy(), self.table["y"].to_numpy()
         near = is_near(x, y, self.person, area, duration)
-        stage = funnels.stage("near the area", len(near), near.sum(), {"elsewhere": (~near).sum()})
+        stage = funnels.stage(
+            "near the area", len(near), near.sum(), {"elsewhere": (~near).sum()}
+        )
         table = funnels.attach(self.table[near].reset_index(drop=True), [stage])
-        return replace(self, table=table, person=self.person[near], tick=self.tick[near])
+        return replace(
+            self, table=table, person=self.person[near], tick=self.tick[near]
+        )
 
     def minutes_by_day(self, minutes: tuple[float, float] | None) -> np.ndarray:
         """Shortest and longest shift of each day [min], (n, 2); `minutes` and errors as in `time_shifted`."""
@@ -134,7 +141,9 @@ class ShiftableTracks:
             )
         return np.outer(share, (low, high))
 
-    def draw_shifts(self, seed: int | Sequence[int], minutes: tuple[float, float] | None) -> np.ndarray:
+    def draw_shifts(
+        self, seed: int | Sequence[int], minutes: tuple[float, float] | None
+    ) -> np.ndarray:
         """Draw a shift for each person [ticks]; companions are separated.
 
         `seed`, `minutes` and errors as in `time_shifted`.
@@ -146,15 +155,23 @@ class ShiftableTracks:
 
         def draw(people: np.ndarray) -> np.ndarray:
             """Shifts of `people`, earlier or later [ticks]."""
-            ticks = rng.integers(round(low * _MINUTE), round(high * _MINUTE), len(people), endpoint=True)
-            return np.asarray(np.rint(ticks * share[people]).astype(int) * rng.choice([-1, 1], len(people)))
+            ticks = rng.integers(
+                round(low * _MINUTE), round(high * _MINUTE), len(people), endpoint=True
+            )
+            return np.asarray(
+                np.rint(ticks * share[people]).astype(int)
+                * rng.choice([-1, 1], len(people))
+            )
 
         shift = draw(np.arange(len(self.day)))
         one, other = self.companions.T
         around = self.period[self.day[one]]
         for _ in range(_ATTEMPTS):
             difference = (shift[one] - shift[other]) % around
-            similar = np.minimum(difference, around - difference) < COMPANION_SEPARATION * TICKS_PER_SECOND
+            similar = (
+                np.minimum(difference, around - difference)
+                < COMPANION_SEPARATION * TICKS_PER_SECOND
+            )
             if not similar.any():
                 return shift
             redrawn = np.unique(other[similar])
@@ -163,12 +180,18 @@ class ShiftableTracks:
         raise DataError(
             f"with shifts of {shortest:.2g} to {longest:.2g} min, {int(similar.sum())} pairs of companions "
             f"could not be separated by {COMPANION_SEPARATION:g} s; "
-            + ("use a longer recording" if minutes is None else "leave minutes out, for a wider range")
+            + (
+                "use a longer recording"
+                if minutes is None
+                else "leave minutes out, for a wider range"
+            )
         )
 
     def shift(self, shift: np.ndarray) -> pd.DataFrame:
         """The track table with each person moved by `shift` [ticks] around the circle."""
-        first, period = (each[self.day[self.person]] for each in (self.first, self.period))
+        first, period = (
+            each[self.day[self.person]] for each in (self.first, self.period)
+        )
         turns, since = np.divmod(self.tick - first + shift[self.person], period)
         rows = np.flatnonzero(since < period - 1)
         order = rows[np.lexsort((since[rows], self.person[rows]))]
@@ -188,7 +211,11 @@ def _companions(rows: TrackRows) -> np.ndarray:
     whole = np.flatnonzero(rows.tick % TICKS_PER_SECOND == 0)
     moments = np.column_stack([rows.day, rows.tick])[whole]
     moment = np.unique(moments, axis=0, return_inverse=True)[1].ravel()
-    points = np.column_stack([rows.x[whole], rows.y[whole], 2 * NEAR * moment])  # two moments are never near
-    pairs = np.sort(rows.person[whole][cKDTree(points).query_pairs(NEAR, output_type="ndarray")], axis=1)
+    # two moments are never near
+    points = np.column_stack([rows.x[whole], rows.y[whole], 2 * NEAR * moment])
+    pairs = np.sort(
+        rows.person[whole][cKDTree(points).query_pairs(NEAR, output_type="ndarray")],
+        axis=1,
+    )
     pairs, seconds = np.unique(pairs, axis=0, return_counts=True)
     return np.asarray(pairs[seconds >= TOGETHER])

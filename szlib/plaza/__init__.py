@@ -7,4 +7,9 @@ accuracy    the precision of a rule for outliers, and the error of a zone
 
 from .accuracy import largest_error, precision_and_recall, true_kinds
 from .generation import make_plaza, positions, stage_encounters
-from .settings import ANY_SPEED_INTRUDERS, RUSHING_INTRUDERS, SLOW_INTRUDERS, PlazaSettings
+from .settings import (
+    ANY_SPEED_INTRUDERS,
+    RUSHING_INTRUDERS,
+    SLOW_INTRUDERS,
+    PlazaSettings,
+)

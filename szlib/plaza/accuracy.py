@@ -55,7 +55,9 @@ def true_kinds(
     return np.asarray(kinds[pair])
 
 
-def precision_and_recall(removed: NDArray[np.bool_], intruders: NDArray[np.bool_]) -> tuple[float, float]:
+def precision_and_recall(
+    removed: NDArray[np.bool_], intruders: NDArray[np.bool_]
+) -> tuple[float, float]:
     """Compute the precision and recall of a rule that removes intruders.
 
     Parameters
@@ -81,14 +83,21 @@ def precision_and_recall(removed: NDArray[np.bool_], intruders: NDArray[np.bool_
     """
     removed, intruders = np.asarray(removed, bool), np.asarray(intruders, bool)
     if removed.shape != intruders.shape:
-        raise DataError(f"expected two arrays of one shape; got {removed.shape} and {intruders.shape}")
+        raise DataError(
+            f"expected two arrays of one shape; got {removed.shape} and {intruders.shape}"
+        )
     n_found = int((removed & intruders).sum())
-    precision, recall = (n_found / n if n else np.nan for n in (int(removed.sum()), int(intruders.sum())))
+    precision, recall = (
+        n_found / n if n else np.nan for n in (int(removed.sum()), int(intruders.sum()))
+    )
     return precision, recall
 
 
 def largest_error(
-    zone: SocialZone, settings: PlazaSettings | None = None, *, speeds: Iterable[float] = SPEEDS
+    zone: SocialZone,
+    settings: PlazaSettings | None = None,
+    *,
+    speeds: Iterable[float] = SPEEDS,
 ) -> float:
     """Compute the largest error of centre and semi-axes over some speeds [m].
 
@@ -114,6 +123,12 @@ def largest_error(
     """
     errors = []
     for speed in speeds:
-        fitted, true = zone.ellipse(speed), (settings or PlazaSettings()).true_zone(speed)
-        errors += [*np.subtract(fitted.center, true.center), *np.subtract(fitted.semi_axes, true.semi_axes)]
+        fitted, true = (
+            zone.ellipse(speed),
+            (settings or PlazaSettings()).true_zone(speed),
+        )
+        errors += [
+            *np.subtract(fitted.center, true.center),
+            *np.subtract(fitted.semi_axes, true.semi_axes),
+        ]
     return float(np.abs(errors).max())

@@ -24,30 +24,43 @@ from ..checks import Array
 from ..encounters.geometry import wrap_angle
 from ..errors import ZoneError
 from ..files import write_file
-from .settings import MARGIN, MIN_WALKING_SPEED, SPACE, WINDOW, PlazaSettings, swept_length
+from .settings import (
+    MARGIN,
+    MIN_WALKING_SPEED,
+    SPACE,
+    WINDOW,
+    PlazaSettings,
+    swept_length,
+)
 
 KINDS = ("overtaking", "head-on", "crossing", "together", "standing", "intruder")
 """Kinds of encounter; the first three by the angle between the directions of motion when closest."""
 # First id, and step between ids, as on the first day of ATC. The ids of a pair are successive.
 FIRST_ID, ID_STEP = 9_190_600, 100
 
-_VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")  # of staged encounters, each with x and y
+# of staged encounters, each with x and y
+_VECTORS = ("walker_", "other_", "walker_v", "other_v", "swerve_")
 _PAUSE = 1.0  # between a pair's end and the start of the next [s]
-_TIME_TO_CLOSEST = (0.5, 2.5)  # from the start of the window until the two are closest [s]
+# from the start of the window until the two are closest [s]
+_TIME_TO_CLOSEST = (0.5, 2.5)
 _DRIFT = 0.25  # greatest relative speed of people who walk together [m/s]
 _MAX_CURVATURE = 1.2  # of a path in the walker's frame [1/m]
 _CHECKS = 15  # of a path in a second
 _MAX_ROUNDS = 5000  # of draws
-_SHIFT, _NEW_BEARING = 0.001, 200  # each draw is 1 mm farther out; a new bearing after so many draws
+# each draw is 1 mm farther out; a new bearing after so many draws
+_SHIFT, _NEW_BEARING = (0.001, 200)
 # After so many draws the mean clearance grows as well: companions with small zones walk too near otherwise.
 _GROWS_AFTER = 1000
 _FRAMES = (33, 50)  # time between frames, (shortest, longest) [ms]
 _SHORT_GAP, _LONG_GAP = (0.1, 0.4), (0.6, 1.0)  # a gap of 0.5 s ends a track [s]
 _HEIGHT = (1.5, 1.8)  # of people [m]
-_VELOCITY_NOISE, _FACING_NOISE = 0.45, 0.3  # of the sensor's own velocity [m/s] and facing angle [rad]
+# of the sensor's own velocity [m/s] and facing angle [rad]
+_VELOCITY_NOISE, _FACING_NOISE = (0.45, 0.3)
 
 
-def make_plaza(path: str | Path, *, seed: int = 0, settings: PlazaSettings | None = None) -> Path:
+def make_plaza(
+    path: str | Path, *, seed: int = 0, settings: PlazaSettings | None = None
+) -> Path:
     """Write a day on the plaza in the raw ATC format.
 
     Parameters
@@ -78,7 +91,9 @@ def make_plaza(path: str | Path, *, seed: int = 0, settings: PlazaSettings | Non
     return path
 
 
-def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) -> pd.DataFrame:
+def stage_encounters(
+    *, seed: int = 0, settings: PlazaSettings | None = None
+) -> pd.DataFrame:
     """Draw the encounters and the exact paths of both people: one row for each encounter.
 
     Parameters
@@ -108,7 +123,9 @@ def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) ->
     n = len(plan)
     heading = rng.uniform(-np.pi, np.pi, n)
     ahead, swept = _unit_vectors(heading), swept_length(speed)
-    half = (np.abs(ahead) * swept[:, None] + np.abs(_rotate_left(ahead)) * SPACE.width) / 2
+    half = (
+        np.abs(ahead) * swept[:, None] + np.abs(_rotate_left(ahead)) * SPACE.width
+    ) / 2
     low, high = np.transpose([settings.area.x, settings.area.y])
     middle = rng.uniform(low + half + MARGIN, high - half - MARGIN)
     walker = middle + (speed * before - swept / 2)[:, None] * ahead
@@ -116,11 +133,15 @@ def stage_encounters(*, seed: int = 0, settings: PlazaSettings | None = None) ->
     offset, other_v, swerve = np.moveaxis(_rotate(motion, heading[:, None]), 1, 0)
     apart = np.abs(np.arctan2(motion[:, 1, 1], motion[:, 1, 0]))
     kind = np.where(
-        plan == "passing", np.select([apart < np.pi / 4, apart > 3 * np.pi / 4], KINDS[:2], KINDS[2]), plan
+        plan == "passing",
+        np.select([apart < np.pi / 4, apart > 3 * np.pi / 4], KINDS[:2], KINDS[2]),
+        plan,
     )
     vectors = [walker, walker + offset, speed[:, None] * ahead, other_v, swerve]
     columns = {
-        name + axis: v[:, k] for name, v in zip(_VECTORS, vectors, strict=True) for k, axis in enumerate("xy")
+        name + axis: v[:, k]
+        for name, v in zip(_VECTORS, vectors, strict=True)
+        for k, axis in enumerate("xy")
     }
     closest = start + settings.lead_time + before
     return pd.DataFrame({"kind": kind, "start": start, "closest": closest, **columns})
@@ -152,7 +173,9 @@ def positions(staged: pd.DataFrame, t: Array) -> tuple[Array, Array]:
         staged[[name + "x", name + "y"]].to_numpy() for name in _VECTORS
     )
     position = [walker + walker_v * since, other + other_v * since + swerve * deviation]
-    return np.stack(position, axis=1), np.stack([walker_v, other_v + swerve * swerved], axis=1)
+    return np.stack(position, axis=1), np.stack(
+        [walker_v, other_v + swerve * swerved], axis=1
+    )
 
 
 def _draw_encounters(
@@ -164,11 +187,16 @@ def _draw_encounters(
     enter a zone are drawn again, farther out.
     """
     n = settings.n_encounters
-    ends = np.rint(n * np.cumsum([settings.standing, settings.together, settings.intruders]))
+    ends = np.rint(
+        n * np.cumsum([settings.standing, settings.together, settings.intruders])
+    )
     plan = np.array(["standing", "together", "intruder", "passing"])[
         np.searchsorted(ends, rng.permutation(n), side="right")
     ]
-    speed, bearing = _stratify(rng, n, *settings.speeds), _stratify(rng, n, -np.pi, np.pi)
+    speed, bearing = (
+        _stratify(rng, n, *settings.speeds),
+        _stratify(rng, n, -np.pi, np.pi),
+    )
     clear = rng.exponential(settings.clearance, n)
     before, motion = np.zeros(n), np.zeros((n, 3, 2))
     pending = np.arange(n)
@@ -210,7 +238,9 @@ def _draw(
     n, standing, intruder = len(plan), plan == "standing", plan == "intruder"
     center, semi_axes, angle = settings.interpolate_zones(speed)
     a, b = semi_axes.T
-    beside = np.arctan2(b * np.cos(angle), a * np.sin(angle)) + np.pi * rng.integers(2, size=n)
+    beside = np.arctan2(b * np.cos(angle), a * np.sin(angle)) + np.pi * rng.integers(
+        2, size=n
+    )
     unit = _unit_vectors(np.where(standing, beside, bearing))
     edge = _rotate(_rotate_left(unit) * semi_axes, angle)
     point = center + _rotate(unit * semi_axes, angle)
@@ -218,10 +248,16 @@ def _draw(
     tangent = np.where(intruder[:, None], _rotate_left(unit), edge)
     normal = -_rotate_left(tangent)
     intrusion = rng.uniform(*settings.intruder_distances, n)
-    offset = np.where(intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal)
+    offset = np.where(
+        intruder[:, None], intrusion[:, None] * unit, point + clear[:, None] * normal
+    )
     (low, high), limit = settings.intruder_speeds, 2 * settings.max_speed
-    pace = rng.uniform(np.where(intruder, low, _DRIFT), np.where(intruder, min(high, limit), limit))
-    pace = np.where(plan == "together", rng.uniform(0, _DRIFT, n), np.where(standing, speed, pace))
+    pace = rng.uniform(
+        np.where(intruder, low, _DRIFT), np.where(intruder, min(high, limit), limit)
+    )
+    pace = np.where(
+        plan == "together", rng.uniform(0, _DRIFT, n), np.where(standing, speed, pace)
+    )
     side = np.where(standing, -np.sign(tangent[:, 0]), rng.choice([-1.0, 1.0], n))
     passing = (side * pace)[:, None] * tangent
     curvature = np.where(plan == "passing", rng.uniform(0, bend, n), 0.0)
@@ -230,7 +266,11 @@ def _draw(
 
 
 def _is_possible(
-    settings: PlazaSettings, plan: NDArray[np.str_], speed: Array, before: Array, motion: Array
+    settings: PlazaSettings,
+    plan: NDArray[np.str_],
+    speed: Array,
+    before: Array,
+    motion: Array,
 ) -> NDArray[np.bool_]:
     """Which motions start ahead of the walker, have walking speeds, and stay outside both zones."""
     lead = settings.lead_time
@@ -242,18 +282,25 @@ def _is_possible(
     position = offset + passing * since + swerve * deviation
     velocity = velocity + swerve * swerved
     x, y = position[:, -1].T
-    is_in_view = (x >= MARGIN) & (x <= SPACE.length - MARGIN) & (np.abs(y) <= SPACE.width / 2 - MARGIN)
+    is_in_view = (
+        (x >= MARGIN)
+        & (x <= SPACE.length - MARGIN)
+        & (np.abs(y) <= SPACE.width / 2 - MARGIN)
+    )
     pace = np.linalg.norm(velocity, axis=-1)
     is_standing, is_respectful = plan == "standing", plan != "intruder"
     is_fast_enough = (pace >= MIN_WALKING_SPEED) | is_standing[:, None]
     has_walking_speed = ((pace <= settings.max_speed) & is_fast_enough).all(axis=1)
     possible = is_in_view & (np.hypot(x, y) >= 1 + MARGIN) & has_walking_speed
-    some = np.flatnonzero(possible & is_respectful)  # checked last, because zones take longest
+    # checked last, because zones take longest
+    some = np.flatnonzero(possible & is_respectful)
     walker_speed = np.broadcast_to(speed[some, None], pace[some].shape)
     possible[some] = _stays_outside(settings, position[some], walker_speed)
     some = np.flatnonzero(possible & is_respectful & ~is_standing)
     course = np.arctan2(velocity[some, :, 1], velocity[some, :, 0])
-    possible[some] = _stays_outside(settings, _rotate(-position[some], -course), pace[some])
+    possible[some] = _stays_outside(
+        settings, _rotate(-position[some], -course), pace[some]
+    )
     return np.asarray(possible)
 
 
@@ -266,10 +313,13 @@ def _swerve(since: Array) -> tuple[Array, Array]:
     return bent, bent * since - bent**2 / 2
 
 
-def _stays_outside(settings: PlazaSettings, points: Array, speed: Array) -> NDArray[np.bool_]:
+def _stays_outside(
+    settings: PlazaSettings, points: Array, speed: Array
+) -> NDArray[np.bool_]:
     """Which paths (n, moments, 2) [m] stay outside the zones at speeds (n, moments) at all moments; (n,)."""
     center, semi_axes, angle = settings.interpolate_zones(speed)
-    mapped = _rotate(points - center, -angle) / semi_axes  # the zones become the unit disc
+    # the zones become the unit disc
+    mapped = _rotate(points - center, -angle) / semi_axes
     return np.asarray((np.linalg.norm(mapped, axis=-1) >= 1).all(axis=1))
 
 
@@ -281,24 +331,47 @@ def _record(staged: pd.DataFrame, seed: int, settings: PlazaSettings) -> pl.Data
     ms = rng.integers(*_FRAMES, int(lasts * 1000 / _FRAMES[0]) + 1, endpoint=True)
     frames = start[0] + np.cumsum(ms) / 1000
     pair = np.searchsorted(start, frames, side="right") - 1
-    pair, frames = (array[frames <= start[pair] + settings.tracked] for array in (pair, frames))
+    pair, frames = (
+        array[frames <= start[pair] + settings.tracked] for array in (pair, frames)
+    )
     position, velocity = positions(staged.iloc[pair], frames)
     measured = position + rng.normal(0, settings.noise, position.shape)
     sensor_velocity = velocity + rng.normal(0, _VELOCITY_NOISE, velocity.shape)
-    facing = np.arctan2(velocity[..., 1], velocity[..., 0]) + rng.normal(0, _FACING_NOISE, velocity.shape[:2])
-    height = rng.uniform(*_HEIGHT, (n, 2))[pair] + rng.normal(0, settings.noise, velocity.shape[:2])
+    facing = np.arctan2(velocity[..., 1], velocity[..., 0]) + rng.normal(
+        0, _FACING_NOISE, velocity.shape[:2]
+    )
+    height = rng.uniform(*_HEIGHT, (n, 2))[pair] + rng.normal(
+        0, settings.noise, velocity.shape[:2]
+    )
     short, long = settings.short_gaps, settings.long_gaps
     kind = rng.choice(3, (n, 2), p=[short, long, 1 - short - long])
-    length = np.stack([rng.uniform(*_SHORT_GAP, (n, 2)), rng.uniform(*_LONG_GAP, (n, 2)), np.zeros((n, 2))])
+    length = np.stack(
+        [
+            rng.uniform(*_SHORT_GAP, (n, 2)),
+            rng.uniform(*_LONG_GAP, (n, 2)),
+            np.zeros((n, 2)),
+        ]
+    )
     length = np.take_along_axis(length, kind[None], axis=0)[0]
     gap_start = start[:, None] + rng.uniform(0, settings.tracked - length)
-    is_recorded = ~((frames[:, None] > gap_start[pair]) & (frames[:, None] < (gap_start + length)[pair]))
+    is_recorded = ~(
+        (frames[:, None] > gap_start[pair])
+        & (frames[:, None] < (gap_start + length)[pair])
+    )
     speed = np.linalg.norm(sensor_velocity, axis=-1)
-    metres = {"x": measured[..., 0], "y": measured[..., 1], "z": height, "velocity": speed}
+    metres = {
+        "x": measured[..., 0],
+        "y": measured[..., 1],
+        "z": height,
+        "velocity": speed,
+    }
     columns = {
         "time": np.broadcast_to(frames[:, None], is_recorded.shape),
         "id": FIRST_ID + ID_STEP * (2 * pair[:, None] + np.arange(2)),
-        **{name: np.rint(1000 * value).astype(np.int32) for name, value in metres.items()},
+        **{
+            name: np.rint(1000 * value).astype(np.int32)
+            for name, value in metres.items()
+        },
         "motion_angle": np.arctan2(sensor_velocity[..., 1], sensor_velocity[..., 0]),
         "facing_angle": wrap_angle(facing),
     }

@@ -14,7 +14,8 @@ from ..zones.ellipses import Ellipse
 from ..zones.outliers import R_MAX
 from ..zones.polar import ellipse_reach
 
-MIN_WALKING_SPEED = 0.45  # lowest speed of a walking person [m/s]; the paper has speeds from 0.4 m/s
+# lowest speed of a walking person [m/s]; the paper has speeds from 0.4 m/s
+MIN_WALKING_SPEED = 0.45
 SPACE = AttentionalSpace()
 MARGIN = 0.15  # distance from an edge at which a point stays inside in spite of the noise [m]
 RUSHING_INTRUDERS, SLOW_INTRUDERS = (1.5, np.inf), (0.25, 1.0)
@@ -23,12 +24,17 @@ ANY_SPEED_INTRUDERS = (0.25, np.inf)
 WINDOW = 3.4  # a pair seen for this time is seen for 3 s of the clock, wherever its ticks fall [s]
 
 _LOW_SPEED, _HIGH_SPEED = 0.5, 1.5  # speeds of `slow_zone` and `fast_zone` [m/s]
-_SLOW_ZONE, _FAST_ZONE = Ellipse((0.04, 0.0), (0.88, 0.68)), Ellipse((0.06, 0.0), (1.0, 0.78))
+_SLOW_ZONE, _FAST_ZONE = (
+    Ellipse((0.04, 0.0), (0.88, 0.68)),
+    Ellipse((0.06, 0.0), (1.0, 0.78)),
+)
 _JAPAN = timezone(timedelta(hours=9))
 _FIRST_HOUR = 10  # of the day, when the first pair comes
-_SWEPT = 3.15  # the window of 3 s begins at the first tick or, at the latest, the next [s]
+# the window of 3 s begins at the first tick or, at the latest, the next [s]
+_SWEPT = 3.15
 _LONGEST_TRACKED = 60.0  # of a pair [s]
-_MIN_INTRUDER_SPEED = 0.5  # a slower intruder does not come close within the window [m/s]
+# a slower intruder does not come close within the window [m/s]
+_MIN_INTRUDER_SPEED = 0.5
 
 
 @dataclass(frozen=True)
@@ -106,22 +112,48 @@ class PlazaSettings:
     date: str = "2000-01-02"
 
     def __post_init__(self) -> None:
-        (low, high), nearest, speed = self.speeds, self.intruder_distances, self.intruder_speeds
-        shares, gaps = (self.standing, self.together, self.intruders), (self.short_gaps, self.long_gaps)
-        for names, values in (("standing, together, intruders", shares), ("short_gaps, long_gaps", gaps)):
-            require(min(values) >= 0 and sum(values) <= 1, names, values, "shares, in sum at most 1")
+        (low, high), nearest, speed = (
+            self.speeds,
+            self.intruder_distances,
+            self.intruder_speeds,
+        )
+        shares, gaps = (
+            (self.standing, self.together, self.intruders),
+            (self.short_gaps, self.long_gaps),
+        )
+        for names, values in (
+            ("standing, together, intruders", shares),
+            ("short_gaps, long_gaps", gaps),
+        ):
+            require(
+                min(values) >= 0 and sum(values) <= 1,
+                names,
+                values,
+                "shares, in sum at most 1",
+            )
         require(self.n_encounters >= 1, "n_encounters", self.n_encounters, "at least 1")
         longest = f"{WINDOW} to {_LONGEST_TRACKED:g} s"
-        require(WINDOW <= self.tracked <= _LONGEST_TRACKED, "tracked", self.tracked, longest)
+        require(
+            WINDOW <= self.tracked <= _LONGEST_TRACKED, "tracked", self.tracked, longest
+        )
         for name, metres in (("clearance", self.clearance), ("noise", self.noise)):
             require(0 <= metres < np.inf, name, metres, "at least 0 m")
         top = self.max_speed
         is_range = MIN_WALKING_SPEED <= low < high <= top < np.inf
-        expected = f"(lowest, highest), from {MIN_WALKING_SPEED} m/s to max_speed = {top} m/s"
+        expected = (
+            f"(lowest, highest), from {MIN_WALKING_SPEED} m/s to max_speed = {top} m/s"
+        )
         require(is_range, "speeds", self.speeds, expected)
         is_range = 0 < nearest[0] <= nearest[1] < np.inf
-        require(is_range, "intruder_distances", nearest, "(smallest, largest), both positive [m]")
-        is_range = 0 < speed[0] <= speed[1] >= _MIN_INTRUDER_SPEED and speed[0] < 2 * top
+        require(
+            is_range,
+            "intruder_distances",
+            nearest,
+            "(smallest, largest), both positive [m]",
+        )
+        is_range = (
+            0 < speed[0] <= speed[1] >= _MIN_INTRUDER_SPEED and speed[0] < 2 * top
+        )
         expected = f"(lowest, highest), between 0 and {2 * top} m/s and at least {_MIN_INTRUDER_SPEED} m/s"
         require(is_range, "intruder_speeds", speed, expected)
         needed = np.hypot(swept_length(high), SPACE.width) + 2 * MARGIN
@@ -133,7 +165,9 @@ class PlazaSettings:
             )
         self.compute_start_time()
         zones = map(self.true_zone, np.linspace(low, high, 3))
-        reach = ellipse_reach(np.array([(*zone.center, *zone.semi_axes, zone.angle) for zone in zones]))
+        reach = ellipse_reach(
+            np.array([(*zone.center, *zone.semi_axes, zone.angle) for zone in zones])
+        )
         if not (reach < R_MAX).all():  # NaN where a zone does not contain the person
             raise ZoneError(
                 f"{self.slow_zone}, {self.fast_zone}: at {self.speeds} m/s the zone must "
@@ -149,19 +183,28 @@ class PlazaSettings:
         """Centres (..., 2), semi-axes (..., 2) [m] and angles (...) [rad] of the zones at `speed`."""
         slow, fast = self.slow_zone, self.fast_zone
         share = (speed - _LOW_SPEED) / (_HIGH_SPEED - _LOW_SPEED)
-        turn = Ellipse((0, 0), (1, 1), fast.angle - slow.angle).angle  # the shorter rotation
+        turn = Ellipse(
+            (0, 0), (1, 1), fast.angle - slow.angle
+        ).angle  # the shorter rotation
         center, semi_axes = (
             np.add(start, share[..., None] * np.subtract(end, start))
-            for start, end in ((slow.center, fast.center), (slow.semi_axes, fast.semi_axes))
+            for start, end in (
+                (slow.center, fast.center),
+                (slow.semi_axes, fast.semi_axes),
+            )
         )
         return center, semi_axes, slow.angle + share * turn
 
     def compute_start_time(self) -> float:
         """Compute the time at which the first pair comes [s since 1970]."""
         try:
-            day = datetime.strptime(self.date, "%Y-%m-%d").replace(hour=_FIRST_HOUR, tzinfo=_JAPAN)
+            day = datetime.strptime(self.date, "%Y-%m-%d").replace(
+                hour=_FIRST_HOUR, tzinfo=_JAPAN
+            )
         except ValueError as error:
-            raise DataError(f'date must be a day "YYYY-MM-DD"; got {self.date!r}') from error
+            raise DataError(
+                f'date must be a day "YYYY-MM-DD"; got {self.date!r}'
+            ) from error
         return day.timestamp()
 
     @property

@@ -18,16 +18,36 @@ replay                the robot in the place of a recorded walker: `find_replays
 """
 
 from .closed_loop import drive, simulate
-from .comparisons import BEHAVIOURS, CONTROLLERS, FORMULATIONS, ZONES, compare, measure_time_inside, summarise
+from .comparisons import (
+    BEHAVIOURS,
+    CONTROLLERS,
+    FORMULATIONS,
+    ZONES,
+    compare,
+    measure_time_inside,
+    summarise,
+)
 from .crowds import ReactingPeople
 from .log import SimulationLog
-from .metrics import compute_metrics, find_avoidance_start, find_passing_side, find_yielding_steps
+from .metrics import (
+    compute_metrics,
+    find_avoidance_start,
+    find_passing_side,
+    find_yielding_steps,
+)
 from .monte_carlo import rerun_world, rollouts
 from .outcomes import classify_outcome
 from .replay import ReplacedWalker, Replay, Replays, find_replays
 from .run import Run
 from .safety_claims import safety_violations
 from .scenario import Behaviour, Claim, Crowd, CrowdModel, Scenario
-from .scenarios import MEETINGS, ONE_PERSON, SCENARIOS, Variations, VisiblePeople, Worlds
+from .scenarios import (
+    MEETINGS,
+    ONE_PERSON,
+    SCENARIOS,
+    Variations,
+    VisiblePeople,
+    Worlds,
+)
 from .social_metrics import compute_replay_metrics, compute_social_metrics
 from .strategies import STRATEGIES, classify_strategy, compute_retreat

@@ -45,15 +45,21 @@ class BaselineController(Controller):
     def __init__(self, scenario: Scenario, settings: MPCSettings) -> None:
         self.settings, self.walls = settings, scenario.walls
 
-    def step(self, state: Array, goal: Array, people: Sequence[Person]) -> SimpleNamespace:
+    def step(
+        self, state: Array, goal: Array, people: Sequence[Person]
+    ) -> SimpleNamespace:
         """The acceleration towards the desired velocity; see `Controller.step` for `state`, `goal`,
         `people`.
         """
         s, desired = self.settings, self.desired_velocity(state, goal, people)
         change = (desired / max(1.0, np.hypot(*desired) / s.v_max) - state[2:]) / s.dt
-        return SimpleNamespace(control=change / max(1.0, np.abs(change).max() / s.a_max))
+        return SimpleNamespace(
+            control=change / max(1.0, np.abs(change).max() / s.a_max)
+        )
 
-    def desired_velocity(self, state: Array, goal: Array, people: Sequence[Person]) -> Array:
+    def desired_velocity(
+        self, state: Array, goal: Array, people: Sequence[Person]
+    ) -> Array:
         """The velocity that the robot desires now [m/s].
 
         Parameters
@@ -83,9 +89,13 @@ class BaselineController(Controller):
         x, y = at[..., 0], at[..., 1]
         nearest = np.full(x.shape, np.inf)
         for (px, py), (vx, vy) in ((p.position, p.velocity) for p in people):
-            nearest = np.minimum(nearest, np.hypot(x - px - time * vx, y - py - time * vy) - BODY_RADIUS)
+            nearest = np.minimum(
+                nearest, np.hypot(x - px - time * vx, y - py - time * vy) - BODY_RADIUS
+            )
         for wall in self.walls:
-            nearest = np.minimum(nearest, euclidean_segment_formula(x, y, *wall.ravel()))
+            nearest = np.minimum(
+                nearest, euclidean_segment_formula(x, y, *wall.ravel())
+            )
         return nearest - self.settings.r_robot - self.settings.eps
 
 
@@ -97,12 +107,18 @@ class StraightController(BaselineController):
 
     margin = 0.5
 
-    def desired_velocity(self, state: Array, goal: Array, people: Sequence[Person]) -> Array:
+    def desired_velocity(
+        self, state: Array, goal: Array, people: Sequence[Person]
+    ) -> Array:
         """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
         s, position, velocity = self.settings, state[:2], state[2:]
         ahead = self.velocity_to_goal(goal - position)
-        reach = float(velocity @ velocity) / (2 * s.a_max) + s.v_max * s.dt + self.margin
-        lane = position + np.linspace(0.0, 1.0, 9)[:, None] * reach * ahead / max(np.hypot(*ahead), 1e-9)
+        reach = (
+            float(velocity @ velocity) / (2 * s.a_max) + s.v_max * s.dt + self.margin
+        )
+        lane = position + np.linspace(0.0, 1.0, 9)[:, None] * reach * ahead / max(
+            np.hypot(*ahead), 1e-9
+        )
         return ahead if self.gap(lane, people).min() > 0 else np.zeros(2)
 
 
@@ -124,7 +140,9 @@ class SocialForceController(BaselineController):
     wall = 3.0
     wall_reach = 0.1
 
-    def desired_velocity(self, state: Array, goal: Array, people: Sequence[Person]) -> Array:
+    def desired_velocity(
+        self, state: Array, goal: Array, people: Sequence[Person]
+    ) -> Array:
         """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
         position, velocity = state[:2], state[2:]
         force = (self.velocity_to_goal(goal - position) - velocity) / self.tau
@@ -136,7 +154,10 @@ class SocialForceController(BaselineController):
             away = position - (xa, ya) - share * along
             distance = max(float(np.hypot(*away)), 1e-9)
             gap = distance - self.settings.r_robot
-            force = force + self.wall * np.exp(-max(gap, 0.0) / self.wall_reach) * away / distance
+            force = (
+                force
+                + self.wall * np.exp(-max(gap, 0.0) / self.wall_reach) * away / distance
+            )
         return velocity + self.settings.dt * force
 
     def _push(self, position: Array, velocity: Array, person: Person) -> Array:
@@ -149,7 +170,11 @@ class SocialForceController(BaselineController):
         left = np.array([-drive[1], drive[0]])
         theta = np.arctan2(left @ to, drive @ to) + 0.005 * b
         slow, turn = np.exp(-((2 * b * theta) ** 2)), np.exp(-((3 * b * theta) ** 2))
-        return np.asarray(-self.strength * np.exp(-apart / b) * (slow * drive + np.sign(theta) * turn * left))
+        return np.asarray(
+            -self.strength
+            * np.exp(-apart / b)
+            * (slow * drive + np.sign(theta) * turn * left)
+        )
 
 
 class DynamicWindowController(BaselineController):
@@ -167,11 +192,15 @@ class DynamicWindowController(BaselineController):
     clearance = 0.5
     samples = 9
 
-    def desired_velocity(self, state: Array, goal: Array, people: Sequence[Person]) -> Array:
+    def desired_velocity(
+        self, state: Array, goal: Array, people: Sequence[Person]
+    ) -> Array:
         """See `BaselineController.desired_velocity` for `state`, `goal`, `people`."""
         s, position, velocity = self.settings, state[:2], state[2:]
         change = np.linspace(-1, 1, self.samples) * s.a_max * s.dt
-        window = velocity + np.stack(np.meshgrid(change, change), axis=-1).reshape(-1, 2)
+        window = velocity + np.stack(np.meshgrid(change, change), axis=-1).reshape(
+            -1, 2
+        )
         window = window[np.hypot(*window.T) <= s.v_max]
         time = np.arange(1, round(self.horizon / s.dt) + 1) * s.dt
         at = position + time[:, None] * window[:, None]

@@ -23,7 +23,14 @@ from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import BODY_RADIUS, Ellipse, circle_around
 from .log import SimulationLog
-from .scenario import GOAL_RADIUS, STOPPED_SPEED, UNAFFECTED, Crowd, CrowdModel, Scenario
+from .scenario import (
+    GOAL_RADIUS,
+    STOPPED_SPEED,
+    UNAFFECTED,
+    Crowd,
+    CrowdModel,
+    Scenario,
+)
 
 # Makes the zone that the robot keeps out of from a person's own zone.
 ZoneTransform = Callable[[Ellipse], Ellipse]
@@ -79,13 +86,17 @@ def simulate(
     (True, 'right')
     """
     controller = as_controller(controller)
-    if controller.walls is not None and not np.array_equal(controller.walls, scenario.walls):
+    if controller.walls is not None and not np.array_equal(
+        controller.walls, scenario.walls
+    ):
         raise SolverError(
             f"the controller knows {len(controller.walls)} walls, and not the {len(scenario.walls)} of "
             f"{scenario.name!r}; build it with walls=scenario.walls"
         )
     try:
-        controller.check_start(scenario.start, scenario.goal, scenario.people if crowd is None else ())
+        controller.check_start(
+            scenario.start, scenario.goal, scenario.people if crowd is None else ()
+        )
     except SolverError as error:
         raise SolverError(f"{scenario.name!r}: {error}") from error
     return drive(scenario, controller, crowd=crowd, max_time=max_time)
@@ -138,7 +149,9 @@ def drive(
     s, robot = _choose_settings(controller, settings), controller.robot
     default_zone = BODY_ZONE if controller.zone is None else controller.zone
     zones = ZoneAssignment(default_zone, zone_transform, s.zone_speed)
-    people = tuple(replace(p, zone=zones.zone_of(i, p)) for i, p in enumerate(scenario.people))
+    people = tuple(
+        replace(p, zone=zones.zone_of(i, p)) for i, p in enumerate(scenario.people)
+    )
     if crowd is None:
         crowd = behaviour.start(replace(scenario, people=people), seed)
     end = scenario.duration if max_time is None else max_time
@@ -156,7 +169,9 @@ def drive(
             numbers += _ABSENT if p is None else (*p.position, p.heading, *p.velocity)
         present = [i for i, p in enumerate(everyone) if p is not None]
         observed = behaviour.observe(tuple([p for p in everyone if p is not None]), rng)
-        seen_by_step.append([i for i, p in zip(present, observed, strict=True) if p is not None])
+        seen_by_step.append(
+            [i for i, p in zip(present, observed, strict=True) if p is not None]
+        )
         seen = tuple([p for p in observed if p is not None])
         begin = perf_counter()
         step = controller.step(own, goal, seen)
@@ -167,12 +182,18 @@ def drive(
         states.append(state)
         controls.append(control)
         x, y, vx, vy = state.tolist()
-        if arrival is None and hypot(vx, vy) <= STOPPED_SPEED and hypot(x - gx, y - gy) <= GOAL_RADIUS:
+        if (
+            arrival is None
+            and hypot(vx, vy) <= STOPPED_SPEED
+            and hypot(x - gx, y - gy) <= GOAL_RADIUS
+        ):
             arrival = k
             if until_arrival:
                 break
         if not all(map(isfinite, given := control.tolist())):
-            raise SolverError(f"{scenario.name!r}: the controller gave {given} at {k * dt:g} s")
+            raise SolverError(
+                f"{scenario.name!r}: the controller gave {given} at {k * dt:g} s"
+            )
         own = robot.advance(own, control, dt)
     n, n_people = len(states), len(everyone)
     return SimulationLog(
@@ -183,20 +204,29 @@ def drive(
         controls=np.array(controls),
         people=_fill_headings(np.reshape(np.array(numbers, float), (n, n_people, 5))),
         predicted=_stack_plans(reported["predicted"]),
-        residual=_align_residuals(reported["residual"], seen_by_step, n_people, len(scenario.walls)),
+        residual=_align_residuals(
+            reported["residual"], seen_by_step, n_people, len(scenario.walls)
+        ),
         fallback=np.array(reported["fallback"]),
         safe=np.array(reported["safe"], bool),
-        **{name: np.array(reported[name], float) for name in ("slack", "solve_time", "stuck")},
+        **{
+            name: np.array(reported[name], float)
+            for name in ("slack", "solve_time", "stuck")
+        },
         arrival=arrival,
         has_safety_claims=reported["safe"][0] is not None,
         inputs=tuple(robot.inputs),
     )
 
 
-def _choose_settings(controller: Controller, settings: MPCSettings | None) -> MPCSettings:
+def _choose_settings(
+    controller: Controller, settings: MPCSettings | None
+) -> MPCSettings:
     own = controller.settings
     if settings and own and settings.dt != own.dt:
-        raise SolverError(f"the controller steps every {own.dt} s, the loop every {settings.dt} s; give one")
+        raise SolverError(
+            f"the controller steps every {own.dt} s, the loop every {settings.dt} s; give one"
+        )
     return settings or own or MPCSettings()
 
 
@@ -210,7 +240,12 @@ class ZoneAssignment:
     speed : walking speed for zones that depend on it [m/s].
     """
 
-    def __init__(self, default: Ellipse | SpeedZone, transform: ZoneTransform | None, speed: float) -> None:
+    def __init__(
+        self,
+        default: Ellipse | SpeedZone,
+        transform: ZoneTransform | None,
+        speed: float,
+    ) -> None:
         self._default, self._transform, self._speed = default, transform, speed
         self._zones: dict[int, Ellipse] = {}
         self._n_people: int | None = None
@@ -218,7 +253,9 @@ class ZoneAssignment:
     def zone_of(self, i: int, person: Person | None) -> Ellipse:
         """The zone of person `i`, made from the `person` at the first call; None: they never appear."""
         if i not in self._zones:
-            own = self._default if person is None or person.zone is None else person.zone
+            own = (
+                self._default if person is None or person.zone is None else person.zone
+            )
             zone = as_ellipse(own, self._speed)
             if person is not None and person.heading is None:
                 zone = circle_around(zone)
@@ -235,7 +272,9 @@ class ZoneAssignment:
                 f"{self._n_people}, and now is {len(people)}"
             )
         return [
-            p if p is None or p.zone is self._zones.get(i, self) else replace(p, zone=self.zone_of(i, p))
+            p
+            if p is None or p.zone is self._zones.get(i, self)
+            else replace(p, zone=self.zone_of(i, p))
             for i, p in enumerate(people)
         ]
 
@@ -252,10 +291,17 @@ def _fill_headings(people: Array) -> Array:
 def _stack_plans(plans: Sequence[Array]) -> Array:
     """The plan of each step, shape (n, N+1, 4); (n, 0, 4) if there are none, NaN after shorter ones."""
     longest = max(map(len, plans))
-    return np.array([np.pad(p, ((0, longest - len(p)), (0, 0)), constant_values=np.nan) for p in plans])
+    return np.array(
+        [
+            np.pad(p, ((0, longest - len(p)), (0, 0)), constant_values=np.nan)
+            for p in plans
+        ]
+    )
 
 
-def _align_residuals(rows: Sequence[Any], seen: Sequence[list[int]], n_people: int, n_walls: int) -> Array:
+def _align_residuals(
+    rows: Sequence[Any], seen: Sequence[list[int]], n_people: int, n_walls: int
+) -> Array:
     """The conditions of each step, shape (n, P+W, N_h), NaN for people who were not seen; else (n, P+W, 0).
 
     A step has a row for each person whom it sees, then for people whom it remembers, then for each wall.

@@ -28,7 +28,11 @@ from ..control.settings import MPCSettings
 from ..errors import SolverError
 from ..zones.ellipses import Ellipse
 from ..zones.enclosing_ellipse import minimum_enclosing_ellipse_of_curve
-from .baseline_controllers import DynamicWindowController, SocialForceController, StraightController
+from .baseline_controllers import (
+    DynamicWindowController,
+    SocialForceController,
+    StraightController,
+)
 from .closed_loop import BODY_ZONE, ZoneTransform
 from .monte_carlo import ControllerFactory, ScenarioSource, make_mpc_cbf, rollouts
 from .run import Run
@@ -84,7 +88,9 @@ def kirby_curve(angles: Array, speed: float) -> Array:
 
 @lru_cache
 def _fit_kirby_ellipse() -> Ellipse:
-    return minimum_enclosing_ellipse_of_curve(partial(kirby_curve, speed=KIRBY_SPEED), [-pi / 2, pi / 2])
+    return minimum_enclosing_ellipse_of_curve(
+        partial(kirby_curve, speed=KIRBY_SPEED), [-pi / 2, pi / 2]
+    )
 
 
 ZONES: Mapping[str, ZoneTransform] = {
@@ -121,7 +127,12 @@ CONTROLLERS: Mapping[str, ControllerFactory] = {
 }
 """Controllers, by name."""
 
-METHOD = ("controller", "zone", "formulation", "behaviour")  # columns of `compare` that name a method
+METHOD = (
+    "controller",
+    "zone",
+    "formulation",
+    "behaviour",
+)  # columns of `compare` that name a method
 
 WORLDS = Worlds(people=(3, 5), size=8.0, travel=(4.0, 8.0), start_speed=0.0, min_h=1.0)
 """Worlds with space for each of the zones at the start and at the goal: the robot starts outside all."""
@@ -148,12 +159,17 @@ def measure_time_inside(run: Run) -> dict[str, float]:
     """
     own = [person.zone for person in run.scenario.people] or [None] * len(run.zones)
     fitted = [
-        as_ellipse(each or zone, run.settings.zone_speed) for each, zone in zip(own, run.zones, strict=True)
+        as_ellipse(each or zone, run.settings.zone_speed)
+        for each, zone in zip(own, run.zones, strict=True)
     ]
     inside = {}
     for name, zone in ZONES.items():
-        gaps = run.distances_to_zones([zone(each) for each in fitted], euclidean_to_ellipse)
-        overlaps = (gaps < run.settings.r_robot).any(axis=1)  # NaN, of absent people, is no overlap
+        gaps = run.distances_to_zones(
+            [zone(each) for each in fitted], euclidean_to_ellipse
+        )
+        overlaps = (gaps < run.settings.r_robot).any(
+            axis=1
+        )  # NaN, of absent people, is no overlap
         inside[f"inside {name}"] = run.settings.dt * float(overlaps.sum())
     return inside
 
@@ -199,12 +215,16 @@ def compare(
     """
     methods = (controllers, zones, formulations, behaviours)
     tables = []
-    for names in product(*map(_resolve_names, methods, (CONTROLLERS, ZONES, FORMULATIONS, BEHAVIOURS))):
+    for names in product(
+        *map(_resolve_names, methods, (CONTROLLERS, ZONES, FORMULATIONS, BEHAVIOURS))
+    ):
         (_, controller), (_, zone), (_, settings), (_, behaviour) = names
         robot = {"settings": settings, "controller": controller, "zone_transform": zone}
         people = {"worlds": worlds, "behaviour": behaviour}
         table = rollouts(n, **robot, **people, measure=measure_time_inside, **options)
-        tables.append(table.assign(**dict(zip(METHOD, (name for name, _ in names), strict=True))))
+        tables.append(
+            table.assign(**dict(zip(METHOD, (name for name, _ in names), strict=True)))
+        )
     return pd.concat(tables, ignore_index=True)
 
 
@@ -215,7 +235,9 @@ def _resolve_names(
     if isinstance(given, Mapping):
         return list(given.items())
     if unknown := sorted(set(given) - set(known)):
-        raise SolverError(f"unknown names: {', '.join(unknown)}; expected {', '.join(known)}, or a mapping")
+        raise SolverError(
+            f"unknown names: {', '.join(unknown)}; expected {', '.join(known)}, or a mapping"
+        )
     return [(name, known[name]) for name in given]
 
 
@@ -254,7 +276,9 @@ def summarise(
     SolverError : the level is not in (0, 1), or the number of samples is not positive.
     """
     if not 0 < level < 1 or resamples < 1:
-        raise SolverError(f"level must be in (0, 1) and resamples positive; got {level}, {resamples}")
+        raise SolverError(
+            f"level must be in (0, 1) and resamples positive; got {level}, {resamples}"
+        )
     values = rows.set_index(["seed", *by])[list(metrics)].astype(float)
     if against is not None:
         rest = [name for name in by if name not in against]
@@ -267,7 +291,13 @@ def summarise(
     weight = counts @ wide.notna().to_numpy()
     means = np.full(weight.shape, np.nan)
     np.divide(counts @ wide.fillna(0.0).to_numpy(), weight, out=means, where=weight > 0)
-    low, high = pd.DataFrame(means).quantile([(1 - level) / 2, (1 + level) / 2]).to_numpy()
+    low, high = (
+        pd.DataFrame(means).quantile([(1 - level) / 2, (1 + level) / 2]).to_numpy()
+    )
     table = pd.DataFrame(wide.columns.tolist(), columns=["metric", *by])
-    table = table.assign(mean=np.asarray(wide.mean()), low=low, high=high, n=np.asarray(wide.count()))
-    return table.assign(first=wide.iloc[0].to_numpy())[[*by, "metric", "mean", "low", "high", "n", "first"]]
+    table = table.assign(
+        mean=np.asarray(wide.mean()), low=low, high=high, n=np.asarray(wide.count())
+    )
+    return table.assign(first=wide.iloc[0].to_numpy())[
+        [*by, "metric", "mean", "low", "high", "n", "first"]
+    ]

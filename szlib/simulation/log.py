@@ -32,7 +32,14 @@ _ARRAYS = (
     "states", "controls", "people", "predicted", "residual", "fallback", "safe", "slack", "solve_time",
     "stuck",
 )  # fmt: skip
-_SHOWN = ("success", "outcome", "time_to_goal", "min_h", "min_clearance", "infeasible_steps")
+_SHOWN = (
+    "success",
+    "outcome",
+    "time_to_goal",
+    "min_h",
+    "min_clearance",
+    "infeasible_steps",
+)
 
 
 class SimulationLog(Run):
@@ -66,17 +73,32 @@ class SimulationLog(Run):
         """
         n = len(self.zones)
         columns: dict[str, Any] = {"t": self.time}
-        columns |= dict(zip(("x", "y", "vx", "vy"), self.states.T, strict=True)) | {"speed": self.speed}
+        columns |= dict(zip(("x", "y", "vx", "vy"), self.states.T, strict=True)) | {
+            "speed": self.speed
+        }
         columns |= dict(zip(self.inputs, self.controls.T, strict=True))
-        columns |= {"status": [status_of(name) for name in self.fallback.tolist()], "fallback": self.fallback}
-        columns |= {"slack": self.slack, "solve_time": self.solve_time, "stuck": self.stuck}
+        columns |= {
+            "status": [status_of(name) for name in self.fallback.tolist()],
+            "fallback": self.fallback,
+        }
+        columns |= {
+            "slack": self.slack,
+            "solve_time": self.solve_time,
+            "stuck": self.stuck,
+        }
         columns["cbf_people"] = self.cbf_people
         columns["clearance"] = nanmin(self.clearance, axis=1)
         for i in range(n):
             x, y, heading = self.people[:, i, :3].T
-            columns |= {f"person_{i}_x": x, f"person_{i}_y": y, f"person_{i}_heading": heading}
+            columns |= {
+                f"person_{i}_x": x,
+                f"person_{i}_y": y,
+                f"person_{i}_heading": heading,
+            }
             columns[f"h_person_{i}"] = self.h[:, i]
-        columns |= {f"h_wall_{j}": self.h[:, n + j] for j in range(len(self.scenario.walls))}
+        columns |= {
+            f"h_wall_{j}": self.h[:, n + j] for j in range(len(self.scenario.walls))
+        }
         return pd.DataFrame(columns)
 
     def metrics(self) -> dict[str, Any]:
@@ -104,9 +126,13 @@ class SimulationLog(Run):
         )
 
     def _repr_html_(self) -> str:
-        rows = pd.Series({name: _format(value) for name, value in self.metrics().items()})
+        rows = pd.Series(
+            {name: _format(value) for name, value in self.metrics().items()}
+        )
         title = self.scenario.title or self.scenario.name
-        return f"<p><b>{title}</b></p>" + rows.to_frame(f"{self.time[-1]:g} s").to_html()
+        return (
+            f"<p><b>{title}</b></p>" + rows.to_frame(f"{self.time[-1]:g} s").to_html()
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the run to ``<path>.parquet`` (its arrays) and ``<path>.json`` (all else).
@@ -119,7 +145,10 @@ class SimulationLog(Run):
         """
         stem, rows = Path(path).with_suffix(""), len(self.states)
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        flat = {name: list(a.reshape(rows, -1)) if a.ndim > 1 else a for name, a in arrays.items()}
+        flat = {
+            name: list(a.reshape(rows, -1)) if a.ndim > 1 else a
+            for name, a in arrays.items()
+        }
         scenario, people = self.scenario, self.scenario.people
         content = {
             "format": _FORMAT,
@@ -129,10 +158,17 @@ class SimulationLog(Run):
             "run": _pick(self, "arrival", "has_safety_claims", "inputs"),
             "shapes": {name: a.shape for name, a in arrays.items() if a.ndim == 3},
             "settings": asdict(self.settings),
-            "zones": [_pick(zone, "center", "semi_axes", "angle") for zone in self.zones],
+            "zones": [
+                _pick(zone, "center", "semi_axes", "angle") for zone in self.zones
+            ],
             "scenario": _pick(scenario, "name", "title", "duration")
-            | {name: getattr(scenario, name).tolist() for name in ("start", "goal", "walls")},
-            "people": [_pick(person, "position", "velocity", "heading") for person in people],
+            | {
+                name: getattr(scenario, name).tolist()
+                for name in ("start", "goal", "walls")
+            },
+            "people": [
+                _pick(person, "position", "velocity", "heading") for person in people
+            ],
         }
         buffer = io.BytesIO()
         pd.DataFrame(flat).to_parquet(buffer)
@@ -156,8 +192,13 @@ class SimulationLog(Run):
                 )
             with open_regular(stem.with_suffix(".parquet")) as stream:
                 rows = pd.read_parquet(stream)
-            arrays: dict[str, Any] = {name: np.array(rows[name].tolist()) for name in _ARRAYS}
-            arrays |= {name: arrays[name].reshape(shape) for name, shape in content["shapes"].items()}
+            arrays: dict[str, Any] = {
+                name: np.array(rows[name].tolist()) for name in _ARRAYS
+            }
+            arrays |= {
+                name: arrays[name].reshape(shape)
+                for name, shape in content["shapes"].items()
+            }
             zones = tuple(Ellipse(**zone) for zone in content["zones"])
             people = tuple(
                 Person(**person, zone=zones[i] if i < len(zones) else None)

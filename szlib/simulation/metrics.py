@@ -23,7 +23,9 @@ from .scenario import GOAL_RADIUS, STOPPED_SPEED
 START_UP_TIME = 1.0  # time after the start that does not count as slow or yielding [s]: v_max / a_max
 # The robot brakes into its goal after it last has this fraction of its greatest speed (assumed).
 CRUISE_FRACTION = 0.95
-ACTIVE_RESIDUAL = 1e-4  # a barrier condition with at most this residual holds the robot back [m]
+ACTIVE_RESIDUAL = (
+    1e-4  # a barrier condition with at most this residual holds the robot back [m]
+)
 
 # Metrics of `Step.solve_time`, each with its quantile.
 SOLVE_TIMES = {
@@ -67,11 +69,19 @@ def compute_metrics(run: Run) -> dict[str, Any]:
     -----
     A step counts if its control is applied.  The step of the last state does not count.
     """
-    dt, n_people, way, applied = run.settings.dt, len(run.zones), run.until_arrival, slice(0, -1)
+    dt, n_people, way, applied = (
+        run.settings.dt,
+        len(run.zones),
+        run.until_arrival,
+        slice(0, -1),
+    )
     speed = run.speed[way]
     time = dt * np.arange(len(speed))
     jerk = np.diff(np.diff(run.states[way, 2:], axis=0), axis=0) / dt**2
-    cruising = np.arange(len(speed)) <= np.flatnonzero(speed >= CRUISE_FRACTION * speed.max())[-1]
+    cruising = (
+        np.arange(len(speed))
+        <= np.flatnonzero(speed >= CRUISE_FRACTION * speed.max())[-1]
+    )
     has_moved = np.maximum.accumulate(speed > STOPPED_SPEED)
     has_residuals = run.residual.shape[2] > 0 or not n_people
     violated = (nanmin(run.h, axis=1) < -TOLERANCE)[1:]
@@ -88,11 +98,15 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "min_clearance": _min_or_nan(run.clearance),
         "min_clearance_people": _min_or_nan(run.clearance[:, :n_people]),
         "min_clearance_walls": _min_or_nan(run.clearance[:, n_people:]),
-        "min_speed": float(speed[(time >= START_UP_TIME) & cruising].min(initial=speed.max())),
+        "min_speed": float(
+            speed[(time >= START_UP_TIME) & cruising].min(initial=speed.max())
+        ),
         "mean_speed": float(speed.mean()),
         "max_speed": float(speed.max()),
         "time_stopped": dt * int((has_moved & (speed < STOPPED_SPEED))[:-1].sum()),
-        "time_yielding": dt * int(find_yielding_steps(run).sum()) if has_residuals else np.nan,
+        "time_yielding": dt * int(find_yielding_steps(run).sum())
+        if has_residuals
+        else np.nan,
         "passing_side": find_passing_side(run),
         "jerk": float((jerk**2).sum(axis=1).mean()) if len(jerk) else 0.0,
         "people": n_people,
@@ -104,7 +118,10 @@ def compute_metrics(run: Run) -> dict[str, Any]:
         "flagged_steps": int(run.flagged[applied].sum()),
         "unflagged_violations": int((run.safe[applied] & violated).sum()),
         "unflagged_overlaps": int((run.safe[applied] & overlap).sum()),
-        **{f"steps_{name}": int((run.fallback[applied] == name).sum()) for name in FALLBACKS},
+        **{
+            f"steps_{name}": int((run.fallback[applied] == name).sum())
+            for name in FALLBACKS
+        },
         "max_slack": float(run.slack[applied].max(initial=0.0)),
         **dict(zip(SOLVE_TIMES, solve_times, strict=True)),
     }
@@ -130,7 +147,9 @@ def find_yielding_steps(run: Run) -> NDArray[np.bool_]:
     to_goal = np.hypot(*(run.states[way, :2] - run.scenario.goal).T)
     is_held = (run.time[way] >= START_UP_TIME) & (to_goal > GOAL_RADIUS)
     is_held &= run.cbf_people[way] <= ACTIVE_RESIDUAL
-    return np.asarray(is_held[:-1] & (-np.diff(to_goal) / run.settings.dt < STOPPED_SPEED))
+    return np.asarray(
+        is_held[:-1] & (-np.diff(to_goal) / run.settings.dt < STOPPED_SPEED)
+    )
 
 
 def locate_along_course(run: Run, person: int) -> tuple[Array, Array]:
@@ -162,7 +181,9 @@ def find_passing_side(run: Run) -> str:
     return "right" if left[abeam[-1] + 1] > 0 else "left"
 
 
-def find_avoidance_start(run: Run, person: int = 0, deviation: float = 0.1) -> tuple[float, float]:
+def find_avoidance_start(
+    run: Run, person: int = 0, deviation: float = 0.1
+) -> tuple[float, float]:
     """Distance to a person, and h, where the robot first leaves its straight line (paper, sec. 4).
 
     Parameters
@@ -177,12 +198,20 @@ def find_avoidance_start(run: Run, person: int = 0, deviation: float = 0.1) -> t
     """
     start, course = run.scenario.start[:2], run.scenario.goal - run.scenario.start[:2]
     beside = run.states[:, :2] - start
-    beside = np.abs(beside[:, 0] * course[1] - beside[:, 1] * course[0]) / np.hypot(*course)
+    beside = np.abs(beside[:, 0] * course[1] - beside[:, 1] * course[0]) / np.hypot(
+        *course
+    )
     rows = np.flatnonzero(beside > deviation)
     if not len(rows):
         return np.nan, np.nan
     last, first = max(int(rows[0]) - 1, 0), int(rows[0])
-    share = (deviation - beside[last]) / (beside[first] - beside[last]) if first > last else 1.0
+    share = (
+        (deviation - beside[last]) / (beside[first] - beside[last])
+        if first > last
+        else 1.0
+    )
     ahead, left = locate_along_course(run, person)
-    x, y, h = (v[last] + share * (v[first] - v[last]) for v in (ahead, left, run.h[:, person]))
+    x, y, h = (
+        v[last] + share * (v[first] - v[last]) for v in (ahead, left, run.h[:, person])
+    )
     return float(np.hypot(x, y)), float(h)

@@ -51,12 +51,19 @@ ControllerFactory = Callable[[Scenario, MPCSettings], Controller]
 # Makes the scenario of a seed, the same one each time: `Worlds` or another function.
 ScenarioSource = Callable[[int], Scenario]
 
-Measure = Callable[[Run], dict[str, float]]  # further columns of a row; a function of a module
+Measure = Callable[
+    [Run], dict[str, float]
+]  # further columns of a row; a function of a module
 
 
 def make_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
     """The MPC-CBF controller for a `scenario` with `settings`; people without a zone have `DEFAULT_ZONE`."""
-    return MPCCBF(DEFAULT_ZONE, walls=scenario.walls, settings=settings, max_people=len(scenario.people))
+    return MPCCBF(
+        DEFAULT_ZONE,
+        walls=scenario.walls,
+        settings=settings,
+        max_people=len(scenario.people),
+    )
 
 
 def rollouts(
@@ -116,7 +123,10 @@ def rollouts(
         claim_folder(folder.parent, PURPOSE)
         claim_folder(folder, f"{PURPOSE} {setup.key()}")
         write_file(folder / "parameters.txt", setup.describe() + "\n")
-    chunks = [range(first, min(first + CHUNK_SIZE, seed + n)) for first in range(seed, seed + n, CHUNK_SIZE)]
+    chunks = [
+        range(first, min(first + CHUNK_SIZE, seed + n))
+        for first in range(seed, seed + n, CHUNK_SIZE)
+    ]
     tasks = [delayed(run_chunk)(setup, chunk, folder) for chunk in chunks]
     tables: list[pd.DataFrame] = []
     with tqdm(total=n, unit="world", disable=None if progress else True) as bar:
@@ -127,7 +137,9 @@ def rollouts(
 
 
 @lru_cache(maxsize=1)
-def _controllers_of(settings: MPCSettings, thread: int) -> dict[tuple[int, int], MPCCBF]:
+def _controllers_of(
+    settings: MPCSettings, thread: int
+) -> dict[tuple[int, int], MPCCBF]:
     """The controllers of one thread for these settings, kept from chunk to chunk."""
     return {}
 
@@ -138,7 +150,10 @@ def reuse_mpc_cbf(scenario: Scenario, settings: MPCSettings) -> MPCCBF:
     The size is the numbers of people and walls. To build a controller takes as long as ten steps. The loop
     resets it before each run, so that it remembers nothing of the last world.
     """
-    controllers, size = _controllers_of(settings, get_ident()), (len(scenario.people), len(scenario.walls))
+    controllers, size = (
+        _controllers_of(settings, get_ident()),
+        (len(scenario.people), len(scenario.walls)),
+    )
     if size not in controllers:
         controllers[size] = make_mpc_cbf(scenario, settings)
     controllers[size].set_walls(scenario.walls)
@@ -204,7 +219,9 @@ def identify(part: Any) -> str:
     kind = part if isinstance(part, FunctionType | type) else type(part)
     name = f"{kind.__module__}.{kind.__qualname__}"
     if "<" in name:
-        raise SolverError(f"{name} has no name that other processes know; define it in a module")
+        raise SolverError(
+            f"{name} has no name that other processes know; define it in a module"
+        )
     return name if kind is part else f"{name} {joblib.hash(part)}"
 
 
@@ -213,11 +230,17 @@ def rerun_world(seed: int, **parameters: Any) -> SimulationLog:
     return RolloutSetup(**parameters).run(seed)
 
 
-def run_chunk(setup: RolloutSetup, seeds: range, folder: Path | None = None) -> pd.DataFrame:
+def run_chunk(
+    setup: RolloutSetup, seeds: range, folder: Path | None = None
+) -> pd.DataFrame:
     """The rows of the worlds of `seeds` with a `setup`: read from `folder` if finished, else driven and
     stored.
     """
-    file = None if folder is None else folder / f"seeds-{seeds.start:07d}-{seeds.stop - 1:07d}.parquet"
+    file = (
+        None
+        if folder is None
+        else folder / f"seeds-{seeds.start:07d}-{seeds.stop - 1:07d}.parquet"
+    )
     key = {"rollouts": file and setup.describe(), "seeds": [seeds.start, seeds.stop]}
     if file is not None and (content := load_cached(file, key)) is not None:
         return pd.read_parquet(io.BytesIO(content))

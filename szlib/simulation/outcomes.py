@@ -14,10 +14,19 @@ from .run import Run, nanmin
 from .scenario import STOPPED_SPEED
 
 Outcome = Literal[
-    "arrived", "hit wall", "run into", "squeezed", "drove in", "boxed in", "deadlock", "out of time"
+    "arrived",
+    "hit wall",
+    "run into",
+    "squeezed",
+    "drove in",
+    "boxed in",
+    "deadlock",
+    "out of time",
 ]
 """How a run ends; see `classify_outcome`."""
-CROWDED_H = 0.2  # if two barriers are below this h, the robot has no way out [m] (assumed)
+CROWDED_H = (
+    0.2  # if two barriers are below this h, the robot has no way out [m] (assumed)
+)
 STOP_WINDOW = 3.0  # a robot that stands for this time at the end of a run has stopped for good [s] (assumed)
 _CELL = 0.1  # cell size of the grid for the search of a free path to the goal [m]
 _MARGIN = 2.5  # margin of the grid around everything: enough for a zone and the robot beside it [m]
@@ -66,18 +75,29 @@ def _classify_violation(run: Run, k: int) -> Outcome:
 def _has_free_path(run: Run) -> bool:
     """True if a path with h >= 0 leads from the robot to the goal, with people at their last positions."""
     ends = np.array([run.states[-1, :2], run.scenario.goal])
-    people = [(zone, p) for zone, p in zip(run.zones, run.people[-1], strict=True) if p[0] == p[0]]
+    people = [
+        (zone, p)
+        for zone, p in zip(run.zones, run.people[-1], strict=True)
+        if p[0] == p[0]
+    ]
     bodies = np.reshape([p[:2] for _, p in people], (-1, 2))
     everything = np.vstack([ends, bodies, run.scenario.walls.reshape(-1, 2)])
     low, high = everything.min(axis=0) - _MARGIN, everything.max(axis=0) + _MARGIN
     axes = [np.arange(low[i], high[i], _CELL) for i in range(2)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     s = run.settings
-    zones = [(*zone.placed((x, y), heading).foci_and_axis, 0.0, 0.0) for zone, (x, y, heading, *_) in people]
+    zones = [
+        (*zone.placed((x, y), heading).foci_and_axis, 0.0, 0.0)
+        for zone, (x, y, heading, *_) in people
+    ]
     walls = walls_with_margins(run.scenario.walls, s)
-    h = compute_h(grid[..., 0], grid[..., 1], zones, walls, r_robot=s.r_robot, eps=s.eps)
+    h = compute_h(
+        grid[..., 0], grid[..., 1], zones, walls, r_robot=s.r_robot, eps=s.eps
+    )
     is_free = nanmin(np.array([np.ones(grid.shape[:2]), *h]), axis=0) >= 0
     regions = label(is_free, structure=np.ones((3, 3)))[0]
     cells = np.round((ends - low) / _CELL).astype(int)
-    robot, goal = (regions[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] for i, j in cells)
+    robot, goal = (
+        regions[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] for i, j in cells
+    )
     return bool(set(np.unique(robot)) & set(np.unique(goal)) - {0})

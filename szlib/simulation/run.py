@@ -14,7 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Array
-from ..control.barriers import barrier, ellipse_distance, euclidean_segment_formula, segment_formula
+from ..control.barriers import (
+    barrier,
+    ellipse_distance,
+    euclidean_segment_formula,
+    segment_formula,
+)
 from ..control.distances import walls_with_margins
 from ..control.person import Person
 from ..control.settings import MPCSettings
@@ -128,16 +133,24 @@ class Run:
     def h(self) -> Array:
         """Barriers with the true positions of people, shape (n, P+W) [m]."""
         s, (x, y) = self.settings, (self.states[:, :1], self.states[:, 1:2])
-        *ends, margin = np.reshape(walls_with_margins(self.scenario.walls, s), (-1, 5)).T
-        to_people = barrier(self.distances_to_zones(self.zones, ellipse_distance), s.r_robot, s.eps)
-        return np.hstack([to_people, barrier(segment_formula(x, y, *ends), s.r_robot, margin)])
+        *ends, margin = np.reshape(
+            walls_with_margins(self.scenario.walls, s), (-1, 5)
+        ).T
+        to_people = barrier(
+            self.distances_to_zones(self.zones, ellipse_distance), s.r_robot, s.eps
+        )
+        return np.hstack(
+            [to_people, barrier(segment_formula(x, y, *ends), s.r_robot, margin)]
+        )
 
     @cached_property
     def clearance(self) -> Array:
         """Euclidean gaps from the robot's disc to bodies (of `BODY_RADIUS`) and walls, shape (n, P+W) [m]."""
         to_people = np.hypot(self.relative[..., 0], self.relative[..., 1]) - BODY_RADIUS
         x, y = self.states[:, :1], self.states[:, 1:2]
-        to_walls = euclidean_segment_formula(x, y, *self.scenario.walls.reshape(-1, 4).T)
+        to_walls = euclidean_segment_formula(
+            x, y, *self.scenario.walls.reshape(-1, 4).T
+        )
         return np.hstack([to_people, to_walls]) - self.settings.r_robot
 
     @cached_property
@@ -156,10 +169,14 @@ class Run:
         """
         row = round(time / self.settings.dt)
         if not 0 <= row < len(self.states):
-            raise DataError(f"the run has times from 0 to {self.time[-1]:g} s; got {time:g}")
+            raise DataError(
+                f"the run has times from 0 to {self.time[-1]:g} s; got {time:g}"
+            )
         present = [
             Person((x, y), (vx, vy), heading, zone)
-            for zone, (x, y, heading, vx, vy) in zip(self.zones, self.people[row].tolist(), strict=True)
+            for zone, (x, y, heading, vx, vy) in zip(
+                self.zones, self.people[row].tolist(), strict=True
+            )
             if x == x
         ]
         return self.states[row], self.scenario.goal, present

@@ -53,7 +53,9 @@ def safety_violations(run: Run) -> pd.DataFrame:
             rows.append((t, i, h, np.nan, np.nan, "came", True))
             continue
         expected = before[:2] + dt * before[3:]
-        zone = run.zones[i].placed((float(expected[0]), float(expected[1])), float(before[2]))
+        zone = run.zones[i].placed(
+            (float(expected[0]), float(expected[1])), float(before[2])
+        )
         distance = float(ellipse_distance(run.states[k + 1, :2], zone))
         h_claimed = barrier(distance, run.settings.r_robot, run.settings.eps)
         deviation = float(np.hypot(*(after[:2] - expected)))

@@ -84,18 +84,29 @@ class Scenario:
         arrays = {
             "start": check_array("start", self.start, (4,)),
             "goal": check_array("goal", self.goal, (2,)),
-            "walls": np.array([check_wall(wall) for wall in self.walls]).reshape(-1, 2, 2),
+            "walls": np.array([check_wall(wall) for wall in self.walls]).reshape(
+                -1, 2, 2
+            ),
         }
         for name, array in arrays.items():
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "people", tuple(self.people))
         is_positive = 0 < self.duration < np.inf
-        require(is_positive, "duration", self.duration, "a positive number of seconds", SolverError)
+        require(
+            is_positive,
+            "duration",
+            self.duration,
+            "a positive number of seconds",
+            SolverError,
+        )
 
     def turn_people(self) -> Scenario:
         """The same scene with all people facing the other way; people who walk then walk backwards."""
-        people = tuple(p if p.heading is None else replace(p, heading=p.heading + pi) for p in self.people)
+        people = tuple(
+            p if p.heading is None else replace(p, heading=p.heading + pi)
+            for p in self.people
+        )
         return replace(self, people=people)
 
 
@@ -108,7 +119,9 @@ class CrowdModel(Protocol):
     def start(self, scenario: Scenario, seed: int) -> Crowd:
         """The people of a `scenario` from its start on, with a `seed` for what is random."""
 
-    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> Sequence[Person | None]:
+    def observe(
+        self, people: tuple[Person, ...], rng: np.random.Generator
+    ) -> Sequence[Person | None]:
         """What the controller sees of the `people` who are present, in their order; None: not seen.
 
         `rng` is for noise.  By default the controller sees all people as they are.
@@ -151,10 +164,15 @@ class Behaviour:
         if self.pace == 1.0 and self.turn == 0.0:
             return lambda t, _: [person.after(t) for person in people]
         rng = np.random.default_rng([seed, 1])
-        plans = [(p, rng.uniform(*self.between), self.turn * rng.choice([-1, 1])) for p in people]
+        plans = [
+            (p, rng.uniform(*self.between), self.turn * rng.choice([-1, 1]))
+            for p in people
+        ]
         return lambda t, _: [self._locate(t, *plan) for plan in plans]
 
-    def _locate(self, t: float, person: Person, change_time: float, turn: float) -> Person:
+    def _locate(
+        self, t: float, person: Person, change_time: float, turn: float
+    ) -> Person:
         if t <= change_time or person.stands:
             return person.after(t)
         vx, vy = person.velocity
@@ -162,15 +180,20 @@ class Behaviour:
         speed = self.pace * hypot(vx, vy)
         velocity = (speed * cos(heading), speed * sin(heading))
         position = person.after(change_time).position
-        return Person(position, velocity, heading, person.zone, person.id).after(t - change_time)
+        return Person(position, velocity, heading, person.zone, person.id).after(
+            t - change_time
+        )
 
-    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person, ...]:
+    def observe(
+        self, people: tuple[Person, ...], rng: np.random.Generator
+    ) -> tuple[Person, ...]:
         """The `people` at positions with noise from `rng`."""
         if self.noise == 0:
             return people
         noise = rng.normal(0.0, self.noise, (len(people), 2)).tolist()
         return tuple(
-            p.at((p.position[0] + dx, p.position[1] + dy)) for p, (dx, dy) in zip(people, noise, strict=True)
+            p.at((p.position[0] + dx, p.position[1] + dy))
+            for p, (dx, dy) in zip(people, noise, strict=True)
         )
 
 

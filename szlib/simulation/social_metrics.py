@@ -20,7 +20,11 @@ from .run import Run, nanmin
 from .scenario import STOPPED_SPEED
 
 # Range of each of Hall's distances [m].
-HALL_DISTANCES = {"intimate": (0.0, 0.45), "personal": (0.45, 1.2), "social": (1.2, 3.6)}
+HALL_DISTANCES = {
+    "intimate": (0.0, 0.45),
+    "personal": (0.45, 1.2),
+    "social": (1.2, 3.6),
+}
 NOT_MOVING = 0.001  # below this speed HuNavSim's robot does not move [m/s]
 # Within this distance a person or a robot has reached the goal [m] (assumed): people walk on there.
 REACHED = 0.5
@@ -57,7 +61,9 @@ def compute_social_metrics(run: Run) -> dict[str, float]:
     }
     return {
         "heading_changes": _sum_heading_changes(states),
-        "closest_person": float(nearest[is_near_person].mean()) if is_near_person.any() else np.nan,
+        "closest_person": float(nearest[is_near_person].mean())
+        if is_near_person.any()
+        else np.nan,
         **fractions,
         "robot_on_person": robot_on_person,
         "person_on_robot": person_on_robot,
@@ -76,9 +82,14 @@ def _compute_path_efficiency(run: Run, states: Array) -> float:
     start, goal = run.scenario.start[:2], run.scenario.goal
     straight = start + np.linspace(0, 1, _N_POINTS)[:, None] * (goal - start)
     radius = run.settings.r_robot
-    if not run.success or any(euclidean_to_segment(straight, *w).min() < radius for w in run.scenario.walls):
+    if not run.success or any(
+        euclidean_to_segment(straight, *w).min() < radius for w in run.scenario.walls
+    ):
         return np.nan
-    driven, rest = measure_path_length(states[:, :2]), float(np.hypot(*(goal - states[-1, :2])))
+    driven, rest = (
+        measure_path_length(states[:, :2]),
+        float(np.hypot(*(goal - states[-1, :2]))),
+    )
     return float(np.hypot(*(goal - start))) / (driven + rest) if driven else np.nan
 
 
@@ -93,7 +104,9 @@ def _count_collisions(run: Run, way: slice, gap: Array) -> tuple[int, int]:
     offset = run.states[way, None, :2] - run.people[way, :, :2]
     robot = -(run.states[way, None, 2:] * offset).sum(axis=2)
     person = (run.people[way, :, 3:] * offset).sum(axis=2)
-    return int((begins & (robot >= person)).sum()), int((begins & (robot < person)).sum())
+    return int((begins & (robot >= person)).sum()), int(
+        (begins & (robot < person)).sum()
+    )
 
 
 def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, float]:
@@ -114,12 +127,16 @@ def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, f
     time_intruding : time in any zone [s].
     nearest : smallest distance from the robot's centre to a person's [m]; NaN without people.
     """
-    rows = np.flatnonzero(np.hypot(*(run.states[:, :2] - run.scenario.goal).T) <= REACHED)
+    rows = np.flatnonzero(
+        np.hypot(*(run.states[:, :2] - run.scenario.goal).T) <= REACHED
+    )
     way = slice(None, int(rows[0]) + 1 if len(rows) else None)
     path, n_people = run.states[way, :2], len(run.zones)
     length, straight = measure_path_length(path), float(np.hypot(*(path[-1] - path[0])))
     zones = run.zones if zone is None else (zone,) * n_people
-    inside = run.distances_to_zones(zones, ellipse_distance)[way] < 0  # NaN, of absent people, is not inside
+    inside = (
+        run.distances_to_zones(zones, ellipse_distance)[way] < 0
+    )  # NaN, of absent people, is not inside
     distance = np.hypot(run.relative[way, :, 0], run.relative[way, :, 1])
     reached = len(rows) > 0
     return {
@@ -128,5 +145,7 @@ def compute_replay_metrics(run: Run, zone: Ellipse | None = None) -> dict[str, f
         "path_efficiency": straight / length if reached and length > 0 else np.nan,
         "intrusions": float(_find_onsets(inside).sum()),
         "time_intruding": run.settings.dt * float(inside.any(axis=1).sum()),
-        "nearest": float(np.nanmin(distance)) if np.isfinite(distance).any() else np.nan,
+        "nearest": float(np.nanmin(distance))
+        if np.isfinite(distance).any()
+        else np.nan,
     }

@@ -11,12 +11,19 @@ from .metrics import compute_metrics, find_passing_side
 from .run import Run, nanmin
 
 Strategy = Literal[
-    "goes ahead", "waits", "backs out", "passes on the other side", "deadlock", "infeasible", "h < 0"
+    "goes ahead",
+    "waits",
+    "backs out",
+    "passes on the other side",
+    "deadlock",
+    "infeasible",
+    "h < 0",
 ]
 """What a robot does in a run; see `classify_strategy`."""
 STRATEGIES: tuple[Strategy, ...] = get_args(Strategy)
 MIN_WAIT = 1.0  # a robot that yields for this time waits [s] (assumed)
-MIN_RETREAT = 0.5  # a robot that goes back by this distance, its radius, backs out [m] (assumed)
+# a robot that goes back by this distance, its radius, backs out [m] (assumed)
+MIN_RETREAT = 0.5
 
 
 def classify_strategy(run: Run) -> Strategy:
@@ -58,5 +65,9 @@ def compute_retreat(run: Run) -> float:
     It is measured from the farthest point that the robot has reached so far.
     """
     course = run.scenario.goal - run.scenario.start[:2]
-    along = (run.states[:, :2] - run.scenario.start[:2]) @ course / max(float(np.hypot(*course)), 1e-12)
+    along = (
+        (run.states[:, :2] - run.scenario.start[:2])
+        @ course
+        / max(float(np.hypot(*course)), 1e-12)
+    )
     return float((np.maximum.accumulate(along) - along).max())

@@ -17,6 +17,11 @@ from . import datasets, funnels
 from .clock import clock_index, read_tracks, to_clock
 from .interop import check_tracks, read_groups, to_pedpy
 from .options import ReadOptions
-from .quality import count_visits_by_hour, measure_frame_intervals, summarise_people, summarise_seconds
+from .quality import (
+    count_visits_by_hour,
+    measure_frame_intervals,
+    summarise_people,
+    summarise_seconds,
+)
 from .readers import read_raw
 from .sites import read_edinburgh, read_grand_central, read_magni, read_magni_groups

@@ -36,11 +36,13 @@ VELOCITY_SPAN = 0.5
 # Longest gap across which positions are interpolated, unless the user allows more [s] (assumed).
 _LONGEST_INTERVAL = 5.0
 
-_ROUNDING = 1e-6  # rounding error of time stamps [s]; those near 1e9 s are exact to 2e-7 s
+# rounding error of time stamps [s]; those near 1e9 s are exact to 2e-7 s
+_ROUNDING = 1e-6
 
 _LAST_SECOND = 1e11  # latest time [s]; up to here ticks are exact
 
-_ROWS_AT_ONCE = 1 << 17  # rows brought to the clock at a time; their arrays fit into the processor's cache
+# rows brought to the clock at a time; their arrays fit into the processor's cache
+_ROWS_AT_ONCE = 1 << 17
 
 _BYTES_PER_TICK = 160  # memory of a tick while a table is brought to the clock [bytes] (measured: 147 to 153)
 
@@ -86,7 +88,9 @@ def read_tracks(
     """
     given = {name: value for name, value in parameters.items() if value is not None}
     options = replace(options or ReadOptions(), **given)
-    return _interpolate(read_raw(paths, options=options, exclude=exclude), options.max_gap)
+    return _interpolate(
+        read_raw(paths, options=options, exclude=exclude), options.max_gap
+    )
 
 
 def to_clock(raw: pd.DataFrame, *, max_gap: float | None = None) -> pd.DataFrame:
@@ -132,38 +136,65 @@ def _interpolate(raw: pd.DataFrame, max_gap: float | None) -> pd.DataFrame:
     require(max_gap > SHORTEST_GAP, "max_gap", max_gap, "longer than the clock's 0.1 s")
     within = np.r_[False, same & (step <= max_gap + _ROUNDING)]
     ticks = float(step.sum(where=within[1:])) * TICKS_PER_SECOND
-    memory.require(ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows")
+    memory.require(
+        ticks * _BYTES_PER_TICK, f"the clock: {ticks:,.0f} ticks of {len(t):,} rows"
+    )
     x, y = raw["x"].to_numpy(float), raw["y"].to_numpy(float)
-    blocks = [(_on_clock(t[rows], x[rows], y[rows], within[rows]), rows.start) for rows in _blocks(within)]
+    blocks = [
+        (_on_clock(t[rows], x[rows], y[rows], within[rows]), rows.start)
+        for rows in _blocks(within)
+    ]
     row = np.concatenate([block.pop("row") + start for block, start in blocks])
     covered = sum(int(block.pop("covered")) for block, _ in blocks)
     day = raw["day"].astype("category").array.take(row)
-    columns = {name: np.concatenate([block[name] for block, _ in blocks]) for name in COLUMNS[2:]}
-    table = pd.DataFrame({"day": day, "id": raw["id"].to_numpy()[row], **columns}, copy=False)
+    columns = {
+        name: np.concatenate([block[name] for block, _ in blocks])
+        for name in COLUMNS[2:]
+    }
+    table = pd.DataFrame(
+        {"day": day, "id": raw["id"].to_numpy()[row], **columns}, copy=False
+    )
     rejected = {"in a gap-free piece that covers no tick": len(t) - covered}
-    stages = [*funnels.get(raw), funnels.stage("clock: samples", len(t), covered, rejected)]
+    stages = [
+        *funnels.get(raw),
+        funnels.stage("clock: samples", len(t), covered, rejected),
+    ]
     return funnels.attach(table, stages)
 
 
 def _blocks(within: np.ndarray) -> Iterator[slice]:
     """Blocks of rows that end where a piece does; `within` (n,): whether a row continues a piece."""
     begins = np.flatnonzero(~within)
-    cuts = np.unique(begins[np.searchsorted(begins, np.arange(0, begins[-1] + 1, _ROWS_AT_ONCE))])
+    cuts = np.unique(
+        begins[np.searchsorted(begins, np.arange(0, begins[-1] + 1, _ROWS_AT_ONCE))]
+    )
     return map(slice, cuts, np.r_[cuts[1:], len(within)])
 
 
-def _on_clock(t: np.ndarray, x: np.ndarray, y: np.ndarray, within: np.ndarray) -> dict[str, np.ndarray]:
+def _on_clock(
+    t: np.ndarray, x: np.ndarray, y: np.ndarray, within: np.ndarray
+) -> dict[str, np.ndarray]:
     """The ticks of whole pieces: t, x, y, vx, vy, the row before each; and how many rows are covered."""
     piece = np.cumsum(~within) - 1
     row, tick = _ticks(t, piece)
     after = row + np.r_[within[1:], False][row]
     moment, before, of = tick / TICKS_PER_SECOND, t[row], piece[row]
-    weight = np.clip((moment - before) / np.where(after > row, t[after] - before, 1.0), 0.0, 1.0)
+    weight = np.clip(
+        (moment - before) / np.where(after > row, t[after] - before, 1.0), 0.0, 1.0
+    )
     x, y = (values[row] + weight * (values[after] - values[row]) for values in (x, y))
     vx, vy = _velocities(of, x, y)
     any_tick = np.zeros(piece[-1] + 1, bool)
     any_tick[of] = True
-    return {"row": row, "t": moment, "x": x, "y": y, "vx": vx, "vy": vy, "covered": any_tick[piece].sum()}
+    return {
+        "row": row,
+        "t": moment,
+        "x": x,
+        "y": y,
+        "vx": vx,
+        "vy": vy,
+        "covered": any_tick[piece].sum(),
+    }
 
 
 def compute_velocities(tracks: pd.DataFrame) -> np.ndarray:
@@ -211,7 +242,9 @@ def clock_index(tracks: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return np.arange(len(t))[order], tick, piece
 
 
-def _order_rows(frame: pd.DataFrame, time: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray]:
+def _order_rows(
+    frame: pd.DataFrame, time: np.ndarray
+) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray]:
     """Order of rows by person and `time` (a slice where they are sorted), and the times in that order.
 
     Then, of each row but the first: whether it has the same person as the row before, and the time between
@@ -222,7 +255,9 @@ def _order_rows(frame: pd.DataFrame, time: np.ndarray) -> tuple[Any, np.ndarray,
     person, time = person[order], time[order]
     same, step = person[1:] == person[:-1], np.diff(time)
     expected = "this person has two rows at this time; keep one of them"
-    check_rows(frame.iloc[order], np.r_[True, ~same | (step > 0)], ["id", "t"], expected)
+    check_rows(
+        frame.iloc[order], np.r_[True, ~same | (step > 0)], ["id", "t"], expected
+    )
     return order, time, same, step
 
 
@@ -258,7 +293,9 @@ def _ticks(t: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     first = np.ceil(t * TICKS_PER_SECOND - tolerance).astype(np.int64)
     last_of_piece = np.r_[piece[1:] != piece[:-1], True]
     end = np.where(
-        last_of_piece, np.floor(t * TICKS_PER_SECOND + tolerance).astype(np.int64) + 1, np.r_[first[1:], 0]
+        last_of_piece,
+        np.floor(t * TICKS_PER_SECOND + tolerance).astype(np.int64) + 1,
+        np.r_[first[1:], 0],
     )
     count = np.maximum(end - first, 0)
     row = np.repeat(np.arange(len(t)), count)
@@ -283,7 +320,9 @@ def _velocities(piece: np.ndarray, *positions: np.ndarray) -> Iterator[np.ndarra
 def _person_codes(frame: pd.DataFrame) -> np.ndarray:
     """One integer for each (day, id), ordered by day, then id."""
     days, ids = frame["day"].array, frame["id"].to_numpy()
-    begins = np.flatnonzero(np.r_[True, (ids[1:] != ids[:-1]) | np.asarray(days[1:] != days[:-1])])
+    begins = np.flatnonzero(
+        np.r_[True, (ids[1:] != ids[:-1]) | np.asarray(days[1:] != days[:-1])]
+    )
     day = pd.factorize(pd.Index(days[begins]), sort=True)[0].astype(np.int64)
     person, people = pd.factorize(ids[begins], sort=True)
     return np.repeat(day * len(people) + person, np.diff(begins, append=len(ids)))

@@ -32,7 +32,9 @@ _ATTEMPTS = 3  # number of times that a file with a wrong hash is fetched
 
 def git_blob_id(file: str | Path) -> str:
     """The name that git gives to the content of `file`: SHA-1 of "blob", size, a zero byte, content."""
-    digest = hashlib.sha1(f"blob {Path(file).stat().st_size}\0".encode(), usedforsecurity=False)
+    digest = hashlib.sha1(
+        f"blob {Path(file).stat().st_size}\0".encode(), usedforsecurity=False
+    )
     with Path(file).open("rb") as stream:
         while block := stream.read(1 << 20):
             digest.update(block)
@@ -62,7 +64,11 @@ class DataSet:
 
 def _read_hashes(name: str) -> dict[str, str]:
     """Hash by file name, from a list "hash  name"."""
-    lines = (Path(__file__).parent / "hashes" / f"{name}.txt").read_text(encoding="utf-8").splitlines()
+    lines = (
+        (Path(__file__).parent / "hashes" / f"{name}.txt")
+        .read_text(encoding="utf-8")
+        .splitlines()
+    )
     return {file: value for value, file in (line.split() for line in lines)}
 
 
@@ -115,7 +121,9 @@ def find(data: str | Path | Sequence[str | Path]) -> list[Path]:
     names = [data] if isinstance(data, str | Path) else list(data)
     files = [file for name in names for file in _expand(name)]
     if not files:
-        raise DataError(f"no data was named; expected {_NAMED}, or paths of track files")
+        raise DataError(
+            f"no data was named; expected {_NAMED}, or paths of track files"
+        )
     return files
 
 
@@ -143,7 +151,12 @@ def _find_named(name: str) -> list[Path]:
     if folder := os.environ.get(DATA_DIR_VARIABLE):
         return [_verify(Path(folder) / name / file, data) for file in data.hashes]
     home = pooch.os_cache("szlib") / name
-    store = pooch.create(path=home, base_url=data.url, registry=dict.fromkeys(data.hashes), retry_if_failed=2)
+    store = pooch.create(
+        path=home,
+        base_url=data.url,
+        registry=dict.fromkeys(data.hashes),
+        retry_if_failed=2,
+    )
     try:
         return [_fetch(store, file, data) for file in data.hashes]
     except OSError as error:  # requests' errors are OSErrors
@@ -194,7 +207,12 @@ def _expand(name: str | Path) -> list[Path]:
         raise DataError(
             f"{printable(name)}: {reason}; expected {_NAMED}, or a file, folder or glob of tracks"
         )
-    others = sum(not file.is_file() and not (path.is_dir() and file.is_dir()) for file in found)
+    others = sum(
+        not file.is_file() and not (path.is_dir() and file.is_dir()) for file in found
+    )
     if others:
-        warn(f"{printable(name)}: left out what is no regular file: {others} x folder or other", 4)
+        warn(
+            f"{printable(name)}: left out what is no regular file: {others} x folder or other",
+            4,
+        )
     return files

@@ -20,7 +20,9 @@ KEY = "funnel"
 WARNING = "warning: "  # how the name of a stage begins that rejects nothing, but says what is implausible
 
 
-def stage(name: str, entered: int, kept: int, rejected: Mapping[str, int]) -> dict[str, Any]:
+def stage(
+    name: str, entered: int, kept: int, rejected: Mapping[str, int]
+) -> dict[str, Any]:
     """One stage of a funnel.
 
     Parameters
@@ -41,8 +43,15 @@ def stage(name: str, entered: int, kept: int, rejected: Mapping[str, int]) -> di
     """
     reasons = {reason: int(count) for reason, count in rejected.items() if count}
     if int(entered) != int(kept) + sum(reasons.values()):
-        raise SzlibError(f"funnel stage '{name}' does not add up: {entered} != {kept} + {reasons}")
-    return {"stage": name, "entered": int(entered), "kept": int(kept), "rejected": reasons}
+        raise SzlibError(
+            f"funnel stage '{name}' does not add up: {entered} != {kept} + {reasons}"
+        )
+    return {
+        "stage": name,
+        "entered": int(entered),
+        "kept": int(kept),
+        "rejected": reasons,
+    }
 
 
 def get(frame: pd.DataFrame) -> list[dict[str, Any]]:
@@ -68,7 +77,11 @@ def warnings(stages: Sequence[Mapping[str, Any]]) -> list[str]:
     >>> funnels.warnings([funnels.stage("warning: nobody walks", 9, 9, {})])
     ['nobody walks']
     """
-    return [s["stage"].removeprefix(WARNING) for s in stages if s["stage"].startswith(WARNING)]
+    return [
+        s["stage"].removeprefix(WARNING)
+        for s in stages
+        if s["stage"].startswith(WARNING)
+    ]
 
 
 def attach(frame: pd.DataFrame, stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
@@ -77,7 +90,9 @@ def attach(frame: pd.DataFrame, stages: Sequence[Mapping[str, Any]]) -> pd.DataF
     return frame
 
 
-def select(frame: pd.DataFrame, is_kept: ArrayLike, name: str, reason: str) -> pd.DataFrame:
+def select(
+    frame: pd.DataFrame, is_kept: ArrayLike, name: str, reason: str
+) -> pd.DataFrame:
     """The rows of a `frame` that are kept, with a further stage in its funnel.
 
     Parameters
@@ -107,7 +122,10 @@ def table(stages: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     rows: list[tuple[str, str, int]] = []
     for s in stages:
         rows.append((s["stage"], "entered", s["entered"]))
-        rows += [(s["stage"], f"- {reason}", count) for reason, count in s["rejected"].items()]
+        rows += [
+            (s["stage"], f"- {reason}", count)
+            for reason, count in s["rejected"].items()
+        ]
         rows.append((s["stage"], "kept", s["kept"]))
     return pd.DataFrame(rows, columns=["stage", "what", "rows"])
 
@@ -142,5 +160,12 @@ def add(funnels: Iterable[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
         reasons: Counter[str] = Counter()
         for part in parts:
             reasons.update(part["rejected"])
-        added.append(stage(name, sum(p["entered"] for p in parts), sum(p["kept"] for p in parts), reasons))
+        added.append(
+            stage(
+                name,
+                sum(p["entered"] for p in parts),
+                sum(p["kept"] for p in parts),
+                reasons,
+            )
+        )
     return added

@@ -29,12 +29,19 @@ from ..checks import check_rows
 from ..errors import DataError, warn
 from ..input_files import read_small, reading
 from . import funnels
-from .clock import COLUMNS, TICKS_PER_SECOND, clock_index, compute_velocities, nearest_tick
+from .clock import (
+    COLUMNS,
+    TICKS_PER_SECOND,
+    clock_index,
+    compute_velocities,
+    nearest_tick,
+)
 
 if TYPE_CHECKING:
     from pedpy import TrajectoryData
 
-_TOLERANCE = 1e-6  # greatest difference between velocities and those from positions [m/s]
+# greatest difference between velocities and those from positions [m/s]
+_TOLERANCE = 1e-6
 
 
 def check_tracks(tracks: pd.DataFrame) -> None:
@@ -63,20 +70,28 @@ def check_tracks(tracks: pd.DataFrame) -> None:
     expected = "this row is out of order; expected rows sorted by day, id, t"
     check_rows(tracks, order == np.arange(len(order)), ["day", "id", "t"], expected)
     if list(tracks.columns[: len(COLUMNS)]) != COLUMNS:
-        raise DataError(f"columns are {list(tracks.columns)}; expected {COLUMNS} first, in this order")
+        raise DataError(
+            f"columns are {list(tracks.columns)}; expected {COLUMNS} first, in this order"
+        )
     if not pd.api.types.is_integer_dtype(tracks["id"]):
         raise DataError(f"id is {tracks['id'].dtype}; expected whole numbers")
     right, given = compute_velocities(tracks), tracks[["vx", "vy"]].to_numpy(float)
-    is_right = np.isclose(given, right, rtol=0, atol=_TOLERANCE, equal_nan=True).all(axis=1)
+    is_right = np.isclose(given, right, rtol=0, atol=_TOLERANCE, equal_nan=True).all(
+        axis=1
+    )
     table = tracks.assign(expected_vx=right[:, 0], expected_vy=right[:, 1])
     advice = "let szlib.tracks.clock.to_clock compute velocities from positions, and never bridge a gap"
     columns = ["day", "id", "t", "vx", "vy", "expected_vx", "expected_vy"]
     check_rows(table, is_right, columns, f"expected velocities over +-0.5 s; {advice}")
     stages = funnels.get(tracks)
     if not stages:
-        raise DataError('the table has no funnel; expected its stages in .attrs["funnel"]')
+        raise DataError(
+            'the table has no funnel; expected its stages in .attrs["funnel"]'
+        )
     for stage in stages:
-        funnels.stage(stage["stage"], stage["entered"], stage["kept"], stage["rejected"])
+        funnels.stage(
+            stage["stage"], stage["entered"], stage["kept"], stage["rejected"]
+        )
 
 
 def read_groups(path: str | Path) -> pd.DataFrame:
@@ -113,7 +128,9 @@ def read_groups(path: str | Path) -> pd.DataFrame:
         if not fields:
             continue
         if not all(field.isdecimal() for field in fields) or len(set(fields)) < 2:
-            raise DataError(f"{path}, line {number}: {line[:80]!r} is no group; expected two or more ids")
+            raise DataError(
+                f"{path}, line {number}: {line[:80]!r} is no group; expected two or more ids"
+            )
         people = list(map(int, fields))
         if any(person in groups for person in people):
             joined.append(number)
@@ -124,7 +141,12 @@ def read_groups(path: str | Path) -> pd.DataFrame:
         where = ", ".join(map(str, joined))
         warn(f"{path.name}: joined to earlier groups that share people: line {where}")
     ids = list(groups)
-    table = pd.DataFrame({"group": pd.factorize(np.array([groups[person] for person in ids]))[0], "id": ids})
+    table = pd.DataFrame(
+        {
+            "group": pd.factorize(np.array([groups[person] for person in ids]))[0],
+            "id": ids,
+        }
+    )
     return table.astype("int64").sort_values("group", kind="stable", ignore_index=True)
 
 
@@ -152,4 +174,6 @@ def to_pedpy(tracks: pd.DataFrame) -> TrajectoryData:
         )
     frame = nearest_tick(tracks["t"].to_numpy(float))
     data = tracks[["id", "x", "y"]].assign(frame=frame).reset_index(drop=True)
-    return TrajectoryData(data=data[["id", "frame", "x", "y"]], frame_rate=float(TICKS_PER_SECOND))
+    return TrajectoryData(
+        data=data[["id", "frame", "x", "y"]], frame_rate=float(TICKS_PER_SECOND)
+    )

@@ -9,8 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 MAX_SITE = 1000.0  # a wider site [m] means that millimetres were read as metres
-FASTEST = (3.0, 6.0)  # greatest median and greatest 90 % quantile of the speed of people [m/s]
-_FAST_WALK = 4.0  # greatest 90 % quantile of the speed where people certainly walk [m/s]
+# greatest median and greatest 90 % quantile of the speed of people [m/s]
+FASTEST = (3.0, 6.0)
+# greatest 90 % quantile of the speed where people certainly walk [m/s]
+_FAST_WALK = 4.0
 _SLOWEST = 0.6  # smallest 90 % quantile of the speed of people [m/s]; less is usual only where they stand
 _LONGEST_STEP = 5.0  # longest time between two samples of a person [s]
 _MIN_STEPS = 20  # number of steps that allows a judgement
@@ -68,7 +70,8 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
     t, person, x, y = rows[:, np.lexsort((rows[0], rows[1]))]
     same = person[1:] == person[:-1]
     steps = np.diff(t)[same]
-    first = np.flatnonzero(np.r_[True, ~same | (np.diff(np.floor(t)) != 0)][: len(t)])  # one row a second
+    # one row a second
+    first = np.flatnonzero(np.r_[True, ~same | (np.diff(np.floor(t)) != 0)][: len(t)])
     by_second = person[first][1:] == person[first][:-1]
     if by_second.sum() < _MIN_STEPS:
         return None
@@ -87,7 +90,10 @@ def measure_motion(rows: np.ndarray) -> Motion | None:
 
 
 def find_walking(
-    columns: np.ndarray, known: Mapping[int, int] | None = None, rate: float = 1.0, metres: float = 1.0
+    columns: np.ndarray,
+    known: Mapping[int, int] | None = None,
+    rate: float = 1.0,
+    metres: float = 1.0,
 ) -> tuple[int, ...] | None:
     """The columns in which people walk, as t, id, x, y; None where there are none.
 

@@ -23,10 +23,12 @@ FORMAT_NAMES = (
     "juelich-text", "juelich-hdf5", "viswalk", "vadere", "jupedsim", "pathfinder",
     "vsp", "trajnet", "magni",
 )  # fmt: skip
-FRAME_RATES = (1.0, 240.0)  # lowest and highest number of frames a second that a video can have
+# lowest and highest number of frames a second that a video can have
+FRAME_RATES = (1.0, 240.0)
 _FASTEST_COUNT = 1e9  # highest frame rate [1/s]: what counts time may count nanoseconds
 FRAMES = 25.0  # a usual frame rate [1/s], for suggestions
-SHORTEST_GAP = 0.1  # one step of the common clock [s]; a track cannot end after a shorter gap
+# one step of the common clock [s]; a track cannot end after a shorter gap
+SHORTEST_GAP = 0.1
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "ft": 0.3048}  # metres in a unit of position
 # Environment variable of the command that reads files, such as "szlib inspect hall.csv"; unset in a program.
 COMMAND_VARIABLE = "SZLIB_COMMAND"
@@ -86,17 +88,27 @@ class ReadOptions:
         length = "metres in one unit of position, more than 0"
         count = f"frames a second from 1 to {_FASTEST_COUNT:g}"
         for name, is_valid, expected in (
-            ("file_format", self.file_format in (None, *FORMAT_NAMES), f"one of {list(FORMAT_NAMES)}"),
+            (
+                "file_format",
+                self.file_format in (None, *FORMAT_NAMES),
+                f"one of {list(FORMAT_NAMES)}",
+            ),
             ("unit", self.unit in (None, *UNITS), f"one of {list(UNITS)}"),
             ("scale", self.scale is None or 0 < self.scale <= 1e3, length),
             ("frame_rate", rate is None or 1 <= rate <= _FASTEST_COUNT, count),
-            ("max_gap", gap is None or gap > SHORTEST_GAP, "longer than the clock's 0.1 s"),
+            (
+                "max_gap",
+                gap is None or gap > SHORTEST_GAP,
+                "longer than the clock's 0.1 s",
+            ),
         ):
             require(is_valid, name, getattr(self, name), expected)
         if self.unit and self.scale:
             raise DataError("both unit and scale are given; expected one of them")
         if unknown := sorted(set(self.columns or ()) - set(COLUMN_NAMES)):
-            raise DataError(f"columns: {unknown} are unknown; expected some of {list(COLUMN_NAMES)}")
+            raise DataError(
+                f"columns: {unknown} are unknown; expected some of {list(COLUMN_NAMES)}"
+            )
         if {"t", "frame"} <= set(self.columns or ()):
             raise DataError("columns: both t and frame are given; expected one of them")
         if self.columns and self.file_format not in (None, "tidy"):
@@ -108,7 +120,9 @@ class ReadOptions:
             ZoneInfo(zone)
             pl.select(pl.from_epoch(pl.lit(0)).dt.convert_time_zone(zone))
         except (KeyError, ValueError, OSError, pl.exceptions.PolarsError) as error:
-            raise DataError(f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'") from error
+            raise DataError(
+                f"unknown time zone {self.tz!r}; expected one like 'Asia/Tokyo'"
+            ) from error
 
     @property
     def metres(self) -> float | None:
@@ -117,7 +131,9 @@ class ReadOptions:
 
     def as_json(self) -> dict[str, Any]:
         """The options that are given, as JSON values: ``ReadOptions(**options.as_json())`` is the same."""
-        return {name: value for name, value in asdict(self).items() if value is not None}
+        return {
+            name: value for name, value in asdict(self).items() if value is not None
+        }
 
 
 def arguments(options: Mapping[str, Any]) -> str:
@@ -141,6 +157,10 @@ def arguments(options: Mapping[str, Any]) -> str:
 def advise(**options: Any) -> str:
     """Advice to read again with `options`: as arguments, or from a shell as the whole command."""
     if command := os.environ.get(COMMAND_VARIABLE):
-        command = command if len(command) <= _LONGEST_COMMAND else "the same command with"
+        command = (
+            command if len(command) <= _LONGEST_COMMAND else "the same command with"
+        )
         return f"try: {command} {arguments(options)}"
-    return "pass " + " and ".join(f"{name}={value!r}" for name, value in options.items())
+    return "pass " + " and ".join(
+        f"{name}={value!r}" for name, value in options.items()
+    )

@@ -19,13 +19,16 @@ from .motion import FASTEST, MAX_SITE, REGULAR, find_walking, measure_motion
 from .options import FRAMES, UNITS, advise
 
 _MIN_SITE = 0.5  # a smaller site [m] means that metres were read as millimetres
-_SPRINT, _JUMP = 12.5, 100.0  # nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
+# nobody is faster [m/s]; a sensor that confuses two people errs by less [m]
+_SPRINT, _JUMP = (12.5, 100.0)
 _ROWS = 200_000  # number of rows that are looked at
 _DEGREE = 111_320.0  # metres in a degree of latitude, or of longitude at the equator
 _WALK = 1.2  # a usual walking speed [m/s]
 
 
-def check_people(rows: pl.DataFrame, layout: TrackFormat, path: Path, *, is_unit_given: bool) -> None:
+def check_people(
+    rows: pl.DataFrame, layout: TrackFormat, path: Path, *, is_unit_given: bool
+) -> None:
     """Raise DataError where people cannot move as they do in a table, and suggest another reading.
 
     Parameters
@@ -56,11 +59,21 @@ def check_people(rows: pl.DataFrame, layout: TrackFormat, path: Path, *, is_unit
 def find_implausible(rows: pl.DataFrame) -> list[str]:
     """What people cannot do in `rows` day, id, t [s], x, y [m], sorted by day, id and t, as texts."""
     person = pl.struct("day", "id").rle_id()
-    first = rows.head(_ROWS).select("t", person.alias("id"), "x", "y").to_numpy().astype(float)
+    first = (
+        rows.head(_ROWS)
+        .select("t", person.alias("id"), "x", "y")
+        .to_numpy()
+        .astype(float)
+    )
     motion, n_jumps, fastest = measure_motion(first.T), 0, 0.0
-    step, moved = pl.col("t").diff(), (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt()
+    step, moved = (
+        pl.col("t").diff(),
+        (pl.col("x").diff() ** 2 + pl.col("y").diff() ** 2).sqrt(),
+    )
     is_jump = (person.diff() == 0) & (moved > _JUMP + _SPRINT * step)
-    for block in rows.iter_slices(1 << 20):  # a table of the steps of a whole day would double its memory
+    for block in rows.iter_slices(
+        1 << 20
+    ):  # a table of the steps of a whole day would double its memory
         speeds = block.select((moved / step).filter(is_jump)).to_series()
         n_jumps, fastest = n_jumps + len(speeds), max([fastest, *speeds.top_k(1)])
     texts = [motion.fault] if motion is not None and motion.fault else []
@@ -89,7 +102,10 @@ def suggest_reading(rows: pl.DataFrame, layout: TrackFormat) -> str:
 def check_unit(rows: pl.DataFrame, layout: TrackFormat, path: Path) -> None:
     """Raise DataError where `rows` x, y of file `path`, read as `layout`, span an impossible site."""
     positions = rows.select("x", "y").to_numpy()
-    if layout.metres < 1 and (reach := float(np.abs(positions).max())) * layout.metres < _MIN_SITE:
+    if (
+        layout.metres < 1
+        and (reach := float(np.abs(positions).max())) * layout.metres < _MIN_SITE
+    ):
         raise DataError(
             f"{path}: positions reach only {reach:.3g}, expected millimetres as in {layout.name}; if they "
             f"are metres, {advise(unit='m')}; if the site is that small, {advise(unit='mm')}"
@@ -108,10 +124,14 @@ def _convert(rows: pl.DataFrame, layout: TrackFormat) -> np.ndarray:
     large = pl.col("id").abs().max() >= 2**53  # floats do not tell such ids apart
     person = pl.when(large).then(pl.col("id").rank("dense")).otherwise("id")
     first = rows.head(_ROWS).select("t", person, "x", "y").to_numpy().astype(float).T
-    return np.asarray(first * np.array([[layout.seconds], [1.0], [layout.metres], [layout.metres]]))
+    return np.asarray(
+        first * np.array([[layout.seconds], [1.0], [layout.metres], [layout.metres]])
+    )
 
 
-def _readings(rows: np.ndarray, layout: TrackFormat) -> Iterator[tuple[np.ndarray, str]]:
+def _readings(
+    rows: np.ndarray, layout: TrackFormat
+) -> Iterator[tuple[np.ndarray, str]]:
     """Other readings of rows (4, n), the likeliest first, each with its advice."""
     t, person, x, y = rows[:, np.isfinite(rows).all(axis=0)]
     for name, unit in (("millimetres", "mm"), ("centimetres", "cm"), ("feet", "ft")):
@@ -120,9 +140,18 @@ def _readings(rows: np.ndarray, layout: TrackFormat) -> Iterator[tuple[np.ndarra
     for name, rate in (("milliseconds", 1000.0), ("numbers of frames", FRAMES)):
         if name == "milliseconds" or (t % 1 == 0).all():
             advice = advise(columns=layout.name_columns(frame="t"), frame_rate=rate)
-            yield np.array([t / rate, person, x, y]), f"times look like {name}: {advice}"
+            yield (
+                np.array([t / rate, person, x, y]),
+                f"times look like {name}: {advice}",
+            )
     project = "project them to metres first: x = 111320 cos(lat) (lon - lon0), y = 111320 (lat - lat0)"
-    for one, other, names in ((x, y, "longitude and latitude"), (y, x, "latitude and longitude")):
+    for one, other, names in (
+        (x, y, "longitude and latitude"),
+        (y, x, "latitude and longitude"),
+    ):
         if (np.abs(one) <= 180).all() and (np.abs(other) <= 90).all():
             east, north = one * _DEGREE * np.cos(np.radians(other)), other * _DEGREE
-            yield np.array([t, person, east, north]), f"positions look like degrees of {names}: {project}"
+            yield (
+                np.array([t, person, east, north]),
+                f"positions look like degrees of {names}: {project}",
+            )

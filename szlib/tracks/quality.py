@@ -23,10 +23,13 @@ STANDING = 0.1
 ROWS = 200_000
 """Number of rows by which a file is described."""
 
-_MAP, _INK = 60, " .:+#"  # letters in a line of a map; letters from nobody to most people
+# letters in a line of a map; letters from nobody to most people
+_MAP, _INK = (60, " .:+#")
 
 
-def summarise_seconds(path: str | Path, options: ReadOptions | None = None) -> pd.DataFrame:
+def summarise_seconds(
+    path: str | Path, options: ReadOptions | None = None
+) -> pd.DataFrame:
     """Summarise a file by person and second.
 
     Parameters
@@ -63,7 +66,9 @@ def summarise_seconds(path: str | Path, options: ReadOptions | None = None) -> p
             layout = replace(layout, columns={**layout.columns, "speed": number})
             scan, speed = layout.scan(plain), pl.col("speed").mean() * unit
         rows = _usable_rows(layout, scan).group_by("id", second=pl.col("t").floor())
-        summary = rows.agg(pl.col("x", "y").sort_by("t").first(), rows=pl.len(), sensor_speed=speed)
+        summary = rows.agg(
+            pl.col("x", "y").sort_by("t").first(), rows=pl.len(), sensor_speed=speed
+        )
         table = summary.sort("id", "second").collect(engine="streaming").to_pandas()
     step = table[["id", "second", "x", "y"]].diff()
     is_next_second = ((step["id"] == 0) & (step["second"] == 1)).to_numpy()
@@ -71,7 +76,9 @@ def summarise_seconds(path: str | Path, options: ReadOptions | None = None) -> p
     return table.assign(moved=np.r_[moved[1:], np.nan])
 
 
-def measure_frame_intervals(path: str | Path, options: ReadOptions | None = None) -> np.ndarray:
+def measure_frame_intervals(
+    path: str | Path, options: ReadOptions | None = None
+) -> np.ndarray:
     """Times from one frame of file `path`, read with `options`, to the next [s].
 
     A frame is a time at which somebody was seen.
@@ -85,11 +92,15 @@ def measure_frame_intervals(path: str | Path, options: ReadOptions | None = None
     array([0.5, 1. ])
     """
     with open_file(Path(path), options or ReadOptions()) as (layout, scan, _):
-        frames = scan.select(pl.col("t").drop_nulls().unique()).collect(engine="streaming")["t"]
+        frames = scan.select(pl.col("t").drop_nulls().unique()).collect(
+            engine="streaming"
+        )["t"]
     return np.asarray(np.diff(np.sort(frames.to_numpy())) * layout.seconds)
 
 
-def summarise_people(path: str | Path, options: ReadOptions | None = None) -> pd.DataFrame:
+def summarise_people(
+    path: str | Path, options: ReadOptions | None = None
+) -> pd.DataFrame:
     """Summarise the file `path`, read with `options`, by person.
 
     Columns id, first_seen, last_seen, longest_gap [s], rows.
@@ -107,14 +118,18 @@ def summarise_people(path: str | Path, options: ReadOptions | None = None) -> pd
     with open_file(Path(path), options or ReadOptions()) as (layout, scan, _):
         people = _usable_rows(layout, scan).group_by("id")
         gap = time.sort().diff().max()
-        summary = people.agg(first_seen=time.min(), last_seen=time.max(), longest_gap=gap, rows=pl.len())
+        summary = people.agg(
+            first_seen=time.min(), last_seen=time.max(), longest_gap=gap, rows=pl.len()
+        )
         return summary.sort("id").collect(engine="streaming").to_pandas()
 
 
 def _usable_rows(layout: TrackFormat, scan: pl.LazyFrame) -> pl.LazyFrame:
     """Usable rows: id, t [s], x, y [m], and what else the scan holds."""
     time, place = pl.col("t") * layout.seconds, pl.col("x", "y") * layout.metres
-    return scan.filter(layout.rejection_reason().is_null()).with_columns(time, place, id="exact_id")
+    return scan.filter(layout.rejection_reason().is_null()).with_columns(
+        time, place, id="exact_id"
+    )
 
 
 def describe_file(path: str | Path, options: ReadOptions | None = None) -> str:
@@ -133,23 +148,39 @@ def describe_file(path: str | Path, options: ReadOptions | None = None) -> str:
     ...
     """
     with open_file(path := Path(path), options or ReadOptions()) as (layout, scan, _):
-        rows = _usable_rows(layout, scan).head(ROWS).select("t", "id", "x", "y").collect()
+        rows = (
+            _usable_rows(layout, scan).head(ROWS).select("t", "id", "x", "y").collect()
+        )
     t, person, x, y = rows.to_numpy().T
-    lines = [f"{path.name} is read as {layout.name}" + (f": {layout.text}" if layout.text else "")]
+    lines = [
+        f"{path.name} is read as {layout.name}"
+        + (f": {layout.text}" if layout.text else "")
+    ]
     if rows.height == 0:
         return lines[0]
     seconds, motion = float(np.ptp(t)), measure_motion(np.array([t, person, x, y]))
     first = "first " if rows.height == ROWS else ""
-    lines.append(f"{first}{rows.height:,} rows: {rows['id'].n_unique():,} people in {seconds:,.1f} s")
+    lines.append(
+        f"{first}{rows.height:,} rows: {rows['id'].n_unique():,} people in {seconds:,.1f} s"
+    )
     if motion is not None:
         speeds = f"speed {motion.median_speed:.2f} m/s (median), {motion.high_speed:.2f} (90 % quantile)"
         lines.append(f"{speeds}; a person is seen every {motion.interval:.3g} s")
     (west, east), (south, north) = ((each.min(), each.max()) for each in (x, y))
-    lines.append(f"x {west:.1f} to {east:.1f} m, y {south:.1f} to {north:.1f} m; where people were seen:")
-    shape = (max(1, round(_MAP * min((north - south) / max(east - west, 1e-9), 1.0) / 2)), _MAP)
+    lines.append(
+        f"x {west:.1f} to {east:.1f} m, y {south:.1f} to {north:.1f} m; where people were seen:"
+    )
+    shape = (
+        max(1, round(_MAP * min((north - south) / max(east - west, 1e-9), 1.0) / 2)),
+        _MAP,
+    )
     counts = np.histogram2d(y, x, bins=shape)[0][::-1]
-    levels = np.ceil(np.minimum(counts / max(np.quantile(counts, 0.95), 1.0), 1.0) * (len(_INK) - 1))
-    return "\n".join([*lines, *("".join(_INK[int(level)] for level in row) for row in levels)])
+    levels = np.ceil(
+        np.minimum(counts / max(np.quantile(counts, 0.95), 1.0), 1.0) * (len(_INK) - 1)
+    )
+    return "\n".join(
+        [*lines, *("".join(_INK[int(level)] for level in row) for row in levels)]
+    )
 
 
 def count_visits_by_hour(rows: pd.DataFrame, *, tz: str = "UTC") -> pd.DataFrame:
@@ -175,10 +206,16 @@ def count_visits_by_hour(rows: pd.DataFrame, *, tz: str = "UTC") -> pd.DataFrame
     """
     local = pd.to_datetime(rows["second"], unit="s", utc=True).dt.tz_convert(tz)
     keyed = rows.assign(
-        day=local.dt.strftime("%Y-%m-%d"), hour=local.dt.hour, is_standing=rows["moved"] < STANDING
+        day=local.dt.strftime("%Y-%m-%d"),
+        hour=local.dt.hour,
+        is_standing=rows["moved"] < STANDING,
     )
     grouped = keyed.groupby(["day", "hour"], as_index=False)
     table = grouped.agg(
-        visits=("id", "nunique"), standing=("is_standing", "sum"), seconds=("second", "nunique")
+        visits=("id", "nunique"),
+        standing=("is_standing", "sum"),
+        seconds=("second", "nunique"),
     )
-    return table.assign(standing=table["standing"] / table["seconds"]).drop(columns="seconds")
+    return table.assign(standing=table["standing"] / table["seconds"]).drop(
+        columns="seconds"
+    )

@@ -24,7 +24,9 @@ from .plausibility import check_people, check_unit, find_implausible, suggest_re
 from .recordings import LoadedFile, separate_recordings
 
 
-def read_raw(paths: Any, *, options: ReadOptions | None = None, exclude: Iterable[str] = ()) -> pd.DataFrame:
+def read_raw(
+    paths: Any, *, options: ReadOptions | None = None, exclude: Iterable[str] = ()
+) -> pd.DataFrame:
     """Read files as they are: day, id, t [s], x, y [m], sorted, without duplicates.
 
     Parameters
@@ -53,16 +55,26 @@ def read_raw(paths: Any, *, options: ReadOptions | None = None, exclude: Iterabl
     1  walk   1  0.4  0.5  0.0
     """
     options = options or ReadOptions()
-    sources = [paths] if isinstance(paths, str | Path) or is_table(paths) else list(paths)
+    sources = (
+        [paths] if isinstance(paths, str | Path) or is_table(paths) else list(paths)
+    )
     excluded = [exclude] if isinstance(exclude, str) else sorted(map(str, exclude))
     if not sources:
         raise DataError("no track file was given; pass at least one path")
-    names = (Path(f"table-{k}") if is_table(each) else Path(each) for k, each in enumerate(sources, start=1))
-    files = [_read_file(source, path, options) for source, path in zip(sources, names, strict=True)]
+    names = (
+        Path(f"table-{k}") if is_table(each) else Path(each)
+        for k, each in enumerate(sources, start=1)
+    )
+    files = [
+        _read_file(source, path, options)
+        for source, path in zip(sources, names, strict=True)
+    ]
     return merge(separate_recordings(files), excluded)
 
 
-def merge(files: Sequence[LoadedFile], excluded: Sequence[str] = (), *, copy: bool = True) -> pd.DataFrame:
+def merge(
+    files: Sequence[LoadedFile], excluded: Sequence[str] = (), *, copy: bool = True
+) -> pd.DataFrame:
     """Merge the rows of `files` into one table as from `read_raw`: sorted, without duplicates.
 
     Days `excluded` are left out.  Without `copy` the table may share the memory of the rows.
@@ -71,7 +83,11 @@ def merge(files: Sequence[LoadedFile], excluded: Sequence[str] = (), *, copy: bo
     if len({part.schema["day"] for part in parts}) > 1:
         parts = [part.with_columns(pl.col("day").cast(pl.String)) for part in parts]
     merged = pl.concat(parts)
-    wanted = merged.filter(~pl.col("day").cast(pl.String).is_in(excluded)) if excluded else merged
+    wanted = (
+        merged.filter(~pl.col("day").cast(pl.String).is_in(excluded))
+        if excluded
+        else merged
+    )
     keys = ["day", "id", "t"]
     rows = _sort(wanted)
     again = pl.all_horizontal(pl.col(keys).eq_missing(pl.col(keys).shift()))
@@ -80,10 +96,18 @@ def merge(files: Sequence[LoadedFile], excluded: Sequence[str] = (), *, copy: bo
     doubled = {"duplicate (day, id, t)": wanted.height - rows.height}
     _warn_rejected("all files", doubled)
     if rows.height == 0:
-        raise DataError(f"all {merged.height} rows lie on excluded days {excluded}; check `exclude`")
-    frame = pd.DataFrame({name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}, copy=copy)
+        raise DataError(
+            f"all {merged.height} rows lie on excluded days {excluded}; check `exclude`"
+        )
+    frame = pd.DataFrame(
+        {name: rows[name].to_numpy() for name in ("id", "t", "x", "y")}, copy=copy
+    )
     days = rows["day"].unique().sort()
-    codes = rows["day"].replace_strict(days, range(len(days)), return_dtype=pl.Int32).to_numpy()
+    codes = (
+        rows["day"]
+        .replace_strict(days, range(len(days)), return_dtype=pl.Int32)
+        .to_numpy()
+    )
     names = pd.Index(days.cast(pl.String).to_list())
     frame.insert(0, "day", pd.Series(pd.Categorical.from_codes(codes, names)))
     gaps = [file.layout.max_gap for file in files if file.layout.max_gap is not None]
@@ -92,8 +116,13 @@ def merge(files: Sequence[LoadedFile], excluded: Sequence[str] = (), *, copy: bo
     stages = [stage for file in files for stage in file.stages]
     for text in find_implausible(rows):
         warn(f"{', '.join(file.path.name for file in files[:3])}: {text}")
-        stages.append(funnels.stage(f"{funnels.WARNING}{text}", merged.height, merged.height, {}))
-    return funnels.attach(frame, [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)])
+        stages.append(
+            funnels.stage(f"{funnels.WARNING}{text}", merged.height, merged.height, {})
+        )
+    return funnels.attach(
+        frame,
+        [*stages, funnels.stage("merge files", merged.height, rows.height, reasons)],
+    )
 
 
 def _sort(rows: pl.DataFrame) -> pl.DataFrame:
@@ -128,7 +157,11 @@ def _read_file(source: Any, path: Path, options: ReadOptions) -> LoadedFile:
         with open_file(path, options, is_whole=True) as (layout, scan, plain):
             rows = scan.collect()
             good, reasons, first = reject_rows(rows, layout, plain)
-    hint = suggest_reading(rows, layout) if layout.is_ambiguous and 2 * good.height < rows.height else ""
+    hint = (
+        suggest_reading(rows, layout)
+        if layout.is_ambiguous and 2 * good.height < rows.height
+        else ""
+    )
     stage = read_stage(path, layout, good.height, reasons, first, hint)
     if layout.is_ambiguous:
         check_people(good, layout, path, is_unit_given=options.metres is not None)
@@ -152,7 +185,11 @@ def reject_rows(
     if first and first[1] == MISSING:
         name = next(name for name in ("t", "id", "x", "y") if bad[name][0] is None)
         first = (first[0], f"{MISSING} ({layout.show_field(plain, first[0], name)})")
-    return rows.filter(pl.col("reason").is_null()).with_columns(id="exact_id"), reasons, first
+    return (
+        rows.filter(pl.col("reason").is_null()).with_columns(id="exact_id"),
+        reasons,
+        first,
+    )
 
 
 def read_stage(
@@ -187,12 +224,16 @@ def read_stage(
         raise DataError(f"{path}: holds no row; {EXPECTED}")
     if first:
         detail = first[1].partition(" (")[2]
-        _warn_rejected(f"{path.name}, first at line {first[0]}{detail and f' ({detail}'}", reasons)
+        _warn_rejected(
+            f"{path.name}, first at line {first[0]}{detail and f' ({detail}'}", reasons
+        )
     rate = f" at {1 / layout.seconds:g} frames/s" if layout.seconds != 1 else ""
     return funnels.stage(f"read {path.name}{rate}", n_good + n_bad, n_good, reasons)
 
 
 def _warn_rejected(where: str, reasons: dict[str, int]) -> None:
-    counts = ", ".join(f"{count} x {reason}" for reason, count in reasons.items() if count)
+    counts = ", ".join(
+        f"{count} x {reason}" for reason, count in reasons.items() if count
+    )
     if counts:
         warn(f"{where}: rejected rows: {counts}")

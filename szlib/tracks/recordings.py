@@ -62,14 +62,22 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
         for file, is_text in zip(files, has_text_day, strict=True)
     ]
     candidates = [
-        file.rows.with_columns(day=pl.lit("")) if named and not file.layout.is_sequence else file.rows.head(0)
+        file.rows.with_columns(day=pl.lit(""))
+        if named and not file.layout.is_sequence
+        else file.rows.head(0)
         for file, named in zip(files, is_named, strict=True)
     ]
-    joined = {(j, k) for j, k, _, n_apart, _ in _find_shared_people(candidates) if not n_apart}
+    joined = {
+        (j, k) for j, k, _, n_apart, _ in _find_shared_people(candidates) if not n_apart
+    }
     for k in (k for k, named in enumerate(is_named) if named):
         first = next((j for j in range(k) if (j, k) in joined), None)
-        found[k] = files[k].with_day(pl.lit(names[k] if first is None else found[first].rows["day"][0]))
-    for j, k, n_together, n_apart, example in _find_shared_people([file.rows for file in found]):
+        found[k] = files[k].with_day(
+            pl.lit(names[k] if first is None else found[first].rows["day"][0])
+        )
+    for j, k, n_together, n_apart, example in _find_shared_people(
+        [file.rows for file in found]
+    ):
         where = f"{printable(files[j].path.name)} and {printable(files[k].path.name)}"
         if n_apart and (n_apart <= n_together or has_text_day[k]):
             raise DataError(
@@ -77,34 +85,52 @@ def separate_recordings(files: Sequence[LoadedFile]) -> list[LoadedFile]:
                 "people in both files are); read these files one by one, or correct them"
             )
         if n_apart:
-            warn(f"{where}: {n_apart} people are in two places at once; read as two recordings")
-            found[k] = files[k].with_day(pl.format("{} {}", pl.col("day").cast(pl.String), pl.lit(names[k])))
+            warn(
+                f"{where}: {n_apart} people are in two places at once; read as two recordings"
+            )
+            found[k] = files[k].with_day(
+                pl.format("{} {}", pl.col("day").cast(pl.String), pl.lit(names[k]))
+            )
     return found
 
 
-def _find_shared_people(parts: Sequence[pl.DataFrame]) -> list[tuple[int, int, int, int, int]]:
+def _find_shared_people(
+    parts: Sequence[pl.DataFrame],
+) -> list[tuple[int, int, int, int, int]]:
     """Pairs of files that share people.
 
     For each: the numbers of both files, how many people continue from one to the other, how many are in two
     places at once, and one of the latter.
     """
     keys = [pl.col("day").cast(pl.String), pl.col("id", "t", "x", "y")]
-    rows = pl.concat([part.select(*keys, file=pl.lit(k, pl.Int32)) for k, part in enumerate(parts)])
+    rows = pl.concat(
+        [part.select(*keys, file=pl.lit(k, pl.Int32)) for k, part in enumerate(parts)]
+    )
     rows = rows.filter((pl.col("file").min() != pl.col("file").max()).over("day", "id"))
     rows = rows.sort("day", "id", "t", "file")
-    step = [pl.col(name).diff().over("day", "id").alias(f"d{name}") for name in ("t", "x", "y", "file")]
-    steps = rows.with_columns(step).filter((pl.col("dfile") != 0) & (pl.col("dt") <= _SOON))
+    step = [
+        pl.col(name).diff().over("day", "id").alias(f"d{name}")
+        for name in ("t", "x", "y", "file")
+    ]
+    steps = rows.with_columns(step).filter(
+        (pl.col("dfile") != 0) & (pl.col("dt") <= _SOON)
+    )
     before = pl.col("file") - pl.col("dfile")
     steps = steps.with_columns(
         j=pl.min_horizontal("file", before),
         k=pl.max_horizontal("file", before),
-        apart=(pl.col("dx") ** 2 + pl.col("dy") ** 2).sqrt() > _BLUR + _FASTEST * pl.col("dt"),
+        apart=(pl.col("dx") ** 2 + pl.col("dy") ** 2).sqrt()
+        > _BLUR + _FASTEST * pl.col("dt"),
     )
     people = (
-        steps.group_by("j", "k", "day", "id").agg(pl.col("apart").any()).sort("j", "k", "apart", "day", "id")
+        steps.group_by("j", "k", "day", "id")
+        .agg(pl.col("apart").any())
+        .sort("j", "k", "apart", "day", "id")
     )
     found = people.group_by("j", "k", maintain_order=True).agg(
-        (~pl.col("apart")).sum().alias("together"), pl.col("apart").sum(), pl.col("id").last()
+        (~pl.col("apart")).sum().alias("together"),
+        pl.col("apart").sum(),
+        pl.col("id").last(),
     )
     return list(found.iter_rows())
 
@@ -116,7 +142,10 @@ def name_recordings(files: Sequence[Path]) -> list[str]:
         f"{file.parent.name}-{name}" if names.count(name) > 1 else name
         for file, name in zip(files, names, strict=True)
     ]
-    return [f"{n} ({names[:k].count(n) + 1})" if n in names[:k] else n for k, n in enumerate(names)]
+    return [
+        f"{n} ({names[:k].count(n) + 1})" if n in names[:k] else n
+        for k, n in enumerate(names)
+    ]
 
 
 def find_day(path: Path, options: ReadOptions) -> str | None:
@@ -126,11 +155,20 @@ def find_day(path: Path, options: ReadOptions) -> str | None:
         layout = find_format(path, options)
         if layout.is_sequence or not layout.separator:
             return None
-        time = float(layout.split(first)[layout.columns["t"]]) + layout.clock_start(path, first)
+        time = float(layout.split(first)[layout.columns["t"]]) + layout.clock_start(
+            path, first
+        )
         if not time >= CALENDAR_BEGINS:
             return None
-        return datetime.fromtimestamp(time, ZoneInfo(options.tz or layout.tz)).strftime("%Y-%m-%d")
-    except (LookupError, ValueError, OverflowError, OSError):  # a table, or a damaged first row
+        return datetime.fromtimestamp(time, ZoneInfo(options.tz or layout.tz)).strftime(
+            "%Y-%m-%d"
+        )
+    except (
+        LookupError,
+        ValueError,
+        OverflowError,
+        OSError,
+    ):  # a table, or a damaged first row
         return None
 
 

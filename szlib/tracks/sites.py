@@ -34,10 +34,12 @@ from .formats.parsed import read_magni_rows
 from .options import ReadOptions
 from .recordings import check_names
 
-GRAND_CENTRAL_RATE = 25.0  # frames a second of the video of Grand Central; every 20th is annotated
+# frames a second of the video of Grand Central; every 20th is annotated
+GRAND_CENTRAL_RATE = 25.0
 GRAND_CENTRAL_SCALE = 0.8  # metres in one unit of its homography (OpenTraj)
 EDINBURGH_RATE = 9.0  # approximate frames a second of Edinburgh's files; the rate varies over short times
-EDINBURGH_PIXEL, EDINBURGH_ROWS = 0.0247, 480  # metres in a pixel on the floor, and rows of an image
+# metres in a pixel on the floor, and rows of an image
+EDINBURGH_PIXEL, EDINBURGH_ROWS = (0.0247, 480)
 _TRACK = re.compile(r"TRACK\.R(\d+)\s*=\s*\[(.*?)\]\s*;\s*$", flags=re.MULTILINE)
 
 
@@ -82,13 +84,22 @@ def read_grand_central(
         parts.append(rows)
     column, row, frame = np.concatenate(parts).T
     floor = np.column_stack([row, column, np.ones(len(row))]) @ matrix.T
-    raw = pd.DataFrame({"day": "grand-central", "id": np.concatenate(ids), "t": frame / GRAND_CENTRAL_RATE})
+    raw = pd.DataFrame(
+        {
+            "day": "grand-central",
+            "id": np.concatenate(ids),
+            "t": frame / GRAND_CENTRAL_RATE,
+        }
+    )
     raw[["x", "y"]] = GRAND_CENTRAL_SCALE * floor[:, :2] / floor[:, 2:]
     return _finish(raw, path.name, max_gap, {})
 
 
 def read_edinburgh(
-    paths: str | Path | Iterable[str | Path], *, frame_rate: float = EDINBURGH_RATE, max_gap: float = 0.5
+    paths: str | Path | Iterable[str | Path],
+    *,
+    frame_rate: float = EDINBURGH_RATE,
+    max_gap: float = 0.5,
 ) -> pd.DataFrame:
     """Read the Edinburgh Informatics Forum (Majecka, 2009): ``TRACK.Rn=[[x y frame];[x y frame];...];``.
 
@@ -118,12 +129,18 @@ def read_edinburgh(
     1  tracks.Aug24   1  1.1
     2  tracks.Aug24   1  1.2
     """
-    files = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
+    files = (
+        [Path(paths)]
+        if isinstance(paths, str | Path)
+        else [Path(path) for path in paths]
+    )
     if not files:
         raise DataError("no file of Edinburgh was given; pass at least one path")
     ReadOptions(frame_rate=frame_rate)  # checks the rate
     check_names([file.stem for file in files])
-    parts, n_repeated = zip(*(_read_edinburgh_file(file, frame_rate) for file in files), strict=True)
+    parts, n_repeated = zip(
+        *(_read_edinburgh_file(file, frame_rate) for file in files), strict=True
+    )
     name = files[0].name if len(files) == 1 else f"{len(files)} files"
     reasons = {"a blob of an earlier track": sum(n_repeated)}
     return _finish(pd.concat(parts, ignore_index=True), name, max_gap, reasons)
@@ -194,12 +211,16 @@ def read_magni_groups(path: str | Path) -> pd.DataFrame:
             continue
         size, left = int(match[1]), sorted(people["id"].unique())
         if len(left) % size:
-            raise DataError(f"{path}: {len(left)} people are labelled {label!r} in session {session}")
+            raise DataError(
+                f"{path}: {len(left)} people are labelled {label!r} in session {session}"
+            )
         at = people.pivot_table(index="t", columns="id", values=["x", "y"])
         while left:
             one = left.pop(0)
             distance = {
-                each: np.hypot(at["x"][one] - at["x"][each], at["y"][one] - at["y"][each]).median()
+                each: np.hypot(
+                    at["x"][one] - at["x"][each], at["y"][one] - at["y"][each]
+                ).median()
                 for each in left
             }
             nearest = sorted(left, key=distance.__getitem__)[: size - 1]
@@ -211,15 +232,21 @@ def read_magni_groups(path: str | Path) -> pd.DataFrame:
 
 def _homography(path: Path, homography: str | Path | None) -> np.ndarray:
     """The matrix of Grand Central, shape (3, 3)."""
-    places = [Path(homography)] if homography else [path.parent / "H.json", path / "H.json"]
+    places = (
+        [Path(homography)] if homography else [path.parent / "H.json", path / "H.json"]
+    )
     file = next((place for place in places if place.is_file()), None)
     if file is None:
         looked = " or ".join(map(str, places))
-        raise DataError(f"{looked}: no such file; expected the homography of Grand Central, pass homography=")
+        raise DataError(
+            f"{looked}: no such file; expected the homography of Grand Central, pass homography="
+        )
     with reading(file, "as a homography", "homog, 3 x 3"):
         matrix = np.array(json.loads(read_small(file))["homog"], float)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-        raise DataError(f"{file}: homog has shape {matrix.shape}; expected 3 x 3 finite numbers")
+        raise DataError(
+            f"{file}: homog has shape {matrix.shape}; expected 3 x 3 finite numbers"
+        )
     return matrix
 
 
@@ -227,13 +254,19 @@ def _annotations(path: Path) -> dict[str, bytes]:
     """Content of each file of Grand Central, by name."""
     with reading(path, "as annotations", "Annotation.zip or its folder"):
         if path.is_dir():
-            found = {file.name: file.read_bytes() for file in sorted(path.glob("*.txt"))}
+            found = {
+                file.name: file.read_bytes() for file in sorted(path.glob("*.txt"))
+            }
         else:
             with zipfile.ZipFile(path) as packed:
-                names = sorted(name for name in packed.namelist() if name.endswith(".txt"))
+                names = sorted(
+                    name for name in packed.namelist() if name.endswith(".txt")
+                )
                 found = {name.rsplit("/", 1)[-1]: packed.read(name) for name in names}
     if not found:
-        raise DataError(f"{path}: holds no file *.txt; expected Annotation.zip or the folder of its files")
+        raise DataError(
+            f"{path}: holds no file *.txt; expected Annotation.zip or the folder of its files"
+        )
     return found
 
 
@@ -248,21 +281,35 @@ def _read_edinburgh_file(path: Path, frame_rate: float) -> tuple[pd.DataFrame, i
     parts = []
     for number, points in tracks:
         try:
-            rows = np.array(re.sub(r"[\[\];,]", " ", points).split(), float).reshape(-1, 3)
+            rows = np.array(re.sub(r"[\[\];,]", " ", points).split(), float).reshape(
+                -1, 3
+            )
         except ValueError as error:
-            raise DataError(f"{path}, TRACK.R{number}: expected triples of x, y, frame ({error})") from error
+            raise DataError(
+                f"{path}, TRACK.R{number}: expected triples of x, y, frame ({error})"
+            ) from error
         parts.append(np.column_stack([np.full(len(rows), int(number)), rows]))
     columns = np.concatenate(parts).T
-    blobs = pd.DataFrame(dict(zip(("id", "column", "row", "frame"), columns, strict=True)))
+    blobs = pd.DataFrame(
+        dict(zip(("id", "column", "row", "frame"), columns, strict=True))
+    )
     repeated = blobs.duplicated(["column", "row", "frame"]) & ~blobs.duplicated()
     blobs = blobs[~repeated]
-    raw = pd.DataFrame({"day": path.stem, "id": blobs["id"].astype(int), "t": blobs["frame"] / frame_rate})
+    raw = pd.DataFrame(
+        {
+            "day": path.stem,
+            "id": blobs["id"].astype(int),
+            "t": blobs["frame"] / frame_rate,
+        }
+    )
     raw["x"] = EDINBURGH_PIXEL * blobs["column"]
     raw["y"] = EDINBURGH_PIXEL * (EDINBURGH_ROWS - blobs["row"])
     return raw, int(repeated.sum())
 
 
-def _finish(raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str, int]) -> pd.DataFrame:
+def _finish(
+    raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str, int]
+) -> pd.DataFrame:
     """The track table of rows from which some were `rejected` before."""
     finite = np.isfinite(raw[["t", "x", "y"]].to_numpy(float)).all(axis=1)
     doubled = raw.duplicated(["day", "id", "t"]).to_numpy() & finite
@@ -274,5 +321,7 @@ def _finish(raw: pd.DataFrame, name: str, max_gap: float, rejected: Mapping[str,
         "not finite": int((~finite).sum()),
         "second position at a time": int(doubled.sum()),
     }
-    stage = funnels.stage(f"read {name}", len(raw) + sum(rejected.values()), len(usable), reasons)
+    stage = funnels.stage(
+        f"read {name}", len(raw) + sum(rejected.values()), len(usable), reasons
+    )
     return to_clock(funnels.attach(usable, [stage]), max_gap=max_gap)

@@ -37,7 +37,14 @@ from ..errors import DataError, DataWarning, SzlibError
 from ..input_files import printable
 
 # Packages of the extra `workbook`, which the commands `run` and `report` need.
-_WORKBOOK_PACKAGES = ("anywidget", "ipykernel", "jupytext", "latex2mathml", "nbconvert", "papermill")
+_WORKBOOK_PACKAGES = (
+    "anywidget",
+    "ipykernel",
+    "jupytext",
+    "latex2mathml",
+    "nbconvert",
+    "papermill",
+)
 _STOPPED = "stopped; finished results stay in their folder"
 # Errors of standard output or standard error that is full or closed.
 _BROKEN_STREAM = (OSError, ValueError)
@@ -48,13 +55,18 @@ _UNWRITABLE = (errno.EBADF, errno.EFBIG, errno.EIO, errno.ENOSPC, errno.EPIPE)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that `arguments` name (default: those of the process) and return its exit code."""
     _open_missing_streams()
-    for stream in (sys.stdout, sys.stderr):  # print escapes where the terminal's encoding lacks a letter
+    for stream in (
+        sys.stdout,
+        sys.stderr,
+    ):  # print escapes where the terminal's encoding lacks a letter
         with suppress(*_BROKEN_STREAM, AttributeError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     given = sys.argv[1:] if arguments is None else arguments
     try:
         with _stop_on_signals(), warnings.catch_warnings():
-            options = build_parser().parse_args([_mark_number(argument) for argument in given])
+            options = build_parser().parse_args(
+                [_mark_number(argument) for argument in given]
+            )
             size = None if options.memory is None else memory.parse_size(options.memory)
             warnings.showwarning = lambda message, *_, **__: _print_error(str(message))
             with memory.granted(size):
@@ -78,24 +90,34 @@ class _CommandParser(argparse.ArgumentParser):
 
     def format_help(self) -> str:
         """The help, and the list of parameters if there is one."""
-        return super().format_help() + (f"\n{self.list_parameters()}\n" if self.list_parameters else "")
+        return super().format_help() + (
+            f"\n{self.list_parameters()}\n" if self.list_parameters else ""
+        )
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Build the parser of the command line from `commands.toml`, which describes each command."""
-    content = tomllib.loads(Path(__file__).with_name("commands.toml").read_text(encoding="utf-8"))
+    content = tomllib.loads(
+        Path(__file__).with_name("commands.toml").read_text(encoding="utf-8")
+    )
     as_written = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(prog="szlib", description=__doc__, formatter_class=as_written)
+    parser = argparse.ArgumentParser(
+        prog="szlib", description=__doc__, formatter_class=as_written
+    )
     parser.add_argument("--version", action="version", version=f"szlib {__version__}")
     parser.set_defaults(memory=None)
     groups = {name: _CommandParser(add_help=False) for name in content["groups"]}
     for name, group in groups.items():
         one = group.add_mutually_exclusive_group() if name == "area" else group
         _add_arguments(one, content["groups"][name])
-    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_CommandParser)
+    commands = parser.add_subparsers(
+        required=True, metavar="COMMAND", parser_class=_CommandParser
+    )
     for name, each in content["commands"].items():
         parents = [groups[group] for group in each.get("groups", ())]
-        command = commands.add_parser(name, help=each["summary"], parents=parents, formatter_class=as_written)
+        command = commands.add_parser(
+            name, help=each["summary"], parents=parents, formatter_class=as_written
+        )
         _add_arguments(command, each["arguments"])
         command.set_defaults(command=globals()[f"_{name}"])
     run = commands.choices["run"]
@@ -118,13 +140,22 @@ def _add_arguments(parser: Any, arguments: dict[str, dict[str, Any]]) -> None:
 def _read_options(options: argparse.Namespace) -> dict[str, Any]:
     """The options of `ReadOptions` that a command gives."""
     columns: dict[str, str | int] = {}
-    for pair in (pair for text in options.columns for pair in re.split(r",(?=[a-z]+=)", text)):
+    for pair in (
+        pair for text in options.columns for pair in re.split(r",(?=[a-z]+=)", text)
+    ):
         name, equals, column = pair.partition("=")
         if not equals or not column:
-            raise DataError(f"columns: {pair!r} must be NAME=COLUMN, such as t=Zeit or id=0; see --help")
-        columns[name.strip()] = int(column) if column.isdecimal() and column.isascii() else column.strip()
+            raise DataError(
+                f"columns: {pair!r} must be NAME=COLUMN, such as t=Zeit or id=0; see --help"
+            )
+        columns[name.strip()] = (
+            int(column) if column.isdecimal() and column.isascii() else column.strip()
+        )
     names = ("unit", "scale", "frame_rate", "tz", "file_format", "max_gap")
-    given = {"columns": columns or None, **{name: getattr(options, name) for name in names}}
+    given = {
+        "columns": columns or None,
+        **{name: getattr(options, name) for name in names},
+    }
     return {name: value for name, value in given.items() if value is not None}
 
 
@@ -187,10 +218,16 @@ def _run(options: argparse.Namespace) -> int:
         print(f"report: {printable(os.path.relpath(summary['report']))}")
     if summary.get("verdict"):
         print(summary["verdict"])
-    refused = {name: n["error"] for name, n in summary["notebooks"].items() if n["status"] == "refused"}
+    refused = {
+        name: n["error"]
+        for name, n in summary["notebooks"].items()
+        if n["status"] == "refused"
+    }
     if refused:
         error = next(iter(refused.values()))
-        raise SzlibError(f"{', '.join(refused)}: could not be run: {error}; finished results stay")
+        raise SzlibError(
+            f"{', '.join(refused)}: could not be run: {error}; finished results stay"
+        )
     return 0 if summary["passed"] else 1
 
 
@@ -199,7 +236,9 @@ def _list_parameters(meanings: dict[str, str]) -> str:
     from . import folders
     from .notebook_parameters import describe_parameters
 
-    return describe_parameters(folders.list_notebooks(folders.find_notebooks()), meanings)
+    return describe_parameters(
+        folders.list_notebooks(folders.find_notebooks()), meanings
+    )
 
 
 def _notebooks(options: argparse.Namespace) -> int:
@@ -208,7 +247,9 @@ def _notebooks(options: argparse.Namespace) -> int:
     from .folders import copy_notebooks
 
     place = printable(copy_notebooks(options.folder))
-    print(f"{place}: szlib run --notebooks {place} runs them, jupyter lab {place} opens them")
+    print(
+        f"{place}: szlib run --notebooks {place} runs them, jupyter lab {place} opens them"
+    )
     return 0
 
 
@@ -218,19 +259,29 @@ def _report(options: argparse.Namespace) -> int:
     from . import folders
     from .report import write_report
 
-    home = Path(options.folder) if options.folder else folders.default_results() / "synthetic"
+    home = (
+        Path(options.folder)
+        if options.folder
+        else folders.default_results() / "synthetic"
+    )
     print(printable(os.path.relpath(file := write_report(home))))
     if options.open:
         import webbrowser
 
         if not webbrowser.open(file.resolve().as_uri()):
-            raise SzlibError("no browser can be opened on this machine; open the file in a browser yourself")
+            raise SzlibError(
+                "no browser can be opened on this machine; open the file in a browser yourself"
+            )
     return 0
 
 
 def _inspect(options: argparse.Namespace) -> int:
     """Print the funnel of a file, from its rows to its encounters."""
-    from ..encounters.one_day import FEW_ENCOUNTERS, find_encounters_in_files, relax_conditions
+    from ..encounters.one_day import (
+        FEW_ENCOUNTERS,
+        find_encounters_in_files,
+        relax_conditions,
+    )
     from ..encounters.settings import EncounterSettings
     from ..tracks import datasets, funnels
     from ..tracks.clock import read_tracks
@@ -245,10 +296,14 @@ def _inspect(options: argparse.Namespace) -> int:
     advice, settings = "", EncounterSettings(area=options.area, has_walls=options.walls)
     reading = ReadOptions(**_read_options(options))
     print(describe_file(files[0], reading))
-    with warnings.catch_warnings(action="ignore", category=DataWarning):  # the table shows the same counts
+    with warnings.catch_warnings(
+        action="ignore", category=DataWarning
+    ):  # the table shows the same counts
         samples = find_encounters_in_files(files, settings, reading)
         if "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS:
-            advice = relax_conditions(samples, read_tracks(files, options=reading), settings)
+            advice = relax_conditions(
+                samples, read_tracks(files, options=reading), settings
+            )
     if "area" in samples.attrs:
         print(f"area {samples.attrs['area']}")
         if samples.attrs["area_reason"]:
@@ -256,7 +311,13 @@ def _inspect(options: argparse.Namespace) -> int:
     print(funnels.text(funnels.get(samples)))
     if advice:
         print(advice)
-    words = ["szlib", "run", "--data", options.file, *(["--walls"] if options.walls else [])]
+    words = [
+        "szlib",
+        "run",
+        "--data",
+        options.file,
+        *(["--walls"] if options.walls else []),
+    ]
     if isinstance(options.area, list):
         words += ["--area", *map("{:g}".format, options.area)]
     elif options.area:
@@ -286,7 +347,10 @@ def _fit(options: argparse.Namespace) -> int:
     from ..tracks.options import ReadOptions
     from .fit_command import fit
 
-    given = {name: getattr(options, name) for name in ("out", "method", "kind", "tracks", "exclude", "jobs")}
+    given = {
+        name: getattr(options, name)
+        for name in ("out", "method", "kind", "tracks", "exclude", "jobs")
+    }
     given["settings"] = EncounterSettings(area=options.area, has_walls=options.walls)
     print(fit(options.data, reading=ReadOptions(**_read_options(options)), **given))
     return 0
@@ -295,7 +359,9 @@ def _fit(options: argparse.Namespace) -> int:
 def _require_workbook_packages() -> None:
     """Raise SzlibError if a package is missing that executes the notebooks."""
     if missing := [name for name in _WORKBOOK_PACKAGES if find_spec(name) is None]:
-        raise SzlibError(f"the notebooks need {', '.join(missing)}: pip install 'szlib[workbook]'")
+        raise SzlibError(
+            f"the notebooks need {', '.join(missing)}: pip install 'szlib[workbook]'"
+        )
 
 
 def _parse_parameter(text: str) -> tuple[str, Any]:
@@ -307,14 +373,21 @@ def _parse_parameter(text: str) -> tuple[str, Any]:
         return name, json.loads(value)
     except json.JSONDecodeError:
         return name, value
-    except (ValueError, RecursionError) as error:  # an integer with too many digits, or too many brackets
-        raise DataError(f"parameter {name}: cannot be read ({error}); give a shorter value") from error
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # an integer with too many digits, or too many brackets
+        raise DataError(
+            f"parameter {name}: cannot be read ({error}); give a shorter value"
+        ) from error
 
 
 def _mark_number(argument: str) -> str:
     """Put a space before a negative number such as -1.85e1, an option to argparse; -1 is none."""
     with suppress(ValueError):
-        is_option = argument.startswith("-") and not re.fullmatch(r"-\d+|-\d*\.\d+", argument, re.ASCII)
+        is_option = argument.startswith("-") and not re.fullmatch(
+            r"-\d+|-\d*\.\d+", argument, re.ASCII
+        )
         return f" {argument}" if is_option and float(argument) < 0 else argument
     return argument
 
@@ -322,12 +395,18 @@ def _mark_number(argument: str) -> str:
 def _job_count(text: str) -> int:
     """A number of processes."""
     if not text.isascii() or not text.isdigit() or len(text) > 9 or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number >= 1; got {text[:40]!a}")
+        raise argparse.ArgumentTypeError(
+            f"expected a whole number >= 1; got {text[:40]!a}"
+        )
     return int(text)
 
 
 # Types of arguments in `commands.toml`.
-_TYPES: dict[str, Callable[[str], Any]] = {"float": float, "path": os.path.abspath, "count": _job_count}
+_TYPES: dict[str, Callable[[str], Any]] = {
+    "float": float,
+    "path": os.path.abspath,
+    "count": _job_count,
+}
 
 
 @contextmanager
@@ -354,14 +433,24 @@ def _stop_on_signals() -> Iterator[None]:
         stopped.append(number)
         if len(stopped) > 1:
             end()
-        sys.unraisablehook = lambda lost: end() if lost.exc_type is KeyboardInterrupt else None
+        sys.unraisablehook = lambda lost: (
+            end() if lost.exc_type is KeyboardInterrupt else None
+        )
         threading.excepthook = lambda _: None
         raise KeyboardInterrupt(128 + number)
 
     is_main = threading.current_thread() is threading.main_thread()
-    names = [name for name in ("SIGINT", "SIGTERM", "SIGHUP") if is_main and hasattr(signal, name)]
+    names = [
+        name
+        for name in ("SIGINT", "SIGTERM", "SIGHUP")
+        if is_main and hasattr(signal, name)
+    ]
     numbers = [getattr(signal, name) for name in names]
-    before = {n: signal.signal(n, stop) for n in numbers if signal.getsignal(n) is not signal.SIG_IGN}
+    before = {
+        n: signal.signal(n, stop)
+        for n in numbers
+        if signal.getsignal(n) is not signal.SIG_IGN
+    }
     try:
         yield
     except Exception as error:
@@ -385,7 +474,9 @@ def _open_missing_streams() -> None:
 
 def _describe(error: Exception) -> str:
     """One line about an error that ends the command."""
-    if isinstance(error, MemoryError) or "failed to map segment" in str(error):  # the latter of a library
+    if isinstance(error, MemoryError) or "failed to map segment" in str(
+        error
+    ):  # the latter of a library
         return f"this process has no more memory ({error}); raise its limit (ulimit -v), or free memory"
     if isinstance(error, OSError) and error.errno in _UNWRITABLE and not error.filename:
         return f"standard output cannot be written ({error.strerror}); make room, or name another file"
@@ -396,7 +487,9 @@ def _describe(error: Exception) -> str:
 def _print_error(text: str) -> None:
     """Print one line on standard error, and drop the rest of a standard output that cannot be written."""
     with suppress(*_BROKEN_STREAM):
-        print(f"szlib: {printable(' '.join(text.split()))}", file=sys.stderr, flush=True)
+        print(
+            f"szlib: {printable(' '.join(text.split()))}", file=sys.stderr, flush=True
+        )
     try:
         sys.stdout.flush()
     except _BROKEN_STREAM:

@@ -13,7 +13,12 @@ from ..encounters.areas import AUTO
 from ..encounters.days import PURPOSE, Extraction
 from ..encounters.finding import find_encounters
 from ..encounters.kinds import of_kind
-from ..encounters.one_day import FEW_ENCOUNTERS, known_area, relax_conditions, require_encounters
+from ..encounters.one_day import (
+    FEW_ENCOUNTERS,
+    known_area,
+    relax_conditions,
+    require_encounters,
+)
 from ..encounters.settings import EncounterSettings
 from ..errors import DataError, DataWarning, StorageError, ZoneError
 from ..files import folder_purpose, write_file
@@ -72,33 +77,65 @@ def fit(
     file = _require_place(Path(out))
     if any(folder_purpose(path) == PURPOSE for path in paths):
         if len(paths) > 1:
-            raise DataError(f"{' '.join(paths)}: give one folder of extracted days, or files of tracks")
+            raise DataError(
+                f"{' '.join(paths)}: give one folder of extracted days, or files of tracks"
+            )
         days = Extraction.load(paths[0], exclude=exclude)
         samples, settings, reading = days.samples(), days.settings, days.options
-        of_days = [list(content) for source in days.sources.values() for content in source["files"]]
+        of_days = [
+            list(content)
+            for source in days.sources.values()
+            for content in source["files"]
+        ]
         files = datasets.find(tracks) if tracks else []
-        if other := [each for each in files if [each.name, *file_content(each)] not in of_days]:
-            raise DataError(f"{printable(other[0])}: is none of the files of the extracted days, unchanged")
+        if other := [
+            each for each in files if [each.name, *file_content(each)] not in of_days
+        ]:
+            raise DataError(
+                f"{printable(other[0])}: is none of the files of the extracted days, unchanged"
+            )
         table = read_tracks(files, options=reading) if files else None
     else:
-        for name in [name for name, given in (("tracks", tracks), ("exclude", exclude)) if given]:
-            raise DataError(f"--{name} belongs to a folder of extracted days; {paths[0]} is none")
+        for name in [
+            name for name, given in (("tracks", tracks), ("exclude", exclude)) if given
+        ]:
+            raise DataError(
+                f"--{name} belongs to a folder of extracted days; {paths[0]} is none"
+            )
         files = datasets.find(paths)
         settings = replace(settings, area=known_area(settings, files, reading) or AUTO)
         table = read_tracks(files, options=reading)
         samples = find_encounters(table, settings=settings)
-        is_small = "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS
-        require_encounters(samples, relax_conditions(samples, table, settings) if is_small else "")
+        is_small = (
+            "area" in samples.attrs and samples["encounter"].nunique() < FEW_ENCOUNTERS
+        )
+        require_encounters(
+            samples, relax_conditions(samples, table, settings) if is_small else ""
+        )
     samples, null = of_kind(samples, kind), None
     if table is not None:
-        null = find_null_model(table, samples, settings, r_max=R_MAX, kinds=kind, n_jobs=jobs, progress=True)
+        null = find_null_model(
+            table,
+            samples,
+            settings,
+            r_max=R_MAX,
+            kinds=kind,
+            n_jobs=jobs,
+            progress=True,
+        )
     elif method == "respect":
         raise DataError(f"method respect needs a null model; {NO_TRACKS}")
     try:
-        with warnings.catch_warnings(action="ignore", category=DataWarning):  # the verdicts say the same
-            zone = SocialZone.fit(samples, method=method, null=null, n_resamples=N_RESAMPLES)
+        with warnings.catch_warnings(
+            action="ignore", category=DataWarning
+        ):  # the verdicts say the same
+            zone = SocialZone.fit(
+                samples, method=method, null=null, n_resamples=N_RESAMPLES
+            )
     except (ZoneError, DataError) as error:
-        missing = describe_missing_encounters({"encounters": samples["encounter"].nunique()})
+        missing = describe_missing_encounters(
+            {"encounters": samples["encounter"].nunique()}
+        )
         raise ZoneError("; ".join(filter(None, [str(error), missing]))) from error
     figure, content = Figure(figsize=(6, 4.5), layout="constrained"), io.BytesIO()
     zone.plot(SPEED if SPEED in zone.ellipses else None, ax=figure.subplots())
@@ -108,7 +145,14 @@ def fit(
     notes = [f"zone: {printable(file)}; figure: {printable(picture)}"]
     notes += [] if table is not None else [NO_TRACKS]
     verdict = f"zone at {SPEED:g} m/s: {zone.verdict(SPEED).sentence}"
-    return "\n".join([f"method {zone.method}", format_table(zone).to_string(index=False), *notes, verdict])
+    return "\n".join(
+        [
+            f"method {zone.method}",
+            format_table(zone).to_string(index=False),
+            *notes,
+            verdict,
+        ]
+    )
 
 
 def _require_place(file: Path) -> Path:
@@ -116,7 +160,11 @@ def _require_place(file: Path) -> Path:
     if file.suffix != ".json":
         raise StorageError(f"{printable(file)}: expected a file that ends in .json")
     if require_place(file).exists() and read_json_object(file).get("format") != FORMAT:
-        raise StorageError(f"{printable(file)}: exists, and is no zone of szlib; choose another name")
+        raise StorageError(
+            f"{printable(file)}: exists, and is no zone of szlib; choose another name"
+        )
     if not file.exists() and (picture := file.with_suffix(".png")).exists():
-        raise StorageError(f"{printable(picture)}: exists without a zone; choose another name for the zone")
+        raise StorageError(
+            f"{printable(picture)}: exists without a zone; choose another name for the zone"
+        )
     return file

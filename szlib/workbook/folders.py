@@ -29,15 +29,14 @@ BUNDLED = Path(__file__).resolve().parent / "notebooks"
 NOTEBOOKS = BUNDLED if BUNDLED.is_dir() else BUNDLED.parents[2] / "notebooks"
 RESULTS = "../results"  # the default folder of all results, relative to the notebooks
 RESULTS_OF = "results of "  # how the purpose of each folder of results begins
-PURPOSE = f"{RESULTS_OF}the workbook"  # the purpose that marks the folder of all results
+# the purpose that marks the folder of all results
+PURPOSE = f"{RESULTS_OF}the workbook"
 LAB = "lab"  # the folder, among all results, of notebooks that are executed by hand
 REPORT = "report.html"  # file of a run: its report
 PARAMETERS = "parameters.json"  # file of a run: its data and parameters
 # What a copy of the notebooks leaves out: their executed copies.
 _UNNEEDED = shutil.ignore_patterns("*.ipynb", "__pycache__", "real_day", "tools", ".*")
-FIGURES_VARIABLE = (
-    "SZLIB_FIGURES"  # environment variable of a kernel: a second format of figures, such as svg
-)
+FIGURES_VARIABLE = "SZLIB_FIGURES"  # environment variable of a kernel: a second format of figures, as svg
 RUN_VARIABLE = "SZLIB_RUN"  # environment variable of a kernel: the results folder of the kernel's run
 
 
@@ -62,19 +61,27 @@ def find_notebooks(folder: str | Path | None = None) -> Path:
     Raises DataError if there are none.
     """
     given = Path(folder or ".").resolve()
-    places = [NOTEBOOKS] if folder is None and NOTEBOOKS != BUNDLED else [given, given / "notebooks"]
+    places = (
+        [NOTEBOOKS]
+        if folder is None and NOTEBOOKS != BUNDLED
+        else [given, given / "notebooks"]
+    )
     places += [BUNDLED] if folder is None else []
     found = next((place for place in places if list_notebooks(place)), None)
     if found is None:
         name = printable(folder or NOTEBOOKS)
-        raise DataError(f"{name}: there are no notebooks; expected a folder that `szlib notebooks` wrote")
+        raise DataError(
+            f"{name}: there are no notebooks; expected a folder that `szlib notebooks` wrote"
+        )
     return found
 
 
 def list_notebooks(folder: Path | None = None) -> list[Path]:
     """The scripts of the notebooks in a `folder` (None: `NOTEBOOKS`): the chapters, and those in `deeper`."""
     parts = ("[0-9][0-9]*_*.py", "deeper/[0-9][0-9]*_*.py")
-    return [script for part in parts for script in sorted((folder or NOTEBOOKS).glob(part))]
+    return [
+        script for part in parts for script in sorted((folder or NOTEBOOKS).glob(part))
+    ]
 
 
 def copy_notebooks(folder: str | Path) -> Path:
@@ -88,10 +95,14 @@ def copy_notebooks(folder: str | Path) -> Path:
     place = Path(folder) / "notebooks"
     try:
         if place.exists() and any(place.iterdir()):
-            raise StorageError(f"{printable(place)}: holds files; choose a new or empty folder")
+            raise StorageError(
+                f"{printable(place)}: holds files; choose a new or empty folder"
+            )
         place.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=".szlib-", dir=place.parent) as private:
-            whole = shutil.copytree(NOTEBOOKS, Path(private, place.name), ignore=_UNNEEDED)
+            whole = shutil.copytree(
+                NOTEBOOKS, Path(private, place.name), ignore=_UNNEEDED
+            )
             for script in (
                 *list_notebooks(whole),
                 *whole.glob("exercises/*.py"),
@@ -123,7 +134,9 @@ def absolute_data(data: str | Path | Sequence[str | Path]) -> str | list[str]:
     paths = [data] if isinstance(data, str | Path) else list(data)
     for path in paths:
         if printable(path) != str(path):
-            raise DataError(f"{printable(path)}: the name is not readable text (UTF-8); rename the file")
+            raise DataError(
+                f"{printable(path)}: the name is not readable text (UTF-8); rename the file"
+            )
     return [os.path.abspath(path) for path in paths]  # noqa: PTH100 - links keep their names
 
 
@@ -157,7 +170,9 @@ def claim_results(
     folder = Path(results) / datasets.label(data)
     claim_folder(results, PURPOSE)
     if parameters or folder_purpose(folder) not in (None, purpose):
-        folder = folder.with_name(f"{folder.name}-{hashlib.sha256(purpose.encode()).hexdigest()[:8]}")
+        folder = folder.with_name(
+            f"{folder.name}-{hashlib.sha256(purpose.encode()).hexdigest()[:8]}"
+        )
     return claim_folder(folder, purpose, inputs=inputs)
 
 
@@ -166,18 +181,27 @@ def remove_outputs(folder: Path, notebooks: Iterable[str]) -> None:
 
     Raises OSError if a file cannot be removed.
     """
-    for file in [folder / REPORT, *(file for name in notebooks for file in list_outputs(folder, name))]:
+    for file in [
+        folder / REPORT,
+        *(file for name in notebooks for file in list_outputs(folder, name)),
+    ]:
         file.unlink(missing_ok=True)
 
 
 def list_outputs(folder: Path, notebook: str) -> list[Path]:
     """Files of a `notebook` in a results `folder` that every run writes again: copy, record and figures."""
     figures = (folder / "figures").glob(f"{notebook}-*")
-    return [folder / f"{notebook}.ipynb", folder / "records" / f"{notebook}.json", *figures]
+    return [
+        folder / f"{notebook}.ipynb",
+        folder / "records" / f"{notebook}.json",
+        *figures,
+    ]
 
 
 def require_place(file: Path) -> Path:
     """The `file`, if it can be written to its folder: before hours of work, not after them."""
     if not file.parent.is_dir() or not os.access(file.parent, os.W_OK):
-        raise StorageError(f"{printable(file.parent)}: is no folder that can be written; choose another one")
+        raise StorageError(
+            f"{printable(file.parent)}: is no folder that can be written; choose another one"
+        )
     return file

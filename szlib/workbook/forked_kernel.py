@@ -37,7 +37,9 @@ class ForkedKernelManager(AsyncKernelManager):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         if sys.platform == "linux":
-            self.provisioner = ForkingProvisioner(kernel_spec=self.kernel_spec, parent=self)
+            self.provisioner = ForkingProvisioner(
+                kernel_spec=self.kernel_spec, parent=self
+            )
 
     @property
     def kernel_spec(self) -> KernelSpec:
@@ -61,7 +63,9 @@ class ForkingProvisioner(LocalProvisioner):
         self.cwd = Path(options.get("cwd") or ".").absolute()
         try:
             process = _KernelProcess(
-                context.Process(target=_serve, args=(cmd[3:], options["env"], str(self.cwd)))
+                context.Process(
+                    target=_serve, args=(cmd[3:], options["env"], str(self.cwd))
+                )
             )
         except OSError:  # the path of the temporary folder is too long for a socket
             return await super().launch_kernel(cmd, **options)
@@ -78,7 +82,11 @@ class _KernelProcess:
     def __init__(self, process: Any) -> None:
         process.start()
         self.pid = process.pid
-        self.kill, self.terminate, self._process = process.kill, process.terminate, process
+        self.kill, self.terminate, self._process = (
+            process.kill,
+            process.terminate,
+            process,
+        )
 
     def poll(self) -> int | None:
         """The exit code, or None while the process runs."""
@@ -96,7 +104,8 @@ def _serve(arguments: list[str], environment: dict[str, str], folder: str) -> No
     from ipykernel.kernelapp import IPKernelApp
 
     os.setsid()
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # Jupyter's own way to interrupt a cell
+    # Jupyter's own way to interrupt a cell
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)

@@ -18,7 +18,12 @@ from .record.display import format_value
 # The environment variable in which GitHub names the file for the summary of a step.
 GITHUB = "GITHUB_STEP_SUMMARY"
 # The element of JUnit for a notebook of each status that is not "done".
-_ELEMENTS = {"error": "error", "refused": "error", "undecided": "skipped", "not started": "skipped"}
+_ELEMENTS = {
+    "error": "error",
+    "refused": "error",
+    "undecided": "skipped",
+    "not started": "skipped",
+}
 
 
 def require_junit(file: Path) -> Path:
@@ -26,7 +31,9 @@ def require_junit(file: Path) -> Path:
     if file.suffix != ".xml":
         raise StorageError(f"{printable(file)}: expected a file that ends in .xml")
     if require_place(file).exists() and b"<testsuites" not in read_small(file)[:100]:
-        raise StorageError(f"{printable(file)}: exists, and is no JUnit XML of szlib; choose another name")
+        raise StorageError(
+            f"{printable(file)}: exists, and is no JUnit XML of szlib; choose another name"
+        )
     return file
 
 
@@ -37,17 +44,33 @@ def write_junit(summary: Mapping[str, Any], file: str | Path) -> None:
     """
     root = ET.Element("testsuites")
     for name, outcome in summary["notebooks"].items():
-        cases = [(name, _ELEMENTS.get(outcome["status"]), outcome.get("error", outcome["status"]))]
+        cases = [
+            (
+                name,
+                _ELEMENTS.get(outcome["status"]),
+                outcome.get("error", outcome["status"]),
+            )
+        ]
         for check in (check for check in outcome["checks"] if check["kind"] == "check"):
             result = f"{check['result']} ({format_value(check['value'])})"
-            cases.append((check["name"], None if check["passed"] else "failure", result))
+            cases.append(
+                (check["name"], None if check["passed"] else "failure", result)
+            )
         kinds = [kind for _, kind, _ in cases]
         seconds = f"{outcome['seconds']:.3f}"
-        suite = ET.SubElement(root, "testsuite", name=name, tests=str(len(cases)), time=seconds)
-        for kind, plural in (("failure", "failures"), ("error", "errors"), ("skipped", "skipped")):
+        suite = ET.SubElement(
+            root, "testsuite", name=name, tests=str(len(cases)), time=seconds
+        )
+        for kind, plural in (
+            ("failure", "failures"),
+            ("error", "errors"),
+            ("skipped", "skipped"),
+        ):
             suite.set(plural, str(kinds.count(kind)))
         for number, (title, element, text) in enumerate(cases):
-            case = ET.SubElement(suite, "testcase", classname=name, name=printable(title))
+            case = ET.SubElement(
+                suite, "testcase", classname=name, name=printable(title)
+            )
             case.set("time", "0" if number else seconds)
             if element:
                 ET.SubElement(case, element, message=printable(text))
@@ -71,7 +94,9 @@ def append_markdown(rows: list[tuple[str, ...]], notes: list[str]) -> None:
         with Path(file).open("a", encoding="utf-8") as stream:
             stream.write("\n".join([*lines, ""]))
     except OSError as error:
-        warn(f"${GITHUB}: {printable(file)} cannot be written ({error.strerror or error})")
+        warn(
+            f"${GITHUB}: {printable(file)} cannot be written ({error.strerror or error})"
+        )
 
 
 def _escape(text: str) -> str:

@@ -39,7 +39,10 @@ EMPTY_RECORD: dict[str, Any] = {"checks": [], "key_figures": {}, "figures": []}
 
 
 def execute_notebook(
-    script: str, parameters: Mapping[str, Any], folder: str, environment: Mapping[str, str]
+    script: str,
+    parameters: Mapping[str, Any],
+    folder: str,
+    environment: Mapping[str, str],
 ) -> tuple[str, dict[str, Any]]:
     """Execute one notebook in a kernel of its own, and save the executed copy.
 
@@ -61,21 +64,33 @@ def execute_notebook(
         run_cells(source, parameters, results, environment)
     except Exception as error:  # of szlib, of a cell, or of Jupyter
         name = getattr(error, "ename", type(error).__name__)
-        is_refused = name in REFUSED or isinstance(error, SzlibError | OSError | MemoryError)
+        is_refused = name in REFUSED or isinstance(
+            error, SzlibError | OSError | MemoryError
+        )
         text = printable(" ".join(f"{name}: {getattr(error, 'evalue', error)}".split()))
         outcome = {"status": "refused" if is_refused else "error", "error": text}
-        if name == "ZoneError" and describe_missing_data(results / "encounters.parquet"):
-            outcome = {"status": "undecided", "error": f"not decidable on this data: {text}"}
+        if name == "ZoneError" and describe_missing_data(
+            results / "encounters.parquet"
+        ):
+            outcome = {
+                "status": "undecided",
+                "error": f"not decidable on this data: {text}",
+            }
     outcome["seconds"] = round(time.perf_counter() - start, 2)
     record = read_json_object(results / "records" / f"{source.stem}.json")
     if not record.get("closed") and outcome["status"] == "done":
         missing = "the notebook wrote no record; it must end with record.close()"
         outcome |= {"status": "error", "error": missing}
-    return source.stem, outcome | {name: record.get(name, empty) for name, empty in EMPTY_RECORD.items()}
+    return source.stem, outcome | {
+        name: record.get(name, empty) for name, empty in EMPTY_RECORD.items()
+    }
 
 
 def run_cells(
-    script: Path, parameters: Mapping[str, Any], folder: Path, environment: Mapping[str, str]
+    script: Path,
+    parameters: Mapping[str, Any],
+    folder: Path,
+    environment: Mapping[str, str],
 ) -> None:
     """Run the cells of a notebook by papermill, and write the executed copy also if a cell fails.
 
@@ -103,7 +118,9 @@ def run_cells(
         """Papermill's own engine, but the kernel has an environment and the copy is written atomically."""
 
         @classmethod
-        def execute_managed_notebook(cls, nb_man: Any, kernel_name: str, **_: Any) -> None:
+        def execute_managed_notebook(
+            cls, nb_man: Any, kernel_name: str, **_: Any
+        ) -> None:
             """Execute the notebook of the manager `nb_man` in the kernel `kernel_name`."""
             client = PapermillNotebookClient(
                 nb_man,
@@ -129,7 +146,8 @@ def run_cells(
                     _CLIENTS.discard(client)
                     write_file(folder / f"{script.stem}.ipynb", nbformat.writes(copy))
 
-    logging.getLogger("papermill").setLevel(logging.ERROR)  # those of the zone are in no notebook's own cell
+    # those of the zone are in no notebook's own cell
+    logging.getLogger("papermill").setLevel(logging.ERROR)
     known = METHOD_DEFAULTS.keys() | read_defaults(script).keys()
     papermill_engines.register(script.stem, KernelEngine)
     papermill.execute_notebook(
@@ -153,7 +171,9 @@ def end_kernels(executions: Sequence[Future[Any]]) -> None:
         each.cancel()
     while not all(each.done() for each in executions):
         for client in list(_CLIENTS):
-            if process := getattr(getattr(client.km, "provisioner", None), "process", None):
+            if process := getattr(
+                getattr(client.km, "provisioner", None), "process", None
+            ):
                 _CLIENTS.discard(client)
                 process.kill()
         time.sleep(0.1)

@@ -9,7 +9,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-OPTIONS = {"data": "--data", "results": "--out"}  # parameters that are options of the command line
+OPTIONS = {
+    "data": "--data",
+    "results": "--out",
+}  # parameters that are options of the command line
 
 
 def read_defaults(notebook: Path) -> dict[str, Any]:
@@ -31,7 +34,12 @@ def read_parameters(notebook: Path) -> list[tuple[str, Any, str]]:
 
 def _comment(body: str, node: ast.Assign) -> str:
     """The comment behind an assignment."""
-    return body.splitlines()[(node.end_lineno or 1) - 1].encode()[node.end_col_offset :].decode().strip(" #")
+    return (
+        body.splitlines()[(node.end_lineno or 1) - 1]
+        .encode()[node.end_col_offset :]
+        .decode()
+        .strip(" #")
+    )
 
 
 def describe_parameters(notebooks: Sequence[Path], meanings: Mapping[str, str]) -> str:
@@ -41,14 +49,20 @@ def describe_parameters(notebooks: Sequence[Path], meanings: Mapping[str, str]) 
     """
     rows: dict[tuple[str, str], tuple[list[str], list[str]]] = {}
     for notebook in notebooks:
-        for name, value, comment in (each for each in read_parameters(notebook) if each[0] not in OPTIONS):
+        for name, value, comment in (
+            each for each in read_parameters(notebook) if each[0] not in OPTIONS
+        ):
             numbers, comments = rows.setdefault((name, repr(value)), ([], []))
             numbers.append(notebook.stem.partition("_")[0])
             comments += [comment] if comment else []
     lines = []
-    for (name, value), (numbers, comments) in sorted(rows.items(), key=lambda row: -len(row[1][0])):
+    for (name, value), (numbers, comments) in sorted(
+        rows.items(), key=lambda row: -len(row[1][0])
+    ):
         where = "all" if len(numbers) == len(notebooks) else ", ".join(numbers)
         meaning = meanings.get(name) or "".join(comments[:1])
         text = f"{name} = {value}  {meaning} ({where})"
-        lines += textwrap.wrap(text, 108, initial_indent="  ", subsequent_indent=" " * 6)
+        lines += textwrap.wrap(
+            text, 108, initial_indent="  ", subsequent_indent=" " * 6
+        )
     return "\n".join(["parameters (-p NAME=VALUE):", *lines])

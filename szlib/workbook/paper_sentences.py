@@ -18,7 +18,10 @@ from .record.display import format_result
 from .record.notebook_record import NotebookRecord
 
 NOT_RUN = "not run with this data"  # verdict of a sentence whose checks were not made in this run
-_FIXED = {"untestable": "untestable here", "open": "not done here"}  # verdicts that no check decides
+_FIXED = {
+    "untestable": "untestable here",
+    "open": "not done here",
+}  # verdicts that no check decides
 _TESTS = "tests/"  # begins the name of a test, which a run does not execute
 
 
@@ -58,22 +61,33 @@ def judge_sentences(record: NotebookRecord) -> pd.DataFrame:
         for check in made
     }
     numbers = {
-        name: f"{name}: {format_result(check['result'], check['value'])}" for name, check in checks.items()
+        name: f"{name}: {format_result(check['result'], check['value'])}"
+        for name, check in checks.items()
     }
     made_in = {notebook.split("_")[0] for notebook in records}
     table = load_sentences()
     table["verdict"] = [
-        judge(kind, names, checks) for kind, names in zip(table["kind"], table["held_by"], strict=True)
+        judge(kind, names, checks)
+        for kind, names in zip(table["kind"], table["held_by"], strict=True)
     ]
-    table["numbers"] = ["\n".join(numbers.get(name, name) for name in names) for names in table["held_by"]]
+    table["numbers"] = [
+        "\n".join(numbers.get(name, name) for name in names)
+        for names in table["held_by"]
+    ]
     table["unknown"] = [
-        [name for name in names if name.split(": ")[0] in made_in and name not in checks]
+        [
+            name
+            for name in names
+            if name.split(": ")[0] in made_in and name not in checks
+        ]
         for names in table["held_by"]
     ]
     return table
 
 
-def judge(kind: str, names: Sequence[str], checks: Mapping[str, Mapping[str, Any]]) -> str:
+def judge(
+    kind: str, names: Sequence[str], checks: Mapping[str, Mapping[str, Any]]
+) -> str:
     """The verdict of a sentence of this `kind`, from the `checks` of a run that have these `names`.
 
     Tests among the names do not count: a run does not execute them.

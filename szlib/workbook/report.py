@@ -46,10 +46,14 @@ REPORT = folders.REPORT
 _LARGEST_NOTEBOOK = 100_000_000  # of an executed notebook, with its animations [bytes]
 _STATIC = Path(__file__).parent / "static"
 _HARMLESS = tomllib.loads((_STATIC / "harmless.toml").read_text(encoding="utf-8"))
-_OUTPUTS, _TAGS, _ATTRIBUTES = ({*_HARMLESS[name].split()} for name in ("outputs", "tags", "attributes"))
+_OUTPUTS, _TAGS, _ATTRIBUTES = (
+    {*_HARMLESS[name].split()} for name in ("outputs", "tags", "attributes")
+)
 _SCRIPT_OR_STYLE = re.compile(r"<(script|style)\b.*?</\1>", re.DOTALL)
 # The data of a player, and its name, in the script of `static/player.html`.
-_RUN = re.compile(r"(?m)^const run = (\{.*\});\nconst figures = .*\[data-run=(szlib-[0-9a-f]{8})\]")
+_RUN = re.compile(
+    r"(?m)^const run = (\{.*\});\nconst figures = .*\[data-run=(szlib-[0-9a-f]{8})\]"
+)
 # The picture of a player, which is shown on the front page only.
 _GIF = re.compile(r'<img src="data:image/gif;base64,[^"]*" alt="([^"]*)">')
 # The text of a link to another file, and the name of the file without folder and ending.
@@ -65,19 +69,31 @@ def write_report(home: Path) -> Path:
     Raises DataError if the folder is not marked as results, holds no notebooks, or holds a damaged file.
     """
     if not (folder_purpose(home) or "").startswith(folders.RESULTS_OF):
-        raise DataError(f"{printable(home / MARKER)}: does not mark results of szlib; `szlib run` makes them")
+        raise DataError(
+            f"{printable(home / MARKER)}: does not mark results of szlib; `szlib run` makes them"
+        )
     names = [file.stem for file in sorted(home.glob("[0-9][0-9]*_*.ipynb"))]
-    if isinstance(run := read_json_object(home / "summary.json").get("notebooks"), dict):
+    if isinstance(
+        run := read_json_object(home / "summary.json").get("notebooks"), dict
+    ):
         names = [name for name in names if name in run]
     if not names:
-        raise DataError(f"{printable(home)}: holds no executed notebooks; `szlib run` makes them")
+        raise DataError(
+            f"{printable(home)}: holds no executed notebooks; `szlib run` makes them"
+        )
     notebooks, runs = {}, dict[str, Any]()
     for name in names:
         with _reading(home / f"{name}.ipynb"):
             notebooks[name] = _read_notebook(home / f"{name}.ipynb", names, runs)
-    front, back = map(nbformat.v4.new_markdown_cell, _render_front_page(home, notebooks))
+    front, back = map(
+        nbformat.v4.new_markdown_cell, _render_front_page(home, notebooks)
+    )
     page = nbformat.v4.new_notebook()
-    page.cells = [front, *(cell for notebook in notebooks.values() for cell in notebook.cells), back]
+    page.cells = [
+        front,
+        *(cell for notebook in notebooks.values() for cell in notebook.cells),
+        back,
+    ]
     for i, cell in enumerate(page.cells):
         cell["id"] = f"cell-{i}"
     data = json.dumps(runs, separators=(",", ":")).replace("<", "\\u003c")
@@ -109,7 +125,9 @@ def _reading(file: Path) -> Iterator[None]:
         ) from error
 
 
-def _read_notebook(file: Path, names: Sequence[str], runs: dict[str, Any]) -> nbformat.NotebookNode:
+def _read_notebook(
+    file: Path, names: Sequence[str], runs: dict[str, Any]
+) -> nbformat.NotebookNode:
     """The notebook in a `file`, its texts as HTML.
 
     Links to the notebooks `names` lead into the report. The runs that its players show are added to `runs`.
@@ -124,23 +142,35 @@ def _read_notebook(file: Path, names: Sequence[str], runs: dict[str, Any]) -> nb
         for output in cell.get("outputs", ()):
             if "data" not in output:
                 continue
-            data = {kind: text for kind, text in output.data.items() if kind in _OUTPUTS}
+            data = {
+                kind: text for kind, text in output.data.items() if kind in _OUTPUTS
+            }
             data = data or {"text/plain": ""}
             if "text/markdown" in data:
                 data["text/markdown"] = _render_markdown(data["text/markdown"], names)
             if "text/html" in data:
-                runs |= {found[2]: json.loads(found[1]) for found in _RUN.finditer(data["text/html"])}
+                runs |= {
+                    found[2]: json.loads(found[1])
+                    for found in _RUN.finditer(data["text/html"])
+                }
                 data["text/html"] = _SCRIPT_OR_STYLE.sub("", data["text/html"])
                 notebook.metadata["html"].append(data["text/html"])
             alt = output.metadata.get("image/png", {}).get("alt", "")
-            output.data, output.metadata = data, nbformat.from_dict({"image/png": {"alt": str(alt)}})
+            output.data, output.metadata = (
+                data,
+                nbformat.from_dict({"image/png": {"alt": str(alt)}}),
+            )
     return notebook
 
 
 def _remove_harmful(html: str) -> str:
     """The same HTML with harmless tags and attributes only: nothing in it can run, or ask another server."""
     protocols = [*bleach.ALLOWED_PROTOCOLS, "data"]
-    return str(bleach.clean(html, tags=_TAGS, attributes=_is_harmless, protocols=protocols, strip=True))
+    return str(
+        bleach.clean(
+            html, tags=_TAGS, attributes=_is_harmless, protocols=protocols, strip=True
+        )
+    )
 
 
 def _is_harmless(tag: str, name: str, value: str) -> bool:
@@ -168,15 +198,25 @@ class MathRenderer(IPythonRenderer):
 
 def _render_markdown(source: str, names: Sequence[str]) -> str:
     """Render markdown with its pictures embedded; links to the notebooks `names` lead into the report."""
-    renderer = MathRenderer(escape=False, path=str(folders.NOTEBOOKS), embed_images=True)
-    source = _FILE_LINK.sub(lambda x: f"[{x[1]}](#{x[2]})" if x[2] in names else x[1], source)
+    renderer = MathRenderer(
+        escape=False, path=str(folders.NOTEBOOKS), embed_images=True
+    )
+    source = _FILE_LINK.sub(
+        lambda x: f"[{x[1]}](#{x[2]})" if x[2] in names else x[1], source
+    )
     return MarkdownWithMath(renderer=renderer).render(source)
 
 
 def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str]:
     """The pages before and after the executed `notebooks` as HTML, made from the results in `home`."""
-    pages = Environment(loader=FileSystemLoader(_STATIC), autoescape=True, undefined=StrictUndefined)
-    outputs = [(name, html) for name, notebook in notebooks.items() for html in notebook.metadata["html"]]
+    pages = Environment(
+        loader=FileSystemLoader(_STATIC), autoescape=True, undefined=StrictUndefined
+    )
+    outputs = [
+        (name, html)
+        for name, notebook in notebooks.items()
+        for html in notebook.metadata["html"]
+    ]
     samples, zone, funnel = home / "encounters.parquet", home / "zone.json", ""
     with _reading(home / "parameters.json"):
         run = _read_json(home / "parameters.json")
@@ -186,29 +226,48 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str
         speed = float(given.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
     with _reading(home / "summary.json"):
         summary = _read_json(home / "summary.json")
-        outcomes = {name: _format_outcome(name, o) for name, o in summary.get("notebooks", {}).items()}
+        outcomes = {
+            name: _format_outcome(name, o)
+            for name, o in summary.get("notebooks", {}).items()
+        }
     for name, notebook in notebooks.items():
-        fold = {"name": name, "question": notebook.metadata["question"], "outcome": outcomes.get(name)}
-        notebook.cells[0].metadata["fold"], notebook.cells[-1].metadata["is_last"] = fold, True
+        fold = {
+            "name": name,
+            "question": notebook.metadata["question"],
+            "outcome": outcomes.get(name),
+        }
+        notebook.cells[0].metadata["fold"], notebook.cells[-1].metadata["is_last"] = (
+            fold,
+            True,
+        )
     with _reading(samples):
         if samples.exists():
             with open_regular(samples) as stream:
                 stages = funnels.table(funnels.get(pd.read_parquet(stream, columns=[])))
-            stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")  # each is named once
-            funnel = stages.to_html(index=False, border=0, formatters={"rows": "{:,}".format})
+            # each is named once
+            stages["stage"] = stages["stage"].where(~stages["stage"].duplicated(), "")
+            funnel = stages.to_html(
+                index=False, border=0, formatters={"rows": "{:,}".format}
+            )
     with _reading(zone):
-        texts = _show_zone(zone, speed, is_synthetic=is_synthetic) if zone.exists() else {}
+        texts = (
+            _show_zone(zone, speed, is_synthetic=is_synthetic) if zone.exists() else {}
+        )
     checks = [check for outcome in outcomes.values() for check in outcome["checks"]]
     named = {check["key"]: check for check in checks}
     claims = load_sentences().query("kind == 'claim'")
     claims["verdict"] = [judge("claim", names, named) for names in claims["held_by"]]
-    claims["checks"] = [[named[n] for n in names if n in named] for names in claims["held_by"]]
+    claims["checks"] = [
+        [named[n] for n in names if n in named] for names in claims["held_by"]
+    ]
     html = pages.get_template("front_page.html.j2").render(
         data=str(summary.get("data", home.name)),
         data_sets=datasets.NAMES,
         is_synthetic=is_synthetic,
         speed=speed,
-        verdict=str(summary.get("verdict", "")).removeprefix(f"zone at {speed:g} m/s: "),
+        verdict=str(summary.get("verdict", "")).removeprefix(
+            f"zone at {speed:g} m/s: "
+        ),
         outcomes=outcomes,
         checks=checks,
         not_run=NOT_RUN,
@@ -220,7 +279,10 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str
         notebooks=list(notebooks),
         funnel=funnel,
         zone=texts,
-        players={s.name.replace("_", " "): _find_player(s.title, outputs) for s in SCENARIOS.values()},
+        players={
+            s.name.replace("_", " "): _find_player(s.title, outputs)
+            for s in SCENARIOS.values()
+        },
         parameters=_list_parameters(outputs),
     )
     return html.rpartition("<!-- notebooks -->")[::2]
@@ -228,17 +290,29 @@ def _render_front_page(home: Path, notebooks: Mapping[str, Any]) -> Sequence[str
 
 def _format_outcome(name: str, outcome: Mapping[str, Any]) -> dict[str, Any]:
     """The outcome of the notebook `name` as texts; an ordinary Python error where it is malformed."""
-    checks = [{part: str(check[part]) for part in ("kind", "name", "result")} for check in outcome["checks"]]
+    checks = [
+        {part: str(check[part]) for part in ("kind", "name", "result")}
+        for check in outcome["checks"]
+    ]
     for text, check in zip(checks, outcome["checks"], strict=True):
-        text |= {"passed": check["passed"], "value": format_value(check["value"]), "notebook": name}
+        text |= {
+            "passed": check["passed"],
+            "value": format_value(check["value"]),
+            "notebook": name,
+        }
         text["key"] = f"{name.split('_')[0]}: {text['name']}"
-    texts = {"status": str(outcome["status"]), "error": str(outcome.get("error", outcome["status"]))}
+    texts = {
+        "status": str(outcome["status"]),
+        "error": str(outcome.get("error", outcome["status"])),
+    }
     return {**texts, "seconds": f"{outcome['seconds']:.0f}", "checks": checks}
 
 
 def _find_question(notebook: Any) -> str:
     """The question in the first cell of a notebook."""
-    found = re.search(r"\*\*Question\.\*\*(.*?)(\n\n|\*\*|$)", notebook.cells[0].source, re.DOTALL)
+    found = re.search(
+        r"\*\*Question\.\*\*(.*?)(\n\n|\*\*|$)", notebook.cells[0].source, re.DOTALL
+    )
     return " ".join(found[1].replace("*", "").split()) if found else ""
 
 
@@ -250,21 +324,31 @@ def _show_zone(file: Path, speed: float, *, is_synthetic: bool) -> dict[str, Any
 
     zone = SocialZone.load(file)
     table = zone.table()
-    shown = table.filter(regex="^(speed|center_x|[ab](_low|_high)?|encounters|adequate|verdict)$")
-    texts: dict[str, Any] = {"method": zone.method, "table": shown.round(2).to_html(index=False, border=0)}
+    shown = table.filter(
+        regex="^(speed|center_x|[ab](_low|_high)?|encounters|adequate|verdict)$"
+    )
+    texts: dict[str, Any] = {
+        "method": zone.method,
+        "table": shown.round(2).to_html(index=False, border=0),
+    }
     if speed in zone.ellipses:
         figure, content = Figure(figsize=(4.8, 4.5), layout="constrained"), io.BytesIO()
         truth = PlazaSettings().true_zone(speed) if is_synthetic else None
         figures.plot_zone(zone, speed, truth=truth, ax=figure.subplots())
         figure.savefig(content, format="png", dpi=100)
-        texts |= {"picture": b64encode(content.getvalue()).decode(), "alt": figures.alt_text(figure)}
+        texts |= {
+            "picture": b64encode(content.getvalue()).decode(),
+            "alt": figures.alt_text(figure),
+        }
         texts |= {"size": table.set_index("speed").loc[speed].to_dict()}
     return texts
 
 
 def _find_player(title: str, outputs: Sequence[tuple[str, str]]) -> str:
     """The first player of the scenario with a `title` among the outputs; "" if there is none."""
-    return next((h for _, h in outputs if "szlib-player" in h and f'alt="{title}:' in h), "")
+    return next(
+        (h for _, h in outputs if "szlib-player" in h and f'alt="{title}:' in h), ""
+    )
 
 
 def _list_parameters(outputs: Sequence[tuple[str, str]]) -> dict[tuple[str, ...], str]:
@@ -273,7 +357,9 @@ def _list_parameters(outputs: Sequence[tuple[str, str]]) -> dict[tuple[str, ...]
     for name, html in outputs:
         if ">badge<" in html:
             for row in BeautifulSoup(html, "html.parser").select("tbody tr"):
-                rows.setdefault(tuple(cell.get_text(strip=True) for cell in row.select("td")), name)
+                rows.setdefault(
+                    tuple(cell.get_text(strip=True) for cell in row.select("td")), name
+                )
     return rows
 
 

@@ -12,7 +12,13 @@ import os
 import socket
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,7 +33,13 @@ from ..input_files import file_content, read_json_object
 from ..parallel import limit_jobs, safe_path, uninterrupted
 from ..tracks import datasets, funnels
 from . import folders
-from .kept_results import PRODUCTS, SUMMARIES, find_kept, outcome_checksum, package_checksum
+from .kept_results import (
+    PRODUCTS,
+    SUMMARIES,
+    find_kept,
+    outcome_checksum,
+    package_checksum,
+)
 from .notebook_execution import EMPTY_RECORD, end_kernels, execute_notebook
 from .record.data_cache import DataCache, describe_missing_data, read_stored_zone
 from .record.display import format_value
@@ -39,7 +51,8 @@ LONGEST = ("06", "25", "26")
 SUMMARY = "summary.json"  # file of the outcome of a run
 # Files that a process opens: a kernel, 70 to 90; this process for each kernel, about 15 (both measured).
 _FILES_OF_KERNEL, _FILES_OF_CLIENT = 96, 16
-_ADDRESSES = 2 * 10**9  # memory, mostly unused, that the imports of a process reserve (measured) [bytes]
+# memory, mostly unused, that the imports of a process reserve (measured) [bytes]
+_ADDRESSES = 2 * 10**9
 _POLL = 0.5  # longest wait before Ctrl-C is noticed, whichever thread receives it [s]
 
 
@@ -88,14 +101,23 @@ def run(
     jobs = max(limit_jobs(jobs, len(scripts)), 1)
     _require_limits(_FILES_OF_KERNEL + _FILES_OF_CLIENT * jobs)
     _require_loopback()
-    known = sorted({*scripts, *(s for s in folders.list_notebooks(place) if s.stem[:2] <= PRODUCERS[-1])})
+    known = sorted(
+        {
+            *scripts,
+            *(s for s in folders.list_notebooks(place) if s.stem[:2] <= PRODUCERS[-1]),
+        }
+    )
     given = check_parameters(parameters or {}, known)
-    results = folders.default_results(place) if out is None else folders.results_root(out)
+    results = (
+        folders.default_results(place) if out is None else folders.results_root(out)
+    )
     data = folders.absolute_data(data)
     home = folders.claim_results(results, data, given)
     with folder_lock(home), safe_path(), _private_temporary_files():
         files = DataCache(home, data, seed=given.get("seed", 0)).files()
-        if read_stored_zone(home / "zone.json") is None:  # missing, damaged or of another version
+        if (
+            read_stored_zone(home / "zone.json") is None
+        ):  # missing, damaged or of another version
             (home / "zone.json").unlink(missing_ok=True)
         contents = [[file.name, *file_content(file)] for file in files]
         source: dict[str, Any] = {"szlib": __version__, "data": datasets.label(data)}
@@ -104,23 +126,33 @@ def run(
         kept = [] if force else find_kept(home, scripts, stored, code, figures)
         due = [script for script in scripts if script.stem not in kept]
         names = [script.stem for script in due]
-        there = {script.stem for script in folders.list_notebooks(place)}.difference(names)
+        there = {script.stem for script in folders.list_notebooks(place)}.difference(
+            names
+        )
         outcomes = {name: each for name, each in stored.items() if name in there}
         write_file(home / folders.PARAMETERS, json.dumps(source, indent=1))
         if due:
             folders.remove_outputs(home, names)
             _store_unfinished(home, outcomes, names)
             variables = given | {"data": data, "results": str(results)}
-            for script, outcome in _execute_all(due, variables, home, jobs, client, figures):
+            for script, outcome in _execute_all(
+                due, variables, home, jobs, client, figures
+            ):
                 outcome["checksum"] = outcome_checksum(home, script, outcome, code)
                 outcomes[script.stem] = outcome
                 _store_unfinished(home, outcomes, names)
-        verdict = _judge(zone, source["files"], given) if (zone := home / "zone.json").exists() else ""
+        verdict = (
+            _judge(zone, source["files"], given)
+            if (zone := home / "zone.json").exists()
+            else ""
+        )
         if (samples := home / "encounters.parquet").exists():
             table = pd.read_parquet(samples, columns=[])
             source["warnings"] = funnels.warnings(funnels.get(table))
             source["area"] = "{area} {area_reason}".format_map(table.attrs).strip()
-            if not verdict and any(outcome["status"] == "undecided" for outcome in outcomes.values()):
+            if not verdict and any(
+                outcome["status"] == "undecided" for outcome in outcomes.values()
+            ):
                 verdict = f"undecided: {describe_missing_data(samples)}"
             if advice := table.attrs.get("advice"):
                 source["warnings"] += [] if verdict else [advice]
@@ -129,7 +161,10 @@ def run(
         text = json.dumps(_summarise(source, outcomes), indent=1)
         write_file(home / SUMMARY, text)
         if any((home / f"{name}.ipynb").exists() for name in outcomes):
-            _update_report(report := home / folders.REPORT, hashlib.sha256(text.encode()).hexdigest())
+            _update_report(
+                report := home / folders.REPORT,
+                hashlib.sha256(text.encode()).hexdigest(),
+            )
             source["report"] = str(report)
         chosen = {script.stem: outcomes[script.stem] for script in scripts}
         return _summarise(source | {"kept": kept}, chosen)
@@ -138,7 +173,8 @@ def run(
 def _update_report(file: Path, made_of: str) -> None:
     """Write the report again, unless the `file` is that of the summary with the checksum `made_of`."""
     if load_cached(file, made_of) is None:
-        from .report import write_report  # importing it takes longer than all other imports
+        # importing it takes longer than all other imports
+        from .report import write_report
 
         write_checksum(file, write_report(file.parent).read_bytes(), made_of)
 
@@ -146,7 +182,9 @@ def _update_report(file: Path, made_of: str) -> None:
 def _judge(file: Path, contents: Sequence[Any], parameters: Mapping[str, Any]) -> str:
     """The verdict on the zone in a `file`; "" if there is none that was made from data of `contents`."""
     zone = read_stored_zone(file)
-    if not zone or zone.provenance.get("source", {}).get("files") != json.loads(json.dumps(contents)):
+    if not zone or zone.provenance.get("source", {}).get("files") != json.loads(
+        json.dumps(contents)
+    ):
         return ""
     speed = float(parameters.get("zone_speed", METHOD_DEFAULTS["zone_speed"]))
     return f"zone at {speed:g} m/s: {zone.verdict(speed).sentence}"
@@ -200,19 +238,38 @@ def choose_notebooks(only: Iterable[str], place: Path | None = None) -> list[Pat
 
     Raises DataError for an unknown name, and if there are no notebooks.
     """
-    scripts, wanted = folders.list_notebooks(place or folders.find_notebooks()), list(only)
-    if unknown := [name for name in wanted if not any(folders.has_name(script, name) for script in scripts)]:
+    scripts, wanted = (
+        folders.list_notebooks(place or folders.find_notebooks()),
+        list(only),
+    )
+    if unknown := [
+        name
+        for name in wanted
+        if not any(folders.has_name(script, name) for script in scripts)
+    ]:
         raise DataError(
             f"no notebook {', '.join(unknown)}; there are {', '.join(script.stem for script in scripts)}"
         )
-    return [s for s in scripts if not wanted or any(folders.has_name(s, name) for name in wanted)]
+    return [
+        s
+        for s in scripts
+        if not wanted or any(folders.has_name(s, name) for name in wanted)
+    ]
 
 
 def _execute_all(
-    scripts: Sequence[Path], given: Mapping[str, Any], home: Path, jobs: int, client: Any, figures: str | None
+    scripts: Sequence[Path],
+    given: Mapping[str, Any],
+    home: Path,
+    jobs: int,
+    client: Any,
+    figures: str | None,
 ) -> Iterator[tuple[Path, dict[str, Any]]]:
     """Execute the notebooks; yield the script and the outcome of each when it has ended."""
-    environment = {folders.RUN_VARIABLE: str(home), folders.FIGURES_VARIABLE: figures or ""}
+    environment = {
+        folders.RUN_VARIABLE: str(home),
+        folders.FIGURES_VARIABLE: figures or "",
+    }
     if client is None:
         threads = max(1, (os.cpu_count() or 1) // jobs)
         environment |= {
@@ -228,11 +285,16 @@ def _execute_all(
                 break  # the later notebooks need its result
             arguments = (dict(given), str(home), environment)
             with uninterrupted():
-                futures[:] = [executor.submit(execute_notebook, str(script), *arguments) for script in batch]
+                futures[:] = [
+                    executor.submit(execute_notebook, str(script), *arguments)
+                    for script in batch
+                ]
             script_of = dict(zip(futures, batch, strict=True))
             running = set(futures)
             while running:
-                done, running = wait(running, timeout=_POLL, return_when=FIRST_COMPLETED)
+                done, running = wait(
+                    running, timeout=_POLL, return_when=FIRST_COMPLETED
+                )
                 for future in done:
                     name, outcome = future.result()
                     ended.add(script := script_of[future])
@@ -253,14 +315,22 @@ def split_batches(scripts: Sequence[Path]) -> list[list[Path]]:
     for script in sorted(scripts, key=lambda script: script.stem[:2] not in LONGEST):
         number = script.stem[:2]
         last = number in SUMMARIES
-        batches[-1 if last else sum(number > producer for producer in PRODUCERS)].append(script)
+        batches[
+            -1 if last else sum(number > producer for producer in PRODUCERS)
+        ].append(script)
     return batches
 
 
 @contextmanager
-def _open_executor(client: Any, jobs: int, futures: Sequence[Future[Any]]) -> Iterator[Executor]:
+def _open_executor(
+    client: Any, jobs: int, futures: Sequence[Future[Any]]
+) -> Iterator[Executor]:
     """The workers of a Dask `client`, or threads that wait for kernels; an interruption ends `futures`."""
-    with client.get_executor(pure=False) if client else ThreadPoolExecutor(jobs) as executor:
+    with (
+        client.get_executor(pure=False)
+        if client
+        else ThreadPoolExecutor(jobs) as executor
+    ):
         try:
             yield executor
         except BaseException:
@@ -269,7 +339,9 @@ def _open_executor(client: Any, jobs: int, futures: Sequence[Future[Any]]) -> It
             raise
 
 
-def _store_unfinished(home: Path, outcomes: Mapping[str, Any], names: Sequence[str]) -> None:
+def _store_unfinished(
+    home: Path, outcomes: Mapping[str, Any], names: Sequence[str]
+) -> None:
     """Write the `outcomes` that there are as a summary that has not passed; `names` are of all that run."""
     if not outcomes:
         (home / SUMMARY).unlink(missing_ok=True)
@@ -279,16 +351,22 @@ def _store_unfinished(home: Path, outcomes: Mapping[str, Any], names: Sequence[s
     write_file(home / SUMMARY, json.dumps(unfinished, indent=1), durable=False)
 
 
-def _stored_outcomes(home: Path, source: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def _stored_outcomes(
+    home: Path, source: Mapping[str, Any]
+) -> dict[str, dict[str, Any]]:
     """The outcomes in the summary of an earlier run of the same `source`: version, data and parameters."""
-    is_same = read_json_object(home / folders.PARAMETERS) == json.loads(json.dumps(source))
+    is_same = read_json_object(home / folders.PARAMETERS) == json.loads(
+        json.dumps(source)
+    )
     stored = read_json_object(home / SUMMARY).get("notebooks") if is_same else None
     outcomes = stored.items() if isinstance(stored, dict) else ()
     whole = ((name, each) for name, each in outcomes if isinstance(each, dict))
     return {name: each for name, each in whole if each.keys() >= EMPTY_RECORD.keys()}
 
 
-def _summarise(source: Mapping[str, Any], notebooks: Mapping[str, Any]) -> dict[str, Any]:
+def _summarise(
+    source: Mapping[str, Any], notebooks: Mapping[str, Any]
+) -> dict[str, Any]:
     passed = all(has_passed(outcome) for outcome in notebooks.values())
     return {**source, "passed": passed, "notebooks": dict(sorted(notebooks.items()))}
 
@@ -296,32 +374,56 @@ def _summarise(source: Mapping[str, Any], notebooks: Mapping[str, Any]) -> dict[
 def has_passed(outcome: Mapping[str, Any]) -> bool:
     """Whether a notebook with this `outcome` has finished or is undecided, and none of its checks failed."""
     is_over = outcome["status"] in ("done", "undecided")
-    return is_over and all(c["passed"] for c in outcome["checks"] if c["kind"] == "check")
+    return is_over and all(
+        c["passed"] for c in outcome["checks"] if c["kind"] == "check"
+    )
 
 
 def format_summary(summary: Mapping[str, Any]) -> str:
     """Format the `summary` of a run: a row for each notebook, each result that does not hold, the verdict."""
     rows, notes = list_results(summary)
-    table = [f"{row[0]:<24} {row[1]:>7} {row[2]:>11} {row[3]:>9}  {row[4]}" for row in rows]
+    table = [
+        f"{row[0]:<24} {row[1]:>7} {row[2]:>11} {row[3]:>9}  {row[4]}" for row in rows
+    ]
     return "\n".join([*table, *notes])
 
 
 def list_results(summary: Mapping[str, Any]) -> tuple[list[tuple[str, ...]], list[str]]:
     """List rows of a table of the `summary` of a run, the first its head, and notes, the last its result."""
-    rows: list[tuple[str, ...]] = [("notebook", "seconds", "checks", "observed", "key figures")]
+    rows: list[tuple[str, ...]] = [
+        ("notebook", "seconds", "checks", "observed", "key figures")
+    ]
     notes = []
     for name, outcome in summary["notebooks"].items():
         done = outcome["status"] == "done"
         held = [_count_passed(outcome, kind) for kind in ("check", "observation")]
-        key = ", ".join(f"{k} {format_value(v)}" for k, v in outcome["key_figures"].items())
-        rows.append((name, f"{outcome['seconds']:.1f}", held[0] if done else outcome["status"], held[1], key))
+        key = ", ".join(
+            f"{k} {format_value(v)}" for k, v in outcome["key_figures"].items()
+        )
+        rows.append(
+            (
+                name,
+                f"{outcome['seconds']:.1f}",
+                held[0] if done else outcome["status"],
+                held[1],
+                key,
+            )
+        )
         notes += [
-            f"{name}: {c['name']}: {c['result']} ({c['value']})" for c in outcome["checks"] if not c["passed"]
+            f"{name}: {c['name']}: {c['result']} ({c['value']})"
+            for c in outcome["checks"]
+            if not c["passed"]
         ]
         if "error" in outcome and outcome["status"] != "undecided":
             notes.append(f"{name}: {outcome['error']}")
-    undecided = [name for name, n in summary["notebooks"].items() if n["status"] == "undecided"]
-    notes += [f"not decidable on this data, see the report: {', '.join(undecided)}"] if undecided else []
+    undecided = [
+        name for name, n in summary["notebooks"].items() if n["status"] == "undecided"
+    ]
+    notes += (
+        [f"not decidable on this data, see the report: {', '.join(undecided)}"]
+        if undecided
+        else []
+    )
     notes += [f"data: {text}" for text in summary.get("warnings", ())]
     notes += [f"area: {summary['area']}"] if "area" in summary else []
     if n_kept := len(summary.get("kept", ())):

@@ -25,7 +25,10 @@ sensitivity           the zone with each parameter of the method varied alone
 
 from .costmaps import Grid, draw_costmap
 from .ellipses import BODY_RADIUS, Ellipse, circle_around
-from .enclosing_ellipse import minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
+from .enclosing_ellipse import (
+    minimum_enclosing_ellipse,
+    minimum_enclosing_ellipse_of_curve,
+)
 from .hulls import HullZone, hull_vertices, slice_hull
 from .imposed_zone import PairedSamples, impose_zone
 from .occupancy import PairCorrelation, pair_correlation

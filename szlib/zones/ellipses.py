@@ -58,12 +58,16 @@ class Ellipse:
         center = (float(self.center[0]), float(self.center[1]))
         a, b = (float(axis) for axis in self.semi_axes)
         if not np.all(np.isfinite([*center, a, b, self.angle])):
-            raise ZoneError(f"an ellipse needs finite numbers; got {self.center}, {(a, b)}, {self.angle}")
+            raise ZoneError(
+                f"an ellipse needs finite numbers; got {self.center}, {(a, b)}, {self.angle}"
+            )
         if not a >= b > 0:
             raise ZoneError(f"semi-axes must satisfy a >= b > 0; got a = {a}, b = {b}")
         object.__setattr__(self, "center", center)
         object.__setattr__(self, "semi_axes", (a, b))
-        object.__setattr__(self, "angle", float(np.pi / 2 - (np.pi / 2 - self.angle) % np.pi))
+        object.__setattr__(
+            self, "angle", float(np.pi / 2 - (np.pi / 2 - self.angle) % np.pi)
+        )
 
     @property
     def area(self) -> float:
@@ -84,14 +88,22 @@ class Ellipse:
 
     def level(self, points: ArrayLike) -> Array:
         """Left side of the ellipse equation at `points` (..., 2) [m]: 1 on the curve, less inside."""
-        d, cosine, sine = np.asarray(points, float) - self.center, np.cos(self.angle), np.sin(self.angle)
+        d, cosine, sine = (
+            np.asarray(points, float) - self.center,
+            np.cos(self.angle),
+            np.sin(self.angle),
+        )
         u = (d[..., 0] * cosine + d[..., 1] * sine) / self.semi_axes[0]
         v = (d[..., 1] * cosine - d[..., 0] * sine) / self.semi_axes[1]
         return np.asarray(u**2 + v**2)
 
     def curve(self, n: int = 200) -> Array:
         """`n` points on the curve, shape (n, 2) [m]; the last repeats the first."""
-        phi, cosine, sine = np.linspace(0, 2 * np.pi, n), np.cos(self.angle), np.sin(self.angle)
+        phi, cosine, sine = (
+            np.linspace(0, 2 * np.pi, n),
+            np.cos(self.angle),
+            np.sin(self.angle),
+        )
         u, v = self.semi_axes[0] * np.cos(phi), self.semi_axes[1] * np.sin(phi)
         x, y = self.center
         return np.stack([x + u * cosine - v * sine, y + u * sine + v * cosine], axis=-1)
@@ -142,7 +154,9 @@ def circle_around(zone: Ellipse) -> Ellipse:
 
 
 @lru_cache(maxsize=256)
-def _greatest_distance(center: tuple[float, float], semi_axes: tuple[float, float], angle: float) -> float:
+def _greatest_distance(
+    center: tuple[float, float], semi_axes: tuple[float, float], angle: float
+) -> float:
     """Greatest distance from the origin to an ellipse [m], by bisection."""
     (m, n), (a, b) = center, semi_axes
     c, s = cos(angle), sin(angle)

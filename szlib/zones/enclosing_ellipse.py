@@ -18,19 +18,26 @@ from ..checks import Array
 from ..errors import ZoneError
 from .ellipses import Ellipse
 
-Curve = Callable[[Array], Array]  # a closed curve: angles (n,) [rad] to points (n, 2) [m]
+# a closed curve: angles (n,) [rad] to points (n, 2) [m]
+Curve = Callable[[Array], Array]
 
 _MIN_WIDTH = 1e-9  # width over length below which points count as collinear (a choice, far from any zone)
-_POINT_TOLERANCE, _CURVE_TOLERANCE = 1e-13, 1e-12  # excess of the level that counts as rounding
-_FULL_STEP, _CONVERGED = 0.25, 1e-8  # Newton decrements: each is below the square of the last
+# excess of the level that counts as rounding
+_POINT_TOLERANCE, _CURVE_TOLERANCE = (1e-13, 1e-12)
+# Newton decrements: each is below the square of the last
+_FULL_STEP, _CONVERGED = (0.25, 1e-8)
 _TINY, _SQRT2 = 1e-15, np.sqrt(2)  # smaller singular values count as zero
-_TARGET = np.array([-2.0, 1.0, 1.0, 0.0, 0.0, 0.0])  # I - 3 e1 e1^T: gradients of log det M and 3 sum w
+# I - 3 e1 e1^T: gradients of log det M and 3 sum w
+_TARGET = np.array([-2.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 _ARC_SAMPLES = 25  # nodes of an arc; on an arc of a zone the level has one or two peaks
-_ZOOM, _N_ZOOMS = 8, 9  # each zoom makes a bracket 8 times smaller: 8^-9 < sqrt(machine precision)
+# each zoom makes a bracket 8 times smaller: 8^-9 < sqrt(machine precision)
+_ZOOM, _N_ZOOMS = (8, 9)
 _MAX_ROUNDS = 50  # exchanges with a curve; a smooth curve needs about six
 
 
-def minimum_enclosing_ellipse(points: ArrayLike, *, start: Sequence[int] = ()) -> Ellipse:
+def minimum_enclosing_ellipse(
+    points: ArrayLike, *, start: Sequence[int] = ()
+) -> Ellipse:
     """Find the smallest-area ellipse that encloses all points, exact up to rounding (paper, sec. 2).
 
     Parameters
@@ -96,9 +103,14 @@ def minimum_enclosing_ellipse_of_curve(curve: Curve, breaks: ArrayLike = ()) -> 
     """
     corners = np.asarray(breaks, float)
     if corners.ndim != 1 or not np.all(np.isfinite(corners)):
-        raise ZoneError(f"breaks must be finite angles of shape (k,) [rad]; got {breaks!r}")
-    ends = np.unique([*corners % (2 * np.pi), *np.linspace(0, 2 * np.pi, 9)])  # no arc above 45 degrees
-    nodes = (1 - np.cos(np.linspace(0, np.pi, _ARC_SAMPLES))) / 2  # denser towards the corners
+        raise ZoneError(
+            f"breaks must be finite angles of shape (k,) [rad]; got {breaks!r}"
+        )
+    # no arc above 45 degrees
+    ends = np.unique([*corners % (2 * np.pi), *np.linspace(0, 2 * np.pi, 9)])
+    nodes = (
+        1 - np.cos(np.linspace(0, np.pi, _ARC_SAMPLES))
+    ) / 2  # denser towards the corners
     angles = ends[:-1, None] + np.diff(ends)[:, None] * nodes
     samples = _evaluate(curve, angles)
     points: Array = samples.reshape(-1, 2)
@@ -111,8 +123,14 @@ def minimum_enclosing_ellipse_of_curve(curve: Curve, breaks: ArrayLike = ()) -> 
         if np.max(excess, initial=0) <= _CURVE_TOLERANCE:
             return _scale_to_contain(ellipse, np.vstack([points, peak_points]))
         outside = excess > 0
-        finer = spacing[outside] / float(_ZOOM) ** number * np.linspace(-1, 1, 4 * _ZOOM + 1)[:, None]
-        points = np.vstack([points, peak_points, _evaluate(curve, (peaks[outside] + finer).ravel())])
+        finer = (
+            spacing[outside]
+            / float(_ZOOM) ** number
+            * np.linspace(-1, 1, 4 * _ZOOM + 1)[:, None]
+        )
+        points = np.vstack(
+            [points, peak_points, _evaluate(curve, (peaks[outside] + finer).ravel())]
+        )
     raise ZoneError(
         f"after {_MAX_ROUNDS} rounds the curve still leaves its ellipse, by {np.max(excess):.1e} in level; "
         "the curve must be smooth between its breaks: list every corner in `breaks`"
@@ -132,23 +150,33 @@ def check_points(points: ArrayLike, columns: str, min_points: int) -> Array:
     try:
         array = np.asarray(points, float)
     except (TypeError, ValueError) as error:
-        raise ZoneError(f"points must be numbers, one row ({columns}) for each point: {error}") from error
+        raise ZoneError(
+            f"points must be numbers, one row ({columns}) for each point: {error}"
+        ) from error
     if array.ndim != 2 or array.shape[1] != size or len(array) < min_points:
         raise ZoneError(
             f"points must have shape (n, {size}), n >= {min_points}, one row ({columns}) each; "
             f"got {array.shape}; add data"
         )
     for i in np.flatnonzero(~np.all(np.isfinite(array), axis=1))[:1]:
-        raise ZoneError(f"points must be finite; point {i} is {array[i].tolist()}: drop or repair it")
+        raise ZoneError(
+            f"points must be finite; point {i} is {array[i].tolist()}: drop or repair it"
+        )
     return array
 
 
-def _enclose(points: Array, support: list[int] | None = None) -> tuple[Ellipse, list[int]]:
+def _enclose(
+    points: Array, support: list[int] | None = None
+) -> tuple[Ellipse, list[int]]:
     """The smallest ellipse around checked points, and its support; the search starts at `support`."""
     triangle = _find_large_triangle(points)
     origin = points[triangle[0]]
-    frame = (points[triangle[1:]] - origin).T  # affine coordinates: no point set is thin or far away
-    q = np.column_stack([np.ones(len(points)), np.linalg.solve(frame, (points - origin).T).T])
+    frame = (
+        points[triangle[1:]] - origin
+    ).T  # affine coordinates: no point set is thin or far away
+    q = np.column_stack(
+        [np.ones(len(points)), np.linalg.solve(frame, (points - origin).T).T]
+    )
     active = support or triangle
     weights = np.full(len(active), 1 / len(active))
     seen: set[frozenset[int]] = set()
@@ -164,7 +192,9 @@ def _enclose(points: Array, support: list[int] | None = None) -> tuple[Ellipse, 
         active, weights = [*support, farthest], np.append(weights, 0.0)
     axes, semi_axes, _ = np.linalg.svd(np.sqrt(2) * frame @ root[1:, 1:])
     center, angle = origin + frame @ root[1:, 0], np.arctan2(axes[1, 0], axes[0, 0])
-    ellipse = Ellipse((center[0], center[1]), (semi_axes[0], semi_axes[1]), angle, points[support])
+    ellipse = Ellipse(
+        (center[0], center[1]), (semi_axes[0], semi_axes[1]), angle, points[support]
+    )
     return _scale_to_contain(ellipse, points), support
 
 
@@ -173,13 +203,16 @@ def _find_large_triangle(points: Array) -> list[int]:
     along = points[:, np.argmax(np.ptp(points, axis=0))]
     first, last = int(np.argmin(along)), int(np.argmax(along))
     edge, offset = points[last] - points[first], points - points[first]
-    doubled = np.abs(offset[:, 0] * edge[1] - offset[:, 1] * edge[0])  # areas of the triangles
+    # areas of the triangles
+    doubled = np.abs(offset[:, 0] * edge[1] - offset[:, 1] * edge[0])
     apex, length = int(np.argmax(doubled)), np.hypot(*edge)
     rounding = 64 * np.finfo(float).eps * np.max(np.abs(points))
     if doubled[apex] > length * max(_MIN_WIDTH * length, rounding):
         return [first, last, apex]
     if (distinct := len(np.unique(points, axis=0))) < 3:
-        raise ZoneError(f"an ellipse needs at least 3 distinct points; got {distinct}: add points")
+        raise ZoneError(
+            f"an ellipse needs at least 3 distinct points; got {distinct}: add points"
+        )
     raise ZoneError(
         f"the {distinct} distinct points lie on a line: {length:.3g} m long and at most "
         f"{doubled[apex] / length:.1e} m wide, expected a width above {_MIN_WIDTH:g} of the length and above "
@@ -205,7 +238,9 @@ def _maximise_determinant(q: Array, weights: Array) -> tuple[NDArray[np.intp], A
     while True:
         root = _root(q[rows], weights)
         x, y, z = np.linalg.solve(root, q[rows].T)
-        r = np.stack([x * x, y * y, z * z, _SQRT2 * x * y, _SQRT2 * x * z, _SQRT2 * y * z])
+        r = np.stack(
+            [x * x, y * y, z * z, _SQRT2 * x * y, _SQRT2 * x * z, _SQRT2 * y * z]
+        )
         left, singular, right = np.linalg.svd(r, full_matrices=False)
         target = left.T @ _TARGET
         step = right.T @ (target / np.maximum(singular, _TINY))
@@ -219,7 +254,9 @@ def _maximise_determinant(q: Array, weights: Array) -> tuple[NDArray[np.intp], A
         if not is_complete:
             rows, weights = np.delete(rows, dropped), np.delete(weights, dropped)
         weights /= np.sum(weights)
-        if is_complete and (decrement < _CONVERGED or last <= decrement < _FULL_STEP):  # or rounding
+        if is_complete and (
+            decrement < _CONVERGED or last <= decrement < _FULL_STEP
+        ):  # or rounding
             return rows, weights
         last = decrement if is_complete else float("inf")
 
@@ -235,13 +272,19 @@ def _evaluate(curve: Curve, angles: Array) -> Array:
     """Points of the curve at angles (...), shape (..., 2)."""
     points = np.asarray(curve(angles.ravel()), float)
     if points.shape != (angles.size, 2):
-        raise ZoneError(f"curve must give points (n, 2); got {points.shape} for n = {angles.size} angles")
+        raise ZoneError(
+            f"curve must give points (n, 2); got {points.shape} for n = {angles.size} angles"
+        )
     for i in np.flatnonzero(~np.all(np.isfinite(points), axis=1))[:1]:
-        raise ZoneError(f"the curve must be finite; at {angles.ravel()[i]} rad it is {points[i].tolist()}")
+        raise ZoneError(
+            f"the curve must be finite; at {angles.ravel()[i]} rad it is {points[i].tolist()}"
+        )
     return points.reshape(*angles.shape, 2)
 
 
-def _find_peaks(ellipse: Ellipse, curve: Curve, angles: Array, samples: Array) -> tuple[Array, Array]:
+def _find_peaks(
+    ellipse: Ellipse, curve: Curve, angles: Array, samples: Array
+) -> tuple[Array, Array]:
     """Angles (k,) of the peaks of the level that may exceed 1, and the spacing (k,) of the samples there.
 
     `samples` has the shape (arcs, nodes, 2). A parabola exceeds the highest of three samples by less than
@@ -254,7 +297,10 @@ def _find_peaks(ellipse: Ellipse, curve: Curve, angles: Array, samples: Array) -
     grid, rows, last = angles[arc], np.arange(len(arc)), angles.shape[1] - 1
     spacing = np.max(np.diff(grid, axis=1), axis=1)
     for _ in range(_N_ZOOMS):
-        low, high = grid[rows, np.maximum(best - 1, 0)], grid[rows, np.minimum(best + 1, last)]
+        low, high = (
+            grid[rows, np.maximum(best - 1, 0)],
+            grid[rows, np.minimum(best + 1, last)],
+        )
         grid, last = np.linspace(low, high, 2 * _ZOOM + 1, axis=1), 2 * _ZOOM
         best = np.argmax(ellipse.level(_evaluate(curve, grid)), axis=1)
     return grid[rows, best], spacing

@@ -64,7 +64,9 @@ class Estimator(ABC):
         Ellipses (k, s, 5): centre, semi-axes [m] and angle [rad]; NaN where there is no zone.
         """
 
-    def draw_posterior(self, n: int, speeds: Sequence[float], rng: np.random.Generator) -> Array | None:
+    def draw_posterior(
+        self, n: int, speeds: Sequence[float], rng: np.random.Generator
+    ) -> Array | None:
         """Draw `n` ellipses at `speeds` with `rng` from the posterior, as in `refit`; None: it has none."""
         return None
 

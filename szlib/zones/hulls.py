@@ -25,7 +25,11 @@ from ..checks import Array
 from ..errors import ZoneError
 from ..tracks import funnels
 from .ellipses import Ellipse, unit_vectors
-from .enclosing_ellipse import check_points, minimum_enclosing_ellipse, minimum_enclosing_ellipse_of_curve
+from .enclosing_ellipse import (
+    check_points,
+    minimum_enclosing_ellipse,
+    minimum_enclosing_ellipse_of_curve,
+)
 from .estimators import Estimator
 from .outliers import complementary_points, encounter_numbers, remove_outliers
 from .polar import DIRECTIONS, missing_directions_error
@@ -82,7 +86,9 @@ class Slice:
     def __post_init__(self) -> None:
         if (self._edges()[1] <= 0).any():  # the origin is outside the polygon
             away = self.polygon[np.hypot(*self.polygon.T) > 0]
-            raise missing_directions_error(self.speed, np.sort(np.arctan2(away[:, 1], away[:, 0])))
+            raise missing_directions_error(
+                self.speed, np.sort(np.arctan2(away[:, 1], away[:, 0]))
+            )
 
     @property
     def corner_angles(self) -> Array:
@@ -93,17 +99,24 @@ class Slice:
         """R'(theta), the distance from the origin to the polygon's edge; same shape as `theta` [m]."""
         normals, offsets = self._edges()
         theta = np.asarray(theta, float)
-        along = np.cos(theta)[..., None] * normals[:, 0] + np.sin(theta)[..., None] * normals[:, 1]
+        along = (
+            np.cos(theta)[..., None] * normals[:, 0]
+            + np.sin(theta)[..., None] * normals[:, 1]
+        )
         return _reach(along, offsets)
 
     def boundary(self, theta: ArrayLike) -> Array:
         """Boundary of the zone in the directions `theta` (...) [rad], in the person's frame, (..., 2) [m]."""
-        return np.asarray((self.r_max - self.reach(theta))[..., None] * unit_vectors(theta))
+        return np.asarray(
+            (self.r_max - self.reach(theta))[..., None] * unit_vectors(theta)
+        )
 
     def _edges(self) -> tuple[Array, Array]:
         """Outward unit normals (k, 2) and distances from the origin (k,) of the polygon's edges."""
         along = np.roll(self.polygon, -1, axis=0) - self.polygon
-        normals = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
+        normals = (
+            np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
+        )
         return normals, np.einsum("ij,ij->i", normals, self.polygon)
 
 
@@ -194,7 +207,9 @@ class HullZone:
     def ellipse(self, speed: float) -> Ellipse:
         """The smallest ellipse around the boundary at a `speed` [m/s]; ZoneError if it is undefined."""
         section = self.slice(speed)
-        return minimum_enclosing_ellipse_of_curve(section.boundary, section.corner_angles)
+        return minimum_enclosing_ellipse_of_curve(
+            section.boundary, section.corner_angles
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -237,7 +252,12 @@ class HullEstimator(Estimator):
         speed = inliers["speed"].to_numpy(float)
         points = np.column_stack([complementary_points(inliers, r_max=r_max), speed])
         n_vertices = len(hull_vertices(points))
-        stage = funnels.stage("hull", len(points), n_vertices, {"inside the hull": len(points) - n_vertices})
+        stage = funnels.stage(
+            "hull",
+            len(points),
+            n_vertices,
+            {"inside the hull": len(points) - n_vertices},
+        )
         number, encounters = encounter_numbers(inliers)
         return cls(
             points=points,
@@ -263,12 +283,22 @@ class HullEstimator(Estimator):
         start: dict[int, list[int]] = {}
         for i, weight in enumerate(weights):
             with suppress(ZoneError):
-                reach = _hull_reach(_convex_hull(self.points[weight[self.number] > 0]), unit, speeds)
+                reach = _hull_reach(
+                    _convex_hull(self.points[weight[self.number] > 0]), unit, speeds
+                )
                 for j in map(int, np.flatnonzero(np.isfinite(reach).all(axis=1))):
                     boundary = (self.r_max - reach[j])[:, None] * unit
-                    ellipse = minimum_enclosing_ellipse(boundary, start=start.get(j, []))
-                    ellipses[i, j] = [*ellipse.center, *ellipse.semi_axes, ellipse.angle]
-                    is_support = (boundary[:, None] == ellipse.support).all(axis=-1).any(axis=1)
+                    ellipse = minimum_enclosing_ellipse(
+                        boundary, start=start.get(j, [])
+                    )
+                    ellipses[i, j] = [
+                        *ellipse.center,
+                        *ellipse.semi_axes,
+                        ellipse.angle,
+                    ]
+                    is_support = (
+                        (boundary[:, None] == ellipse.support).all(axis=-1).any(axis=1)
+                    )
                     start[j] = np.flatnonzero(is_support).tolist()
         return ellipses
 
@@ -296,7 +326,9 @@ def _reach(along: Array, offsets: Array) -> Array:
     `along` (..., edges) are the cosines of directions with the normals of edges, which are at `offsets`.
     """
     ahead = along > 0
-    return np.asarray(np.min(np.where(ahead, offsets / np.where(ahead, along, 1.0), np.inf), axis=-1))
+    return np.asarray(
+        np.min(np.where(ahead, offsets / np.where(ahead, along, 1.0), np.inf), axis=-1)
+    )
 
 
 def _hull_reach(hull: ConvexHull, unit: Array, speeds: Sequence[float]) -> Array:

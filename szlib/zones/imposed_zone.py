@@ -75,7 +75,9 @@ def impose_zone(
     """
     shifted = time_shifted(tracks, seed=seed, minutes=minutes)
     samples = find_encounters(shifted, settings=settings, kinds=kinds, **parameters)
-    return PairedSamples.from_samples(samples).impose(ellipse, careless=careless, seed=seed)
+    return PairedSamples.from_samples(samples).impose(
+        ellipse, careless=careless, seed=seed
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,15 +102,23 @@ class PairedSamples:
         if len(samples):
             check_columns(samples, SAMPLE_COLUMNS)
         views = [
-            samples["distance"] * np.exp(1j * samples[angle].where(samples[speed] >= WALKING))
-            for angle, speed in (("los_angle", "speed"), ("other_los_angle", "other_speed"))
+            samples["distance"]
+            * np.exp(1j * samples[angle].where(samples[speed] >= WALKING))
+            for angle, speed in (
+                ("los_angle", "speed"),
+                ("other_los_angle", "other_speed"),
+            )
         ]
-        points = np.array([np.column_stack([np.real(view), np.imag(view)]) for view in views])
+        points = np.array(
+            [np.column_stack([np.real(view), np.imag(view)]) for view in views]
+        )
         return cls(samples, pair_numbers(samples), points)
 
     def pairs_inside(self, ellipse: Ellipse) -> NDArray[np.bool_]:
         """Whether, at any sample of each pair, one person is inside the other's `ellipse`; (pairs,)."""
-        require(isinstance(ellipse, Ellipse), "ellipse", ellipse, "an Ellipse", ZoneError)
+        require(
+            isinstance(ellipse, Ellipse), "ellipse", ellipse, "an Ellipse", ZoneError
+        )
         inside = np.zeros(int(self.pair.max(initial=-1)) + 1, bool)
         inside[self.pair[(ellipse.level(self.points) < 1).any(axis=0)]] = True
         return inside
@@ -123,7 +133,8 @@ class PairedSamples:
         """
         require(0 <= careless <= 1, "careless", careless, "a share of pairs, 0 to 1")
         inside = self.pairs_inside(ellipse)
-        rng = np.random.default_rng([*np.atleast_1d(seed), 1])  # not the numbers of the time shifts
+        # not the numbers of the time shifts
+        rng = np.random.default_rng([*np.atleast_1d(seed), 1])
         removed = inside & (rng.random(len(inside)) >= careless)
         kept = self.samples[~removed[self.pair]].copy()
         before, after = (table["encounter"].nunique() for table in (self.samples, kept))

@@ -13,7 +13,8 @@ from ..encounters.null_model import NullEncounters
 from ..errors import ZoneError
 
 _N_DISTANCES, _N_DIRECTIONS = 80, 36
-_BLUR = (15.0, 0.1)  # standard deviations of the Gaussians that smooth the map of g [deg, m]
+# standard deviations of the Gaussians that smooth the map of g [deg, m]
+_BLUR = (15.0, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,9 @@ def pair_correlation(samples: pd.DataFrame, null: NullEncounters) -> PairCorrela
     """
     check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
     if len(null.encounters) == 0:
-        raise ZoneError("the null model has no encounter: nothing to compare; use more shifts")
+        raise ZoneError(
+            "the null model has no encounter: nothing to compare; use more shifts"
+        )
     real = _smooth_density(samples, samples["encounter"].nunique(), null.r_max)
     model = _smooth_density(null.samples, len(null.encounters), null.r_max)
     g = np.divide(real, model, out=np.full(real.shape, np.nan), where=model > 0)
@@ -73,9 +76,14 @@ def pair_correlation(samples: pd.DataFrame, null: NullEncounters) -> PairCorrela
 
 def _smooth_density(samples: pd.DataFrame, n_encounters: int, r_max: float) -> Array:
     """Smoothed samples per encounter within `r_max` [m], by direction (from 0 rad on) and distance."""
-    ranges = [(0, 2 * np.pi), (0, np.nextafter(r_max, 0))]  # the last bin holds its upper end
+    # the last bin holds its upper end
+    ranges = [(0, 2 * np.pi), (0, np.nextafter(r_max, 0))]
     turn = np.mod(samples["los_angle"].to_numpy(float), 2 * np.pi)
     bins = (_N_DIRECTIONS, _N_DISTANCES)
-    counts = np.histogram2d(turn, samples["distance"].to_numpy(float), bins=bins, range=ranges)[0]
+    counts = np.histogram2d(
+        turn, samples["distance"].to_numpy(float), bins=bins, range=ranges
+    )[0]
     blur = np.divide(_BLUR, (360 / _N_DIRECTIONS, r_max / _N_DISTANCES))
-    return np.asarray(gaussian_filter(counts / n_encounters, blur, mode=("wrap", "nearest")))
+    return np.asarray(
+        gaussian_filter(counts / n_encounters, blur, mode=("wrap", "nearest"))
+    )

@@ -52,7 +52,10 @@ def complementary_points(samples: pd.DataFrame, *, r_max: float = R_MAX) -> Arra
     [[1.5, 0.0]]
     """
     check_columns(samples, ["los_angle", "distance"])
-    angle, distance = samples["los_angle"].to_numpy(float), samples["distance"].to_numpy(float)
+    angle, distance = (
+        samples["los_angle"].to_numpy(float),
+        samples["distance"].to_numpy(float),
+    )
     is_valid = np.isfinite(angle) & (distance >= 0) & (distance <= r_max)
     expected = f"expected 0 <= distance <= r_max = {r_max} m and a finite los_angle"
     check_rows(samples, is_valid, ["los_angle", "distance"], expected)
@@ -89,14 +92,18 @@ def pair_numbers(samples: pd.DataFrame) -> NDArray[np.intp]:
     people = np.sort(samples[["ref_id", "other_id"]].to_numpy(), axis=1)
     day = samples["day"].to_numpy() if "day" in samples else 0
     table = pd.DataFrame({"day": day, "one": people[:, 0], "two": people[:, 1]})
-    return np.asarray(table.groupby([*table], observed=True, dropna=False).ngroup(), np.intp)
+    return np.asarray(
+        table.groupby([*table], observed=True, dropna=False).ngroup(), np.intp
+    )
 
 
 def nearest_approaches(samples: pd.DataFrame) -> pd.DataFrame:
     """The nearest of the `samples` of each encounter (see `encounter_numbers`), one row for each."""
     check_columns(samples, ["los_angle", "distance"])
     number = encounter_numbers(samples)[0]
-    order = np.lexsort((samples["los_angle"].to_numpy(), samples["distance"].to_numpy(), number))
+    order = np.lexsort(
+        (samples["los_angle"].to_numpy(), samples["distance"].to_numpy(), number)
+    )
     return samples.iloc[order[np.r_[True, np.diff(number[order]) > 0]]]
 
 
@@ -161,10 +168,17 @@ def is_outlier(
     n_samples = len(complementary_points(samples, r_max=r_max))
     if fraction is None:
         nearest = nearest_approaches(samples)
-        places, place = np.unique(_features(nearest, r_max, speed_scale), axis=0, return_inverse=True)
+        places, place = np.unique(
+            _features(nearest, r_max, speed_scale), axis=0, return_inverse=True
+        )
         is_far = _find_far(places, n_neighbours)[place.ravel()]
         return np.asarray(is_far[encounter_numbers(samples)[0]])
-    require(0 <= fraction <= 0.5, "fraction", fraction, "within [0, 0.5], or None to judge whole encounters")
+    require(
+        0 <= fraction <= 0.5,
+        "fraction",
+        fraction,
+        "within [0, 0.5], or None to judge whole encounters",
+    )
     if fraction == 0:
         return np.zeros(n_samples, bool)
     n_neighbours = N_NEIGHBOURS if n_neighbours is None else n_neighbours
@@ -202,17 +216,30 @@ def remove_outliers(
     """
     require(0 < r_max < np.inf, "r_max", r_max, "a positive distance in metres")
     check_columns(samples, ["los_angle", "distance"])
-    check_rows(samples, samples["distance"].notna(), ["distance"], "expected a distance; drop the row")
+    check_rows(
+        samples,
+        samples["distance"].notna(),
+        ["distance"],
+        "expected a distance; drop the row",
+    )
     near = is_close(samples["distance"].to_numpy(float), r_max)
     close = funnels.select(samples, near, "samples: close", f"farther than {r_max} m")
     outlier = is_outlier(
-        close, fraction=fraction, r_max=r_max, n_neighbours=n_neighbours, speed_scale=speed_scale
+        close,
+        fraction=fraction,
+        r_max=r_max,
+        n_neighbours=n_neighbours,
+        speed_scale=speed_scale,
     )
-    reason = "outlier (LOF)" if fraction is not None else "of an outlying encounter (LOF)"
+    reason = (
+        "outlier (LOF)" if fraction is not None else "of an outlying encounter (LOF)"
+    )
     return funnels.select(close, ~outlier, "samples: inliers", reason)
 
 
-def _fit_factors(points: Array, n_neighbours: int, fraction: float | str = "auto") -> tuple[Array, float]:
+def _fit_factors(
+    points: Array, n_neighbours: int, fraction: float | str = "auto"
+) -> tuple[Array, float]:
     """Local outlier factors of points (n, d), and the limit that a `fraction` of them exceeds.
 
     The points are sorted into narrow strips along y, so that successive points have the same neighbours and
@@ -224,7 +251,9 @@ def _fit_factors(points: Array, n_neighbours: int, fraction: float | str = "auto
     across = points[:, 0]
     width = np.ptp(across) / math.sqrt(len(points)) or 1.0
     order = np.lexsort((points[:, 1], np.floor((across - across.min()) / width)))
-    lof = LocalOutlierFactor(n_neighbors=n_neighbours, contamination=fraction).fit(points[order])
+    lof = LocalOutlierFactor(n_neighbors=n_neighbours, contamination=fraction).fit(
+        points[order]
+    )
     factors = np.empty(len(points))
     factors[order] = -lof.negative_outlier_factor_
     return factors, -float(lof.offset_)
@@ -285,6 +314,10 @@ def _features(samples: pd.DataFrame, r_max: float, speed_scale: float | None) ->
     check_columns(samples, ["speed"])
     speed = samples["speed"].to_numpy(float)
     is_scale = 0 < speed_scale < np.inf
-    require(is_scale, "speed_scale", speed_scale, "a positive number of m per m/s, or None")
-    check_rows(samples, np.isfinite(speed), ["speed"], "expected a finite speed; drop the row")
+    require(
+        is_scale, "speed_scale", speed_scale, "a positive number of m per m/s, or None"
+    )
+    check_rows(
+        samples, np.isfinite(speed), ["speed"], "expected a finite speed; drop the row"
+    )
     return np.column_stack([points, speed_scale * speed])

@@ -21,7 +21,8 @@ DIRECTIONS: Array = np.radians(np.arange(-180.0, 180.0, 5.0))
 # Range of directions without data from which on there is no zone [rad]; the hull has the same limit.
 WIDEST_GAP = np.pi
 
-_MAX_ITERATIONS, _CONVERGED = 100, 1e-12  # of Levenberg and Marquardt; step relative to the mean radius
+# of Levenberg and Marquardt; step relative to the mean radius
+_MAX_ITERATIONS, _CONVERGED = (100, 1e-12)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +58,18 @@ class PolarZone:
             object.__setattr__(self, name, np.asarray(getattr(self, name), float))
         shape = (len(self.speeds), len(self.directions))
         if self.radii.shape != shape or 0 in shape:
-            raise ZoneError(f"radii must have shape (speeds, directions) = {shape}; got {self.radii.shape}")
+            raise ZoneError(
+                f"radii must have shape (speeds, directions) = {shape}; got {self.radii.shape}"
+            )
         for name, values in (("speeds", self.speeds), ("directions", self.directions)):
             if not (np.isfinite(values).all() and (np.diff(values) > 0).all()):
-                raise ZoneError(f"{name} of radii must be finite and ascend; got {values.tolist()}")
+                raise ZoneError(
+                    f"{name} of radii must be finite and ascend; got {values.tolist()}"
+                )
         if (self.radii < 0).any():
-            raise ZoneError(f"radii must not be negative; got {np.nanmin(self.radii)} m")
+            raise ZoneError(
+                f"radii must not be negative; got {np.nanmin(self.radii)} m"
+            )
 
     @property
     def speed_range(self) -> tuple[float, float]:
@@ -80,8 +87,12 @@ class PolarZone:
         after = min(int(np.searchsorted(self.speeds, speed)), len(self.speeds) - 1)
         if self.speeds[after] == speed:
             return np.asarray(self.radii[after])
-        share = (speed - self.speeds[after - 1]) / (self.speeds[after] - self.speeds[after - 1])
-        return np.asarray((1 - share) * self.radii[after - 1] + share * self.radii[after])
+        share = (speed - self.speeds[after - 1]) / (
+            self.speeds[after] - self.speeds[after - 1]
+        )
+        return np.asarray(
+            (1 - share) * self.radii[after - 1] + share * self.radii[after]
+        )
 
     def boundary(self, speed: float, theta: ArrayLike) -> Array:
         """Boundary at a `speed` [m/s] in the directions `theta` (...) [rad], shape (..., 2) [m].
@@ -90,7 +101,11 @@ class PolarZone:
         """
         directions = np.append(self.directions, self.directions[0] + 2 * np.pi)
         radii = np.append(self.radii_at(speed), self.radii_at(speed)[0])
-        r = np.interp(np.subtract(theta, directions[0]) % (2 * np.pi) + directions[0], directions, radii)
+        r = np.interp(
+            np.subtract(theta, directions[0]) % (2 * np.pi) + directions[0],
+            directions,
+            radii,
+        )
         return np.asarray(r[..., None] * unit_vectors(theta))
 
     def ellipse(self, speed: float) -> Ellipse:
@@ -120,7 +135,9 @@ def fill_gaps(radii: Array, directions: Array = DIRECTIONS) -> Array:
         if high - low >= WIDEST_GAP:
             out[row] = np.nan
         else:
-            out[row] = np.interp(directions, directions[has_data], radii[row, has_data], period=2 * np.pi)
+            out[row] = np.interp(
+                directions, directions[has_data], radii[row, has_data], period=2 * np.pi
+            )
     return out
 
 
@@ -144,7 +161,8 @@ def fit_ellipses(radii: Array, directions: Array = DIRECTIONS) -> Array:
     unit = unit_vectors(directions)
     scale = radii[rows].mean(axis=1)
     target = radii[rows] / scale[:, None]
-    p = np.tile([0.0, 0.0, 1.0, 0.0, 1.0], (len(rows), 1))  # m, n, and the root [[p, r], [r, s]] of the form
+    # m, n, and the root [[p, r], [r, s]] of the form
+    p = np.tile([0.0, 0.0, 1.0, 0.0, 1.0], (len(rows), 1))
     damping = np.full(len(rows), 1e-3)
     residual, jacobian = _parametric_reach(p, unit)
     residual -= target
@@ -157,7 +175,8 @@ def fit_ellipses(radii: Array, directions: Array = DIRECTIONS) -> Array:
         step = -np.linalg.solve(damped, transposed @ residual[active, :, None])[..., 0]
         new_residual, new_jacobian = _parametric_reach(p[active] + step, unit)
         new_residual -= target[active]
-        better = (new_residual**2).sum(axis=1) <= (residual[active] ** 2).sum(axis=1)  # NaN: False
+        # NaN: False
+        better = (new_residual**2).sum(axis=1) <= (residual[active] ** 2).sum(axis=1)
         p[active[better]] += step[better]
         residual[active[better]] = new_residual[better]
         jacobian[active[better]] = new_jacobian[better]
@@ -172,7 +191,9 @@ def fit_ellipses(radii: Array, directions: Array = DIRECTIONS) -> Array:
     major = vectors[np.arange(len(rows)), :, 1 - minor]
     angle = np.pi / 2 - (np.pi / 2 - np.arctan2(major[:, 1], major[:, 0])) % np.pi
     axes = 1 / np.sort(values, axis=1)
-    ellipses[rows] = np.column_stack([p[:, :2] * scale[:, None], axes * scale[:, None], angle])
+    ellipses[rows] = np.column_stack(
+        [p[:, :2] * scale[:, None], axes * scale[:, None], angle]
+    )
     return ellipses
 
 
@@ -203,7 +224,10 @@ def _parametric_reach(p: Array, unit: Array) -> tuple[Array, Array]:
     slope = np.concatenate(
         [
             np.einsum("kij,knj->kni", root, w),
-            -np.stack([w[..., 0] * d[..., 0], w[..., 0] * d[..., 1] + w[..., 1] * d[..., 0]], axis=-1),
+            -np.stack(
+                [w[..., 0] * d[..., 0], w[..., 0] * d[..., 1] + w[..., 1] * d[..., 0]],
+                axis=-1,
+            ),
             -(w[..., 1] * d[..., 1])[..., None],
         ],
         axis=-1,

@@ -64,11 +64,18 @@ class Approaches:
         check_columns(samples, ["los_angle", "distance", "speed"])
         values = samples[["los_angle", "distance", "speed"]].to_numpy(float)
         is_finite = np.isfinite(values).all(axis=1)
-        check_rows(samples, is_finite, ["los_angle", "distance", "speed"], "expected finite numbers")
+        check_rows(
+            samples,
+            is_finite,
+            ["los_angle", "distance", "speed"],
+            "expected finite numbers",
+        )
         angle, distance = smooth_paths(samples)
         close = is_close(distance, r_max)
         step = 2 * np.pi / len(DIRECTIONS)
-        direction = np.rint((angle[close] - DIRECTIONS[0]) / step).astype(int) % len(DIRECTIONS)
+        direction = np.rint((angle[close] - DIRECTIONS[0]) / step).astype(int) % len(
+            DIRECTIONS
+        )
         number, encounters = encounter_numbers(samples[close])
         return cls(number, direction, distance[close], values[close, 2], encounters)
 
@@ -82,10 +89,14 @@ class Approaches:
         distances = np.full((len(encounters), len(DIRECTIONS)), np.inf)
         np.minimum.at(distances, (row, self.direction[in_band]), self.distance[in_band])
         turns = range(-(SECTOR // 2), SECTOR // 2 + 1)
-        return encounters, np.minimum.reduce([np.roll(distances, turn, axis=1) for turn in turns])
+        return encounters, np.minimum.reduce(
+            [np.roll(distances, turn, axis=1) for turn in turns]
+        )
 
 
-def smooth_paths(samples: pd.DataFrame, column: str = "los_angle") -> tuple[Array, Array]:
+def smooth_paths(
+    samples: pd.DataFrame, column: str = "los_angle"
+) -> tuple[Array, Array]:
     """Line-of-sight angle [rad] and distance [m] of `samples` (n,) along smoothed paths, in the same order.
 
     The angle is that of a `column`: los_angle, or other_los_angle.
@@ -93,13 +104,18 @@ def smooth_paths(samples: pd.DataFrame, column: str = "los_angle") -> tuple[Arra
     Local polynomials of degree 2 over +-`SMOOTHING` (Savitzky & Golay, 1964) smooth each encounter, but not
     across a gap in time. Straight and evenly curved paths do not change. Without a column `t`, no path does.
     """
-    angle, distance = samples[column].to_numpy(float), samples["distance"].to_numpy(float)
+    angle, distance = (
+        samples[column].to_numpy(float),
+        samples["distance"].to_numpy(float),
+    )
     if "t" not in samples:
         return angle, distance
     number, t = encounter_numbers(samples)[0], samples["t"].to_numpy(float)
     order = np.lexsort([t, number])
     path = (distance * np.exp(1j * angle))[order]
-    is_end = (np.diff(number[order]) != 0) | (np.abs(np.diff(t[order]) - _TICK) > _TICK / 2)
+    is_end = (np.diff(number[order]) != 0) | (
+        np.abs(np.diff(t[order]) - _TICK) > _TICK / 2
+    )
     starts = np.flatnonzero(np.append(True, is_end))
     lengths = np.diff(np.append(starts, len(path)))
     for length in np.unique(lengths[lengths > _DEGREE + 1]):
@@ -110,7 +126,9 @@ def smooth_paths(samples: pd.DataFrame, column: str = "los_angle") -> tuple[Arra
     return np.angle(out), np.abs(out)
 
 
-def quantile_radii(approaches: Approaches, speed: float, q: float, weights: Array | None = None) -> Array:
+def quantile_radii(
+    approaches: Approaches, speed: float, q: float, weights: Array | None = None
+) -> Array:
     """Compute the radius in each direction that at least a share q of the encounters enter.
 
     Parameters
@@ -126,13 +144,16 @@ def quantile_radii(approaches: Approaches, speed: float, q: float, weights: Arra
     Radii (k, 72) [m]; NaN where no person was seen.
     """
     encounters, nearest = approaches.nearest(speed)
-    weights = np.ones((1, len(encounters))) if weights is None else weights[:, encounters]
+    weights = (
+        np.ones((1, len(encounters))) if weights is None else weights[:, encounters]
+    )
     radii = np.full((len(weights), len(DIRECTIONS)), np.nan)
     order, is_seen = np.argsort(nearest, axis=0, kind="stable"), np.isfinite(nearest)
     needed = q * (weights @ is_seen) * (1 - 1e-12)
     for d, count in enumerate(is_seen.sum(axis=0)):
         if count:
-            likely = int(q * count + 8 * np.sqrt(q * count) + 8)  # the quantile lies among the first of them
+            # the quantile lies among the first of them
+            likely = int(q * count + 8 * np.sqrt(q * count) + 8)
             for first in (order[: min(likely, count), d], order[:count, d]):
                 cumulated = np.cumsum(weights[:, first], axis=1)
                 if (cumulated[:, -1] >= needed[:, d]).all():
@@ -161,16 +182,29 @@ class QuantileEstimator(Estimator):
     q: float
 
     def __post_init__(self) -> None:
-        require(0 < self.q < 1, "q", self.q, "a share of encounters, 0 < q < 1", ZoneError)
+        require(
+            0 < self.q < 1, "q", self.q, "a share of encounters, 0 < q < 1", ZoneError
+        )
 
     @classmethod
-    def from_samples(cls, samples: pd.DataFrame, *, r_max: float, q: float = QUANTILE) -> QuantileEstimator:
+    def from_samples(
+        cls, samples: pd.DataFrame, *, r_max: float, q: float = QUANTILE
+    ) -> QuantileEstimator:
         """Prepare `samples` within `r_max` [m] for a share `q`; errors as in `Approaches.from_samples`."""
         approaches = Approaches.from_samples(samples, r_max=r_max)
         entered, kept = len(encounter_numbers(samples)[1]), len(approaches.encounters)
-        near = funnels.stage("encounters: near", entered, kept, {f"never within {r_max} m": entered - kept})
+        near = funnels.stage(
+            "encounters: near",
+            entered,
+            kept,
+            {f"never within {r_max} m": entered - kept},
+        )
         sector = 360 * SECTOR / len(DIRECTIONS)
-        assumed = {"sector_deg": sector, "speed_band": SPEED_BAND, "smoothing": SMOOTHING}
+        assumed = {
+            "sector_deg": sector,
+            "speed_band": SPEED_BAND,
+            "smoothing": SMOOTHING,
+        }
         return cls(
             approaches=approaches,
             q=float(q),
@@ -186,15 +220,22 @@ class QuantileEstimator(Estimator):
 
     def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
         """Fit ellipses to encounters with `weights` at `speeds` (see `Estimator`)."""
-        radii = np.stack([quantile_radii(self.approaches, v, self.q, weights) for v in speeds], axis=1)
-        return fit_ellipses(fill_gaps(radii.reshape(-1, radii.shape[-1]))).reshape(*radii.shape[:2], 5)
+        radii = np.stack(
+            [quantile_radii(self.approaches, v, self.q, weights) for v in speeds],
+            axis=1,
+        )
+        return fit_ellipses(fill_gaps(radii.reshape(-1, radii.shape[-1]))).reshape(
+            *radii.shape[:2], 5
+        )
 
     def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
         """Row numbers of the encounters that enter the zones at `speeds` [m/s] in most directions."""
         depth = np.zeros(len(self.encounters))
         for speed in speeds:
             encounters, nearest = self.approaches.nearest(speed)
-            depth[encounters] += (nearest <= quantile_radii(self.approaches, speed, self.q)[0]).sum(axis=1)
+            depth[encounters] += (
+                nearest <= quantile_radii(self.approaches, speed, self.q)[0]
+            ).sum(axis=1)
         return np.argsort(-depth, kind="stable")[:_MAX_LEFT_OUT]
 
 
@@ -204,5 +245,7 @@ def _smoothing_matrix(length: int) -> Array:
     matrix = np.zeros((length, length))
     for i in range(length):
         near = np.arange(max(0, i - half), min(length, i + half + 1))
-        matrix[i, near] = np.linalg.pinv(np.vander((near - i) / half, _DEGREE + 1, increasing=True))[0]
+        matrix[i, near] = np.linalg.pinv(
+            np.vander((near - i) / half, _DEGREE + 1, increasing=True)
+        )[0]
     return matrix

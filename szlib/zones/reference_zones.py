@@ -78,7 +78,9 @@ def reference_zone(name: str) -> ReferenceZone:
     return ReferenceZone(
         name=name,
         ellipse=Ellipse(**entry["ellipse"]),
-        intervals={quantity: tuple(ends) for quantity, ends in entry["intervals"].items()},
+        intervals={
+            quantity: tuple(ends) for quantity, ends in entry["intervals"].items()
+        },
         verdict=Verdict(entry["verdict"], entry["reasons"]),
         **{key: entry[key] for key in ("n_encounters", "method", "source", "cite")},
     )

@@ -51,7 +51,8 @@ from .respect_likelihood import VIEWS, Likelihood, PairPaths, threads, zone_elli
 # a row, for other reasons than respect, which a shift in time removes as well. Who stands has no heading.
 _KINDS = ("opposite", "crossing")
 _MIN_EVIDENCE = 20.0  # twice the log likelihood ratio of a zone against none: the 1 % level of 8 parameters
-_NULL_DRAWN = (4000, 8000)  # encounters drawn from the null model, at least and at most; else two for each
+# encounters drawn from the null model, at least and at most; else two for each
+_NULL_DRAWN = (4000, 8000)
 _NULL_PER_ENCOUNTER = 2  # of the data
 # Encounters of the data within r_max: with fewer the zone reaches as far as nobody was seen.
 MIN_COMPARED = 150
@@ -92,16 +93,22 @@ class RespectEstimator(Estimator):
         ZoneError : there is no null model, its `r_max` differs, or nothing can be compared.
         """
         if null is None:
-            raise ZoneError('method="respect" needs a null model; pass null=szlib.null_encounters(tracks)')
+            raise ZoneError(
+                'method="respect" needs a null model; pass null=szlib.null_encounters(tracks)'
+            )
         if null.r_max != r_max:
             raise ZoneError(
                 f"r_max is {r_max} m, that of the null model {null.r_max} m; pass the same to both"
             )
         is_far = samples["distance"] >= r_max
-        close = funnels.select(samples, ~is_far, "samples: close", f"farther than {r_max} m")
+        close = funnels.select(
+            samples, ~is_far, "samples: close", f"farther than {r_max} m"
+        )
         against = null.samples[null.samples["distance"] < r_max]
         if "kind" in close and "kind" in against:
-            of_kind = close["kind"].isin(_KINDS) & close["kind"].isin(against["kind"].unique())
+            of_kind = close["kind"].isin(_KINDS) & close["kind"].isin(
+                against["kind"].unique()
+            )
             reason = "of a kind that is not compared (same direction, companions), or not in the null model"
             close = funnels.select(close, of_kind, "samples: kinds compared", reason)
             against = against[against["kind"].isin(close["kind"].unique())]
@@ -126,7 +133,12 @@ class RespectEstimator(Estimator):
 
     @classmethod
     def where_better(
-        cls, samples: pd.DataFrame, speeds: Sequence[float], *, r_max: float, null: NullEncounters | None
+        cls,
+        samples: pd.DataFrame,
+        speeds: Sequence[float],
+        *,
+        r_max: float,
+        null: NullEncounters | None,
     ) -> RespectEstimator | None:
         """The estimator where it is better than the quantile, else None.
 
@@ -134,14 +146,23 @@ class RespectEstimator(Estimator):
         many as the data. The zone must fit better than none, and contain its person at all `speeds` [m/s].
         `samples`, `r_max` and `null` are as in `from_samples`; samples need not hold the other's view.
         """
-        if null is None or null.r_max != r_max or not {*VIEWS[1]} <= {*samples} & {*null.samples}:
+        if (
+            null is None
+            or null.r_max != r_max
+            or not {*VIEWS[1]} <= {*samples} & {*null.samples}
+        ):
             return None
         try:
             estimator = cls.from_samples(samples, r_max=r_max, null=null)
-            n, n_null = len(estimator.data.kind), estimator.parameters["null_encounters"]
+            n, n_null = (
+                len(estimator.data.kind),
+                estimator.parameters["null_encounters"],
+            )
             is_large = n >= MIN_COMPARED and n_null >= _NULL_PER_ENCOUNTER * n
             return estimator if is_large and estimator.fit_shape(speeds) else None
-        except ZoneError:  # nothing to compare, no respect, or no zone around the person
+        except (
+            ZoneError
+        ):  # nothing to compare, no respect, or no zone around the person
             return None
 
     @cached_property
@@ -161,7 +182,9 @@ class RespectEstimator(Estimator):
     def draws(self) -> Array:
         """Parameters drawn from the posterior, shape (k, 12)."""
         with threads().limit(limits=1):
-            return Likelihood.of(self.data, self.null).draw(self.best, np.random.default_rng(0))
+            return Likelihood.of(self.data, self.null).draw(
+                self.best, np.random.default_rng(0)
+            )
 
     def fit_shape(self, speeds: Sequence[float]) -> PolarZone:
         """Fit the ellipses, and give their radii at `speeds`, ascending [m/s]."""
@@ -172,10 +195,15 @@ class RespectEstimator(Estimator):
 
     def refit(self, weights: Array, speeds: Sequence[float]) -> Array:
         """Fit ellipses to encounters with `weights` at `speeds`, from the fit of all."""
-        fits = [Likelihood.of(self.data, self.null, w).maximise([self.best]) for w in weights]
+        fits = [
+            Likelihood.of(self.data, self.null, w).maximise([self.best])
+            for w in weights
+        ]
         return zone_ellipses(np.array(fits), speeds)
 
-    def draw_posterior(self, n: int, speeds: Sequence[float], rng: np.random.Generator) -> Array:
+    def draw_posterior(
+        self, n: int, speeds: Sequence[float], rng: np.random.Generator
+    ) -> Array:
         """Draw `n` ellipses at `speeds` (s,) [m/s] with `rng` from the posterior, shape (n, s, 5)."""
         return self.posterior(speeds)[rng.integers(len(self.draws), size=n)]
 
@@ -183,8 +211,12 @@ class RespectEstimator(Estimator):
         """All ellipses drawn from the posterior at `speeds` (s,) [m/s], shape (k, s, 5)."""
         ellipses = zone_ellipses(self.draws, speeds)
         mean, spread = ellipses.mean(axis=0), np.maximum(ellipses.std(axis=0), 1e-9)
-        return np.asarray(mean + (ellipses - mean) * np.maximum(1, _MODEL_ERROR / spread))
+        return np.asarray(
+            mean + (ellipses - mean) * np.maximum(1, _MODEL_ERROR / spread)
+        )
 
     def find_influential(self, speeds: Sequence[float]) -> NDArray[np.intp]:
         """Row numbers of the encounters deepest inside the zone, whatever the `speeds`."""
-        return np.argsort(self.data.distances(self.best)[0], kind="stable")[:_MAX_LEFT_OUT]
+        return np.argsort(self.data.distances(self.best)[0], kind="stable")[
+            :_MAX_LEFT_OUT
+        ]

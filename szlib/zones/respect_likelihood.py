@@ -20,7 +20,8 @@ from .outliers import encounter_numbers
 from .quantile import smooth_paths
 
 REFERENCE_SPEED = 1.1  # at which the parameters describe the ellipse [m/s]
-_SPEED_BOUNDS = (0.3, 2.0)  # slower and faster people carry the ellipse of these speeds [m/s]
+# slower and faster people carry the ellipse of these speeds [m/s]
+_SPEED_BOUNDS = (0.3, 2.0)
 # Columns of the samples: direction of the other person, and speed, of each of the two people.
 VIEWS = (("los_angle", "speed"), ("other_los_angle", "other_speed"))
 
@@ -30,9 +31,21 @@ _PARAMETERS = [
     (-0.5, 0.5, 0.0, 0.15, 0.05),  # centre ahead [m]
     (-0.5, 0.5, 0.0, 0.15, 0.05),  # its change with speed
     (-0.3, 0.3, 0.0, 0.15, 0.02),  # centre to the left [m]
-    (np.log(0.1), np.log(1.9), np.log(0.8), 0.5, 0.06),  # logarithm of the semi-axis along [m]
+    (
+        np.log(0.1),
+        np.log(1.9),
+        np.log(0.8),
+        0.5,
+        0.06,
+    ),  # logarithm of the semi-axis along [m]
     (-0.6, 0.6, 0.0, 0.15, 0.06),  # its change with speed
-    (np.log(0.1), np.log(1.9), np.log(0.8), 0.5, 0.03),  # logarithm of the semi-axis across [m]
+    (
+        np.log(0.1),
+        np.log(1.9),
+        np.log(0.8),
+        0.5,
+        0.03,
+    ),  # logarithm of the semi-axis across [m]
     (-0.6, 0.6, 0.0, 0.15, 0.05),  # its change with speed
     (-0.6, 0.6, 0.0, 0.15, 0.05),  # shear
     (-6.0, 1.5, 0.0, np.inf, 0.3),  # logit f
@@ -44,7 +57,8 @@ _LOW, _HIGH, _MEAN, _SPREAD, _FIRST_STEPS = np.transpose(_PARAMETERS)
 _ELONGATION = 0.4  # standard deviation of the logarithm of the ratio of the semi-axes
 _BANK, _BANK_SEED = 24, 0  # ellipses that say which samples may be the nearest
 _RADII = np.arange(0.2, 1.81, 0.1)  # of the circles from which the fit starts [m]
-_STARTS, _START_GAP = 3, 0.15  # number of best circles tried, and the least difference of their radii [m]
+# number of best circles tried, and the least difference of their radii [m]
+_STARTS, _START_GAP = (3, 0.15)
 _STEPS, _BURN_IN, _ADAPT, _ACCEPTED = 6000, 2000, 250, 0.25  # of the Metropolis chain
 
 
@@ -86,9 +100,13 @@ class PairPaths:
             theta, r = smooth_paths(samples, angle)
             own, path = samples[own_speed].to_numpy(float), r * np.exp(1j * theta)
             # A person who stands has no direction of motion, and one of unknown velocity has none either.
-            has_zone = np.isfinite(path) & (own >= (WALKING if own_speed == "other_speed" else 0.0))
+            has_zone = np.isfinite(path) & (
+                own >= (WALKING if own_speed == "other_speed" else 0.0)
+            )
             carried = np.clip(own, *_SPEED_BOUNDS) - REFERENCE_SPEED
-            view = pd.DataFrame({"x": path.real, "y": path.imag, "speed": carried, "row": number})
+            view = pd.DataFrame(
+                {"x": path.real, "y": path.imag, "speed": carried, "row": number}
+            )
             views.append(view[has_zone])
         paths = pd.concat(views).sort_values("row", kind="stable")
         x, y, speed, row = (paths[name].to_numpy() for name in paths)
@@ -98,9 +116,21 @@ class PairPaths:
             level = _level(x, y, speed, p)[0]
             may_be_nearest |= level == np.minimum.reduceat(level, first)[row]
         kept = row[may_be_nearest]
-        names = encounters["kind"].to_numpy(object) if "kind" in encounters else np.full(len(encounters), "")
+        names = (
+            encounters["kind"].to_numpy(object)
+            if "kind" in encounters
+            else np.full(len(encounters), "")
+        )
         x, y, speed = (each[may_be_nearest] for each in (x, y, speed))
-        return cls(x, y, speed, kept, np.flatnonzero(np.diff(kept, prepend=-1)), names, encounters)
+        return cls(
+            x,
+            y,
+            speed,
+            kept,
+            np.flatnonzero(np.diff(kept, prepend=-1)),
+            names,
+            encounters,
+        )
 
     def distances(self, p: Array, *, gradient: bool = False) -> tuple[Array, Array]:
         """h of each encounter for the parameters `p`, shape (k,) [m].
@@ -110,7 +140,8 @@ class PairPaths:
         level, u, v, log_a, log_b = _level(self.x, self.y, self.speed, p)
         least = level == np.minimum.reduceat(level, self.first)[self.encounter]
         at = np.flatnonzero(least)
-        at = at[np.flatnonzero(np.diff(self.encounter[at], prepend=-1))]  # the first of equal ones
+        # the first of equal ones
+        at = at[np.flatnonzero(np.diff(self.encounter[at], prepend=-1))]
         r, scale = np.sqrt(level[at]), np.exp((log_a[at] + log_b[at]) / 2)
         h = (r - 1) * scale
         if not gradient:
@@ -121,11 +152,22 @@ class PairPaths:
         by_x = k * u * np.exp(-log_a) - by_y * p[7]
         by_a, by_b = h / 2 - k * u * u, h / 2 - k * v * v
         shear = -by_y * u * np.exp(log_a)
-        slopes = (-by_x, -by_x * speed, -by_y, by_a, by_a * speed, by_b, by_b * speed, shear)
+        slopes = (
+            -by_x,
+            -by_x * speed,
+            -by_y,
+            by_a,
+            by_a * speed,
+            by_b,
+            by_b * speed,
+            shear,
+        )
         return h, np.stack(slopes, axis=1)
 
 
-def _level(x: Array, y: Array, speed: Array, p: Array) -> tuple[Array, Array, Array, Array, Array]:
+def _level(
+    x: Array, y: Array, speed: Array, p: Array
+) -> tuple[Array, Array, Array, Array, Array]:
     """The squared norm of points in which the ellipse of `p` is the unit circle, and what it is made of."""
     log_a, log_b = p[3] + p[4] * speed, p[5] + p[6] * speed
     ahead = x - p[0] - p[1] * speed
@@ -137,8 +179,13 @@ def _level(x: Array, y: Array, speed: Array, p: Array) -> tuple[Array, Array, Ar
 def _bank() -> Array:
     """Parameters of ellipses of all forms, one a row."""
     bank = np.zeros((_BANK, len(_PARAMETERS)))
-    low, high = (-0.25, -0.1, -0.3, *np.log([0.35, 0.35])), (0.25, 0.1, 0.3, *np.log([1.5, 1.3]))
-    bank[:, [0, 2, 7, 3, 5]] = np.random.default_rng(_BANK_SEED).uniform(low, high, (_BANK, 5))
+    low, high = (
+        (-0.25, -0.1, -0.3, *np.log([0.35, 0.35])),
+        (0.25, 0.1, 0.3, *np.log([1.5, 1.3])),
+    )
+    bank[:, [0, 2, 7, 3, 5]] = np.random.default_rng(_BANK_SEED).uniform(
+        low, high, (_BANK, 5)
+    )
     return bank
 
 
@@ -186,11 +233,16 @@ class Likelihood:
     kinds: list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]
 
     @classmethod
-    def of(cls, data: PairPaths, null: PairPaths, weights: Array | None = None) -> Likelihood:
+    def of(
+        cls, data: PairPaths, null: PairPaths, weights: Array | None = None
+    ) -> Likelihood:
         """Compare the kinds of `data` with those of `null`; `weights` None: equal weights."""
         weights = np.ones(len(data.kind)) if weights is None else weights
         return cls(
-            data, null, weights, [(data.kind == kind, null.kind == kind) for kind in np.unique(data.kind)]
+            data,
+            null,
+            weights,
+            [(data.kind == kind, null.kind == kind) for kind in np.unique(data.kind)],
         )
 
     @property
@@ -203,7 +255,9 @@ class Likelihood:
 
         `distances` are h of data and null model; None: those of `p`.
         """
-        h, h_null = distances or [each.distances(p)[0] for each in (self.data, self.null)]
+        h, h_null = distances or [
+            each.distances(p)[0] for each in (self.data, self.null)
+        ]
         out, against = np.log(_factor(h, p)[0]), _factor(h_null, p)[0]
         for of_data, of_null in self.kinds:
             out[of_data] -= np.log(against[of_null].mean())
@@ -223,7 +277,11 @@ class Likelihood:
         (g, by_h, by_p), (g_null, by_h_null, by_p_null) = (
             _factor_and_slopes(each, p) for each in (h, h_null)
         )
-        per, per_null, value = self.weights / g, np.zeros(len(g_null)), self.weights @ np.log(g)
+        per, per_null, value = (
+            self.weights / g,
+            np.zeros(len(g_null)),
+            self.weights @ np.log(g),
+        )
         for of_data, of_null in self.kinds:
             n, total = self.weights[of_data].sum(), g_null[of_null].sum()
             value -= n * np.log(total / of_null.sum())
@@ -236,20 +294,35 @@ class Likelihood:
     def maximise(self, starts: Sequence[Array]) -> Array:
         """The best parameters found from several `starts`."""
         bounds = list(zip(_LOW, _HIGH, strict=True))
-        with threads().limit(limits=1):  # several threads take ten times as long for small products
-            tries = [minimize(self.cost, p, jac=True, method="L-BFGS-B", bounds=bounds) for p in starts]
+        with threads().limit(
+            limits=1
+        ):  # several threads take ten times as long for small products
+            tries = [
+                minimize(self.cost, p, jac=True, method="L-BFGS-B", bounds=bounds)
+                for p in starts
+            ]
         return np.asarray(min(tries, key=lambda found: float(found.fun)).x)
 
     def starts(self) -> list[Array]:
         """The best circles of a grid of radii, edges and shares."""
         circle = np.zeros(len(_PARAMETERS))
         circle[11] = np.log(0.12)
-        near = [each.distances(circle)[0] + 1 for each in (self.data, self.null)]  # the nearest approaches
+        # the nearest approaches
+        near = [each.distances(circle)[0] + 1 for each in (self.data, self.null)]
         found = []
-        for radius, f, w, excess in product(_RADII.tolist(), (-3, -1), np.log([0.05, 0.15]), (-2, 2, 5)):
+        for radius, f, w, excess in product(
+            _RADII.tolist(), (-3, -1), np.log([0.05, 0.15]), (-2, 2, 5)
+        ):
             p = circle.copy()
-            p[3], p[5], p[8:11] = np.log(1.1 * radius), np.log(0.9 * radius), (f, w, excess)
-            value = self.log_ratios(p, [each - radius for each in near]).sum() - _minus_log_prior(p)[0]
+            p[3], p[5], p[8:11] = (
+                np.log(1.1 * radius),
+                np.log(0.9 * radius),
+                (f, w, excess),
+            )
+            value = (
+                self.log_ratios(p, [each - radius for each in near]).sum()
+                - _minus_log_prior(p)[0]
+            )
             found.append((float(value), radius, p))
         best: list[tuple[float, float, Array]] = []
         for each in sorted(found, key=lambda found: -found[0]):
@@ -269,7 +342,9 @@ class Likelihood:
         root, scale, accepted = np.diag(_FIRST_STEPS), 0.5, 0
         for k in range(_STEPS):
             if k and k % _ADAPT == 0:
-                root = np.linalg.cholesky(np.cov(chain[k // 2 : k].T) + 1e-7 * np.eye(size))
+                root = np.linalg.cholesky(
+                    np.cov(chain[k // 2 : k].T) + 1e-7 * np.eye(size)
+                )
                 scale, accepted = scale * np.exp(2 * (accepted / _ADAPT - _ACCEPTED)), 0
             proposed = p + scale * 2.38 / np.sqrt(size) * root @ rng.normal(size=size)
             there = self.log_posterior(proposed)
@@ -289,11 +364,18 @@ def zone_ellipses(parameters: Array, speeds: Sequence[float]) -> Array:
     """Ellipses (k, s, 5), as those of `fit_ellipses`, for `parameters` (k, 12) at `speeds` (s,) [m/s]."""
     p = np.asarray(parameters)[:, None, :]
     speed = np.clip(np.asarray(speeds, float), *_SPEED_BOUNDS) - REFERENCE_SPEED
-    along, across = np.exp(-p[..., 3] - p[..., 4] * speed), np.exp(-p[..., 5] - p[..., 6] * speed)
+    along, across = (
+        np.exp(-p[..., 3] - p[..., 4] * speed),
+        np.exp(-p[..., 5] - p[..., 6] * speed),
+    )
     shear = -p[..., 7] * across
-    form = np.stack([along**2 + shear**2, shear * across, shear * across, across**2], axis=-1)
+    form = np.stack(
+        [along**2 + shear**2, shear * across, shear * across, across**2], axis=-1
+    )
     values, vectors = np.linalg.eigh(form.reshape(*along.shape, 2, 2))
     major = vectors[..., 0]
     angle = np.pi / 2 - (np.pi / 2 - np.arctan2(major[..., 1], major[..., 0])) % np.pi
     centre = p[..., 0] + p[..., 1] * speed, np.broadcast_to(p[..., 2], along.shape)
-    return np.stack([*centre, values[..., 0] ** -0.5, values[..., 1] ** -0.5, angle], axis=-1)
+    return np.stack(
+        [*centre, values[..., 0] ** -0.5, values[..., 1] ** -0.5, angle], axis=-1
+    )

@@ -40,7 +40,8 @@ from .outliers import nearest_approaches
 # Softness of the edge w [m].  Its standard deviation is 1.8 w, at least 6 cm: a sharper edge follows single
 # encounters.
 _SOFTNESS = (0.033, 0.06, 0.1, 0.18, 0.3)
-_IGNORING = (0.0, *expit(np.linspace(-6, 4, 30)).tolist())  # f; with a half and more there is no zone
+# f; with a half and more there is no zone
+_IGNORING = (0.0, *expit(np.linspace(-6, 4, 30)).tolist())
 _FARTHEST = 0.8  # largest R, in r_max: beyond it people at a distance are hardly seen
 _N_RADII, _N_BINS = 160, 80  # values of R up to there, and bins of r up to r_max
 _LEVEL = 0.95
@@ -66,17 +67,30 @@ class Approaches:
     r_max: float
 
     @classmethod
-    def of(cls, samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0) -> Approaches:
+    def of(
+        cls, samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0
+    ) -> Approaches:
         """Collect the encounters of `samples` and `null` that came within `excluded_below` [m] to its r_max.
 
         Without a column `kind`, all encounters are of one kind. Raises DataError if the samples lack a column
         or are empty, and ZoneError if no encounter of the data or of the null model came so near.
         """
         check_columns(samples, ["encounter", "los_angle", "distance", "speed"])
-        data = nearest_approaches(samples).rename(columns={"distance": "nearest"}).assign(shift=-1)
-        columns = ["nearest", "shift", *(["kind"] if "kind" in data and "kind" in null.encounters else [])]
+        data = (
+            nearest_approaches(samples)
+            .rename(columns={"distance": "nearest"})
+            .assign(shift=-1)
+        )
+        columns = [
+            "nearest",
+            "shift",
+            *(["kind"] if "kind" in data and "kind" in null.encounters else []),
+        ]
         counted = [
-            each.loc[(each["nearest"] >= excluded_below) & (each["nearest"] < null.r_max), columns]
+            each.loc[
+                (each["nearest"] >= excluded_below) & (each["nearest"] < null.r_max),
+                columns,
+            ]
             for each in (data, null.encounters)
         ]
         if not all(map(len, counted)):
@@ -84,11 +98,22 @@ class Approaches:
                 f"{len(counted[0])} encounters of the data and {len(counted[1])} of the null model came "
                 f"within {excluded_below:g} to {null.r_max:g} m: nothing to test; add data, or more shifts"
             )
-        both = [np.concatenate([each[name].to_numpy(object) for each in counted]) for name in columns]
+        both = [
+            np.concatenate([each[name].to_numpy(object) for each in counted])
+            for name in columns
+        ]
         kind = (
-            pd.factorize(both[2], use_na_sentinel=False)[0] if len(both) == 3 else np.zeros(len(both[0]), int)
+            pd.factorize(both[2], use_na_sentinel=False)[0]
+            if len(both) == 3
+            else np.zeros(len(both[0]), int)
         )
-        return cls(both[0].astype(float), kind, 1 + both[1].astype(int), null.shifts, null.r_max)
+        return cls(
+            both[0].astype(float),
+            kind,
+            1 + both[1].astype(int),
+            null.shifts,
+            null.r_max,
+        )
 
 
 @dataclass(frozen=True)
@@ -141,7 +166,9 @@ def fit_radius(approaches: Approaches) -> RespectRadius:
         careless += share[:, 0] * ((1 - edge) @ expected) / total * real.sum() / n
     is_likely = 2 * (likelihood.max() - likelihood) <= chi2.ppf(_LEVEL, 1) * (1 + n / m)
     best = likelihood.argmax()
-    radius = np.broadcast_to(np.where(share[:, 0] < 0.5, radii[:, None, None], 0.0), likelihood.shape)
+    radius = np.broadcast_to(
+        np.where(share[:, 0] < 0.5, radii[:, None, None], 0.0), likelihood.shape
+    )
     return RespectRadius(
         radius=round(float(radius.flat[best]), 2),
         low=round(float(radius[is_likely].min()), 2),
@@ -153,7 +180,9 @@ def fit_radius(approaches: Approaches) -> RespectRadius:
 
 def _histograms(approaches: Approaches) -> Iterable[tuple[Array, Array]]:
     """Histograms of data and null model over the distance, for each kind that both have."""
-    bins = np.minimum(approaches.nearest / approaches.r_max * _N_BINS, _N_BINS - 1).astype(int)
+    bins = np.minimum(
+        approaches.nearest / approaches.r_max * _N_BINS, _N_BINS - 1
+    ).astype(int)
     for kind in np.unique(approaches.kind):
         is_kind = approaches.kind == kind
         real, null = (

@@ -38,7 +38,8 @@ from .respect_profile import Approaches, RespectRadius, fit_radius
 # Radii of the statistic [m]; the radius of the zone need not be among them.
 RADII = np.arange(0.2, 1.5 + 1e-9, 0.05)
 SIGNIFICANCE_LEVEL = 0.05
-_NULL_DRAWS, _MAX_DRAWN = 5, 1000  # zones fitted to the null model, and most encounters of each
+# zones fitted to the null model, and most encounters of each
+_NULL_DRAWS, _MAX_DRAWN = (5, 1000)
 
 # A kind that is expected more often than this and is missing was filtered out on one side only.
 _MIN_EXPECTED = 30
@@ -85,11 +86,15 @@ class NullTest:
         return self.p_value <= SIGNIFICANCE_LEVEL
 
     def __str__(self) -> str:
-        result = "people avoid each other" if self.is_significant else "no respect shown"
+        result = (
+            "people avoid each other" if self.is_significant else "no respect shown"
+        )
         return f"{result} (p = {self.p_value:.2g}, {self.n_shifts} shifts, {self.n_encounters:,} encounters)"
 
 
-def null_test(samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0) -> NullTest:
+def null_test(
+    samples: pd.DataFrame, null: NullEncounters, *, excluded_below: float = 0.0
+) -> NullTest:
     """Test whether people keep away from each other, one-sided (see the top of this module).
 
     Each kind of encounter is compared with the same kind of the null model; without a column `kind`, all
@@ -126,7 +131,9 @@ def null_test(samples: pd.DataFrame, null: NullEncounters, *, excluded_below: fl
     near = found.nearest[:, None] < RADII
     statistics = _find_deficits(found.shift, near, found.kind, 1 + null.shifts)
     return NullTest(
-        p_value=float((1 + (statistics[1:] >= statistics[0]).sum()) / (1 + null.shifts)),
+        p_value=float(
+            (1 + (statistics[1:] >= statistics[0]).sum()) / (1 + null.shifts)
+        ),
         statistic=float(statistics[0]),
         null_statistics=tuple(map(float, statistics[1:])),
         n_encounters=int((found.shift == 0).sum()),
@@ -157,7 +164,10 @@ def fit_null_radii(
     By speed, the largest of several draws [m]; NaN where none has a zone.
     """
     rng, known = np.random.default_rng(seed), null.samples["encounter"].unique()
-    size, radii = min(n_encounters, len(known), _MAX_DRAWN), np.full((_NULL_DRAWS, len(speeds)), np.nan)
+    size, radii = (
+        min(n_encounters, len(known), _MAX_DRAWN),
+        np.full((_NULL_DRAWS, len(speeds)), np.nan),
+    )
     for row in radii:
         drawn = null.samples["encounter"].isin(rng.choice(known, size, replace=False))
         with suppress(ZoneError, DataError):  # no zone: stays NaN
@@ -168,7 +178,10 @@ def fit_null_radii(
 
 
 def _find_deficits(
-    shift: NDArray[np.intp], near: NDArray[np.bool_], kind: NDArray[np.intp], shifts: int
+    shift: NDArray[np.intp],
+    near: NDArray[np.bool_],
+    kind: NDArray[np.intp],
+    shifts: int,
 ) -> NDArray[np.float64]:
     """Largest deficit of near encounters over all radii, for each shift, in standard deviations.
 
@@ -179,12 +192,17 @@ def _find_deficits(
     for each in range(kind.max() + 1):
         is_kind = kind == each
         n = np.bincount(shift[is_kind], minlength=shifts)[:, None]
-        k = np.stack([np.bincount(shift[is_kind], c, minlength=shifts) for c in near[is_kind].T], axis=1)
+        k = np.stack(
+            [np.bincount(shift[is_kind], c, minlength=shifts) for c in near[is_kind].T],
+            axis=1,
+        )
         total = n.sum()
         share = k.sum(axis=0) / total
         deficit = deficit + n * share - k
         variance = variance + n * share * (1 - share) * (total - n) / max(total - 1, 1)
-    deviations = np.divide(deficit, np.sqrt(variance), out=np.zeros_like(deficit), where=variance > 0)
+    deviations = np.divide(
+        deficit, np.sqrt(variance), out=np.zeros_like(deficit), where=variance > 0
+    )
     return np.asarray(deviations.max(axis=1))
 
 
@@ -194,7 +212,10 @@ def _warn_about_kinds(samples: pd.DataFrame, null: NullEncounters) -> None:
         return
     data = samples.drop_duplicates("encounter")["kind"].value_counts()
     model = null.encounters["kind"].value_counts()
-    for here, there, name in ((data, model, "the data has"), (model, data, "the null model has")):
+    for here, there, name in (
+        (data, model, "the data has"),
+        (model, data, "the null model has"),
+    ):
         expected = there * here.sum() / max(there.sum(), 1)
         for kind in expected.index[expected > _MIN_EXPECTED]:
             if here.get(kind, 0) == 0 and (here is data or kind != COMPANIONS):

@@ -69,26 +69,37 @@ def sensitivity(
         try:
             # The number of encounters is in the table.
             with warnings.catch_warnings(action="ignore", category=DataWarning):
-                (ellipse,) = SocialZone.fit(samples, **(usual | options)).ellipses.values()
+                (ellipse,) = SocialZone.fit(
+                    samples, **(usual | options)
+                ).ellipses.values()
             sizes = (*ellipse.semi_axes, ellipse.area)
         except (ZoneError, DataError):
             if not rows:
                 raise
         text = ", ".join(value) if isinstance(value, tuple) else str(value)
         rows.append((parameter, text, samples["encounter"].nunique(), *sizes))
-    return pd.DataFrame(rows, columns=["parameter", "value", "encounters", "a", "b", "area"])
+    return pd.DataFrame(
+        rows, columns=["parameter", "value", "encounters", "a", "b", "area"]
+    )
 
 
 def _variations(
     tracks: pd.DataFrame, area: Area, has_walls: bool, fit: Mapping[str, Sequence[Any]]
 ) -> Iterator[tuple[str, Any, pd.DataFrame, dict[str, Any]]]:
     """Parameter, value, samples and options of the fit, for each variation."""
-    search = partial(find_encounters, select_near_rows(tracks, area, max(SEARCH["duration"])))
+    search = partial(
+        find_encounters, select_near_rows(tracks, area, max(SEARCH["duration"]))
+    )
     samples = search(area=area, has_walls=has_walls)
     yield "default", "", samples, {}
     for name, values in SEARCH.items():
         for value in values:
-            yield name, value, search(area=area, has_walls=has_walls, **{name: value}), {}
+            yield (
+                name,
+                value,
+                search(area=area, has_walls=has_walls, **{name: value}),
+                {},
+            )
     smaller = search(area=area.grown(-NARROWER), has_walls=has_walls)
     yield "area", f"{NARROWER:g} m narrower", smaller, {}
     for name, values in fit.items():

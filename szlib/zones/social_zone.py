@@ -54,7 +54,12 @@ SPEEDS = (0.5, 0.7, 0.9, 1.1, 1.3, 1.5)
 # The methods of `SocialZone.fit`: the estimator, and its options.
 METHODS: dict[str, tuple[Callable[..., Estimator], tuple[str, ...]]] = {
     "quantile": (QuantileEstimator.from_samples, ("q",)),
-    "paper": (partial(HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_NEIGHBOURS), ()),
+    "paper": (
+        partial(
+            HullEstimator.from_samples, fraction=FRACTION, n_neighbours=N_NEIGHBOURS
+        ),
+        (),
+    ),
     "hull": (HullEstimator.from_samples, ("fraction", "n_neighbours", "speed_scale")),
     "respect": (RespectEstimator.from_samples, ()),
 }
@@ -112,15 +117,27 @@ class SocialZone:
             raise ZoneError(
                 f"a {type(self.shape).__name__} is not the shape of a zone of method {self.method!r}"
             )
-        require(0 < self.r_max < np.inf, "r_max", self.r_max, "a positive distance in metres", ZoneError)
+        require(
+            0 < self.r_max < np.inf,
+            "r_max",
+            self.r_max,
+            "a positive distance in metres",
+            ZoneError,
+        )
 
     def __repr__(self) -> str:
-        sizes = [f"{v:g}: {e.semi_axes[0]:.2f} x {e.semi_axes[1]:.2f}" for v, e in self.ellipses.items()]
+        sizes = [
+            f"{v:g}: {e.semi_axes[0]:.2f} x {e.semi_axes[1]:.2f}"
+            for v, e in self.ellipses.items()
+        ]
         adequate = [f"{speed:g}" for speed in self.ellipses if self.adequate(speed)]
         by_verdict: dict[str, list[str]] = {}
         for speed in self.ellipses:
             by_verdict.setdefault(self.verdict(speed), []).append(f"{speed:g}")
-        verdicts = [f"{verdict} at {', '.join(speeds)} m/s" for verdict, speeds in by_verdict.items()]
+        verdicts = [
+            f"{verdict} at {', '.join(speeds)} m/s"
+            for verdict, speeds in by_verdict.items()
+        ]
         return (
             f"SocialZone: method {self.method!r}, people within {self.r_max:g} m\n"
             f"semi-axes at each speed [m/s: m]: {', '.join(sizes) or 'none'}\n"
@@ -190,7 +207,9 @@ class SocialZone:
             raise ZoneError("no speed has a zone: `speeds` is empty")
         better = None
         if method is None:
-            better = RespectEstimator.where_better(samples, fitted_speeds, r_max=r_max, null=null)
+            better = RespectEstimator.where_better(
+                samples, fitted_speeds, r_max=r_max, null=null
+            )
         method = method or ("quantile" if better is None else "respect")
         if method == "respect":
             options = {"null": null}
@@ -211,22 +230,36 @@ class SocialZone:
             )
         provenance = {
             "szlib": __version__,
-            "days": sorted(map(str, samples["day"].unique())) if "day" in samples else [],
-            "encounters": len(encounter_numbers(samples)[1]) if "encounter" in samples else None,
+            "days": sorted(map(str, samples["day"].unique()))
+            if "day" in samples
+            else [],
+            "encounters": len(encounter_numbers(samples)[1])
+            if "encounter" in samples
+            else None,
             "hours": recorded_hours(samples),
-            "parameters": {"method": method, "r_max": float(r_max), **estimator.parameters},
+            "parameters": {
+                "method": method,
+                "r_max": float(r_max),
+                **estimator.parameters,
+            },
             "funnel": estimator.funnel,
         }
         test, null_radii = None, {}
         if null is not None:
             require(
-                r_max <= null.r_max, "r_max", r_max, f"at most the null model's {null.r_max} m", ZoneError
+                r_max <= null.r_max,
+                "r_max",
+                r_max,
+                f"at most the null model's {null.r_max} m",
+                ZoneError,
             )
             test = null_test(samples, null)
             null_radii = (
                 dict.fromkeys(ellipses, 0.0)  # it is the difference from the null model
                 if method == "respect"
-                else fit_null_radii(build, null, len(estimator.encounters), list(ellipses), seed)
+                else fit_null_radii(
+                    build, null, len(estimator.encounters), list(ellipses), seed
+                )
             )
         sides = uncertainty = None
         if "encounter" in samples:
@@ -236,9 +269,21 @@ class SocialZone:
                     estimator, list(ellipses), n_resamples=n_resamples, seed=seed
                 )
         zone = cls(
-            shape, float(r_max), ellipses, undefined, provenance, method, sides, uncertainty, test, null_radii
+            shape,
+            float(r_max),
+            ellipses,
+            undefined,
+            provenance,
+            method,
+            sides,
+            uncertainty,
+            test,
+            null_radii,
         )
-        problems = [*undefined.values(), *filter(None, map(zone.missing_data, ellipses))]
+        problems = [
+            *undefined.values(),
+            *filter(None, map(zone.missing_data, ellipses)),
+        ]
         if problems:
             warn("; ".join(dict.fromkeys(problems)))
         return zone
@@ -269,7 +314,9 @@ class SocialZone:
 
     def adequate(self, speed: float) -> bool:
         """Whether there are enough encounters, and on every side, to rely on the zone at a `speed` [m/s]."""
-        return not (describe_missing_encounters(self.provenance) or self.missing_data(speed))
+        return not (
+            describe_missing_encounters(self.provenance) or self.missing_data(speed)
+        )
 
     def verdict(self, speed: float) -> Verdict:
         """Whether the zone can be used at a `speed` [m/s]: "usable", "undecided" or "no respect shown".
@@ -308,25 +355,37 @@ class SocialZone:
         out [m]; encounters within r_max at that speed; adequate; verdict.
         """
         ellipses = sorted(self.ellipses.items())
-        rows = [(v, *e.center, *e.semi_axes, np.degrees(e.angle), e.area) for v, e in ellipses]
+        rows = [
+            (v, *e.center, *e.semi_axes, np.degrees(e.angle), e.area)
+            for v, e in ellipses
+        ]
         table = pd.DataFrame(rows, columns=["speed", *QUANTITIES]).set_index("speed")
         ends = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
         table[[*ends, "influence", "encounters"]] = np.nan
         if self.uncertainty is not None:
-            intervals = self.uncertainty.intervals.pivot(index="speed", columns="quantity")
+            intervals = self.uncertainty.intervals.pivot(
+                index="speed", columns="quantity"
+            )
             for name in QUANTITIES:
-                table[f"{name}_low"], table[f"{name}_high"] = intervals["low"][name], intervals["high"][name]
+                table[f"{name}_low"], table[f"{name}_high"] = (
+                    intervals["low"][name],
+                    intervals["high"][name],
+                )
             table["influence"] = self.uncertainty.influence.set_index("speed")["metres"]
         if self.side_counts is not None:
             table["encounters"] = self.side_counts.set_index("speed")["encounters"]
         verdicts = [str(self.verdict(v)) for v in table.index]
-        return table.assign(adequate=[self.adequate(v) for v in table.index], verdict=verdicts).reset_index()
+        return table.assign(
+            adequate=[self.adequate(v) for v in table.index], verdict=verdicts
+        ).reset_index()
 
     def plot(self, speed: float | None = None, *, ax: Axes | None = None) -> Axes:
         """Plot the zone at a `speed` [m/s] with its interval, or all ellipses (None), into the axes `ax`."""
         from ..workbook.figures.zones import plot_zone, plot_zones
 
-        return plot_zones(self, ax=ax) if speed is None else plot_zone(self, speed, ax=ax)
+        return (
+            plot_zones(self, ax=ax) if speed is None else plot_zone(self, speed, ax=ax)
+        )
 
     def to_geojson(self, *, n: int = 72) -> str:
         """The ellipses as GeoJSON text: a polygon of `n` corners for each speed, with its verdict.
@@ -380,9 +439,12 @@ def recorded_hours(samples: pd.DataFrame) -> float | None:
 
 def _check_method(method: str, options: Iterable[str] = ()) -> None:
     """Raise ZoneError if the method is unknown, or does not have one of the options."""
-    require(method in METHODS, "method", method, f"one of {', '.join(METHODS)}", ZoneError)
+    require(
+        method in METHODS, "method", method, f"one of {', '.join(METHODS)}", ZoneError
+    )
     for name in set(options).difference(METHODS[method][1]):
         known = "; ".join(
-            f"{each!r} has {', '.join(names) or 'none'}" for each, (_, names) in METHODS.items()
+            f"{each!r} has {', '.join(names) or 'none'}"
+            for each, (_, names) in METHODS.items()
         )
         raise ZoneError(f"method {method!r} has no option {name!r}; {known}")

@@ -84,7 +84,9 @@ class Uncertainty:
     influence: pd.DataFrame
 
 
-def count_by_side(samples: pd.DataFrame, speeds: Sequence[float], *, r_max: float) -> pd.DataFrame:
+def count_by_side(
+    samples: pd.DataFrame, speeds: Sequence[float], *, r_max: float
+) -> pd.DataFrame:
     """Count the encounters within `r_max` [m] on each side, by speed of the reference pedestrian.
 
     The table has one row for each of the `speeds` (+-`SPEED_BAND`): speed [m/s], encounters, and one column
@@ -102,7 +104,9 @@ def count_by_side(samples: pd.DataFrame, speeds: Sequence[float], *, r_max: floa
     """
     close = samples[samples["distance"] <= r_max]
     number = encounter_numbers(close)[0]
-    side = np.rint(close["los_angle"].to_numpy(float) / (2 * np.pi / len(SIDES))).astype(int) % len(SIDES)
+    side = np.rint(
+        close["los_angle"].to_numpy(float) / (2 * np.pi / len(SIDES))
+    ).astype(int) % len(SIDES)
     rows = []
     for speed in speeds:
         in_band = np.abs(close["speed"].to_numpy(float) - speed) <= SPEED_BAND
@@ -121,9 +125,13 @@ def describe_missing_sides(counts: pd.DataFrame, speed: float) -> str:
     known = counts["speed"].to_numpy(float)
     if not known.min() <= speed <= known.max():
         return f"at {speed:g} m/s no encounters were counted (only at {known.min():g} to {known.max():g} m/s)"
-    rows = counts.iloc[[np.flatnonzero(known <= speed)[-1], np.flatnonzero(known >= speed)[0]]]
+    rows = counts.iloc[
+        [np.flatnonzero(known <= speed)[-1], np.flatnonzero(known >= speed)[0]]
+    ]
     fewest = rows[list(SIDES)].min()
-    few = [f"{side} ({count})" for side, count in fewest.items() if count < MIN_ENCOUNTERS]
+    few = [
+        f"{side} ({count})" for side, count in fewest.items() if count < MIN_ENCOUNTERS
+    ]
     if not few:
         return ""
     return f"at {speed:g} m/s fewer than {MIN_ENCOUNTERS} encounters were seen {', '.join(few)}"
@@ -155,7 +163,12 @@ def estimate_uncertainty(
     DataError : `n_resamples` is not a whole number of at least 2.
     """
     is_count = isinstance(n_resamples, int | np.integer) and n_resamples >= 2
-    require(is_count, "n_resamples", n_resamples, "a whole number, 0 (no intervals) or at least 2")
+    require(
+        is_count,
+        "n_resamples",
+        n_resamples,
+        "a whole number, 0 (no intervals) or at least 2",
+    )
     rng = np.random.default_rng(seed)
     unit, member = resampling_units(estimator.encounters)
     n = int(member.max()) + 1
@@ -169,7 +182,8 @@ def estimate_uncertainty(
         ratio = (size / n) ** RATE
         factor = ratio / (1 - ratio)
         description = (
-            f"subsampling: {size} of {n} {unit}; differences times {factor:.2f} subtracted (rate {RATE:g})"
+            f"subsampling: {size} of {n} {unit}; "
+            f"differences times {factor:.2f} subtracted (rate {RATE:g})"
         )
     else:
         drawn = rng.multinomial(n, np.full(n, 1 / n), size=n_resamples)
@@ -183,7 +197,9 @@ def estimate_uncertainty(
     angle = QUANTITIES.index("angle_deg")
     differences[..., angle] = (differences[..., angle] + 90) % 180 - 90
     intervals = _interval(values, differences, factor, not is_posterior)
-    bands = np.maximum(_interval(reach, ellipse_reach(resampled) - reach, factor, not is_posterior), 0)
+    bands = np.maximum(
+        _interval(reach, ellipse_reach(resampled) - reach, factor, not is_posterior), 0
+    )
     tables = (
         _interval_table(speeds, "quantity", QUANTITIES, intervals),
         _interval_table(speeds, "direction", DIRECTIONS, bands),
@@ -192,13 +208,19 @@ def estimate_uncertainty(
     return Uncertainty(LEVEL, int(n_resamples), unit, description, *tables)
 
 
-def _influence(estimator: Estimator, speeds: Sequence[float], ellipses: Array) -> pd.DataFrame:
+def _influence(
+    estimator: Estimator, speeds: Sequence[float], ellipses: Array
+) -> pd.DataFrame:
     """The most influential encounter by speed; the change is infinite if no zone is left without it."""
     left_out, without = estimator.leave_one_out(speeds)
     moved = np.abs(without - ellipses)[..., :4].max(axis=-1)
     moved[np.isnan(moved)] = np.inf
-    encounter = estimator.encounters["encounter"].to_numpy()[left_out[np.argmax(moved, axis=0)]]
-    return pd.DataFrame({"speed": list(speeds), "encounter": encounter, "metres": np.max(moved, axis=0)})
+    encounter = estimator.encounters["encounter"].to_numpy()[
+        left_out[np.argmax(moved, axis=0)]
+    ]
+    return pd.DataFrame(
+        {"speed": list(speeds), "encounter": encounter, "metres": np.max(moved, axis=0)}
+    )
 
 
 def _quantities(ellipses: Array) -> Array:
@@ -207,18 +229,27 @@ def _quantities(ellipses: Array) -> Array:
     return np.stack([m, n, a, b, np.degrees(angle), np.pi * a * b], axis=-1)
 
 
-def _interval(values: Array, differences: Array, factor: float, corrects: bool = True) -> Array:
+def _interval(
+    values: Array, differences: Array, factor: float, corrects: bool = True
+) -> Array:
     """Low and high (2, s, k) around values (1, s, k), from the differences (r, s, k) of the resamples.
 
     With `factor` 0 the ends are percentiles: bias-corrected if `corrects`, else moved outwards to the value
     where it is outside. Otherwise the quantiles of the differences, times `factor`, are subtracted.
     """
     has_interval = np.isnan(differences).mean(axis=0) <= _MAX_FAILED
-    tails, ends = np.full((2, *has_interval.shape), np.nan), np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    tails, ends = (
+        np.full((2, *has_interval.shape), np.nan),
+        np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2]),
+    )
     for at in zip(*np.nonzero(has_interval), strict=True):
         known = differences[:, *at][~np.isnan(differences[:, *at])]
         below = np.mean(known < 0) + np.mean(known == 0) / 2
-        bias = 0.0 if factor or not corrects else np.clip(norm.ppf(below), -_MAX_BIAS, _MAX_BIAS)
+        bias = (
+            0.0
+            if factor or not corrects
+            else np.clip(norm.ppf(below), -_MAX_BIAS, _MAX_BIAS)
+        )
         tails[:, *at] = np.quantile(known, norm.cdf(2 * bias + norm.ppf(ends)))
     if not corrects:
         tails = np.stack([np.minimum(tails[0], 0), np.maximum(tails[1], 0)])

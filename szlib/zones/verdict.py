@@ -57,8 +57,16 @@ def judge(zone: FittedZone, speed: float) -> Verdict:
     test = zone.null_test
     if test is not None and not test.is_significant and test.n_encounters >= MIN_TESTED:
         compared = f"p = {test.p_value:.3g} ({test.n_shifts} shifts, {test.n_encounters} encounters)"
-        return Verdict(NO_RESPECT, [f"people came as near as people who ignore each other would: {compared}"])
-    reasons = [*filter(None, (describe_missing_encounters(zone.provenance), zone.missing_data(speed)))]
+        return Verdict(
+            NO_RESPECT,
+            [f"people came as near as people who ignore each other would: {compared}"],
+        )
+    reasons = [
+        *filter(
+            None,
+            (describe_missing_encounters(zone.provenance), zone.missing_data(speed)),
+        )
+    ]
     reasons += funnels.warnings(zone.provenance.get("funnel", []))
     reasons += [*_null_model(zone, speed), *_intervals(zone, speed)]
     return Verdict(UNDECIDED, reasons) if reasons else Verdict(USABLE, [f"{test}"])
@@ -69,7 +77,11 @@ def describe_missing_encounters(provenance: Mapping[str, Any]) -> str:
     n, hours = provenance.get("encounters"), provenance.get("hours")
     if not n or n >= MIN_TOTAL:
         return ""
-    more = "" if not hours else f": {(MIN_TOTAL / n - 1) * hours:.2g} more hours of recording at this rate"
+    more = (
+        ""
+        if not hours
+        else f": {(MIN_TOTAL / n - 1) * hours:.2g} more hours of recording at this rate"
+    )
     return f"{n} encounters were found, {MIN_TOTAL} are needed{more}"
 
 
@@ -88,7 +100,10 @@ def _null_model(zone: FittedZone, speed: float) -> Iterator[str]:
             f"the zone; it holds only if these are fewer than q = {q:.1%}"
         )
     for fitted in _neighbours(zone, speed):
-        area, null = _interval(zone, fitted, "area")[0], zone.null_radii.get(fitted, np.nan)
+        area, null = (
+            _interval(zone, fitted, "area")[0],
+            zone.null_radii.get(fitted, np.nan),
+        )
         if not np.sqrt(max(area, 0.0) / np.pi) > null:
             yield (
                 f"at {fitted:g} m/s the same method gives people who ignore each other a zone with a mean "
@@ -98,7 +113,11 @@ def _null_model(zone: FittedZone, speed: float) -> Iterator[str]:
 
 def _intervals(zone: FittedZone, speed: float) -> Iterator[str]:
     """What is wrong with the intervals."""
-    counts = {} if zone.side_counts is None else zone.side_counts.set_index("speed")["encounters"]
+    counts = (
+        {}
+        if zone.side_counts is None
+        else zone.side_counts.set_index("speed")["encounters"]
+    )
     for fitted in _neighbours(zone, speed):
         for name in ("a", "b"):
             low, high = _interval(zone, fitted, name)
@@ -114,7 +133,11 @@ def _interval(zone: FittedZone, speed: float, quantity: str) -> tuple[float, flo
         return np.nan, np.nan
     rows = zone.uncertainty.intervals
     row = rows[(rows["speed"] == speed) & (rows["quantity"] == quantity)]
-    return (float(row["low"].iloc[0]), float(row["high"].iloc[0])) if len(row) else (np.nan, np.nan)
+    return (
+        (float(row["low"].iloc[0]), float(row["high"].iloc[0]))
+        if len(row)
+        else (np.nan, np.nan)
+    )
 
 
 def _neighbours(zone: FittedZone, speed: float) -> list[float]:

@@ -14,7 +14,12 @@ from .ellipses import circle_around
 from .verdict import FittedZone
 
 _DIGITS = 4  # decimals of metres and radians: tenths of a millimetre
-_SPECIAL = {"%": r"\%", "&": r"\&", "_": r"\_", "#": r"\#"}  # letters that LaTeX reads as commands
+_SPECIAL = {
+    "%": r"\%",
+    "&": r"\&",
+    "_": r"\_",
+    "#": r"\#",
+}  # letters that LaTeX reads as commands
 
 
 def format_table(zone: FittedZone) -> pd.DataFrame:
@@ -24,10 +29,14 @@ def format_table(zone: FittedZone) -> pd.DataFrame:
     for name in ("a", "b"):
         rows = table[[name, f"{name}_low", f"{name}_high"]].itertuples(index=False)
         shown[f"{name} [m] (95 %)"] = [
-            f"{v:.2f} ({low:.2f} to {high:.2f})" if high == high else f"{v:.2f} (unknown)"
+            f"{v:.2f} ({low:.2f} to {high:.2f})"
+            if high == high
+            else f"{v:.2f} (unknown)"
             for v, low, high in rows
         ]
-    return shown.assign(encounters=table["encounters"].map("{:,.0f}".format), verdict=table["verdict"])
+    return shown.assign(
+        encounters=table["encounters"].map("{:,.0f}".format), verdict=table["verdict"]
+    )
 
 
 def as_latex(zone: FittedZone) -> str:
@@ -35,7 +44,14 @@ def as_latex(zone: FittedZone) -> str:
     table = format_table(zone)
     texts: list[list[str]] = [list(table.columns), *table.to_numpy().tolist()]
     rows = [" & ".join(map(_escape, row)) + r" \\" for row in texts]
-    lines = [r"\begin{tabular}{rllrl}", r"\toprule", rows[0], r"\midrule", *rows[1:], r"\bottomrule"]
+    lines = [
+        r"\begin{tabular}{rllrl}",
+        r"\toprule",
+        rows[0],
+        r"\midrule",
+        *rows[1:],
+        r"\bottomrule",
+    ]
     return "\n".join([*lines, r"\end{tabular}", ""])
 
 
@@ -49,9 +65,15 @@ def as_geojson(zone: FittedZone, n: int) -> str:
     for speed, ellipse in sorted(zone.ellipses.items()):
         ring = ellipse.curve(n + 1).round(_DIGITS)
         ring[-1] = ring[0]
-        properties = {"speed": speed, "verdict": str(zone.verdict(speed)), **_numbers(ellipse)}
+        properties = {
+            "speed": speed,
+            "verdict": str(zone.verdict(speed)),
+            **_numbers(ellipse),
+        }
         geometry = {"type": "Polygon", "coordinates": [ring.tolist()]}
-        features.append({"type": "Feature", "properties": properties, "geometry": geometry})
+        features.append(
+            {"type": "Feature", "properties": properties, "geometry": geometry}
+        )
     return json.dumps({"type": "FeatureCollection", "features": features}, indent=1)
 
 
@@ -59,11 +81,21 @@ def as_ros_params(zone: FittedZone, layer: str) -> str:
     """The ellipses of a `zone` as YAML: a file of parameters of ROS 2 for the costmap `layer`."""
     speeds = sorted(zone.ellipses)
     numbers = [_numbers(zone.ellipses[speed]) for speed in speeds]
-    lists: dict[str, list[Any]] = {name: [each[name] for each in numbers] for name in numbers[0]}
+    lists: dict[str, list[Any]] = {
+        name: [each[name] for each in numbers] for name in numbers[0]
+    }
     circles = [circle_around(zone.ellipses[speed]).semi_axes[0] for speed in speeds]
-    radii = [float(np.ceil(radius * 10**_DIGITS) / 10**_DIGITS) for radius in circles]  # not too small
-    values = {"speeds": speeds, **lists, "radius": radii, "verdict": [str(zone.verdict(v)) for v in speeds]}
-    text = yaml.safe_dump({"/**": {"ros__parameters": {layer: values}}}, sort_keys=False, width=100)
+    # not too small
+    radii = [float(np.ceil(radius * 10**_DIGITS) / 10**_DIGITS) for radius in circles]
+    values = {
+        "speeds": speeds,
+        **lists,
+        "radius": radii,
+        "verdict": [str(zone.verdict(v)) for v in speeds],
+    }
+    text = yaml.safe_dump(
+        {"/**": {"ros__parameters": {layer: values}}}, sort_keys=False, width=100
+    )
     head = (
         f"szlib {__version__}: social zones by method {zone.method}, one for each walking speed [m/s]",
         "ellipses in the frame of the person, x ahead, y to the left [m, rad]",
@@ -76,4 +108,7 @@ def _numbers(ellipse: Any) -> dict[str, float]:
     """Centre, semi-axes and angle of an ellipse by name [m, rad]."""
     values = (*ellipse.center, *ellipse.semi_axes, ellipse.angle)
     names = ("center_x", "center_y", "semi_major", "semi_minor", "angle")
-    return {name: round(float(value), _DIGITS) for name, value in zip(names, values, strict=True)}
+    return {
+        name: round(float(value), _DIGITS)
+        for name, value in zip(names, values, strict=True)
+    }

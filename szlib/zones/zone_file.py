@@ -37,7 +37,9 @@ _KEYS = {
 }  # fmt: skip
 
 
-def write_zone(path: Path, fields: Mapping[str, Any], verdicts: Mapping[float, Verdict]) -> None:
+def write_zone(
+    path: Path, fields: Mapping[str, Any], verdicts: Mapping[float, Verdict]
+) -> None:
     """Write the `fields` of a `SocialZone`, and its `verdicts` by speed, to `path`.
 
     The verdicts are for other programs: when the file is read, they are made again. Raises ZoneError if the
@@ -54,15 +56,22 @@ def write_zone(path: Path, fields: Mapping[str, Any], verdicts: Mapping[float, V
             {"speed": v, "center": e.center, "semi_axes": e.semi_axes, "angle": e.angle}
             for v, e in sorted(fields["ellipses"].items())
         ],
-        "undefined": [{"speed": v, "why": reason} for v, reason in sorted(fields["undefined"].items())],
+        "undefined": [
+            {"speed": v, "why": reason}
+            for v, reason in sorted(fields["undefined"].items())
+        ],
         "provenance": fields["provenance"],
         "seen": fields["side_counts"],
         "uncertainty": fields["uncertainty"],
         "null_test": fields["null_test"],
         "null_radii": [
-            {"speed": v, "radius": r if np.isfinite(r) else None} for v, r in fields["null_radii"].items()
+            {"speed": v, "radius": r if np.isfinite(r) else None}
+            for v, r in fields["null_radii"].items()
         ],
-        "verdicts": [{"speed": v, "verdict": each, "reasons": each.reasons} for v, each in verdicts.items()],
+        "verdicts": [
+            {"speed": v, "verdict": each, "reasons": each.reasons}
+            for v, each in verdicts.items()
+        ],
         "radii": shape if isinstance(shape, PolarZone) else None,
         "hull_vertices": shape.vertices if isinstance(shape, HullZone) else None,
     }
@@ -91,8 +100,17 @@ def read_zone(path: Path, build: Callable[..., Zone]) -> Zone:
         )
     try:
         return build(**_fields(content))
-    except (KeyError, TypeError, IndexError, ValueError, OverflowError, AttributeError) as error:
-        raise ZoneError(f"{path}: the zone in it is damaged ({error!r}); fit and save it again") from error
+    except (
+        KeyError,
+        TypeError,
+        IndexError,
+        ValueError,
+        OverflowError,
+        AttributeError,
+    ) as error:
+        raise ZoneError(
+            f"{path}: the zone in it is damaged ({error!r}); fit and save it again"
+        ) from error
 
 
 def _read_content(path: Path) -> dict[str, Any]:
@@ -114,21 +132,34 @@ def _read_content(path: Path) -> dict[str, Any]:
 def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a `SocialZone` from the content of its file; damage raises an ordinary Python error."""
     r_max, side_counts = float(content["r_max"]), content["seen"]
-    uncertainty, null_test = (_rename_keys(content[name]) for name in ("uncertainty", "null_test"))
+    uncertainty, null_test = (
+        _rename_keys(content[name]) for name in ("uncertainty", "null_test")
+    )
     if uncertainty is not None:
-        tables = {name: _table(uncertainty[name]) for name in ("intervals", "bands", "influence")}
+        tables = {
+            name: _table(uncertainty[name])
+            for name in ("intervals", "bands", "influence")
+        }
         uncertainty = Uncertainty(**{**uncertainty, **tables})
     if null_test is not None:
         statistics = tuple(map(float, null_test["null_statistics"]))
         respect = RespectRadius(**null_test["respect"])
-        null_test = NullTest(**{**null_test, "null_statistics": statistics, "respect": respect})
+        null_test = NullTest(
+            **{**null_test, "null_statistics": statistics, "respect": respect}
+        )
     return {
         "shape": HullZone(np.array(content["hull_vertices"], float), r_max)
         if content["radii"] is None
-        else PolarZone(**{name: np.array(values, float) for name, values in content["radii"].items()}),
+        else PolarZone(
+            **{
+                name: np.array(values, float)
+                for name, values in content["radii"].items()
+            }
+        ),
         "r_max": r_max,
         "ellipses": {
-            float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"]) for e in content["ellipses"]
+            float(e["speed"]): Ellipse(e["center"], e["semi_axes"], e["angle"])
+            for e in content["ellipses"]
         },
         "undefined": {float(u["speed"]): str(u["why"]) for u in content["undefined"]},
         "provenance": dict(content["provenance"]),
@@ -137,7 +168,8 @@ def _fields(content: Mapping[str, Any]) -> dict[str, Any]:
         "uncertainty": uncertainty,
         "null_test": null_test,
         "null_radii": {
-            float(each["speed"]): float(np.array(each["radius"], float)) for each in content["null_radii"]
+            float(each["speed"]): float(np.array(each["radius"], float))
+            for each in content["null_radii"]
         },
     }
 
@@ -150,12 +182,18 @@ def _checksum(content: Mapping[str, Any]) -> str:
 def _rename_keys(record: Mapping[str, Any] | None) -> Any:
     """The record with attribute names instead of the keys of the file."""
     names = {key: name for name, key in _KEYS.items()}
-    return None if record is None else {names.get(key, key): value for key, value in record.items()}
+    return (
+        None
+        if record is None
+        else {names.get(key, key): value for key, value in record.items()}
+    )
 
 
 def _table(content: Mapping[str, Any]) -> pd.DataFrame:
     table = pd.DataFrame(content)
-    numbers = table.columns.intersection(["speed", "direction", "low", "high", "metres"])
+    numbers = table.columns.intersection(
+        ["speed", "direction", "low", "high", "metres"]
+    )
     return table.astype(dict.fromkeys(numbers, float))
 
 

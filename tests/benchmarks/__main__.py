@@ -36,10 +36,14 @@ from szlib.plaza.generation import make_plaza
 from szlib.tracks import datasets
 
 
-def in_turn(first: Callable[[], object], second: Callable[[], object], repeats: int) -> tuple[float, float]:
+def in_turn(
+    first: Callable[[], object], second: Callable[[], object], repeats: int
+) -> tuple[float, float]:
     """Medians of both, run alternately after one warm-up each."""
     first(), second()
-    pairs = [(measuring.seconds(first), measuring.seconds(second)) for _ in range(repeats)]
+    pairs = [
+        (measuring.seconds(first), measuring.seconds(second)) for _ in range(repeats)
+    ]
     return median(p[0] for p in pairs), median(p[1] for p in pairs)
 
 
@@ -59,13 +63,20 @@ CROWD = szlib.Scenario(
             ((1.0, -3.0), (0.3, 0.2)),
         )
     ),
-    [((-6, 5), (10, 5)), ((-6, -5), (10, -5)), ((4, 5), (4, 3.2)), ((0, -5), (0, -3.8))],
+    [
+        ((-6, 5), (10, 5)),
+        ((-6, -5), (10, -5)),
+        ((4, 5), (4, 3.2)),
+        ((0, -5), (0, -3.8)),
+    ],
 )
 
 
 def controller_of(scenario: szlib.Scenario, **settings: Any) -> szlib.MPCCBF:
     chosen = szlib.MPCSettings(**settings)
-    return szlib.MPCCBF(ZONE, walls=scenario.walls, settings=chosen, max_people=len(scenario.people))
+    return szlib.MPCCBF(
+        ZONE, walls=scenario.walls, settings=chosen, max_people=len(scenario.people)
+    )
 
 
 def way(scenario: szlib.Scenario) -> list[Question]:
@@ -81,7 +92,9 @@ def way(scenario: szlib.Scenario) -> list[Question]:
 
 
 def race(
-    scenario: szlib.Scenario, baselines: dict[str, Callable[..., object]], repeats: int = 7
+    scenario: szlib.Scenario,
+    baselines: dict[str, Callable[..., object]],
+    repeats: int = 7,
 ) -> dict[str, Array]:
     """Times of each rival along the way [s], shape (steps,): laps in turn, medians over them.
 
@@ -91,7 +104,11 @@ def race(
     asked = way(scenario)
     for _ in range(repeats):
         for name, step in baselines.items():
-            laps[name].append([measuring.seconds(lambda: step(*each)) for each in asked][3:])  # noqa: B023 - at once
+            laps[name].append(
+                [measuring.seconds(lambda of=step, on=each: of(*on)) for each in asked][
+                    3:
+                ]
+            )
     return {name: np.median(lap, axis=0) for name, lap in laps.items()}
 
 
@@ -103,7 +120,9 @@ def ratios(times: dict[str, Array], rival: str) -> dict[str, float]:
         "sqp p99 ms": 1e3 * float(np.quantile(sqp_times, 0.99)),
         "sqp p99.9 ms": 1e3 * float(np.quantile(sqp_times, 0.999)),
         f"{rival} / sqp median": float(np.median(rival_times) / np.median(sqp_times)),
-        f"{rival} / sqp p95": float(np.quantile(rival_times, 0.95) / np.quantile(sqp_times, 0.95)),
+        f"{rival} / sqp p95": float(
+            np.quantile(rival_times, 0.95) / np.quantile(sqp_times, 0.95)
+        ),
         f"{rival} / sqp max": float(rival_times.max() / sqp_times.max()),
     }
 
@@ -111,18 +130,25 @@ def ratios(times: dict[str, Array], rival: str) -> dict[str, float]:
 def bench_solvers(scenario: szlib.Scenario) -> dict[str, float]:
     """One control step by SQP against IPOPT, warm: as tuned here, and as it comes."""
     ipopt._build.cache_clear()  # of an earlier case, with other options
-    baselines = {name: controller_of(scenario, solver=name) for name in ("sqp", "ipopt")}
+    baselines = {
+        name: controller_of(scenario, solver=name) for name in ("sqp", "ipopt")
+    }
     tuned = dict(ipopt._OPTIONS)
     for name in tuned.keys() - {"print_level", "sb"}:
         del ipopt._OPTIONS[name]
     ipopt._build.cache_clear()
     baselines["plain ipopt"] = controller_of(scenario, solver="ipopt")
     ipopt._OPTIONS.update(tuned)
-    times = race(scenario, {name: asking(controller, scenario) for name, controller in baselines.items()})
+    times = race(
+        scenario,
+        {name: asking(controller, scenario) for name, controller in baselines.items()},
+    )
     return ratios(times, "ipopt") | ratios(times, "plain ipopt")
 
 
-def asking(controller: szlib.MPCCBF, scenario: szlib.Scenario) -> Callable[..., szlib.Step]:
+def asking(
+    controller: szlib.MPCCBF, scenario: szlib.Scenario
+) -> Callable[..., szlib.Step]:
     return lambda state, people, target: controller.step(state, scenario.goal, people)
 
 
@@ -131,13 +157,21 @@ def bench_rival() -> dict[str, float]:
     from benchmarks.do_mpc_controller import do_mpc_step
 
     scenario = szlib.SCENARIOS["passing"]
-    step, rival = asking(controller_of(scenario), scenario), do_mpc_step(szlib.MPCSettings(), ZONE)
+    step, rival = (
+        asking(controller_of(scenario), scenario),
+        do_mpc_step(szlib.MPCSettings(), ZONE),
+    )
 
     def rival_control(x: Array, people: Sequence[szlib.Person], target: Array) -> Array:
         return rival(x, target, people[0])
 
-    apart = [np.abs(step(*each).control - rival_control(*each)).max() for each in way(scenario)]
-    found = ratios(race(scenario, {"sqp": step, "do-mpc": rival_control}, repeats=3), "do-mpc")
+    apart = [
+        np.abs(step(*each).control - rival_control(*each)).max()
+        for each in way(scenario)
+    ]
+    found = ratios(
+        race(scenario, {"sqp": step, "do-mpc": rival_control}, repeats=3), "do-mpc"
+    )
     return found | {"largest difference of controls": max(apart)}
 
 
@@ -148,7 +182,11 @@ def bench_cruel(count: int) -> dict[str, float]:
     tally: Counter[str] = Counter()
     for solver in ("sqp", "ipopt"):
         attack_time(count, tally, solver)
-    return {what: n for what, n in tally.items() if what.startswith(("p", "max", "timed", "broken"))}
+    return {
+        what: n
+        for what, n in tally.items()
+        if what.startswith(("p", "max", "timed", "broken"))
+    }
 
 
 def bench_build() -> dict[str, float]:
@@ -164,16 +202,27 @@ def bench_build() -> dict[str, float]:
         rebuilt.step(x, scenario.goal, people)
 
     times = race(scenario, {"once": asking(once, scenario), "anew": anew}, repeats=3)
-    return {"rebuilt / built once": float(np.median(times["anew"]) / np.median(times["once"]))}
+    return {
+        "rebuilt / built once": float(
+            np.median(times["anew"]) / np.median(times["once"])
+        )
+    }
 
 
 def check_agreement(count: int) -> dict[str, float]:
     """Both solvers on seeded states, each from nothing: where they differ, and by how much where not."""
-    found = dict.fromkeys(("states", "both solve", "same", "lower by sqp", "lower by ipopt"), 0)
+    found = dict.fromkeys(
+        ("states", "both solve", "same", "lower by sqp", "lower by ipopt"), 0
+    )
     found |= dict.fromkeys(("only sqp", "only ipopt"), 0)
     apart, residual = [0.0], [0.0]
-    for question in tqdm(itertools.islice(questions(seed=10), count), "agreement", count):
-        sqp, other = (question.ask(szlib.MPCSettings(solver=s, head_on_share=0.0)) for s in ("sqp", "ipopt"))
+    for question in tqdm(
+        itertools.islice(questions(seed=10), count), "agreement", count
+    ):
+        sqp, other = (
+            question.ask(szlib.MPCSettings(solver=s, head_on_share=0.0))
+            for s in ("sqp", "ipopt")
+        )
         solved = [step.status == "optimal" for step in (sqp, other)]
         found["states"] += 1
         found["both solve"] += all(solved)
@@ -193,10 +242,14 @@ def check_agreement(count: int) -> dict[str, float]:
 def check_meetings(count: int, solver: str) -> dict[str, float]:
     """Exactly symmetric meetings: how many end at the goal, and on the side that was to be expected."""
     reached = side = 0
-    for scenario, place in tqdm(itertools.islice(meetings(seed=11), count), f"meetings, {solver}", count):
+    for scenario, place in tqdm(
+        itertools.islice(meetings(seed=11), count), f"meetings, {solver}", count
+    ):
         log = szlib.simulate(scenario, controller_of(scenario, solver=solver))
         reached += log.success
-        side += log.metrics()["passing_side"] == ("left" if place == "wall" else "right")
+        side += log.metrics()["passing_side"] == (
+            "left" if place == "wall" else "right"
+        )
     return {"meetings": count, "goal reached": reached, "on the expected side": side}
 
 
@@ -219,7 +272,11 @@ def bench_plaza() -> dict[str, float]:
         fitted = measuring.seconds(
             lambda: szlib.SocialZone.fit(szlib.find_encounters(szlib.read_tracks(file)))
         )
-        return {"made and written s": made, "MB": file.stat().st_size / 1e6, "read to zone s": fitted}
+        return {
+            "made and written s": made,
+            "MB": file.stat().st_size / 1e6,
+            "read to zone s": fitted,
+        }
 
 
 def bench_import() -> dict[str, float]:
@@ -229,7 +286,10 @@ def bench_import() -> dict[str, float]:
         lambda: subprocess.run([sys.executable, "-c", "pass"], check=True),
         repeats=5,
     )
-    return {"s more than bare Python": imported - bare, "szlib / bare Python": imported / bare}
+    return {
+        "s more than bare Python": imported - bare,
+        "szlib / bare Python": imported / bare,
+    }
 
 
 BARS: dict[str, measuring.Bars] = {
@@ -264,7 +324,9 @@ def main() -> None:
     bars = BARS | steps.BARS | data_sizes.BARS | data_growth.BARS
     wanted = [name for name in sys.argv[1:] if not name.startswith("--")] or list(cases)
     if unknown := set(wanted) - set(cases):
-        sys.exit(f"no such case: {', '.join(sorted(unknown))}; there are {', '.join(cases)}")
+        sys.exit(
+            f"no such case: {', '.join(sorted(unknown))}; there are {', '.join(cases)}"
+        )
     found: dict[str, dict[str, float]] = {}
     for name in wanted:
         bench = cases[name]

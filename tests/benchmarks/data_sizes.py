@@ -91,7 +91,12 @@ def run(program: str, *files: Path) -> Run:
     imports, program = program.split("# begin")
     environment = os.environ | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
     done = subprocess.run(
-        [sys.executable, "-c", _TIMED.format(imports=imports, program=program), *map(str, files)],
+        [
+            sys.executable,
+            "-c",
+            _TIMED.format(imports=imports, program=program),
+            *map(str, files),
+        ],
         capture_output=True,
         text=True,
         check=True,
@@ -110,7 +115,9 @@ def raw_day() -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as folder:
         names = [f"column_{k}" for k in range(1, 9)]
         plaza = pl.read_csv(
-            make_plaza(Path(folder) / "plaza.csv", seed=0), has_header=False, new_columns=names
+            make_plaza(Path(folder) / "plaza.csv", seed=0),
+            has_header=False,
+            new_columns=names,
         )
         copies = -(-ROWS // plaza.height)
         shift = (
@@ -156,9 +163,14 @@ def bench_days(repeats: int = 3) -> dict[str, float]:
     found = {}
     with raw_day() as day:
         rounds = [{n: run(OURS, *[day] * n) for n in (1, 2, 4)} for _ in range(repeats)]
-    one, memory = median(r[1].seconds for r in rounds), median(r[1].memory for r in rounds)
+    one, memory = (
+        median(r[1].seconds for r in rounds),
+        median(r[1].memory for r in rounds),
+    )
     for n in (2, 4):
-        found[f"{n} days / {n} x one"] = median(r[n].seconds for r in rounds) / (n * one)
+        found[f"{n} days / {n} x one"] = median(r[n].seconds for r in rounds) / (
+            n * one
+        )
         found[f"{n} days, memory / one"] = median(r[n].memory for r in rounds) / memory
     return found
 
@@ -168,7 +180,9 @@ def bench_lof() -> dict[str, float]:
     samples = paper_samples()
     points = outliers.complementary_points(samples)
     begun = time.perf_counter()
-    sklearn_labels = LocalOutlierFactor(contamination=outliers.FRACTION).fit_predict(points) == -1
+    sklearn_labels = (
+        LocalOutlierFactor(contamination=outliers.FRACTION).fit_predict(points) == -1
+    )
     between = time.perf_counter()
     ours = outliers.is_outlier(samples, fraction=outliers.FRACTION)
     ended = time.perf_counter()
@@ -194,5 +208,7 @@ CASES: dict[str, Callable[[], dict[str, float]]] = {
     "zone, paper size": bench_zone,
 }
 
-BARS: dict[str, measuring.Bars] = {"raw day to encounters": {"ours / bare scan": ("<=", 1.95)}}
+BARS: dict[str, measuring.Bars] = {
+    "raw day to encounters": {"ours / bare scan": ("<=", 1.95)}
+}
 """Of a case: what its numbers are held against."""

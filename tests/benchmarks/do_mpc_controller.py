@@ -5,14 +5,16 @@ from collections.abc import Callable, Sequence
 import casadi as ca
 import do_mpc
 import numpy as np
+from szlib.control.obstacles import barrier, cbf_residual, ellipse_formula
+from szlib.control.people import place_zone
 
 import szlib
 from szlib.checks import Array
-from szlib.control.barriers import barrier, cbf_residual, ellipse_formula
-from szlib.control.person import place_zone
 
 
-def do_mpc_step(settings: szlib.MPCSettings, zone: szlib.Ellipse) -> Callable[..., Array]:
+def do_mpc_step(
+    settings: szlib.MPCSettings, zone: szlib.Ellipse
+) -> Callable[..., Array]:
     """A function (state, target, person) -> control for one person and no wall, warm from call to call."""
     s = settings
     model = do_mpc.model.Model("discrete")
@@ -28,7 +30,10 @@ def do_mpc_step(settings: szlib.MPCSettings, zone: szlib.Ellipse) -> Callable[..
 
     mpc = do_mpc.controller.MPC(model)
     mpc.settings.n_horizon, mpc.settings.t_step = s.N, s.dt
-    mpc.settings.state_discretization, mpc.settings.store_full_solution = "discrete", False
+    mpc.settings.state_discretization, mpc.settings.store_full_solution = (
+        "discrete",
+        False,
+    )
     mpc.settings.supress_ipopt_output()
     error = x - ca.vertcat(target, 0, 0)
     weighted = [ca.dot(ca.DM(weights), error**2) for weights in (s.P, s.Q)]
@@ -50,8 +55,13 @@ def do_mpc_step(settings: szlib.MPCSettings, zone: szlib.Ellipse) -> Callable[..
     def predictions(_: float) -> object:
         for k in range(s.N + 1):
             template["_tvp", k, "target"] = known["target"]
-            seen = [place_zone(known["person"].after(j * s.dt), zone)[:5] for j in (k, k + 1)]
-            template["_tvp", k, "here"], template["_tvp", k, "after"] = (np.array(each) for each in seen)
+            seen = [
+                place_zone(known["person"].after(j * s.dt), zone)[:5]
+                for j in (k, k + 1)
+            ]
+            template["_tvp", k, "here"], template["_tvp", k, "after"] = (
+                np.array(each) for each in seen
+            )
             template["_tvp", k, "active"] = float(k < s.N_h)
         return template
 

@@ -34,7 +34,9 @@ def seconds(call: Callable[[], object]) -> float:
     return time.perf_counter() - begun
 
 
-def grow(work: Mapping[float, Callable[[], object]], repeats: int = 3) -> dict[float, float]:
+def grow(
+    work: Mapping[float, Callable[[], object]], repeats: int = 3
+) -> dict[float, float]:
     """Median seconds of each size's work: the sizes in turn, after one lap that does not count.
 
     Seconds of this process's processors: what else the machine does hardly matters.

@@ -26,32 +26,56 @@ from szlib.control.controller import advance
 
 BEFORE_VARIABLE = "SZLIB_BEFORE"
 GOAL = (8.0, 0.5)
-_WALLS = [((-6, 5), (10, 5)), ((-6, -5), (10, -5)), ((4, 5), (4, 3.2)), ((0, -5), (0, -3.8))]
+_WALLS = [
+    ((-6, 5), (10, 5)),
+    ((-6, -5), (10, -5)),
+    ((4, 5), (4, 3.2)),
+    ((0, -5), (0, -3.8)),
+]
 
 
 def crowd(n: int) -> Array:
     """People along the way and beside it, shape (n, 4), always the same: x, y [m], vx, vy [m/s]."""
     rng = np.random.default_rng(5)
-    rows = np.c_[rng.uniform(-2, 10, 40), rng.uniform(0.3, 4.5, 40), rng.uniform(-0.5, 0.5, (40, 2))]
+    rows = np.c_[
+        rng.uniform(-2, 10, 40),
+        rng.uniform(0.3, 4.5, 40),
+        rng.uniform(-0.5, 0.5, (40, 2)),
+    ]
     rows[::2, 1] *= -1
     return rows[:n]
 
 
 def walls(n: int) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """Four walls of a room, then short ones that stand off them."""
-    short = [((-5 + 0.6 * i, side * 5), (-5 + 0.6 * i, side * 4.3)) for i in range(23) for side in (1, -1)]
+    short = [
+        ((-5 + 0.6 * i, side * 5), (-5 + 0.6 * i, side * 4.3))
+        for i in range(23)
+        for side in (1, -1)
+    ]
     return (_WALLS + short)[:n]
 
 
 def controller_of(of: ModuleType, people: int, n_walls: int, **settings: Any) -> Any:
     """A controller of this szlib, or of an earlier one."""
     zone = of.Ellipse(ZONE.center, ZONE.semi_axes, ZONE.angle)
-    return of.MPCCBF(zone, walls=walls(n_walls), settings=of.MPCSettings(**settings), max_people=people)
+    return of.MPCCBF(
+        zone,
+        walls=walls(n_walls),
+        settings=of.MPCSettings(**settings),
+        max_people=people,
+    )
 
 
-def way(people: int, n_walls: int, steps: int = 120, **settings: Any) -> list[tuple[Array, Array]]:
+def way(
+    people: int, n_walls: int, steps: int = 120, **settings: Any
+) -> list[tuple[Array, Array]]:
     """The states of a run, and everybody's numbers in each."""
-    controller, x, rows = controller_of(szlib, people, n_walls, **settings), np.zeros(4), crowd(people)
+    controller, x, rows = (
+        controller_of(szlib, people, n_walls, **settings),
+        np.zeros(4),
+        crowd(people),
+    )
     x[0], asked = -4.0, []
     for _ in range(steps):
         asked.append((x, rows))
@@ -61,12 +85,21 @@ def way(people: int, n_walls: int, steps: int = 120, **settings: Any) -> list[tu
 
 
 def laps(
-    rivals: Sequence[tuple[ModuleType, Any]], asked: Sequence[tuple[Array, Array]], repeats: int
+    rivals: Sequence[tuple[ModuleType, Any]],
+    asked: Sequence[tuple[Array, Array]],
+    repeats: int,
 ) -> tuple[Array, float]:
     """Times of each rival, shape (rivals, repeats, steps) [s], laps in turn; largest |du| from the first."""
-    took, apart, first = np.zeros((len(rivals), repeats, len(asked))), 0.0, np.zeros((len(asked), 2))
+    took, apart, first = (
+        np.zeros((len(rivals), repeats, len(asked))),
+        0.0,
+        np.zeros((len(asked), 2)),
+    )
     people = [
-        [[of.Person(tuple(row[:2]), tuple(row[2:])) for row in rows.tolist()] for _, rows in asked]
+        [
+            [of.Person(tuple(row[:2]), tuple(row[2:])) for row in rows.tolist()]
+            for _, rows in asked
+        ]
         for of, _ in rivals
     ]
     for lap in range(-1, repeats):
@@ -109,10 +142,16 @@ def bench_build() -> dict[str, float]:
         with get_context("spawn").Pool(1) as pool:
             first, again, megabytes = pool.apply(build, (people, n_walls))
         name = f"{people} + {n_walls}"
-        found |= {f"{name}: first ms": first, f"{name}: another ms": again, f"{name}: first MB": megabytes}
+        found |= {
+            f"{name}: first ms": first,
+            f"{name}: another ms": again,
+            f"{name}: first MB": megabytes,
+        }
     slots = [people + n_walls for people, n_walls in sizes]
     return found | {
-        "exponent": measuring.exponent(slots, [v for k, v in found.items() if k.endswith("first ms")])
+        "exponent": measuring.exponent(
+            slots, [v for k, v in found.items() if k.endswith("first ms")]
+        )
     }
 
 
@@ -132,7 +171,11 @@ def build(people: int, n_walls: int) -> tuple[float, float, float]:
 def _resident() -> float:
     """The memory of this process [MB]; NaN where the system does not say (not Linux)."""
     file = Path("/proc/self/statm")
-    return int(file.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6 if file.exists() else np.nan
+    return (
+        int(file.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+        if file.exists()
+        else np.nan
+    )
 
 
 def bench_jump() -> dict[str, float]:
@@ -175,7 +218,9 @@ def earlier(clone: str) -> ModuleType:
         "szlib_before", file, submodule_search_locations=[str(file.parent)]
     )
     if spec is None or spec.loader is None:
-        raise SystemExit(f"${BEFORE_VARIABLE}: {file} is no package; name a clone of szlib")
+        raise SystemExit(
+            f"${BEFORE_VARIABLE}: {file} is no package; name a clone of szlib"
+        )
     module = sys.modules["szlib_before"] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -191,8 +236,12 @@ def bench_before(people: int, n_walls: int) -> dict[str, float]:
     return {
         "ms": 1e3 * float(np.median(now_each)),
         "now / before median": float(np.median(now_each) / np.median(before_each)),
-        "now / before p95": float(np.quantile(now_each, 0.95) / np.quantile(before_each, 0.95)),
-        "now / before p99.9": float(np.quantile(took[1], 0.999) / np.quantile(took[0], 0.999)),
+        "now / before p95": float(
+            np.quantile(now_each, 0.95) / np.quantile(before_each, 0.95)
+        ),
+        "now / before p99.9": float(
+            np.quantile(took[1], 0.999) / np.quantile(took[0], 0.999)
+        ),
         "largest |du|": apart,
     }
 
@@ -203,13 +252,23 @@ def bench_worlds(count: int) -> dict[str, float]:
     Each has a process of its own, or it would collect the others' garbage.
     """
     rivals = ("before", "now")
-    took, rows = np.zeros((len(rivals), count // 10)), dict[tuple[int, int], list[dict[str, Any]]]()
+    took, rows = (
+        np.zeros((len(rivals), count // 10)),
+        dict[tuple[int, int], list[dict[str, Any]]](),
+    )
     with ExitStack() as open_pools:
         pools = [open_pools.enter_context(get_context("spawn").Pool(1)) for _ in rivals]
-        for first in 2 * [*range(0, count, 10)]:  # the first lap builds what the second times
+        for first in 2 * [
+            *range(0, count, 10)
+        ]:  # the first lap builds what the second times
             for i, (rival, pool) in enumerate(zip(rivals, pools, strict=True)):
-                took[i, first // 10], rows[i, first] = pool.apply(ten_worlds, (rival, first))
-    pairs = (zip(rows[0, first], rows[1, first], strict=True) for first in range(0, count, 10))
+                took[i, first // 10], rows[i, first] = pool.apply(
+                    ten_worlds, (rival, first)
+                )
+    pairs = (
+        zip(rows[0, first], rows[1, first], strict=True)
+        for first in range(0, count, 10)
+    )
     differ = sum(not _same(*pair) for ten in pairs for pair in ten)
     before, now = took.sum(axis=1)
     return {"before / now": before / now, "rows that differ": differ}
@@ -230,10 +289,18 @@ def ten_worlds(rival: str, first: int) -> tuple[float, list[dict[str, Any]]]:
 
 def _same(one: dict[str, Any], other: dict[str, Any]) -> bool:
     """True if the columns that both rows have agree to 1e-5, but for times."""
-    names = [name for name in one if name in other and not name.startswith("solve_time")]
+    names = [
+        name for name in one if name in other and not name.startswith("solve_time")
+    ]
     numbers = [name for name in names if isinstance(one[name], float)]
-    return all(one[name] == other[name] for name in set(names) - set(numbers)) and np.allclose(
-        [one[name] for name in numbers], [other[name] for name in numbers], 1e-5, 1e-6, equal_nan=True
+    return all(
+        one[name] == other[name] for name in set(names) - set(numbers)
+    ) and np.allclose(
+        [one[name] for name in numbers],
+        [other[name] for name in numbers],
+        1e-5,
+        1e-6,
+        equal_nan=True,
     )
 
 

@@ -20,7 +20,13 @@ import pytest
 from jupytext.config import load_jupytext_config
 
 ROOT = Path(__file__).parents[2]
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "microsoft-edge")
+BROWSERS = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "microsoft-edge",
+)
 CHAPTERS = "chapters"
 """A folder of the copy with the executed chapters."""
 REQUIRED = "SZLIB_BROWSER"
@@ -64,7 +70,9 @@ def browser() -> Iterator[object]:
     executable = chromium()
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as driver:
-        launched = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
+        launched = driver.chromium.launch(
+            executable_path=executable, args=["--no-sandbox"]
+        )
         yield launched.new_context(viewport={"width": 1400, "height": 1000})
         launched.close()
 
@@ -74,7 +82,11 @@ def copy(browser: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The package, the notebooks and their settings, as a git repository of their own."""
     folder = tmp_path_factory.mktemp("copy") / "szlib"
     for name in ("szlib", "notebooks"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", ".*"))
+        shutil.copytree(
+            ROOT / name,
+            folder / name,
+            ignore=shutil.ignore_patterns("__pycache__", ".*"),
+        )
     shutil.copy(ROOT / "pyproject.toml", folder)
     for chapter in (ROOT / "notebooks").glob("*.ipynb"):
         (folder / CHAPTERS).mkdir(exist_ok=True)
@@ -84,7 +96,9 @@ def copy(browser: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for arguments in (["init", "-q"], ["add", "-A"]):
         subprocess.run(["git", *arguments], cwd=folder, check=True)
     author = ["-c", "user.name=szlib", "-c", "user.email=szlib@localhost"]
-    subprocess.run(["git", *author, "commit", "-q", "-m", "copy"], cwd=folder, check=True)
+    subprocess.run(
+        ["git", *author, "commit", "-q", "-m", "copy"], cwd=folder, check=True
+    )
     return folder
 
 
@@ -93,7 +107,10 @@ def shorten(script: Path) -> None:
     notebook, kept = jupytext.read(script), []
     for cell in notebook.cells:
         is_operated = any(text in cell.source for text in OPERATED[script.stem])
-        is_set_up = "parameters" in cell.metadata.get("tags", []) or "import" in cell.source.split()
+        is_set_up = (
+            "parameters" in cell.metadata.get("tags", [])
+            or "import" in cell.source.split()
+        )
         is_record = "= NotebookRecord(" in cell.source
         if is_operated or is_set_up or is_record:
             kept.append(cell)
@@ -113,9 +130,18 @@ def lab(copy: Path) -> Iterator[str]:
         file = home / "settings" / "@jupyterlab" / f"{name}.jupyterlab-settings"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(content))
-    folders = {f"JUPYTER_{name}_DIR": str(home / name.lower()) for name in ("CONFIG", "RUNTIME")}
-    folders |= {"JUPYTERLAB_SETTINGS_DIR": str(home / "settings"), "IPYTHONDIR": str(home / "ipython")}
-    folders |= {"JUPYTERLAB_WORKSPACES_DIR": str(home / "workspaces"), "PYTHONPATH": str(copy)}
+    folders = {
+        f"JUPYTER_{name}_DIR": str(home / name.lower())
+        for name in ("CONFIG", "RUNTIME")
+    }
+    folders |= {
+        "JUPYTERLAB_SETTINGS_DIR": str(home / "settings"),
+        "IPYTHONDIR": str(home / "ipython"),
+    }
+    folders |= {
+        "JUPYTERLAB_WORKSPACES_DIR": str(home / "workspaces"),
+        "PYTHONPATH": str(copy),
+    }
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -125,7 +151,9 @@ def lab(copy: Path) -> Iterator[str]:
         f"--ServerApp.root_dir={copy}",
     ]  # fmt: skip
     log = (copy.parent / "lab.log").open("wb")
-    server = subprocess.Popen(command, env=os.environ | folders, stdout=log, stderr=log, cwd=copy)
+    server = subprocess.Popen(
+        command, env=os.environ | folders, stdout=log, stderr=log, cwd=copy
+    )
     address = f"http://127.0.0.1:{port}"
     try:
         _wait(server, f"{address}/api/status?token=szlib", copy.parent / "lab.log")

@@ -24,7 +24,9 @@ class Notebook:
         self.page, self.file = page, copy / "notebooks" / f"{name}.ipynb"
         page.goto(f"{address}/doc/tree/notebooks/{name}.ipynb?token=szlib")
         page.wait_for_selector(".jp-Notebook .jp-CodeCell", timeout=2 * MINUTES)
-        page.wait_for_function("window.jupyterapp?.shell.currentWidget?.sessionContext?.isReady")
+        page.wait_for_function(
+            "window.jupyterapp?.shell.currentWidget?.sessionContext?.isReady"
+        )
 
     def command(self, name):
         self.page.evaluate(f"{COMMANDS}.execute('{name}')")
@@ -32,16 +34,22 @@ class Notebook:
     def run(self):
         """Run all cells, to the end."""
         session = "window.jupyterapp.shell.currentWidget.sessionContext.session"
-        self.page.wait_for_function(f"{session}?.kernel?.status === 'idle'", timeout=MINUTES)
+        self.page.wait_for_function(
+            f"{session}?.kernel?.status === 'idle'", timeout=MINUTES
+        )
         self.page.evaluate("() => { window.done = false; }")
         finished = ".then(() => { window.done = true; })"
-        self.page.evaluate(f"() => {{ {COMMANDS}.execute('notebook:run-all-cells'){finished}; }}")
+        self.page.evaluate(
+            f"() => {{ {COMMANDS}.execute('notebook:run-all-cells'){finished}; }}"
+        )
         self.page.wait_for_function("window.done", timeout=4 * MINUTES)
 
     def save(self):
         """Save, and return the content of the file."""
         self.command("docmanager:save")
-        self.page.wait_for_function("!window.jupyterapp.shell.currentWidget.context.model.dirty")
+        self.page.wait_for_function(
+            "!window.jupyterapp.shell.currentWidget.context.model.dirty"
+        )
         return nbformat.read(self.file, as_version=4)
 
 
@@ -57,7 +65,10 @@ def notebook(browser, lab, copy):
 
 def errors(saved):
     return [
-        out.evalue for cell in saved.cells for out in cell.get("outputs", ()) if out.output_type == "error"
+        out.evalue
+        for cell in saved.cells
+        for out in cell.get("outputs", ())
+        if out.output_type == "error"
     ]
 
 
@@ -108,13 +119,23 @@ def test_the_first_picture_of_each_chapter_is_in_the_first_screen(browser, lab, 
     page = browser.new_page()
     page.set_viewport_size({"width": WIDTH, "height": HEIGHT})
     page.goto(f"{lab}/lab/tree/chapters?token=szlib")
-    page.wait_for_function("window.jupyterapp?.shell.currentWidget", timeout=2 * MINUTES)
+    page.wait_for_function(
+        "window.jupyterapp?.shell.currentWidget", timeout=2 * MINUTES
+    )
     chapters = sorted((copy / "chapters").glob("*.ipynb"))
-    places = {each.stem: page.evaluate(FIRST_PICTURE, f"chapters/{each.name}") for each in chapters}
+    places = {
+        each.stem: page.evaluate(FIRST_PICTURE, f"chapters/{each.name}")
+        for each in chapters
+    }
     print({name: [round(at) for at in place] for name, place in places.items()})
     page.close()
-    shown = {name: (screen - top) / (bottom - top) for name, (top, bottom, _, screen) in places.items()}
-    assert {name: round(share, 2) for name, share in shown.items() if share < 0.95} == {}
+    shown = {
+        name: (screen - top) / (bottom - top)
+        for name, (top, bottom, _, screen) in places.items()
+    }
+    assert {
+        name: round(share, 2) for name, share in shown.items() if share < 0.95
+    } == {}
 
 
 def picture(locator):
@@ -129,18 +150,30 @@ def natural_size(image):
 def test_an_exercise_is_solved(notebook, copy):
     """An answer is checked, and saved into both files of the pair."""
     solved = jupytext.read(copy / "notebooks" / "solutions" / "sheet5_barriers.py")
-    (answer,) = (c.source for c in solved.cells if c.source.startswith("def focal_distance"))
+    (answer,) = (
+        c.source for c in solved.cells if c.source.startswith("def focal_distance")
+    )
     opened = notebook("exercises/sheet5_barriers")
-    opened.page.locator(".jp-CodeCell .cm-content", has_text="def focal_distance").click()
+    opened.page.locator(
+        ".jp-CodeCell .cm-content", has_text="def focal_distance"
+    ).click()
     opened.page.keyboard.press("Control+a")
     opened.page.keyboard.insert_text(answer)
     opened.run()
     saved = opened.save()
     assert errors(saved) == []
     outputs = {c.source: str(c.outputs) for c in saved.cells if c.cell_type == "code"}
-    assert "passed - focal_distance" in outputs['judges.check("focal_distance", focal_distance)']
-    assert "not yet - wall_distance" in outputs['judges.check("wall_distance", wall_distance)']
-    assert answer in [cell.source for cell in jupytext.read(opened.file.with_suffix(".py")).cells]
+    assert (
+        "passed - focal_distance"
+        in outputs['judges.check("focal_distance", focal_distance)']
+    )
+    assert (
+        "not yet - wall_distance"
+        in outputs['judges.check("wall_distance", wall_distance)']
+    )
+    assert answer in [
+        cell.source for cell in jupytext.read(opened.file.with_suffix(".py")).cells
+    ]
 
 
 def test_a_slider_of_the_zones_draws_another_speed(notebook):
@@ -148,14 +181,21 @@ def test_a_slider_of_the_zones_draws_another_speed(notebook):
     opened.run()
     shown = opened.page.locator("img.widget-image")
     shown.wait_for(timeout=MINUTES)
-    opened.page.wait_for_function("document.querySelector('img.widget-image').naturalWidth > 0")
+    opened.page.wait_for_function(
+        "document.querySelector('img.widget-image').naturalWidth > 0"
+    )
     before, size = shown.get_attribute("src"), natural_size(shown)
     opened.page.locator(".widget-slider .noUi-handle").last.press("ArrowRight")
     opened.page.wait_for_function(
-        "before => document.querySelector('img.widget-image').src !== before", arg=before
+        "before => document.querySelector('img.widget-image').src !== before",
+        arg=before,
     )
-    opened.page.wait_for_function("document.querySelector('img.widget-image').naturalWidth > 0")
-    assert shown.count() == 1 and natural_size(shown) == size, "one picture, which keeps its size"
+    opened.page.wait_for_function(
+        "document.querySelector('img.widget-image').naturalWidth > 0"
+    )
+    assert shown.count() == 1 and natural_size(shown) == size, (
+        "one picture, which keeps its size"
+    )
     saved = opened.save()
     assert errors(saved) == []
     check_pair(opened.file, saved)
@@ -173,23 +213,36 @@ def test_a_run_plays_in_its_notebook_and_in_the_report(notebook, browser, copy):
     page, messages = browser.new_page(), []
     page.on("console", lambda message: messages.append(message.text))
     page.on("pageerror", lambda error: messages.append(str(error)))
-    page.on("request", lambda r: messages.append(r.url) if r.url.startswith("http") else None)
+    page.on(
+        "request",
+        lambda r: messages.append(r.url) if r.url.startswith("http") else None,
+    )
     page.goto(write_report(home).as_uri())
     check_player(page)
-    broken = page.evaluate("[...document.images].filter((i) => !i.complete || !i.naturalWidth).length")
+    broken = page.evaluate(
+        "[...document.images].filter((i) => !i.complete || !i.naturalWidth).length"
+    )
     assert (messages, broken) == ([], 0)
     page.close()
 
 
 def test_nothing_of_a_hostile_folder_runs_in_its_report(browser, tmp_path):
-    report, page, asked = write_report(make_hostile_results(tmp_path)), browser.new_page(), []
+    report, page, asked = (
+        write_report(make_hostile_results(tmp_path)),
+        browser.new_page(),
+        [],
+    )
     page.add_init_script("window.attack = () => { window.attacked = true; }")
     page.on("request", lambda request: asked.append(request.url))
     page.goto(report.as_uri())
-    page.evaluate("document.querySelectorAll('a, button, summary').forEach((each) => each.click())")
+    page.evaluate(
+        "document.querySelectorAll('a, button, summary').forEach((each) => each.click())"
+    )
     page.wait_for_timeout(200)
     assert page.evaluate("window.attacked") is None
-    assert [url for url in asked if not url.startswith(("data:", report.as_uri()))] == []
+    assert [
+        url for url in asked if not url.startswith(("data:", report.as_uri()))
+    ] == []
     assert page.url.partition("#")[0] == report.as_uri()
     page.close()
 
@@ -214,7 +267,8 @@ def check_player(page):
 def open_laboratory(page, lab):
     """The page of a `Laboratory` without JupyterLab: its messages are answered by this process."""
     page.expose_function(
-        "answer", lambda request: json.loads(json.dumps(lab.answer(request), allow_nan=False))
+        "answer",
+        lambda request: json.loads(json.dumps(lab.answer(request), allow_nan=False)),
     )
     page.set_content("<div id=lab></div>")
     page.evaluate(
@@ -250,7 +304,10 @@ def drag(page, start, end):
     box = page.locator(".szlib-lab-scene").bounding_box()
     scale = (600 - 40) / 14.6  # the corridor with its margins is 14.6 m long
     (x0, y0), (x1, y1) = (
-        (box["x"] + 300 + scale * (x - 0.5), box["y"] + (box["height"] - 20) / 2 - scale * y)
+        (
+            box["x"] + 300 + scale * (x - 0.5),
+            box["y"] + (box["height"] - 20) / 2 - scale * y,
+        )
         for x, y in (start, end)
     )
     page.mouse.move(x0, y0)
@@ -277,12 +334,21 @@ def test_the_laboratory_goes_back_and_on(lab_page):
     assert "It keeps its speed" in page.locator(".szlib-why").text_content()
     shown = picture(page.locator(".szlib-lab-scene"))
     page.locator(".szlib-time").fill("0")
-    settle(page, "document.querySelector('.szlib-why').textContent.startsWith('It sets off')")
+    settle(
+        page,
+        "document.querySelector('.szlib-why').textContent.startsWith('It sets off')",
+    )
     assert lab.world.n == 25, "to look at the past changes nothing"
     page.locator(".szlib-step").click()
-    settle(page, "document.querySelector('.szlib-status').textContent.startsWith('t = 0.1 s')")
+    settle(
+        page,
+        "document.querySelector('.szlib-status').textContent.startsWith('t = 0.1 s')",
+    )
     page.locator(".szlib-time").fill("25")
-    settle(page, "document.querySelector('.szlib-status').textContent.startsWith('t = 2.5 s')")
+    settle(
+        page,
+        "document.querySelector('.szlib-status').textContent.startsWith('t = 2.5 s')",
+    )
     assert picture(page.locator(".szlib-lab-scene")) == shown
     page.locator(".szlib-time").fill("10")
     page.locator("input[name=gamma]").fill("0.2")
@@ -306,9 +372,15 @@ def test_the_laboratory_is_dragged_and_shared(lab_page):
     page.wait_for_timeout(300)
     assert lab.world.people[0].velocity == pytest.approx((0.0, 1.0), abs=0.1)
     page.locator(".szlib-add").click()
-    settle(page, "document.querySelector('.szlib-remove').textContent === 'remove person 1'")
+    settle(
+        page,
+        "document.querySelector('.szlib-remove').textContent === 'remove person 1'",
+    )
     page.locator(".szlib-second").select_option("MPCSettings.among_people")
-    settle(page, "document.querySelector('.szlib-rival').textContent.startsWith('Second robot')")
+    settle(
+        page,
+        "document.querySelector('.szlib-rival').textContent.startsWith('Second robot')",
+    )
     take_steps(page, 2)
     page.locator(".szlib-share").click()
     settle(page, "document.querySelector('.szlib-code').value.length")
@@ -317,7 +389,10 @@ def test_the_laboratory_is_dragged_and_shared(lab_page):
     controls = [shared[name].controls[-1].tolist() for name in ("log", "log_b")]
     assert controls == [step.control.tolist() for step in lab.world.steps]
     page.locator(".szlib-remove").click()
-    settle(page, "document.querySelector('.szlib-remove').textContent === 'remove person 0'")
+    settle(
+        page,
+        "document.querySelector('.szlib-remove').textContent === 'remove person 0'",
+    )
 
 
 def test_a_refused_drag_of_the_laboratory_snaps_back(lab_page):
@@ -329,7 +404,10 @@ def test_a_refused_drag_of_the_laboratory_snaps_back(lab_page):
     alone = picture(page.locator(".szlib-lab-scene"))
     assert alone != before
     drag(page, (4.0, 0.0), (4.0, 2.2))
-    settle(page, "document.querySelector('.szlib-error').textContent.includes('too close to the wall')")
+    settle(
+        page,
+        "document.querySelector('.szlib-error').textContent.includes('too close to the wall')",
+    )
     assert lab.world.scenario.goal[1] < 1.8
     drag(page, lab.world.scenario.goal, (4.0, 0.0))
     settle(page, "document.querySelector('.szlib-error').textContent === ''")
@@ -346,7 +424,10 @@ def test_the_laboratory_runs_in_its_notebook(notebook):
     page = opened.page
     settle(page, "document.querySelector('.szlib-why')?.textContent")
     page.locator(".szlib-play").click()
-    settle(page, "parseFloat(document.querySelector('.szlib-status').textContent.slice(4)) > 1")
+    settle(
+        page,
+        "parseFloat(document.querySelector('.szlib-status').textContent.slice(4)) > 1",
+    )
     page.locator(".szlib-play").click()
     assert page.locator(".szlib-error").text_content() == ""
     saved = opened.save()

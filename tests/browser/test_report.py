@@ -20,30 +20,52 @@ def report(tmp_path_factory):
     """The report of four short runs and a zone, with a wide table in the first notebook."""
     home = claim_folder(tmp_path_factory.mktemp("run"), "results of mine")
     n, rng = 3000, np.random.default_rng(0)
-    samples = pd.DataFrame({"encounter": np.arange(n), "los_angle": rng.uniform(-3.1, 3.1, n), "speed": 1.1})
+    samples = pd.DataFrame(
+        {
+            "encounter": np.arange(n),
+            "los_angle": rng.uniform(-3.1, 3.1, n),
+            "speed": 1.1,
+        }
+    )
     samples["distance"] = rng.uniform(0.9, 2.5, n)
     szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=0).save(home / "zone.json")
     outputs = {}
     for number, scenario in enumerate(szlib.SCENARIOS.values(), 9):
-        controller = szlib.MPCCBF(szlib.Ellipse((0.05, 0.0), (0.95, 0.75)), walls=scenario.walls)
-        movie = szlib.simulate(scenario, controller, max_time=1.0).animate(every=1.0, width=2.0)
+        controller = szlib.MPCCBF(
+            szlib.Ellipse((0.05, 0.0), (0.95, 0.75)), walls=scenario.walls
+        )
+        movie = szlib.simulate(scenario, controller, max_time=1.0).animate(
+            every=1.0, width=2.0
+        )
         outputs[f"{number:02d}_{scenario.name}"] = [movie._repr_html_()]
     wide = pd.DataFrame({f"a column of numbers, {i}": [1.5, 2.0] for i in range(20)})
-    outputs["09_passing"] += [wide.assign(name=["first", "second"]).to_html(index=False)]
+    outputs["09_passing"] += [
+        wide.assign(name=["first", "second"]).to_html(index=False)
+    ]
     for name, shown in outputs.items():
-        data = [nbformat.v4.new_output("display_data", {"text/html": html}) for html in shown]
+        data = [
+            nbformat.v4.new_output("display_data", {"text/html": html})
+            for html in shown
+        ]
         cells = [
             nbformat.v4.new_markdown_cell("# A notebook\n\n**Question.** Which?"),
             nbformat.v4.new_code_cell("x = 1  # " + "long " * 60, outputs=data),
         ]
         nbformat.write(nbformat.v4.new_notebook(cells=cells), home / f"{name}.ipynb")
-    slows = {"kind": "claim", "name": "The robot slows down while passing.", "passed": True}
+    slows = {
+        "kind": "claim",
+        "name": "The robot slows down while passing.",
+        "passed": True,
+    }
     slows |= {"value": "to 12 % of its greatest speed", "result": "supported"}
     outcome = {"status": "done", "seconds": 1, "checks": [slows]}
     summary = {
         "data": "hall",
         "verdict": f"zone at 1.1 m/s: {VERDICT}",
-        "notebooks": {name: outcome | ({} if name == "10_corridor" else {"checks": []}) for name in outputs},
+        "notebooks": {
+            name: outcome | ({} if name == "10_corridor" else {"checks": []})
+            for name in outputs
+        },
     }
     (home / "summary.json").write_text(json.dumps(summary))
     return write_report(home).as_uri()
@@ -60,7 +82,10 @@ def open_report(browser, report, request):
         page.emulate_media(color_scheme=request.param)
         page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
         page.on("pageerror", lambda error: messages.append(str(error)))
-        page.on("request", lambda r: messages.append(r.url) if r.url.startswith("http") else None)
+        page.on(
+            "request",
+            lambda r: messages.append(r.url) if r.url.startswith("http") else None,
+        )
         page.goto(report)
         page.locator(".players canvas").first.wait_for()
         return page
@@ -84,7 +109,11 @@ def test_the_first_screen_is_the_answer(open_report):
     assert VERDICT in page.locator(".answer").text_content()
     players = page.locator(".players figure[data-ready]")
     assert players.count() == 4
-    first = [page.locator("h1").first, page.locator(".answer"), page.locator(".first img").first]
+    first = [
+        page.locator("h1").first,
+        page.locator(".answer"),
+        page.locator(".first img").first,
+    ]
     assert all(0 <= top(each) < WIDE[1] for each in [*first, *players.all()])
     assert top(page.locator("#claims")) > max(map(top, players.all()))
     assert page.locator(".side").is_visible() and not page.locator(".menu").is_visible()
@@ -101,8 +130,12 @@ def test_a_phone_shows_all_without_scrolling_to_the_side(open_report):
     assert menu.get_attribute("open") is None
     table = page.locator("[id='09_passing'] table").first
     assert table.is_visible() and fits(page)
-    assert table.evaluate("table => table.scrollWidth > table.clientWidth"), "it scrolls in its own box"
-    page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
+    assert table.evaluate("table => table.scrollWidth > table.clientWidth"), (
+        "it scrolls in its own box"
+    )
+    page.evaluate(
+        "document.querySelectorAll('details').forEach((each) => { each.open = true; })"
+    )
     assert fits(page)
 
 
@@ -113,7 +146,8 @@ def test_a_notebook_opens_from_the_menu_and_its_run_plays(open_report):
     page.locator(".side a", has_text="10 corridor").click()
     fold.locator("figure[data-ready] canvas").first.wait_for()
     assert (
-        fold.locator("canvas").nth(1).is_visible() and not page.locator(".players canvas").nth(1).is_visible()
+        fold.locator("canvas").nth(1).is_visible()
+        and not page.locator(".players canvas").nth(1).is_visible()
     )
 
 
@@ -127,14 +161,20 @@ def test_headers_are_aligned_with_their_cells(open_report):
     })""")
     assert all(head == cell for _, head, cell in sides)
     by_name = {name: head for name, head, _ in sides}
-    assert (by_name["speed"], by_name["verdict"], by_name["name"]) == ("right", "left", "left")
+    assert (by_name["speed"], by_name["verdict"], by_name["name"]) == (
+        "right",
+        "left",
+        "left",
+    )
     assert by_name["a column of numbers, 0"] == "right"
 
 
 def test_figures_have_a_white_card_at_night(open_report):
     page = open_report(WIDE)
     shades = [
-        page.locator(name).first.evaluate("each => getComputedStyle(each).backgroundColor")
+        page.locator(name).first.evaluate(
+            "each => getComputedStyle(each).backgroundColor"
+        )
         for name in (".first img", ".players figure", "body")
     ]
     is_dark = page.evaluate("matchMedia('(prefers-color-scheme: dark)').matches")

@@ -15,13 +15,27 @@ from szlib.control.step import Step
 ZONE = szlib.Ellipse((0.05, 0.0), (0.97, 0.75))
 PASSAGE = szlib.SCENARIOS["making_room"].walls
 MOMENTS = {
-    "backing out": ([1.6, -0.1, -0.07, -0.06], szlib.Person((4.0, 0.0), (-0.5, 0.0)), PASSAGE),
-    "waiting beside the mouth": ([-0.72, -1.5, 0.03, -0.19], szlib.Person((0.5, 0.0), (-0.5, 0.0)), PASSAGE),
-    "at full speed": ([-2.55, -0.7, 0.5, -0.86], szlib.Person((0.0, 0.0), heading=np.pi), []),
+    "backing out": (
+        [1.6, -0.1, -0.07, -0.06],
+        szlib.Person((4.0, 0.0), (-0.5, 0.0)),
+        PASSAGE,
+    ),
+    "waiting beside the mouth": (
+        [-0.72, -1.5, 0.03, -0.19],
+        szlib.Person((0.5, 0.0), (-0.5, 0.0)),
+        PASSAGE,
+    ),
+    "at full speed": (
+        [-2.55, -0.7, 0.5, -0.86],
+        szlib.Person((0.0, 0.0), heading=np.pi),
+        [],
+    ),
 }
 
 
-def step_at(state: list[float], person: szlib.Person, walls: object, **settings: object) -> Step:
+def step_at(
+    state: list[float], person: szlib.Person, walls: object, **settings: object
+) -> Step:
     controller = szlib.MPCCBF(ZONE, walls=walls, settings=szlib.MPCSettings(**settings))
     return controller.step(state, (6.0, 0.0), [person])
 
@@ -37,7 +51,9 @@ def with_first(step: Step, a: np.ndarray) -> Step:
 
 @pytest.mark.parametrize("n_h", [2, 8])
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_points_satisfy_every_row_exactly_if_they_lie_inside_the_polygon(moment: str, n_h: int) -> None:
+def test_points_satisfy_every_row_exactly_if_they_lie_inside_the_polygon(
+    moment: str, n_h: int
+) -> None:
     step = step_at(*MOMENTS[moment], N_h=n_h)
     polygon = find_admissible_controls(step).polygon
     edge, inside = polygon.boundary, 0
@@ -52,14 +68,21 @@ def test_points_satisfy_every_row_exactly_if_they_lie_inside_the_polygon(moment:
 
 def test_the_polygon_lies_within_the_bounds_of_the_acceleration() -> None:
     step = step_at(*MOMENTS["at full speed"])
-    assert shapely.box(-1, -1, 1, 1).buffer(1e-9).covers(find_admissible_controls(step).polygon)
+    assert (
+        shapely.box(-1, -1, 1, 1)
+        .buffer(1e-9)
+        .covers(find_admissible_controls(step).polygon)
+    )
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
 def test_the_control_of_a_feasible_step_is_allowed(moment: str) -> None:
     step = step_at(*MOMENTS[moment])
     assert step.feasible
-    assert find_admissible_controls(step).polygon.distance(shapely.Point(step.control)) < 1e-3
+    assert (
+        find_admissible_controls(step).polygon.distance(shapely.Point(step.control))
+        < 1e-3
+    )
 
 
 def test_a_robot_alone_at_rest_may_choose_every_acceleration() -> None:
@@ -72,7 +95,10 @@ def test_a_robot_alone_at_rest_may_choose_every_acceleration() -> None:
 
 def test_each_limit_names_its_obstacle_and_has_the_allowed_side_on_its_left() -> None:
     found = find_admissible_controls(step_at(*MOMENTS["backing out"]))
-    assert {(each.kind, each.number) for each in found.limits} == {("person", 0), ("wall", 1)}
+    assert {(each.kind, each.number) for each in found.limits} == {
+        ("person", 0),
+        ("wall", 1),
+    }
     inner = np.array(found.polygon.representative_point().coords[0])
     for limit in found.limits:
         along, off = limit.curve[-1] - limit.curve[0], inner - limit.curve[0]
@@ -82,15 +108,23 @@ def test_each_limit_names_its_obstacle_and_has_the_allowed_side_on_its_left() ->
 def test_the_control_of_an_infeasible_plan_lies_outside_the_polygon() -> None:
     step = step_at([0.0, 0.0, 1.0, 0.0], szlib.Person((1.6, 0.0), (-0.5, 0.0)), [])
     assert not step.feasible
-    assert not find_admissible_controls(step).polygon.covers(shapely.Point(step.control))
+    assert not find_admissible_controls(step).polygon.covers(
+        shapely.Point(step.control)
+    )
 
 
 @pytest.mark.parametrize("n_people", [1, 2, 4])
-def test_each_row_has_the_gamma_of_its_barrier_however_crowded_it_is(n_people: int) -> None:
+def test_each_row_has_the_gamma_of_its_barrier_however_crowded_it_is(
+    n_people: int,
+) -> None:
     crowding = szlib.control.Crowding(gamma=0.3)
     settings = szlib.MPCSettings(gamma=0.05, crowding=crowding)
-    people = [szlib.Person((3.0, y), (-0.5, 0.0)) for y in (0.0, 1.5, -1.5, 2.5)[:n_people]]
-    step = szlib.MPCCBF(ZONE, walls=PASSAGE, settings=settings).step([0.0, 0.0, 0.5, 0.0], (6.0, 0.0), people)
+    people = [
+        szlib.Person((3.0, y), (-0.5, 0.0)) for y in (0.0, 1.5, -1.5, 2.5)[:n_people]
+    ]
+    step = szlib.MPCCBF(ZONE, walls=PASSAGE, settings=settings).step(
+        [0.0, 0.0, 0.5, 0.0], (6.0, 0.0), people
+    )
     assert step.scene.level == {1: "alone", 2: "few", 4: "crowd"}[n_people]
     chosen = np.broadcast_to(step.control, (*step.residual.shape, 1, 2))
     assert _residuals(step, chosen)[..., 0] == pytest.approx(step.residual, abs=1e-9)

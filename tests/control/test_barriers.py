@@ -6,9 +6,14 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from szlib.control.obstacles import (
+    barrier,
+    cbf_residual,
+    ellipse_formula,
+    segment_formula,
+)
 
 import szlib
-from szlib.control.barriers import barrier, cbf_residual, ellipse_formula, segment_formula
 
 coordinate = st.floats(-5, 5)
 point = st.tuples(coordinate, coordinate)
@@ -29,7 +34,9 @@ def test_a_segment_is_at_distance_zero_from_itself(a, b, share):
 
 @settings(derandomize=True, max_examples=200)
 @given(point, point, point)
-def test_off_the_segment_the_distance_is_positive_and_euclidean_within_its_disc(p, a, b):
+def test_off_the_segment_the_distance_is_positive_and_euclidean_within_its_disc(
+    p, a, b
+):
     if not far_apart(a, b):
         return
     true = shapely.distance(shapely.Point(p), shapely.LineString([a, b]))
@@ -40,7 +47,9 @@ def test_off_the_segment_the_distance_is_positive_and_euclidean_within_its_disc(
     if np.hypot(p[0] - (a[0] + b[0]) / 2, p[1] - (a[1] + b[1]) / 2) <= radius:
         line = shapely.LineString([2 * np.array(a) - b, 2 * np.array(b) - a])
         assert found == pytest.approx(true, abs=1e-9)
-        assert found == pytest.approx(shapely.distance(shapely.Point(p), line), abs=1e-9)
+        assert found == pytest.approx(
+            shapely.distance(shapely.Point(p), line), abs=1e-9
+        )
 
 
 def test_beyond_its_end_the_distance_is_euclidean_to_first_order():
@@ -51,7 +60,9 @@ def test_beyond_its_end_the_distance_is_euclidean_to_first_order():
 
 @settings(derandomize=True, max_examples=100)
 @given(point, point, point, st.floats(-np.pi, np.pi), point)
-def test_moving_and_turning_everything_or_swapping_the_ends_changes_nothing(p, a, b, angle, shift):
+def test_moving_and_turning_everything_or_swapping_the_ends_changes_nothing(
+    p, a, b, angle, shift
+):
     if not far_apart(a, b):
         return
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -60,9 +71,9 @@ def test_moving_and_turning_everything_or_swapping_the_ends_changes_nothing(p, a
     assert szlib.segment_distance(*moved) == pytest.approx(here, abs=1e-6, rel=1e-9)
     assert szlib.segment_distance(p, b, a) == pytest.approx(here, abs=1e-9)
     here = szlib.ellipse_distance(p, ZONE)
-    assert szlib.ellipse_distance(turn @ p + shift, ZONE.placed(shift, angle)) == pytest.approx(
-        here, abs=1e-9
-    )
+    assert szlib.ellipse_distance(
+        turn @ p + shift, ZONE.placed(shift, angle)
+    ) == pytest.approx(here, abs=1e-9)
 
 
 def test_the_ellipse_is_its_own_zero_level_and_divides_the_plane():
@@ -75,17 +86,24 @@ def test_the_ellipse_is_its_own_zero_level_and_divides_the_plane():
 def test_the_distance_to_a_circle_is_euclidean():
     circle = szlib.Ellipse((1.0, 2.0), (0.8, 0.8))
     points = np.random.default_rng(1).uniform(-3, 5, (200, 2))
-    assert szlib.ellipse_distance(points, circle) == pytest.approx(np.hypot(*(points - (1, 2)).T) - 0.8)
+    assert szlib.ellipse_distance(points, circle) == pytest.approx(
+        np.hypot(*(points - (1, 2)).T) - 0.8
+    )
 
 
 @pytest.mark.parametrize(
     ("formula", "numbers"),
-    [(segment_formula, (-1.0, 0.5, 2.0, 1.5)), (ellipse_formula, (-0.6, 0.1, 0.7, -0.2, 0.9))],
+    [
+        (segment_formula, (-1.0, 0.5, 2.0, 1.5)),
+        (ellipse_formula, (-0.6, 0.1, 0.7, -0.2, 0.9)),
+    ],
 )
 def test_numbers_and_symbols_agree_and_so_do_the_gradients(formula, numbers):
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     expression = formula(x, y, *numbers)
-    both = ca.Function("both", [x, y], [expression, ca.jacobian(expression, ca.vertcat(x, y))])
+    both = ca.Function(
+        "both", [x, y], [expression, ca.jacobian(expression, ca.vertcat(x, y))]
+    )
     for px, py in np.random.default_rng(2).uniform(-4, 4, (50, 2)):
         value, gradient = (np.asarray(part).ravel() for part in both(px, py))
         assert value == pytest.approx(formula(px, py, *numbers), rel=1e-12)

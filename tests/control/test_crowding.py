@@ -24,7 +24,8 @@ def people(n, rng, radius=3.5, standing=False):
     velocities = np.zeros((n, 2)) if standing else rng.normal(0, 0.7, (n, 2))
     places = np.column_stack([np.cos(angles), np.sin(angles)]) * distances[:, None]
     return [
-        szlib.Person(tuple(at), tuple(v)) for at, v in zip(places.tolist(), velocities.tolist(), strict=True)
+        szlib.Person(tuple(at), tuple(v))
+        for at, v in zip(places.tolist(), velocities.tolist(), strict=True)
     ]
 
 
@@ -50,7 +51,10 @@ def test_each_step_holds_what_stays_hard_and_verifies(n):
         feasible += 1
         for k, time in enumerate(SETTINGS.times[1:], start=1):
             at = step.predicted[k, :2]
-            gaps = [np.hypot(*(at - p.after(time).position)) - BODY - SETTINGS.r_robot for p in around]
+            gaps = [
+                np.hypot(*(at - p.after(time).position)) - BODY - SETTINGS.r_robot
+                for p in around
+            ]
             if n == 6:
                 assert min(gaps) >= SETTINGS.crowding.gap - 1e-5
             else:
@@ -67,7 +71,9 @@ def drive_through_a_front(settings):
     controller, state, steps = szlib.MPCCBF(ZONE, settings=settings), np.zeros(4), []
     front = [szlib.Person((4.5, y), (-1.0, 0.0)) for y in np.arange(-4.4, 4.5, 2.2)]
     for k in range(100):
-        steps.append(controller.step(state, (8.0, 0.0), [p.after(0.1 * k) for p in front]))
+        steps.append(
+            controller.step(state, (8.0, 0.0), [p.after(0.1 * k) for p in front])
+        )
         state = steps[-1].predicted[1]
     return steps
 
@@ -78,9 +84,14 @@ def test_a_crowd_is_entered_by_choice_and_the_step_says_so():
     assert steps[-1].scene.state[0] > 7.0 and clearance >= SETTINGS.crowding.gap - 1e-3
     inside = [step for step in steps if step.h.min() < -1e-3]
     assert inside and not any(step.safe for step in inside)
-    assert any("in a crowd; 2 zones overlap here, keeps 0.2 m" in step.explain() for step in inside)
+    assert any(
+        "in a crowd; 2 zones overlap here, keeps 0.2 m" in step.explain()
+        for step in inside
+    )
     stays = drive_through_a_front(szlib.MPCSettings(time_limit=np.inf))
-    assert min(step.scene.state[0] for step in stays) < -2.0, "without prices the robot is driven backwards"
+    assert min(step.scene.state[0] for step in stays) < -2.0, (
+        "without prices the robot is driven backwards"
+    )
 
 
 def test_no_step_called_safe_leads_into_a_zone_in_random_worlds():
@@ -99,7 +110,9 @@ def test_no_step_called_safe_leads_into_a_zone_in_random_worlds():
 @pytest.mark.parametrize("name", szlib.SCENARIOS)
 def test_the_scenarios_of_the_paper_keep_their_claims(name):
     scenario = szlib.SCENARIOS[name]
-    log = szlib.simulate(scenario, szlib.MPCCBF(ZONE, walls=scenario.walls, settings=SETTINGS))
+    log = szlib.simulate(
+        scenario, szlib.MPCCBF(ZONE, walls=scenario.walls, settings=SETTINGS)
+    )
     assert log.success and log.h.min() >= -TOLERANCE
     for claim in scenario.claims:
         holds, value = claim.check(log)
@@ -117,7 +130,9 @@ def test_one_step_of_an_even_grid_is_the_step_without_a_grid():
     person = szlib.Person((0.0, 0.3), (-0.5, 0.0))
     plain = szlib.MPCSettings(N=6, N_h=6, time_limit=np.inf)
     steps = [
-        szlib.MPCCBF(ZONE, settings=settings).step((-2.6, 0.0, 0.6, 0.0), (4.0, 0.0), [person])
+        szlib.MPCCBF(ZONE, settings=settings).step(
+            (-2.6, 0.0, 0.6, 0.0), (4.0, 0.0), [person]
+        )
         for settings in (plain, replace(plain, grid=(1,) * 6))
     ]
     assert steps[1].control == pytest.approx(steps[0].control, abs=1e-9)
@@ -138,7 +153,8 @@ def test_bad_settings_are_refused(wrong, message):
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"few": 0}, {"many": 1}, {"price": 0.0}, {"gamma": 1.5}, {"radius": np.nan}]
+    "wrong",
+    [{"few": 0}, {"many": 1}, {"price": 0.0}, {"gamma": 1.5}, {"radius": np.nan}],
 )
 def test_bad_crowding_is_refused(wrong):
     with pytest.raises(SolverError, match=next(iter(wrong))):

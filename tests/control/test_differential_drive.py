@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from szlib.control.obstacles import ellipse_distance, segment_distance
+from szlib.control.verification import euclidean_to_ellipse, euclidean_to_segment
 
 import szlib
-from szlib.control.barriers import ellipse_distance, segment_distance
 from szlib.control.differential_drive import Unicycle
-from szlib.control.distances import euclidean_to_ellipse, euclidean_to_segment
 from szlib.control.settings import TOLERANCE
 from szlib.simulation.scenarios.random_worlds import Worlds, draw_zone
 from szlib.zones.ellipses import BODY_RADIUS
@@ -27,11 +27,17 @@ def drives(seed):
     rng = np.random.default_rng(seed)
     while True:
         settings = szlib.MPCSettings(
-            dt=rng.uniform(0.05, 0.3), v_max=rng.uniform(0.2, 2.0), r_robot=rng.uniform(0.1, 0.6)
+            dt=rng.uniform(0.05, 0.3),
+            v_max=rng.uniform(0.2, 2.0),
+            r_robot=rng.uniform(0.1, 0.6),
         )
         ahead = rng.choice([None, rng.uniform(0.05, 1.0)])
         yield szlib.DifferentialDrive(
-            ZONE, settings=settings, omega_max=rng.uniform(0.5, 8.0), ahead=ahead, max_people=0
+            ZONE,
+            settings=settings,
+            omega_max=rng.uniform(0.5, 8.0),
+            ahead=ahead,
+            max_people=0,
         )
 
 
@@ -50,7 +56,9 @@ def integrate(own, control, dt, times):
 
 
 def point_of(pose, ahead):
-    return pose[..., :2] + ahead * np.stack([np.cos(pose[..., 2]), np.sin(pose[..., 2])], axis=-1)
+    return pose[..., :2] + ahead * np.stack(
+        [np.cos(pose[..., 2]), np.sin(pose[..., 2])], axis=-1
+    )
 
 
 def loop(drive, own, goal, people=(), steps=150):
@@ -68,7 +76,10 @@ def loop(drive, own, goal, people=(), steps=150):
 def test_the_point_lands_where_the_plan_says_near_its_chord_and_within_the_limits():
     rng = np.random.default_rng(0)
     for drive in islice(drives(1), 60):
-        s, own = drive.settings, np.r_[rng.uniform(-5, 5, 2), rng.uniform(-np.pi, np.pi), 0, 0]
+        s, own = (
+            drive.settings,
+            np.r_[rng.uniform(-5, 5, 2), rng.uniform(-np.pi, np.pi), 0, 0],
+        )
         way = drive.v_max * s.dt * rng.choice([1.0, rng.uniform()])
         angle = rng.uniform(-np.pi, np.pi)
         start = point_of(own, drive.ahead)
@@ -80,7 +91,9 @@ def test_the_point_lands_where_the_plan_says_near_its_chord_and_within_the_limit
         poses = integrate(own, control, s.dt, np.linspace(0, s.dt, 21))
         points = point_of(poses, drive.ahead)
         assert points[-1] == pytest.approx(end, abs=1e-9)
-        assert drive.robot.advance(own, control, s.dt)[:2] == pytest.approx(poses[-1, :2], abs=1e-9)
+        assert drive.robot.advance(own, control, s.dt)[:2] == pytest.approx(
+            poses[-1, :2], abs=1e-9
+        )
         assert reached[:2] == pytest.approx(poses[-1, :2], abs=1e-9)
         across = np.array([-np.sin(angle), np.cos(angle)])
         assert np.abs((points - start) @ across).max() <= drive.chord_error + 1e-12
@@ -91,26 +104,42 @@ def test_the_chord_error_and_the_limits_are_attained():
     """No slack is left in the bounds: some motion turns at omega_max, and bows as far as allowed."""
     for drive in islice(drives(2), 20):
         if drive.v_max < drive.settings.v_max:  # the turning rate is what limits
-            dt, side = drive.settings.dt, np.arccos(-drive.v_max * drive.settings.dt / 2 / drive.ahead)
-            end = [drive.ahead + drive.v_max * dt * np.cos(side), drive.v_max * dt * np.sin(side)]
+            dt, side = (
+                drive.settings.dt,
+                np.arccos(-drive.v_max * drive.settings.dt / 2 / drive.ahead),
+            )
+            end = [
+                drive.ahead + drive.v_max * dt * np.cos(side),
+                drive.v_max * dt * np.sin(side),
+            ]
             _, (control,) = drive._follow(np.zeros(5), np.array([end]))
             assert control[1] == pytest.approx(drive.omega_max)
-            points = point_of(integrate(np.zeros(3), control, dt, [0, dt / 2, dt]), drive.ahead)
-            assert np.hypot(*(points[1] - points[[0, 2]].mean(axis=0))) == pytest.approx(
-                drive.chord_error, rel=1e-6
+            points = point_of(
+                integrate(np.zeros(3), control, dt, [0, dt / 2, dt]), drive.ahead
             )
+            assert np.hypot(
+                *(points[1] - points[[0, 2]].mean(axis=0))
+            ) == pytest.approx(drive.chord_error, rel=1e-6)
 
 
 def test_the_disc_is_safe_at_any_heading_where_the_point_is_safe():
     """For people and walls, of any length: also those so short that their own margin is more than eps."""
     rng, near = np.random.default_rng(3), 0
     for _ in range(50):
-        s = szlib.MPCSettings(eps=rng.choice([0.0, 0.05]), margin=rng.choice(["euclidean", "paper"]))
-        wall = rng.uniform(-2, 2, 2) + np.outer([-1, 1], rng.uniform(-1, 1, 2)) * rng.choice([0.1, 2.0])
+        s = szlib.MPCSettings(
+            eps=rng.choice([0.0, 0.05]), margin=rng.choice(["euclidean", "paper"])
+        )
+        wall = rng.uniform(-2, 2, 2) + np.outer(
+            [-1, 1], rng.uniform(-1, 1, 2)
+        ) * rng.choice([0.1, 2.0])
         drive = szlib.DifferentialDrive(
             ZONE, walls=[wall], settings=s, ahead=rng.uniform(0.1, 0.6), max_people=0
         )
-        person = szlib.Person(tuple(rng.uniform(-2, 2, 2)), heading=rng.uniform(-3, 3), zone=draw_zone(rng))
+        person = szlib.Person(
+            tuple(rng.uniform(-2, 2, 2)),
+            heading=rng.uniform(-3, 3),
+            zone=draw_zone(rng),
+        )
         zone = person.zone.placed(person.position, person.heading)
         for point in rng.uniform(-5, 5, (60, 2)):
             h = drive._point.barriers(point, [person])
@@ -118,7 +147,9 @@ def test_the_disc_is_safe_at_any_heading_where_the_point_is_safe():
                 continue
             near += 1
             angle = rng.uniform(-np.pi, np.pi, 30)
-            discs = point - drive.ahead * np.column_stack([np.cos(angle), np.sin(angle)])
+            discs = point - drive.ahead * np.column_stack(
+                [np.cos(angle), np.sin(angle)]
+            )
             for disc in discs:
                 assert drive.barriers(disc, [person]).min() >= -1e-12
             assert euclidean_to_segment(discs, *wall).min() >= s.r_robot
@@ -132,10 +163,14 @@ def test_the_barriers_are_those_of_the_disc():
     person = szlib.Person((1.0, 2.0), (0.3, 0.1))
     plain = szlib.MPCCBF(ZONE, walls=[wall])
     for position in np.random.default_rng(4).uniform(-4, 4, (20, 2)):
-        assert drive.barriers(position, [person]) == pytest.approx(plain.barriers(position, [person]))
+        assert drive.barriers(position, [person]) == pytest.approx(
+            plain.barriers(position, [person])
+        )
     step = drive.step((-2.0, 0.0, 0.3), OPEN, [person])
     assert step.h == pytest.approx(plain.barriers((-2.0, 0.0), [person]))
-    assert step.h[1] == pytest.approx(segment_distance([-2.0, 0.0], *wall) - 0.5 - 0.25 / 1.2)
+    assert step.h[1] == pytest.approx(
+        segment_distance([-2.0, 0.0], *wall) - 0.5 - 0.25 / 1.2
+    )
     assert step.h[0] == pytest.approx(
         ellipse_distance([-2.0, 0.0], ZONE.placed((1.0, 2.0), person.heading)) - 0.55
     )
@@ -150,7 +185,9 @@ def test_the_loop_of_the_point_is_that_of_a_double_integrator():
         assert point_of(states[k], drive.ahead) == pytest.approx(
             steps[k - 1].point.predicted[1, :2], abs=1e-9
         )
-        assert steps[k].point.predicted[0, 2:] == pytest.approx(steps[k - 1].point.predicted[1, 2:], abs=1e-9)
+        assert steps[k].point.predicted[0, 2:] == pytest.approx(
+            steps[k - 1].point.predicted[1, 2:], abs=1e-9
+        )
         assert steps[k - 1].predicted[1, :2] == pytest.approx(states[k, :2], abs=1e-12)
 
 
@@ -168,7 +205,9 @@ def test_the_drive_reaches_its_goal_past_a_person_from_any_heading(heading):
 
 
 def test_every_step_is_safe_where_there_is_nobody_and_no_wall():
-    _, steps = loop(szlib.DifferentialDrive(ZONE, max_people=0), np.zeros(5), OPEN, steps=3)
+    _, steps = loop(
+        szlib.DifferentialDrive(ZONE, max_people=0), np.zeros(5), OPEN, steps=3
+    )
     assert all(step.safe for step in steps)
 
 
@@ -177,13 +216,22 @@ def test_the_disc_stays_clear_between_samples_after_every_safe_step():
     checked = 0
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        zone, wall = draw_zone(rng), np.array([[1.0, -4.0], [1.0 + rng.uniform(-1, 1), -1.2]])
+        zone, wall = (
+            draw_zone(rng),
+            np.array([[1.0, -4.0], [1.0 + rng.uniform(-1, 1), -1.2]]),
+        )
         people = [
-            szlib.Person(tuple(rng.uniform((2, -2), (5, 2))), tuple(rng.uniform(-0.5, 0.5, 2)), zone=zone)
+            szlib.Person(
+                tuple(rng.uniform((2, -2), (5, 2))),
+                tuple(rng.uniform(-0.5, 0.5, 2)),
+                zone=zone,
+            )
             for _ in range(3)
         ]
         drive = szlib.DifferentialDrive(ZONE, walls=[wall], max_people=3)
-        own = Unicycle(rng.uniform(-np.pi, np.pi)).start([-2.0, rng.uniform(-2, 2), 0.0, 0.0])
+        own = Unicycle(rng.uniform(-np.pi, np.pi)).start(
+            [-2.0, rng.uniform(-2, 2), 0.0, 0.0]
+        )
         states, steps = loop(drive, own, OPEN, people)
         for k, step in enumerate(steps):
             if not step.safe:
@@ -194,31 +242,52 @@ def test_the_disc_stays_clear_between_samples_after_every_safe_step():
             assert euclidean_to_segment(discs, *wall).min() >= 0.5
             for person in people:
                 at = [person.after(0.1 * k + t).position for t in times]
-                gap = euclidean_to_ellipse(discs - at, zone.placed((0, 0), person.heading)) - 0.5
+                gap = (
+                    euclidean_to_ellipse(
+                        discs - at, zone.placed((0, 0), person.heading)
+                    )
+                    - 0.5
+                )
                 assert gap[[0, -1]].min() >= 0.05 - 2 * TOLERANCE  # eps, at the samples
-                assert gap.min() >= 0.05 - (1.5 * 0.1) ** 2 / 8 / 0.8 - drive.chord_error
+                assert (
+                    gap.min() >= 0.05 - (1.5 * 0.1) ** 2 / 8 / 0.8 - drive.chord_error
+                )
                 assert (np.hypot(*(discs - at).T) - 0.5 - BODY_RADIUS).min() >= 0
     assert checked > 500
 
 
 def test_plans_that_end_at_rest_stay_feasible_among_standing_people():
     """Recursive feasibility, proved of the double integrator in `szlib.control.mpc`, holds of the wheels."""
-    settings, quiet = szlib.MPCSettings(terminal="rest"), Worlds(standing=1.0, start_speed=0.0, min_h=0.6)
+    settings, quiet = (
+        szlib.MPCSettings(terminal="rest"),
+        Worlds(standing=1.0, start_speed=0.0, min_h=0.6),
+    )
     for seed in range(10):
         scene = quiet(seed)
         drive = szlib.DifferentialDrive(
             ZONE, walls=scene.walls, settings=settings, max_people=len(scene.people)
         )
-        own = Unicycle(np.random.default_rng(seed).uniform(-np.pi, np.pi)).start(scene.start)
-        assert drive._point.barriers(point_of(own, drive.ahead), scene.people).min() >= 0
+        own = Unicycle(np.random.default_rng(seed).uniform(-np.pi, np.pi)).start(
+            scene.start
+        )
+        assert (
+            drive._point.barriers(point_of(own, drive.ahead), scene.people).min() >= 0
+        )
         states, steps = loop(drive, own, scene.goal, scene.people, 100)
         assert all(step.safe for step in steps)
-        assert min(drive.barriers(state[:2], scene.people).min() for state in states) >= -TOLERANCE
+        assert (
+            min(drive.barriers(state[:2], scene.people).min() for state in states)
+            >= -TOLERANCE
+        )
 
 
 def test_a_plan_begins_at_the_true_velocity_of_a_robot_that_was_stopped():
     """With (v, omega) the stop is seen; without, the robot is assumed to follow its commands."""
-    own, held, trusted = np.zeros(5), szlib.DifferentialDrive(ZONE), szlib.DifferentialDrive(ZONE)
+    own, held, trusted = (
+        np.zeros(5),
+        szlib.DifferentialDrive(ZONE),
+        szlib.DifferentialDrive(ZONE),
+    )
     for _ in range(8):
         fast = held.step(own, OPEN)
         trusted.step(own[:3], OPEN)
@@ -235,17 +304,23 @@ def test_the_pose_is_enough_for_a_robot_that_follows_its_commands():
     states, steps = loop(drive, np.r_[0.0, 0.0, 1.0, 0.0, 0.0], OPEN, [person], 40)
     drive.reset()
     for k, (state, step) in enumerate(zip(states[:-1], steps, strict=True)):
-        assert drive.step(state[:3], OPEN, [person.after(0.1 * k)]).control == pytest.approx(step.control)
+        assert drive.step(
+            state[:3], OPEN, [person.after(0.1 * k)]
+        ).control == pytest.approx(step.control)
 
 
 def test_turning_and_moving_the_world_does_not_change_the_commands():
     """By a quarter turn: the box of accelerations is the same again."""
     rotation, shift = np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([30.0, -8.0])
     person = szlib.Person((2.5, 0.4), (-0.3, 0.05))
-    moved = szlib.Person(tuple(rotation @ person.position + shift), tuple(rotation @ person.velocity))
+    moved = szlib.Person(
+        tuple(rotation @ person.position + shift), tuple(rotation @ person.velocity)
+    )
     goal = rotation @ OPEN + shift
     here, _ = loop(szlib.DifferentialDrive(ZONE), np.zeros(5), OPEN, [person], 100)
-    there, _ = loop(szlib.DifferentialDrive(ZONE), np.r_[shift, np.pi / 2, 0, 0], goal, [moved], 100)
+    there, _ = loop(
+        szlib.DifferentialDrive(ZONE), np.r_[shift, np.pi / 2, 0, 0], goal, [moved], 100
+    )
     assert there[:, :2] == pytest.approx(here[:, :2] @ rotation.T + shift, abs=1e-2)
 
 
@@ -253,7 +328,9 @@ def test_turning_and_moving_the_world_does_not_change_the_commands():
 def test_the_drive_reaches_the_goal_in_the_scenarios_of_the_paper(name):
     """In the loop of szlib. At 8 rad/s: with 4, two passages are too narrow for the point ahead."""
     scenario = szlib.SCENARIOS[name]
-    log = szlib.simulate(scenario, szlib.DifferentialDrive(ZONE, walls=scenario.walls, omega_max=8.0))
+    log = szlib.simulate(
+        scenario, szlib.DifferentialDrive(ZONE, walls=scenario.walls, omega_max=8.0)
+    )
     numbers = log.metrics()
     assert numbers["success"]
     assert numbers["flagged_steps"] == numbers["unflagged_violations"] == 0
@@ -284,7 +361,9 @@ def test_only_an_ahead_below_the_default_makes_the_robot_slower():
     near = szlib.DifferentialDrive(ZONE, settings=settings, ahead=0.1, omega_max=2.0)
     assert near.v_max == pytest.approx(0.2, rel=0.01)
     assert near.v_max < 0.2
-    assert near._point.settings.r_robot == pytest.approx(0.5 + 0.05 + 0.1 + near.chord_error)
+    assert near._point.settings.r_robot == pytest.approx(
+        0.5 + 0.05 + 0.1 + near.chord_error
+    )
 
 
 def test_people_may_be_an_array_with_ids_and_an_unknown_person_makes_the_step_unsafe():
@@ -292,9 +371,13 @@ def test_people_may_be_an_array_with_ids_and_an_unknown_person_makes_the_step_un
     by_row, by_person = szlib.DifferentialDrive(ZONE), szlib.DifferentialDrive(ZONE)
     people = [szlib.Person((3.0, 0.4), (-0.3, 0.0)), szlib.Person((2.0, 3.0))]
     step = by_row.step(np.zeros(3), OPEN, rows, ids=["a", "b"])
-    assert step.control == pytest.approx(by_person.step(np.zeros(3), OPEN, people).control)
+    assert step.control == pytest.approx(
+        by_person.step(np.zeros(3), OPEN, people).control
+    )
     assert step.safe
-    lost = by_row.step(np.zeros(3), OPEN, np.vstack([rows, np.full(4, np.nan)]), ids=["a", "b", "c"])
+    lost = by_row.step(
+        np.zeros(3), OPEN, np.vstack([rows, np.full(4, np.nan)]), ids=["a", "b", "c"]
+    )
     assert not lost.safe
     assert lost.point.unknown == 1
 
@@ -307,7 +390,9 @@ def test_walls_may_change_between_steps_and_a_copy_continues_identically():
     drive.set_walls([((2.0, -0.5), (2.0, 0.5), (3.0, 0.5))])
     twins = [pickle.loads(pickle.dumps(drive)), copy.deepcopy(drive), copy.copy(drive)]
     step = drive.step(own, OPEN)
-    assert step.h == pytest.approx(szlib.MPCCBF(ZONE, walls=drive.walls).barriers(own[:2]))
+    assert step.h == pytest.approx(
+        szlib.MPCCBF(ZONE, walls=drive.walls).barriers(own[:2])
+    )
     assert len(step.h) == 2
     for twin in twins:
         assert np.array_equal(twin.step(own, OPEN).control, step.control)
@@ -369,8 +454,12 @@ def test_a_state_of_another_shape_is_refused(state):
 # --- routes, and goals close to a wall ---------------------------------------------------------------
 
 
-def drive_to(goal: tuple[float, float], walls: Any, steps: int, **more: Any) -> list[Any]:
-    drive = szlib.DifferentialDrive(ZONE, walls=walls, settings=szlib.MPCSettings(lookahead=4.0))
+def drive_to(
+    goal: tuple[float, float], walls: Any, steps: int, **more: Any
+) -> list[Any]:
+    drive = szlib.DifferentialDrive(
+        ZONE, walls=walls, settings=szlib.MPCSettings(lookahead=4.0)
+    )
     own, taken = drive.robot.start((-3.0, 0.0, 0.0, 0.0)), []
     for _ in range(steps):
         taken.append(drive.step(own, goal, **more))
@@ -397,4 +486,5 @@ def test_a_drive_turns_its_back_to_a_wall_behind_the_goal(gap: float) -> None:
     steps = drive_to((0.0, 0.0), wall, 200)
     assert min(np.hypot(*step.predicted[0, :2]) for step in steps) < 0.1
     assert all(step.safe for step in steps)
-    assert abs(steps[-1].heading) > 1.5  # the point ahead would be too close to the wall
+    # the point ahead would be too close to the wall
+    assert abs(steps[-1].heading) > 1.5

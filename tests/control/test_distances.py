@@ -5,9 +5,7 @@ import pytest
 import shapely
 from hypothesis import example, given
 from hypothesis import strategies as st
-
-import szlib
-from szlib.control.distances import (
+from szlib.control.verification import (
     compare_distances,
     compute_distance_error,
     euclidean_to_ellipse,
@@ -15,6 +13,8 @@ from szlib.control.distances import (
     find_safe_boundary,
     required_margin,
 )
+
+import szlib
 
 coordinate = st.floats(-3, 3, allow_subnormal=False)
 points = st.tuples(coordinate, coordinate)
@@ -40,17 +40,24 @@ def test_euclidean_distance_to_an_ellipse_equals_shapelys(point, ellipse):
     n = 20_000
     exact = shapely.LinearRing(ellipse.curve(n + 1)).distance(shapely.Point(point))
     found = euclidean_to_ellipse(point, ellipse)
-    assert abs(found) == pytest.approx(exact, abs=2 * ellipse.semi_axes[0] * (1 - np.cos(np.pi / n)) + 1e-9)
+    assert abs(found) == pytest.approx(
+        exact, abs=2 * ellipse.semi_axes[0] * (1 - np.cos(np.pi / n)) + 1e-9
+    )
     assert (found < 0) == (ellipse.level(point) < 1) or exact < 1e-9
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0])
 def test_euclidean_distance_is_exact_on_the_axes_of_an_ellipse(angle):
     ellipse = szlib.Ellipse((0.0, 0.0), (2.0, 1.0), angle)
-    along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    along, across = (
+        np.array([np.cos(angle), np.sin(angle)]),
+        np.array([-np.sin(angle), np.cos(angle)]),
+    )
     at = np.array([0 * along, 3 * along, 3 * across, 1.9 * along, 0.5 * across])
     # Beyond the centre of curvature, a - b^2/a = 1.5 from the centre, the vertex is nearest.
-    assert euclidean_to_ellipse(at, ellipse) == pytest.approx([-1, 1, 2, -0.1, -0.5], abs=1e-9)
+    assert euclidean_to_ellipse(at, ellipse) == pytest.approx(
+        [-1, 1, 2, -0.1, -0.5], abs=1e-9
+    )
 
 
 @given(st.lists(points, min_size=1, max_size=20), ellipses)
@@ -83,9 +90,9 @@ def test_no_margin_of_a_wall_below_the_required_one_is_enough(length, radius):
 
 @given(ellipses, st.floats(0.05, 1.5))
 def test_safe_boundary_of_an_ellipse_lies_at_its_distance(ellipse, distance):
-    assert szlib.ellipse_distance(find_safe_boundary(ellipse, distance, 50), ellipse) == pytest.approx(
-        distance, abs=1e-9
-    )
+    assert szlib.ellipse_distance(
+        find_safe_boundary(ellipse, distance, 50), ellipse
+    ) == pytest.approx(distance, abs=1e-9)
 
 
 @given(points, points, st.floats(0.05, 1.5))
@@ -103,25 +110,38 @@ def test_safe_boundary_of_a_wall_goes_around_it_once(length, widest):
     turns = np.diff(around)
     assert (turns >= -1e-9).all() or (turns <= 1e-9).all()
     assert abs(around[-1] - around[0]) == pytest.approx(2 * np.pi, abs=0.1)
-    assert np.abs((edge - edge.mean(axis=0)) @ (-0.8, 0.6)).max() == pytest.approx(widest, abs=1e-3)
+    assert np.abs((edge - edge.mean(axis=0)) @ (-0.8, 0.6)).max() == pytest.approx(
+        widest, abs=1e-3
+    )
 
 
 def test_the_margin_of_the_paper_is_too_small_for_short_walls_only():
     wall = lambda length: [(-length / 2, 0.0), (length / 2, 0.0)]  # noqa: E731
     one = compare_distances(wall(1.0), r_robot=0.5, eps=0.05)
-    assert one.nearest == pytest.approx((np.sqrt(1 + 4 * 0.55) - 1) / 2 - 0.5)  # d = s + s^2/L on the line
-    assert compare_distances(wall(5.0), r_robot=0.5, eps=0.05).nearest == pytest.approx(0, abs=1e-12)
+    # d = s + s^2/L on the line
+    assert one.nearest == pytest.approx((np.sqrt(1 + 4 * 0.55) - 1) / 2 - 0.5)
+    assert compare_distances(wall(5.0), r_robot=0.5, eps=0.05).nearest == pytest.approx(
+        0, abs=1e-12
+    )
     for length in (0.3, 1.0, 3.0):
-        enough = compare_distances(wall(length), r_robot=0.5, eps=required_margin(wall(length), 0.5))
+        enough = compare_distances(
+            wall(length), r_robot=0.5, eps=required_margin(wall(length), 0.5)
+        )
         assert enough.nearest == pytest.approx(0, abs=1e-9)
-    zone = compare_distances(szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), r_robot=0.5, eps=0.05)
+    zone = compare_distances(
+        szlib.Ellipse((0.1, 0.0), (1.0, 0.7)), r_robot=0.5, eps=0.05
+    )
     assert zone.nearest == pytest.approx(0.05)
     assert zone.farthest > 0.05
 
 
 def test_controller_keeps_the_required_margin_of_each_wall():
     walls = [[(0.0, 0.0), (1.0, 0.0)], [(0.0, 5.0), (9.0, 5.0)]]
-    settings = szlib.MPCSettings(margin="paper", eps=max(required_margin(wall, 0.5) for wall in walls))
+    settings = szlib.MPCSettings(
+        margin="paper", eps=max(required_margin(wall, 0.5) for wall in walls)
+    )
     assert settings.eps == 0.25
-    controller = szlib.MPCCBF(szlib.Ellipse((0.0, 0.0), (1.0, 0.7)), walls=walls, settings=settings)
+    controller = szlib.MPCCBF(
+        szlib.Ellipse((0.0, 0.0), (1.0, 0.7)), walls=walls, settings=settings
+    )
     assert controller.barriers((1.5, 0.0))[0] == pytest.approx(0)

@@ -24,7 +24,9 @@ def load(monkeypatch):
 def tracks(tmp_path_factory):
     """Pairs of people who meet, one pair after another."""
     settings = szlib.PlazaSettings(n_encounters=6, tracked=20.0)
-    return szlib.make_plaza(tmp_path_factory.mktemp("plaza") / "plaza.csv", settings=settings)
+    return szlib.make_plaza(
+        tmp_path_factory.mktemp("plaza") / "plaza.csv", settings=settings
+    )
 
 
 def write_map(folder, middle):
@@ -40,7 +42,13 @@ def write_map(folder, middle):
 
 @pytest.mark.parametrize(
     ("name", "lines"),
-    [("plain_loop", 80), ("mujoco_drive", 80), ("ros2_node", 80), ("many_days", 60), ("gymnasium_env", 120)],
+    [
+        ("plain_loop", 80),
+        ("mujoco_drive", 80),
+        ("ros2_node", 80),
+        ("many_days", 60),
+        ("gymnasium_env", 120),
+    ],
 )
 def test_examples_can_be_read_at_once(name, lines):
     assert len((EXAMPLES / f"{name}.py").read_text().splitlines()) <= lines
@@ -51,7 +59,9 @@ def test_the_plain_loop_arrives(load, capsys):
     assert "arrived after" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("has_walls", "seconds", "goals"), [(False, 25.0, 1), (True, 40.0, 2)])
+@pytest.mark.parametrize(
+    ("has_walls", "seconds", "goals"), [(False, 25.0, 1), (True, 40.0, 2)]
+)
 def test_in_a_physics_engine_the_robot_arrives_and_no_safe_step_leads_to_a_contact(
     load, tracks, tmp_path, has_walls, seconds, goals
 ):

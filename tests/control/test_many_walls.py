@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from szlib.control.obstacles import compute_h, find_near_walls
+from szlib.control.verification import walls_with_margins
 
 import szlib
 from szlib.checks import Array
 from szlib.control import advance, euclidean_to_segment, mpc
-from szlib.control.barriers import compute_h, find_near_walls
-from szlib.control.distances import walls_with_margins
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 S = szlib.MPCSettings()
@@ -22,9 +22,16 @@ def scattered(n: int, seed: int = 0, size: float = 40.0) -> Array:
     """Short and long walls, none within 1.5 m of start and goal."""
     rng, walls = np.random.default_rng(seed), list[Array]()
     while len(walls) < n:
-        middle, angle, half = rng.uniform(-size / 2, size / 2, 2), rng.uniform(0, np.pi), rng.uniform(0.01, 2)
+        middle, angle, half = (
+            rng.uniform(-size / 2, size / 2, 2),
+            rng.uniform(0, np.pi),
+            rng.uniform(0.01, 2),
+        )
         along = half * np.array([np.cos(angle), np.sin(angle)])
-        if euclidean_to_segment([START, GOAL], middle - along, middle + along).min() > 1.5:
+        if (
+            euclidean_to_segment([START, GOAL], middle - along, middle + along).min()
+            > 1.5
+        ):
             walls.append(np.array([middle - along, middle + along]))
     return np.array(walls)
 
@@ -32,7 +39,9 @@ def scattered(n: int, seed: int = 0, size: float = 40.0) -> Array:
 def drive(controller: szlib.MPCCBF, steps: int) -> list[szlib.Step]:
     state, taken = np.array([0.0, 0.0, 0.3, 0.1]), list[szlib.Step]()
     for _ in range(steps):
-        taken.append(controller.step(state, GOAL, [szlib.Person((2.0, 1.0), (-0.3, 0.0))]))
+        taken.append(
+            controller.step(state, GOAL, [szlib.Person((2.0, 1.0), (-0.3, 0.0))])
+        )
         state = advance(state, taken[-1].control, 0.1)
     return taken
 
@@ -49,7 +58,11 @@ def test_the_plan_is_that_with_all_walls(monkeypatch: pytest.MonkeyPatch) -> Non
         known = np.isfinite(a.h)
         assert 5 < known.sum() < 100
         assert a.h[known] == pytest.approx(b.h[known], abs=1e-4)
-        assert (b.residual[~known] > 0).all() and (b.h[~known] > 1).all() and (b.clearance[~known] > 1).all()
+        assert (
+            (b.residual[~known] > 0).all()
+            and (b.h[~known] > 1).all()
+            and (b.clearance[~known] > 1).all()
+        )
         assert (a.safe, a.status) == (b.safe, b.status)
         assert a.verify().ok and b.verify().ok, a.verify().faults
     assert near[0].residual[~np.isfinite(near[0].h)].min() == np.inf
@@ -61,8 +74,13 @@ def test_no_move_makes_a_wall_out_of_reach_matter() -> None:
     reach = S.r_robot + S.eps + v * S.dt * (2 / S.gamma + S.N)
     for half in (5e-4, 0.05, 0.5, 2.0, 20.0):
         wall = np.array([[(-half, 0.0), (half, 0.0)]])
-        rows, points = walls_with_margins(wall, S), rng.uniform(-12 - half, 12 + half, (3000, 2))
-        out = np.array([p for p in points.tolist() if not find_near_walls(wall, *p, reach)])
+        rows, points = (
+            walls_with_margins(wall, S),
+            rng.uniform(-12 - half, 12 + half, (3000, 2)),
+        )
+        out = np.array(
+            [p for p in points.tolist() if not find_near_walls(wall, *p, reach)]
+        )
         assert len(out) > 100
         edge = out[np.argsort(np.abs(np.hypot(*out.T) - reach))][:500]
         for step in (0.0, (S.N - 1) * v * S.dt):
@@ -89,7 +107,9 @@ def test_a_wall_that_comes_near_is_in_the_problem_in_time() -> None:
 def test_a_robot_that_is_too_fast_sees_farther() -> None:
     walls = scattered(300)
     counts = [
-        np.isfinite(szlib.MPCCBF(ZONE, walls=walls).step((0.0, 0.0, speed, 0.0), (9.0, 0.0)).h).sum()
+        np.isfinite(
+            szlib.MPCCBF(ZONE, walls=walls).step((0.0, 0.0, speed, 0.0), (9.0, 0.0)).h
+        ).sum()
         for speed in (0.0, 1.0, 2.0)
     ]
     assert counts[0] == counts[1] < counts[2]
@@ -110,7 +130,9 @@ def test_new_walls_and_a_reset_are_noticed() -> None:
 @pytest.mark.parametrize("make", [szlib.MPCCBF, szlib.DifferentialDrive])
 def test_a_run_among_many_walls_has_a_log_about_all(make: Any) -> None:
     walls = scattered(60)
-    scenario = szlib.Scenario("field", (0, 0, 0, 0), (1.0, 0.2), (szlib.Person((3.0, 0.0)),), walls)
+    scenario = szlib.Scenario(
+        "field", (0, 0, 0, 0), (1.0, 0.2), (szlib.Person((3.0, 0.0)),), walls
+    )
     log = szlib.simulate(scenario, make(ZONE, walls=walls), max_time=2.0)
     assert log.residual.shape[1] == log.h.shape[1] == 61
     assert log.metrics()["unflagged_violations"] == 0

@@ -14,10 +14,10 @@ import pytest
 import shapely
 from numpy.typing import NDArray
 from PIL import Image
+from szlib.control.obstacles import find_solids
 
 import szlib
 from szlib.control import read_walls, walls_from_grid
-from szlib.control.barriers import find_solids
 
 ZONE = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
 GREY = NDArray[np.uint8]
@@ -36,7 +36,9 @@ def cells() -> GREY:
 
 def write_map(folder: Path, grey: GREY | None = None, **changes: Any) -> Path:
     """A map; an entry that is None is left out."""
-    entries = {key: value for key, value in {**ENTRIES, **changes}.items() if value is not None}
+    entries = {
+        key: value for key, value in {**ENTRIES, **changes}.items() if value is not None
+    }
     if isinstance(name := entries.get("image"), str):
         Image.fromarray(cells() if grey is None else grey).save(folder / name)
     path = folder / "map.yaml"
@@ -49,22 +51,28 @@ def bounds(walls: Any) -> list[float]:
 
 
 @pytest.mark.parametrize("image", ["map.pgm", "map.png"])
-def test_a_block_of_cells_becomes_its_outline_in_the_world(tmp_path: Path, image: str) -> None:
+def test_a_block_of_cells_becomes_its_outline_in_the_world(
+    tmp_path: Path, image: str
+) -> None:
     walls = szlib.walls_from_map(write_map(tmp_path, image=image))
     assert walls.shape == (4, 2, 2)
-    assert bounds(walls) == pytest.approx([-0.8, -1.75, -0.3, -0.75])  # rows count from the top
+    # rows count from the top
+    assert bounds(walls) == pytest.approx([-0.8, -1.75, -0.3, -0.75])
 
 
 def test_yaw_turns_the_map_about_its_origin(tmp_path: Path) -> None:
     straight = szlib.walls_from_map(write_map(tmp_path))
     turned = szlib.walls_from_map(write_map(tmp_path, origin=[-1.0, -2.0, pi / 6]))
     c, s = cos(pi / 6), sin(pi / 6)
-    assert turned - (-1, -2) == pytest.approx((straight - (-1, -2)) @ np.array([[c, s], [-s, c]]))
+    assert turned - (-1, -2) == pytest.approx(
+        (straight - (-1, -2)) @ np.array([[c, s], [-s, c]])
+    )
 
 
 def test_each_kind_of_cell_is_read_as_map_server_reads_it(tmp_path: Path) -> None:
     grey = np.full((3, 40), 254, np.uint8)
-    grey[1, 5], grey[1, 15], grey[1, 25], grey[1, 35] = 0, 205, 128, 85  # p = 1, 0.196, 0.498, 0.667
+    # p = 1, 0.196, 0.498, 0.667
+    grey[1, 5], grey[1, 15], grey[1, 25], grey[1, 35] = (0, 205, 128, 85)
     columns = {
         (): {5, 35},
         (("unknown", True),): {5, 15, 25, 35},
@@ -78,12 +86,16 @@ def test_each_kind_of_cell_is_read_as_map_server_reads_it(tmp_path: Path) -> Non
     for changes, expected in columns.items():
         given = {"free_thresh": 0.19, **dict(changes)}
         unknown = bool(given.pop("unknown", False))
-        path = write_map(tmp_path, grey, resolution=1.0, origin=[0.0, 0.0, 0.0], **given)
+        path = write_map(
+            tmp_path, grey, resolution=1.0, origin=[0.0, 0.0, 0.0], **given
+        )
         walls = szlib.walls_from_map(path, unknown=unknown)
         centres = np.arange(40) + 0.5
         solid = find_solids(walls)
         found = (
-            set() if solid is None else set(np.flatnonzero(shapely.contains_xy(solid, centres, 1.5)).tolist())
+            set()
+            if solid is None
+            else set(np.flatnonzero(shapely.contains_xy(solid, centres, 1.5)).tolist())
         )
         assert found == expected, changes
 
@@ -92,7 +104,10 @@ def test_transparent_pixels_of_a_scale_map_are_unknown(tmp_path: Path) -> None:
     pixels = np.full((10, 10, 2), 255, np.uint8)
     pixels[4:6, 4:6] = (128, 0)
     path = write_map(tmp_path, pixels, image="map.png", mode="scale")
-    assert len(szlib.walls_from_map(path)) == 0 and len(szlib.walls_from_map(path, unknown=True)) == 4
+    assert (
+        len(szlib.walls_from_map(path)) == 0
+        and len(szlib.walls_from_map(path, unknown=True)) == 4
+    )
 
 
 def test_simplified_outlines_are_few_and_deviate_by_no_more_than_asked() -> None:
@@ -102,7 +117,10 @@ def test_simplified_outlines_are_few_and_deviate_by_no_more_than_asked() -> None
     raw = walls_from_grid(ring | slanted, 0.05, simplify=0.0)
     few = walls_from_grid(ring | slanted, 0.05)
     assert len(few) < len(raw) / 8
-    lines, cells = shapely.multilinestrings(few.tolist()), shapely.multilinestrings(raw.tolist())
+    lines, cells = (
+        shapely.multilinestrings(few.tolist()),
+        shapely.multilinestrings(raw.tolist()),
+    )
     assert shapely.hausdorff_distance(cells, lines) < 0.05 + 1e-6
 
 
@@ -122,7 +140,10 @@ BAD = {
     "no image": ("image .other.pgm. cannot be read", {"image": "[map.pgm]"}),
     "origin": (r"origin must have shape \(3,\)", {"origin": [0.0, 0.0]}),
     "infinite": ("origin must be finite", {"origin": "[.inf, 0.0, 0.0]"}),
-    "swapped": ("free_thresh must be from 0 to below occupied_thresh = 0.1", {"occupied_thresh": 0.1}),
+    "swapped": (
+        "free_thresh must be from 0 to below occupied_thresh = 0.1",
+        {"occupied_thresh": 0.1},
+    ),
     "threshold": ("free_thresh must be", {"occupied_thresh": 65}),
     "negate": ("negate must be 0 or 1", {"negate": 2}),
     "mode": ("mode must be 'trinary'", {"mode": "trinity"}),
@@ -147,7 +168,13 @@ def test_a_file_that_is_no_map_is_an_error(tmp_path: Path) -> None:
     whole = (tmp_path / "map.pgm").read_bytes()
     wide = io.BytesIO()
     Image.fromarray(np.zeros((4, 4), np.uint16)).save(wide, "png")
-    for content in (whole[:-100], b"no picture", b"", b"P5\n100000 100000\n255\n", wide.getvalue()):
+    for content in (
+        whole[:-100],
+        b"no picture",
+        b"",
+        b"P5\n100000 100000\n255\n",
+        wide.getvalue(),
+    ):
         (tmp_path / "map.pgm").write_bytes(content)
         with pytest.raises(szlib.DataError, match=r"map\.yaml: image .map\.pgm"):
             szlib.walls_from_map(path)
@@ -163,7 +190,11 @@ def test_a_file_that_is_no_map_is_an_error(tmp_path: Path) -> None:
 
 
 def test_a_bad_grid_is_an_error() -> None:
-    for arguments in ((np.zeros(4), 0.05), (np.zeros((4, 4)), 0.0), (np.zeros((4, 4)), 0.05, (0.0, 0.0))):
+    for arguments in (
+        (np.zeros(4), 0.05),
+        (np.zeros((4, 4)), 0.0),
+        (np.zeros((4, 4)), 0.05, (0.0, 0.0)),
+    ):
         with pytest.raises(szlib.SolverError):
             walls_from_grid(*arguments)
 
@@ -175,10 +206,16 @@ def inside_step(controller: Any, at: tuple[float, float]) -> Any:
     return controller.step((*at, 0.0, 0.0), (20.0, 0.0))
 
 
-@pytest.mark.parametrize("source", ["polygon", "nested", "map", "set", "copy", "pickle"])
+@pytest.mark.parametrize(
+    "source", ["polygon", "nested", "map", "set", "copy", "pickle"]
+)
 def test_a_robot_inside_of_a_solid_wall_is_not_safe(source: str) -> None:
     block = shapely.box(-8.5, -8.5, 8.5, 8.5)
-    walls: Any = [shapely.MultiPolygon([block]), [(30.0, 0.0), (30.0, 1.0)]] if source == "nested" else block
+    walls: Any = (
+        [shapely.MultiPolygon([block]), [(30.0, 0.0), (30.0, 1.0)]]
+        if source == "nested"
+        else block
+    )
     if source == "map":
         walls = walls_from_grid(np.ones((34, 34)), 0.5, (-8.5, -8.5, 0.0))
     controller = szlib.MPCCBF(ZONE, walls=() if source == "set" else walls)
@@ -188,19 +225,32 @@ def test_a_robot_inside_of_a_solid_wall_is_not_safe(source: str) -> None:
         controller = copy.deepcopy(controller)
     if source == "pickle":
         controller = pickle.loads(pickle.dumps(controller))
-    inside, outside = inside_step(controller, (0.0, 0.0)), inside_step(controller, (11.0, 0.0))
+    inside, outside = (
+        inside_step(controller, (0.0, 0.0)),
+        inside_step(controller, (11.0, 0.0)),
+    )
     assert not inside.safe and inside.verify().ok and not inside.verify().safe
     assert "inside of a solid wall" in inside.explain()
     assert outside.safe and outside.verify().ok
     drive = szlib.DifferentialDrive(ZONE, walls=walls)
-    inside, outside = drive.step((0.0, 0.0, 0.0), (20.0, 0.0)), drive.step((11.0, 0.0, 0.0), (20.0, 0.0))
-    assert not inside.safe and outside.safe and inside.verify().ok and outside.verify().ok
+    inside, outside = (
+        drive.step((0.0, 0.0, 0.0), (20.0, 0.0)),
+        drive.step((11.0, 0.0, 0.0), (20.0, 0.0)),
+    )
+    assert (
+        not inside.safe and outside.safe and inside.verify().ok and outside.verify().ok
+    )
 
 
 def test_a_room_is_no_solid() -> None:
     outline = shapely.box(-8.5, -8.5, 8.5, 8.5)
     courtyard = shapely.box(-9, -9, 9, 9) - outline
-    for walls in (outline.exterior, list(outline.exterior.coords), read_walls(outline), courtyard):
+    for walls in (
+        outline.exterior,
+        list(outline.exterior.coords),
+        read_walls(outline),
+        courtyard,
+    ):
         step = szlib.MPCCBF(ZONE, walls=walls).step((0.0, 0.0, 0.0, 0.0), (4.0, 0.0))
         assert step.safe and step.verify().ok
 

@@ -6,15 +6,16 @@ import helpers.ros_stubs as ros
 import numpy as np
 import pytest
 from helpers.ros_stubs import Node, goal, grid, hear, odometry, people
+from szlib.control.verification import euclidean_to_ellipse
 
 import szlib
 from szlib.control.differential_drive import Unicycle
-from szlib.control.distances import euclidean_to_ellipse
 from szlib.zones.polar import DIRECTIONS, PolarZone
 
 ZONE = szlib.Ellipse((0.1, 0.0), (0.9, 0.7), 0.0)
 GOAL = (5.0, 0.5)
-pytestmark = pytest.mark.filterwarnings("ignore::szlib.errors.DataWarning")  # a zone of nobody's data
+# a zone of nobody's data
+pytestmark = pytest.mark.filterwarnings("ignore::szlib.errors.DataWarning")
 
 
 CLASSES = {"ros2_node": "SocialDrive", "ros2_node_full": "FullSocialDrive"}
@@ -93,7 +94,10 @@ def test_the_robot_reaches_its_goal_past_a_person(make_either):
     assert np.abs(path[-1][1]).max() < 0.05
     for k, (own, _) in enumerate(path):
         offset = own[:2] - np.array(walker[:2]) - 0.1 * k * np.array(walker[2:])
-        assert euclidean_to_ellipse(offset, ZONE.placed((0.0, 0.0), np.pi)) >= 0.3 + 0.05 - 1e-6
+        assert (
+            euclidean_to_ellipse(offset, ZONE.placed((0.0, 0.0), np.pi))
+            >= 0.3 + 0.05 - 1e-6
+        )
 
 
 @pytest.mark.parametrize("topic", ["odom", "people"])
@@ -104,7 +108,9 @@ def test_the_robot_stops_when_a_topic_falls_silent(make_either, topic):
     commands = np.array([command for _, command in path])
     assert np.abs(commands[25:30, 0]).min() > 0.3  # it was on its way
     assert not commands[36:].any()  # 0.5 s after the last message, and a step
-    assert {"odom": "no recent odometry", "people": "no recent people"}[topic] in node.logged[-1]
+    assert {"odom": "no recent odometry", "people": "no recent people"}[
+        topic
+    ] in node.logged[-1]
     last = path[-1][0]
     hear(node, "odom", odometry(last))
     hear(node, "people", people())
@@ -176,11 +182,17 @@ def test_a_base_that_wants_stamped_commands_gets_them(make):
     assert command.header.stamp == ros.stamp_of(Node.now)
 
 
-def test_messages_in_frames_that_tf_knows_are_brought_into_the_frame_of_the_walls(make_with_tf, monkeypatch):
+def test_messages_in_frames_that_tf_knows_are_brought_into_the_frame_of_the_walls(
+    make_with_tf, monkeypatch
+):
     half = np.pi / 4  # the camera is at (1, 2) and looks along y
     turned = ros.xyz(w=float(np.cos(half)))
     turned.z = float(np.sin(half))
-    monkeypatch.setattr(ros.Buffer, "poses", {"camera": (1.0, 2.0, turned), "broken": (0, 0, ros.xyz(w=0.0))})
+    monkeypatch.setattr(
+        ros.Buffer,
+        "poses",
+        {"camera": (1.0, 2.0, turned), "broken": (0, 0, ros.xyz(w=0.0))},
+    )
     node = make_with_tf()
     hear(node, "odom", odometry(np.array([3.0, -1.0, 0.5, 0.2, 0.1]), frame="camera"))
     assert node.own == pytest.approx([2.0, 5.0, 0.5 + np.pi / 2, 0.2, 0.1])
@@ -191,14 +203,19 @@ def test_messages_in_frames_that_tf_knows_are_brought_into_the_frame_of_the_wall
     hear(node, "goal_pose", goal(1.0, 1.0, frame="unknown"))
     hear(node, "people", people(frame="broken"))
     assert node.goal == pytest.approx((0.0, 3.0)) and len(node.people) == 1
-    assert "unknown does not exist" in node.logged[0] and "is no rotation" in node.logged[1]
+    assert (
+        "unknown does not exist" in node.logged[0]
+        and "is no rotation" in node.logged[1]
+    )
 
 
 def test_a_robot_that_is_stuck_says_why(make_either):
     node = make_either(walls="1.2 -3 1.2 3; -3 -3 -3 3; -3 -3 1.2 -3; -3 3 1.2 3")
     hear(node, "goal_pose", goal(*GOAL))
     drive(node, (-4.0, 3.0, 0.0, 0.0), 110)
-    assert any("no progress for" in said and "held by wall 0" in said for said in node.logged)
+    assert any(
+        "no progress for" in said and "held by wall 0" in said for said in node.logged
+    )
 
 
 def test_a_goal_inside_a_wall_is_dropped_with_an_error(make_either):
@@ -240,7 +257,9 @@ def test_a_zone_that_does_not_exist_is_refused(make_either):
         make_either(zone="nowhere.json")
 
 
-def test_the_short_node_stands_still_when_a_number_of_its_odometry_is_not_finite(make_short):
+def test_the_short_node_stands_still_when_a_number_of_its_odometry_is_not_finite(
+    make_short,
+):
     node = make_short()
     hear(node, "people", people())
     hear(node, "goal_pose", goal(*GOAL))
@@ -255,20 +274,34 @@ def test_a_map_gives_walls_in_the_frame_of_the_walls(make_with_tf, monkeypatch):
     monkeypatch.setattr(ros.Buffer, "poses", {"map": (10.0, 0.0, turned)})
     node = make_with_tf(walls="4 -3 4 3")
     cells = np.zeros((8, 10), int)
-    cells[2:4, 1:5], cells[6, 6], cells[7, 7] = 100, -1, 40  # a block, an unknown cell, and one below 65 %
+    # a block, an unknown cell, and one below 65 %
+    cells[2:4, 1:5], cells[6, 6], cells[7, 7] = (100, -1, 40)
     hear(node, "map", grid(cells, 0.5, (1.0, 2.0, 0.0), frame="map"))
     walls = node.drive.walls
     assert walls.shape == (5, 2, 2)
     block = walls[:4]
-    assert [*block.min(axis=(0, 1)), *block.max(axis=(0, 1))] == pytest.approx([6.0, 1.5, 7.0, 3.5])
+    assert [*block.min(axis=(0, 1)), *block.max(axis=(0, 1))] == pytest.approx(
+        [6.0, 1.5, 7.0, 3.5]
+    )
     assert not node.drive.step((6.5, 2.5, 0.0), (9.0, 9.0)).safe
 
 
 def test_a_map_that_cannot_be_used_changes_nothing(make):
     node = make(walls="4 -3 4 3")
-    short, still = grid(np.zeros((4, 4), int), 0.5, (0, 0, 0)), grid(np.zeros((4, 4), int), 0.0, (0, 0, 0))
+    short, still = (
+        grid(np.zeros((4, 4), int), 0.5, (0, 0, 0)),
+        grid(np.zeros((4, 4), int), 0.0, (0, 0, 0)),
+    )
     short.data = short.data[:-1]
-    for bad in (short, still, grid(np.zeros((4, 4), int), 0.5, (0, 0, 0), frame="elsewhere")):
+    for bad in (
+        short,
+        still,
+        grid(np.zeros((4, 4), int), 0.5, (0, 0, 0), frame="elsewhere"),
+    ):
         hear(node, "map", bad)
         assert node.drive.walls.shape == (1, 2, 2)
-    assert len(node.logged) == 3 and "cannot be used" in node.logged[0] and "resolution" in node.logged[1]
+    assert (
+        len(node.logged) == 3
+        and "cannot be used" in node.logged[0]
+        and "resolution" in node.logged[1]
+    )

@@ -10,13 +10,17 @@ import numpy as np
 import pytest
 import shapely
 from helpers.random_states import ZONE, questions
+from szlib.control.obstacles import compute_h, read_walls
 
 import szlib
 from szlib.control import problem
-from szlib.control.barriers import compute_h, read_walls
 from szlib.control.controller import advance
 from szlib.control.solvers import solver_pool
-from szlib.control.solvers.solver_pool import INACTIVE_H, padded_parameters, round_up_size
+from szlib.control.solvers.solver_pool import (
+    INACTIVE_H,
+    padded_parameters,
+    round_up_size,
+)
 
 GOAL = (4.0, 0.0)
 SOLVERS = ("sqp", "ipopt")
@@ -32,7 +36,9 @@ def crowd(n, k=0):
     """People around the way, k steps of 0.1 s later."""
     rng = np.random.default_rng(6)
     rows = np.c_[
-        rng.uniform(-6, 10, 40), rng.choice([-1, 1], 40) * rng.uniform(1.8, 5, 40), np.zeros((40, 2))
+        rng.uniform(-6, 10, 40),
+        rng.choice([-1, 1], 40) * rng.uniform(1.8, 5, 40),
+        np.zeros((40, 2)),
     ]
     rows[:, 2:] = rng.uniform(-0.2, 0.2, (40, 2))
     return (rows + 0.1 * k * np.c_[rows[:, 2:], np.zeros((40, 2))])[:n]
@@ -59,7 +65,20 @@ def wait_for_the_builder(controller, _=None):
 
 
 def test_sizes_are_powers_of_two_and_three_quarters_of_them():
-    assert sorted({round_up_size(n) for n in range(49)}) == [0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48]
+    assert sorted({round_up_size(n) for n in range(49)}) == [
+        0,
+        1,
+        2,
+        3,
+        4,
+        6,
+        8,
+        12,
+        16,
+        24,
+        32,
+        48,
+    ]
     assert all(n <= round_up_size(n) < 1.5 * n for n in range(1, 1000))
 
 
@@ -70,18 +89,31 @@ def test_empty_slots_do_not_change_the_control(monkeypatch, solver, count, formu
         answers = []
         for size in (lambda n: n, lambda n: 4 if n <= 4 else 8):
             monkeypatch.setattr(solver_pool, "round_up_size", size)
-            controller = controller_of(solver, question.walls, max_people=0, **formulation)
-            steps = [controller.step(question.state, question.goal, question.people) for _ in range(2)]
+            controller = controller_of(
+                solver, question.walls, max_people=0, **formulation
+            )
+            steps = [
+                controller.step(question.state, question.goal, question.people)
+                for _ in range(2)
+            ]
             answers.append(steps)
-        assert controller._pool.get(len(question.people), len(question.walls)).evaluate.size == (4, 4)
+        assert controller._pool.get(
+            len(question.people), len(question.walls)
+        ).evaluate.size == (4, 4)
         for exact, padded in zip(*answers, strict=True):
             assert padded.control == pytest.approx(exact.control, abs=1e-6)
             assert padded.fallback == exact.fallback
             assert padded.slack == pytest.approx(exact.slack, abs=1e-6)
-            assert padded.h == pytest.approx(exact.h) and padded.residual.shape == exact.residual.shape
+            assert (
+                padded.h == pytest.approx(exact.h)
+                and padded.residual.shape == exact.residual.shape
+            )
             assert padded.residual == pytest.approx(exact.residual, abs=1e-5)
             assert (
-                max(np.abs(padded.h).max(initial=0), np.abs(padded.residual).max(initial=0))
+                max(
+                    np.abs(padded.h).max(initial=0),
+                    np.abs(padded.residual).max(initial=0),
+                )
                 < INACTIVE_H / 100
             )
 
@@ -91,7 +123,10 @@ def test_empty_slots_do_not_change_the_control(monkeypatch, solver, count, formu
 
 def test_empty_slots_are_far_from_everything():
     parameters = padded_parameters((3.0, -2.0, 1.0, 0.0), [], [], (2, 2))
-    people, walls = np.reshape(parameters[:18], (2, 9))[:, :7], np.reshape(parameters[18:], (2, 5))
+    people, walls = (
+        np.reshape(parameters[:18], (2, 9))[:, :7],
+        np.reshape(parameters[18:], (2, 5)),
+    )
     for x, y in ((3.0, -2.0), (13.0, -2.0), (3.0, 8.0)):
         h = compute_h(x, y, people.tolist(), walls.tolist(), r_robot=0.5, eps=0.05)
         assert min(h) > INACTIVE_H
@@ -107,7 +142,9 @@ def test_a_run_is_the_same_whether_or_not_a_size_was_built_ahead(monkeypatch, so
     assert np.array_equal(ahead, racing) and np.array_equal(ahead, in_place)
 
 
-def test_a_controller_is_built_for_eight_people_and_doubles_when_half_are_present(caplog):
+def test_a_controller_is_built_for_eight_people_and_doubles_when_half_are_present(
+    caplog,
+):
     caplog.set_level("INFO", logger="szlib")
     controller = controller_of()
     built = controller._pool._solvers
@@ -162,20 +199,33 @@ def test_walls_may_be_segments_lines_and_shapes(walls, count):
     segments = read_walls(walls)
     assert segments.shape == (count, 2, 2)
     if hasattr(walls, "boundary") and hasattr(walls, "length"):
-        assert np.hypot(*(segments[:, 1] - segments[:, 0]).T).sum() == pytest.approx(walls.length)
+        assert np.hypot(*(segments[:, 1] - segments[:, 0]).T).sum() == pytest.approx(
+            walls.length
+        )
     assert np.array_equal(szlib.MPCCBF(ZONE, walls=walls, max_people=0).walls, segments)
 
 
 def test_the_same_wall_in_any_shape_gives_the_same_control():
     rings = [BOX, BOX.exterior, list(BOX.exterior.coords), read_walls(BOX)]
-    steps = [controller_of(walls=walls).step((-1.0, 1.0, 0.4, 0), (5.0, -2.0)) for walls in rings]
+    steps = [
+        controller_of(walls=walls).step((-1.0, 1.0, 0.4, 0), (5.0, -2.0))
+        for walls in rings
+    ]
     assert all(np.array_equal(step.control, steps[0].control) for step in steps)
     assert len(steps[0].h) == 4
 
 
 @pytest.mark.parametrize(
     "walls",
-    [5, "wall", None, shapely.Point(0, 0), [(0, 0)], [(0, 0, 0), (1, 1, 1)], [[(0, 0), (0, 0), (0, 0)]]],
+    [
+        5,
+        "wall",
+        None,
+        shapely.Point(0, 0),
+        [(0, 0)],
+        [(0, 0, 0), (1, 1, 1)],
+        [[(0, 0), (0, 0), (0, 0)]],
+    ],
 )
 def test_objects_that_are_not_walls_raise_an_error(walls):
     with pytest.raises(szlib.SolverError, match="wall"):
@@ -210,7 +260,9 @@ def test_a_wall_set_around_the_goal_of_a_moving_robot_sets_goal_blocked():
 # copies
 
 
-@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda c: pickle.loads(pickle.dumps(c))])
+@pytest.mark.parametrize(
+    "again", [copy.copy, copy.deepcopy, lambda c: pickle.loads(pickle.dumps(c))]
+)
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_copy_gives_the_steps_of_its_original_bit_for_bit(solver, again):
     original = controller_of(solver, walls=[[(-6, 2), (6, 2)]], max_people=4)
@@ -220,14 +272,25 @@ def test_a_copy_gives_the_steps_of_its_original_bit_for_bit(solver, again):
         if k == 20:
             rows[0, 2:] = 0.0
         step = original.step(state, GOAL, rows, ids="ab")
-        state, rows = advance(state, step.control, 0.1), rows + 0.1 * np.c_[rows[:, 2:], np.zeros((2, 2))]
+        state, rows = (
+            advance(state, step.control, 0.1),
+            rows + 0.1 * np.c_[rows[:, 2:], np.zeros((2, 2))],
+        )
     twin = again(original)
-    assert np.array_equal(twin.walls, original.walls) and twin.settings == original.settings
+    assert (
+        np.array_equal(twin.walls, original.walls)
+        and twin.settings == original.settings
+    )
     for _ in range(10):
         step, other = (c.step(state, GOAL, rows, ids="ab") for c in (original, twin))
         assert np.array_equal(other.predicted, step.predicted)
-        assert np.array_equal(other.residual, step.residual) and other.fallback == step.fallback
-        assert [p.heading for p in other.scene.people] == [p.heading for p in step.scene.people]
+        assert (
+            np.array_equal(other.residual, step.residual)
+            and other.fallback == step.fallback
+        )
+        assert [p.heading for p in other.scene.people] == [
+            p.heading for p in step.scene.people
+        ]
         state = advance(state, step.control, 0.1)
     assert step.scene.people[0].heading == pytest.approx(np.pi), "remembered"
 
@@ -235,7 +298,10 @@ def test_a_copy_gives_the_steps_of_its_original_bit_for_bit(solver, again):
 def test_copies_can_be_used_in_other_threads():
     controller = controller_of()
     expected = drive(controller, [2] * 30)
-    with pytest.raises(szlib.SolverError, match="another thread"), ThreadPoolExecutor(1) as other:
+    with (
+        pytest.raises(szlib.SolverError, match="another thread"),
+        ThreadPoolExecutor(1) as other,
+    ):
         other.submit(controller.step, (0, 0, 0, 0), GOAL).result()
     controller.reset()
     copies = [copy.deepcopy(controller) for _ in range(4)]

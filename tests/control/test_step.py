@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import shapely
 from helpers.random_states import ZONE, questions
+from szlib.control.verification import required_margin, wall_margin
 
 import szlib
 from szlib.control import problem
 from szlib.control.controller import advance
-from szlib.control.distances import required_margin, wall_margin
 from szlib.simulation.closed_loop import drive
 from szlib.zones.ellipses import BODY_RADIUS
 
@@ -24,7 +24,9 @@ FACING = szlib.Person((0.0, 0.0), heading=np.pi)
 
 
 def controller_of(solver="sqp", walls=(), **settings):
-    return szlib.MPCCBF(ZONE, walls=walls, settings=szlib.MPCSettings(solver=solver, **settings))
+    return szlib.MPCCBF(
+        ZONE, walls=walls, settings=szlib.MPCSettings(solver=solver, **settings)
+    )
 
 
 # clearance, and what "safe" covers
@@ -34,17 +36,28 @@ def test_clearance_equals_the_gap_that_shapely_computes():
     for question in islice(questions(seed=21), 40):
         step = question.ask(szlib.MPCSettings())
         for k, (x, y) in enumerate(step.predicted[:, :2]):
-            robot, here = shapely.Point(x, y), [p.after(0.1 * k).position for p in question.people]
+            robot, here = (
+                shapely.Point(x, y),
+                [p.after(0.1 * k).position for p in question.people],
+            )
             gaps = [robot.distance(shapely.Point(p)) - BODY_RADIUS for p in here]
-            gaps += [robot.distance(shapely.LineString(wall)) for wall in question.walls]
+            gaps += [
+                robot.distance(shapely.LineString(wall)) for wall in question.walls
+            ]
             assert step.clearance[:, k] == pytest.approx(np.array(gaps) - 0.5, abs=1e-9)
 
 
 def end_of_wall(margin):
     """A robot that is sent past the end of a wall of 1 m, 13 cm nearer than its disc allows."""
     wall = np.array([[(0.0, -1.0), (0.0, 0.0)]])
-    scenario = szlib.Scenario("end", np.array([-3.0, 0.4, 0, 0]), np.array([3.0, 0.4]), walls=wall)
-    return drive(scenario, controller_of(walls=wall, margin=margin, gamma=0.5, N_h=8), until_arrival=False)
+    scenario = szlib.Scenario(
+        "end", np.array([-3.0, 0.4, 0, 0]), np.array([3.0, 0.4]), walls=wall
+    )
+    return drive(
+        scenario,
+        controller_of(walls=wall, margin=margin, gamma=0.5, N_h=8),
+        until_arrival=False,
+    )
 
 
 def test_only_the_euclidean_margin_keeps_the_disc_off_the_end_of_a_short_wall():
@@ -65,7 +78,9 @@ def test_a_step_into_an_overlap_is_not_safe_although_every_barrier_holds():
 
 
 def test_a_zone_smaller_than_the_body_does_not_make_an_overlap_safe():
-    person = szlib.Person((0.0, 0.0), heading=0.0, zone=szlib.Ellipse((0.0, 0.0), (0.05, 0.05)))
+    person = szlib.Person(
+        (0.0, 0.0), heading=0.0, zone=szlib.Ellipse((0.0, 0.0), (0.05, 0.05))
+    )
     step = controller_of().step((0.62, 0.0, 0.0, 0.0), (5.0, 0.0), [person])
     assert step.feasible and step.h[0] >= 0
     assert step.clearance[0, 0] == pytest.approx(0.62 - 0.5 - BODY_RADIUS)
@@ -82,7 +97,9 @@ def test_the_margin_of_a_wall_is_what_it_requires_and_never_less_than_eps(length
     touching = np.array([(length + 0.5, 0.0), (-0.3, 0.4), (length + 0.3, -0.4)])
     assert all(controller.barriers(p)[0] <= 1e-9 for p in touching)
     beside = (length / 2, 0.5 * (1 + 0.42) + 0.05)
-    assert controller.barriers(beside)[0] >= 0, "no more than 0.42 r of room is given away"
+    assert controller.barriers(beside)[0] >= 0, (
+        "no more than 0.42 r of room is given away"
+    )
 
 
 # whatever people do
@@ -107,7 +124,10 @@ def test_a_goal_where_a_person_stands_sets_goal_blocked_and_raises_nothing(solve
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_second_person_under_terminal_person_makes_the_plan_end_at_rest(solver):
     controller = controller_of(solver, terminal="person")
-    walker, other = szlib.Person((1.0, 0.3), (-0.4, 0.0)), szlib.Person((3.0, 2.5), (0.0, -0.3))
+    walker, other = (
+        szlib.Person((1.0, 0.3), (-0.4, 0.0)),
+        szlib.Person((3.0, 2.5), (0.0, -0.3)),
+    )
     state, said = np.array([-3.0, 0.0, 0.0, 0.0]), []
     for people in [[walker]] * 5 + [[walker, other]] * 10 + [[]] + [[walker]] * 3:
         step = controller.step(state, GOAL, people)
@@ -125,14 +145,21 @@ def test_a_second_person_under_terminal_person_makes_the_plan_end_at_rest(solver
 @pytest.mark.parametrize("large", [1e7, 1e8])
 def test_the_largest_numbers_get_a_control(solver, large):
     controller = controller_of(solver, walls=[[(large - 1, 3.0), (large, 3.0)]])
-    for person in (szlib.Person((large, 0.0), (-large, 0.0)), szlib.Person((0.0, -large), (0.0, 1.0))):
-        step = controller.step((-large / 2, 0.0, 0.0, large), (large / 3, 0.0), [person])
+    for person in (
+        szlib.Person((large, 0.0), (-large, 0.0)),
+        szlib.Person((0.0, -large), (0.0, 1.0)),
+    ):
+        step = controller.step(
+            (-large / 2, 0.0, 0.0, large), (large / 3, 0.0), [person]
+        )
         assert np.isfinite(step.control).all() and np.abs(step.control).max() <= 1
         assert not step.safe
 
 
 def test_a_robot_on_the_focus_of_a_zone_to_the_last_digit_gets_a_control():
-    person = szlib.Person((0.0, 0.0), heading=0.0, zone=szlib.Ellipse((0.0, 0.0), (0.8, 0.8)))
+    person = szlib.Person(
+        (0.0, 0.0), heading=0.0, zone=szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
+    )
     step = controller_of().step((1e-170, 0.0, 0.0, 0.0), GOAL, [person])
     assert np.isfinite(step.control).all() and not step.safe
 
@@ -181,7 +208,9 @@ for solver, n_steps in (("sqp", 60), ("ipopt", 10)):
 
 
 def test_one_controller_a_thread_gives_the_same_answers_as_one_after_another():
-    done = subprocess.run([sys.executable, "-c", ONE_EACH], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", ONE_EACH], capture_output=True, text=True
+    )
     assert done.returncode == 0, (done.returncode, done.stderr)
 
 
@@ -196,8 +225,13 @@ def test_a_controller_used_in_a_second_thread_raises_an_error(solver):
     with ThreadPoolExecutor(max_workers=1) as other:
         mine, theirs = controller_of(solver), controller_of(solver)
         assert ask(mine) == "optimal"
-        assert "belongs to another thread; build one in each" in other.submit(ask, mine).result()
-        assert other.submit(ask, theirs).result() == "optimal", "built here, used there alone"
+        assert (
+            "belongs to another thread; build one in each"
+            in other.submit(ask, mine).result()
+        )
+        assert other.submit(ask, theirs).result() == "optimal", (
+            "built here, used there alone"
+        )
         assert "belongs to another thread" in ask(theirs)
         assert ask(mine) == other.submit(ask, theirs).result() == "optimal"
 
@@ -206,7 +240,9 @@ def test_controllers_with_the_same_settings_share_their_ipopt_solvers():
     settings = szlib.MPCSettings(solver="ipopt", max_iterations=98)
     one, two = (szlib.MPCCBF(ZONE, settings=settings, max_people=0) for _ in range(2))
     assert one._pool.get(0, 0)._hard is two._pool.get(0, 0)._hard
-    other = szlib.MPCCBF(ZONE, settings=replace(settings, max_iterations=97), max_people=0)
+    other = szlib.MPCCBF(
+        ZONE, settings=replace(settings, max_iterations=97), max_people=0
+    )
     assert other._pool.get(0, 0)._hard is not one._pool.get(0, 0)._hard
 
 
@@ -222,7 +258,9 @@ def ticking(monkeypatch, seconds):
 
 @pytest.mark.parametrize("terminal", ["none", "rest"])
 @pytest.mark.parametrize("tick", [1e-4, 3e-3, 0.02, 1.0])
-def test_a_step_out_of_time_uses_the_next_fallback_and_reports_it(monkeypatch, tick, terminal):
+def test_a_step_out_of_time_uses_the_next_fallback_and_reports_it(
+    monkeypatch, tick, terminal
+):
     for question in islice(questions(seed=22), 15):
         s = szlib.MPCSettings(terminal=terminal)
         controller = szlib.MPCCBF(ZONE, walls=question.walls, settings=s, max_people=3)
@@ -239,7 +277,9 @@ def test_a_step_out_of_time_uses_the_next_fallback_and_reports_it(monkeypatch, t
             assert step.control == pytest.approx(unhurried.control, abs=1e-9)
 
 
-def test_an_unfinished_plan_is_used_only_if_it_violates_no_more_than_braking(monkeypatch):
+def test_an_unfinished_plan_is_used_only_if_it_violates_no_more_than_braking(
+    monkeypatch,
+):
     for question in islice(questions(seed=23), 20):
         controller = szlib.MPCCBF(ZONE, walls=question.walls, max_people=3)
         with monkeypatch.context() as clock:
@@ -248,17 +288,29 @@ def test_an_unfinished_plan_is_used_only_if_it_violates_no_more_than_braking(mon
         if step.timed_out:
             controller = szlib.MPCCBF(ZONE, walls=question.walls, max_people=3)
             for solver in controller._pool._solvers.values():
-                answer = lambda guess, numbers, of=solver: (of.evaluate(guess, numbers), False)  # noqa: E731
+
+                def answer(guess, numbers, of=solver):
+                    return of.evaluate(guess, numbers), False
+
                 for name in ("hard", "relaxed"):
                     monkeypatch.setattr(solver, name, answer)
-            assert step.slack <= controller.step(question.state, question.goal, question.people).slack + 1e-9
+            assert (
+                step.slack
+                <= controller.step(question.state, question.goal, question.people).slack
+                + 1e-9
+            )
 
 
 def test_ipopt_stops_when_the_time_is_up():
     steps = []
     for question in islice(questions(seed=24), 12):
         steps.append(question.ask(szlib.MPCSettings(solver="ipopt", time_limit=1e-7)))
-        assert np.isfinite(steps[-1].control).all() and np.abs(steps[-1].control).max() <= 1
+        assert (
+            np.isfinite(steps[-1].control).all()
+            and np.abs(steps[-1].control).max() <= 1
+        )
         assert steps[-1].feasible == (steps[-1].slack <= 1e-6)
-        assert not question.ask(szlib.MPCSettings(solver="ipopt", time_limit=np.inf)).timed_out
+        assert not question.ask(
+            szlib.MPCSettings(solver="ipopt", time_limit=np.inf)
+        ).timed_out
     assert any(step.timed_out and step.status != "optimal" for step in steps)

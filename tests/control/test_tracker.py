@@ -27,13 +27,19 @@ def test_the_circle_contains_the_zone_in_every_heading_and_touches_it():
     rng = np.random.default_rng(0)
     for _ in range(200):
         a = rng.uniform(0.1, 2)
-        zone = szlib.Ellipse(tuple(rng.uniform(-1, 1, 2)), (a, a * rng.uniform(0.05, 1)), rng.uniform(-3, 3))
+        zone = szlib.Ellipse(
+            tuple(rng.uniform(-1, 1, 2)),
+            (a, a * rng.uniform(0.05, 1)),
+            rng.uniform(-3, 3),
+        )
         circle = circle_around(zone)
         outline = zone.curve(5001)
         assert circle.center == (0, 0) and circle.semi_axes[0] == circle.semi_axes[1]
         assert circle.level(outline).max() == pytest.approx(1, abs=1e-6)
         for heading in rng.uniform(-4, 4, 3):
-            assert circle.level(zone.placed((0, 0), heading).curve(500)).max() <= 1 + 1e-9
+            assert (
+                circle.level(zone.placed((0, 0), heading).curve(500)).max() <= 1 + 1e-9
+            )
     assert circle_around(circle).semi_axes == pytest.approx(circle.semi_axes)
 
 
@@ -57,14 +63,18 @@ def test_a_person_with_unknown_heading_gets_the_circle():
 
 def test_noise_does_not_turn_the_zone_of_a_standing_person():
     rng, tracker = np.random.default_rng(1), szlib.Tracker()
-    walked = tracker.see([[-1.0, 0.0, 0.3, 0.4], [2.0, 2.0, 0.0, 0.0]], ids=["a", "b"], now=0.0)
+    walked = tracker.see(
+        [[-1.0, 0.0, 0.3, 0.4], [2.0, 2.0, 0.0, 0.0]], ids=["a", "b"], now=0.0
+    )
     assert headings(walked) == [pytest.approx(np.arctan2(0.4, 0.3)), None]
     for k in range(1, 1001):
         noisy = np.c_[[[0, 0], [2, 2]], np.zeros((2, 2))] + rng.normal(0, 0.02, (2, 4))
         seen = tracker.see(noisy, ids=["a", "b"], now=0.1 * k)
         assert headings(seen) == headings(walked)
         assert [p.velocity for p in seen.people] == [tuple(row[2:]) for row in noisy]
-        assert headings(tracker.see(noisy, now=0.1 * k))[:2] == [None, None], "nobody knows them without ids"
+        assert headings(tracker.see(noisy, now=0.1 * k))[:2] == [None, None], (
+            "nobody knows them without ids"
+        )
 
 
 def test_the_heading_is_the_direction_of_walking_unless_it_is_given():
@@ -73,13 +83,19 @@ def test_the_heading_is_the_direction_of_walking_unless_it_is_given():
         step = 0.2 * np.array([np.cos(angle), np.sin(angle)])
         (person,) = tracker.see([[0, 0, *(1.0001 * step)]], ids=[7], now=0.0).people
         assert person.heading == pytest.approx(angle)
-        assert headings(tracker.see([[0, 0, *(0.99 * step)]], ids=[7], now=0.0)) == [person.heading]
-        assert headings(tracker.see([szlib.Person((0, 0), id=7)], now=0.0)) == [person.heading]
+        assert headings(tracker.see([[0, 0, *(0.99 * step)]], ids=[7], now=0.0)) == [
+            person.heading
+        ]
+        assert headings(tracker.see([szlib.Person((0, 0), id=7)], now=0.0)) == [
+            person.heading
+        ]
         turned = szlib.Person((0, 0), (1.0, 0.0), heading=2.0, id=8)
         assert tracker.see([turned], now=0.0).people[0] == turned
         facing = szlib.Person((0, 0), heading=0.0, id=9)
         assert tracker.see([facing], now=0.0).people[0] == facing
-    assert headings(tracker.see([[0, 0, 0, 0]], ids=[7], now=9.0)) == [None], "forgotten meanwhile"
+    assert headings(tracker.see([[0, 0, 0, 0]], ids=[7], now=9.0)) == [None], (
+        "forgotten meanwhile"
+    )
 
 
 def test_persons_without_id_are_used_unchanged():
@@ -95,7 +111,8 @@ def test_people_are_moved_forward_to_now():
     rows, stamps = rng.uniform(-2, 2, (5, 4)), rng.uniform(1.7e9 - 0.5, 1.7e9, 5)
     seen = tracker.see(rows, ids=range(5), stamps=stamps, now=1.7e9)
     assert [p.position for p in seen.people] == [
-        pytest.approx(row[:2] + (1.7e9 - t) * row[2:], abs=1e-6) for row, t in zip(rows, stamps, strict=True)
+        pytest.approx(row[:2] + (1.7e9 - t) * row[2:], abs=1e-6)
+        for row, t in zip(rows, stamps, strict=True)
     ]
     alone = tracker.see([szlib.Person((0, 0), (1.0, 0.5))], stamps=9.0, now=10.0)
     assert alone.people[0].position == (1.0, 0.5)
@@ -109,7 +126,9 @@ def test_people_not_seen_any_more_are_remembered_at_constant_velocity():
         assert [p.id for p in seen.people] == ["b", "a"]
         assert seen.people[1].position == pytest.approx((0.1 * k, 0))
         assert seen.rejected == seen.unknown == 0
-    assert [p.id for p in tracker.see([[5, 5, 0, 0.5]], ids=["b"], now=0.6).people] == ["b"]
+    assert [p.id for p in tracker.see([[5, 5, 0, 0.5]], ids=["b"], now=0.6).people] == [
+        "b"
+    ]
     tracker.reset()
     assert tracker.see(now=0.6).people == ()
 
@@ -120,7 +139,9 @@ def test_without_a_time_each_step_is_dt_after_the_last():
     there = [controller.step((-3, 0, 0, 0), GOAL).scene.people for _ in range(3)]
     assert [len(people) for people in there] == [1, 1, 0]
     assert there[1][0].position == pytest.approx((0.1, 1.0))
-    stamped = controller.step((-3, 0, 0, 0), GOAL, [[0, 1, 0.5, 0]], ids=["a"], stamps=[49.8], now=50.0)
+    stamped = controller.step(
+        (-3, 0, 0, 0), GOAL, [[0, 1, 0.5, 0]], ids=["a"], stamps=[49.8], now=50.0
+    )
     assert stamped.scene.people[0].position == pytest.approx((0.1, 1.0))
 
 
@@ -142,7 +163,10 @@ def test_known_people_with_bad_numbers_are_moved_forward_and_counted(bad):
         assert seen.people[0].position == pytest.approx((0.2, 0))
     seen = tracker.see([[0.3, 0.1, bad, 0]], ids=["a"], now=0.3)
     assert (seen.rejected, seen.unknown) == (1, 0)
-    assert seen.people[0].position == (0.3, 0.1) and seen.people[0].velocity == (1.0, 0.0)
+    assert seen.people[0].position == (0.3, 0.1) and seen.people[0].velocity == (
+        1.0,
+        0.0,
+    )
     seen = tracker.see([[0.3, 0.1, 1, 0]], ids=["a"], stamps=bad, now=0.4)
     assert (seen.rejected, seen.unknown) == (1, 0)
     assert seen.people[0].position == pytest.approx((0.4, 0.1))
@@ -166,13 +190,19 @@ def test_the_robot_brakes_if_the_position_of_a_person_is_unknown(solver, bad):
 
 
 def test_a_person_without_usable_velocity_keeps_a_zone_and_counts_as_unknown():
-    step = controller_of().step((-3, 0, 0.5, 0), GOAL, [[0, 0, np.nan, np.nan]], ids=["new"])
+    step = controller_of().step(
+        (-3, 0, 0.5, 0), GOAL, [[0, 0, np.nan, np.nan]], ids=["new"]
+    )
     assert (step.rejected, step.unknown) == (1, 1) and not step.safe
-    assert step.h == pytest.approx(controller_of().barriers((-3, 0), [szlib.Person((0, 0))]))
+    assert step.h == pytest.approx(
+        controller_of().barriers((-3, 0), [szlib.Person((0, 0))])
+    )
 
 
 def test_with_unknown_people_the_target_is_where_full_braking_ends():
-    step = controller_of().step((-3, 1, 0.6, -0.2), GOAL, [[0, 0, np.nan, np.nan]], ids=["new"])
+    step = controller_of().step(
+        (-3, 1, 0.6, -0.2), GOAL, [[0, 0, np.nan, np.nan]], ids=["new"]
+    )
     time = 0.6 / step.scene.settings.a_max
     assert step.target == pytest.approx((-3 + 0.6 * time / 2, 1 - 0.2 * time / 2))
 
@@ -185,7 +215,11 @@ def test_with_unknown_people_the_target_is_where_full_braking_ends():
         ([["a", 0, 0, 0]], {}, "Persons, or numbers"),
         ([szlib.Person((0, 0)), (0, 0, 0, 0)], {}, "Persons, or numbers"),
         ([[0, 0, 0, 0]], {"ids": [1, 2]}, "one for each of 1 people; got 2"),
-        ([[0, 0, 0, 0]], {"stamps": [1, 2], "now": 3}, r"stamps must be one time, .* \(2,\)"),
+        (
+            [[0, 0, 0, 0]],
+            {"stamps": [1, 2], "now": 3},
+            r"stamps must be one time, .* \(2,\)",
+        ),
         ([[0, 0, 0, 0]], {"stamps": 1.0}, "stamps need `now`"),
         ([[0, 0, 0, 0]], {"now": np.nan}, "now must be a finite time"),
     ],
@@ -205,18 +239,29 @@ def test_tracker_parameters_must_be_finite_and_not_negative(name, value):
 # arrays
 
 
-@pytest.mark.parametrize(("solver", "side"), [("sqp", "right"), ("sqp", "left"), ("ipopt", "right")])
+@pytest.mark.parametrize(
+    ("solver", "side"), [("sqp", "right"), ("sqp", "left"), ("ipopt", "right")]
+)
 def test_head_on_rule_holds_for_people_given_as_arrays(solver, side):
-    controller = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver, pass_side=side))
-    by_persons = szlib.MPCCBF(ZONE, settings=szlib.MPCSettings(solver=solver, pass_side=side))
+    controller = szlib.MPCCBF(
+        ZONE, settings=szlib.MPCSettings(solver=solver, pass_side=side)
+    )
+    by_persons = szlib.MPCCBF(
+        ZONE, settings=szlib.MPCSettings(solver=solver, pass_side=side)
+    )
     state, person = np.array([-4.0, 0.0, 0.0, 0.0]), np.array([2.0, 0.0, -0.5, 0.0])
     passed = None
     for _ in range(250):
         step = controller.step(state, GOAL, person[None], ids=[3])
-        same = by_persons.step(state, GOAL, [szlib.Person(tuple(person[:2]), tuple(person[2:]))])
+        same = by_persons.step(
+            state, GOAL, [szlib.Person(tuple(person[:2]), tuple(person[2:]))]
+        )
         assert np.array_equal(step.control, same.control)
         assert step.safe
-        state, person = advance(state, step.control, 0.1), person + 0.1 * np.r_[person[2:], 0, 0]
+        state, person = (
+            advance(state, step.control, 0.1),
+            person + 0.1 * np.r_[person[2:], 0, 0],
+        )
         if passed is None and state[0] > person[0]:
             passed = state[1]
     assert (passed > 0) == (side == "left")
@@ -230,9 +275,14 @@ def test_a_person_met_head_on_is_passed_despite_noise(solver):
     for k in range(300):
         if k == 60:
             person[2:] = 0.0
-        step = controller.step(state, GOAL, [person + rng.normal(0, 0.02, 4)], ids=["a"])
+        step = controller.step(
+            state, GOAL, [person + rng.normal(0, 0.02, 4)], ids=["a"]
+        )
         assert np.abs(step.control).max() <= 1
-        state, person = advance(state, step.control, 0.1), person + 0.1 * np.r_[person[2:], 0, 0]
+        state, person = (
+            advance(state, step.control, 0.1),
+            person + 0.1 * np.r_[person[2:], 0, 0],
+        )
     assert state[:2] == pytest.approx(GOAL, abs=0.1)
 
 
@@ -260,7 +310,9 @@ def test_a_goal_at_a_wall_raises_at_the_first_step_and_sets_goal_blocked_later(s
 def test_a_person_standing_on_the_goal_blocks_it_despite_noise():
     rng, controller = np.random.default_rng(5), controller_of()
     assert all(
-        controller.step((-3, 0, 0, 0), GOAL, [np.r_[GOAL, rng.normal(0, 0.02, 2)]]).goal_blocked
+        controller.step(
+            (-3, 0, 0, 0), GOAL, [np.r_[GOAL, rng.normal(0, 0.02, 2)]]
+        ).goal_blocked
         for _ in range(200)
     )
     assert not controller.step((-3, 0, 0, 0), GOAL, [[*GOAL, 0.1, 0.0]]).goal_blocked
@@ -268,11 +320,15 @@ def test_a_person_standing_on_the_goal_blocks_it_despite_noise():
 
 @pytest.mark.parametrize("ids", [[[]], [{}], 5, [np.zeros(2)]])
 def test_ids_that_have_no_hash_are_refused(ids):
-    with pytest.raises(szlib.SolverError, match="ids must be a list of hashable values"):
+    with pytest.raises(
+        szlib.SolverError, match="ids must be a list of hashable values"
+    ):
         szlib.Tracker().see([[0.0, 0.0, 0.0, 0.0]], now=0.0, ids=ids)
 
 
-@pytest.mark.parametrize("now", [np.nan, np.inf, "x", None, [], [1.0], 10**400, np.zeros(2)])
+@pytest.mark.parametrize(
+    "now", [np.nan, np.inf, "x", None, [], [1.0], 10**400, np.zeros(2)]
+)
 def test_now_that_is_no_finite_number_is_refused(now):
     with pytest.raises(szlib.SolverError, match="now must be"):
         szlib.Tracker().see([[0.0, 0.0, 0.0, 0.0]], now=now)
@@ -284,7 +340,9 @@ def test_stamps_that_are_no_numbers_are_refused(stamps):
         szlib.Tracker().see([[0.0, 0.0, 0.0, 0.0]], now=0.0, stamps=stamps)
 
 
-@pytest.mark.parametrize("people", [None, 5, "abcd", [[10**400] * 4], [[1.0], [1.0, 2.0]]])
+@pytest.mark.parametrize(
+    "people", [None, 5, "abcd", [[10**400] * 4], [[1.0], [1.0, 2.0]]]
+)
 def test_people_that_are_no_rows_are_refused(people):
     with pytest.raises(szlib.SolverError, match="people"):
         szlib.Tracker().see(people, now=0.0)

@@ -28,7 +28,9 @@ from szlib.workbook.record import DataCache
 ATC_POLYGON = shapely.box(-18.5, -10, -7.5, 8)
 HALL = shapely.Polygon([(0, 0), (12, 0), (12, 8), (0, 8)])
 ELL = shapely.Polygon([(0, 0), (12, 0), (12, 5), (5, 5), (5, 12), (0, 12)])
-PILLAR = shapely.Polygon([(0, 0), (12, 0), (12, 8), (0, 8)], [[(5, 3), (6, 3), (6, 4), (5, 4)]])
+PILLAR = shapely.Polygon(
+    [(0, 0), (12, 0), (12, 8), (0, 8)], [[(5, 3), (6, 3), (6, 4), (5, 4)]]
+)
 SHAPES = {
     "hall": HALL,
     "ell": ELL,
@@ -37,13 +39,21 @@ SHAPES = {
 }
 
 
-def turned(shape: object, angle: float, by: tuple[float, float] = (3.0, -7.0)) -> object:
-    matrix = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+def turned(
+    shape: object, angle: float, by: tuple[float, float] = (3.0, -7.0)
+) -> object:
+    matrix = np.array(
+        [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    )
     return shapely.transform(shape, lambda points: points @ matrix.T + by)
 
 
-def turned_tracks(tracks: pd.DataFrame, angle: float, by: tuple[float, float] = (3.0, -7.0)) -> pd.DataFrame:
-    matrix = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+def turned_tracks(
+    tracks: pd.DataFrame, angle: float, by: tuple[float, float] = (3.0, -7.0)
+) -> pd.DataFrame:
+    matrix = np.array(
+        [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    )
     moved = tracks.copy()
     moved[["x", "y"]] = tracks[["x", "y"]].to_numpy() @ matrix.T + by
     moved[["vx", "vy"]] = tracks[["vx", "vy"]].to_numpy() @ matrix.T
@@ -57,11 +67,15 @@ def geojson(shape: object, kind: str) -> str:
     geometry = json.loads(shapely.to_geojson(shape))
     feature = {"type": "Feature", "properties": {"name": "hall"}, "geometry": geometry}
     whole = {"type": "FeatureCollection", "features": [feature]}
-    return json.dumps({"geometry": geometry, "feature": feature, "collection": whole}[kind])
+    return json.dumps(
+        {"geometry": geometry, "feature": feature, "collection": whole}[kind]
+    )
 
 
 @pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("form", ["shapely", "wkt", "geometry", "feature", "collection", "text", "with z"])
+@pytest.mark.parametrize(
+    "form", ["shapely", "wkt", "geometry", "feature", "collection", "text", "with z"]
+)
 def test_all_forms_give_the_same_area(tmp_path: Path, name: str, form: str) -> None:
     shape = SHAPES[name]
     given = {
@@ -81,7 +95,8 @@ def test_all_forms_give_the_same_area(tmp_path: Path, name: str, form: str) -> N
 
 
 @pytest.mark.parametrize(
-    "given", ["0 12 0 8", "0,12, 0,8", [0, 12, 0, 8], "POLYGON ((0 0, 0 8, 12 8, 12 0, 0 0))"]
+    "given",
+    ["0 12 0 8", "0,12, 0,8", [0, 12, 0, 8], "POLYGON ((0 0, 0 8, 12 8, 12 0, 0 0))"],
 )
 def test_four_numbers_are_a_square(given: object) -> None:
     assert szlib.as_area(given) == Square(x=(0, 12), y=(0, 8))
@@ -90,16 +105,22 @@ def test_four_numbers_are_a_square(given: object) -> None:
 def test_areas_of_pedpy_are_accepted() -> None:
     pedpy = pytest.importorskip("pedpy")
     assert szlib.as_area(pedpy.WalkableArea(HALL)) == Square(x=(0, 12), y=(0, 8))
-    with_pillar = pedpy.WalkableArea(HALL.exterior.coords[:-1], obstacles=[PILLAR.interiors[0].coords[:-1]])
+    with_pillar = pedpy.WalkableArea(
+        HALL.exterior.coords[:-1], obstacles=[PILLAR.interiors[0].coords[:-1]]
+    )
     assert szlib.as_area(with_pillar).area == 95
-    assert szlib.as_area(pedpy.MeasurementArea(turned(HALL, 1.0))) == szlib.as_area(turned(HALL, 1.0))
+    assert szlib.as_area(pedpy.MeasurementArea(turned(HALL, 1.0))) == szlib.as_area(
+        turned(HALL, 1.0)
+    )
 
 
 numbers = strategies.floats(-1e6, 1e6, allow_nan=False)
 
 
 @given(numbers, strategies.floats(1e-3, 1e6), numbers, strategies.floats(1e-3, 1e6))
-def test_text_of_a_square_round_trips(x: float, width: float, y: float, height: float) -> None:
+def test_text_of_a_square_round_trips(
+    x: float, width: float, y: float, height: float
+) -> None:
     square = Square(x=(x, x + width), y=(y, y + height))
     assert szlib.as_area(str(square)) == square
 
@@ -133,7 +154,8 @@ def test_invalid_text_raises(text: str, message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "given", [None, 3, [1, 2, 3], shapely.Point(1, 2), shapely.LineString([(0, 0), (1, 1)])]
+    "given",
+    [None, 3, [1, 2, 3], shapely.Point(1, 2), shapely.LineString([(0, 0), (1, 1)])],
 )
 def test_objects_that_are_no_area_raise(given: object) -> None:
     with pytest.raises(szlib.DataError, match="area"):
@@ -141,7 +163,12 @@ def test_objects_that_are_no_area_raise(given: object) -> None:
 
 
 def test_error_names_a_file_that_is_no_area(tmp_path: Path) -> None:
-    for content in (b"t,id,x,y\n1,2,3,4\n", b"", b"\xff\xfe\x00", b"POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))"):
+    for content in (
+        b"t,id,x,y\n1,2,3,4\n",
+        b"",
+        b"\xff\xfe\x00",
+        b"POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))",
+    ):
         (tmp_path / "hall.wkt").write_bytes(content)
         with pytest.raises(szlib.DataError, match=r"hall\.wkt"):
             szlib.as_area(tmp_path / "hall.wkt")
@@ -158,9 +185,12 @@ def test_contains_agrees_with_matplotlib(name: str, angle: float) -> None:
     shape = turned(SHAPES[name], angle)
     area = szlib.as_area(shape)
     x0, x1, y0, y1 = *area.box.x, *area.box.y
-    x, y = np.random.default_rng(0).uniform([[x0 - 1], [y0 - 1]], [[x1 + 1], [y1 + 1]], (2, 20_000))
+    x, y = np.random.default_rng(0).uniform(
+        [[x0 - 1], [y0 - 1]], [[x1 + 1], [y1 + 1]], (2, 20_000)
+    )
     crossings = sum(
-        Outline(ring).contains_points(np.column_stack([x, y])).astype(int) for ring in area.outlines
+        Outline(ring).contains_points(np.column_stack([x, y])).astype(int)
+        for ring in area.outlines
     )
     np.testing.assert_array_equal(area.contains(x, y), crossings % 2 == 1)
 
@@ -168,7 +198,13 @@ def test_contains_agrees_with_matplotlib(name: str, angle: float) -> None:
 def test_border_is_inside() -> None:
     square, polygon = szlib.ATC_SQUARE, Region(ATC_POLYGON.wkt)
     ticks = np.r_[
-        -18.5, -10, -7.5, 8, np.nextafter([-18.5, -7.5, 8, -10], 99), np.nextafter([-18.5, 8], -99), np.nan
+        -18.5,
+        -10,
+        -7.5,
+        8,
+        np.nextafter([-18.5, -7.5, 8, -10], 99),
+        np.nextafter([-18.5, 8], -99),
+        np.nan,
     ]
     x, y = np.meshgrid(ticks, ticks)
     np.testing.assert_array_equal(polygon.contains(x, y), square.contains(x, y))
@@ -185,12 +221,17 @@ def test_covers_requires_every_point_inside(name: str) -> None:
     y = rng.uniform(0, 8, n) + ahead * np.sin(heading) + side * np.cos(heading)
     u, v = (each.ravel()[:, None] for each in np.meshgrid(unit, unit))
     weights = [(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v]
-    points = [sum(w * corner for w, corner in zip(weights, each, strict=True)) for each in (x, y)]
+    points = [
+        sum(w * corner for w, corner in zip(weights, each, strict=True))
+        for each in (x, y)
+    ]
     dense = area.contains(*points).all(axis=0)
     covered = area.covers(x, y)
     assert 20 < covered.sum() < n - 20
     assert not (covered & ~dense).any()
-    assert (dense & ~covered).sum() <= 2, "a corner may reach in between two of the points"
+    assert (dense & ~covered).sum() <= 2, (
+        "a corner may reach in between two of the points"
+    )
 
 
 # --- encounters --------------------------------------------------------------------------------------
@@ -202,7 +243,12 @@ def test_square_given_as_polygon_gives_identical_encounters() -> None:
     for seed in range(6):
         tracks = make_crowd(seed)
         expected = find_encounters(tracks)
-        forms = [Region(ATC_POLYGON.wkt), ATC_POLYGON, pedpy.WalkableArea(ATC_POLYGON), "-18.5 -7.5 -10 8"]
+        forms = [
+            Region(ATC_POLYGON.wkt),
+            ATC_POLYGON,
+            pedpy.WalkableArea(ATC_POLYGON),
+            "-18.5 -7.5 -10 8",
+        ]
         for form in forms:
             samples = find_encounters(tracks, square=form)
             pd.testing.assert_frame_equal(samples, expected, check_exact=True)
@@ -215,29 +261,48 @@ def test_square_given_as_polygon_gives_identical_encounters() -> None:
 @pytest.mark.parametrize("angle", [0.3, -2.0])
 def test_encounters_do_not_depend_on_the_direction_of_the_axes(angle: float) -> None:
     crowd = make_crowd(77, people=160, seconds=200, square=ROOM)
-    for shape in (shapely.box(-20, -20, 20, 20), shapely.box(-20, -20, 20, 20) - shapely.box(-3, -3, 3, 3)):
+    for shape in (
+        shapely.box(-20, -20, 20, 20),
+        shapely.box(-20, -20, 20, 20) - shapely.box(-3, -3, 3, 3),
+    ):
         known = find_encounters(crowd, square=shape)
-        samples = find_encounters(turned_tracks(crowd, angle), square=turned(shape, angle))
+        samples = find_encounters(
+            turned_tracks(crowd, angle), square=turned(shape, angle)
+        )
         assert len(known) > 0
         assert_same_samples(samples, known)
         assert samples["kind"].tolist() == known["kind"].tolist()
 
 
 def test_no_encounter_where_the_space_holds_a_pillar() -> None:
-    walks = make_walk((1, 5), (1.0, 0), duration=6), make_walk((9, 5), (-1.0, 0), person=2, duration=6)
+    walks = (
+        make_walk((1, 5), (1.0, 0), duration=6),
+        make_walk((9, 5), (-1.0, 0), person=2, duration=6),
+    )
     room, pillar = shapely.box(-5, 0, 15, 10), shapely.box(5.2, 5.5, 5.4, 5.7)
     assert find_encounters(make_tracks(*walks), square=room)["encounter"].nunique() == 2
     assert len(find_encounters(make_tracks(*walks), square=room - pillar)) == 0
 
 
 @pytest.mark.parametrize(
-    "shape", [ATC_POLYGON, turned(ATC_POLYGON, 0.3, (-4, 3)), ATC_POLYGON - shapely.box(-13, -1, -12, 0)]
+    "shape",
+    [
+        ATC_POLYGON,
+        turned(ATC_POLYGON, 0.3, (-4, 3)),
+        ATC_POLYGON - shapely.box(-13, -1, -12, 0),
+    ],
 )
-def test_streaming_in_a_polygon_gives_the_encounters_of_the_whole_day(tmp_path: Path, shape: object) -> None:
+def test_streaming_in_a_polygon_gives_the_encounters_of_the_whole_day(
+    tmp_path: Path, shape: object
+) -> None:
     found = 0
     for seed in range(2):
-        path = write_raw_day(tmp_path / "day.csv", make_raw_day(seed, wild=seed % 2 == 0))
-        found += assert_streamed_as_whole(path, square=szlib.as_area(shape), duration=1.0)
+        path = write_raw_day(
+            tmp_path / "day.csv", make_raw_day(seed, wild=seed % 2 == 0)
+        )
+        found += assert_streamed_as_whole(
+            path, square=szlib.as_area(shape), duration=1.0
+        )
     assert found > 0
 
 
@@ -278,18 +343,28 @@ def test_largest_rectangle_is_the_best_of_all(side: int) -> None:
 
 def test_walked_area_reaches_the_walls_of_a_hall() -> None:
     found = szlib.walked_area(make_hall())
-    assert shapely.box(found.x[0], found.y[0], found.x[1], found.y[1]).symmetric_difference(HALL).area < 8
+    assert (
+        shapely.box(found.x[0], found.y[0], found.x[1], found.y[1])
+        .symmetric_difference(HALL)
+        .area
+        < 8
+    )
     assert found == area_for(make_hall(), "auto")
     samples = find_encounters(make_hall(), square="auto")
     assert samples.attrs["area"] == str(found)
 
 
 @pytest.mark.parametrize(("walkers", "end"), [(2, 12.0), (3, 16.0)])
-def test_walked_area_ends_where_fewer_than_three_people_walked(walkers: int, end: float) -> None:
+def test_walked_area_ends_where_fewer_than_three_people_walked(
+    walkers: int, end: float
+) -> None:
     lengths = [12.0] * 5 + [16.0] * walkers
     rows = np.arange(0.25, 8.0, 0.5)
     lanes = [(y, length) for y in rows for length in lengths]
-    walks = [make_walk((0.05, y), (1.0, 0.0), person=k, duration=x - 0.1) for k, (y, x) in enumerate(lanes)]
+    walks = [
+        make_walk((0.05, y), (1.0, 0.0), person=k, duration=x - 0.1)
+        for k, (y, x) in enumerate(lanes)
+    ]
     area = szlib.walked_area(make_tracks(*walks), cell=0.5)
     assert area.x == pytest.approx((0.0, end), abs=0.5)
 
@@ -305,12 +380,18 @@ def test_walked_area_excludes_a_pillar() -> None:
 def test_walked_area_ignores_queues_jumps_and_ids() -> None:
     tracks = make_hall()
     found = szlib.walked_area(tracks)
-    queue = [make_walk((-3 + 0.1 * k, 4), (0.05, 0), person=1000 + k) for k in range(20)]
+    queue = [
+        make_walk((-3 + 0.1 * k, 4), (0.05, 0), person=1000 + k) for k in range(20)
+    ]
     jump = [make_walk((4000, -3000), (1, 0), person=2000, duration=0.3)]
     assert szlib.walked_area(make_tracks(tracks, *queue, *jump)) == found
     assert szlib.walked_area(tracks.sample(frac=1, random_state=1)) == found
     assert (
-        szlib.walked_area(tracks.assign(id=tracks["id"] % 100 + 7, day=(tracks["id"] // 100).astype(str)))
+        szlib.walked_area(
+            tracks.assign(
+                id=tracks["id"] % 100 + 7, day=(tracks["id"] // 100).astype(str)
+            )
+        )
         == found
     )
 
@@ -318,8 +399,13 @@ def test_walked_area_ignores_queues_jumps_and_ids() -> None:
 def views() -> dict[str, tuple[pd.DataFrame, shapely.Polygon]]:
     """People in rooms and in the view of a camera, few and many, and where they can be seen."""
     oblique = shapely.Polygon([(0, 0), (16, 2), (20, 13), (-1, 11)])
-    wide, few = make_hall(2, people=500, size=(24, 18)), make_hall(people=60, size=(24, 18))
-    seen = [each[shapely.contains_xy(oblique, each["x"], each["y"])] for each in (wide, few)]
+    wide, few = (
+        make_hall(2, people=500, size=(24, 18)),
+        make_hall(people=60, size=(24, 18)),
+    )
+    seen = [
+        each[shapely.contains_xy(oblique, each["x"], each["y"])] for each in (wide, few)
+    ]
     return {
         "hall": (make_hall(), HALL),
         "few people": (make_hall(people=60, size=(15, 13)), shapely.box(0, 0, 15, 13)),
@@ -348,30 +434,57 @@ def test_walked_area_of_a_corridor_holds_its_encounters() -> None:
     """Narrower than the space can turn in: the people who walk along it still meet."""
     corridor = make_hall(people=300, size=(20, 5))
     by_hand = find_encounters(corridor, area="0 20 0 5")["encounter"].nunique()
-    assert 0.7 * by_hand < find_encounters(corridor, area="auto")["encounter"].nunique() <= by_hand
-    with pytest.raises(szlib.DataError, match="in no place as wide as the attentional space, 4 m x 5 m"):
+    assert (
+        0.7 * by_hand
+        < find_encounters(corridor, area="auto")["encounter"].nunique()
+        <= by_hand
+    )
+    with pytest.raises(
+        szlib.DataError, match="in no place as wide as the attentional space, 4 m x 5 m"
+    ):
         szlib.walked_area(make_hall(size=(30, 3)))
-    assert szlib.walked_area(make_hall(size=(30, 3)), space=szlib.AttentionalSpace(width=2.0)).area > 85
+    assert (
+        szlib.walked_area(
+            make_hall(size=(30, 3)), space=szlib.AttentionalSpace(width=2.0)
+        ).area
+        > 85
+    )
 
 
 def test_walked_area_ignores_one_who_walks_just_outside() -> None:
     tracks = make_hall()
     for start in ((-0.4, 3.0), (4.0, -0.4), (12.2, 3.0), (4.0, 8.2)):
-        outside = make_walk(start, (0.0, 1.0) if start[1] == 3.0 else (1.0, 0.0), person=3000, duration=0.3)
-        assert szlib.walked_area(make_tracks(tracks, outside)) == szlib.walked_area(tracks)
+        outside = make_walk(
+            start,
+            (0.0, 1.0) if start[1] == 3.0 else (1.0, 0.0),
+            person=3000,
+            duration=0.3,
+        )
+        assert szlib.walked_area(make_tracks(tracks, outside)) == szlib.walked_area(
+            tracks
+        )
 
 
 def test_walked_area_moves_and_turns_with_the_tracks() -> None:
     found = szlib.walked_area(make_hall())
-    moved = szlib.walked_area(make_hall().assign(x=lambda t: t["x"] + 37.5, y=lambda t: t["y"] - 12))
-    assert moved == Square(x=(found.x[0] + 37.5, found.x[1] + 37.5), y=(found.y[0] - 12, found.y[1] - 12))
-    turned_by_right_angle = szlib.walked_area(turned_tracks(make_hall(), np.pi / 2, (0.0, 0.0)))
+    moved = szlib.walked_area(
+        make_hall().assign(x=lambda t: t["x"] + 37.5, y=lambda t: t["y"] - 12)
+    )
+    assert moved == Square(
+        x=(found.x[0] + 37.5, found.x[1] + 37.5), y=(found.y[0] - 12, found.y[1] - 12)
+    )
+    turned_by_right_angle = szlib.walked_area(
+        turned_tracks(make_hall(), np.pi / 2, (0.0, 0.0))
+    )
     assert turned_by_right_angle.area == pytest.approx(found.area, abs=8)
 
 
 def test_walked_area_with_furniture_warns() -> None:
     tracks = make_hall(people=900, pillar=(5.2, 3.2, 6.8, 4.8))
-    with pytest.warns(szlib.DataWarning, match=r"of the area found \(.* m2\) fewer than 3 people walked"):
+    with pytest.warns(
+        szlib.DataWarning,
+        match=r"of the area found \(.* m2\) fewer than 3 people walked",
+    ):
         found = szlib.walked_area(tracks)
     assert found.area > 60
 
@@ -386,7 +499,8 @@ def test_tracks_without_an_area_raise() -> None:
 
 
 def test_walked_area_of_the_mall_is_its_open_square(real_tracks: pd.DataFrame) -> None:
-    by_eye = Square(x=(-18.5, -7.5), y=(-11.5, 8.5))  # the largest rectangle free of pillars and walls
+    # the largest rectangle free of pillars and walls
+    by_eye = Square(x=(-18.5, -7.5), y=(-11.5, 8.5))
     found = szlib.walked_area(real_tracks)
     for ours, theirs in zip((*found.x, *found.y), (*by_eye.x, *by_eye.y), strict=True):
         assert abs(ours - theirs) <= 0.5
@@ -406,24 +520,38 @@ def by_day(samples: pd.DataFrame) -> dict[str, int]:
     return samples.groupby(samples["day"].astype(str))["encounter"].nunique().to_dict()
 
 
-def test_recordings_without_a_calendar_have_each_their_own_area(rooms: dict[str, pd.DataFrame]) -> None:
-    alone = {name: by_day(find_encounters(room, area="auto"))[name] for name, room in rooms.items()}
+def test_recordings_without_a_calendar_have_each_their_own_area(
+    rooms: dict[str, pd.DataFrame],
+) -> None:
+    alone = {
+        name: by_day(find_encounters(room, area="auto"))[name]
+        for name, room in rooms.items()
+    }
     together = find_encounters(pd.concat(rooms.values()), area="auto")
     assert by_day(together) == alone
     assert together.attrs["area_reason"].count("the largest rectangle") == 3
-    null = null_encounters(pd.concat(rooms.values()), shifts=2, progress=False, area="auto")
+    null = null_encounters(
+        pd.concat(rooms.values()), shifts=2, progress=False, area="auto"
+    )
     assert len(null.encounters) > 0
-    assert szlib.as_area(null.parameters["area"]) == szlib.as_area(together.attrs["area"])
+    assert szlib.as_area(null.parameters["area"]) == szlib.as_area(
+        together.attrs["area"]
+    )
 
 
 def test_days_of_a_calendar_share_an_area(rooms: dict[str, pd.DataFrame]) -> None:
-    days = [room.assign(day=f"2024-05-0{k}") for k, room in enumerate(rooms.values(), start=1)]
+    days = [
+        room.assign(day=f"2024-05-0{k}")
+        for k, room in enumerate(rooms.values(), start=1)
+    ]
     assert find_encounters(pd.concat(days), area="auto").attrs["area"] == str(
         szlib.walked_area(pd.concat(days))
     )
 
 
-def test_recordings_are_placed_apart_once_and_one_place_stays(rooms: dict[str, pd.DataFrame]) -> None:
+def test_recordings_are_placed_apart_once_and_one_place_stays(
+    rooms: dict[str, pd.DataFrame],
+) -> None:
     apart = place_apart(pd.concat(rooms.values(), ignore_index=True))
     pd.testing.assert_frame_equal(place_apart(apart), apart)
     spans = apart.groupby("day")["x"].agg(["min", "max"]).to_numpy()
@@ -439,9 +567,16 @@ def test_extraction_and_notebooks_find_the_encounters_of_each_recording(
         room[["t", "id", "x", "y"]].to_csv(file, index=False)
     days = szlib.extract_days(files, out=tmp_path / "days", progress=False)
     alone = {
-        file.stem: by_day(find_encounters(szlib.read_tracks(file), area="auto"))[file.stem] for file in files
+        file.stem: by_day(find_encounters(szlib.read_tracks(file), area="auto"))[
+            file.stem
+        ]
+        for file in files
     }
-    assert days.table.set_index("day")["encounters"].to_dict() == alone == by_day(days.samples())
+    assert (
+        days.table.set_index("day")["encounters"].to_dict()
+        == alone
+        == by_day(days.samples())
+    )
     assert days.area is None
     cache = DataCache(tmp_path / "results", list(map(str, files)))
     assert by_day(cache.encounters()) == alone

@@ -59,25 +59,36 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def reference(days: list[Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+def reference(
+    days: list[Path], tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, bytes]:
     out = tmp_path_factory.mktemp("reference")
     assert set(extract(days, out).table["status"]) == {"done"}
     return contents(out)
 
 
-def test_samples_of_days_equal_those_of_one_table(days: list[Path], tmp_path: Path) -> None:
+def test_samples_of_days_equal_those_of_one_table(
+    days: list[Path], tmp_path: Path
+) -> None:
     ours = extract(days, tmp_path / "out").samples()
     whole = szlib.find_encounters(szlib.read_tracks(days))
-    pd.testing.assert_frame_equal(ours, whole, check_exact=True, check_categorical=False)
+    pd.testing.assert_frame_equal(
+        ours, whole, check_exact=True, check_categorical=False
+    )
     assert len(ours) > 0
     read = [stage for stage in funnels.get(ours) if stage["stage"].startswith("read ")]
     entered, kept = sum(s["entered"] for s in read), sum(s["kept"] for s in read)
     assert entered == sum(len(day.read_text().splitlines()) for day in days)
-    assert kept == next(s["entered"] for s in funnels.get(ours) if s["stage"] == "near the area")
+    assert kept == next(
+        s["entered"] for s in funnels.get(ours) if s["stage"] == "near the area"
+    )
 
 
 def test_result_does_not_depend_on_order_processes_or_blocks(
-    days: list[Path], reference: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    days: list[Path],
+    reference: dict[str, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     extract(days[::-1], tmp_path / "reversed")
     extract(str(days[0].parent / "*.csv"), tmp_path / "two", n_jobs=2)
@@ -87,7 +98,10 @@ def test_result_does_not_depend_on_order_processes_or_blocks(
         assert contents(tmp_path / name) == reference
     zones = [
         szlib.SocialZone.fit(
-            extract(paths, tmp_path / "two").samples(), method="hull", speeds=(0.9, 1.1), n_resamples=2
+            extract(paths, tmp_path / "two").samples(),
+            method="hull",
+            speeds=(0.9, 1.1),
+            n_resamples=2,
         )
         for paths in (days, days[::-1])
     ]
@@ -95,7 +109,9 @@ def test_result_does_not_depend_on_order_processes_or_blocks(
     assert zones[0].provenance == zones[1].provenance
 
 
-def test_finished_days_are_kept_and_changed_days_computed_again(days: list[Path], tmp_path: Path) -> None:
+def test_finished_days_are_kept_and_changed_days_computed_again(
+    days: list[Path], tmp_path: Path
+) -> None:
     out, copies = tmp_path / "out", [tmp_path / day.name for day in days]
     for copy, day in zip(copies, days, strict=True):
         copy.write_bytes(day.read_bytes())
@@ -105,16 +121,24 @@ def test_finished_days_are_kept_and_changed_days_computed_again(days: list[Path]
 
     assert statuses(paths=copies[:3]) == ["done"] * 3
     assert statuses() == ["kept"] * 3 + ["done"], "a further day"
-    assert statuses(exclude=[DATES[1]]) == ["kept", "excluded", "kept", "kept"], "excluded days stay"
+    assert statuses(exclude=[DATES[1]]) == ["kept", "excluded", "kept", "kept"], (
+        "excluded days stay"
+    )
     os.utime(copies[0])
-    assert statuses(n_jobs=2) == ["kept"] * 4, "content counts, not the time of the file"
+    assert statuses(n_jobs=2) == ["kept"] * 4, (
+        "content counts, not the time of the file"
+    )
     content = bytearray(copies[2].read_bytes())
     content[-2] ^= 1  # the last digit of the last row
     copies[2].write_bytes(content)
     assert statuses() == ["kept", "kept", "done", "kept"]
-    (out / f"{DATES[3]}.parquet").write_bytes((out / f"{DATES[3]}.parquet").read_bytes()[:-1])
+    (out / f"{DATES[3]}.parquet").write_bytes(
+        (out / f"{DATES[3]}.parquet").read_bytes()[:-1]
+    )
     (out / f"{DATES[0]}.parquet.json").write_text("{")
-    assert statuses() == ["done", "kept", "kept", "done"], "what is damaged is done again"
+    assert statuses() == ["done", "kept", "kept", "done"], (
+        "what is damaged is done again"
+    )
     assert statuses(min_speed=0.5) == ["done"] * 4
     assert statuses() == ["done"] * 4
     record = json.loads((out / f"{DATES[0]}.parquet.json").read_text())
@@ -182,7 +206,11 @@ def test_rows_are_of_the_bytes_of_their_checksum(
     monkeypatch.setattr(extraction, "describe_source", describe_first)
     monkeypatch.setattr(one_day, "read_near_area", read_the_other)
     done = extract(file, tmp_path / "out")
-    stored = {name: content for name, content in contents(tmp_path / "out").items() if "parquet" in name}
+    stored = {
+        name: content
+        for name, content in contents(tmp_path / "out").items()
+        if "parquet" in name
+    }
     if exchange is other_folder and Path("/proc/self/fd").exists():
         assert stored == {name: reference[name] for name in stored} and len(stored) == 2
     else:
@@ -199,19 +227,28 @@ def test_day_whose_file_changes_after_the_area_was_found_fails(
 
     def find_and_change(*given: Any) -> object:
         settings = find_area(*given)
-        copies[0].write_bytes(copies[0].read_bytes() + copies[0].read_bytes().splitlines(keepends=True)[-1])
+        copies[0].write_bytes(
+            copies[0].read_bytes()
+            + copies[0].read_bytes().splitlines(keepends=True)[-1]
+        )
         return settings
 
     find_area = extraction.find_area
     monkeypatch.setattr(extraction, "find_area", find_and_change)
-    monkeypatch.setattr("szlib.encounters.areas.walked_area", lambda _, **__: szlib.ATC_SQUARE)
+    monkeypatch.setattr(
+        "szlib.encounters.areas.walked_area", lambda _, **__: szlib.ATC_SQUARE
+    )
     done = extract(copies, tmp_path / "out", area="auto")
     assert list(done.table["status"]) == ["failed", "done"]
     assert "changed after its day or the area was found" in done.failed["why"].item()
 
 
-def test_days_that_fail_do_not_stop_the_others(days: list[Path], tmp_path: Path) -> None:
-    (tmp_path / "atc-20121107.csv").write_text("1352246400.0,1,2,3,4,5,6,7\n" + "rubbish\n" * 5)
+def test_days_that_fail_do_not_stop_the_others(
+    days: list[Path], tmp_path: Path
+) -> None:
+    (tmp_path / "atc-20121107.csv").write_text(
+        "1352246400.0,1,2,3,4,5,6,7\n" + "rubbish\n" * 5
+    )
     (tmp_path / "broken.csv.gz").write_bytes(b"\x1f\x8b rubbish")
     done = extract([*days[:2], tmp_path], tmp_path / "out")
     assert list(done.table["status"]) == ["done", "done", "failed", "failed"]
@@ -224,7 +261,9 @@ def test_days_that_fail_do_not_stop_the_others(days: list[Path], tmp_path: Path)
 
 def test_files_of_one_date_make_one_day(days: list[Path], tmp_path: Path) -> None:
     lines = days[0].read_text().splitlines(keepends=True)
-    for part in range(2):  # as in the public 1 Hz day: people of one hour in several files
+    for part in range(
+        2
+    ):  # as in the public 1 Hz day: people of one hour in several files
         (tmp_path / f"part{part}.csv").write_text("".join(lines[part::2]))
     pieces = extract(sorted(tmp_path.glob("part*.csv")), tmp_path / "pieces")
     assert list(pieces.table["files"]) == [2]
@@ -232,12 +271,18 @@ def test_files_of_one_date_make_one_day(days: list[Path], tmp_path: Path) -> Non
     pd.testing.assert_frame_equal(pieces.samples(), whole, check_exact=True)
 
 
-def test_day_without_encounters_gives_an_empty_table(days: list[Path], tmp_path: Path) -> None:
-    far = extract(days[:2], tmp_path / "far", square=szlib.Square(x=(500, 520), y=(500, 520)))
+def test_day_without_encounters_gives_an_empty_table(
+    days: list[Path], tmp_path: Path
+) -> None:
+    far = extract(
+        days[:2], tmp_path / "far", square=szlib.Square(x=(500, 520), y=(500, 520))
+    )
     assert list(far.table["encounters"]) == [0, 0]
     samples = far.samples()
     assert len(samples) == 0
-    assert list(samples.columns) == list(szlib.find_encounters(szlib.read_tracks(days[0])).columns)
+    assert list(samples.columns) == list(
+        szlib.find_encounters(szlib.read_tracks(days[0])).columns
+    )
 
 
 @pytest.mark.parametrize(
@@ -256,7 +301,9 @@ def test_invalid_parameters_raise(
         extract(days, tmp_path / "out", **given)
 
 
-def test_output_or_input_that_does_not_exist_raises(days: list[Path], tmp_path: Path) -> None:
+def test_output_or_input_that_does_not_exist_raises(
+    days: list[Path], tmp_path: Path
+) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(szlib.DataError, match="cannot be made"):
         extract(days, tmp_path / "file" / "out")
@@ -270,9 +317,8 @@ def test_full_disk_is_reported_and_earlier_days_stay_intact(
     extract(days[:2], tmp_path)
     before = contents(tmp_path)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(
-        resource.RLIMIT_FSIZE, (4096, hard)
-    )  # no file may grow beyond 4 KiB: as on a full disk
+    # no file may grow beyond 4 KiB: as on a full disk
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
     try:
         full = extract(days, tmp_path)
     finally:
@@ -294,14 +340,19 @@ def test_read_only_output_fails_each_day(days: list[Path], tmp_path: Path) -> No
         refused.samples()
 
 
-def kill_and_resume(days: list[Path], out: Path, reference: dict[str, bytes], kills: int, seed: int) -> int:
+def kill_and_resume(
+    days: list[Path], out: Path, reference: dict[str, bytes], kills: int, seed: int
+) -> int:
     """Kill runs at random moments, each with its processes; then let one finish. How often it struck."""
     rng, struck, longest = random.Random(seed), 0, 4.0
     for _ in range(kills):
         command = [sys.executable, "-c", ONE_RUN.format(2), str(out), *map(str, days)]
         begun = time.monotonic()
         run = subprocess.Popen(
-            command, start_new_session=True, stderr=subprocess.DEVNULL, env=os.environ | HERE
+            command,
+            start_new_session=True,
+            stderr=subprocess.DEVNULL,
+            env=os.environ | HERE,
         )
         try:
             run.wait(timeout=rng.uniform(0.3, longest))
@@ -310,13 +361,21 @@ def kill_and_resume(days: list[Path], out: Path, reference: dict[str, bytes], ki
             os.killpg(run.pid, signal.SIGKILL)
             run.wait()
             struck += 1
-        finished = {name for name in contents(out) if not name.startswith(".")} if out.exists() else set()
+        finished = (
+            {name for name in contents(out) if not name.startswith(".")}
+            if out.exists()
+            else set()
+        )
         for name in finished:
             if name.endswith(".json"):
-                assert contents(out)[name] == reference[name], "a record that is there is whole"
+                assert contents(out)[name] == reference[name], (
+                    "a record that is there is whole"
+                )
         if rng.random() < 0.3 and finished:
             (out / rng.choice(sorted(finished))).unlink()
-    assert contents_after_an_hour(days, out) == reference, "and nothing unfinished is left"
+    assert contents_after_an_hour(days, out) == reference, (
+        "and nothing unfinished is left"
+    )
     return struck
 
 
@@ -334,7 +393,9 @@ def test_killed_runs_resume_to_the_same_result(
     assert kill_and_resume(days, tmp_path / "out", reference, kills=2, seed=1) > 0
 
 
-def test_killed_worker_raises(days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_killed_worker_raises(
+    days: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(extraction, "extract_day", _die)
     with pytest.raises(szlib.SzlibError, match="a worker process was killed"):
         extract(days, tmp_path / "out", n_jobs=2)
@@ -398,16 +459,23 @@ def test_extraction_is_loaded_from_its_folder(days: list[Path], tmp_path: Path) 
     assert set(some.samples()["day"]) == {DATES[3]}
 
 
-def test_folder_without_extracted_days_is_refused(days: list[Path], tmp_path: Path) -> None:
+def test_folder_without_extracted_days_is_refused(
+    days: list[Path], tmp_path: Path
+) -> None:
     with pytest.raises(szlib.DataError, match="holds no extracted days"):
         szlib.Extraction.load(tmp_path)
     extract(days[:1], tmp_path / "out")
     (tmp_path / "out" / f"{DATES[0]}.parquet.json").write_text("{")
-    with pytest.raises(szlib.DataError, match=rf"{DATES[0]}.parquet.json: is damaged; extract the day again"):
+    with pytest.raises(
+        szlib.DataError,
+        match=rf"{DATES[0]}.parquet.json: is damaged; extract the day again",
+    ):
         szlib.Extraction.load(tmp_path / "out")
 
 
-def test_days_of_different_settings_are_not_mixed(days: list[Path], tmp_path: Path) -> None:
+def test_days_of_different_settings_are_not_mixed(
+    days: list[Path], tmp_path: Path
+) -> None:
     extract(days[:1], tmp_path / "out", min_speed=0.5)
     extract(days[1:2], tmp_path / "out", min_speed=0.6)
     message = f"{DATES[1]} was extracted with other settings than {DATES[0]}"

@@ -26,7 +26,11 @@ VARIANTS = {
     "centred, throughout": {"space": AROUND, "throughout": True},
     "1 s": {"duration": 1.0},
     "one sample": {"duration": 0.1, "min_distance": 0.0},
-    "5 s, narrow": {"duration": 5.0, "space": AttentionalSpace(3.0, 2.0), "min_speed": 0.2},
+    "5 s, narrow": {
+        "duration": 5.0,
+        "space": AttentionalSpace(3.0, 2.0),
+        "min_speed": 0.2,
+    },
     "far and fast": {"min_distance": 2.5, "min_speed": 0.9},
 }
 
@@ -65,14 +69,21 @@ def search(
     throughout: bool = False,
 ) -> pd.DataFrame:
     """Every sample of every encounter, straight from the four conditions."""
-    near, far = (-space.length / 2, space.length / 2) if space.centred else (0.0, space.length)
+    near, far = (
+        (-space.length / 2, space.length / 2) if space.centred else (0.0, space.length)
+    )
     side = space.width / 2
     people: dict[tuple, list[int]] = {}  # (day, id): ticks
     scene: dict[tuple, dict[int, tuple]] = {}  # (day, tick): who is where
     for row in tracks.itertuples():
         tick = round(row.t * 10)
         people.setdefault((str(row.day), row.id), []).append(tick)
-        scene.setdefault((str(row.day), tick), {})[row.id] = (row.x, row.y, row.vx, row.vy)
+        scene.setdefault((str(row.day), tick), {})[row.id] = (
+            row.x,
+            row.y,
+            row.vx,
+            row.vy,
+        )
 
     def walks_within(person: tuple) -> bool:
         if not math.hypot(person[2], person[3]) >= min_speed:
@@ -82,13 +93,19 @@ def search(
             for left in (-side, side):
                 x = person[0] + ahead * math.cos(heading) - left * math.sin(heading)
                 y = person[1] + ahead * math.sin(heading) + left * math.cos(heading)
-                if not (square.x[0] <= x <= square.x[1] and square.y[0] <= y <= square.y[1]):
+                if not (
+                    square.x[0] <= x <= square.x[1] and square.y[0] <= y <= square.y[1]
+                ):
                     return False
         return True
 
     def occupants(now: dict[int, tuple], ref: int) -> set[int]:
         seen = {other: in_frame(now[ref], now[other]) for other in now if other != ref}
-        return {o for o, (ahead, left) in seen.items() if near <= ahead <= far and abs(left) <= side}
+        return {
+            o
+            for o, (ahead, left) in seen.items()
+            if near <= ahead <= far and abs(left) <= side
+        }
 
     def met_from(day: str, ref: int, window: range) -> int | None:
         now = scene[day, window[0]]
@@ -117,13 +134,20 @@ def search(
             for tick in window:
                 person, met = scene[day, tick][ref], scene[day, tick][other]
                 ahead, left = in_frame(person, met)
-                distance, angle = math.dist(person[:2], met[:2]), math.atan2(left, ahead)
-                speed, other_speed = (math.hypot(each[2], each[3]) for each in (person, met))
+                distance, angle = (
+                    math.dist(person[:2], met[:2]),
+                    math.atan2(left, ahead),
+                )
+                speed, other_speed = (
+                    math.hypot(each[2], each[3]) for each in (person, met)
+                )
                 other_angle = math.atan2(*in_frame(met, person)[::-1])
                 sample = (tick / 10, angle, distance, speed, other_angle, other_speed)
                 found.append((number, day, ref, other, *sample))
             free, number = window[-1] + 1, number + 1
-    return pd.DataFrame(found, columns=SAMPLE_COLUMNS).astype(dict.fromkeys(SAMPLE_COLUMNS[4:], float))
+    return pd.DataFrame(found, columns=SAMPLE_COLUMNS).astype(
+        dict.fromkeys(SAMPLE_COLUMNS[4:], float)
+    )
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -138,7 +162,9 @@ def test_encounters_agree_with_plain_loops(variant: str) -> None:
     assert found >= 5  # or nothing was compared
 
 
-def test_encounters_agree_with_plain_loops_in_a_larger_room(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_encounters_agree_with_plain_loops_in_a_larger_room(
+    crowd: pd.DataFrame, known: pd.DataFrame
+) -> None:
     assert known["encounter"].nunique() >= 20
     assert_same_samples(known, search(crowd, square=ROOM))
 
@@ -154,30 +180,42 @@ def test_encounters_move_and_turn_with_the_world(
     moved = crowd.copy()
     moved[["x", "y"]] = crowd[["x", "y"]].to_numpy() @ turn.T + [3.0, -7.0]
     moved[["vx", "vy"]] = crowd[["vx", "vy"]].to_numpy() @ turn.T
-    assert_same_samples(find_encounters(moved, square=Square(x=(-17, 23), y=(-27, 13))), known)
+    assert_same_samples(
+        find_encounters(moved, square=Square(x=(-17, 23), y=(-27, 13))), known
+    )
 
 
-def test_mirror_reverses_the_sign_of_los_angle(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_mirror_reverses_the_sign_of_los_angle(
+    crowd: pd.DataFrame, known: pd.DataFrame
+) -> None:
     mirrored = crowd.assign(y=-crowd["y"], vy=-crowd["vy"])
     expected = known.assign(los_angle=-known["los_angle"])
     assert_same_samples(find_encounters(mirrored, square=ROOM), expected)
     assert (known["los_angle"] < 0).any()
 
 
-def test_row_order_does_not_matter_and_input_is_unchanged(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_row_order_does_not_matter_and_input_is_unchanged(
+    crowd: pd.DataFrame, known: pd.DataFrame
+) -> None:
     shuffled = crowd.sample(frac=1, random_state=5)
     before = shuffled.copy(deep=True)
     pd.testing.assert_frame_equal(find_encounters(shuffled, square=ROOM), known)
     pd.testing.assert_frame_equal(shuffled, before)
 
 
-def test_ids_and_day_names_do_not_matter(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_ids_and_day_names_do_not_matter(
+    crowd: pd.DataFrame, known: pd.DataFrame
+) -> None:
     names = {person: f"p{person:04d}" for person in crowd["id"].unique()}
     renamed = find_encounters(crowd.assign(id=crowd["id"].map(names)), square=ROOM)
-    expected = known.assign(ref_id=known["ref_id"].map(names), other_id=known["other_id"].map(names))
+    expected = known.assign(
+        ref_id=known["ref_id"].map(names), other_id=known["other_id"].map(names)
+    )
     assert_same_samples(renamed, expected)
     backwards = find_encounters(crowd.assign(id=-crowd["id"]), square=ROOM)
-    back = backwards.assign(ref_id=-backwards["ref_id"], other_id=-backwards["other_id"])
+    back = backwards.assign(
+        ref_id=-backwards["ref_id"], other_id=-backwards["other_id"]
+    )
     columns = [*SAMPLE_COLUMNS[1:], "kind"]
     pd.testing.assert_frame_equal(
         back.sort_values(["ref_id", "t"], ignore_index=True)[columns],
@@ -187,7 +225,9 @@ def test_ids_and_day_names_do_not_matter(crowd: pd.DataFrame, known: pd.DataFram
 
 def test_days_separately_and_together_give_the_same() -> None:
     days = {f"2012-10-2{k}": make_crowd(k, people=20) for k in range(1, 6)}
-    together = make_tracks(*(tracks.assign(day=day) for day, tracks in reversed(days.items())))
+    together = make_tracks(
+        *(tracks.assign(day=day) for day, tracks in reversed(days.items()))
+    )
     alone = [find_encounters(tracks.assign(day=day)) for day, tracks in days.items()]
     assert sum(len(samples) for samples in alone) > 0
     expected = pd.concat(alone)
@@ -203,7 +243,9 @@ def test_block_size_does_not_matter(
         pd.testing.assert_frame_equal(find_encounters(crowd, square=ROOM), known)
 
 
-def test_every_encounter_meets_the_four_conditions(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_every_encounter_meets_the_four_conditions(
+    crowd: pd.DataFrame, known: pd.DataFrame
+) -> None:
     assert (known.groupby("encounter").size() == 31).all()
     assert known["encounter"].is_monotonic_increasing
     assert known.equals(known.sort_values(["day", "ref_id", "t"], ignore_index=True))
@@ -234,7 +276,11 @@ def test_the_funnel_adds_up(crowd: pd.DataFrame, variant: str) -> None:
 
 
 def reasons(samples: pd.DataFrame) -> dict[str, int]:
-    return {reason: count for stage in funnels.get(samples) for reason, count in stage["rejected"].items()}
+    return {
+        reason: count
+        for stage in funnels.get(samples)
+        for reason, count in stage["rejected"].items()
+    }
 
 
 def test_two_people_who_meet_are_two_encounters() -> None:
@@ -242,7 +288,9 @@ def test_two_people_who_meet_are_two_encounters() -> None:
     east = make_walk((-2.0, -0.5), (1.2, 0.0), person=1, duration=3.0)
     west = make_walk((2.0, 0.5), (-1.2, 0.0), person=2, duration=3.0)
     samples = find_encounters(make_tracks(east, west), square=ROOM)
-    assert samples.groupby("encounter")[["ref_id", "other_id"]].first().to_numpy().tolist() == [
+    assert samples.groupby("encounter")[
+        ["ref_id", "other_id"]
+    ].first().to_numpy().tolist() == [
         [1, 2],
         [2, 1],
     ]
@@ -272,7 +320,9 @@ def test_only_the_follower_has_an_encounter() -> None:
     assert set(samples["ref_id"]) == {1}
     np.testing.assert_allclose(samples["los_angle"], math.atan2(0.2, 3.0))
     around = find_encounters(
-        make_tracks(FOLLOWER, FOLLOWED), square=ROOM, space=AttentionalSpace(7.0, 4.0, centred=True)
+        make_tracks(FOLLOWER, FOLLOWED),
+        square=ROOM,
+        space=AttentionalSpace(7.0, 4.0, centred=True),
     )
     assert around.groupby("encounter")["ref_id"].first().tolist() == [1, 2]
     behind = around.loc[around["ref_id"] == 2, "los_angle"]
@@ -282,25 +332,57 @@ def test_only_the_follower_has_an_encounter() -> None:
 def test_los_angle_straight_behind_is_plus_pi() -> None:
     behind = make_walk((-1.5, 0.0), (1.0, 0.0), person=2, duration=3.0)
     samples = find_encounters(make_tracks(FOLLOWER, behind), square=ROOM, space=AROUND)
-    np.testing.assert_array_equal(samples.loc[samples["ref_id"] == 1, "los_angle"], np.pi)
+    np.testing.assert_array_equal(
+        samples.loc[samples["ref_id"] == 1, "los_angle"], np.pi
+    )
 
 
 STRANGER = make_walk((4.0, 2.5), (0.0, -1.0), person=3, duration=3.0)
 ALMOST_SLOW = FOLLOWER.assign(vx=FOLLOWER["vx"].where(FOLLOWER["t"] != 1.7, 0.3))
 SPOILED = {
-    "a stranger crosses": ([FOLLOWER, FOLLOWED, STRANGER], "somebody else enters the space"),
-    "three people": ([FOLLOWER, FOLLOWED, FOLLOWED.assign(id=3, y=-0.3)], "several people in the space"),
-    "too near": ([FOLLOWER, FOLLOWED.assign(x=FOLLOWED["x"] - 2.1)], "other person nearer than 1.0 m"),
-    "slow": ([make_walk((0, 0), (0.39, 0), duration=3.0), FOLLOWED], "slower than 0.4 m/s"),
+    "a stranger crosses": (
+        [FOLLOWER, FOLLOWED, STRANGER],
+        "somebody else enters the space",
+    ),
+    "three people": (
+        [FOLLOWER, FOLLOWED, FOLLOWED.assign(id=3, y=-0.3)],
+        "several people in the space",
+    ),
+    "too near": (
+        [FOLLOWER, FOLLOWED.assign(x=FOLLOWED["x"] - 2.1)],
+        "other person nearer than 1.0 m",
+    ),
+    "slow": (
+        [make_walk((0, 0), (0.39, 0), duration=3.0), FOLLOWED],
+        "slower than 0.4 m/s",
+    ),
     "slow for a moment": ([ALMOST_SLOW, FOLLOWED], "too slow within the window"),
-    "standing": ([make_walk((0, 0), (0, 0), duration=3.0), FOLLOWED], "slower than 0.4 m/s"),
+    "standing": (
+        [make_walk((0, 0), (0, 0), duration=3.0), FOLLOWED],
+        "slower than 0.4 m/s",
+    ),
     "no velocity": ([FOLLOWER.assign(vx=np.nan), FOLLOWED], "velocity unknown"),
-    "the reference ends": ([FOLLOWER.query("t < 2.95"), FOLLOWED], "a track ends within the window"),
-    "the other ends": ([FOLLOWER, FOLLOWED.query("t < 2.95")], "a track ends within the window"),
-    "the reference blinks": ([FOLLOWER.drop(index=20), FOLLOWED], "a track ends within the window"),
-    "the other blinks": ([FOLLOWER, FOLLOWED.drop(index=20)], "a track ends within the window"),
+    "the reference ends": (
+        [FOLLOWER.query("t < 2.95"), FOLLOWED],
+        "a track ends within the window",
+    ),
+    "the other ends": (
+        [FOLLOWER, FOLLOWED.query("t < 2.95")],
+        "a track ends within the window",
+    ),
+    "the reference blinks": (
+        [FOLLOWER.drop(index=20), FOLLOWED],
+        "a track ends within the window",
+    ),
+    "the other blinks": (
+        [FOLLOWER, FOLLOWED.drop(index=20)],
+        "a track ends within the window",
+    ),
     "beside": ([FOLLOWER, FOLLOWED.assign(y=2.01)], "nobody in the space"),
-    "too far ahead": ([FOLLOWER, FOLLOWED.assign(x=FOLLOWED["x"] + 2.01)], "nobody in the space"),
+    "too far ahead": (
+        [FOLLOWER, FOLLOWED.assign(x=FOLLOWED["x"] + 2.01)],
+        "nobody in the space",
+    ),
 }
 
 
@@ -320,7 +402,9 @@ def test_funnel_names_the_failed_condition(scene: str) -> None:
         (3.05, 20.0, "not in the area"),
     ],
 )
-def test_funnel_names_a_space_that_leaves_the_area(low: float, high: float, reason: str) -> None:
+def test_funnel_names_a_space_that_leaves_the_area(
+    low: float, high: float, reason: str
+) -> None:
     """The far corners of the follower's space go from 5 to 8 m."""
     tracks = make_tracks(FOLLOWER, FOLLOWED)
     assert len(find_encounters(tracks, square=Square(x=(-1, 8.1), y=(-2.1, 2.1)))) == 31
@@ -375,7 +459,9 @@ def test_same_id_on_another_day_is_another_person() -> None:
 def test_a_person_whose_id_changes_is_two_people() -> None:
     """The tracker loses the follower and goes on with the next id, at the next tick."""
     relabelled = FOLLOWER.assign(id=FOLLOWER["id"].where(FOLLOWER["t"] < 1.55, 2))
-    samples = find_encounters(make_tracks(relabelled, FOLLOWED.assign(id=5)), square=ROOM)
+    samples = find_encounters(
+        make_tracks(relabelled, FOLLOWED.assign(id=5)), square=ROOM
+    )
     assert len(samples) == 0
     assert reasons(samples)["a track ends within the window"] > 0
 
@@ -434,7 +520,9 @@ def test_squares_without_an_inside_raise(x: tuple[float, float]) -> None:
 
 @pytest.mark.parametrize("sides", [(0, 4), (5, -1), (np.nan, 4), (5, np.inf)])
 def test_spaces_without_an_inside_raise(sides: tuple[float, float]) -> None:
-    with pytest.raises(szlib.DataError, match="of an attentional space must be positive"):
+    with pytest.raises(
+        szlib.DataError, match="of an attentional space must be positive"
+    ):
         AttentionalSpace(*sides)
 
 
@@ -446,7 +534,9 @@ def test_corners_lie_on_the_border_of_the_space() -> None:
         corners = space.corners
         assert np.ptp(corners, axis=0).tolist() == [space.length, space.width]
         assert space.contains(*corners.T).all()
-        assert not space.contains(*((corners - corners.mean(axis=0)) * 1.001 + corners.mean(axis=0)).T).any()
+        assert not space.contains(
+            *((corners - corners.mean(axis=0)) * 1.001 + corners.mean(axis=0)).T
+        ).any()
     assert AHEAD.corners[:, 0].min() == 0.0
     np.testing.assert_array_equal(AROUND.corners.mean(axis=0), 0)
 
@@ -484,15 +574,23 @@ def test_paths_need_the_people_and_times_of_the_samples(
         reference_frame(crowd, known.drop(columns=column))
 
 
-def test_paths_follow_the_order_of_the_samples(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
+def test_paths_follow_the_order_of_the_samples(
+    crowd: pd.DataFrame, known: pd.DataFrame
+) -> None:
     expected = reference_frame(crowd, known)
     shuffled = known.sample(frac=1, random_state=2)
     again = reference_frame(crowd, shuffled)
-    pd.testing.assert_frame_equal(again, expected.iloc[shuffled.index].reset_index(drop=True))
+    pd.testing.assert_frame_equal(
+        again, expected.iloc[shuffled.index].reset_index(drop=True)
+    )
 
 
-def test_samples_of_other_tracks_raise(crowd: pd.DataFrame, known: pd.DataFrame) -> None:
-    with pytest.raises(szlib.DataError, match=r"row .*got .*; this sample is not in these tracks"):
+def test_samples_of_other_tracks_raise(
+    crowd: pd.DataFrame, known: pd.DataFrame
+) -> None:
+    with pytest.raises(
+        szlib.DataError, match=r"row .*got .*; this sample is not in these tracks"
+    ):
         reference_frame(crowd[crowd["id"] != known["ref_id"].iloc[40]], known)
     with pytest.raises(szlib.DataError, match="the table is empty"):
         reference_frame(crowd, known.iloc[:0])
@@ -501,16 +599,24 @@ def test_samples_of_other_tracks_raise(crowd: pd.DataFrame, known: pd.DataFrame)
 # --- the real day ------------------------------------------------------------------------------------
 
 
-def test_the_real_day_has_about_as_many_encounters_as_the_paper(real_samples: pd.DataFrame) -> None:
+def test_the_real_day_has_about_as_many_encounters_as_the_paper(
+    real_samples: pd.DataFrame,
+) -> None:
     """The paper: 16,181 in 92 days, 176 a day."""
     assert 100 <= real_samples["encounter"].nunique() <= 400
     assert (real_samples["los_angle"].abs() > np.pi / 2).any()
     for earlier, later in pairwise(funnels.get(real_samples)[-3:]):
-        assert later["entered"] == earlier["kept"] or earlier["stage"] == "clock: samples"
+        assert (
+            later["entered"] == earlier["kept"] or earlier["stage"] == "clock: samples"
+        )
 
 
 def test_plain_loops_agree_on_the_real_day(real_tracks: pd.DataFrame) -> None:
-    here = real_tracks[szlib.ATC_SQUARE.contains(real_tracks["x"].to_numpy(), real_tracks["y"].to_numpy())]
+    here = real_tracks[
+        szlib.ATC_SQUARE.contains(
+            real_tracks["x"].to_numpy(), real_tracks["y"].to_numpy()
+        )
+    ]
     samples = find_encounters(here)
     assert samples["encounter"].nunique() >= 100
     assert_same_samples(samples, search(here, square=szlib.ATC_SQUARE))
@@ -518,4 +624,6 @@ def test_plain_loops_agree_on_the_real_day(real_tracks: pd.DataFrame) -> None:
 
 def test_the_papers_conditions_are_the_defaults() -> None:
     assert szlib.EncounterSettings.paper() == szlib.EncounterSettings()
-    assert szlib.EncounterSettings.paper("0 12 0 8").area == szlib.Square((0, 12), (0, 8))
+    assert szlib.EncounterSettings.paper("0 12 0 8").area == szlib.Square(
+        (0, 12), (0, 8)
+    )

@@ -46,7 +46,9 @@ def days(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def samples(days: Path, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """The encounters of these days, found without a cluster."""
-    return szlib.extract_days(days, out=tmp_path_factory.mktemp("alone"), progress=False).samples()
+    return szlib.extract_days(
+        days, out=tmp_path_factory.mktemp("alone"), progress=False
+    ).samples()
 
 
 def run(kind: str, size: str, days: Path, out: Path, **environment: str) -> str:
@@ -64,14 +66,19 @@ def check(printed: str, out: Path, samples: pd.DataFrame) -> None:
     assert "3 done" in printed and "undecided: " in printed.splitlines()[-1]
     found = szlib.Extraction.load(out / "days").samples()
     pd.testing.assert_frame_equal(found, samples, check_exact=True)
-    assert szlib.SocialZone.load(out / "zone.json").provenance["encounters"] == samples["encounter"].nunique()
+    assert (
+        szlib.SocialZone.load(out / "zone.json").provenance["encounters"]
+        == samples["encounter"].nunique()
+    )
 
 
 def test_on_this_machine(days: Path, samples: pd.DataFrame, tmp_path: Path) -> None:
     check(run("local", "2", days, tmp_path / "out"), tmp_path / "out", samples)
 
 
-@pytest.mark.skipif(shutil.which("setsid") is None, reason="the scripts in place of SLURM need setsid")
+@pytest.mark.skipif(
+    shutil.which("setsid") is None, reason="the scripts in place of SLURM need setsid"
+)
 def test_on_slurm_each_job_is_a_process_and_is_cancelled(
     days: Path, samples: pd.DataFrame, tmp_path: Path
 ) -> None:
@@ -81,21 +88,33 @@ def test_on_slurm_each_job_is_a_process_and_is_cancelled(
         (commands / name).write_text(text)
         (commands / name).chmod(0o755)
     path = f"{commands}{os.pathsep}{os.environ['PATH']}"
-    check(run("slurm", "2", days, tmp_path / "out", PATH=path, LOGS=str(tmp_path)), tmp_path / "out", samples)
+    check(
+        run("slurm", "2", days, tmp_path / "out", PATH=path, LOGS=str(tmp_path)),
+        tmp_path / "out",
+        samples,
+    )
     jobs = [line.split() for line in (tmp_path / "slurm.log").read_text().splitlines()]
     submitted, cancelled = (
-        {pid for verb, pid in jobs if verb == which} for which in ("submitted", "cancelled")
+        {pid for verb, pid in jobs if verb == which}
+        for which in ("submitted", "cancelled")
     )
     assert len(submitted) == 2 and cancelled == submitted
     for script in tmp_path.glob("job.*[0-9]"):
         assert "#SBATCH --cpus-per-task=1" in script.read_text()
-        assert "Starting established connection" in script.with_name(script.name + ".out").read_text()
+        assert (
+            "Starting established connection"
+            in script.with_name(script.name + ".out").read_text()
+        )
 
 
 @pytest.fixture
 def home(tmp_path: Path) -> Iterator[Path]:
     """A home whose SSH configuration leads to a server on this machine."""
-    server = [sys.executable, str(ROOT / "tests" / "helpers" / "ssh_server.py"), str(tmp_path)]
+    server = [
+        sys.executable,
+        str(ROOT / "tests" / "helpers" / "ssh_server.py"),
+        str(tmp_path),
+    ]
     with subprocess.Popen(server, stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout is not None and running.stdout.readline() == "ready\n"
         yield tmp_path
@@ -103,9 +122,16 @@ def home(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_on_machines_with_ssh(days: Path, samples: pd.DataFrame, home: Path) -> None:
-    check(run("ssh", "node1,node2", days, home / "out", HOME=str(home)), home / "out", samples)
+    check(
+        run("ssh", "node1,node2", days, home / "out", HOME=str(home)),
+        home / "out",
+        samples,
+    )
     commands = (home / "commands.log").read_text()
-    assert commands.count("distributed.Scheduler") == 1 and commands.count("distributed.Nanny") == 2
+    assert (
+        commands.count("distributed.Scheduler") == 1
+        and commands.count("distributed.Nanny") == 2
+    )
 
 
 def test_what_is_no_cluster_is_refused(days: Path, tmp_path: Path) -> None:
@@ -113,4 +139,7 @@ def test_what_is_no_cluster_is_refused(days: Path, tmp_path: Path) -> None:
         [sys.executable, str(EXAMPLE), "cloud", "2", str(days), str(tmp_path / "out")],
         capture_output=True, text=True, env=os.environ | HERE,
     )  # fmt: skip
-    assert done.returncode == 1 and "must be local, ssh or slurm; got 'cloud'" in done.stderr
+    assert (
+        done.returncode == 1
+        and "must be local, ssh or slurm; got 'cloud'" in done.stderr
+    )

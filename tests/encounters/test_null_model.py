@@ -36,13 +36,23 @@ def test_each_shift_equals_encounters_of_the_shifted_day(
         own = null.encounters[null.encounters["shift"] == shift]
         nearest = whole.groupby("encounter")["distance"].min()
         np.testing.assert_array_equal(own["nearest"], nearest)
-        np.testing.assert_array_equal(own["kind"], whole.groupby("encounter")["kind"].first())
-        expected = whole[whole["distance"] <= null.r_max].drop(columns="encounter").reset_index(drop=True)
-        found = null.one(shift).drop(columns=["encounter", "shift"]).reset_index(drop=True)
+        np.testing.assert_array_equal(
+            own["kind"], whole.groupby("encounter")["kind"].first()
+        )
+        expected = (
+            whole[whole["distance"] <= null.r_max]
+            .drop(columns="encounter")
+            .reset_index(drop=True)
+        )
+        found = (
+            null.one(shift).drop(columns=["encounter", "shift"]).reset_index(drop=True)
+        )
         pd.testing.assert_frame_equal(found, expected)
 
 
-def test_encounter_numbers_are_unique_and_the_funnel_adds_up(null: szlib.NullEncounters) -> None:
+def test_encounter_numbers_are_unique_and_the_funnel_adds_up(
+    null: szlib.NullEncounters,
+) -> None:
     assert null.encounters["encounter"].is_unique
     assert (null.samples.groupby("encounter")["shift"].nunique() == 1).all()
     assert set(null.samples["encounter"]) <= set(null.encounters["encounter"])
@@ -54,35 +64,54 @@ def test_encounter_numbers_are_unique_and_the_funnel_adds_up(null: szlib.NullEnc
     json.dumps(null.parameters)
 
 
-def test_result_does_not_depend_on_processes(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
-    other = szlib.null_encounters(tracks, shifts=7, seed=4, n_jobs=2, progress=False, **ASKED)
+def test_result_does_not_depend_on_processes(
+    tracks: pd.DataFrame, null: szlib.NullEncounters
+) -> None:
+    other = szlib.null_encounters(
+        tracks, shifts=7, seed=4, n_jobs=2, progress=False, **ASKED
+    )
     pd.testing.assert_frame_equal(other.samples, null.samples)
     pd.testing.assert_frame_equal(other.encounters, null.encounters)
 
 
-def test_first_shifts_do_not_depend_on_their_number(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
+def test_first_shifts_do_not_depend_on_their_number(
+    tracks: pd.DataFrame, null: szlib.NullEncounters
+) -> None:
     fewer = szlib.null_encounters(tracks, shifts=2, seed=4, progress=False, **ASKED)
-    pd.testing.assert_frame_equal(fewer.encounters, null.encounters[null.encounters["shift"] < 2])
+    pd.testing.assert_frame_equal(
+        fewer.encounters, null.encounters[null.encounters["shift"] < 2]
+    )
 
 
 def test_kinds_are_selected_as_in_the_data(null: szlib.NullEncounters) -> None:
     some = null.of_kind(["opposite", "crossing"])
-    assert set(some.encounters["kind"]) == set(some.samples["kind"]) == {"opposite", "crossing"}
-    assert len(some.encounters) == null.encounters["kind"].isin(["opposite", "crossing"]).sum()
+    assert (
+        set(some.encounters["kind"])
+        == set(some.samples["kind"])
+        == {"opposite", "crossing"}
+    )
+    assert (
+        len(some.encounters)
+        == null.encounters["kind"].isin(["opposite", "crossing"]).sum()
+    )
     assert null.of_kind(None).encounters is null.encounters
     with pytest.raises(DataError, match="unknown kinds"):
         null.of_kind("friends")
 
 
 def test_null_model_without_encounters_is_empty() -> None:
-    tracks = make_tracks(make_walk((-12, 0), (1, 0)), make_walk((-12, 0), (1, 0), person=2, begin=1800))
+    tracks = make_tracks(
+        make_walk((-12, 0), (1, 0)), make_walk((-12, 0), (1, 0), person=2, begin=1800)
+    )
     null = szlib.null_encounters(tracks, shifts=3, progress=False)
     assert len(null.samples) == len(null.encounters) == 0
     assert null.shifts == 3
     assert len(null.one(2)) == 0
 
 
-def test_invalid_arguments_raise(tracks: pd.DataFrame, null: szlib.NullEncounters) -> None:
+def test_invalid_arguments_raise(
+    tracks: pd.DataFrame, null: szlib.NullEncounters
+) -> None:
     with pytest.raises(DataError, match="shifts must be at least 1"):
         szlib.null_encounters(tracks, shifts=0)
     with pytest.raises(DataError, match="too short"):
@@ -96,5 +125,9 @@ def test_invalid_arguments_raise(tracks: pd.DataFrame, null: szlib.NullEncounter
 def test_the_real_day(real_tracks: pd.DataFrame) -> None:
     null = szlib.null_encounters(real_tracks, shifts=1, seed=2, progress=False)
     whole = szlib.find_encounters(szlib.time_shifted(real_tracks, seed=(2, 0)))
-    np.testing.assert_array_equal(null.encounters["nearest"], whole.groupby("encounter")["distance"].min())
-    np.testing.assert_array_equal(null.encounters["kind"], whole.groupby("encounter")["kind"].first())
+    np.testing.assert_array_equal(
+        null.encounters["nearest"], whole.groupby("encounter")["distance"].min()
+    )
+    np.testing.assert_array_equal(
+        null.encounters["kind"], whole.groupby("encounter")["kind"].first()
+    )

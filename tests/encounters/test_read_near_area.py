@@ -10,7 +10,13 @@ import numpy as np
 import pandas as pd
 import polars as pl
 import pytest
-from helpers.raw_days import SPACE, assert_streamed_as_whole, encounters, make_raw_day, write_raw_day
+from helpers.raw_days import (
+    SPACE,
+    assert_streamed_as_whole,
+    encounters,
+    make_raw_day,
+    write_raw_day,
+)
 
 import szlib
 from szlib.encounters import blocks, cells
@@ -33,10 +39,14 @@ SETTINGS = [
 def raw_days(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("raw")
     days = (make_raw_day(seed, wild=seed % 2 == 0) for seed in range(4))
-    return [write_raw_day(folder / f"day{seed}.csv", day) for seed, day in enumerate(days)]
+    return [
+        write_raw_day(folder / f"day{seed}.csv", day) for seed, day in enumerate(days)
+    ]
 
 
-@pytest.mark.parametrize(("rows_at_once", "seeds"), [(97, (0, 1)), (1000, (2, 3)), (1 << 17, (0, 3))])
+@pytest.mark.parametrize(
+    ("rows_at_once", "seeds"), [(97, (0, 1)), (1000, (2, 3)), (1 << 17, (0, 3))]
+)
 @pytest.mark.parametrize(("square", "duration", "max_gap"), SETTINGS)
 def test_streamed_encounters_equal_those_of_the_whole_day(
     raw_days: list[Path],
@@ -50,15 +60,23 @@ def test_streamed_encounters_equal_those_of_the_whole_day(
     monkeypatch.setattr(blocks, "_BLOCK_ROWS", rows_at_once)
     found = 0
     for seed in seeds:
-        found += assert_streamed_as_whole(raw_days[seed], square=square, duration=duration, max_gap=max_gap)
+        found += assert_streamed_as_whole(
+            raw_days[seed], square=square, duration=duration, max_gap=max_gap
+        )
     assert found > 0
 
 
-def test_order_of_rows_does_not_matter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_order_of_rows_does_not_matter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(blocks, "_BLOCK_ROWS", 1000)
     rows = make_raw_day(1, wild=False)
-    shuffled = write_raw_day(tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0))
-    in_order = read_near_area(write_raw_day(tmp_path / "a.csv", rows), area=szlib.ATC_SQUARE, duration=1.0)
+    shuffled = write_raw_day(
+        tmp_path / "shuffled.csv", rows.sample(frac=1, random_state=0)
+    )
+    in_order = read_near_area(
+        write_raw_day(tmp_path / "a.csv", rows), area=szlib.ATC_SQUARE, duration=1.0
+    )
     given = {"duration": 1.0, "space": SPACE}
     any_order = read_near_area(shuffled, area=szlib.ATC_SQUARE, duration=1.0)
     found = encounters(any_order, **given)
@@ -66,7 +84,9 @@ def test_order_of_rows_does_not_matter(tmp_path: Path, monkeypatch: pytest.Monke
     pd.testing.assert_frame_equal(encounters(in_order, **given), found)
 
 
-def test_shared_slots_select_more_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shared_slots_select_more_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = write_raw_day(tmp_path / "day.csv", make_raw_day(3))
     apart = len(read_near_area(path, area=szlib.ATC_SQUARE, duration=1.0))
     monkeypatch.setattr(cells, "_SLOTS", 64)
@@ -75,8 +95,15 @@ def test_shared_slots_select_more_rows(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_gzip_files_and_bad_rows_are_reported_as_by_read_tracks(tmp_path: Path) -> None:
-    lines = write_raw_day(tmp_path / "day.csv", make_raw_day(2)).read_text().splitlines()
-    for at, bad in ((5, "1,2"), (900, "no row at all"), (901, lines[900] + ",9"), (3000, lines[0])):
+    lines = (
+        write_raw_day(tmp_path / "day.csv", make_raw_day(2)).read_text().splitlines()
+    )
+    for at, bad in (
+        (5, "1,2"),
+        (900, "no row at all"),
+        (901, lines[900] + ",9"),
+        (3000, lines[0]),
+    ):
         lines.insert(at, bad)
     path = tmp_path / "day.csv.gz"
     path.write_bytes(gzip.compress("\n".join(lines).encode()))
@@ -87,7 +114,9 @@ def test_gzip_files_and_bad_rows_are_reported_as_by_read_tracks(tmp_path: Path) 
         warnings.simplefilter("always")
         whole = read_raw(path)
     assert "first at line 6: rejected rows" in str(caught[0].message)
-    assert [str(each.message) for each in caught] == [str(each.message) for each in expected]
+    assert [str(each.message) for each in caught] == [
+        str(each.message) for each in expected
+    ]
     assert funnels.get(raw)[0] == funnels.get(whole)[0]
     assert sum(funnels.get(raw)[0]["rejected"].values()) == 3
 
@@ -139,7 +168,9 @@ def test_damaged_rows_are_rejected_as_by_read_raw(
 def test_area_without_people_gives_an_empty_table(tmp_path: Path) -> None:
     path = make_plaza(tmp_path / "plaza.csv", settings=PlazaSettings(n_encounters=30))
     assert assert_streamed_as_whole(path, square=szlib.ATC_SQUARE, duration=3.0) > 0
-    elsewhere = read_near_area(path, area=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0)
+    elsewhere = read_near_area(
+        path, area=szlib.Square(x=(500, 520), y=(500, 520)), duration=3.0
+    )
     assert len(elsewhere) == 0
     assert list(elsewhere.columns) == ["day", "id", "t", "x", "y"]
     read, near = funnels.get(elsewhere)
@@ -150,9 +181,13 @@ def test_unreadable_files_raise_as_in_read_tracks(tmp_path: Path) -> None:
     rows = make_raw_day(0)
     mostly_bad = tmp_path / "bad.csv"
     mostly_bad.write_text(
-        write_raw_day(tmp_path / "a.csv", rows.head(3)).read_text() + "1,2,3,4,5,6,7\n" * 9, encoding="utf-8"
+        write_raw_day(tmp_path / "a.csv", rows.head(3)).read_text()
+        + "1,2,3,4,5,6,7\n" * 9,
+        encoding="utf-8",
     )
-    in_metres = write_raw_day(tmp_path / "metres.csv", rows.assign(x=rows["x"] / 1000, y=rows["y"] / 1000))
+    in_metres = write_raw_day(
+        tmp_path / "metres.csv", rows.assign(x=rows["x"] / 1000, y=rows["y"] / 1000)
+    )
     for path in (mostly_bad, in_metres, tmp_path / "missing.csv", tmp_path):
         with pytest.raises(szlib.DataError) as ours:
             read_near_area(path, area=szlib.ATC_SQUARE, duration=3.0)
@@ -163,7 +198,9 @@ def test_unreadable_files_raise_as_in_read_tracks(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("duration", [0.2, 1.0, 3.0, 10.0])
 @pytest.mark.parametrize("max_gap", [0.2, 0.5, 3.0])
-def test_cells_reach_half_a_second_back_and_a_window_ahead(duration: float, max_gap: float) -> None:
+def test_cells_reach_half_a_second_back_and_a_window_ahead(
+    duration: float, max_gap: float
+) -> None:
     """And one gap farther both ways, to interpolate."""
     of = cells.Cells(szlib.ATC_SQUARE, duration, max_gap, 1e-3)
     assert of.width > max_gap

@@ -2,8 +2,8 @@
 
 import numpy as np
 from helpers.speed_model import SpeedModel
+from szlib.control.people import Person
 
-from szlib.control.person import Person
 from szlib.simulation.crowds.reacting import MODELS
 from szlib.simulation.crowds.walking_model import ModelFactory
 from szlib.simulation.scenario import Scenario
@@ -16,5 +16,10 @@ FACTORIES: dict[str, ModelFactory] = {**MODELS, "speed model": SpeedModel}
 
 def scene(*people: Person, walls: object = (), duration: float = 20.0) -> Scenario:
     return Scenario(
-        "scene", np.zeros(4), np.ones(2), people, np.reshape(walls, (-1, 2, 2)), duration=duration
+        "scene",
+        np.zeros(4),
+        np.ones(2),
+        people,
+        np.reshape(walls, (-1, 2, 2)),
+        duration=duration,
     )

@@ -15,8 +15,13 @@ def assert_same_samples(samples: pd.DataFrame, expected: pd.DataFrame) -> None:
     assert list(samples.columns) == [*SAMPLE_COLUMNS, "kind"]
     assert list(expected.columns[: len(SAMPLE_COLUMNS)]) == SAMPLE_COLUMNS
     labels = SAMPLE_COLUMNS[:4]
-    assert samples[labels].astype(str).to_numpy().tolist() == expected[labels].astype(str).to_numpy().tolist()
+    assert (
+        samples[labels].astype(str).to_numpy().tolist()
+        == expected[labels].astype(str).to_numpy().tolist()
+    )
     for name in ("t", "distance", "speed"):
         np.testing.assert_allclose(samples[name], expected[name], rtol=0, atol=1e-9)
-    turn = wrap_angle(samples["los_angle"].to_numpy() - expected["los_angle"].to_numpy())
+    turn = wrap_angle(
+        samples["los_angle"].to_numpy() - expected["los_angle"].to_numpy()
+    )
     np.testing.assert_allclose(turn, 0, atol=1e-9)

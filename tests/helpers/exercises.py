@@ -14,7 +14,9 @@ from szlib.workbook import folders
 
 EXERCISES, SOLUTIONS = folders.NOTEBOOKS / "exercises", folders.NOTEBOOKS / "solutions"
 TASKS: dict[str, tuple[str, int, Task]] = {
-    task.name: (sheet, number, task) for sheet, tasks in SHEETS.items() for number, task in enumerate(tasks)
+    task.name: (sheet, number, task)
+    for sheet, tasks in SHEETS.items()
+    for number, task in enumerate(tasks)
 }
 """Sheet, place in the sheet, and task, by name of the task."""
 
@@ -29,7 +31,9 @@ def defined(sheet: str, folder: Path) -> dict[str, Any]:
     """The names that the cells of a sheet define; only cells that import or define functions are run."""
     found: dict[str, Any] = {"__name__": "sheet"}
     for cell in cells(folder / f"{sheet}.py"):
-        if cell.cell_type == "code" and re.search(r"^(import|from|def) ", cell.source, re.MULTILINE):
+        if cell.cell_type == "code" and re.search(
+            r"^(import|from|def) ", cell.source, re.MULTILINE
+        ):
             exec(cell.source, found)
     return found
 

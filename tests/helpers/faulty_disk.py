@@ -13,7 +13,12 @@ class FaultyDisk:
     """In a `with` block, write number `failing` (from 0) writes half of its bytes and raises `error`."""
 
     def __init__(self, failing: int, error: int = errno.ENOSPC) -> None:
-        self.failing, self.error, self.n_writes, self.fill = failing, error, 0, files._fill
+        self.failing, self.error, self.n_writes, self.fill = (
+            failing,
+            error,
+            0,
+            files._fill,
+        )
 
     def __call__(self, unfinished: Path, content: bytes, durable: bool) -> None:
         self.n_writes += 1

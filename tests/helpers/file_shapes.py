@@ -26,19 +26,36 @@ def hall(people: int = 40, seed: int = 0) -> pd.DataFrame:
     rng, parts = np.random.default_rng(seed), []
     for person in range(people):
         frame = INTERVAL * (rng.integers(0, 100) + np.arange(26))
-        start, end = np.array([0.5, rng.uniform(1, 7)]), np.array([11.5, rng.uniform(1, 7)])
+        start, end = (
+            np.array([0.5, rng.uniform(1, 7)]),
+            np.array([11.5, rng.uniform(1, 7)]),
+        )
         if person % 2:
             start, end = end, start
         where = start + np.linspace(0, 1, 26)[:, None] * (end - start)
-        parts.append(pd.DataFrame({"frame": frame, "id": person + 1, "x": where[:, 0], "y": where[:, 1]}))
+        parts.append(
+            pd.DataFrame(
+                {"frame": frame, "id": person + 1, "x": where[:, 0], "y": where[:, 1]}
+            )
+        )
     rows = pd.concat(parts, ignore_index=True).round(3)
     return rows.assign(t=rows["frame"] / RATE)[["frame", "t", "id", "x", "y"]]
 
 
-def _table(*, names: str = "t,id,x,y", separator: str = ",", decimal: str = ".", **changes: Callable) -> str:
+def _table(
+    *,
+    names: str = "t,id,x,y",
+    separator: str = ",",
+    decimal: str = ".",
+    **changes: Callable,
+) -> str:
     """The rows as text: columns called `names`, after `changes`."""
     rows = hall().assign(**changes)
-    columns = ["t", "id", "x", "y"] if "frame" not in names.casefold() else ["frame", "id", "x", "y"]
+    columns = (
+        ["t", "id", "x", "y"]
+        if "frame" not in names.casefold()
+        else ["frame", "id", "x", "y"]
+    )
     rows = rows[columns].set_axis(names.split(","), axis=1)
     return rows.to_csv(index=False, sep=separator, decimal=decimal)
 
@@ -46,11 +63,16 @@ def _table(*, names: str = "t,id,x,y", separator: str = ",", decimal: str = ".",
 def _times(zone: str | None) -> list[str]:
     moments = [datetime.fromtimestamp(BEGIN + t, UTC) for t in hall()["t"]]
     local = [moment.astimezone(ZoneInfo(zone or "Europe/Berlin")) for moment in moments]
-    return [m.isoformat() if zone else m.replace(tzinfo=None).isoformat(sep=" ") for m in local]
+    return [
+        m.isoformat() if zone else m.replace(tzinfo=None).isoformat(sep=" ")
+        for m in local
+    ]
 
 
 def _scaled(factor: float) -> dict[str, Callable]:
-    return {name: (lambda rows, name=name: (rows[name] / factor).round(3)) for name in "xy"}
+    return {
+        name: (lambda rows, name=name: (rows[name] / factor).round(3)) for name in "xy"
+    }
 
 
 def _vsp() -> str:
@@ -60,15 +82,31 @@ def _vsp() -> str:
     for _, one in people:
         points = one.iloc[::4]
         lines.append(f"{len(points)} - Num of control points")
-        lines += [f"{r.x:.3f} {r.y:.3f} {r.frame} 90.0 - (2D point, m_id)" for r in points.itertuples()]
+        lines += [
+            f"{r.x:.3f} {r.y:.3f} {r.frame} 90.0 - (2D point, m_id)"
+            for r in points.itertuples()
+        ]
     return "\n".join([*lines, "0 - Extra data", ""])
 
 
 def _trajnet() -> str:
     rows = hall()
-    scene = {"id": 0, "p": 1, "s": 0, "e": int(rows["frame"].max()), "fps": 2.5, "tag": 2}
+    scene = {
+        "id": 0,
+        "p": 1,
+        "s": 0,
+        "e": int(rows["frame"].max()),
+        "fps": 2.5,
+        "tag": 2,
+    }
     tracks = [{"f": r.frame, "p": r.id, "x": r.x, "y": r.y} for r in rows.itertuples()]
-    return "\n".join(json.dumps(line) for line in [{"scene": scene}, *({"track": t} for t in tracks)]) + "\n"
+    return (
+        "\n".join(
+            json.dumps(line)
+            for line in [{"scene": scene}, *({"track": t} for t in tracks)]
+        )
+        + "\n"
+    )
 
 
 def _pathfinder_json() -> str:
@@ -80,21 +118,33 @@ def _pathfinder_json() -> str:
 
 
 def _pathfinder_csv() -> str:
-    rows = [f"{r.t:.2f},{r.id},Occ{r.id},1,{r.x},{r.y},0.0" for r in hall().itertuples()]
+    rows = [
+        f"{r.t:.2f},{r.id},Occ{r.id},1,{r.x},{r.y},0.0" for r in hall().itertuples()
+    ]
     return "\n".join(["t,id,name,active,x,y,z", "s,,,,m,m,m", *rows]) + "\n"
 
 
 def _magni() -> str:
     rows = hall().sort_values("t")
     names = rows["id"].map("Helmet_{}".format)
-    more = {"speed": 1.2, "x_speed": 1.2, "y_speed": 0.0, "theta_delta": 0.0, "data_label": "Visitors-Alone"}
-    table = pd.DataFrame({"Time": rows["t"], "ag_id": names, "x": rows["x"], "y": rows["y"]})
+    more = {
+        "speed": 1.2,
+        "x_speed": 1.2,
+        "y_speed": 0.0,
+        "theta_delta": 0.0,
+        "data_label": "Visitors-Alone",
+    }
+    table = pd.DataFrame(
+        {"Time": rows["t"], "ag_id": names, "x": rows["x"], "y": rows["y"]}
+    )
     return table.assign(**more).to_csv(index=False)
 
 
 def _sqlite(path: Path) -> None:
     with sqlite3.connect(path) as file:
-        rows = hall()[["t", "id", "x", "y"]].set_axis(["time", "person_id", "x", "y"], axis=1)
+        rows = hall()[["t", "id", "x", "y"]].set_axis(
+            ["time", "person_id", "x", "y"], axis=1
+        )
         rows.to_sql("tracks", file, index=False)
         file.execute("CREATE TABLE cameras(name TEXT, height REAL)")
     file.close()
@@ -113,14 +163,19 @@ TEXTS: dict[str, Callable[[], str]] = {
     "tabs.txt": lambda: _table(separator="\t"),
     "german.csv": lambda: _table(names="Zeit,Person,X,Y", separator=";", decimal=","),
     "japanese.csv": lambda: _table(names="時刻,人物ID,X座標,Y座標"),
-    "french.csv": lambda: _table(names="temps,personne,x,y", separator=";", decimal=","),
+    "french.csv": lambda: _table(
+        names="temps,personne,x,y", separator=";", decimal=","
+    ),
     "time.csv": lambda: _table(names="time,pedestrian_id,pos_x,pos_y"),
     "iso-zone.csv": lambda: _table(t=lambda r: _times("Asia/Tokyo")),
     "iso-local.csv": lambda: _table(names="timestamp,id,x,y", t=lambda r: _times(None)),
     "nanoseconds.csv": lambda: _table(
-        names="timestamp,id,x,y", t=lambda r: BEGIN * 10**9 + (r["t"] * 1000).astype(int) * 10**6
+        names="timestamp,id,x,y",
+        t=lambda r: BEGIN * 10**9 + (r["t"] * 1000).astype(int) * 10**6,
     ),
-    "milliseconds.csv": lambda: _table(names="time_ms,id,x,y", t=lambda r: (r["t"] * 1000).astype(int)),
+    "milliseconds.csv": lambda: _table(
+        names="time_ms,id,x,y", t=lambda r: (r["t"] * 1000).astype(int)
+    ),
     "text-ids.csv": lambda: _table(id=lambda r: r["id"].map("P{:03d}".format)),
     "quoted.csv": lambda: _table().replace("t,id,x,y", '"t","id","x","y"'),
     "frames.csv": lambda: _table(names="frame,id,x,y"),
@@ -128,7 +183,9 @@ TEXTS: dict[str, Callable[[], str]] = {
     "mm.csv": lambda: _table(**_scaled(1e-3)),
     "cm.csv": lambda: _table(**_scaled(1e-2)),
     "feet.csv": lambda: _table(**_scaled(0.3048)),
-    "headerless.txt": lambda: _table(names="frame,id,x,y", separator=" ").partition("\n")[2],
+    "headerless.txt": lambda: _table(names="frame,id,x,y", separator=" ").partition(
+        "\n"
+    )[2],
     "unknown-names.csv": lambda: _table(names="a,b,c,d"),
     "crowd.vsp": _vsp,
     "trajnet.ndjson": _trajnet,

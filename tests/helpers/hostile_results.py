@@ -41,30 +41,53 @@ def make_hostile_results(folder: Path) -> Path:
         "image/jpeg": BAD, "image/png": BAD, "application/javascript": "attack()",
         "text/vnd.mermaid": BAD, "application/vnd.jupyter.widget-view+json": {"model_id": BAD},
     }  # fmt: skip
-    spoiled = {"image/png": {"alt": BAD, "width": BAD}, "image/jpeg": {"width": "1 onerror=attack()"}}
-    outputs = [output("display_data", {kind: data[kind]}, metadata=spoiled) for kind in data]
-    outputs += [output("stream", **stream), output("error", ename=BAD, evalue=BAD, traceback=[BAD])]
+    spoiled = {
+        "image/png": {"alt": BAD, "width": BAD},
+        "image/jpeg": {"width": "1 onerror=attack()"},
+    }
+    outputs = [
+        output("display_data", {kind: data[kind]}, metadata=spoiled) for kind in data
+    ]
+    outputs += [
+        output("stream", **stream),
+        output("error", ename=BAD, evalue=BAD, traceback=[BAD]),
+    ]
     formula = r"$\text{<img/src=x/onerror=attack()>}$"
     cells = [
-        nbformat.v4.new_markdown_cell(f"# 8\n\n**Question.** {BAD}\n\n{formula}\n\n{MARKUP}\n\n![{BAD}](x)"),
+        nbformat.v4.new_markdown_cell(
+            f"# 8\n\n**Question.** {BAD}\n\n{formula}\n\n{MARKUP}\n\n![{BAD}](x)"
+        ),
         nbformat.v4.new_markdown_cell(
             "![p](/etc/passwd) ![q](../../../../../../etc/passwd) [x](javascript:attack())"
         ),
         nbformat.v4.new_raw_cell(MARKUP, metadata={"raw_mimetype": "text/html"}),
-        nbformat.v4.new_code_cell(BAD, outputs=outputs, metadata={"tags": [BAD.replace(",", "")]}),
+        nbformat.v4.new_code_cell(
+            BAD, outputs=outputs, metadata={"tags": [BAD.replace(",", "")]}
+        ),
     ]
-    page = nbformat.v4.new_notebook(cells=cells, metadata={"title": BAD, "widgets": {"x": BAD}})
+    page = nbformat.v4.new_notebook(
+        cells=cells, metadata={"title": BAD, "widgets": {"x": BAD}}
+    )
     nbformat.write(page, home / f"10_corridor{BAD.replace('/', '')}.ipynb")
     rows = f"<table><th>badge<tbody><tr><td>{escape(BAD)}</td><td>{BAD}</td></tr></tbody></table>".replace(
         "<th>badge<", "<th>badge</th><"
     )
-    cell = nbformat.v4.new_code_cell("", outputs=[output("display_data", {"text/html": rows})])
+    cell = nbformat.v4.new_code_cell(
+        "", outputs=[output("display_data", {"text/html": rows})]
+    )
     nbformat.write(nbformat.v4.new_notebook(cells=[cell]), home / "11_waiting.ipynb")
     kinds = ("check", "claim", "observation")
     checks = [
-        {"kind": kind, "name": BAD, "passed": False, "value": {BAD: BAD}, "result": BAD} for kind in kinds
+        {"kind": kind, "name": BAD, "passed": False, "value": {BAD: BAD}, "result": BAD}
+        for kind in kinds
     ]
-    outcome = {"status": BAD, "error": BAD, "seconds": 1.2, "checks": checks, "key_figures": {BAD: BAD}}
+    outcome = {
+        "status": BAD,
+        "error": BAD,
+        "seconds": 1.2,
+        "checks": checks,
+        "key_figures": {BAD: BAD},
+    }
     summary = {
         "data": BAD,
         "area": BAD,
@@ -72,9 +95,16 @@ def make_hostile_results(folder: Path) -> Path:
         "notebooks": {BAD: outcome, "11_waiting": {**outcome, "status": BAD}},
     }
     (home / "summary.json").write_text(json.dumps(summary))
-    parameters = {"szlib": BAD, "data": BAD, "files": [[BAD, 3, BAD]], "parameters": {BAD: BAD}}
+    parameters = {
+        "szlib": BAD,
+        "data": BAD,
+        "files": [[BAD, 3, BAD]],
+        "parameters": {BAD: BAD},
+    }
     (home / "parameters.json").write_text(json.dumps(parameters))
     samples = pd.DataFrame({"encounter": [0]})
-    samples.attrs["funnel"] = [{"stage": BAD, "entered": 1, "kept": 0, "rejected": {BAD: 1}}]
+    samples.attrs["funnel"] = [
+        {"stage": BAD, "entered": 1, "kept": 0, "rejected": {BAD: 1}}
+    ]
     samples.to_parquet(home / "encounters.parquet")
     return home

@@ -26,8 +26,14 @@ def violations(element: ET.Element) -> list[str]:
     known = {each.attrib["name"]: each for each in kind.findall(f"{XS}attribute")}
     children = {each.attrib["ref"] for each in kind.iter(f"{XS}element")}
     required = {name for name, each in known.items() if each.get("use") == "required"}
-    found = [f"<{element.tag}> lacks {name}" for name in sorted(required - set(element.attrib))]
-    found += [f"<{element.tag}> has {name}" for name in sorted(set(element.attrib) - set(known))]
+    found = [
+        f"<{element.tag}> lacks {name}"
+        for name in sorted(required - set(element.attrib))
+    ]
+    found += [
+        f"<{element.tag}> has {name}"
+        for name in sorted(set(element.attrib) - set(known))
+    ]
     for name, value in element.items():
         pattern = PATTERNS.get(known[name].attrib["type"]) if name in known else None
         if pattern and not re.fullmatch(pattern, value):
@@ -36,5 +42,9 @@ def violations(element: ET.Element) -> list[str]:
     if text.strip() and kind.get("mixed") != "true":
         found.append(f"<{element.tag}> has the text {text.strip()!r}")
     for child in element:
-        found += violations(child) if child.tag in children else [f"<{element.tag}> has <{child.tag}>"]
+        found += (
+            violations(child)
+            if child.tag in children
+            else [f"<{element.tag}> has <{child.tag}>"]
+        )
     return found

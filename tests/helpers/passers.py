@@ -8,7 +8,9 @@ import pandas as pd
 TRUTH = np.array([0.05, 0.0, 0.95, 0.75, 0.0])
 
 
-def passers(n: int, *, seed: int = 0, clearance: float = 0.1, noise: float = 0.0) -> pd.DataFrame:
+def passers(
+    n: int, *, seed: int = 0, clearance: float = 0.1, noise: float = 0.0
+) -> pd.DataFrame:
     """People who pass straight, at an exponential `clearance` [m] from the ellipse `TRUTH`."""
     rng = np.random.default_rng(seed)
     m, _, a, b, _ = TRUTH
@@ -29,7 +31,9 @@ def wanderers(n: int, *, seed: int = 0) -> pd.DataFrame:
     return _walked(rng.uniform(0, 2, n)[:, None] * normal, tangent, rng, 0.0)
 
 
-def _walked(nearest: np.ndarray, tangent: np.ndarray, rng: np.random.Generator, noise: float) -> pd.DataFrame:
+def _walked(
+    nearest: np.ndarray, tangent: np.ndarray, rng: np.random.Generator, noise: float
+) -> pd.DataFrame:
     n, t = len(nearest), np.arange(31) / 10 - 1.5
     pace = rng.uniform(0.5, 2.0, n) * rng.choice([-1, 1], n)
     path = nearest[:, None] + (pace[:, None] * t)[..., None] * tangent[:, None]

@@ -18,9 +18,12 @@ def passing_pairs(n: int, seed: int) -> pd.DataFrame:
     heading = rng.uniform(-np.pi, np.pi, n)
     kind = (np.abs(heading) < 3 * np.pi / 4).astype(int)
     speed, other_speed = rng.uniform(0.5, 1.7, (2, n))
-    velocity = other_speed * np.exp(1j * heading) - speed  # of the other person, in the person's frame
+    # of the other person, in the person's frame
+    velocity = other_speed * np.exp(1j * heading) - speed
     passing = rng.uniform(-R_MAX, R_MAX, n) * 1j * velocity / np.abs(velocity)
-    at = passing[:, None] + velocity[:, None] * (TIMES - rng.uniform(0.5, 2.5, n)[:, None])
+    at = passing[:, None] + velocity[:, None] * (
+        TIMES - rng.uniform(0.5, 2.5, n)[:, None]
+    )
     table = pd.DataFrame(
         {
             "encounter": np.repeat(np.arange(n), len(TIMES)),
@@ -40,8 +43,14 @@ def passing_pairs(n: int, seed: int) -> pd.DataFrame:
 
 def exchanged(samples: pd.DataFrame) -> pd.DataFrame:
     """The same encounters from the other person's point of view."""
-    names = {"ref_id": "other_id", "los_angle": "other_los_angle", "speed": "other_speed"}
-    return samples.rename(columns=names | {there: here for here, there in names.items()})
+    names = {
+        "ref_id": "other_id",
+        "los_angle": "other_los_angle",
+        "speed": "other_speed",
+    }
+    return samples.rename(
+        columns=names | {there: here for here, there in names.items()}
+    )
 
 
 def respecting(
@@ -54,12 +63,16 @@ def respecting(
         inside |= zone.level(samples["distance"].to_numpy()[:, None] * directions) < 1
     entered = samples["encounter"][inside].unique()
     kept = entered[np.random.default_rng(seed).random(len(entered)) < careless]
-    return samples[~samples["encounter"].isin(entered) | samples["encounter"].isin(kept)]
+    return samples[
+        ~samples["encounter"].isin(entered) | samples["encounter"].isin(kept)
+    ]
 
 
 def null_of(samples: pd.DataFrame, shifts: int = 20) -> szlib.NullEncounters:
     """A null model that holds `samples`."""
     samples = samples.assign(shift=samples["encounter"] % shifts)
     groups = samples.groupby("encounter")
-    encounters = groups.agg(shift=("shift", "first"), kind=("kind", "first"), nearest=("distance", "min"))
+    encounters = groups.agg(
+        shift=("shift", "first"), kind=("kind", "first"), nearest=("distance", "min")
+    )
     return szlib.NullEncounters(samples, encounters.reset_index(), shifts, R_MAX)

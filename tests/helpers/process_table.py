@@ -30,19 +30,25 @@ def descendants() -> dict[int, str]:
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             state, parent = (folder / "stat").read_text().rpartition(")")[2].split()[:2]
-            commands[int(folder.name)] = (folder / "cmdline").read_text().replace("\0", " ")[:200]
+            commands[int(folder.name)] = (
+                (folder / "cmdline").read_text().replace("\0", " ")[:200]
+            )
         except OSError:
             continue
         if state not in "ZX":
             parents[int(folder.name)] = int(parent)
     found: dict[int, str] = {}
-    while more := {n for n, parent in parents.items() if parent in {os.getpid(), *found}} - set(found):
+    while more := {
+        n for n, parent in parents.items() if parent in {os.getpid(), *found}
+    } - set(found):
         found |= {number: commands[number] for number in more}
     NOTED.update(found)
     return found
 
 
-def wait_and_note(process: subprocess.Popen[bytes], seconds: float = float("inf")) -> int | None:
+def wait_and_note(
+    process: subprocess.Popen[bytes], seconds: float = float("inf")
+) -> int | None:
     """Note the descendants until a process ends, and return its exit code; None after some time [s]."""
     end = time.monotonic() + seconds
     while (code := process.poll()) is None and (left := end - time.monotonic()) > 0:
@@ -58,7 +64,11 @@ def named_after_noted(folder: Path) -> set[str]:
     Files of other programs, which run on the same machine, have other numbers.
     """
     number = re.compile("(?<=[-_])[0-9]+(?=[-_])")
-    return {str(path) for path in folder.glob("*") if {*map(int, number.findall(path.name))} & NOTED}
+    return {
+        str(path)
+        for path in folder.glob("*")
+        if {*map(int, number.findall(path.name))} & NOTED
+    }
 
 
 def users_of(place: Path) -> list[str]:
@@ -68,7 +78,9 @@ def users_of(place: Path) -> list[str]:
         if int(folder.name) == os.getpid():
             continue
         try:
-            targets = [link.readlink() for link in (folder / "cwd", *(folder / "fd").iterdir())]
+            targets = [
+                link.readlink() for link in (folder / "cwd", *(folder / "fd").iterdir())
+            ]
             used = [target for target in targets if place in target.parents]
         except OSError:
             continue
@@ -81,7 +93,9 @@ def wait_for_end(place: Path, grace: float) -> list[str]:
     """Descendants, and users of `place`, who are still there after the time of grace [s]."""
     end = time.monotonic() + grace
     while True:
-        left = [f"{number}: {command}" for number, command in descendants().items()] + users_of(place)
+        left = [
+            f"{number}: {command}" for number, command in descendants().items()
+        ] + users_of(place)
         if not left or time.monotonic() > end:
             return left
         time.sleep(0.1)

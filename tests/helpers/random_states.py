@@ -22,7 +22,9 @@ class Question:
 
     def ask(self, settings: szlib.MPCSettings) -> szlib.Step:
         """The step of a new controller."""
-        controller = szlib.MPCCBF(ZONE, walls=self.walls, settings=settings, max_people=len(self.people))
+        controller = szlib.MPCCBF(
+            ZONE, walls=self.walls, settings=settings, max_people=len(self.people)
+        )
         return controller.step(self.state, self.goal, self.people)
 
 
@@ -35,7 +37,9 @@ def questions(seed: int) -> Iterator[Question]:
             for _ in range(rng.integers(0, 4))
         )
         starts = rng.uniform(-4, 4, (rng.integers(0, 3), 1, 2))
-        walls = np.concatenate([starts, starts + rng.uniform(-3, 3, starts.shape)], axis=1)
+        walls = np.concatenate(
+            [starts, starts + rng.uniform(-3, 3, starts.shape)], axis=1
+        )
         state = np.r_[rng.uniform(-3, 3, 2), rng.uniform(-0.6, 0.6, 2)]
         goal = rng.uniform(-6, 6, 2)
         controller = szlib.MPCCBF(ZONE, walls=walls, max_people=0)
@@ -62,6 +66,11 @@ def meetings(seed: int) -> Iterator[tuple[szlib.Scenario, str]]:
         place = ("open", "corridor", "wall")[rng.integers(3)]
         beside = {"open": [], "corridor": [1, -1], "wall": [-1]}[place]
         away = rng.uniform(2.2, 3.0) if place == "corridor" else rng.uniform(0.7, 1.2)
-        walls = [center + side * away * left + np.outer([-12, 12], ahead) for side in beside]
+        walls = [
+            center + side * away * left + np.outer([-12, 12], ahead) for side in beside
+        ]
         start = np.r_[center - before * ahead, 0, 0]
-        yield szlib.Scenario("meeting", start, center + behind * ahead, (person,), walls), place
+        yield (
+            szlib.Scenario("meeting", start, center + behind * ahead, (person,), walls),
+            place,
+        )

@@ -27,11 +27,16 @@ def make_raw_day(seed: int, *, people: int = 60, wild: bool = True) -> pd.DataFr
         step = 0.04 * pace * np.column_stack([np.cos(heading), np.sin(heading)])
         middle = [rng.uniform(-25, -1), rng.uniform(-16, 14)]
         where = middle + np.cumsum(step, axis=0) - step[: n // 2].sum(axis=0)
-        if wild and rng.random() < 0.5:  # the sensor takes somebody else for them, for a moment
+        if (
+            wild and rng.random() < 0.5
+        ):  # the sensor takes somebody else for them, for a moment
             at = int(rng.integers(n))
             where[at : at + int(rng.integers(1, 30))] += rng.uniform(-60, 60, 2)
         walk = pd.DataFrame(
-            {"t": 1351038629 + 0.04 * (rng.integers(1500) + np.arange(n)), "id": 100 * person}
+            {
+                "t": 1351038629 + 0.04 * (rng.integers(1500) + np.arange(n)),
+                "id": 100 * person,
+            }
         )
         walk[["x", "y"]] = where * 1000
         walks.append(walk[rng.random(n) > (0.15 if wild else 0)])
@@ -45,22 +50,26 @@ def write_raw_day(path: Path, rows: pd.DataFrame) -> Path:
 
 
 def encounters(raw: pd.DataFrame, **parameters: object) -> pd.DataFrame:
-    return szlib.find_encounters(to_clock(raw, max_gap=parameters.pop("max_gap", None)), **parameters)
+    return szlib.find_encounters(
+        to_clock(raw, max_gap=parameters.pop("max_gap", None)), **parameters
+    )
 
 
 def assert_streamed_as_whole(
     path: Path, *, square: szlib.Square, duration: float, max_gap: float | None = None
 ) -> int:
     """Check that both ways agree to the last bit, and return the number of samples."""
-    near = read_near_area(path, area=square, duration=duration, options=szlib.ReadOptions(max_gap=max_gap))
+    near = read_near_area(
+        path, area=square, duration=duration, options=szlib.ReadOptions(max_gap=max_gap)
+    )
     given = {"square": square, "duration": duration, "max_gap": max_gap, "space": SPACE}
     streamed, whole = encounters(near, **given), encounters(read_raw(path), **given)
     pd.testing.assert_frame_equal(streamed, whole, check_exact=True)
     of_near, of_whole = funnels.get(streamed), funnels.get(whole)
     assert of_near[-1] == of_whole[-1], "windows are rejected for the same reasons"
-    assert {k: v for k, v in of_near[-2]["rejected"].items() if k != "not in the area"} == {
-        k: v for k, v in of_whole[-2]["rejected"].items() if k != "not in the area"
-    }
+    assert {
+        k: v for k, v in of_near[-2]["rejected"].items() if k != "not in the area"
+    } == {k: v for k, v in of_whole[-2]["rejected"].items() if k != "not in the area"}
     assert of_near[0] == of_whole[0], "every row of the file is counted"
     for before, after in zip(of_near[:3], of_near[1:4], strict=True):
         assert before["kept"] == after["entered"]

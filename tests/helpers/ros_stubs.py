@@ -15,7 +15,11 @@ START = 1.75e9
 
 def message(**fields):
     """A class of messages whose fields begin with copies of these."""
-    return type("Message", (SimpleNamespace,), {"__init__": lambda self: vars(self).update(deepcopy(fields))})
+    return type(
+        "Message",
+        (SimpleNamespace,),
+        {"__init__": lambda self: vars(self).update(deepcopy(fields))},
+    )
 
 
 def xyz(**more):
@@ -30,12 +34,18 @@ Odometry = message(
     pose=SimpleNamespace(pose=POSE),
     twist=SimpleNamespace(twist=SimpleNamespace(linear=xyz(), angular=xyz())),
 )
-TwistStamped = message(header=HEADER, twist=SimpleNamespace(linear=xyz(), angular=xyz()))
+TwistStamped = message(
+    header=HEADER, twist=SimpleNamespace(linear=xyz(), angular=xyz())
+)
 PoseStamped = message(header=HEADER, pose=POSE)
-Walker = message(name="", position=xyz(), velocity=xyz(), reliability=0.0, tagnames=[], tags=[])
+Walker = message(
+    name="", position=xyz(), velocity=xyz(), reliability=0.0, tagnames=[], tags=[]
+)
 People = message(header=HEADER, people=[])
 OccupancyGrid = message(
-    header=HEADER, info=SimpleNamespace(resolution=0.0, width=0, height=0, origin=POSE), data=[]
+    header=HEADER,
+    info=SimpleNamespace(resolution=0.0, width=0, height=0, origin=POSE),
+    data=[],
 )
 
 
@@ -49,7 +59,9 @@ class Node:
 
     def declare_parameter(self, name, value):
         self.logged += (
-            [] if type(self.given.get(name, value)) is type(value) else [f"{name} has another type"]
+            []
+            if type(self.given.get(name, value)) is type(value)
+            else [f"{name} has another type"]
         )
         return SimpleNamespace(value=self.given.get(name, value))
 
@@ -67,7 +79,9 @@ class Node:
         self.every[timer_period_sec] = callback
 
     def get_clock(self):
-        now = SimpleNamespace(nanoseconds=round(Node.now * 1e9), to_msg=lambda: stamp_of(Node.now))
+        now = SimpleNamespace(
+            nanoseconds=round(Node.now * 1e9), to_msg=lambda: stamp_of(Node.now)
+        )
         return SimpleNamespace(now=lambda: now)
 
     def get_logger(self):
@@ -91,7 +105,9 @@ class Buffer:
             raise TransformError(f"{source_frame} does not exist")
         x, y, rotation = self.poses[source_frame]
         return SimpleNamespace(
-            transform=SimpleNamespace(translation=SimpleNamespace(x=x, y=y, z=0.0), rotation=rotation)
+            transform=SimpleNamespace(
+                translation=SimpleNamespace(x=x, y=y, z=0.0), rotation=rotation
+            )
         )
 
 
@@ -102,10 +118,17 @@ def node_module(node_name, tf=False):
         "rclpy": {"init": None, "spin": None, "try_shutdown": None},
         "rclpy.node": {"Node": Node},
         "rclpy.executors": {"ExternalShutdownException": RuntimeError},
-        "rclpy.qos": {"QoSProfile": SimpleNamespace, "DurabilityPolicy": SimpleNamespace(TRANSIENT_LOCAL=1)},
+        "rclpy.qos": {
+            "QoSProfile": SimpleNamespace,
+            "DurabilityPolicy": SimpleNamespace(TRANSIENT_LOCAL=1),
+        },
         "rclpy.time": {"Time": SimpleNamespace(from_msg=time_of)},
         "geometry_msgs": {},
-        "geometry_msgs.msg": {"Twist": Twist, "TwistStamped": TwistStamped, "PoseStamped": PoseStamped},
+        "geometry_msgs.msg": {
+            "Twist": Twist,
+            "TwistStamped": TwistStamped,
+            "PoseStamped": PoseStamped,
+        },
         "nav_msgs": {},
         "nav_msgs.msg": {"Odometry": Odometry, "OccupancyGrid": OccupancyGrid},
         "people_msgs": {},
@@ -144,7 +167,10 @@ def stamped(what, frame="odom", late=0.0):
 def odometry(own, **how):
     at, what = own.tolist(), Odometry()
     what.pose.pose.position.x, what.pose.pose.position.y = at[:2]
-    what.pose.pose.orientation.z, what.pose.pose.orientation.w = sin(at[2] / 2), cos(at[2] / 2)
+    what.pose.pose.orientation.z, what.pose.pose.orientation.w = (
+        sin(at[2] / 2),
+        cos(at[2] / 2),
+    )
     what.twist.twist.linear.x, what.twist.twist.angular.z = at[3:]
     return stamped(what, **how)
 
@@ -163,7 +189,10 @@ def grid(cells, side, origin, **how):
     what = OccupancyGrid()
     (what.info.height, what.info.width), what.info.resolution = cells.shape, side
     what.info.origin.position.x, what.info.origin.position.y, angle = origin
-    what.info.origin.orientation.z, what.info.origin.orientation.w = sin(angle / 2), cos(angle / 2)
+    what.info.origin.orientation.z, what.info.origin.orientation.w = (
+        sin(angle / 2),
+        cos(angle / 2),
+    )
     what.data = cells.ravel().tolist()
     return stamped(what, **how)
 
@@ -186,5 +215,6 @@ def tick(node):
     ((_, callback),) = node.every.items()
     callback()
     twist = node.published["cmd_vel"][-1]
-    assert vars(twist.linear) | {"x": 0.0} == vars(xyz())  # two wheels move ahead and turn, nothing else
+    # two wheels move ahead and turn, nothing else
+    assert vars(twist.linear) | {"x": 0.0} == vars(xyz())
     return twist.linear.x, twist.angular.z

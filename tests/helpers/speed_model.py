@@ -31,18 +31,29 @@ class SpeedModel:
     """`walkers` who walk as fast as the gap ahead allows: a `WalkingModel`."""
 
     def __init__(self, walkers: Walkers) -> None:
-        self._jps, self._r_robot = import_package("jupedsim", INSTALL_JUPEDSIM), walkers.r_robot
+        self._jps, self._r_robot = (
+            import_package("jupedsim", INSTALL_JUPEDSIM),
+            walkers.r_robot,
+        )
         self._floor = _make_floor(walkers)
         model = self._jps.CollisionFreeSpeedModel()
-        self._sim: Any = self._jps.Simulation(model=model, geometry=self._floor, dt=TICK)
-        numbers = (walkers.positions.tolist(), walkers.goals.tolist(), walkers.speeds.tolist())
+        self._sim: Any = self._jps.Simulation(
+            model=model, geometry=self._floor, dt=TICK
+        )
+        numbers = (
+            walkers.positions.tolist(),
+            walkers.goals.tolist(),
+            walkers.speeds.tolist(),
+        )
         try:
             self._ids = [
                 self._add_agent(
                     at,
                     RADIUS,
                     pace,
-                    *self._make_journey(self._sim.add_waypoint_stage(tuple(goal), _GOAL_DISTANCE)),
+                    *self._make_journey(
+                        self._sim.add_waypoint_stage(tuple(goal), _GOAL_DISTANCE)
+                    ),
                 )
                 for at, goal, pace in zip(*numbers, strict=True)
             ]
@@ -63,18 +74,26 @@ class SpeedModel:
         """
         before, ticks = self._positions(), round(dt / TICK)
         if ticks < 1 or abs(ticks * TICK - dt) > 1e-9:
-            raise SolverError(f"dt must be a multiple of JuPedSim's time step of {TICK} s; got {dt} s")
+            raise SolverError(
+                f"dt must be a multiple of JuPedSim's time step of {TICK} s; got {dt} s"
+            )
         if self._robot is not None:
             self._sim.mark_agent_for_removal(self._robot)
         self._sim.iterate(1)
-        self._robot = None if self._r_robot is None else self._add_robot(robot[:2].tolist(), self._r_robot)
+        self._robot = (
+            None
+            if self._r_robot is None
+            else self._add_robot(robot[:2].tolist(), self._r_robot)
+        )
         self._sim.iterate(ticks - 1)
         return (self._positions() - before) / dt
 
     def _add_robot(self, at: list[float], radius: float) -> int | None:
         """Add the robot as a point, then enlarge it: JuPedSim adds no agent that touches another."""
         gap = np.hypot(*(self._positions() - at).T).min(initial=np.inf) - RADIUS
-        if gap <= 2 * _POINT_RADIUS or not self._floor.buffer(-2 * _POINT_RADIUS).contains(shapely.Point(at)):
+        if gap <= 2 * _POINT_RADIUS or not self._floor.buffer(
+            -2 * _POINT_RADIUS
+        ).contains(shapely.Point(at)):
             return None
         robot = self._add_agent(at, _POINT_RADIUS, 0.0, *self._steered)
         agent = self._sim.agent(robot)
@@ -85,21 +104,39 @@ class SpeedModel:
         """A journey with this one stage, and the stage."""
         return int(self._sim.add_journey(self._jps.JourneyDescription([stage]))), stage
 
-    def _add_agent(self, at: list[float], radius: float, pace: float, journey: int, stage: int) -> int:
+    def _add_agent(
+        self, at: list[float], radius: float, pace: float, journey: int, stage: int
+    ) -> int:
         agent = self._jps.CollisionFreeSpeedModelAgentParameters(
-            position=tuple(at), radius=radius, desired_speed=pace, journey_id=journey, stage_id=stage
+            position=tuple(at),
+            radius=radius,
+            desired_speed=pace,
+            journey_id=journey,
+            stage_id=stage,
         )
         return int(self._sim.add_agent(agent))
 
     def _positions(self) -> Array:
-        return np.array([self._sim.agent(i).position for i in self._ids], float).reshape(-1, 2)
+        return np.array(
+            [self._sim.agent(i).position for i in self._ids], float
+        ).reshape(-1, 2)
 
 
 def _make_floor(walkers: Walkers) -> Any:
     """Everything but the walls, as a Shapely polygon; SolverError where walls separate people or goals."""
-    points = np.vstack([walkers.positions, walkers.goals, walkers.walls.reshape(-1, 2), np.zeros((1, 2))])
+    points = np.vstack(
+        [
+            walkers.positions,
+            walkers.goals,
+            walkers.walls.reshape(-1, 2),
+            np.zeros((1, 2)),
+        ]
+    )
     box = shapely.box(*(points.min(axis=0) - _MARGIN), *(points.max(axis=0) + _MARGIN))
-    walls = [shapely.LineString(wall).buffer(_HALF_THICKNESS, cap_style="flat") for wall in walkers.walls]
+    walls = [
+        shapely.LineString(wall).buffer(_HALF_THICKNESS, cap_style="flat")
+        for wall in walkers.walls
+    ]
     parts = shapely.get_parts(box.difference(shapely.union_all(walls)))
     floor = max(parts, key=lambda part: part.area)
     for at in np.vstack([walkers.positions, walkers.goals]).tolist():

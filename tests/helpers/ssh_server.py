@@ -16,13 +16,19 @@ async def run(process):
     """Run one command; a signal of the client ends it."""
     pipe = asyncio.subprocess.PIPE
     command = await asyncio.create_subprocess_shell(
-        process.command, stdin=asyncio.subprocess.DEVNULL, stdout=pipe, stderr=pipe, start_new_session=True
+        process.command,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=pipe,
+        stderr=pipe,
+        start_new_session=True,
     )
     with (folder / "commands.log").open("a") as log:
         log.write(f"{process.command}\n")
     running.add(command.pid)
     signals = asyncio.create_task(obey_signals(process, command))
-    await asyncio.gather(copy(command.stdout, process.stdout), copy(command.stderr, process.stderr))
+    await asyncio.gather(
+        copy(command.stdout, process.stdout), copy(command.stderr, process.stderr)
+    )
     process.exit(await command.wait())
     running.discard(command.pid)
     signals.cancel()
@@ -45,7 +51,10 @@ async def obey_signals(process, command):
 
 async def serve():
     """Write the keys and the configuration of the clients, and serve until the end."""
-    own, client = asyncssh.generate_private_key("ssh-ed25519"), asyncssh.generate_private_key("ssh-ed25519")
+    own, client = (
+        asyncssh.generate_private_key("ssh-ed25519"),
+        asyncssh.generate_private_key("ssh-ed25519"),
+    )
     settings = folder / ".ssh"
     settings.mkdir()
     client.write_private_key(settings / "id_ed25519")

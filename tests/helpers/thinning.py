@@ -8,7 +8,9 @@ import pandas as pd
 from szlib.tracks.clock import TICKS_PER_SECOND, clock_index, nearest_tick, to_clock
 
 
-def measure_thinning_error(tracks: pd.DataFrame, *, every: float = 1.0) -> tuple[float, float]:
+def measure_thinning_error(
+    tracks: pd.DataFrame, *, every: float = 1.0
+) -> tuple[float, float]:
     """RMS and 95 % quantile of the error of positions [m] where one tick in `every` seconds is used.
 
     Measured at 1 s: THOR-MAGNI 5.3 and 9.5 cm, the ETH sequence 5.6 and 11.6 cm (both are sampled every
@@ -21,7 +23,14 @@ def measure_thinning_error(tracks: pd.DataFrame, *, every: float = 1.0) -> tuple
     known[["x", "y"]] = tracks[["x", "y"]].to_numpy(float)[order]
     thinned = to_clock(known[(tick - tick[begin]) % step == 0], max_gap=every)
     matched = known.assign(tick=tick).merge(
-        thinned.assign(tick=nearest_tick(thinned["t"].to_numpy())), on=["id", "tick"], suffixes=("", "_thin")
+        thinned.assign(tick=nearest_tick(thinned["t"].to_numpy())),
+        on=["id", "tick"],
+        suffixes=("", "_thin"),
     )
-    error = np.hypot(*(matched[[name, f"{name}_thin"]].diff(axis=1).to_numpy()[:, 1] for name in "xy"))
+    error = np.hypot(
+        *(
+            matched[[name, f"{name}_thin"]].diff(axis=1).to_numpy()[:, 1]
+            for name in "xy"
+        )
+    )
     return float(np.sqrt((error**2).mean())), float(np.quantile(error, 0.95))

@@ -17,7 +17,11 @@ def samples(people: int = 3, count: int = 20, begin: float = BEGIN) -> pd.DataFr
     """People seen every 0.4 s: multiples of 1/15 s and of 1 ms, as every format can hold them."""
     rng = np.random.default_rng(4)
     rows = [
-        (begin + round(0.4 * k, 3), 7 + person, *(5 + person + 0.4 * k + rng.normal(0, 0.01, 2)).round(6))
+        (
+            begin + round(0.4 * k, 3),
+            7 + person,
+            *(5 + person + 0.4 * k + rng.normal(0, 0.01, 2)).round(6),
+        )
         for k in range(count)
         for person in range(people)
     ]
@@ -32,7 +36,9 @@ def as_raw(rows: pd.DataFrame) -> str:
 
 
 def as_1hz(rows: pd.DataFrame) -> str:
-    return "".join(f"{r.t:.3f},{r.id},{r.x:.6f},{r.y:.6f},1.2,0.78\n" for r in rows.itertuples())
+    return "".join(
+        f"{r.t:.3f},{r.id},{r.x:.6f},{r.y:.6f},1.2,0.78\n" for r in rows.itertuples()
+    )
 
 
 def as_ewap(rows: pd.DataFrame, *, rate: float = 15.0) -> str:
@@ -40,7 +46,9 @@ def as_ewap(rows: pd.DataFrame, *, rate: float = 15.0) -> str:
     with_velocities = rows.copy()
     for _, one in rows.groupby("id"):
         for name in ("x", "y"):
-            with_velocities.loc[one.index, f"v{name}"] = np.gradient(one[name], one["t"])
+            with_velocities.loc[one.index, f"v{name}"] = np.gradient(
+                one[name], one["t"]
+            )
     return "".join(
         f"  {round(r.t * rate):.12e}  {r.id:.7e}   {r.x:.9e}  0.0000000e+00  {r.y:.9e}"
         f"   {r.vx:.7e}  0.0000000e+00  {r.vy:.7e}\n"
@@ -82,9 +90,14 @@ def mutate(content: bytes, rng: random.Random) -> bytes:
                 content[:i] + rng.randbytes(j - i) + content[j:],
                 content[: max(i, 1)],
                 b"\n".join(rng.sample(lines, len(lines))),
-                b"\n".join(rng.choice([line, line[: rng.randrange(len(line) + 1)]]) for line in lines),
+                b"\n".join(
+                    rng.choice([line, line[: rng.randrange(len(line) + 1)]])
+                    for line in lines
+                ),
                 content.replace(
-                    rng.choice([b",", b".", b"1", b" "]), rng.choice(TOKENS), rng.choice([1, 3, -1])
+                    rng.choice([b",", b".", b"1", b" "]),
+                    rng.choice(TOKENS),
+                    rng.choice([1, 3, -1]),
                 ),
             ]
         )
@@ -109,7 +122,11 @@ def people(seed: int = 0, *, count: int = 12, begin: int = 0) -> pd.DataFrame:
         frame = begin + rng.integers(0, 100) + np.arange(100)
         a, b = rng.uniform((0, 0), (12, 8), (2, 2))
         where = a + np.linspace(0, 1, 100)[:, None] * (b - a)
-        rows.append(pd.DataFrame({"id": person + 1, "frame": frame, "x": where[:, 0], "y": where[:, 1]}))
+        rows.append(
+            pd.DataFrame(
+                {"id": person + 1, "frame": frame, "x": where[:, 0], "y": where[:, 1]}
+            )
+        )
     return pd.concat(rows, ignore_index=True).round(4)
 
 

@@ -41,7 +41,11 @@ def make_tracks(*walks: pd.DataFrame) -> pd.DataFrame:
 
 @cache
 def make_crowd(
-    seed: int, *, people: int = 14, seconds: int = 40, square: szlib.Square = szlib.ATC_SQUARE
+    seed: int,
+    *,
+    people: int = 14,
+    seconds: int = 40,
+    square: szlib.Square = szlib.ATC_SQUARE,
 ) -> pd.DataFrame:
     """People who come and go, wander through the square, stop, and are sometimes out of sight.
 
@@ -52,12 +56,20 @@ def make_crowd(
     for person in range(people):
         n = int(rng.integers(40, 180))
         heading = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.03, n))
-        pace = np.clip(rng.normal(1.0, 0.3) + np.cumsum(rng.normal(0, 0.02, n)), 0.0, 2.0)
+        pace = np.clip(
+            rng.normal(1.0, 0.3) + np.cumsum(rng.normal(0, 0.02, n)), 0.0, 2.0
+        )
         velocity = pace[:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
         middle = [rng.uniform(*square.x), rng.uniform(*square.y)]
-        position = middle + (np.cumsum(velocity, axis=0) - velocity[: n // 2].sum(axis=0)) / 10
+        position = (
+            middle + (np.cumsum(velocity, axis=0) - velocity[: n // 2].sum(axis=0)) / 10
+        )
         walk = pd.DataFrame(
-            {"day": DAY, "id": 100 + person, "t": (rng.integers(seconds * 10) + np.arange(n)) / 10}
+            {
+                "day": DAY,
+                "id": 100 + person,
+                "t": (rng.integers(seconds * 10) + np.arange(n)) / 10,
+            }
         )
         walk[["x", "y"]], walk[["vx", "vy"]] = position, velocity
         if rng.random() < 0.3:
@@ -69,7 +81,11 @@ def make_crowd(
 
 @cache
 def make_hall(
-    seed: int = 0, *, people: int = 250, pillar: tuple[float, ...] = (), size: tuple[float, float] = (12, 8)
+    seed: int = 0,
+    *,
+    people: int = 250,
+    pillar: tuple[float, ...] = (),
+    size: tuple[float, float] = (12, 8),
 ) -> pd.DataFrame:
     """People who walk straight through a hall from wall to wall, but not through the pillar.
 
@@ -85,7 +101,15 @@ def make_hall(
         if pillar and ((path > pillar[:2]) & (path < pillar[2:])).all(axis=1).any():
             continue
         duration = round(float(np.hypot(*(b - a))) / 1.2, 1)
-        walks.append(make_walk(a, (b - a) / duration, person=person, begin=2.0 * person, duration=duration))
+        walks.append(
+            make_walk(
+                a,
+                (b - a) / duration,
+                person=person,
+                begin=2.0 * person,
+                duration=duration,
+            )
+        )
     return make_tracks(*walks)
 
 

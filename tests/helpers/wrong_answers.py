@@ -42,51 +42,114 @@ def inside(ahead, left, *, back=0.0, length=5.0, half=2.0):
 
 SHEET1: dict[str, list[tuple[str, Answer]]] = {
     "velocity": [
-        ("this is a displacement [m]", lambda path, k, half: path[k + half] - path[k - half]),
-        ("the time step is missing", lambda path, k, half: (path[k + half] - path[k - half]) / (2 * half)),
-        ("this is twice the velocity", lambda path, k, half: (path[k + half] - path[k - half]) / half / 0.1),
+        (
+            "this is a displacement [m]",
+            lambda path, k, half: path[k + half] - path[k - half],
+        ),
+        (
+            "the time step is missing",
+            lambda path, k, half: (path[k + half] - path[k - half]) / (2 * half),
+        ),
+        (
+            "this is twice the velocity",
+            lambda path, k, half: (path[k + half] - path[k - half]) / half / 0.1,
+        ),
         ("velocity over one tick", lambda path, k, half: (path[k + 1] - path[k]) / 0.1),
-        ("the sign is wrong", lambda path, k, half: (path[k - half] - path[k + half]) / (0.2 * half)),
-        ("this looks back only", lambda path, k, half: (path[k] - path[k - half]) / (0.1 * half)),
+        (
+            "the sign is wrong",
+            lambda path, k, half: (path[k - half] - path[k + half]) / (0.2 * half),
+        ),
+        (
+            "this looks back only",
+            lambda path, k, half: (path[k] - path[k - half]) / (0.1 * half),
+        ),
         (
             "this is the speed, one number",
-            lambda path, k, half: math.dist(path[k + half], path[k - half]) / (0.2 * half),
+            lambda path, k, half: (
+                math.dist(path[k + half], path[k - half]) / (0.2 * half)
+            ),
         ),
-        ("shape (2,); got numbers, shape (30, 2)", lambda path, k, half: np.diff(path, axis=0) / 0.1),
+        (
+            "shape (2,); got numbers, shape (30, 2)",
+            lambda path, k, half: np.diff(path, axis=0) / 0.1,
+        ),
         ("stopped with IndexError", lambda path, k, half: path[len(path) + half]),
     ],
     "line_of_sight": [
-        ("these are degrees", lambda ref, heading, other: np.degrees(wrap(bearing(ref, other) - heading))),
-        ("this is the bearing in the world", lambda ref, heading, other: bearing(ref, other)),
-        ("the two people are swapped", lambda ref, heading, other: wrap(bearing(other, ref) - heading)),
-        ("the angle is not wrapped", lambda ref, heading, other: bearing(ref, other) - heading),
-        ("lies in [0, 2 pi)", lambda ref, heading, other: (bearing(ref, other) - heading) % (2 * np.pi)),
+        (
+            "these are degrees",
+            lambda ref, heading, other: np.degrees(wrap(bearing(ref, other) - heading)),
+        ),
+        (
+            "this is the bearing in the world",
+            lambda ref, heading, other: bearing(ref, other),
+        ),
+        (
+            "the two people are swapped",
+            lambda ref, heading, other: wrap(bearing(other, ref) - heading),
+        ),
+        (
+            "the angle is not wrapped",
+            lambda ref, heading, other: bearing(ref, other) - heading,
+        ),
+        (
+            "lies in [0, 2 pi)",
+            lambda ref, heading, other: (bearing(ref, other) - heading) % (2 * np.pi),
+        ),
         (
             "np.arctan2 takes y first",
             lambda ref, heading, other: wrap(np.arctan2(*(other - ref)) - heading),
         ),
         (
             "np.arctan cannot tell ahead from behind",
-            lambda ref, heading, other: wrap(np.arctan((other - ref)[1] / (other - ref)[0]) - heading),
+            lambda ref, heading, other: wrap(
+                np.arctan((other - ref)[1] / (other - ref)[0]) - heading
+            ),
         ),
-        ("the sign is wrong", lambda ref, heading, other: wrap(heading - bearing(ref, other))),
-        ("the heading has the wrong sign", lambda ref, heading, other: wrap(bearing(ref, other) + heading)),
-        ("the side is missing", lambda ref, heading, other: np.abs(wrap(bearing(ref, other) - heading))),
+        (
+            "the sign is wrong",
+            lambda ref, heading, other: wrap(heading - bearing(ref, other)),
+        ),
+        (
+            "the heading has the wrong sign",
+            lambda ref, heading, other: wrap(bearing(ref, other) + heading),
+        ),
+        (
+            "the side is missing",
+            lambda ref, heading, other: np.abs(wrap(bearing(ref, other) - heading)),
+        ),
         (
             "no answer: this calls szlib.encounters.geometry",
-            lambda ref, heading, other: szlib.encounters.geometry.wrap_angle(bearing(ref, other) - heading),
+            lambda ref, heading, other: szlib.encounters.geometry.wrap_angle(
+                bearing(ref, other) - heading
+            ),
         ),
     ],
     "in_space": [
-        ("does not turn with the person", lambda ref, heading, o: inside(*in_frame(ref, 0.0, o))),
-        ("turned the wrong way", lambda ref, heading, o: inside(*in_frame(ref, -heading, o))),
-        ("4 m is the whole width", lambda ref, heading, o: inside(*in_frame(ref, heading, o), half=4)),
-        ("length and width are swapped", lambda r, h, o: inside(*in_frame(r, h, o), length=4, half=2.5)),
+        (
+            "does not turn with the person",
+            lambda ref, heading, o: inside(*in_frame(ref, 0.0, o)),
+        ),
+        (
+            "turned the wrong way",
+            lambda ref, heading, o: inside(*in_frame(ref, -heading, o)),
+        ),
+        (
+            "4 m is the whole width",
+            lambda ref, heading, o: inside(*in_frame(ref, heading, o), half=4),
+        ),
+        (
+            "length and width are swapped",
+            lambda r, h, o: inside(*in_frame(r, h, o), length=4, half=2.5),
+        ),
         (
             "ahead of the person, not around",
             lambda r, h, o: inside(*in_frame(r, h, o), back=-2.5, length=2.5),
         ),
-        ("people behind are counted", lambda r, h, o: inside(*in_frame(r, h, o), back=-np.inf)),
+        (
+            "people behind are counted",
+            lambda r, h, o: inside(*in_frame(r, h, o), back=-np.inf),
+        ),
         (
             "expected booleans, shape (40,); got numbers",
             lambda r, h, o: inside(*in_frame(r, h, o)).astype(int),
@@ -100,7 +163,10 @@ SHEET1: dict[str, list[tuple[str, Answer]]] = {
         ("the interval is missing", lambda r, v, dt: r * (1 - np.cos(v / r / 2))),
         ("distance from the centre", lambda r, v, dt: r * np.cos(v * dt / r / 2)),
         ("length of the chord", lambda r, v, dt: 2 * r * np.sin(v * dt / r / 2)),
-        ("difference of two lengths", lambda r, v, dt: v * dt - 2 * r * np.sin(v * dt / r / 2)),
+        (
+            "difference of two lengths",
+            lambda r, v, dt: v * dt - 2 * r * np.sin(v * dt / r / 2),
+        ),
         ("the radius is missing", lambda r, v, dt: 1 - np.cos(v * dt / r / 2)),
         ("expected 0", lambda r, v, dt: math.nan),
     ],
@@ -108,7 +174,9 @@ SHEET1: dict[str, list[tuple[str, Answer]]] = {
 
 
 def mirrored_points(angle, distance, r_max):
-    return (r_max - distance)[:, None] * np.column_stack([np.cos(angle), -np.sin(angle)])
+    return (r_max - distance)[:, None] * np.column_stack(
+        [np.cos(angle), -np.sin(angle)]
+    )
 
 
 def polar(angle, radius):
@@ -122,14 +190,20 @@ def corner_of(cloud):
 SHEET2: dict[str, list[tuple[str, Answer]]] = {
     "complementary": [
         ("these are plain positions", lambda a, d, r: polar(a, d)),
-        ("the angles are in radians already", lambda a, d, r: polar(np.deg2rad(a), r - d)),
+        (
+            "the angles are in radians already",
+            lambda a, d, r: polar(np.deg2rad(a), r - d),
+        ),
         (
             "cos and sin are swapped",
             lambda a, d, r: np.column_stack([np.sin(a), np.cos(a)]) * (r - d)[:, None],
         ),
         ("the sign is wrong", lambda a, d, r: polar(a, d - r)),
         ("the sign of the angle", mirrored_points),
-        ("the shape is transposed", lambda a, d, r: np.array([(r - d) * np.cos(a), (r - d) * np.sin(a)])),
+        (
+            "the shape is transposed",
+            lambda a, d, r: np.array([(r - d) * np.cos(a), (r - d) * np.sin(a)]),
+        ),
         ("r_max is an argument", lambda a, d, r: polar(a, 2 - d)),
         (
             "no answer: this calls szlib.zones.outliers.complementary_points",
@@ -139,20 +213,34 @@ SHEET2: dict[str, list[tuple[str, Answer]]] = {
         ),
     ],
     "nearest": [
-        ("each encounter has its own minimum", lambda s: [s.distance.min()] * s.encounter.nunique()),
+        (
+            "each encounter has its own minimum",
+            lambda s: [s.distance.min()] * s.encounter.nunique(),
+        ),
         ("this is one number", lambda s: s.distance.min()),
         ("these are means", lambda s: s.groupby("encounter").distance.mean()),
         (
             "these are the first samples",
             lambda s: s.drop_duplicates("encounter").sort_values("encounter").distance,
         ),
-        ("these are the largest", lambda s: s.groupby("encounter").distance.max().tolist()),
+        (
+            "these are the largest",
+            lambda s: s.groupby("encounter").distance.max().tolist(),
+        ),
         (
             "the order is that of the table",
-            lambda s: [s.distance[s.encounter == n].min() for n in s.encounter.unique()],
+            lambda s: [
+                s.distance[s.encounter == n].min() for n in s.encounter.unique()
+            ],
         ),
-        ("the distances are sorted", lambda s: sorted(s.groupby("encounter").distance.min())),
-        ("shape (4, 2)", lambda s: s.groupby("encounter")[["los_angle", "distance"]].min()),
+        (
+            "the distances are sorted",
+            lambda s: sorted(s.groupby("encounter").distance.min()),
+        ),
+        (
+            "shape (4, 2)",
+            lambda s: s.groupby("encounter")[["los_angle", "distance"]].min(),
+        ),
     ],
     "found": [
         ("swapped", lambda r, i: ((r & i).sum() / i.sum(), (r & i).sum() / r.sum())),
@@ -167,19 +255,32 @@ SHEET2: dict[str, list[tuple[str, Answer]]] = {
         ),
         ("share of correct decisions", lambda r, i: (r == i).mean()),
         ("these are counts", lambda r, i: ((r & i).sum(), (r & i).sum())),
-        ("shares of removed samples and of intruders", lambda r, i: (r.mean(), i.mean())),
+        (
+            "shares of removed samples and of intruders",
+            lambda r, i: (r.mean(), i.mean()),
+        ),
         ("got a str", lambda r, i: "precision"),
     ],
     "blind_spot": [
         ("an encounter has 31 samples", lambda cloud: corner_of(cloud)[None]),
         ("this is not an intruder", lambda cloud: cloud[:31] + 0.01),
         ("the same point", lambda cloud: np.tile(corner_of(cloud), (31, 1))),
-        ("LOF removes", lambda cloud: corner_of(cloud) + 0.02 * np.arange(31)[:, None] ** 2),
-        ("LOF removes", lambda cloud: cloud.mean(axis=0) + np.geomspace(20, 900, 31)[:, None] * [1, 0]),
+        (
+            "LOF removes",
+            lambda cloud: corner_of(cloud) + 0.02 * np.arange(31)[:, None] ** 2,
+        ),
+        (
+            "LOF removes",
+            lambda cloud: (
+                cloud.mean(axis=0) + np.geomspace(20, 900, 31)[:, None] * [1, 0]
+            ),
+        ),
         ("some of your samples are not finite", lambda cloud: np.full((31, 2), np.inf)),
         (
             "this is not an intruder",
-            lambda cloud: np.random.default_rng(0).uniform(-1, 1, (31, 2)) + cloud.mean(0),
+            lambda cloud: (
+                np.random.default_rng(0).uniform(-1, 1, (31, 2)) + cloud.mean(0)
+            ),
         ),
     ],
 }
@@ -201,12 +302,15 @@ def side_lengths(triangle):
     return np.hypot(*(triangle - np.roll(triangle, 1, axis=0)).T)
 
 
-SMALLEST = 4 * np.pi / (3 * np.sqrt(3))  # area of the smallest ellipse, over that of its triangle
+# area of the smallest ellipse, over that of its triangle
+SMALLEST = 4 * np.pi / (3 * np.sqrt(3))
 
 
 def quantile_ellipse(samples, q, *, complement=False):
     """An ellipse along the axes, from the quantile q of the nearest approaches on four sides."""
-    close = samples[(samples["distance"] <= 2.0) & (samples["speed"] - 1.1).abs().le(0.2)]
+    close = samples[
+        (samples["distance"] <= 2.0) & (samples["speed"] - 1.1).abs().le(0.2)
+    ]
     turn = np.radians([0, 90, 180, -90])
     off = wrap(close["los_angle"].to_numpy()[:, None] - turn)
     radii = []
@@ -226,9 +330,18 @@ def at_share(a, b, share):
 SHEET3: dict[str, list[tuple[str, Answer]]] = {
     "crossing": [
         ("the middle of the edge", lambda a, b, v: (a[:2] + b[:2]) / 2),
-        ("measured from the wrong end", lambda a, b, v: at_share(a, b, (b[2] - v) / (b[2] - a[2]))),
-        ("the end with the nearer speed", lambda a, b, v: (a if abs(a[2] - v) < abs(b[2] - v) else b)[:2]),
-        ("give x' and y' only", lambda a, b, v: a + (v - a[2]) / (b[2] - a[2]) * (b - a)),
+        (
+            "measured from the wrong end",
+            lambda a, b, v: at_share(a, b, (b[2] - v) / (b[2] - a[2])),
+        ),
+        (
+            "the end with the nearer speed",
+            lambda a, b, v: (a if abs(a[2] - v) < abs(b[2] - v) else b)[:2],
+        ),
+        (
+            "give x' and y' only",
+            lambda a, b, v: a + (v - a[2]) / (b[2] - a[2]) * (b - a),
+        ),
         ("must be divided by the difference", lambda a, b, v: at_share(a, b, v - a[2])),
         ("measure from a[2]", lambda a, b, v: at_share(a, b, v / b[2])),
         ("got a number", lambda a, b, v: at_share(a, b, (v - a[2]) / (b[2] - a[2]))[0]),
@@ -237,9 +350,14 @@ SHEET3: dict[str, list[tuple[str, Answer]]] = {
         ("this is R'", lambda p, th, r: reach_of(p, th)),
         (
             "the distance to a corner",
-            lambda p, th, r: r - np.hypot(*p[np.argmax((p / np.hypot(*p.T)[:, None]) @ unit(th))]),
+            lambda p, th, r: (
+                r - np.hypot(*p[np.argmax((p / np.hypot(*p.T)[:, None]) @ unit(th))])
+            ),
         ),
-        ("any direction", lambda p, th, r: r - min(reach_of(p, t) for t in edge_normals(p))),
+        (
+            "any direction",
+            lambda p, th, r: r - min(reach_of(p, t) for t in edge_normals(p)),
+        ),
         ("do not convert it", lambda p, th, r: r - reach_of(p, np.radians(th))),
         ("the opposite direction", lambda p, th, r: r - reach_of(p, th + np.pi)),
         ("the sign is wrong", lambda p, th, r: reach_of(p, th) - r),
@@ -252,10 +370,19 @@ SHEET3: dict[str, list[tuple[str, Answer]]] = {
         ),
         ("this is the area of the triangle", half_cross),
         ("largest ellipse inside", lambda t: SMALLEST / 4 * half_cross(t)),
-        ("the box around the triangle", lambda t: np.pi / 4 * np.prod(t.max(axis=0) - t.min(axis=0))),
+        (
+            "the box around the triangle",
+            lambda t: np.pi / 4 * np.prod(t.max(axis=0) - t.min(axis=0)),
+        ),
         ("this is twice the area", lambda t: 2 * SMALLEST * half_cross(t)),
-        ("equilateral triangle only", lambda t: np.pi * (side_lengths(t) ** 2).mean() / 3),
-        ("a circle around the longest side", lambda t: np.pi * (side_lengths(t).max() / 2) ** 2),
+        (
+            "equilateral triangle only",
+            lambda t: np.pi * (side_lengths(t) ** 2).mean() / 3,
+        ),
+        (
+            "a circle around the longest side",
+            lambda t: np.pi * (side_lengths(t).max() / 2) ** 2,
+        ),
         (
             "no answer: this calls szlib.zones.enclosing_ellipse",
             lambda t: szlib.minimum_enclosing_ellipse(t).area,
@@ -263,14 +390,31 @@ SHEET3: dict[str, list[tuple[str, Answer]]] = {
     ],
     "my_zone": [
         ("expected a szlib.Ellipse", lambda samples: 1.0),
-        ("too small; a few people walk through", lambda samples: quantile_ellipse(samples, 0.0)),
-        ("too large; most people keep farther away", lambda samples: quantile_ellipse(samples, 0.4)),
-        ("this is an ellipse around the slice", lambda s: quantile_ellipse(s, 0.05, complement=True)),
-        ("does not depend on the arguments", lambda s: szlib.Ellipse((0.05, 0), (0.95, 0.72))),
-        ("no answer: this calls szlib.zones.social_zone", lambda s: szlib.SocialZone.fit(s).ellipse(1.1)),
+        (
+            "too small; a few people walk through",
+            lambda samples: quantile_ellipse(samples, 0.0),
+        ),
+        (
+            "too large; most people keep farther away",
+            lambda samples: quantile_ellipse(samples, 0.4),
+        ),
+        (
+            "this is an ellipse around the slice",
+            lambda s: quantile_ellipse(s, 0.05, complement=True),
+        ),
+        (
+            "does not depend on the arguments",
+            lambda s: szlib.Ellipse((0.05, 0), (0.95, 0.72)),
+        ),
+        (
+            "no answer: this calls szlib.zones.social_zone",
+            lambda s: szlib.SocialZone.fit(s).ellipse(1.1),
+        ),
         (
             "no answer: this calls szlib.zones.enclosing_ellipse",
-            lambda s: szlib.minimum_enclosing_ellipse(polar(s.los_angle, s.distance)[:500]),
+            lambda s: szlib.minimum_enclosing_ellipse(
+                polar(s.los_angle, s.distance)[:500]
+            ),
         ),
     ],
 }
@@ -291,10 +435,16 @@ SHEET4: dict[str, list[tuple[str, Answer]]] = {
         ("the wrong end", lambda d, q: np.sort(d)[math.ceil((1 - q) * len(d)) - 1]),
         ("between two encounters", lambda d, q: np.quantile(d, q)),
         ("one approach too many", lambda d, q: np.sort(d)[int(q * len(d))]),
-        ("one approach too few", lambda d, q: np.sort(d)[max(math.floor(q * len(d)) - 1, 0)]),
+        (
+            "one approach too few",
+            lambda d, q: np.sort(d)[max(math.floor(q * len(d)) - 1, 0)],
+        ),
         ("sort them first", lambda d, q: d[math.ceil(q * len(d)) - 1]),
         ("one approach too far", lambda d, q: np.sort(d)[math.ceil(q * len(d))]),
-        ("expected a number; got numbers", lambda d, q: np.sort(d)[: math.ceil(q * len(d))]),
+        (
+            "expected a number; got numbers",
+            lambda d, q: np.sort(d)[: math.ceil(q * len(d))],
+        ),
     ],
     "expected_nearest": [
         ("the error of a mean", lambda mean, n: mean / n**0.5),
@@ -303,20 +453,37 @@ SHEET4: dict[str, list[tuple[str, Answer]]] = {
         ("the median of the nearest", lambda mean, n: mean * math.log(2) / n),
         ("the mean was taken for a rate", lambda mean, n: 1 / (mean * n)),
         ("probabilities multiply", lambda mean, n: mean**n),
-        ("the farthest of n people", lambda mean, n: mean * sum(1 / k for k in range(1, n + 1))),
+        (
+            "the farthest of n people",
+            lambda mean, n: mean * sum(1 / k for k in range(1, n + 1)),
+        ),
         (
             "expected 0.",
-            lambda mean, n: np.random.default_rng(0).exponential(mean, (2000, n)).min(axis=1).mean(),
+            lambda mean, n: (
+                np.random.default_rng(0).exponential(mean, (2000, n)).min(axis=1).mean()
+            ),
         ),
     ],
     "p_value": [
         ("p could be 0", lambda obs, null: np.mean(null >= obs)),
         (">=, not >", lambda obs, null: (1 + np.sum(null > obs)) / (1 + len(null))),
-        ("the other side", lambda obs, null: (1 + np.sum(null <= obs)) / (1 + len(null))),
-        ("two-sided", lambda obs, null: 2 * (1 + np.sum(null >= obs)) / (1 + len(null))),
+        (
+            "the other side",
+            lambda obs, null: (1 + np.sum(null <= obs)) / (1 + len(null)),
+        ),
+        (
+            "two-sided",
+            lambda obs, null: 2 * (1 + np.sum(null >= obs)) / (1 + len(null)),
+        ),
         ("this is a count", lambda obs, null: np.sum(null >= obs)),
-        ("in the numerator as well", lambda obs, null: np.sum(null >= obs) / (1 + len(null))),
-        ("in the denominator as well", lambda obs, null: (1 + np.sum(null >= obs)) / len(null)),
+        (
+            "in the numerator as well",
+            lambda obs, null: np.sum(null >= obs) / (1 + len(null)),
+        ),
+        (
+            "in the denominator as well",
+            lambda obs, null: (1 + np.sum(null >= obs)) / len(null),
+        ),
         ("got a boolean", lambda obs, null: bool(np.mean(null >= obs) < 0.05)),
     ],
     "shifted": [
@@ -333,7 +500,9 @@ SHEET4: dict[str, list[tuple[str, Answer]]] = {
 
 
 def sum_of_distances(points, center, c, angle):
-    return sum(np.hypot(*(points - center - side * c * unit(angle)).T) for side in (1, -1))
+    return sum(
+        np.hypot(*(points - center - side * c * unit(angle)).T) for side in (1, -1)
+    )
 
 
 def focus(axes):
@@ -349,7 +518,11 @@ def g_t_length(points, a, b):
     length = math.dist(a, b)
     x, y = (points - a).T
     g = (x * (b - a)[1] - y * (b - a)[0]) / length
-    return g, ((length / 2) ** 2 - ((points - (a + b) / 2) ** 2).sum(axis=1)) / length, length
+    return (
+        g,
+        ((length / 2) ** 2 - ((points - (a + b) / 2) ** 2).sum(axis=1)) / length,
+        length,
+    )
 
 
 def wall(g, t):
@@ -367,18 +540,41 @@ def to_segment(points, a, b):
 
 SHEET5: dict[str, list[tuple[str, Answer]]] = {
     "focal_distance": [
-        ("the half is missing", lambda p, c, ab, th: sum_of_distances(p, c, focus(ab), th) - ab[0]),
-        ("not b", lambda p, c, ab, th: sum_of_distances(p, c, focus(ab), th) / 2 - ab[1]),
-        ("the foci are not turned", lambda p, c, ab, th: sum_of_distances(p, c, focus(ab), 0) / 2 - ab[0]),
-        ("turned the wrong way", lambda p, c, ab, th: sum_of_distances(p, c, focus(ab), -th) / 2 - ab[0]),
+        (
+            "the half is missing",
+            lambda p, c, ab, th: sum_of_distances(p, c, focus(ab), th) - ab[0],
+        ),
+        (
+            "not b",
+            lambda p, c, ab, th: sum_of_distances(p, c, focus(ab), th) / 2 - ab[1],
+        ),
+        (
+            "the foci are not turned",
+            lambda p, c, ab, th: sum_of_distances(p, c, focus(ab), 0) / 2 - ab[0],
+        ),
+        (
+            "turned the wrong way",
+            lambda p, c, ab, th: sum_of_distances(p, c, focus(ab), -th) / 2 - ab[0],
+        ),
         (
             "along the longer axis, not across",
-            lambda p, c, ab, th: sum_of_distances(p, c, focus(ab), th + np.pi / 2) / 2 - ab[0],
+            lambda p, c, ab, th: (
+                sum_of_distances(p, c, focus(ab), th + np.pi / 2) / 2 - ab[0]
+            ),
         ),
         ("the level of the ellipse", level),
-        ("the distance to the centre", lambda p, c, ab, th: np.hypot(*(p - c).T) - ab[0]),
-        ("too far out", lambda p, c, ab, th: sum_of_distances(p, c, np.hypot(*ab), th) / 2 - ab[0]),
-        ("not at a - b", lambda p, c, ab, th: sum_of_distances(p, c, ab[0] - ab[1], th) / 2 - ab[0]),
+        (
+            "the distance to the centre",
+            lambda p, c, ab, th: np.hypot(*(p - c).T) - ab[0],
+        ),
+        (
+            "too far out",
+            lambda p, c, ab, th: sum_of_distances(p, c, np.hypot(*ab), th) / 2 - ab[0],
+        ),
+        (
+            "not at a - b",
+            lambda p, c, ab, th: sum_of_distances(p, c, ab[0] - ab[1], th) / 2 - ab[0],
+        ),
         (
             "no answer: this calls szlib",
             lambda p, c, ab, th: szlib.ellipse_distance(p, szlib.Ellipse(c, ab, th)),
@@ -391,23 +587,50 @@ SHEET5: dict[str, list[tuple[str, Answer]]] = {
             "the sign in the trimming term",
             lambda p, a, b: wall(g_t_length(p, a, b)[0], -g_t_length(p, a, b)[1]),
         ),
-        ("the half is missing", lambda p, a, b: wall(g_t_length(p, a, b)[0], 2 * g_t_length(p, a, b)[1])),
-        ("divided by the length", lambda p, a, b: wall(*multiply_t(*g_t_length(p, a, b)))),
+        (
+            "the half is missing",
+            lambda p, a, b: wall(g_t_length(p, a, b)[0], 2 * g_t_length(p, a, b)[1]),
+        ),
+        (
+            "divided by the length",
+            lambda p, a, b: wall(*multiply_t(*g_t_length(p, a, b))),
+        ),
         ("the Euclidean distance", to_segment),
         ("the squared distance", lambda p, a, b: wall(*g_t_length(p, a, b)[:2]) ** 2),
         ("the middle of the wall", lambda p, a, b: np.hypot(*(p - (a + b) / 2).T)),
-        ("no answer: this calls szlib.control.barriers", lambda p, a, b: szlib.segment_distance(p, a, b)),
+        (
+            "no answer: this calls szlib.control.barriers",
+            lambda p, a, b: szlib.segment_distance(p, a, b),
+        ),
     ],
     "barrier_row": [
         ("the size of the robot is missing", lambda d, e, g, r, eps: e - (1 - g) * d),
-        ("the margin eps is missing", lambda d, e, g, r, eps: (e - r) - (1 - g) * (d - r)),
-        ("the margin has the wrong sign", lambda d, e, g, r, eps: (e - r + eps) - (1 - g) * (d - r + eps)),
-        ("gamma and 1 - gamma are swapped", lambda d, e, g, r, eps: (e - r - eps) - g * (d - r - eps)),
-        ("the sign is wrong", lambda d, e, g, r, eps: (1 - g) * (d - r - eps) - (e - r - eps)),
-        ("gamma has the wrong sign", lambda d, e, g, r, eps: (e - d) - g * (d - r - eps)),
+        (
+            "the margin eps is missing",
+            lambda d, e, g, r, eps: (e - r) - (1 - g) * (d - r),
+        ),
+        (
+            "the margin has the wrong sign",
+            lambda d, e, g, r, eps: (e - r + eps) - (1 - g) * (d - r + eps),
+        ),
+        (
+            "gamma and 1 - gamma are swapped",
+            lambda d, e, g, r, eps: (e - r - eps) - g * (d - r - eps),
+        ),
+        (
+            "the sign is wrong",
+            lambda d, e, g, r, eps: (1 - g) * (d - r - eps) - (e - r - eps),
+        ),
+        (
+            "gamma has the wrong sign",
+            lambda d, e, g, r, eps: (e - d) - g * (d - r - eps),
+        ),
         ("only requires that the next h", lambda d, e, g, r, eps: e - r - eps),
         ("this is a comparison", lambda d, e, g, r, eps: e - d >= -g * (d - r - eps)),
-        ("this is a comparison", lambda d, e, g, r, eps: np.bool_(e - d >= -g * (d - r - eps))),
+        (
+            "this is a comparison",
+            lambda d, e, g, r, eps: np.bool_(e - d >= -g * (d - r - eps)),
+        ),
         ("this is the change of d", lambda d, e, g, r, eps: e - d),
     ],
     "end_margin": [
@@ -416,7 +639,9 @@ SHEET5: dict[str, list[tuple[str, Answer]]] = {
         ("half the margin", lambda r, length: r**2 / length / 2),
         (
             "twice the margin",
-            lambda r, length: ((length / 2 + r) ** 2 - (length / 2) ** 2) / length * 2 - 2 * r,
+            lambda r, length: (
+                ((length / 2 + r) ** 2 - (length / 2) ** 2) / length * 2 - 2 * r
+            ),
         ),
         ("the paper's margin", lambda r, length: 0.05),
         ("longer than the true one", lambda r, length: 0),
@@ -431,7 +656,9 @@ def runs_without_infeasible(zone, a_max, gammas):
     good = []
     for gamma in gammas:
         settings = szlib.MPCSettings(gamma=gamma, a_max=a_max)
-        log = szlib.simulate(szlib.SCENARIOS["passing"], szlib.MPCCBF(zone, settings=settings))
+        log = szlib.simulate(
+            szlib.SCENARIOS["passing"], szlib.MPCCBF(zone, settings=settings)
+        )
         if log.metrics()["infeasible_steps"]:
             break
         good.append(gamma)
@@ -458,7 +685,10 @@ SHEET6: dict[str, list[tuple[str, Answer]]] = {
         ("gamma and 1 - gamma are swapped", lambda h, g, dt, v: (1 - g) * h / dt - v),
     ],
     "largest_gamma": [
-        ("this is one too large", lambda z, a, gs: gs[len(runs_without_infeasible(z, a, gs))]),
+        (
+            "this is one too large",
+            lambda z, a, gs: gs[len(runs_without_infeasible(z, a, gs))],
+        ),
         ("this is the smallest gamma", lambda z, a, gs: min(gs)),
         ("this is the largest gamma", lambda z, a, gs: max(gs)),
         ("use a_max", lambda z, a, gs: runs_without_infeasible(z, 1.0, gs)[-1]),
@@ -466,7 +696,10 @@ SHEET6: dict[str, list[tuple[str, Answer]]] = {
             "the formula of the straight approach",
             lambda z, a, gs: max([g for g in gs if g <= a * 0.1] or [gs[0]]),
         ),
-        ("this is an index", lambda z, a, gs: len(runs_without_infeasible(z, a, gs)) - 1),
+        (
+            "this is an index",
+            lambda z, a, gs: len(runs_without_infeasible(z, a, gs)) - 1,
+        ),
         ("does not depend on the arguments", lambda z, a, gs: 0.07),
     ],
     "next_plan": [
@@ -481,22 +714,32 @@ SHEET6: dict[str, list[tuple[str, Answer]]] = {
     ],
     "prediction": [
         ("the same answer", lambda *change: "smaller"),
-        ("the same answer", lambda s, c, before, after, quantity: "larger" if c == "width" else "smaller"),
+        (
+            "the same answer",
+            lambda s, c, before, after, quantity: (
+                "larger" if c == "width" else "smaller"
+            ),
+        ),
         ("the wrong way around", lambda *change: OTHER[predicts(*change)]),
         (
             "at least one kind of change",
-            lambda *change: OTHER[predicts(*change)] if change[1] == "gamma" else predicts(*change),
+            lambda *change: (
+                OTHER[predicts(*change)] if change[1] == "gamma" else predicts(*change)
+            ),
         ),
         (
             "at least one kind of change",
-            lambda s, c, before, after, quantity: "larger" if str(after) > str(before) else "smaller",
+            lambda s, c, before, after, quantity: (
+                "larger" if str(after) > str(before) else "smaller"
+            ),
         ),
         ("expected one of", lambda *change: "nearer"),
         ("expected one of", lambda *change: ("smaller", "larger")),
         (
             "no answer: this calls szlib",
             lambda *change: szlib.simulate(
-                szlib.SCENARIOS[change[0]], szlib.MPCCBF(szlib.Ellipse((0.1, 0), (0.9, 0.7)))
+                szlib.SCENARIOS[change[0]],
+                szlib.MPCCBF(szlib.Ellipse((0.1, 0), (0.9, 0.7))),
             ).metrics(),
         ),
     ],
@@ -518,7 +761,11 @@ CHANGES: dict[str, list[tuple[str, str, str]]] = {
         ("take the smaller of wish and limit", "min(wish", "max(wish"),
         ("this is the wish", "min(wish, limit)", "wish"),
         ("this is the limit", "min(wish, limit)", "limit"),
-        ("expected a number; got a list", "np.clip(min(wish, limit), -V_MAX, V_MAX)", "[None]"),
+        (
+            "expected a number; got a list",
+            "np.clip(min(wish, limit), -V_MAX, V_MAX)",
+            "[None]",
+        ),
     ],
     "filter_2d": [
         ("the gradient has the wrong sign", "(x - people) /", "(people - x) /"),
@@ -537,14 +784,26 @@ CHANGES: dict[str, list[tuple[str, str, str]]] = {
         ("f has the wrong sign", "-2 * wish", "2 * wish"),
     ],
     "predict": [
-        ("the list begins with x_1", "np.vstack(M)", "np.vstack([np.eye(2, 2 + N), *M[:-1]])"),
+        (
+            "the list begins with x_1",
+            "np.vstack(M)",
+            "np.vstack([np.eye(2, 2 + N), *M[:-1]])",
+        ),
         ("DT^2 / 2 is missing in B", "DT**2 / 2", "0"),
         ("the half is missing", "DT**2 / 2", "DT**2"),
         ("not by u", "np.array([DT**2 / 2, DT])", "np.array([DT**2 / 2, 1])"),
         ("the powers of A are one too high", "= B", "= A @ B"),
         ("in reversed order", "2 + k] = B", "1 + N - k] = B"),
-        ("not all positions first", "np.vstack(M)", "np.hstack(M).reshape(2, N, -1).reshape(2 * N, -1)"),
-        ("the initial state is missing", "np.vstack(M)", "np.vstack(M) * (np.arange(2 + N) > 1)"),
+        (
+            "not all positions first",
+            "np.vstack(M)",
+            "np.hstack(M).reshape(2, N, -1).reshape(2 * N, -1)",
+        ),
+        (
+            "the initial state is missing",
+            "np.vstack(M)",
+            "np.vstack(M) * (np.arange(2 + N) > 1)",
+        ),
     ],
     "mpc_1d": [
         ("the cost is on the inputs only", "G.T @ Q @", "0 * G.T @ Q @"),
@@ -556,18 +815,34 @@ CHANGES: dict[str, list[tuple[str, str, str]]] = {
         ("twice as large", "H = 2 *", "H ="),
         ("the goal is missing", "free - np.tile([goal, 0], N)", "free"),
         ("the limits of the inputs are missing", "-A_MAX, A_MAX", "-1e3, 1e3"),
-        ("only the last state", "np.diag(np.tile([1, 2], N))", "np.diag([0] * (2 * N - 2) + [1, 2])"),
-        ("after the last input", "np.diag(np.tile([1, 2], N))", "np.diag([1, 2] * (N - 1) + [0, 0])"),
+        (
+            "only the last state",
+            "np.diag(np.tile([1, 2], N))",
+            "np.diag([0] * (2 * N - 2) + [1, 2])",
+        ),
+        (
+            "after the last input",
+            "np.diag(np.tile([1, 2], N))",
+            "np.diag([1, 2] * (N - 1) + [0, 0])",
+        ),
     ],
     "mpc_cbf_1d": [
         ("the person's velocity is missing", " * velocity", " * 0"),
         ("the person's velocity has the wrong sign", "person + k", "person - k"),
-        ("only the first step", "k = np.arange(1, N_h + 1)", "N_h, k = 1, np.array([1])"),
+        (
+            "only the first step",
+            "k = np.arange(1, N_h + 1)",
+            "N_h, k = 1, np.array([1])",
+        ),
         ("the power is missing", "(1 - gamma) ** k", "(1 - gamma)"),
         ("(1 - gamma)**k of h must be left", "(1 - gamma) ** k", "gamma**k"),
         ("(1 - gamma)**k of h must be left", "(1 - gamma) ** k", "0"),
         ("h may not fall at all", "(1 - gamma) ** k *", ""),
-        ("the horizon of the barrier is off by one", "there = person + k", "there = person + (k - 1)"),
+        (
+            "the horizon of the barrier is off by one",
+            "there = person + k",
+            "there = person + (k - 1)",
+        ),
         ("R is missing", " - RADIUS", ""),
         ("the barrier is missing", "f, rows, least,", "f, [], [],"),
         ("N_h is not used", "    k = np.arange", "    N_h = N\n    k = np.arange"),
@@ -581,10 +856,22 @@ CHANGES: dict[str, list[tuple[str, str, str]]] = {
         ("(1 - gamma)**k of h must be left", "(1 - gamma) ** k", "0"),
         ("the horizon of the people is off by one", "person + k", "person + (k - 1)"),
         ("R is missing", "RADIUS", "0"),
-        ("only the first person", "zip(people, velocities, strict=True)", "zip(people[:1], velocities)"),
-        ("the barriers are missing", "f.T.ravel(), rows, least,", "f.T.ravel(), [], [],"),
+        (
+            "only the first person",
+            "zip(people, velocities, strict=True)",
+            "zip(people[:1], velocities)",
+        ),
+        (
+            "the barriers are missing",
+            "f.T.ravel(), rows, least,",
+            "f.T.ravel(), [], [],",
+        ),
         ("the velocity is not in the cost", "[1, 2]", "[1, 0]"),
-        ("N_h is not used", "    rows, least = [], []", "    rows, least = [], []\n    N_h = N"),
+        (
+            "N_h is not used",
+            "    rows, least = [], []",
+            "    rows, least = [], []\n    N_h = N",
+        ),
     ],
     "tuned": [
         ("does not depend on the arguments", "0.05 * a_max, 8", "0.02, 8"),
@@ -593,7 +880,11 @@ CHANGES: dict[str, list[tuple[str, str, str]]] = {
         ("expected 0 < gamma <= 1", "0.05 * a_max, 8", "0.05 * a_max, 1"),
         ("does not arrive in time", "0.05 * a_max, 8", "0.01 * a_max, 8"),
         ("has no solution", "0.05 * a_max, 8", "0.15 * a_max, 8"),
-        ("expected 0 < gamma <= 1 and a whole number", "0.05 * a_max, 8", "8, 0.05 * a_max"),
+        (
+            "expected 0 < gamma <= 1 and a whole number",
+            "0.05 * a_max, 8",
+            "8, 0.05 * a_max",
+        ),
         ("expected numbers, shape (2,)", "0.05 * a_max, 8", "0.05 * a_max"),
     ],
 }
@@ -608,17 +899,23 @@ def change(source: str, name: str, old: str, new: str) -> Answer:
         raise ValueError(f"{name} has no {old!r} to replace")
     found: dict[str, Any] = {"__name__": "sheet"}
     exec(
-        source[: source.index("# %% [markdown]\n# ## 7.1")].replace("import matplotlib.pyplot as plt\n", ""),
+        source[: source.index("# %% [markdown]\n# ## 7.1")].replace(
+            "import matplotlib.pyplot as plt\n", ""
+        ),
         found,
     )
     for each in ("predict", name):
-        code = source[(at := source.index(f"def {each}(")) : source.index("### END SOLUTION", at)]
+        code = source[
+            (at := source.index(f"def {each}(")) : source.index("### END SOLUTION", at)
+        ]
         exec(code if each != name else body.replace(old, new), found)
     answer: Answer = found[name]
     return answer
 
 
-SOURCE = (folders.NOTEBOOKS / "solutions" / "sheet7_controller.py").read_text(encoding="utf-8")
+SOURCE = (folders.NOTEBOOKS / "solutions" / "sheet7_controller.py").read_text(
+    encoding="utf-8"
+)
 SHEET7 = {
     name: [(message, change(SOURCE, name, old, new)) for message, old, new in changes]
     for name, changes in CHANGES.items()

@@ -15,7 +15,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 HERE = Path(__file__).parent
-ATTACKS = sorted(f.stem for f in HERE.glob("*.py") if not f.stem.startswith(("_", "test_")))
+ATTACKS = sorted(
+    f.stem for f in HERE.glob("*.py") if not f.stem.startswith(("_", "test_"))
+)
 TALLY = Path("results/hostile.json")
 README = HERE / "README.md"
 INTRODUCTION = """# Hostile suite
@@ -31,7 +33,10 @@ def main() -> int:
     long = ["--long"] if "--long" in sys.argv else []
     names = [name for name in sys.argv[1:] if name != "--long"] or ATTACKS
     if unknown := sorted(set(names) - set(ATTACKS)):
-        print(f"no attack is called {', '.join(unknown)}; there are {', '.join(ATTACKS)}", file=sys.stderr)
+        print(
+            f"no attack is called {', '.join(unknown)}; there are {', '.join(ATTACKS)}",
+            file=sys.stderr,
+        )
         return 2
     if len(names) == 1:
         tally = {names[0]: _attack(names[0], bool(long))}
@@ -53,7 +58,12 @@ def _attack(name: str, long: bool) -> dict[str, float]:
     begun = time.monotonic()
     tally = dict(importlib.import_module(name).attack(long))
     tally["seconds"] = round(time.monotonic() - begun)
-    print(f"\n{name}", *(f"  {what}: {count:g}" for what, count in tally.items()), sep="\n", flush=True)
+    print(
+        f"\n{name}",
+        *(f"  {what}: {count:g}" for what, count in tally.items()),
+        sep="\n",
+        flush=True,
+    )
     return tally
 
 
@@ -62,11 +72,17 @@ def write_readme(name: str, tally: dict[str, float]) -> None:
     text = README.read_text(encoding="utf-8") if README.exists() else ""
     found = {part.partition("\n")[0]: part for part in text.split("\n## ")[1:]}
     total = sum(count for what, count in tally.items() if what.startswith("broken"))
-    rows = [f"| {what} | {count:g} |" for what, count in ({"broken, in all": total} | tally).items()]
+    rows = [
+        f"| {what} | {count:g} |"
+        for what, count in ({"broken, in all": total} | tally).items()
+    ]
     when = f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}"
-    found[name] = "\n".join([name, "", when, "", "| what | count |", "|---|--:|", *rows, ""])
+    found[name] = "\n".join(
+        [name, "", when, "", "| what | count |", "|---|--:|", *rows, ""]
+    )
     README.write_text(
-        "\n## ".join([INTRODUCTION, *(found[each] for each in sorted(found))]), encoding="utf-8"
+        "\n## ".join([INTRODUCTION, *(found[each] for each in sorted(found))]),
+        encoding="utf-8",
     )
 
 
@@ -75,7 +91,10 @@ def commit() -> str:
 
     def ask(*arguments: str) -> str:
         done = subprocess.run(
-            ["git", "-C", str(HERE), *arguments], capture_output=True, text=True, check=False
+            ["git", "-C", str(HERE), *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
         )
         return done.stdout.strip() if done.returncode == 0 else "unknown"
 
@@ -86,7 +105,12 @@ def commit() -> str:
 def _finish(tally: dict[str, dict[str, float]]) -> int:
     TALLY.parent.mkdir(exist_ok=True)
     TALLY.write_text(json.dumps(tally, indent=1), encoding="utf-8")
-    found = [count for each in tally.values() for what, count in each.items() if what.startswith("broken")]
+    found = [
+        count
+        for each in tally.values()
+        for what, count in each.items()
+        if what.startswith("broken")
+    ]
     return int(any(found))
 
 

@@ -42,19 +42,42 @@ SCRIPTS = [
     "</style><script>pwned()", "[x](javascript:pwned())", "<iframe srcdoc='<script>pwned()</script>'>",
     "$<script>pwned()$", "--><script>pwned()</script>", "\u2028<a href=javascript:pwned()>",
 ]  # fmt: skip
-OTHERS = [None, True, -1, 1e308, "", [], {}, [[]], {"a": 1}, "x" * 100_000, float("nan"), 10**400]
+OTHERS = [
+    None,
+    True,
+    -1,
+    1e308,
+    "",
+    [],
+    {},
+    [[]],
+    {"a": 1},
+    "x" * 100_000,
+    float("nan"),
+    10**400,
+]
 
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
     """Count what ran that must not, and, in the long form, reports that are not as they should be."""
-    tally = Counter({"broken: foreign code ran": 0, "broken: other results": 0, "broken: reports": 0})
+    tally = Counter(
+        {
+            "broken: foreign code ran": 0,
+            "broken: other results": 0,
+            "broken: reports": 0,
+        }
+    )
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        commands = furnish(place, days=4) if long else furnish(place, days=2, encounters=10)
+        commands = (
+            furnish(place, days=4) if long else furnish(place, days=2, encounters=10)
+        )
         if not long:
             del commands["run"]
         references = {
-            name: make_reference(name, command, place) for name, command in commands.items() if long
+            name: make_reference(name, command, place)
+            for name, command in commands.items()
+            if long
         }
         plant(place)
         for name, command in commands.items():
@@ -80,7 +103,9 @@ def plant(place: Path) -> None:
     (place / "precious" / ".szlib-lock").write_text("not a lock")
     (place / "tmp" / "szlib-link").symlink_to(place / "precious")
     (place / "tmp" / "szlib-locked").mkdir()
-    (place / "tmp" / "szlib-locked" / ".szlib-lock").symlink_to(place / "precious" / "thesis.txt")
+    (place / "tmp" / "szlib-locked" / ".szlib-lock").symlink_to(
+        place / "precious" / "thesis.txt"
+    )
     kernel = place / "jupyter" / "kernels" / "python3"
     kernel.mkdir(parents=True)
     argv = [sys.executable, str(place / "downloads" / "joblib.py")]
@@ -88,7 +113,11 @@ def plant(place: Path) -> None:
 
 
 def among_data(
-    name: str, command: list[str], place: Path, reference: dict[str, bytes] | None, tally: Counter[str]
+    name: str,
+    command: list[str],
+    place: Path,
+    reference: dict[str, bytes] | None,
+    tally: Counter[str],
 ) -> None:
     """Call a command in the folder of downloads; its results are those of before, where these are known."""
     out, data = place / f"{name}-among", place / "downloads"
@@ -99,10 +128,16 @@ def among_data(
     tally["commands among planted modules"] += 1
     found = contents(out)
     if done.returncode or not found or found != (reference or found):
-        print(f"{name}: exit code {done.returncode}, {sorted(found)}: {done.stderr[-1500:]}", file=sys.stderr)
+        print(
+            f"{name}: exit code {done.returncode}, {sorted(found)}: {done.stderr[-1500:]}",
+            file=sys.stderr,
+        )
         tally["broken: other results"] += 1
     if (place / "mark").exists():
-        print(f"{name}: ran {sorted(set((place / 'mark').read_text().split()))}", file=sys.stderr)
+        print(
+            f"{name}: ran {sorted(set((place / 'mark').read_text().split()))}",
+            file=sys.stderr,
+        )
         tally["broken: foreign code ran"] += 1
         (place / "mark").unlink()
     if (place / "precious" / "thesis.txt").read_text() != "not yours":
@@ -113,7 +148,9 @@ def among_data(
 # foreign results
 
 
-def attack_reports(count: int, place: Path, rng: random.Random, tally: Counter[str]) -> None:
+def attack_reports(
+    count: int, place: Path, rng: random.Random, tally: Counter[str]
+) -> None:
     """Reports of changed results: refused by the name of a file, or without their scripts."""
     genuine = next((place / "run-reference").glob("*/summary.json")).parent
     home = place / "results" / "day"
@@ -133,7 +170,10 @@ def attack_reports(count: int, place: Path, rng: random.Random, tally: Counter[s
             wrong = ", ".join(active(home / "report.html"))
         tally[f"reports that end with {code}"] += 1
         if wrong:
-            print(f"report after {changes}: {code}: {wrong}: {printed[-1500:]}", file=sys.stderr)
+            print(
+                f"report after {changes}: {code}: {wrong}: {printed[-1500:]}",
+                file=sys.stderr,
+            )
             tally["broken: reports"] += 1
 
 
@@ -150,7 +190,20 @@ def change(home: Path, rng: random.Random) -> str:
     if not files:
         return "nothing is left"
     file = rng.choice(sorted(files))
-    kind = rng.choice(["text", "text", "text", "type", "bytes", "link", "pipe", "folder", "gone", "huge"])
+    kind = rng.choice(
+        [
+            "text",
+            "text",
+            "text",
+            "type",
+            "bytes",
+            "link",
+            "pipe",
+            "folder",
+            "gone",
+            "huge",
+        ]
+    )
     texts = rng.choice(SCRIPTS) if kind == "text" else None
     if kind in ("text", "type") and file.suffix in (".json", ".ipynb"):
         try:
@@ -179,7 +232,13 @@ def change(home: Path, rng: random.Random) -> str:
 
 def places_in(tree: Any, here: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
     """The path of every value in a JSON file."""
-    items = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
+    items = (
+        tree.items()
+        if isinstance(tree, dict)
+        else enumerate(tree)
+        if isinstance(tree, list)
+        else ()
+    )
     for key, value in items:
         yield (*here, key)
         yield from places_in(value, (*here, key))
@@ -200,7 +259,9 @@ def active(page: Path) -> Iterator[str]:
     for element in soup.find_all(True):
         for name, value in element.attrs.items():
             text = " ".join(value) if isinstance(value, list) else str(value)
-            runs = name.startswith("on") or text.strip().lower().startswith("javascript:")
+            runs = name.startswith("on") or text.strip().lower().startswith(
+                "javascript:"
+            )
             if "pwned" in text and inline and runs:
                 yield f"{name} of {element.name} runs"
     if soup.find("iframe") and "frame-src" not in rules and "default-src" not in rules:

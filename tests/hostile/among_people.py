@@ -15,7 +15,14 @@ from szlib.simulation.scenarios.random_worlds import Worlds
 WORLDS = {False: 4, True: 20_000}
 CROWDS = {False: 1, True: 2_000}
 FIRST_WORLD = 77_000_000
-CROWDED = Worlds(people=(6, 10), standing=0.2, pace=(0.3, 1.2), walls=0.3, size=8.0, travel=(5.0, 8.0))
+CROWDED = Worlds(
+    people=(6, 10),
+    standing=0.2,
+    pace=(0.3, 1.2),
+    walls=0.3,
+    size=8.0,
+    travel=(5.0, 8.0),
+)
 
 
 def attack(long: bool) -> Counter[str]:
@@ -24,7 +31,14 @@ def attack(long: bool) -> Counter[str]:
     seeds = range(FIRST_WORLD, FIRST_WORLD + WORLDS[long])
     attack_worlds(seeds, tally, settings=settings)
     crowds: Counter[str] = Counter()
-    attack_worlds(range(seeds.stop, seeds.stop + CROWDS[long]), crowds, settings=settings, worlds=CROWDED)
+    attack_worlds(
+        range(seeds.stop, seeds.stop + CROWDS[long]),
+        crowds,
+        settings=settings,
+        worlds=CROWDED,
+    )
     for what, count in crowds.items():
-        tally[what if what.startswith("broken") else what.replace("worlds", "crowds")] += count
+        tally[
+            what if what.startswith("broken") else what.replace("worlds", "crowds")
+        ] += count
     return tally

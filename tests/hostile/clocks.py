@@ -68,10 +68,16 @@ def attack_arguments(count: int, tally: Counter[str], seed: int = 0) -> None:
         for k in range(max(1, count // A_SETTING)):
             rng = np.random.default_rng([seed, k, 24])
             s = replace(any_settings(rng), terminal="none", time_limit=1.0)
-            tracker = szlib.Tracker(memory=rng.choice([0.0, 1.0, 1e9]), walking_speed=rng.choice([0.0, 0.2]))
+            tracker = szlib.Tracker(
+                memory=rng.choice([0.0, 1.0, 1e9]), walking_speed=rng.choice([0.0, 0.2])
+            )
             walls = [np.array([(-1.0, 9.0), (4.0, 9.5)])] * int(rng.integers(2))
             controller = szlib.MPCCBF(ZONE, walls=walls, settings=s, tracker=tracker)
-            state, goal, clock = rng.uniform(-3, 3, 4) * [1, 1, 0.1, 0.1], (4.0, 0.0), 0.0
+            state, goal, clock = (
+                rng.uniform(-3, 3, 4) * [1, 1, 0.1, 0.1],
+                (4.0, 0.0),
+                0.0,
+            )
             for i in range(min(A_SETTING, count)):
                 clock += s.dt
                 people, options = draw(rng, clock)
@@ -81,28 +87,46 @@ def attack_arguments(count: int, tally: Counter[str], seed: int = 0) -> None:
                     continue
                 tally["steps with a random clock"] += 1
                 tally["steps with a random clock, safe"] += int(step.safe)
-                tally["steps with a random clock, unknown people"] += int(step.unknown > 0)
+                tally["steps with a random clock, unknown people"] += int(
+                    step.unknown > 0
+                )
                 found = [seen(person) for person in step.scene.people]
-                for fault in Judge(s, walls, found).faults(state, np.asarray(goal), step):
+                for fault in Judge(s, walls, found).faults(
+                    state, np.asarray(goal), step
+                ):
                     broken(tally, fault, where)
                 if step.safe and step.unknown:
                     broken(tally, "safe with unknown people", where)
                 if len(found) + step.unknown < len(people):
                     broken(tally, "fewer people than were given", where)
                 if i % 5 == 4:
-                    state = np.r_[rng.uniform(-3, 3, 2), rng.uniform(-1, 1, 2) * s.v_max]
+                    state = np.r_[
+                        rng.uniform(-3, 3, 2), rng.uniform(-1, 1, 2) * s.v_max
+                    ]
             controller.reset()
-            same = szlib.Tracker(memory=tracker.memory, walking_speed=tracker.walking_speed)
+            same = szlib.Tracker(
+                memory=tracker.memory, walking_speed=tracker.walking_speed
+            )
             new = szlib.MPCCBF(ZONE, walls=walls, settings=s, tracker=same)
             after, fresh = (c.step(state, goal, [(0.0, 2.0, 0.3, 0.0)], ids=["a"], stamps=4.9, now=5.0)
                             for c in (controller, new))  # fmt: skip
             if not np.allclose(after.control, fresh.control, atol=1e-4):
-                broken(tally, "a reset controller differs from a new one", f"seed [{seed}, {k}, 24]")
+                broken(
+                    tally,
+                    "a reset controller differs from a new one",
+                    f"seed [{seed}, {k}, 24]",
+                )
             bar.update(A_SETTING)
 
 
 def ask(
-    controller: Any, state: Any, goal: Any, people: Any, options: Any, tally: Counter[str], where: str
+    controller: Any,
+    state: Any,
+    goal: Any,
+    people: Any,
+    options: Any,
+    tally: Counter[str],
+    where: str,
 ) -> Any:
     """The step, or None where it was refused; anything but an error of szlib is broken."""
     try:
@@ -110,7 +134,11 @@ def ask(
     except szlib.SzlibError:
         tally["random clocks refused"] += 1
     except Exception as error:
-        broken(tally, f"{type(error).__name__} instead of an error of szlib", f"{where}: {options!r:.300}")
+        broken(
+            tally,
+            f"{type(error).__name__} instead of an error of szlib",
+            f"{where}: {options!r:.300}",
+        )
     return None
 
 
@@ -137,7 +165,9 @@ def draw(rng: np.random.Generator, clock: float) -> tuple[Any, dict[str, Any]]:
     if rng.random() < 0.8:
         options["now"] = time()
         if rng.random() < 0.6:
-            options["stamps"] = time() if rng.random() < 0.5 else [time() for _ in range(count)]
+            options["stamps"] = (
+                time() if rng.random() < 0.5 else [time() for _ in range(count)]
+            )
     for name, pool in (("now", NO_TIMES), ("stamps", NO_TIMES), ("ids", NO_LISTS)):
         if rng.random() < 0.01:
             options[name] = choose(pool)
@@ -147,7 +177,9 @@ def draw(rng: np.random.Generator, clock: float) -> tuple[Any, dict[str, Any]]:
 def seen(person: szlib.Person) -> szlib.Person:
     """A person with the zone and the heading that `Judge` needs; without a heading, the circle around it."""
     zone = CIRCLE if person.heading is None else ZONE
-    return replace(person, heading=person.heading or 0.0, zone=zone, heading_unknown=False)
+    return replace(
+        person, heading=person.heading or 0.0, zone=zone, heading_unknown=False
+    )
 
 
 # a consistent clock
@@ -183,22 +215,47 @@ class Loop:
         world = szlib.Worlds()(88_000_000 + self.seed)
         walls, start = list(world.walls), float(rng.choice([0.0, 1.75e9]))
         controller = szlib.MPCCBF(ZONE, walls=walls, settings=s)
-        x, u, now, hidden, back = world.start.astype(float), np.zeros(2), start, set[int](), 0.0
+        x, u, now, hidden, back = (
+            world.start.astype(float),
+            np.zeros(2),
+            start,
+            set[int](),
+            0.0,
+        )
         for i in range(TICKS):
             where = f"{self.name}, seed {self.seed}, step {i}"
             truth = [person.after(now - start) for person in world.people]
-            hidden = {k for k in range(len(truth)) if i and k not in hidden and rng.random() < 0.2}
+            hidden = {
+                k
+                for k in range(len(truth))
+                if i and k not in hidden and rng.random() < 0.2
+            }
             shown = [int(k) for k in rng.permutation(len(truth)) if k not in hidden]
             late = rng.uniform(0, 0.4, len(shown))
             then = [truth[k].after(-by) for k, by in zip(shown, late, strict=True)]
-            rows = np.reshape([[*person.position, *person.velocity] for person in then], (-1, 4))
-            ids, jump = [f"p{k}" for k in shown], rng.uniform(1, 9) * (self.goes_back and i % 7 == 5)
+            rows = np.reshape(
+                [[*person.position, *person.velocity] for person in then], (-1, 4)
+            )
+            ids, jump = (
+                [f"p{k}" for k in shown],
+                rng.uniform(1, 9) * (self.goes_back and i % 7 == 5),
+            )
             back += jump
-            step = controller.step(x, world.goal, rows, ids=ids, stamps=now - back - late, now=now - back)
+            step = controller.step(
+                x, world.goal, rows, ids=ids, stamps=now - back - late, now=now - back
+            )
             if bool(step.clock) != bool(jump) and not self.another_dt:
-                broken(self.tally, "a clock that goes back is not told, or one that does not is", where)
+                broken(
+                    self.tally,
+                    "a clock that goes back is not told, or one that does not is",
+                    where,
+                )
             found = [int(person.id[1:]) for person in step.scene.people]
-            if sorted(found) != list(range(len(truth))) or step.unknown or step.rejected:
+            if (
+                sorted(found) != list(range(len(truth)))
+                or step.unknown
+                or step.rejected
+            ):
                 broken(self.tally, "somebody is forgotten", where)
                 return
             judge = Judge(s, walls, [self.person(truth[k]) for k in found])
@@ -206,30 +263,52 @@ class Loop:
                     for p, k in zip(step.scene.people, found, strict=True)]  # fmt: skip
             if max(gone, default=0.0) > 1e-6 * (1 if start == 0 else 10):
                 broken(self.tally, "somebody is not where the step says", where)
-            for fault in Judge(s, walls, [seen(p) for p in step.scene.people]).faults(x, world.goal, step):
+            for fault in Judge(s, walls, [seen(p) for p in step.scene.people]).faults(
+                x, world.goal, step
+            ):
                 broken(self.tally, fault, where)
             held = float(rng.uniform(0.2, 3.0)) * s.dt if self.another_dt else s.dt
             self.tally[f"steps, {self.name}"] += 1
             if self.lag:
                 x, u = self.follow(x, u, step.control, held)
                 overlap = judge.gaps(x[:2], held).min(initial=1.0) < -TOLERANCE
-                self.tally[f"overlaps after a safe step, {self.name}"] += int(step.safe and overlap)
+                self.tally[f"overlaps after a safe step, {self.name}"] += int(
+                    step.safe and overlap
+                )
             else:
                 if step.safe:
                     self.tally[f"steps safe, {self.name}"] += 1
-                    (a, b), times = along(x, step.control, (0.0, s.dt)), min(held, s.dt) * BETWEEN
+                    (a, b), times = (
+                        along(x, step.control, (0.0, s.dt)),
+                        min(held, s.dt) * BETWEEN,
+                    )
                     bow = hypot(*step.control) * s.dt**2 / 8
-                    excess = judge.between(a, b, along(x, step.control, times), times, bow, s.dt)
-                    if excess < -1e-5 or (held >= s.dt and judge.h(b, s.dt).min(initial=1) < -1e-5):
-                        broken(self.tally, "unsafe between samples after a safe step", f"{where}: {excess}")
-                x = np.r_[x[:2] + held * x[2:] + held**2 / 2 * step.control, x[2:] + held * step.control]
+                    excess = judge.between(
+                        a, b, along(x, step.control, times), times, bow, s.dt
+                    )
+                    if excess < -1e-5 or (
+                        held >= s.dt and judge.h(b, s.dt).min(initial=1) < -1e-5
+                    ):
+                        broken(
+                            self.tally,
+                            "unsafe between samples after a safe step",
+                            f"{where}: {excess}",
+                        )
+                x = np.r_[
+                    x[:2] + held * x[2:] + held**2 / 2 * step.control,
+                    x[2:] + held * step.control,
+                ]
             now += held
 
     def person(self, person: szlib.Person) -> szlib.Person:
         """A true person as a tracker knows them who sees no heading below 0.2 m/s."""
         vx, vy = person.velocity
         slow = hypot(vx, vy) < 0.2
-        return seen(replace(person, heading=None if slow else atan2(vy, vx), heading_unknown=slow))
+        return seen(
+            replace(
+                person, heading=None if slow else atan2(vy, vx), heading_unknown=slow
+            )
+        )
 
     def follow(self, x: Any, u: Any, control: Any, seconds: float) -> tuple[Any, Any]:
         """The robot after a control that its motors follow with a time constant of 0.2 s."""

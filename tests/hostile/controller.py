@@ -53,9 +53,16 @@ def paper_to_segment(p: Any, wall: Any) -> float:
 def foci(center: Any, heading: float, zone: szlib.Ellipse) -> Any:
     """The two foci of a zone around a person at `center`, shape (2, 2)."""
     c, s = np.cos(heading), np.sin(heading)
-    tilt, off = heading + zone.angle, np.sqrt(zone.semi_axes[0] ** 2 - zone.semi_axes[1] ** 2)
+    tilt, off = (
+        heading + zone.angle,
+        np.sqrt(zone.semi_axes[0] ** 2 - zone.semi_axes[1] ** 2),
+    )
     reach = off * np.array([np.cos(tilt), np.sin(tilt)])
-    return np.asarray(center) + np.array([[c, -s], [s, c]]) @ np.asarray(zone.center) + [reach, -reach]
+    return (
+        np.asarray(center)
+        + np.array([[c, -s], [s, c]]) @ np.asarray(zone.center)
+        + [reach, -reach]
+    )
 
 
 def dip(way: float, near: float) -> float:
@@ -94,19 +101,29 @@ class Judge:
         found = []
         for person in self.people:
             center = np.array(person.position) + seconds * np.array(person.velocity)
-            found.append(to_zone(p, center, person.heading, person.zone) - self.s.r_robot - self.s.eps)
-        found += [paper_to_segment(p, wall) - self.s.r_robot - self.margin(wall) for wall in self.walls]
+            found.append(
+                to_zone(p, center, person.heading, person.zone)
+                - self.s.r_robot
+                - self.s.eps
+            )
+        found += [
+            paper_to_segment(p, wall) - self.s.r_robot - self.margin(wall)
+            for wall in self.walls
+        ]
         return np.array(found)
 
     def gaps(self, p: Any, seconds: float = 0.0) -> Any:
         found = [
-            np.linalg.norm(p - person.position - seconds * np.array(person.velocity)) - BODY
+            np.linalg.norm(p - person.position - seconds * np.array(person.velocity))
+            - BODY
             for person in self.people
         ]
         found += [to_segment(p, wall) for wall in self.walls]
         return np.array(found) - self.s.r_robot
 
-    def between(self, a: Any, b: Any, path: Any, times: Any, bow: float, dt: float) -> float:
+    def between(
+        self, a: Any, b: Any, path: Any, times: Any, bow: float, dt: float
+    ) -> float:
         """The least h of people and gap of walls on a `path` between two samples, above what is allowed [m].
 
         Parameters
@@ -118,8 +135,14 @@ class Judge:
         least = np.inf
         for i, person in enumerate(self.people):
             move = dt * np.array(person.velocity)
-            chord, points = (a, b - move), foci(person.position, person.heading, person.zone)
-            near = min(to_segment(point, chord) if np.any(a != b - move) else 0.0 for point in points)
+            chord, points = (
+                (a, b - move),
+                foci(person.position, person.heading, person.zone),
+            )
+            near = min(
+                to_segment(point, chord) if np.any(a != b - move) else 0.0
+                for point in points
+            )
             h = min(self.h(p, time)[i] for p, time in zip(path, times, strict=True))
             least = min(least, h + dip(np.linalg.norm(b - move - a), near) + bow)
         way = np.linalg.norm(b - a)
@@ -129,7 +152,9 @@ class Judge:
             least = min(least, gap + dip(way, near) + bow)
         return float(least)
 
-    def faults(self, state: Any, goal: Any, step: szlib.control.step.Step) -> Iterator[str]:
+    def faults(
+        self, state: Any, goal: Any, step: szlib.control.step.Step
+    ) -> Iterator[str]:
         """What is not as it should be."""
         s, x = self.s, step.predicted
         if not (np.isfinite(x).all() and np.isfinite(step.control).all()):
@@ -137,34 +162,64 @@ class Judge:
             return
         u = np.diff(x[:, 2:], axis=0) / s.dt
         moved = x[:-1, :2] + s.dt * x[:-1, 2:] + s.dt**2 / 2 * u
-        if not (same(x[0], state) and same(x[1:, :2], moved) and same(u[0], step.control)):
+        if not (
+            same(x[0], state) and same(x[1:, :2], moved) and same(u[0], step.control)
+        ):
             yield "plan is no motion"
-        if max(np.abs(u).max(), np.abs(step.control).max()) > s.a_max * (1 + NEAR) + NEAR / s.dt:
+        if (
+            max(np.abs(u).max(), np.abs(step.control).max())
+            > s.a_max * (1 + NEAR) + NEAR / s.dt
+        ):
             yield "out of bounds"
-        h = np.array([self.h(p, k * s.dt) for k, p in enumerate(x[:, :2])]).reshape(len(x), -1)
+        h = np.array([self.h(p, k * s.dt) for k, p in enumerate(x[:, :2])]).reshape(
+            len(x), -1
+        )
         rows = (h[1 : s.N_h + 1] - (1 - s.gamma) * h[: s.N_h]).T
-        if not same(step.h, h[0]) or not same(step.residual, rows, np.abs(h).max(initial=1)):
+        if not same(step.h, h[0]) or not same(
+            step.residual, rows, np.abs(h).max(initial=1)
+        ):
             yield "h or residual"
         speeding = (x[1:, 2:] ** 2).sum(axis=1).max() - s.v_max**2
         target = {"none": x[-1, 2:], "rest": np.zeros(2)}
-        end = self.people[0].velocity if step.terminal == "person" else target[step.terminal]
-        slack = max(0.0, -rows.min(initial=0.0), speeding, np.abs(x[-1, 2:] - end).max())
+        end = (
+            self.people[0].velocity
+            if step.terminal == "person"
+            else target[step.terminal]
+        )
+        slack = max(
+            0.0, -rows.min(initial=0.0), speeding, np.abs(x[-1, 2:] - end).max()
+        )
         if not same(step.slack, slack, np.abs(h).max(initial=1)):
             yield "slack"
-        if step.feasible != (step.slack <= TOLERANCE) or (step.status == "optimal" and not step.feasible):
+        if step.feasible != (step.slack <= TOLERANCE) or (
+            step.status == "optimal" and not step.feasible
+        ):
             yield "feasible or status"
-        gaps = np.array([self.gaps(p, k * s.dt) for k, p in enumerate(x[:, :2])]).reshape(len(x), -1)
+        gaps = np.array(
+            [self.gaps(p, k * s.dt) for k, p in enumerate(x[:, :2])]
+        ).reshape(len(x), -1)
         if not same(step.clearance, gaps.T):
             yield "clearance"
         if step.safe:
             ahead = state[:2] + s.dt * state[2:] + s.dt**2 / 2 * step.control
-            least = min(self.gaps(state[:2]).min(initial=1), self.gaps(ahead, s.dt).min(initial=1))
-            worst = min(self.h(state[:2]).min(initial=1), self.h(ahead, s.dt).min(initial=1))
-            if least < -TOLERANCE - NEAR or worst < -2 * TOLERANCE - NEAR or not step.feasible:
+            least = min(
+                self.gaps(state[:2]).min(initial=1),
+                self.gaps(ahead, s.dt).min(initial=1),
+            )
+            worst = min(
+                self.h(state[:2]).min(initial=1), self.h(ahead, s.dt).min(initial=1)
+            )
+            if (
+                least < -TOLERANCE - NEAR
+                or worst < -2 * TOLERANCE - NEAR
+                or not step.feasible
+            ):
                 yield "safe"
         on_goal = self.h(np.asarray(goal))[: len(self.people)]
         standing = [
-            h < -NEAR for h, person in zip(on_goal, self.people, strict=True) if not any(person.velocity)
+            h < -NEAR
+            for h, person in zip(on_goal, self.people, strict=True)
+            if not any(person.velocity)
         ]
         if any(standing) and not step.goal_blocked:
             yield "goal_blocked"
@@ -208,41 +263,65 @@ def settings_of(rng: np.random.Generator, solver: str = "sqp") -> szlib.MPCSetti
 
 def person_of(rng: np.random.Generator) -> szlib.Person:
     a = rng.uniform(0.3, 2)
-    zone = szlib.Ellipse(tuple(rng.uniform(-0.5, 0.5, 2)), (a, a * rng.uniform(0.1, 1)), rng.uniform(-3, 3))
-    inside = min(1.0, 0.99 / float(np.sqrt(zone.level((0.0, 0.0)))))  # a zone contains its person
+    zone = szlib.Ellipse(
+        tuple(rng.uniform(-0.5, 0.5, 2)),
+        (a, a * rng.uniform(0.1, 1)),
+        rng.uniform(-3, 3),
+    )
+    # a zone contains its person
+    inside = min(1.0, 0.99 / float(np.sqrt(zone.level((0.0, 0.0)))))
     zone = replace(zone, center=(inside * zone.center[0], inside * zone.center[1]))
     velocity = rng.uniform(-1.5, 1.5, 2) * (rng.random() < 0.6)
-    return szlib.Person(tuple(rng.uniform(-5, 5, 2)), tuple(velocity), rng.uniform(-4, 4), zone)
+    return szlib.Person(
+        tuple(rng.uniform(-5, 5, 2)), tuple(velocity), rng.uniform(-4, 4), zone
+    )
 
 
-def attack_steps(count: int, tally: Counter[str], seed: int = 0, solver: str = "sqp") -> None:
+def attack_steps(
+    count: int, tally: Counter[str], seed: int = 0, solver: str = "sqp"
+) -> None:
     """Steps in any state: driven for a while, then thrown elsewhere, with other people and goals."""
     with tqdm(total=count, unit="step", desc=f"steps, {solver}", leave=False) as bar:
         for k in range(count // A_SETTING):
             rng = np.random.default_rng([seed, k])
-            s, here = settings_of(rng, solver), rng.uniform(-5, 5, (rng.integers(0, 5), 1, 2))
+            s, here = (
+                settings_of(rng, solver),
+                rng.uniform(-5, 5, (rng.integers(0, 5), 1, 2)),
+            )
             if s.terminal == "person":
                 here = here[:0]
-            turns, lengths = rng.uniform(-3, 3, len(here)), 10 ** rng.uniform(-2, 1.2, len(here))
+            turns, lengths = (
+                rng.uniform(-3, 3, len(here)),
+                10 ** rng.uniform(-2, 1.2, len(here)),
+            )
             reach = (lengths * np.array([np.cos(turns), np.sin(turns)])).T[:, None]
             walls = list(np.concatenate([here, here + reach], axis=1))
             count_people = int(rng.integers(0, 5))
             controller = szlib.MPCCBF(
-                szlib.Ellipse((0, 0), (1, 1)), walls=walls, settings=s, max_people=count_people
+                szlib.Ellipse((0, 0), (1, 1)),
+                walls=walls,
+                settings=s,
+                max_people=count_people,
             )
             state = goal = people = None
             for i in range(A_SETTING):
                 if i % 10 == 0:
-                    state = np.r_[rng.uniform(-6, 6, 2), rng.uniform(-1.2, 1.2, 2) * s.v_max]
+                    state = np.r_[
+                        rng.uniform(-6, 6, 2), rng.uniform(-1.2, 1.2, 2) * s.v_max
+                    ]
                     goal = rng.uniform(-6, 6, 2)
-                    people = [person_of(rng) for _ in range(rng.integers(0, count_people + 1))]
+                    people = [
+                        person_of(rng) for _ in range(rng.integers(0, count_people + 1))
+                    ]
                 judge, step = Judge(s, walls, people), None
                 reachable = Judge(s, walls, []).h(goal).min(initial=1)
                 try:
                     step = controller.step(state, goal, people)
                 except szlib.SolverError:
                     tally["goals refused"] += 1
-                    tally["broken: refused a goal that is clear of walls"] += int(reachable > NEAR)
+                    tally["broken: refused a goal that is clear of walls"] += int(
+                        reachable > NEAR
+                    )
                     goal = state[:2] + 100.0
                     continue
                 tally["steps"] += 1
@@ -253,7 +332,9 @@ def attack_steps(count: int, tally: Counter[str], seed: int = 0, solver: str = "
                     tally[f"broken: {fault}"] += 1
                     tqdm.write(f"{fault}: seed [{seed}, {k}], step {i}, {s}")
                 u = step.control
-                state = np.r_[state[:2] + s.dt * state[2:] + s.dt**2 / 2 * u, state[2:] + s.dt * u]
+                state = np.r_[
+                    state[:2] + s.dt * state[2:] + s.dt**2 / 2 * u, state[2:] + s.dt * u
+                ]
                 people = [person.after(s.dt) for person in people]
             bar.update(A_SETTING)
 
@@ -265,29 +346,46 @@ def attack_worlds(seeds: range, tally: Counter[str], **parameters: Any) -> None:
         judge = Judge(log.settings, list(log.scenario.walls), list(log.scenario.people))
         dt, x, u = log.settings.dt, log.states, log.controls[:-1]
         times = dt * np.arange(len(x))
-        h = np.array([judge.h(p, t) for p, t in zip(x[:, :2], times, strict=True)]).reshape(len(x), -1)
-        gaps = np.array([judge.gaps(p, t) for p, t in zip(x[:, :2], times, strict=True)]).reshape(len(x), -1)
+        h = np.array(
+            [judge.h(p, t) for p, t in zip(x[:, :2], times, strict=True)]
+        ).reshape(len(x), -1)
+        gaps = np.array(
+            [judge.gaps(p, t) for p, t in zip(x[:, :2], times, strict=True)]
+        ).reshape(len(x), -1)
         people, numbers = len(judge.people), log.metrics()
         moved = np.c_[x[:-1, :2] + dt * x[:-1, 2:] + dt**2 / 2 * u, x[:-1, 2:] + dt * u]
         tally["worlds"] += 1
         tally["worlds with h < 0"] += int(h.min(initial=1) < -TOLERANCE)
-        tally["worlds with an overlap of a wall"] += int(gaps[:, people:].min(initial=1) < -TOLERANCE)
-        tally["worlds with an overlap of a person"] += int(gaps[:, :people].min(initial=1) < -TOLERANCE)
+        tally["worlds with an overlap of a wall"] += int(
+            gaps[:, people:].min(initial=1) < -TOLERANCE
+        )
+        tally["worlds with an overlap of a person"] += int(
+            gaps[:, :people].min(initial=1) < -TOLERANCE
+        )
         said = log.safe[:-1]
-        tally["broken: safe before h < 0"] += int((said & (h[1:].min(axis=1, initial=1) < -1e-5)).sum())
+        tally["broken: safe before h < 0"] += int(
+            (said & (h[1:].min(axis=1, initial=1) < -1e-5)).sum()
+        )
         tally["broken: safe before an overlap"] += int(
             (said & (gaps[1:].min(axis=1, initial=1) < -1e-5)).sum()
         )
         for k in np.flatnonzero(said):
-            near = replace(judge, people=[person.after(times[k]) for person in judge.people])
+            near = replace(
+                judge, people=[person.after(times[k]) for person in judge.people]
+            )
             bow, moments = np.hypot(*u[k]) * dt**2 / 8, dt * BETWEEN
             path = along(x[k], u[k], moments)
             least = near.between(x[k, :2], x[k + 1, :2], path, moments, bow, dt)
-            tally["broken: unsafe between samples after a safe step"] += int(least < -1e-5)
+            tally["broken: unsafe between samples after a safe step"] += int(
+                least < -1e-5
+            )
         tally["broken: no motion"] += int(not same(x[1:], moved))
-        tally["broken: out of bounds"] += bool((np.abs(u) > log.settings.a_max + NEAR).any())
+        tally["broken: out of bounds"] += bool(
+            (np.abs(u) > log.settings.a_max + NEAR).any()
+        )
         tally["broken: metrics"] += not (
-            same(numbers["min_h"], h.min(initial=np.inf)) and same(numbers["min_clearance"], gaps.min())
+            same(numbers["min_h"], h.min(initial=np.inf))
+            and same(numbers["min_clearance"], gaps.min())
             if h.size
             else True
         )
@@ -303,9 +401,16 @@ def cruel_states(seed: int) -> Iterator[tuple[Any, Any, list[szlib.Person], list
             rng.choice([0.01, 0.3, 1.5]),
             rng.choice([0.0, 0.7, 1.0, 3.0]),
         )
-        walls = [np.array([p, p + rng.uniform(-3, 3, 2)]) for p in rng.uniform(-2, 2, (rng.integers(5), 2))]
+        walls = [
+            np.array([p, p + rng.uniform(-3, 3, 2)])
+            for p in rng.uniform(-2, 2, (rng.integers(5), 2))
+        ]
         people = [
-            szlib.Person(tuple(x + rng.normal(0, spread, 2)), tuple(rng.uniform(-1, 1, 2)), zone=zone)
+            szlib.Person(
+                tuple(x + rng.normal(0, spread, 2)),
+                tuple(rng.uniform(-1, 1, 2)),
+                zone=zone,
+            )
             for _ in range(rng.integers(1, 6))
         ]
         yield np.r_[x, rng.uniform(-1, 1, 2) * pace], (30.0, 20.0), people, walls
@@ -316,9 +421,14 @@ def attack_time(count: int, tally: Counter[str], solver: str, **settings: Any) -
     s = szlib.MPCSettings(solver=solver, N_h=8, gamma=0.5, **settings)
     took = []
     for state, goal, people, walls in tqdm(
-        islice(cruel_states(5), count), total=count, desc=f"cruel, {solver}", leave=False
+        islice(cruel_states(5), count),
+        total=count,
+        desc=f"cruel, {solver}",
+        leave=False,
     ):
-        controller = szlib.MPCCBF(szlib.Ellipse((0, 0), (1, 1)), walls=walls, settings=s, max_people=5)
+        controller = szlib.MPCCBF(
+            szlib.Ellipse((0, 0), (1, 1)), walls=walls, settings=s, max_people=5
+        )
         begun = time.thread_time()
         step = controller.step(state, goal, people)
         took.append(time.thread_time() - begun)
@@ -327,18 +437,25 @@ def attack_time(count: int, tally: Counter[str], solver: str, **settings: Any) -
         for fault in Judge(s, walls, people).faults(state, goal, step):
             tally[f"broken: {fault}"] += 1
     for name, share in (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)):
-        tally[f"{name} of cruel steps, {solver} [ms]"] = round(1e3 * float(np.quantile(took, share)), 2)
-    over = sum(each > 2 * s.time_limit for each in took)  # clocks of computing time may tick every 10 ms
+        tally[f"{name} of cruel steps, {solver} [ms]"] = round(
+            1e3 * float(np.quantile(took, share)), 2
+        )
+    # clocks of computing time may tick every 10 ms
+    over = sum(each > 2 * s.time_limit for each in took)
     tally["broken: took longer than two limits"] += over
 
 
 def attack(long: bool) -> Counter[str]:
     tally: Counter[str] = Counter()
     attack_steps(STEPS[long], tally)
-    attack_steps(STEPS[long] // 50 * 2 // A_SETTING * A_SETTING, tally, seed=1, solver="ipopt")
+    attack_steps(
+        STEPS[long] // 50 * 2 // A_SETTING * A_SETTING, tally, seed=1, solver="ipopt"
+    )
     attack_worlds(range(FIRST_WORLD, FIRST_WORLD + WORLDS[long] // 2), tally)
     rest = szlib.MPCSettings(terminal="rest")
-    attack_worlds(range(FIRST_WORLD, FIRST_WORLD + WORLDS[long] // 2), tally, settings=rest)
+    attack_worlds(
+        range(FIRST_WORLD, FIRST_WORLD + WORLDS[long] // 2), tally, settings=rest
+    )
     for solver in ("sqp", "ipopt"):
         attack_time(CRUEL[long], tally, solver)
     return tally

@@ -29,7 +29,12 @@ FIRST_SEED = 100_000
 TIME_LIMIT = 20
 """Seconds that reading a file may take."""
 MEMORY_LIMIT = 1 << 30
-EXPECTED = ("read", "read with rejected rows", "refused with a line", "refused as a whole")
+EXPECTED = (
+    "read",
+    "read with rejected rows",
+    "refused with a line",
+    "refused as a whole",
+)
 
 
 def attack(long: bool) -> Counter[str]:
@@ -39,7 +44,9 @@ def attack(long: bool) -> Counter[str]:
         for seed in range(FIRST_SEED, FIRST_SEED + FILES[long]):
             tally[read_damaged(Path(folder), seed)] += 1
     tally["broken: more memory than allowed"] = int(_peak_memory() >= MEMORY_LIMIT)
-    tally["broken: an outcome that never came"] = sum(tally[outcome] == 0 for outcome in EXPECTED)
+    tally["broken: an outcome that never came"] = sum(
+        tally[outcome] == 0 for outcome in EXPECTED
+    )
     return tally
 
 
@@ -50,7 +57,11 @@ def _peak_memory() -> int:
     """
     status = Path("/proc/self/status")
     if status.exists():
-        line = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM:"))
+        line = next(
+            line
+            for line in status.read_text().splitlines()
+            if line.startswith("VmHWM:")
+        )
         return int(line.split()[1]) * 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
@@ -92,11 +103,15 @@ def _outcome(path: Path, read: Callable[[Path], pd.DataFrame]) -> tuple[str, str
     except szlib.SzlibError as error:
         message = str(error)
         assert str(path) in message, message
-        return ("refused with a line" if ", line " in message else "refused as a whole"), message
+        return (
+            "refused with a line" if ", line " in message else "refused as a whole"
+        ), message
     entered = lines_of(path)
     assert stages[0]["entered"] in (entered, entered - 1), "a header is no row"
     for stage in stages:
         assert stage["entered"] == stage["kept"] + sum(stage["rejected"].values())
     for before, after in zip(stages, stages[1:], strict=False):
         assert before["kept"] == after["entered"]
-    return "read with rejected rows" if stages[0]["rejected"] else "read", str(stages[0])
+    return "read with rejected rows" if stages[0]["rejected"] else "read", str(
+        stages[0]
+    )

@@ -31,15 +31,45 @@ PLACES: list[tuple[str, dict[str, str], str, str]] = [
     ("stale kernel", {"JUPYTER_PATH": "{place}/stale"}, "", SAME),
     ("no home", {"HOME": "/proc/nowhere/home", "MPLCONFIGDIR": ""}, "", SAME),
     ("home that cannot be written", {"HOME": "/proc", "MPLCONFIGDIR": ""}, "", SAME),
-    ("runtime folder that cannot be written", {"JUPYTER_RUNTIME_DIR": "/proc/nowhere"}, "", SAME),
-    ("settings of Jupyter", {"JUPYTER_CONFIG_DIR": "{place}/stale", "IPYTHONDIR": "/proc/nowhere"}, "", SAME),
-    ("locale C", {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"}, "", SAME),
+    (
+        "runtime folder that cannot be written",
+        {"JUPYTER_RUNTIME_DIR": "/proc/nowhere"},
+        "",
+        SAME,
+    ),
+    (
+        "settings of Jupyter",
+        {"JUPYTER_CONFIG_DIR": "{place}/stale", "IPYTHONDIR": "/proc/nowhere"},
+        "",
+        SAME,
+    ),
+    (
+        "locale C",
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
+        "",
+        SAME,
+    ),
     ("time zone", {"TZ": "Asia/Kolkata"}, "", SAME),
     ("no documentation strings", {"PYTHONOPTIMIZE": "2"}, "", SAME),
     ("another hash seed", {"PYTHONHASHSEED": "7"}, "", SAME),
-    ("terminal of one column", {"COLUMNS": "1", "LINES": "1", "TERM": "dumb"}, "", SAME),
-    ("temporary folder with a long name", {"TMPDIR": "{place}/tmp/" + "x" * 100 + "/" + "y" * 100}, "", SAME),
-    ("temporary folder that cannot be written", {"TMPDIR": "/proc/nowhere"}, "", REFUSED),
+    (
+        "terminal of one column",
+        {"COLUMNS": "1", "LINES": "1", "TERM": "dumb"},
+        "",
+        SAME,
+    ),
+    (
+        "temporary folder with a long name",
+        {"TMPDIR": "{place}/tmp/" + "x" * 100 + "/" + "y" * 100},
+        "",
+        SAME,
+    ),
+    (
+        "temporary folder that cannot be written",
+        {"TMPDIR": "/proc/nowhere"},
+        "",
+        REFUSED,
+    ),
     ("one core", {}, "taskset 1", SAME),
     ("64 open files", {}, "ulimit -n 64;", REFUSED),
     ("24 open files", {}, "ulimit -n 24;", REFUSED),
@@ -58,12 +88,29 @@ PLACES: list[tuple[str, dict[str, str], str, str]] = [
         f"{UNSHARE} 'mount -t tmpfs -o ro none /dev/shm; \"$@\"' sh",
         REFUSED,
     ),
-    ("full temporary folder", {}, f"{UNSHARE} 'mount -t tmpfs -o size=8k none $TMPDIR; \"$@\"' sh", REFUSED),
+    (
+        "full temporary folder",
+        {},
+        f"{UNSHARE} 'mount -t tmpfs -o size=8k none $TMPDIR; \"$@\"' sh",
+        REFUSED,
+    ),
     ("no network, not even within", {}, "unshare --net", REFUSED),
-    ("another user", {"HOME": "/proc/nowhere"}, "setpriv --reuid=65534 --regid=65534 --clear-groups", SAME),
+    (
+        "another user",
+        {"HOME": "/proc/nowhere"},
+        "setpriv --reuid=65534 --regid=65534 --clear-groups",
+        SAME,
+    ),
 ]
 """Name, variables, what precedes the command in the shell, and what is expected."""
-ALL_AT_ONCE = ("backend without figures", "stale kernel", "no home", "locale C", "time zone", "one core")
+ALL_AT_ONCE = (
+    "backend without figures",
+    "stale kernel",
+    "no home",
+    "locale C",
+    "time zone",
+    "one core",
+)
 
 
 def attack(long: bool) -> dict[str, int]:
@@ -75,15 +122,25 @@ def attack(long: bool) -> dict[str, int]:
         command = furnish(place, days=1, encounters=60, seconds=0.0)["run"]
         command += [] if long else ["--only", "01"]
         (place / "stale" / "kernels" / "python3").mkdir(parents=True)
-        (place / "stale" / "kernels" / "python3" / "kernel.json").write_text(json.dumps(STALE))
+        (place / "stale" / "kernels" / "python3" / "kernel.json").write_text(
+            json.dumps(STALE)
+        )
         if long:
             reference = make_reference("run", command, place)
             for name, variables, before, expected in PLACES:
-                enter(name, variables, before, expected, command, place, reference, tally)
+                enter(
+                    name, variables, before, expected, command, place, reference, tally
+                )
         else:
             chosen = [each for each in PLACES if each[0] in ALL_AT_ONCE]
-            together = {key: value for _, variables, _, _ in chosen for key, value in variables.items()}
-            enter("all at once", together, "taskset 1", SAME, command, place, None, tally)
+            together = {
+                key: value
+                for _, variables, _, _ in chosen
+                for key, value in variables.items()
+            }
+            enter(
+                "all at once", together, "taskset 1", SAME, command, place, None, tally
+            )
     return dict(tally)
 
 
@@ -113,7 +170,9 @@ def enter(
         ).returncode  # fmt: skip
     text = (place / "said.txt").read_text(errors="replace")
     tally[f"environments with {'the same results' if code == 0 else 'a refusal'}"] += 1
-    wrong = judge(name, code, text, contents(out) if code == 0 else {}, expected, reference)
+    wrong = judge(
+        name, code, text, contents(out) if code == 0 else {}, expected, reference
+    )
     if wrong:
         print(f"{name}: exit code {code}: {wrong}: {text[-1500:]}", file=sys.stderr)
         tally["broken: environments"] += 1
@@ -123,14 +182,23 @@ def enter(
     shutil.rmtree(everybody)
 
 
-def is_allowed(before: str, shell: list[str], settings: dict[str, str], place: Path) -> bool:
+def is_allowed(
+    before: str, shell: list[str], settings: dict[str, str], place: Path
+) -> bool:
     """Whether this machine has the tool, and lets it start Python, which starts itself again."""
     tool = before.partition(" ")[0]
     if tool not in ("unshare", "setpriv", "taskset"):
         return True
-    again = "import subprocess, sys; sys.exit(subprocess.call([sys.executable, '-c', '']))"
+    again = (
+        "import subprocess, sys; sys.exit(subprocess.call([sys.executable, '-c', '']))"
+    )
     trial = [*shell, sys.executable, "-c", again]
-    return subprocess.run(trial, env=settings, cwd=place, capture_output=True, check=False).returncode == 0
+    return (
+        subprocess.run(
+            trial, env=settings, cwd=place, capture_output=True, check=False
+        ).returncode
+        == 0
+    )
 
 
 def judge(
@@ -148,10 +216,18 @@ def judge(
         shown = [content for file, content in found.items() if file.endswith(".ipynb")]
         return "" if shown and all(shown) else "no figures"
     if code == 0 and reference is not None:
-        files = sorted(file for file in {*found, *reference} if found.get(file) != reference.get(file))
+        files = sorted(
+            file
+            for file in {*found, *reference}
+            if found.get(file) != reference.get(file)
+        )
         return f"other results: {files}" if files else ""
     if expected == SAME or code not in (1, 2):
-        return "it must not make a difference" if expected == SAME else "an exit code of its own"
+        return (
+            "it must not make a difference"
+            if expected == SAME
+            else "an exit code of its own"
+        )
     if re.search(r"^szlib: \w+(Error|Exception): ", text, re.MULTILINE):
         return "an error that is not of szlib"
     return "" if re.search("^szlib: ", text, re.MULTILINE) else "no sentence"

@@ -41,19 +41,40 @@ JUMPS = {False: 1, True: 40}
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
     """Count the attacks, and the results that were missing, half-written or different."""
-    tally = Counter({"broken after a full disk": 0, "broken after damage": 0, "broken by a clock": 0})
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), redirect_stdout(io.StringIO()):
-        warnings.simplefilter("ignore", szlib.DataWarning)  # so few encounters make no good zone
+    tally = Counter(
+        {
+            "broken after a full disk": 0,
+            "broken after damage": 0,
+            "broken by a clock": 0,
+        }
+    )
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        warnings.catch_warnings(),
+        redirect_stdout(io.StringIO()),
+    ):
+        # so few encounters make no good zone
+        warnings.simplefilter("ignore", szlib.DataWarning)
         place = Path(folder)
         (place / "data").mkdir()
         for number, date in enumerate(("2012-10-24", "2012-10-28")):
             settings = PlazaSettings(n_encounters=30, date=date)
-            make_plaza(place / "data" / f"day{number}.csv", seed=number, settings=settings)
+            make_plaza(
+                place / "data" / f"day{number}.csv", seed=number, settings=settings
+            )
         for name, work in WORKS.items():
             reference = _reference(work, place, name)
             fill_disks(name, work, place, reference, tally, 1 if long else STRIDE)
-            damage(name, work, place, reference, random.Random(seed), DAMAGES[long], tally)
-        jump(place, _reference(_extract, place, "jumps"), random.Random(seed), JUMPS[long], tally)
+            damage(
+                name, work, place, reference, random.Random(seed), DAMAGES[long], tally
+            )
+        jump(
+            place,
+            _reference(_extract, place, "jumps"),
+            random.Random(seed),
+            JUMPS[long],
+            tally,
+        )
     return dict(tally)
 
 
@@ -78,10 +99,16 @@ def fill_disks(
         if disk.n_writes <= full:
             break
         found = _contents(out)
-        whole = all(reference.get(file) == content or is_open(content) for file, content in found.items())
+        whole = all(
+            reference.get(file) == content or is_open(content)
+            for file, content in found.items()
+        )
         work(place / "data", out)
         if not (refused and whole and _contents(out) == reference):
-            print(f"{name}, full at write {full}: refused {refused}, whole {whole}", file=sys.stderr)
+            print(
+                f"{name}, full at write {full}: refused {refused}, whole {whole}",
+                file=sys.stderr,
+            )
             tally["broken after a full disk"] += 1
         tally["disks full at a write"] += 1
         full += stride
@@ -104,7 +131,9 @@ def damage(
     out = place / f"{name}-damaged"
     work(place / "data", out)
     for _ in range(count):
-        file = out / rng.choice(sorted(file for file in reference if files.MARKER not in file))
+        file = out / rng.choice(
+            sorted(file for file in reference if files.MARKER not in file)
+        )
         content = bytearray(file.read_bytes())
         kind = rng.choice(["cut", "flip", "gone", "garbage"])
         if kind == "cut":
@@ -124,7 +153,11 @@ def damage(
 
 
 def jump(
-    place: Path, reference: dict[str, bytes], rng: random.Random, count: int, tally: Counter[str]
+    place: Path,
+    reference: dict[str, bytes],
+    rng: random.Random,
+    count: int,
+    tally: Counter[str],
 ) -> None:
     """Clocks that jump forwards and backwards, files from the future: times change no result."""
     real = time.time
@@ -132,7 +165,10 @@ def jump(
         time.time = lambda: real() + rng.uniform(-1e9, 1e9)
         out = place / f"jump-{number % 2}"
         try:
-            for file in [*(place / "data").iterdir(), *(out.iterdir() if out.exists() else [])]:
+            for file in [
+                *(place / "data").iterdir(),
+                *(out.iterdir() if out.exists() else []),
+            ]:
                 moment = rng.uniform(0, 4e9)
                 os.utime(file, (moment, moment))
             _extract(place / "data", out)
@@ -161,7 +197,9 @@ class _Quick(ZoneMethod):
 
 
 def _notebook(data: Path, out: Path) -> None:
-    record = NotebookRecord("05_attack", {"data": [str(data / "day0.csv")], "results": out})
+    record = NotebookRecord(
+        "05_attack", {"data": [str(data / "day0.csv")], "results": out}
+    )
     record.cache = replace(record.cache, method=_Quick())
     record.cache.find_area()
     record.check("encounters", len(record.cache.encounters()) > 0)
@@ -179,7 +217,9 @@ def _plaza(_: Path, out: Path) -> None:
 WORKS = {"days": _extract, "worlds": _rollouts, "notebook": _notebook, "plaza": _plaza}
 
 
-def _reference(work: Callable[[Path, Path], None], place: Path, name: str) -> dict[str, bytes]:
+def _reference(
+    work: Callable[[Path, Path], None], place: Path, name: str
+) -> dict[str, bytes]:
     work(place / "data", place / f"{name}-reference")
     return _contents(place / f"{name}-reference")
 
@@ -195,9 +235,15 @@ def _contents(out: Path) -> dict[str, bytes]:
         if not Path(name).name.startswith("seeds-"):
             continue
         if name.endswith(".json"):
-            found[name] = b"made_of" if b'"made_of"' in content and b'"sha256"' in content else content
+            found[name] = (
+                b"made_of"
+                if b'"made_of"' in content and b'"sha256"' in content
+                else content
+            )
             continue
         with suppress(ValueError, OSError):  # damaged
             table = pd.read_parquet(io.BytesIO(content))
-            found[name] = table.drop(columns=[c for c in table if "time_" in c]).to_csv().encode()
+            found[name] = (
+                table.drop(columns=[c for c in table if "time_" in c]).to_csv().encode()
+            )
     return found

@@ -68,20 +68,28 @@ record.close()
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
     """Kill commands, and count what is wrong afterwards; the short form kills one run of notebooks only."""
-    tally = Counter({"broken: other bytes": 0, "broken: processes left": 0, "broken: files left": 0})
+    tally = Counter(
+        {"broken: other bytes": 0, "broken: processes left": 0, "broken: files left": 0}
+    )
     adopt_orphans()
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         commands = furnish(place)
         for name, command in commands.items() if long else [("run", commands["run"])]:
             reference = make_reference(name, command, place)
-            kill(name, command, place, reference, random.Random(seed), KILLS[long], tally)
+            kill(
+                name, command, place, reference, random.Random(seed), KILLS[long], tally
+            )
         if long:
-            both(commands["extract"], place, contents(place / "extract-reference"), tally)
+            both(
+                commands["extract"], place, contents(place / "extract-reference"), tally
+            )
     return dict(tally)
 
 
-def furnish(place: Path, days: int = 4, encounters: int = 150, seconds: float = 1.5) -> dict[str, list[str]]:
+def furnish(
+    place: Path, days: int = 4, encounters: int = 150, seconds: float = 1.5
+) -> dict[str, list[str]]:
     """Make days, the fourth one packed, and two notebooks, which also sleep; return two commands."""
     for name in ("data", "tmp", "home", "bin"):
         (place / name).mkdir()
@@ -92,12 +100,23 @@ def furnish(place: Path, days: int = 4, encounters: int = 150, seconds: float = 
         subprocess.run(["gzip", str(place / "data" / "day3.csv")], check=True)
     (place / "notebooks").mkdir()
     for name in ("01_one", "06_two"):
-        (place / "notebooks" / f"{name}.py").write_text(NOTEBOOK.format(name=name, seconds=seconds))
-    (place / "bin" / "program.py").write_text(PROGRAM.format(notebooks=str(place / "notebooks")))
+        (place / "notebooks" / f"{name}.py").write_text(
+            NOTEBOOK.format(name=name, seconds=seconds)
+        )
+    (place / "bin" / "program.py").write_text(
+        PROGRAM.format(notebooks=str(place / "notebooks"))
+    )
     program = [sys.executable, str(place / "bin" / "program.py")]
     return {
         "extract": [*program, "extract", str(place / "data"), "--jobs", "2"],
-        "run": [*program, "run", "--data", str(place / "data" / "day0.csv"), "--jobs", "2"],
+        "run": [
+            *program,
+            "run",
+            "--data",
+            str(place / "data" / "day0.csv"),
+            "--jobs",
+            "2",
+        ],
     }
 
 
@@ -107,7 +126,9 @@ def make_reference(name: str, command: list[str], place: Path) -> dict[str, byte
     wait_and_note(start([*command, "--out", str(out)], place))
     reference = contents(out)
     if not reference:
-        raise RuntimeError(f"{name}: the reference could not be made: {(place / 'printed.txt').read_text()}")
+        raise RuntimeError(
+            f"{name}: the reference could not be made: {(place / 'printed.txt').read_text()}"
+        )
     return reference
 
 
@@ -133,10 +154,19 @@ def kill(
             tally[f"broken: SIGTERM ends {name} with {code}"] += 1
         judge_end(f"{name}, kill {struck}", out, place, reference, tally)
         if struck == kills or rng.random() < 0.2:
-            finish(f"{name}, kill {struck}", [*command, "--out", str(out)], place, reference, before, tally)
+            finish(
+                f"{name}, kill {struck}",
+                [*command, "--out", str(out)],
+                place,
+                reference,
+                before,
+                tally,
+            )
 
 
-def judge_end(what: str, out: Path, place: Path, reference: dict[str, bytes], tally: Counter[str]) -> None:
+def judge_end(
+    what: str, out: Path, place: Path, reference: dict[str, bytes], tally: Counter[str]
+) -> None:
     """After a command was stopped, no process is left, and each finished file has the right bytes."""
     if left := wait_for_end(place, GRACE):
         print(f"{what}: left {left}", file=sys.stderr)
@@ -166,14 +196,18 @@ def finish(
     tally["resumed to identical bytes"] += same_bytes
     names = {str(path.relative_to(out)) for path in out.rglob("*")}
     undisturbed = place / f"{out.name.partition('-')[0]}-reference"
-    more = names - {str(path.relative_to(undisturbed)) for path in undisturbed.rglob("*")}
+    more = names - {
+        str(path.relative_to(undisturbed)) for path in undisturbed.rglob("*")
+    }
     if left := more | (everything_outside(place) - before):
         print(f"{what}: left {sorted(left)}", file=sys.stderr)
         tally["broken: files left"] += 1
     shutil.rmtree(out)
 
 
-def both(command: list[str], place: Path, reference: dict[str, bytes], tally: Counter[str]) -> None:
+def both(
+    command: list[str], place: Path, reference: dict[str, bytes], tally: Counter[str]
+) -> None:
     """Start two processes at once in one folder."""
     out = place / "both"
     pair = [start([*command, "--out", str(out)], place) for _ in range(2)]
@@ -186,14 +220,24 @@ def both(command: list[str], place: Path, reference: dict[str, bytes], tally: Co
 
 def environment(place: Path) -> dict[str, str]:
     """The environment of a command whose temporary files and own folder are in `place`."""
-    own = {"TMPDIR": str(place / "tmp"), "HOME": str(place / "home"), "MPLCONFIGDIR": str(place / "home")}
-    usual = {name: value for name, value in os.environ.items() if name not in ("MPLBACKEND", "JUPYTER_PATH")}
+    own = {
+        "TMPDIR": str(place / "tmp"),
+        "HOME": str(place / "home"),
+        "MPLCONFIGDIR": str(place / "home"),
+    }
+    usual = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("MPLBACKEND", "JUPYTER_PATH")
+    }
     return usual | own | {"PYTHONPATH": str(Path(szlib.__file__).parents[1])}
 
 
 def everything_outside(place: Path) -> set[str]:
     """Every file where temporary ones may be, in shared memory those of the processes that were noted."""
-    return everything_in(place / "tmp", place / "home") | named_after_noted(SHARED_MEMORY)
+    return everything_in(place / "tmp", place / "home") | named_after_noted(
+        SHARED_MEMORY
+    )
 
 
 def everything_before(place: Path) -> set[str]:
@@ -204,7 +248,9 @@ def everything_before(place: Path) -> set[str]:
 def start(command: list[str], place: Path) -> subprocess.Popen[bytes]:
     """Start a command, which prints to printed.txt."""
     with (place / "printed.txt").open("ab") as printed:
-        return subprocess.Popen(command, env=environment(place), stdout=printed, stderr=printed, cwd=place)
+        return subprocess.Popen(
+            command, env=environment(place), stdout=printed, stderr=printed, cwd=place
+        )
 
 
 def contents(out: Path) -> dict[str, bytes]:
@@ -219,7 +265,11 @@ def contents(out: Path) -> dict[str, bytes]:
         if file.is_file() and not file.name.startswith(".")
         and file.name not in ("summary.json", "report.html", "report.html.json")
     }  # fmt: skip
-    return {name: content for name, content in found.items() if b'"closed": false' not in content}
+    return {
+        name: content
+        for name, content in found.items()
+        if b'"closed": false' not in content
+    }
 
 
 def figures(notebook: Path) -> bytes:

@@ -34,14 +34,23 @@ TRIES = {False: 4, True: 2000}
 LONGEST = 0.01
 """Longest time for which a file is another one, and between two such times [s]; the first begins later."""
 AREA = str(szlib.ATC_SQUARE)
-REASONS = ("changed", "no such file", "cannot be opened", "the file is empty", "damaged")
+REASONS = (
+    "changed",
+    "no such file",
+    "cannot be opened",
+    "the file is empty",
+    "damaged",
+)
 FILES = ("day.csv", "day.csv.gz", "day.parquet")
 
 
 def attack(long: bool, seed: int = 0) -> Counter[str]:
     """Replace files while they are read, and count the results that are of other bytes than they say."""
-    tally = Counter({"broken: rows of other bytes": 0, "broken: refused without a reason": 0})
-    no_sync = mock.patch.object(os, "fsync")  # thousands of files need not survive a power failure
+    tally = Counter(
+        {"broken: rows of other bytes": 0, "broken: refused without a reason": 0}
+    )
+    # thousands of files need not survive a power failure
+    no_sync = mock.patch.object(os, "fsync")
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), no_sync:
         warnings.simplefilter("ignore", szlib.DataWarning)
         place = Path(folder)
@@ -57,7 +66,10 @@ def attack(long: bool, seed: int = 0) -> Counter[str]:
             tally["times that a file was another one"] += swaps[0]
             tally["readings"] += 1
             if fault := judge(found, out, expected[name], tally):
-                print(f"{seed}-{number}: {read} of {name}, {swap}: {fault}: {found}", file=sys.stderr)
+                print(
+                    f"{seed}-{number}: {read} of {name}, {swap}: {fault}: {found}",
+                    file=sys.stderr,
+                )
                 tally[f"broken: {fault}"] += 1
             shutil.rmtree(out, ignore_errors=True)
     return tally
@@ -67,7 +79,11 @@ def furnish(place: Path) -> None:
     """Make two folders with files of the same names, and links to one of them."""
     for number, folder in enumerate(("data", "other")):
         (place / folder).mkdir()
-        day = make_plaza(place / folder / FILES[0], seed=number, settings=PlazaSettings(n_encounters=12))
+        day = make_plaza(
+            place / folder / FILES[0],
+            seed=number,
+            settings=PlazaSettings(n_encounters=12),
+        )
         (place / folder / FILES[1]).write_bytes(gzip.compress(day.read_bytes()))
         szlib.read_tracks(day).to_parquet(place / folder / FILES[2])
 
@@ -84,7 +100,9 @@ def read_in_peace(place: Path, name: str) -> dict[str, dict[str, bytes]]:
             stored |= {result.name: result.read_bytes() for result in _results(out)}
             shutil.rmtree(out)
         expected[file_content(file)[1]] = stored
-    if len({stored[each] for stored in expected.values() for each in stored}) < 2 * len(stored):
+    if len({stored[each] for stored in expected.values() for each in stored}) < 2 * len(
+        stored
+    ):
         raise RuntimeError("both files give the same results")
     return expected
 
@@ -125,11 +143,15 @@ def _refuse(read: Callable[[Path, Path], str]) -> Callable[[Path, Path], str]:
 READERS = {each.__name__: _refuse(each) for each in (extract, extract_twice, use_cache)}
 
 
-def judge(found: str, out: Path, expected: dict[str, dict[str, bytes]], tally: Counter[str]) -> str:
+def judge(
+    found: str, out: Path, expected: dict[str, dict[str, bytes]], tally: Counter[str]
+) -> str:
     """What is wrong with the results in a folder; empty if nothing is."""
     results = _results(out)
     for result in results:
-        record = json.loads(result.with_name(f"{result.name}.json").read_text())["made_of"]
+        record = json.loads(result.with_name(f"{result.name}.json").read_text())[
+            "made_of"
+        ]
         checksum = record["files"][0][2]
         if expected.get(checksum, {}).get(result.name) != result.read_bytes():
             return "rows of other bytes"
@@ -137,21 +159,31 @@ def judge(found: str, out: Path, expected: dict[str, dict[str, bytes]], tally: C
         tally["readings that are stored"] += 1
         return "" if results else "nothing is stored"
     tally["readings that are refused"] += 1
-    return "" if any(reason in found for reason in REASONS) else "refused without a reason"
+    return (
+        "" if any(reason in found for reason in REASONS) else "refused without a reason"
+    )
 
 
 def _results(out: Path) -> list[Path]:
-    return sorted(each for each in out.glob("*.parquet") if each.with_name(f"{each.name}.json").exists())
+    return sorted(
+        each
+        for each in out.glob("*.parquet")
+        if each.with_name(f"{each.name}.json").exists()
+    )
 
 
 @contextlib.contextmanager
-def changing(place: Path, name: str, swap: Swap, rng: random.Random) -> Iterator[list[int]]:
+def changing(
+    place: Path, name: str, swap: Swap, rng: random.Random
+) -> Iterator[list[int]]:
     """Let a file of the data be another one once, or again and again; gives how often it was."""
     stop, swaps, first = threading.Event(), [0], rng.uniform(0, 10 * LONGEST)
     most = rng.choice([1, 1, 1, 1000])
 
     def work() -> None:
-        while swaps[0] < most and not stop.wait(rng.uniform(0, LONGEST) if swaps[0] else first):
+        while swaps[0] < most and not stop.wait(
+            rng.uniform(0, LONGEST) if swaps[0] else first
+        ):
             with swap(place, name):
                 swaps[0] += 1
                 time.sleep(rng.uniform(0, LONGEST))
@@ -202,4 +234,6 @@ def exchange_folders(place: Path, name: str) -> Iterator[None]:
         old.rename(new)
 
 
-SWAPS: dict[str, Swap] = {each.__name__: each for each in (rename, rewrite, exchange_folders)}
+SWAPS: dict[str, Swap] = {
+    each.__name__: each for each in (rename, rewrite, exchange_folders)
+}

@@ -59,25 +59,45 @@ raise SystemExit(main())
 
 def attack(long: bool, seed: int = 0) -> dict[str, int]:
     """Stop commands in a terminal, and count what is wrong afterwards; the short form does so once."""
-    tally = Counter({"broken: other bytes": 0, "broken: processes left": 0, "broken: files left": 0})
+    tally = Counter(
+        {"broken: other bytes": 0, "broken: processes left": 0, "broken: files left": 0}
+    )
     adopt_orphans()
     with tempfile.TemporaryDirectory() as folder:
         place, rng = Path(folder), random.Random(seed)
         commands = furnish(place) if long else furnish(place, days=1)
         if not long:
             out, before = place / "extract-0", everything_before(place)
-            attempt("Ctrl-C twice", [*commands["extract"], "--out", str(out)], place, rng, 0.3, tally)
-            left = wait_for_end(place, GRACE) or sorted(everything_outside(place) - before)
+            attempt(
+                "Ctrl-C twice",
+                [*commands["extract"], "--out", str(out)],
+                place,
+                rng,
+                0.3,
+                tally,
+            )
+            left = wait_for_end(place, GRACE) or sorted(
+                everything_outside(place) - before
+            )
             tally["broken: processes left"] += len(left)
             return dict(tally)
         for _ in range(IMPORTS):
-            command = [sys.executable, "-c", IMPORTING, "inspect", str(place / "data" / "day0.csv")]
+            command = [
+                sys.executable,
+                "-c",
+                IMPORTING,
+                "inspect",
+                str(place / "data" / "day0.csv"),
+            ]
             attempt("Ctrl-C while it imports", command, place, rng, 1.5, tally)
         for name, command in commands.items():
             reference = make_reference(name, command, place)
             before = everything_before(place)
             for trial in range(TRIALS):
-                action, full = rng.choice(list(ACTIONS)), [*command, "--out", str(place / f"{name}-{trial}")]
+                action, full = (
+                    rng.choice(list(ACTIONS)),
+                    [*command, "--out", str(place / f"{name}-{trial}")],
+                )
                 attempt(action, full, place, rng, 5.0, tally)
                 what = f"{name}, trial {trial}, {action}"
                 judge_end(what, Path(full[-1]), place, reference, tally)
@@ -86,7 +106,12 @@ def attack(long: bool, seed: int = 0) -> dict[str, int]:
 
 
 def attempt(
-    action: str, command: list[str], place: Path, rng: random.Random, longest: float, tally: Counter[str]
+    action: str,
+    command: list[str],
+    place: Path,
+    rng: random.Random,
+    longest: float,
+    tally: Counter[str],
 ) -> None:
     """Stop a command within `longest` seconds, and count it if its end is wrong."""
     if wrong := stop(command, place, action, rng, longest, tally):
@@ -95,7 +120,12 @@ def attempt(
 
 
 def stop(
-    command: list[str], place: Path, action: str, rng: random.Random, longest: float, tally: Counter[str]
+    command: list[str],
+    place: Path,
+    action: str,
+    rng: random.Random,
+    longest: float,
+    tally: Counter[str],
 ) -> str:
     """Start a command, do something to it, and return what was wrong with its end; empty if nothing was."""
     master, slave = pty.openpty()
@@ -137,7 +167,11 @@ def stop(
         return f"a foreign traceback: {text[-2000:]}"
     if code not in (0, *ACTIONS.get(action, (130, -signal.SIGINT))):
         return f"exit code {code} after {time.monotonic() - begun:.0f} s: {text[-500:]}"
-    return "" if code != 130 or "szlib: stopped" in text else f"it says nothing: {text[-500:]}"
+    return (
+        ""
+        if code != 130 or "szlib: stopped" in text
+        else f"it says nothing: {text[-500:]}"
+    )
 
 
 def take_terminal() -> None:

@@ -17,13 +17,17 @@ def test_every_step_is_as_reported(solver, steps):
     tally = Counter()
     hostile.attack_steps(steps, tally, seed=2, solver=solver)
     assert broken(tally) == {}
-    assert tally["steps"] > 0.9 * steps and tally["steps safe"] and tally["steps relaxed"]
+    assert (
+        tally["steps"] > 0.9 * steps and tally["steps safe"] and tally["steps relaxed"]
+    )
 
 
 @pytest.mark.parametrize("terminal", ["none", "rest"])
 def test_every_world_is_as_reported_and_no_wall_is_touched(terminal):
     tally = Counter()
-    hostile.attack_worlds(range(5), tally, settings=szlib.MPCSettings(terminal=terminal))
+    hostile.attack_worlds(
+        range(5), tally, settings=szlib.MPCSettings(terminal=terminal)
+    )
     assert broken(tally) == {}
     assert tally["worlds"] == 5 and tally["worlds with an overlap of a wall"] == 0
 
@@ -59,7 +63,9 @@ def test_people_measured_late_are_where_the_step_says(name, change):
 def test_a_clock_that_is_not_consistent_is_found(monkeypatch):
     see, tally = szlib.Tracker.see, Counter()
     monkeypatch.setattr(
-        szlib.Tracker, "see", lambda self, people, *, now, ids, **_: see(self, people, now=now, ids=ids)
+        szlib.Tracker,
+        "see",
+        lambda self, people, *, now, ids, **_: see(self, people, now=now, ids=ids),
     )
     clocks.attack_loops(1, tally, "measured late")
     assert broken(tally)
@@ -69,15 +75,24 @@ def test_drives_and_nodes_are_as_reported():
     tally = Counter()
     drive.attack_drives(100, tally)
     drive.attack_node(200, tally)
-    assert broken(tally) == {} and tally["steps of drives, safe"] and tally["ticks of nodes that move"]
+    assert (
+        broken(tally) == {}
+        and tally["steps of drives, safe"]
+        and tally["ticks of nodes that move"]
+    )
 
 
 def test_judge_finds_a_zone_that_is_entered_between_samples():
-    person = szlib.Person((0.0, 0.0), heading=0.0, zone=szlib.Ellipse((0.0, 0.0), (0.5, 0.5)))
+    person = szlib.Person(
+        (0.0, 0.0), heading=0.0, zone=szlib.Ellipse((0.0, 0.0), (0.5, 0.5))
+    )
     judge = hostile.Judge(szlib.MPCSettings(), [], [person])
     radius = 0.5 + judge.s.r_robot + judge.s.eps
     a, b = radius * np.array([[np.cos(turn), np.sin(turn)] for turn in (-0.1, 0.1)])
-    chord, times = np.array([a + share * (b - a) for share in hostile.BETWEEN]), 0.1 * hostile.BETWEEN
+    chord, times = (
+        np.array([a + share * (b - a) for share in hostile.BETWEEN]),
+        0.1 * hostile.BETWEEN,
+    )
     assert judge.h(chord[1]).min() < -1e-3
     assert judge.between(a, b, chord, times, 0.0, 0.1) >= -1e-9
     assert judge.between(a, b, 0.98 * chord, times, 0.0, 0.1) < -1e-3
@@ -107,12 +122,19 @@ def test_judge_finds_a_changed_step(change, fault):
 
 
 def test_judge_finds_a_margin_that_is_too_small():
-    paper, zone = szlib.MPCSettings(margin="paper"), szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
+    paper, zone = (
+        szlib.MPCSettings(margin="paper"),
+        szlib.Ellipse((0.1, 0.0), (1.0, 0.7)),
+    )
     step = szlib.MPCCBF(zone, walls=[WALL], settings=paper).step(STATE, GOAL)
-    assert "h or residual" in list(hostile.Judge(szlib.MPCSettings(), [WALL], []).faults(STATE, GOAL, step))
+    assert "h or residual" in list(
+        hostile.Judge(szlib.MPCSettings(), [WALL], []).faults(STATE, GOAL, step)
+    )
 
 
-@pytest.mark.parametrize("value", [1e155, -1e300, np.inf, np.nan, 1e-200, "x", None, [], [1], {}])
+@pytest.mark.parametrize(
+    "value", [1e155, -1e300, np.inf, np.nan, 1e-200, "x", None, [], [1], {}]
+)
 def test_invalid_numbers_raise_an_error_of_szlib_or_give_a_step(value):
     zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
     controller, person = szlib.MPCCBF(zone), szlib.Person((0.0, 0.0), heading=0.0)
@@ -120,10 +142,18 @@ def test_invalid_numbers_raise_an_error_of_szlib_or_give_a_step(value):
         lambda: controller.step((value, 0, 0, 0), GOAL, [person]),
         lambda: controller.step((-4, 0, value, 0), GOAL, [person]),
         lambda: controller.step((-4, 0, 0, 0), (value, 5.0), [person]),
-        lambda: controller.step((-4, 0, 0, 0), GOAL, [szlib.Person((value, 0), heading=0.0)]),
-        lambda: controller.step((-4, 0, 0, 0), GOAL, [szlib.Person((0, 0), (0, value), heading=0.0)]),
-        lambda: szlib.MPCCBF(zone, walls=[[(0, 5), (value, 5)]]).step((-4, 0, 0, 0), GOAL, [person]),
-        lambda: szlib.MPCCBF(zone, walls=[[(0, value), (1, 5)]]).step((-4, 0, 0, 0), GOAL, [person]),
+        lambda: controller.step(
+            (-4, 0, 0, 0), GOAL, [szlib.Person((value, 0), heading=0.0)]
+        ),
+        lambda: controller.step(
+            (-4, 0, 0, 0), GOAL, [szlib.Person((0, 0), (0, value), heading=0.0)]
+        ),
+        lambda: szlib.MPCCBF(zone, walls=[[(0, 5), (value, 5)]]).step(
+            (-4, 0, 0, 0), GOAL, [person]
+        ),
+        lambda: szlib.MPCCBF(zone, walls=[[(0, value), (1, 5)]]).step(
+            (-4, 0, 0, 0), GOAL, [person]
+        ),
     ):
         try:
             step = ask()

@@ -22,7 +22,16 @@ POLICY = '<meta http-equiv="Content-Security-Policy" content="{}">'
 
 
 @pytest.mark.parametrize(
-    "attack", ["commands", "damaged_tracks", "files", "races", "terminal", "adversary", "among_people"]
+    "attack",
+    [
+        "commands",
+        "damaged_tracks",
+        "files",
+        "races",
+        "terminal",
+        "adversary",
+        "among_people",
+    ],
 )
 def test_attack_breaks_nothing(attack, tmp_path):
     done = subprocess.run(
@@ -49,7 +58,9 @@ def test_judge_finds_foreign_code_in_a_page(page, tmp_path):
 
 
 def test_judge_accepts_a_page_whose_policy_forbids_scripts(tmp_path):
-    page = POLICY.format("default-src 'none'") + "<script>pwned()</script><b>pwned()</b>"
+    page = (
+        POLICY.format("default-src 'none'") + "<script>pwned()</script><b>pwned()</b>"
+    )
     (tmp_path / "report.html").write_text(page)
     assert list(adversary.active(tmp_path / "report.html")) == []
 
@@ -77,14 +88,21 @@ def test_only_what_a_command_left_in_shared_memory_counts(tmp_path, monkeypatch)
     leave = "import os, time; open(f'sem.loky-{os.getpid()}-own', 'w'); time.sleep(0.5)"
     command = subprocess.Popen([sys.executable, "-c", leave], cwd=tmp_path)
     assert process_table.wait_and_note(command) == 0
-    assert processes.everything_outside(tmp_path) == {str(tmp_path / f"sem.loky-{command.pid}-own")}
+    assert processes.everything_outside(tmp_path) == {
+        str(tmp_path / f"sem.loky-{command.pid}-own")
+    }
 
 
 def test_every_command_and_option_is_drawn():
     lines = [commands.draw(random.Random(seed)) for seed in range(400)]
     words = {word.partition("=")[0] for line in lines for word in line}
-    (verbs,) = [action for action in build_parser()._actions if isinstance(action.choices, dict)]
+    (verbs,) = [
+        action for action in build_parser()._actions if isinstance(action.choices, dict)
+    ]
     options = {
-        name for verb in verbs.choices.values() for each in verb._actions for name in each.option_strings
+        name
+        for verb in verbs.choices.values()
+        for each in verb._actions
+        for name in each.option_strings
     }
     assert {*verbs.choices, *options} - {"-h", "--help"} <= words

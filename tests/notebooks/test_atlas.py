@@ -10,13 +10,24 @@ from studies.atlas import CANNOT_START, REFERENCE, SCENES, AtlasCell, run_atlas
 
 import szlib
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.strategies import MIN_RETREAT, STRATEGIES, classify_strategy, compute_retreat
+from szlib.simulation.strategies import (
+    MIN_RETREAT,
+    STRATEGIES,
+    classify_strategy,
+    compute_retreat,
+)
 
 
-def made(x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: object) -> SimulationLog:
+def made(
+    x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: object
+) -> SimulationLog:
     """A run along x, beside a person who stands at the origin, made by hand."""
     n, s = len(x), szlib.MPCSettings()
-    scene = replace(szlib.SCENARIOS["passing"], start=np.array([x[0], y, 0.0, 0.0]), goal=np.array([4.0, y]))
+    scene = replace(
+        szlib.SCENARIOS["passing"],
+        start=np.array([x[0], y, 0.0, 0.0]),
+        goal=np.array([4.0, y]),
+    )
     states = np.column_stack([x, np.full(n, y), np.gradient(x, s.dt), np.zeros(n)])
     log = SimulationLog(
         scenario=scene,
@@ -38,8 +49,12 @@ def made(x: np.ndarray, y: float = -1.6, *, held: bool = False, **changes: objec
 
 
 AHEAD = np.linspace(-4, 4, 81)
-STANDS = np.concatenate([np.linspace(-4, -1, 31), np.full(20, -1.0), np.linspace(-1, 4, 51)])
-BACK = np.concatenate([np.linspace(-4, -1, 31), np.linspace(-1, -1.9, 10), np.linspace(-1.9, 4, 60)])
+STANDS = np.concatenate(
+    [np.linspace(-4, -1, 31), np.full(20, -1.0), np.linspace(-1, 4, 51)]
+)
+BACK = np.concatenate(
+    [np.linspace(-4, -1, 31), np.linspace(-1, -1.9, 10), np.linspace(-1.9, 4, 60)]
+)
 RUNS = {
     "goes ahead": made(AHEAD),
     "waits": made(STANDS, held=True),
@@ -100,11 +115,14 @@ def test_the_atlas_has_one_row_per_cell_in_order() -> None:
     table = run_atlas(cells, REFERENCE)
     assert table["width"].tolist() == [6.4, 1.0, 4.6]
     assert table["strategy"].iloc[:2].tolist() == ["goes ahead", CANNOT_START]
-    assert table["strategy"].iloc[2] != "goes ahead"  # the corridor of the paper with a larger zone
+    # the corridor of the paper with a larger zone
+    assert table["strategy"].iloc[2] != "goes ahead"
     assert table["min_h"].iloc[[0, 2]].min() >= 0
 
 
-@pytest.mark.parametrize("wrong", [{"scene": "hall"}, {"scene": "corridor", "width": 0}])
+@pytest.mark.parametrize(
+    "wrong", [{"scene": "hall"}, {"scene": "corridor", "width": 0}]
+)
 def test_invalid_cells_are_rejected(wrong: dict[str, object]) -> None:
     with pytest.raises(szlib.SolverError, match="must be"):
         AtlasCell(**wrong)  # type: ignore[arg-type]

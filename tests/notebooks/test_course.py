@@ -14,7 +14,9 @@ from szlib.workbook import folders
 
 
 def _course():
-    spec = importlib.util.spec_from_file_location("course", folders.NOTEBOOKS / "tools" / "course.py")
+    spec = importlib.util.spec_from_file_location(
+        "course", folders.NOTEBOOKS / "tools" / "course.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -23,7 +25,9 @@ def _course():
 course = _course()
 STORY = course.pages()
 REFERENCE = course.REFERENCE.read_text(encoding="utf-8")
-FOLDERS = tuple(folders.NOTEBOOKS / part for part in ("", "deeper", "exercises", "solutions"))
+FOLDERS = tuple(
+    folders.NOTEBOOKS / part for part in ("", "deeper", "exercises", "solutions")
+)
 TIME = re.compile(r"(\d+ h )?\d+\s(#\s)?min\b")
 
 
@@ -55,17 +59,25 @@ def test_navigation_states_reading_time_and_aim(page):
     assert page.cells[1].source == navigation
     (minutes,) = re.findall(r"·\s(\d+)\smin\b", navigation)
     assert abs(int(minutes) - page.minutes) <= 5, "python notebooks/tools/course.py"
-    assert re.search(r"\[paper\]\(https://arxiv.org/abs/2405.15101\):\s(all|sec)", navigation)
+    assert re.search(
+        r"\[paper\]\(https://arxiv.org/abs/2405.15101\):\s(all|sec)", navigation
+    )
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda f: f.name)
 def test_every_link_has_a_target(folder):
     for source in folder.glob("*[0-9]*_*.py"):
-        prose = [c.source for c in jupytext.read(source).cells if c.cell_type == "markdown"]
+        prose = [
+            c.source for c in jupytext.read(source).cells if c.cell_type == "markdown"
+        ]
         links = re.findall(r"\]\(([^)#]+)[)#]", "\n".join(prose))
         files = [(folder / link) for link in links if not link.startswith("http")]
-        recorded = [file for file in files if file.parent.name == "real_day"]  # copies without a script
-        files = [f.with_suffix(".py") if f.suffix == ".ipynb" and f not in recorded else f for f in files]
+        # copies without a script
+        recorded = [file for file in files if file.parent.name == "real_day"]
+        files = [
+            f.with_suffix(".py") if f.suffix == ".ipynb" and f not in recorded else f
+            for f in files
+        ]
         missing = [file.name for file in files if not file.exists()]
         assert missing == [], source.name
 
@@ -74,27 +86,42 @@ def test_the_course_reads_every_notebook_and_does_every_task_once():
     numbers = Counter(number for _, numbers, _ in course.WEEKS for number in numbers)
     assert set(numbers.values()) == {1}
     assert set(numbers) == {page.number for page in STORY if page.is_chapter} - {"00"}
-    done = Counter(task for _, _, ranges in course.WEEKS for part in ranges for task in course.expand(part))
+    done = Counter(
+        task
+        for _, _, ranges in course.WEEKS
+        for part in ranges
+        for task in course.expand(part)
+    )
     assert done == dict.fromkeys(course.tasks(), 1)
     assert len(course.WEEKS) == 6
     assert {page.number for page in STORY} <= set(course.GIVES)
 
 
 def test_every_task_belongs_to_one_notebook_and_comes_after_it():
-    owners = {n: [t for part in parts for t in course.expand(part)] for n, parts in course.EXERCISES.items()}
+    owners = {
+        n: [t for part in parts for t in course.expand(part)]
+        for n, parts in course.EXERCISES.items()
+    }
     belongs = Counter(task for tasks in owners.values() for task in tasks)
     assert belongs == dict.fromkeys(course.tasks(), 1)
     assert set(owners) <= {page.number for page in STORY}
     unread = {page.number for page in STORY if page.is_chapter}
     for _, numbers, ranges in course.WEEKS:
         unread -= set(numbers)
-        early = {n for n, tasks in owners.items() for part in ranges if set(tasks) & set(course.expand(part))}
+        early = {
+            n
+            for n, tasks in owners.items()
+            for part in ranges
+            if set(tasks) & set(course.expand(part))
+        }
         assert not early & unread
 
 
 def test_tasks_and_times_are_those_of_the_judges():
     for sheet, tasks in SHEETS.items():
-        found = [minutes for name, _, minutes in course.tasks().values() if name == sheet]
+        found = [
+            minutes for name, _, minutes in course.tasks().values() if name == sheet
+        ]
         assert found == [*(task.minutes for task in tasks), ESSAY_MINUTES]
 
 
@@ -102,7 +129,9 @@ def test_weeks_take_about_the_same_time():
     minutes = {page.number: page.minutes for page in STORY}
     times = [
         sum(minutes[n] for n in numbers)
-        + sum(course.tasks()[task][2] for part in ranges for task in course.expand(part))
+        + sum(
+            course.tasks()[task][2] for part in ranges for task in course.expand(part)
+        )
         for _, numbers, ranges in course.WEEKS
     ]
     assert max(times) <= 1.6 * min(times), times
@@ -126,11 +155,16 @@ def write_page(folder, *cells, outputs=()):
         shown = [nbformat.v4.new_output("display_data", data=data) for data in outputs]
         copy.cells = [nbformat.v4.new_code_cell("x = 1", outputs=shown)]
         nbformat.write(copy, folder / "01_a.ipynb")
-    return course.Page(folder / "01_a.py", tuple(jupytext.reads(script, fmt="py:percent").cells))
+    return course.Page(
+        folder / "01_a.py", tuple(jupytext.reads(script, fmt="py:percent").cells)
+    )
 
 
 CODE = "\n".join(["x = 1"] * 79)
-IMAGE, TABLE = {"image/png": "aGk="}, {"text/html": "<div><table><tr><td>1</td></tr></table></div>"}
+IMAGE, TABLE = (
+    {"image/png": "aGk="},
+    {"text/html": "<div><table><tr><td>1</td></tr></table></div>"},
+)
 FOLDED = {"text/html": f"<details><summary>All</summary>{TABLE['text/html']}</details>"}
 
 
@@ -142,10 +176,23 @@ FOLDED = {"text/html": f"<details><summary>All</summary>{TABLE['text/html']}</de
         (f'# %% jupyter={{"source_hidden": true}}\n{CODE}', 5),
         ("# %%\n" + "record.figure(axes, 'a')\n" * 6, 10),
         ("# %% [markdown]\n" + "# | a |\n# |---|\n# | 1 |\n#\n" * 9, 10),
-        ("# %% [markdown]\n# <details>\n#\n" + "# | a |\n# |---|\n# | 1 |\n#\n" * 9 + "# </details>", 5),
+        (
+            "# %% [markdown]\n# <details>\n#\n"
+            + "# | a |\n# |---|\n# | 1 |\n#\n" * 9
+            + "# </details>",
+            5,
+        ),
         ("# %% [markdown]\n" + "# $$\n# h = d - r\n# $$\n#\n" * 9, 10),
     ],
-    ids=["words", "code", "hidden code", "figures", "tables", "folded tables", "formulas"],
+    ids=[
+        "words",
+        "code",
+        "hidden code",
+        "figures",
+        "tables",
+        "folded tables",
+        "formulas",
+    ],
 )
 def test_reading_time_of_cells(cell, minutes, tmp_path):
     assert write_page(tmp_path, cell).minutes == minutes
@@ -180,9 +227,13 @@ def test_figures_are_counted_in_the_executed_copy(tmp_path):
 def test_word_is_explained_at_its_first_use(word):
     first = course.first_uses(STORY)[word]
     (page,) = [page for page in STORY if page.number == first]
-    assert f"*{word}*: {course.GLOSSARY[word].means}" in " ".join(page.cells[1].source.split())
+    assert f"*{word}*: {course.GLOSSARY[word].means}" in " ".join(
+        page.cells[1].source.split()
+    )
     before = STORY[1 : STORY.index(page)]
-    assert not any(re.search(rf"\b{word}\b", text) for each in before for text in each.prose)
+    assert not any(
+        re.search(rf"\b{word}\b", text) for each in before for text in each.prose
+    )
 
 
 def test_every_symbol_has_its_name_in_code():
@@ -198,10 +249,18 @@ def test_every_symbol_has_its_name_in_code():
 def test_parameters_in_the_reference_are_those_of_szlib():
     ours, paper = szlib.MPCSettings(), szlib.MPCSettings.paper()
     stated = [
-        ("limit (Euclidean) | 0.1 s; 8; 2; 1 m/s | paper", ("dt", "N", "N_h", "v_max"), (0.1, 8, 2, 1)),
+        (
+            "limit (Euclidean) | 0.1 s; 8; 2; 1 m/s | paper",
+            ("dt", "N", "N_h", "v_max"),
+            (0.1, 8, 2, 1),
+        ),
         ("| 0.5 m; 0.05 m, more at the ends", ("r_robot", "eps"), (0.5, 0.05)),
         ("| gamma | 0.05 | tuned", ("gamma",), (0.05,)),
-        ("| diag(10, 10, 1, 1); I; 10 Q |", ("Q", "R", "P"), ((10, 10, 1, 1), (1, 1), (100, 100, 10, 10))),
+        (
+            "| diag(10, 10, 1, 1); I; 10 Q |",
+            ("Q", "R", "P"),
+            ((10, 10, 1, 1), (1, 1), (100, 100, 10, 10)),
+        ),
         ("axis | 1 m/s² | assumed", ("a_max",), (1,)),
         ("passed | right |", ("pass_side",), ("right",)),
     ]
@@ -223,11 +282,15 @@ def test_a_section_that_is_missing_is_named():
 
 
 def test_every_reference_has_a_doi_or_says_that_there_is_none():
-    entries = REFERENCE.partition("## References")[2].partition("\n## ")[0].split("\n- ")[1:]
+    entries = (
+        REFERENCE.partition("## References")[2].partition("\n## ")[0].split("\n- ")[1:]
+    )
     assert len(entries) >= 10
     for entry in entries:
         assert "https://doi.org/10." in entry or "(no DOI)" in entry, entry
-        for shown, link in re.findall(r"\[(10\.[^\]]+)\]\(https://doi\.org/([^)]+)\)", entry):
+        for shown, link in re.findall(
+            r"\[(10\.[^\]]+)\]\(https://doi\.org/([^)]+)\)", entry
+        ):
             assert shown == link
 
 
@@ -237,4 +300,6 @@ def test_only_the_navigation_is_replaced():
     once = course.replace_cells(script, {}, navigation)
     cell = f"# %% [markdown]\n# 5 min\n#\n# {course.HEADING}x\n\n"
     assert once == script.replace("# %%\nx", f"{cell}# %%\nx")
-    assert course.replace_cells(once, {}, navigation.replace("5", "10")) == once.replace("5 min", "10 min")
+    assert course.replace_cells(
+        once, {}, navigation.replace("5", "10")
+    ) == once.replace("5 min", "10 min")

@@ -15,7 +15,8 @@ EXECUTED = [
     for data in COPIES
     for file in sorted((ROOT / "results" / data).glob("[0-9][0-9]*_*.ipynb"))
     if (COPIES[data] / file.name).exists()
-    and file.stat().st_mtime > (COPIES[data] / file.name).stat().st_mtime  # executed after the copy was made
+    and file.stat().st_mtime
+    > (COPIES[data] / file.name).stat().st_mtime  # executed after the copy was made
 ]
 
 
@@ -25,7 +26,13 @@ def count_images(notebook: Path) -> int:
     return sum("image/png" in output.get("data", {}) for output in outputs)
 
 
-@pytest.mark.skipif(not EXECUTED, reason="no notebook was executed after the copies: make run")
-@pytest.mark.parametrize(("executed", "committed"), EXECUTED, ids=lambda file: file.stem)
-def test_executed_notebook_has_as_many_figures_as_its_copy(executed: Path, committed: Path) -> None:
+@pytest.mark.skipif(
+    not EXECUTED, reason="no notebook was executed after the copies: make run"
+)
+@pytest.mark.parametrize(
+    ("executed", "committed"), EXECUTED, ids=lambda file: file.stem
+)
+def test_executed_notebook_has_as_many_figures_as_its_copy(
+    executed: Path, committed: Path
+) -> None:
     assert count_images(executed) == count_images(committed)

@@ -29,7 +29,9 @@ LONG = {"blind_spot", "my_zone", "largest_gamma", "prediction"} | {
 
 
 def _sheets():
-    spec = importlib.util.spec_from_file_location("sheets", folders.NOTEBOOKS / "tools" / "sheets.py")
+    spec = importlib.util.spec_from_file_location(
+        "sheets", folders.NOTEBOOKS / "tools" / "sheets.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -63,7 +65,9 @@ class TestEach:
                 assert message in verdict.message
 
     def test_the_stub_fails_with_no_answer_yet(self, name):
-        verdict = check(name, defined(TASKS[name][0], sheets.EXERCISES)[name], seed=SEED)
+        verdict = check(
+            name, defined(TASKS[name][0], sheets.EXERCISES)[name], seed=SEED
+        )
         assert not verdict.passed
         assert "no answer yet" in verdict.message
         with pytest.raises(szlib.SzlibError, match="no answer yet"):
@@ -71,7 +75,11 @@ class TestEach:
 
     def test_the_message_of_each_mistake_has_a_wrong_answer(self, name):
         expected = [message for message, _ in WRONG[name]]
-        said = [message for message in TASKS[name][2].mistakes if any(each in message for each in expected)]
+        said = [
+            message
+            for message in TASKS[name][2].mistakes
+            if any(each in message for each in expected)
+        ]
         assert len(said) >= min(5, len(TASKS[name][2].mistakes))
 
     def test_hints_end_before_the_answer(self, name, capsys):
@@ -84,13 +92,19 @@ class TestEach:
         sheet = (sheets.SOLUTIONS / f"{TASKS[name][0]}.py").read_text(encoding="utf-8")
         answers = "".join(re.findall(r"BEGIN SOLUTION\n(.*?)### END", sheet, re.DOTALL))
         results = re.findall(r"return (.+)", answers)
-        assert not any(len(result) > 12 and result in text for result in results for text in hints)
+        assert not any(
+            len(result) > 12 and result in text for result in results for text in hints
+        )
 
     def test_the_sheet_states_the_declared_order_and_time(self, name):
         sheet, number, task = TASKS[name]
         all_cells = cells(sheets.SOLUTIONS / f"{sheet}.py")
         (place,) = [i for i, c in enumerate(all_cells) if f'check("{name}"' in c.source]
-        titles = [c.source.splitlines()[0] for c in all_cells[:place] if c.source.startswith("## ")]
+        titles = [
+            c.source.splitlines()[0]
+            for c in all_cells[:place]
+            if c.source.startswith("## ")
+        ]
         assert titles[number].startswith(f"## {sheet[5]}.{number + 1} ")
         assert titles[number].endswith(f"{task.minutes} min)")
 
@@ -114,7 +128,9 @@ def test_each_check_draws_new_cases():
 
 
 def test_the_examples_of_the_judges_hold():
-    assert doctest.testmod(judges.sheets, extraglobs={"__name__": "example"}).failed == 0
+    assert (
+        doctest.testmod(judges.sheets, extraglobs={"__name__": "example"}).failed == 0
+    )
 
 
 # --- invalid answers ---------------------------------------------------------------------------------
@@ -159,7 +175,9 @@ def test_a_failing_case_can_be_run_again():
         return np.abs(szlib_free_line(points, a, b))
 
     verdict = check("wall_distance", wrong)
-    seed, number = map(int, re.search(r"seed=(\d+), number=(\d+)\)", verdict.message).groups())
+    seed, number = map(
+        int, re.search(r"seed=(\d+), number=(\d+)\)", verdict.message).groups()
+    )
     points, a, b = judges.case("wall_distance", seed=seed, number=number)
     shown = re.search(r"\bb = np\.array\(\[([^]]*)\]\)", verdict.message)[1]
     assert [float(each) for each in shown.split(",")] == b.tolist()
@@ -168,7 +186,9 @@ def test_a_failing_case_can_be_run_again():
 
 
 def szlib_free_line(points, a, b):
-    return ((points - a)[:, 0] * (b - a)[1] - (points - a)[:, 1] * (b - a)[0]) / np.hypot(*(b - a))
+    return (
+        (points - a)[:, 0] * (b - a)[1] - (points - a)[:, 1] * (b - a)[0]
+    ) / np.hypot(*(b - a))
 
 
 def test_an_answer_cannot_read_what_only_the_judge_knows():
@@ -178,9 +198,15 @@ def test_an_answer_cannot_read_what_only_the_judge_knows():
 def test_an_answer_that_calls_szlib_or_the_judges_is_refused():
     line = judges.sheet1_tracks._line_of_sight
     for answer in (line, lambda *args: line(*args)):
-        assert "no answer: this calls judges.sheet1_tracks" in check("line_of_sight", answer).message
+        assert (
+            "no answer: this calls judges.sheet1_tracks"
+            in check("line_of_sight", answer).message
+        )
     verdict = check("wall_distance", szlib.segment_distance)
-    assert "no answer: this calls szlib.control.barriers.segment_distance" in verdict.message
+    assert (
+        "no answer: this calls szlib.control.barriers.segment_distance"
+        in verdict.message
+    )
 
 
 def test_an_answer_cannot_change_the_case():
@@ -194,13 +220,20 @@ def test_an_answer_cannot_change_the_case():
 
 def test_a_value_instead_of_a_function_and_an_unknown_task_are_refused():
     assert "the function itself" in check("velocity", 1.0).message
-    with pytest.raises(szlib.DataError, match="no task 'speed'; the tasks are velocity"):
+    with pytest.raises(
+        szlib.DataError, match="no task 'speed'; the tasks are velocity"
+    ):
         check("speed", lambda: 0)
 
 
 def test_the_first_wrong_number_of_a_large_array_is_shown():
-    verdict = check("in_space", lambda ref, heading, others: np.zeros(len(others), bool), seed=SEED)
-    assert re.search(r"\d+ of 40 numbers are wrong; at \[\d+\] expected True, got False", verdict.message)
+    verdict = check(
+        "in_space", lambda ref, heading, others: np.zeros(len(others), bool), seed=SEED
+    )
+    assert re.search(
+        r"\d+ of 40 numbers are wrong; at \[\d+\] expected True, got False",
+        verdict.message,
+    )
 
 
 # --- the closed loop ---------------------------------------------------------------------------------
@@ -211,8 +244,13 @@ def test_a_world_that_fails_says_when_and_is_drawn():
         return min(wish, 1.0)
 
     verdict = check("filter_1d", careless, seed=SEED)
-    assert re.search(r"after \d+\.\d s h = -0\.\d+ m: the robot is too near to a person", verdict.message)
-    number = int(re.search(rf"filter_1d, seed={SEED}, number=(\d)\)", verdict.message)[1])
+    assert re.search(
+        r"after \d+\.\d s h = -0\.\d+ m: the robot is too near to a person",
+        verdict.message,
+    )
+    number = int(
+        re.search(rf"filter_1d, seed={SEED}, number=(\d)\)", verdict.message)[1]
+    )
     judges.plot("filter_1d", careless, seed=SEED, number=number)
     h = plt.gcf().axes[1].lines[0].get_ydata()
     assert h[-1] < 0 <= h[-2]
@@ -249,7 +287,9 @@ class TestSheet:
         assert exercise.count("# YOUR ANSWER HERE") == 1
         assert "Rubric" not in exercise
 
-    @pytest.mark.parametrize("folder", [sheets.SOLUTIONS, sheets.EXERCISES], ids=lambda f: f.name)
+    @pytest.mark.parametrize(
+        "folder", [sheets.SOLUTIONS, sheets.EXERCISES], ids=lambda f: f.name
+    )
     def test_script_and_notebook_are_equal(self, sheet, folder):
         copy = nbformat.read(folder / f"{sheet}.ipynb", as_version=4).cells
         assert [(c.cell_type, c.source) for c in copy] == [
@@ -264,7 +304,9 @@ class TestSheet:
             if c.source.startswith("judges.check")
             for out in c.outputs
         ]
-        assert [line.split(" - ")[0] for line in outputs] == ["passed"] * len(SHEETS[sheet])
+        assert [line.split(" - ")[0] for line in outputs] == ["passed"] * len(
+            SHEETS[sheet]
+        )
 
     def test_the_sheet_runs_before_it_is_answered(self, sheet, monkeypatch):
         monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
@@ -276,11 +318,18 @@ class TestSheet:
     def test_each_check_of_a_class_is_graded_and_locked(self, sheet):
         solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
         points = {task.name: task.minutes for task in SHEETS[sheet]}
-        marked = [c for c in sheets.make_graded(solutions, points).cells if "nbgrader" in c.metadata]
+        marked = [
+            c
+            for c in sheets.make_graded(solutions, points).cells
+            if "nbgrader" in c.metadata
+        ]
         assert len(marked) == 2 * len(points) + 1
         essay = marked.pop()
         assert essay.metadata["nbgrader"]["points"] == judges.ESSAY_MINUTES
-        assert sum(map(int, re.findall(r"^\| (\d+) \|", essay.source, re.MULTILINE))) == judges.ESSAY_MINUTES
+        assert (
+            sum(map(int, re.findall(r"^\| (\d+) \|", essay.source, re.MULTILINE)))
+            == judges.ESSAY_MINUTES
+        )
         for answer, test in zip(marked[::2], marked[1::2], strict=True):
             assert "### BEGIN SOLUTION" in answer.source
             assert answer.metadata["nbgrader"]["solution"]
@@ -289,9 +338,13 @@ class TestSheet:
             assert test.metadata["nbgrader"]["points"] in points.values()
 
     def test_nbgrader_makes_the_same_stubs(self, sheet):
-        preprocessors = pytest.importorskip("nbgrader.preprocessors", reason="nbgrader is not installed")
+        preprocessors = pytest.importorskip(
+            "nbgrader.preprocessors", reason="nbgrader is not installed"
+        )
         solutions = (sheets.SOLUTIONS / f"{sheet}.py").read_text(encoding="utf-8")
-        source = sheets.make_graded(solutions, {task.name: task.minutes for task in SHEETS[sheet]})
+        source = sheets.make_graded(
+            solutions, {task.name: task.minutes for task in SHEETS[sheet]}
+        )
         released = preprocessors.ClearSolutions().preprocess(source, {})[0].cells
         expected = [cell.source for cell in cells(sheets.EXERCISES / f"{sheet}.py")]
         assert [cell.source.removesuffix(".require()") for cell in released] == expected

@@ -15,7 +15,9 @@ from PIL import Image
 import szlib
 
 ZONE = szlib.Ellipse((0.03, 0.0), (0.97, 0.75))
-PAPER, AMONG_PEOPLE = (RobotOptions(f"MPCSettings.{name}") for name in ("paper", "among_people"))
+PAPER, AMONG_PEOPLE = (
+    RobotOptions(f"MPCSettings.{name}") for name in ("paper", "among_people")
+)
 FAST = RobotOptions(changes={"gamma": 0.5})
 
 
@@ -33,7 +35,15 @@ def describe(world):
     """Everything that a user sees, exactly."""
     controls = [step.control.tolist() for step in world.steps]
     scene, states = world.scenario, [state.tolist() for state in world.states]
-    shown = [world.n, states, controls, world.people, scene.goal.tolist(), scene.walls.tolist(), world.robots]
+    shown = [
+        world.n,
+        states,
+        controls,
+        world.people,
+        scene.goal.tolist(),
+        scene.walls.tolist(),
+        world.robots,
+    ]
     return repr(shown)
 
 
@@ -65,7 +75,12 @@ EDITS = [
     {"walls": [[-6, 2.0, 7, 2.5]]},
     {"start": [-3.0, 0.5]},
     {"robots": [AMONG_PEOPLE]},
-    {"robots": [RobotOptions("MPCSettings.paper", {"v_max": 0.8, "N": 10}), RobotOptions()]},
+    {
+        "robots": [
+            RobotOptions("MPCSettings.paper", {"v_max": 0.8, "N": 10}),
+            RobotOptions(),
+        ]
+    },
 ]
 
 
@@ -83,7 +98,9 @@ def test_shared_code_computes_exactly_what_is_on_the_screen(edit, after):
         assert np.array_equal(log.states[-1], state)
         assert np.array_equal(log.residual[-1], step.residual)
         assert shared[f"settings{suffix}"] == step.scene.settings
-    places = [(*person.position, person.heading, *person.velocity) for person in world.people]
+    places = [
+        (*person.position, person.heading, *person.velocity) for person in world.people
+    ]
     assert np.array_equal(log.people[-1], np.reshape(places, (-1, 5)))
     assert np.array_equal(log.scenario.walls, world.scenario.walls)
     assert ("log_b" in shared) == (len(world.robots) == 2)
@@ -92,10 +109,14 @@ def test_shared_code_computes_exactly_what_is_on_the_screen(edit, after):
 def test_a_change_begins_at_this_instant_and_changes_nothing_else():
     world = make_world(n=20)
     states, people = [state.tolist() for state in world.states], world.people
-    world.change(people={0: {"heading": 1.0}, 1: {"position": [0.0, 1.0], "speed": 0.5}})
+    world.change(
+        people={0: {"heading": 1.0}, 1: {"position": [0.0, 1.0], "speed": 0.5}}
+    )
     assert world.n == 20 and [state.tolist() for state in world.states] == states
     assert world.people[0].position == people[0].position
-    assert world.people[0].velocity == pytest.approx((0.5 * np.cos(1.0), 0.5 * np.sin(1.0)))
+    assert world.people[0].velocity == pytest.approx(
+        (0.5 * np.cos(1.0), 0.5 * np.sin(1.0))
+    )
     assert world.people[1].velocity == (0.5, 0.0)
     world.change(people={0: None}, robots=[RobotOptions(), PAPER])
     assert [person.position for person in world.people] == [(0.0, 1.0)]
@@ -167,17 +188,23 @@ def sentence(world):
 
 
 def test_the_sentence_says_what_the_robot_does_and_why():
-    assert sentence(make_world()).startswith("It sets off: only the bound of its acceleration limits it")
+    assert sentence(make_world()).startswith(
+        "It sets off: only the bound of its acceleration limits it"
+    )
     assert sentence(make_world(n=20)) == (
         "It keeps its speed: 1 m/s is its highest speed, and no person and no wall limits it."
     )
     both = r"It brakes: person 0 comes closer at 0.7 m/s (h = 1.55 m), wall 1 comes closer at 0.5 m/s"
     assert sentence(make_world(n=40)).startswith(both)
-    assert sentence(make_world(n=40)).endswith("and h may shrink by at most 5 % a step.")
+    assert sentence(make_world(n=40)).endswith(
+        "and h may shrink by at most 5 % a step."
+    )
     assert "at most 8 % a step" in sentence(make_world(n=40, robots=[AMONG_PEOPLE]))
     assert sentence(make_world("making_room", 20)).startswith("It goes back")
     there = make_world("passing", 95)
-    assert sentence(there).startswith("It brakes: no person and no wall limits it, and its goal is 0.")
+    assert sentence(there).startswith(
+        "It brakes: no person and no wall limits it, and its goal is 0."
+    )
     assert sentence(advance(there, 20)).endswith(": it is at its goal.")
 
 
@@ -185,7 +212,10 @@ def test_danger_and_goals_that_cannot_be_reached_are_said_in_words():
     world = make_world("passing", 25)
     world.change(goal=[0.8, 0.8])
     (note,) = explain(world.steps[0]).notes
-    assert note == "The goal (0.8, 0.8) cannot be reached: h < 0 there; the robot waits beside it."
+    assert (
+        note
+        == "The goal (0.8, 0.8) cannot be reached: h < 0 there; the robot waits beside it."
+    )
     x, y = world.states[0][:2]
     world.change(people={0: {"position": [x + 1.2, y]}})
     reasons = explain(world.steps[0])
@@ -197,14 +227,20 @@ def test_danger_and_goals_that_cannot_be_reached_are_said_in_words():
         fast.advance()
     reasons = explain(fast.steps[0])
     assert ": no plan keeps every limit, so the plan is relaxed" in reasons.sentence
-    assert reasons.active == () and reasons.notes[0].startswith("The plan violates the barrier of person 0")
+    assert reasons.active == () and reasons.notes[0].startswith(
+        "The plan violates the barrier of person 0"
+    )
 
 
 # --- the page ----------------------------------------------------------------------------------------
 
 
 def ask(lab, kind, n=0, **changes):
-    return json.loads(json.dumps(lab.answer({"kind": kind, "n": n, "changes": changes}), allow_nan=False))
+    return json.loads(
+        json.dumps(
+            lab.answer({"kind": kind, "n": n, "changes": changes}), allow_nan=False
+        )
+    )
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -213,7 +249,11 @@ def test_every_scene_can_be_shown_and_run(name):
     first, second = ask(lab, "show")["snapshots"]
     assert first["robot"] == second["robot"] == PRESETS[name].start[:2].tolist()
     answer = ask(lab, "step")
-    assert (answer["n"], answer["scenario"], len(answer["speeds"])) == (1, name, len(PRESETS[name].people))
+    assert (answer["n"], answer["scenario"], len(answer["speeds"])) == (
+        1,
+        name,
+        len(PRESETS[name].people),
+    )
     assert answer["snapshots"][0]["allowed"] and answer["snapshots"][0]["sentence"]
 
 
@@ -221,10 +261,17 @@ def test_the_view_stays_when_a_change_is_refused():
     lab = Laboratory(zone=ZONE)
     before = ask(lab, "step")
     refused = ask(lab, "show", 1, walls=[[-6, 2.3, 50, 2.3], [-6, 0, 7, 0]])
-    assert refused.pop("kind") == "error" and "too close to the wall" in refused.pop("text")
-    assert refused == {key: value for key, value in before.items() if key not in ("kind", "text")}
+    assert refused.pop("kind") == "error" and "too close to the wall" in refused.pop(
+        "text"
+    )
+    assert refused == {
+        key: value for key, value in before.items() if key not in ("kind", "text")
+    }
     wider = ask(lab, "show", 1, walls=[[-6, 2.3, 50, 2.3]])
-    assert wider["kind"] == "snapshots" and wider["layout"]["limits"] == before["layout"]["limits"]
+    assert (
+        wider["kind"] == "snapshots"
+        and wider["layout"]["limits"] == before["layout"]["limits"]
+    )
 
 
 def test_a_request_goes_back_first_and_a_scene_begins_anew():
@@ -244,7 +291,9 @@ def test_a_scene_of_ones_own_is_opened():
     scene = szlib.Scenario("my hall", (0, 0, 0, 0), (5, 0), [szlib.Person((3, 1))])
     lab = Laboratory(scene, zone=ZONE)
     assert lab.content["presets"][0] == ask(lab, "show")["scenario"] == "my hall"
-    with pytest.raises(szlib.SolverError, match="scenario must be one of passing, corridor"):
+    with pytest.raises(
+        szlib.SolverError, match="scenario must be one of passing, corridor"
+    ):
         Laboratory("nowhere")
 
 
@@ -268,8 +317,18 @@ def test_a_malformed_message_gives_an_error_and_changes_nothing():
     ask(lab, "step")
     before = describe(lab.world)
     requests = [{"kind": "step", "n": 1, "changes": changes} for changes in MALFORMED]
-    requests += [None, 3, "x", [], {}, {"kind": "step"}, {"kind": "x", "n": 1, "changes": {}}]
-    requests += [{"kind": "step", "n": n, "changes": {}} for n in (-1, 2, "x", None, NAN)]
+    requests += [
+        None,
+        3,
+        "x",
+        [],
+        {},
+        {"kind": "step"},
+        {"kind": "x", "n": 1, "changes": {}},
+    ]
+    requests += [
+        {"kind": "step", "n": n, "changes": {}} for n in (-1, 2, "x", None, NAN)
+    ]
     for request in requests:
         assert lab.answer(request)["kind"] == "error", request
         assert describe(lab.world) == before, request
@@ -324,6 +383,7 @@ def test_a_slider_replaces_one_picture_whose_axes_stay(monkeypatch):
     after = Image.open(io.BytesIO(picture.value)).convert("L")
     assert plt.get_fignums() == open_before and len(shown) == 1
     assert before.size == after.size
-    rows = [np.array(image)[:, :40] for image in (before, after)]  # the numbers of the y axis
+    # the numbers of the y axis
+    rows = [np.array(image)[:, :40] for image in (before, after)]
     assert rows[0].min() < 128 and np.array_equal(*rows)
     assert not np.array_equal(np.array(before), np.array(after))

@@ -27,7 +27,11 @@ def is_hidden(cell: nbformat.NotebookNode) -> bool:
 
 
 def code_lines(cell: nbformat.NotebookNode) -> int:
-    return sum(1 for line in cell.source.splitlines() if line.strip() and not line.strip().startswith("#"))
+    return sum(
+        1
+        for line in cell.source.splitlines()
+        if line.strip() and not line.strip().startswith("#")
+    )
 
 
 RESULT = re.compile(
@@ -40,14 +44,20 @@ def read_results(source: Path) -> list[tuple[str, str, str]]:
     """Kind, name and result of each check and claim that the executed copy of a notebook shows."""
     executed = nbformat.read(source.with_suffix(".ipynb"), as_version=4)
     outputs = [out for cell in executed.cells for out in cell.get("outputs", ())]
-    return RESULT.findall("\n".join(out.text for out in outputs if out.output_type == "stream"))
+    return RESULT.findall(
+        "\n".join(out.text for out in outputs if out.output_type == "stream")
+    )
 
 
 def test_each_notebook_has_a_copy_and_no_number_is_missing():
     numbers = [s.stem.split("_")[0] for s in SOURCES]
     assert len(set(numbers)) == len(numbers)
     assert {f"{n:02d}" for n in (*range(14), *range(21, 30))} <= set(numbers)
-    copies = [copy for part in ("", "deeper") for copy in sorted((folders.NOTEBOOKS / part).glob("*.ipynb"))]
+    copies = [
+        copy
+        for part in ("", "deeper")
+        for copy in sorted((folders.NOTEBOOKS / part).glob("*.ipynb"))
+    ]
     assert copies == [source.with_suffix(".ipynb") for source in SOURCES]
 
 
@@ -56,7 +66,10 @@ class TestEach:
     def test_script_and_copy_agree(self, source):
         executed = nbformat.read(source.with_suffix(".ipynb"), as_version=4)
         copied, written = (
-            [(c.cell_type, c.source, c.metadata.get("tags", []), is_hidden(c)) for c in each]
+            [
+                (c.cell_type, c.source, c.metadata.get("tags", []), is_hidden(c))
+                for c in each
+            ]
             for each in (executed.cells, cells(source))
         )
         assert copied == written
@@ -80,7 +93,11 @@ class TestEach:
         assert not re.search(r"/(home|root|work|Users)/|[A-Z]:\\\\Users", text)
 
     def test_parameters_of_the_method_mean_the_same_everywhere(self, source):
-        own = {name: value for name, value in read_defaults(source).items() if name in METHOD_DEFAULTS}
+        own = {
+            name: value
+            for name, value in read_defaults(source).items()
+            if name in METHOD_DEFAULTS
+        }
         assert own == {name: METHOD_DEFAULTS[name] for name in own}
 
     def test_notebook_has_question_expectation_and_meaning(self, source):
@@ -92,10 +109,14 @@ class TestEach:
         assert any(end in cell.source for cell in all_cells[-3:] for end in ends)
         assert all_cells[-1].source.endswith("record.close()")
         assert sum("parameters" in c.metadata.get("tags", []) for c in all_cells) == 1
-        assert max(code_lines(c) for c in all_cells if c.cell_type == "code") <= MAX_LINES
+        assert (
+            max(code_lines(c) for c in all_cells if c.cell_type == "code") <= MAX_LINES
+        )
 
     def test_notebook_has_the_common_parameters(self, source):
-        (tagged,) = [c for c in cells(source) if "parameters" in c.metadata.get("tags", [])]
+        (tagged,) = [
+            c for c in cells(source) if "parameters" in c.metadata.get("tags", [])
+        ]
         assert {"data", "seed", "results"} <= {
             line.split("=")[0].strip() for line in tagged.source.splitlines()
         }
@@ -104,8 +125,14 @@ class TestEach:
 @pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.stem)
 class TestShape:
     def test_parameters_checks_and_record_are_folded(self, source):
-        plumbing = re.compile(r"^(record = |record\.(check|claim|close)\b|import |from .* import )", re.M)
-        visible = [c.source for c in cells(source) if c.cell_type == "code" and not is_hidden(c)]
+        plumbing = re.compile(
+            r"^(record = |record\.(check|claim|close)\b|import |from .* import )", re.M
+        )
+        visible = [
+            c.source
+            for c in cells(source)
+            if c.cell_type == "code" and not is_hidden(c)
+        ]
         assert [text for text in visible if plumbing.search(text)] == []
 
     def test_each_folded_cell_says_what_it_hides(self, source):
@@ -115,9 +142,13 @@ class TestShape:
     def test_a_figure_comes_before_25_visible_lines_of_code(self, source):
         visible = 0
         for cell in nbformat.read(source.with_suffix(".ipynb"), as_version=4).cells:
-            if any("image/png" in out.get("data", {}) for out in cell.get("outputs", ())):
+            if any(
+                "image/png" in out.get("data", {}) for out in cell.get("outputs", ())
+            ):
                 break
-            visible += 0 if is_hidden(cell) or cell.cell_type != "code" else code_lines(cell)
+            visible += (
+                0 if is_hidden(cell) or cell.cell_type != "code" else code_lines(cell)
+            )
         assert visible <= MAX_LINES
 
     def test_the_copy_has_at_most_600_kb(self, source):
@@ -125,17 +156,26 @@ class TestShape:
 
 
 def test_method_parameters_have_the_same_default_everywhere():
-    found = [(n, v) for s in SOURCES for n, v in read_defaults(s).items() if n in METHOD_DEFAULTS]
+    found = [
+        (n, v)
+        for s in SOURCES
+        for n, v in read_defaults(s).items()
+        if n in METHOD_DEFAULTS
+    ]
     assert {name for name, _ in found} == set(METHOD_DEFAULTS)
     assert all(value == METHOD_DEFAULTS[name] for name, value in found)
 
 
 def test_read_defaults_finds_what_the_cell_sets():
     for source in SOURCES:
-        (tagged,) = [c for c in cells(source) if "parameters" in c.metadata.get("tags", [])]
+        (tagged,) = [
+            c for c in cells(source) if "parameters" in c.metadata.get("tags", [])
+        ]
         variables: dict[str, object] = {}
         exec(tagged.source, variables)
-        assert variables == read_defaults(source) | {"__builtins__": variables["__builtins__"]}
+        assert variables == read_defaults(source) | {
+            "__builtins__": variables["__builtins__"]
+        }
 
 
 def test_parameter_has_the_same_type_in_all_notebooks():
@@ -147,11 +187,17 @@ def test_parameter_has_the_same_type_in_all_notebooks():
 
 
 def test_more_than_half_of_the_claims_are_supported_on_the_plaza():
-    claims = [result for s in SOURCES for kind, _, result in read_results(s) if kind == "claim"]
+    claims = [
+        result
+        for s in SOURCES
+        for kind, _, result in read_results(s)
+        if kind == "claim"
+    ]
     assert len(claims) > 20
     assert claims.count("supported") > len(claims) / 2
 
 
 def test_both_methods_find_the_true_zone_of_the_plaza():
     names = [name for _, name, _ in read_results(folders.NOTEBOOKS / "05_zones.py")]
-    assert sum("true zone found" in name for name in names) == 8  # two methods, four speeds
+    # two methods, four speeds
+    assert sum("true zone found" in name for name in names) == 8

@@ -33,7 +33,9 @@ class Mine:
 def make_controller(walls, zone):
     return Mine()
 """
-STRAIGHT = OWN.format(control="10 * ((goal - state[:2]) / max(1, np.hypot(*(goal - state[:2]))) - state[2:])")
+STRAIGHT = OWN.format(
+    control="10 * ((goal - state[:2]) / max(1, np.hypot(*(goal - state[:2]))) - state[2:])"
+)
 PLAIN = """
 import szlib
 
@@ -76,7 +78,9 @@ def test_a_larger_gamma_with_a_longer_barrier_beats_the_papers_settings(run):
 
 
 def test_points_are_the_time_alone_over_the_time_with_a_price_for_zones(run):
-    world = szlib.simulation.Variations(szlib.MEETINGS["overtaking"], judging.REFERENCE)(0)
+    world = szlib.simulation.Variations(
+        szlib.MEETINGS["overtaking"], judging.REFERENCE
+    )(0)
     found = run(BOLDER, "overtaking")
     distance = ((world.goal - world.start[:2]) ** 2).sum() ** 0.5
     cost = found["time_to_goal"] + judging.PRICE * found["time_in_zones"]
@@ -93,8 +97,14 @@ def test_points_are_the_time_alone_over_the_time_with_a_price_for_zones(run):
             OWN.format(control="np.array([0, 1])"),
             "touches a wall in 1 of 1 worlds; does not arrive",
         ),
-        (OWN.format(control="1 / 0"), r"line 10: ZeroDivisionError: division by zero \(in world 1\)"),
-        (OWN.format(control="[np.nan, 0]"), r"gives the acceleration \[nan, 0.0\]; expected two finite"),
+        (
+            OWN.format(control="1 / 0"),
+            r"line 10: ZeroDivisionError: division by zero \(in world 1\)",
+        ),
+        (
+            OWN.format(control="[np.nan, 0]"),
+            r"gives the acceleration \[nan, 0.0\]; expected two finite",
+        ),
         (OWN.format(control="[1, 2, 3]"), "expected two finite numbers"),
         ("def make_controller(:", "line 1: SyntaxError"),
         ("x = 1", "KeyError: 'make_controller'"),
@@ -111,7 +121,9 @@ def test_a_faulty_submission_is_refused_with_the_reason(run, source, reason):
     assert pd.Series([row["refused"]]).str.contains(reason).item(), row["refused"]
 
 
-@pytest.mark.parametrize("start", ["", "import os\nif not os.fork():\n    time.sleep(3600)\nos._exit(0)"])
+@pytest.mark.parametrize(
+    "start", ["", "import os\nif not os.fork():\n    time.sleep(3600)\nos._exit(0)"]
+)
 def test_a_submission_that_takes_too_long_is_refused(run, start):
     """Also if it leaves a process that holds the pipe."""
     if start and not hasattr(os, "fork"):
@@ -176,7 +188,9 @@ def test_the_motors_have_limits(tmp_path):
     assert log.speed.max() == pytest.approx(RULES.v_max)
 
 
-def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(tmp_path, monkeypatch, capsys):
+def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.setattr(judging, "RIVALS", [])
     for name, source in {"crash": "1 / 0", "plain": PLAIN}.items():
         (tmp_path / f"{name}.py").write_text(source)
@@ -184,9 +198,20 @@ def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(tmp_p
     boards = []
     for seed in ("7", "7", "8"):
         out = tmp_path / f"out{len(boards)}"
-        given = ["--meeting", "overtaking", "--worlds", "1", "--seed", seed, "--out", str(out)]
+        given = [
+            "--meeting",
+            "overtaking",
+            "--worlds",
+            "1",
+            "--seed",
+            seed,
+            "--out",
+            str(out),
+        ]
         judging.main([*files, *given])
-        boards.append((out / "board.csv").read_bytes() + (out / "board.md").read_bytes())
+        boards.append(
+            (out / "board.csv").read_bytes() + (out / "board.md").read_bytes()
+        )
     assert boards[0] == boards[1] != boards[2]
     printed = capsys.readouterr().out
     assert printed.splitlines()[2].startswith(f"| {tmp_path.name}/plain |")
@@ -198,17 +223,25 @@ def test_the_same_seed_gives_the_same_board_and_an_error_stops_nobody_else(tmp_p
 
 def test_the_template_runs_as_it_is_and_is_not_refused(run, tmp_path):
     template = PROJECT / "my_controller.py"
-    subprocess.run([sys.executable, template], cwd=tmp_path, check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, template], cwd=tmp_path, check=True, capture_output=True
+    )
     assert (tmp_path / "my_controller.png").stat().st_size > 10_000
     assert run(template.read_text(), "intersection")["refused"] == ""
 
 
 def test_the_assignment_states_the_rules_of_the_judge():
     text = (PROJECT / "README.md").read_text(encoding="utf-8")
-    missing = [link for link in re.findall(r"\]\((?!http)([^)#]+)\)", text) if not (PROJECT / link).exists()]
+    missing = [
+        link
+        for link in re.findall(r"\]\((?!http)([^)#]+)\)", text)
+        if not (PROJECT / link).exists()
+    ]
     assert missing == []
     assert rf"T + {judging.PRICE}\,T" in text
     assert f"has {szlib.MEETINGS['overtaking'].duration:g} s" in text
     assert f"radius of {RULES.r_robot:g} m" in text
-    for command in re.findall(r"^python notebooks/project/judge\.py (.+)$", text, flags=re.M):
+    for command in re.findall(
+        r"^python notebooks/project/judge\.py (.+)$", text, flags=re.M
+    ):
         assert judging.make_parser().parse_args(shlex.split(command)).worlds == 12

@@ -14,7 +14,9 @@ COPIES = sorted((folders.NOTEBOOKS / "real_day").glob("*.ipynb"))
 
 
 def _refresh():
-    spec = importlib.util.spec_from_file_location("refresh", folders.NOTEBOOKS / "tools" / "refresh.py")
+    spec = importlib.util.spec_from_file_location(
+        "refresh", folders.NOTEBOOKS / "tools" / "refresh.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -29,13 +31,19 @@ class TestCopy:
         executed = nbformat.read(copy, as_version=4)
         now = refresh.replace_data(folders.NOTEBOOKS / f"{copy.stem}.py", "atc-1hz")
         again = "python notebooks/tools/refresh.py real_day"
-        assert [c.source for c in executed.cells] == [c.source for c in now.cells], again
+        assert [c.source for c in executed.cells] == [c.source for c in now.cells], (
+            again
+        )
         code = [c for c in executed.cells if c.cell_type == "code"]
         assert [c.execution_count for c in code] == list(range(1, len(code) + 1))
         assert all(out.output_type != "error" for c in code for out in c.outputs)
 
     def test_every_check_of_the_copy_holds(self, copy):
-        outputs = [o for c in nbformat.read(copy, as_version=4).cells for o in c.get("outputs", ())]
+        outputs = [
+            o
+            for c in nbformat.read(copy, as_version=4).cells
+            for o in c.get("outputs", ())
+        ]
         text = "\n".join(out.text for out in outputs if out.output_type == "stream")
         checks = re.findall(r"^check: .+", text, re.M)
         assert checks
@@ -51,7 +59,9 @@ class TestCopy:
 
 
 def record_of(data, name="99_none"):
-    return SimpleNamespace(name=name, cache=SimpleNamespace(is_synthetic=data == "synthetic"))
+    return SimpleNamespace(
+        name=name, cache=SimpleNamespace(is_synthetic=data == "synthetic")
+    )
 
 
 def write_plaza_copy(folder, monkeypatch, numbers):
@@ -64,11 +74,18 @@ def write_plaza_copy(folder, monkeypatch, numbers):
 
 
 def test_numbers_are_shown_beside_those_of_the_plaza(tmp_path, monkeypatch):
-    write_plaza_copy(tmp_path, monkeypatch, {"people": "5,000", "speed, median": "1.02 m/s"})
+    write_plaza_copy(
+        tmp_path, monkeypatch, {"people": "5,000", "speed, median": "1.02 m/s"}
+    )
     numbers = {"people": "15,066", "speed, median": "1.11 m/s", "gaps": "221"}
-    text = real_day.compare_with_plaza(record_of("atc-1hz", "99_a"), numbers, "More people.").data
+    text = real_day.compare_with_plaza(
+        record_of("atc-1hz", "99_a"), numbers, "More people."
+    ).data
     assert text.startswith("**On this data.** More people.\n\n|")
-    rows = [[part.strip() for part in line.strip("|").split("|")] for line in text.splitlines()[4:]]
+    rows = [
+        [part.strip() for part in line.strip("|").split("|")]
+        for line in text.splitlines()[4:]
+    ]
     assert rows == [
         ["people", "15,066", "5,000"],
         ["speed, median", "1.11 m/s", "1.02 m/s"],
@@ -82,7 +99,9 @@ def test_numbers_are_shown_without_a_copy_of_the_plaza(tmp_path, monkeypatch):
     assert "| people | 3 | - |" in text
 
 
-@pytest.mark.parametrize("numbers", [{"a: b": "1"}, {"a": "1; 2"}, {"a|b": "1"}, {"a": "1\n2"}])
+@pytest.mark.parametrize(
+    "numbers", [{"a: b": "1"}, {"a": "1; 2"}, {"a|b": "1"}, {"a": "1\n2"}]
+)
 def test_number_that_cannot_be_read_back_is_an_error(numbers):
     with pytest.raises(ValueError, match="expected names and numbers without"):
         real_day.compare_with_plaza(record_of("synthetic"), numbers)
@@ -92,15 +111,23 @@ def test_copies_on_the_real_day_show_the_numbers_of_the_plaza_copies():
     for copy in COPIES:
         numbers = real_day.read_numbers(folders.NOTEBOOKS / copy.name)
         cells = nbformat.read(copy, as_version=4).cells
-        texts = [o.get("data", {}).get("text/markdown", "") for c in cells for o in c.get("outputs", ())]
+        texts = [
+            o.get("data", {}).get("text/markdown", "")
+            for c in cells
+            for o in c.get("outputs", ())
+        ]
         shown = " ".join(text for text in texts if text.startswith("**On this data.**"))
         for name, value in numbers.items():
-            assert re.search(rf"\| {re.escape(name)} \| [^|]+ \| {re.escape(value)} \|", shown), copy.name
+            assert re.search(
+                rf"\| {re.escape(name)} \| [^|]+ \| {re.escape(value)} \|", shown
+            ), copy.name
 
 
 def test_copy_has_other_data_and_links_from_its_folder():
     notebook = refresh.replace_data(folders.NOTEBOOKS / "01_tracks.py", "atc-1hz")
-    (tagged,) = (c.source for c in notebook.cells if "parameters" in c.metadata.get("tags", []))
+    (tagged,) = (
+        c.source for c in notebook.cells if "parameters" in c.metadata.get("tags", [])
+    )
     assert re.search('^data = "atc-1hz"', tagged, re.M)
     links = re.findall(r"\]\(([^)]+)\)", notebook.cells[1].source)
     assert links
@@ -108,6 +135,15 @@ def test_copy_has_other_data_and_links_from_its_folder():
 
 
 def test_zone_does_not_reach_farther_ahead_on_the_real_day():
-    executed = nbformat.read(folders.NOTEBOOKS / "real_day" / "05_zones.ipynb", as_version=4)
-    text = "".join(out.get("text", "") for cell in executed.cells for out in cell.get("outputs", ()))
-    assert "the zone at 1.1 m/s reaches farther ahead than behind: not supported here" in text
+    executed = nbformat.read(
+        folders.NOTEBOOKS / "real_day" / "05_zones.ipynb", as_version=4
+    )
+    text = "".join(
+        out.get("text", "")
+        for cell in executed.cells
+        for out in cell.get("outputs", ())
+    )
+    assert (
+        "the zone at 1.1 m/s reaches farther ahead than behind: not supported here"
+        in text
+    )

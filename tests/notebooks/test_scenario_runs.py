@@ -25,7 +25,9 @@ def test_five_numbers_are_those_of_the_metrics_and_have_units(corridor):
     table = scenario_runs.tabulate_five({"ours": corridor})
     assert len(table.columns) == 5
     assert all(name.endswith(("[s]", "[m]", "[m/s]")) for name in table.columns)
-    assert table.loc["ours", "least h [m]"] == pytest.approx(corridor.metrics()["min_h"], abs=0.005)
+    assert table.loc["ours", "least h [m]"] == pytest.approx(
+        corridor.metrics()["min_h"], abs=0.005
+    )
 
 
 def test_a_row_holds_the_robot_only_where_its_residual_is_zero(corridor):
@@ -33,12 +35,22 @@ def test_a_row_holds_the_robot_only_where_its_residual_is_zero(corridor):
     assert list(holding) == ["person", "wall to its left", "wall to its right"]
     at = np.isin(corridor.time, holding["person"])
     assert at.any() and not at.all()
-    assert corridor.residual[at, 0].min(axis=1).max() <= 1e-4 < corridor.residual[~at, 0].min()
+    assert (
+        corridor.residual[at, 0].min(axis=1).max()
+        <= 1e-4
+        < corridor.residual[~at, 0].min()
+    )
 
 
 def test_a_change_is_described_by_what_changed():
     rows = [
-        {"scenario": "passing", "chain": chain, "time_to_goal": 11.0, "min_h": h, "min_speed": 0.5}
+        {
+            "scenario": "passing",
+            "chain": chain,
+            "time_to_goal": 11.0,
+            "min_h": h,
+            "min_speed": 0.5,
+        }
         | {"passing_side": side, "claims_held": 2, "changed": chain == "side rule"}
         for chain, h, side in (
             ("paper", 0.17, "left"),
@@ -49,5 +61,6 @@ def test_a_change_is_described_by_what_changed():
     found = pd.DataFrame(rows).set_index(["chain", "scenario"])
     assert chains.describe_change(found, "solver", "passing") == "-"
     assert (
-        chains.describe_change(found, "side rule", "passing") == "least h 0.17 to 0.21 m; side left to right"
+        chains.describe_change(found, "side rule", "passing")
+        == "least h 0.17 to 0.21 m; side left to right"
     )

@@ -12,7 +12,9 @@ from szlib.workbook import folders
 
 
 def _slides():
-    spec = importlib.util.spec_from_file_location("slides", folders.NOTEBOOKS / "tools" / "slides.py")
+    spec = importlib.util.spec_from_file_location(
+        "slides", folders.NOTEBOOKS / "tools" / "slides.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -25,13 +27,17 @@ PNG = (  # one pixel
 FIGURE = new_output("display_data", {"image/png": PNG})
 SENTENCE = new_output("display_data", {"text/markdown": "**What we know now.** 1 m."})
 CHECK = new_output("stream", text="check: the zone has a size [m]: holds (1 m)\n")
-TABLE = new_output("execute_result", {"text/html": "<table><tr><td>1</td></tr></table>"})
+TABLE = new_output(
+    "execute_result", {"text/html": "<table><tr><td>1</td></tr></table>"}
+)
 HIDDEN = {"jupyter": {"source_hidden": True}}
 
 
 def make(*cells):
     """The parts of the slides of these cells: kind and cell."""
-    made = slides.make_slides(new_notebook(cells=[new_markdown_cell("# 7 - Barriers"), *cells]))
+    made = slides.make_slides(
+        new_notebook(cells=[new_markdown_cell("# 7 - Barriers"), *cells])
+    )
     return [(cell.metadata.slideshow.slide_type, cell) for cell in made.cells[1:]]
 
 
@@ -41,7 +47,10 @@ def test_the_title_and_each_heading_start_a_slide():
         new_markdown_cell("## A\n\none\n\n## B\n### C\n\ntwo"),
     ]
     made = slides.make_slides(new_notebook(cells=cells))
-    kinds = [(cell.metadata.slideshow.slide_type, cell.source.splitlines()[0]) for cell in made.cells]
+    kinds = [
+        (cell.metadata.slideshow.slide_type, cell.source.splitlines()[0])
+        for cell in made.cells
+    ]
     starts = [
         ("slide", "# T"),
         ("-", "**Question.** Why?"),
@@ -53,7 +62,9 @@ def test_the_title_and_each_heading_start_a_slide():
 
 
 def test_a_hidden_cell_shows_its_figures_and_sentences_without_its_code():
-    code = new_code_cell("draw()", metadata=HIDDEN, outputs=[CHECK, TABLE, FIGURE, SENTENCE])
+    code = new_code_cell(
+        "draw()", metadata=HIDDEN, outputs=[CHECK, TABLE, FIGURE, SENTENCE]
+    )
     (_, figure), (_, sentence) = make(code)
     assert figure.outputs == [FIGURE] and figure.metadata.transient.remove_source
     assert sentence.source == "**What we know now.** 1 m."
@@ -61,16 +72,22 @@ def test_a_hidden_cell_shows_its_figures_and_sentences_without_its_code():
 
 @pytest.mark.parametrize(("lines", "is_shown"), [(12, True), (13, False)])
 def test_visible_code_is_shown_up_to_twelve_lines(lines, is_shown):
-    parts = make(new_code_cell("\n".join(["x = 1"] * lines), outputs=[CHECK, FIGURE, TABLE]))
+    parts = make(
+        new_code_cell("\n".join(["x = 1"] * lines), outputs=[CHECK, FIGURE, TABLE])
+    )
     shown = [cell for _, cell in parts if cell.source]
     assert bool(shown) == is_shown
-    assert [FIGURE] in [cell.outputs for _, cell in parts], "the figure is shown in any case"
+    assert [FIGURE] in [cell.outputs for _, cell in parts], (
+        "the figure is shown in any case"
+    )
     assert ([TABLE] in [cell.outputs for _, cell in parts]) == is_shown
     assert not is_shown or shown[0].outputs == [CHECK]
 
 
 def test_parameters_long_tables_and_long_prints_are_left_out():
-    table = new_output("execute_result", {"text/html": "<table>" + "<tr></tr>" * 10 + "</table>"})
+    table = new_output(
+        "execute_result", {"text/html": "<table>" + "<tr></tr>" * 10 + "</table>"}
+    )
     prints = new_output("stream", text="a\n" * 13)
     ((_, cell),) = make(
         new_code_cell("seed = 0", metadata={"tags": ["parameters"]}),
@@ -82,24 +99,37 @@ def test_parameters_long_tables_and_long_prints_are_left_out():
 def test_the_text_of_a_fold_appears_at_a_key_press():
     text = "Guess.\n\n<details><summary>Answer</summary>\n\nOne.\n\nTwo.\n\n</details>\n\nSo."
     expected = [("-", "Guess."), ("fragment", "**Answer.** One.\n\nTwo."), ("-", "So.")]
-    assert [(kind, cell.source) for kind, cell in make(new_markdown_cell(text))] == expected
+    assert [
+        (kind, cell.source) for kind, cell in make(new_markdown_cell(text))
+    ] == expected
     output = new_output("display_data", {"text/markdown": text})
     parts = make(new_code_cell("f()", metadata=HIDDEN, outputs=[output]))
-    assert [(kind, cell.source) for kind, cell in parts] == expected, "also where a hidden cell has made it"
+    assert [(kind, cell.source) for kind, cell in parts] == expected, (
+        "also where a hidden cell has made it"
+    )
 
 
 def test_the_table_of_a_fold_stays_a_table():
     table = "| a |\n|---|\n| 1 |"
-    ((_, cell),) = make(new_markdown_cell(f"<details><summary>Answer</summary>\n\n{table}\n\n</details>"))
+    ((_, cell),) = make(
+        new_markdown_cell(
+            f"<details><summary>Answer</summary>\n\n{table}\n\n</details>"
+        )
+    )
     assert cell.source == f"**Answer.**\n\n{table}"
 
 
 def test_the_navigation_is_a_note():
-    assert make(new_markdown_cell("35 min\n\n**Afterwards you can** see."))[0][0] == "notes"
+    assert (
+        make(new_markdown_cell("35 min\n\n**Afterwards you can** see."))[0][0]
+        == "notes"
+    )
 
 
 def test_what_does_not_fit_goes_on_below_under_the_same_heading():
-    text = "## Theory\n\n" + "\n\n".join(f"Paragraph {i}. " + "word " * 60 for i in range(9))
+    text = "## Theory\n\n" + "\n\n".join(
+        f"Paragraph {i}. " + "word " * 60 for i in range(9)
+    )
     parts = make(new_markdown_cell(text))
     more = [cell.source for kind, cell in parts if kind == "subslide"]
     assert more and set(more) == {"## Theory (continued)"}
@@ -113,7 +143,8 @@ def test_blocks_keep_code_and_formulas_whole():
 
 def test_figures_have_the_names_of_the_run():
     code = new_code_cell(
-        'record.figure(fig, "zone")\nrecord.figure(ax.figure, "hull")', outputs=[FIGURE, FIGURE]
+        'record.figure(fig, "zone")\nrecord.figure(ax.figure, "hull")',
+        outputs=[FIGURE, FIGURE],
     )
     notebook = new_notebook(cells=[code, new_code_cell("plot()", outputs=[FIGURE])])
     names = ["05_zones-zone.png", "05_zones-hull.png", "05_zones-figure-3.png"]
@@ -123,8 +154,14 @@ def test_figures_have_the_names_of_the_run():
 @pytest.fixture
 def reveal(tmp_path):
     """A folder as that of reveal.js."""
-    files = {"dist/reveal.css": "a{}", "dist/theme/white.css": "@import url(x.css);\nb{}"}
-    files |= {"dist/reveal.js": "let c = '</script>'", "plugin/notes/notes.js": "let d = 1"}
+    files = {
+        "dist/reveal.css": "a{}",
+        "dist/theme/white.css": "@import url(x.css);\nb{}",
+    }
+    files |= {
+        "dist/reveal.js": "let c = '</script>'",
+        "plugin/notes/notes.js": "let d = 1",
+    }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
@@ -137,26 +174,46 @@ def test_a_chapter_becomes_a_deck_that_asks_no_server_but_that_of_reveal(reveal)
     made = slides.make_slides(notebook)
     deck = slides.export(made, stem, {stem, "08_build_a_controller"})
     page = BeautifulSoup(deck, "html.parser")
-    asked = [tag.get("src") or tag.get("href") for tag in page.select("script[src], link[href], img[src]")]
+    asked = [
+        tag.get("src") or tag.get("href")
+        for tag in page.select("script[src], link[href], img[src]")
+    ]
     assert {each for each in asked if not each.startswith("data:")} == {
         f"{slides.REVEAL}/{path}"
-        for path in ("dist/reveal.css", "dist/theme/white.css", "dist/reveal.js", "plugin/notes/notes.js")
+        for path in (
+            "dist/reveal.css",
+            "dist/theme/white.css",
+            "dist/reveal.js",
+            "plugin/notes/notes.js",
+        )
     }
-    headings = [c.source for c in notebook.cells if c.cell_type == "markdown" and c.source.startswith("#")]
+    headings = [
+        c.source
+        for c in notebook.cells
+        if c.cell_type == "markdown" and c.source.startswith("#")
+    ]
     assert len(page.select(".slides > section")) == len(headings)
     assert len(page.select(".slides img")) == len(slides.list_figures(notebook, stem))
     assert page.select("math") and "$$" not in page.select_one(".slides").get_text()
-    links = {link["href"] for link in page.select(".slides a[href]") if ".html" in link["href"]}
+    links = {
+        link["href"]
+        for link in page.select(".slides a[href]")
+        if ".html" in link["href"]
+    }
     assert links <= {"07_barriers.html", "08_build_a_controller.html"}
 
     whole = slides.export(made, stem, {stem}, reveal)
     assert "unpkg.com" not in whole and "@import" not in whole
-    assert re.search(r"<style>a\{\}</style>", whole) and r"let c = '<\/script>'" in whole
+    assert (
+        re.search(r"<style>a\{\}</style>", whole) and r"let c = '<\/script>'" in whole
+    )
 
 
 def test_decks_and_figures_are_written_to_one_folder(tmp_path):
     slides.main(["10", "--out", str(tmp_path / "slides")])
-    assert [file.name for file in sorted((tmp_path / "slides").glob("*.html"))] == ["10_corridor.html"]
+    assert [file.name for file in sorted((tmp_path / "slides").glob("*.html"))] == [
+        "10_corridor.html"
+    ]
     figures = list((tmp_path / "slides" / "figures").iterdir())
     assert figures and all(file.name.startswith("10_corridor-") for file in figures)
     assert all(file.read_bytes().startswith(b"\x89PNG") for file in figures)

@@ -17,10 +17,18 @@ def test_answers_hold_each_claim_once_for_each_data_set() -> None:
     assert not answers.duplicated(["claim", "data"]).any()
     assert "mean of sites" not in set(answers["data"])
     assert {*claims_study.CLAIMS} <= {*answers["claim"]}
-    assert {verdict.partition(" with")[0] for verdict in answers["verdict"]} <= {*claims_study.VERDICTS}
+    assert {verdict.partition(" with")[0] for verdict in answers["verdict"]} <= {
+        *claims_study.VERDICTS
+    }
 
 
-NOTHING = {"success": 1.0, "time_to_goal": 12.0, "violations": 0, "robot_on_person": 0, "person_on_robot": 0}
+NOTHING = {
+    "success": 1.0,
+    "time_to_goal": 12.0,
+    "violations": 0,
+    "robot_on_person": 0,
+    "person_on_robot": 0,
+}
 
 
 @pytest.mark.parametrize(
@@ -28,15 +36,22 @@ NOTHING = {"success": 1.0, "time_to_goal": 12.0, "violations": 0, "robot_on_pers
     [
         ({}, "arrives, enters no zone"),
         ({"violations": 3.0}, "enters a zone (h < 0)"),
-        ({"violations": 3.0, "success": 0.0, "time_to_goal": np.nan}, "does not always arrive"),
-        ({"violations": 3.0, "success": 0.5, "person_on_robot": 0.1}, "body touches body"),
+        (
+            {"violations": 3.0, "success": 0.0, "time_to_goal": np.nan},
+            "does not always arrive",
+        ),
+        (
+            {"violations": 3.0, "success": 0.5, "person_on_robot": 0.1},
+            "body touches body",
+        ),
         ({"robot_on_person": 0.1}, "body touches body"),
     ],
 )
 def test_the_worst_outcome_is_shown(found: dict[str, float], outcome: str) -> None:
     means = NOTHING | found
     rows = [
-        {"meeting": "door", "controller": "c", "metric": name, "mean": value} for name, value in means.items()
+        {"meeting": "door", "controller": "c", "metric": name, "mean": value}
+        for name, value in means.items()
     ]
     (row,) = find_outcomes(pd.DataFrame(rows)).to_dict("records")
     assert row["outcome"] == outcome and outcome in OUTCOMES
@@ -45,5 +60,7 @@ def test_the_worst_outcome_is_shown(found: dict[str, float], outcome: str) -> No
 
 def test_a_folded_table_is_closed_and_its_summary_is_text() -> None:
     shown = fold_table("a < b", pd.DataFrame({"x [m]": [1 / 3, np.nan]}), 1).data
-    assert shown.startswith("<details><summary>a &lt; b</summary>") and shown.endswith("</details>")
+    assert shown.startswith("<details><summary>a &lt; b</summary>") and shown.endswith(
+        "</details>"
+    )
     assert "0.3<" in shown and "nan" not in shown.lower()

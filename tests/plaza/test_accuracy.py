@@ -31,14 +31,20 @@ def plazas() -> list[pd.DataFrame]:
 
 
 def test_true_kinds_match_the_samples(plazas: list[pd.DataFrame]) -> None:
-    nearest = plazas[0].groupby("encounter").agg(kind=("kind", "first"), distance=("distance", "min"))
+    nearest = (
+        plazas[0]
+        .groupby("encounter")
+        .agg(kind=("kind", "first"), distance=("distance", "min"))
+    )
     assert (nearest["distance"] < 0.45).equals(nearest["kind"] == "intruder")
     together = plazas[0].query("kind == 'together'")
     assert together.groupby("encounter")["distance"].agg(np.ptp).max() < 1
 
 
 def test_people_of_another_plaza_have_no_kind(plazas: list[pd.DataFrame]) -> None:
-    with pytest.raises(szlib.DataError, match=r"row \d+: .* no pair of a plaza of 40 encounters"):
+    with pytest.raises(
+        szlib.DataError, match=r"row \d+: .* no pair of a plaza of 40 encounters"
+    ):
         accuracy.true_kinds(plazas[0], settings=szlib.PlazaSettings(n_encounters=40))
     strangers = plazas[0].assign(other_id=plazas[0]["other_id"] + 400)
     with pytest.raises(szlib.DataError, match=r"row 0: .* no pair"):
@@ -46,9 +52,16 @@ def test_people_of_another_plaza_have_no_kind(plazas: list[pd.DataFrame]) -> Non
 
 
 def test_precision_and_recall() -> None:
-    removed, intruders = np.array([1, 1, 1, 0, 0], bool), np.array([1, 0, 0, 1, 0], bool)
-    assert accuracy.precision_and_recall(removed, intruders) == pytest.approx((1 / 3, 1 / 2))
-    assert accuracy.precision_and_recall(intruders, removed) == pytest.approx((1 / 2, 1 / 3))
+    removed, intruders = (
+        np.array([1, 1, 1, 0, 0], bool),
+        np.array([1, 0, 0, 1, 0], bool),
+    )
+    assert accuracy.precision_and_recall(removed, intruders) == pytest.approx(
+        (1 / 3, 1 / 2)
+    )
+    assert accuracy.precision_and_recall(intruders, removed) == pytest.approx(
+        (1 / 2, 1 / 3)
+    )
     assert accuracy.precision_and_recall(removed, removed) == (1, 1)
     precision, recall = accuracy.precision_and_recall(np.zeros(5, bool), intruders)
     assert np.isnan(precision)
@@ -60,19 +73,29 @@ def test_precision_and_recall() -> None:
 
 def test_largest_error_is_that_of_centre_and_axes(plazas: list[pd.DataFrame]) -> None:
     zone, truth = (
-        szlib.SocialZone.fit(plazas[0], method="hull", speeds=accuracy.SPEEDS, n_resamples=0),
+        szlib.SocialZone.fit(
+            plazas[0], method="hull", speeds=accuracy.SPEEDS, n_resamples=0
+        ),
         szlib.PlazaSettings(),
     )
     off = [
-        np.abs(np.subtract([*zone.ellipse(v).center, *zone.ellipse(v).semi_axes], [*t.center, *t.semi_axes]))
+        np.abs(
+            np.subtract(
+                [*zone.ellipse(v).center, *zone.ellipse(v).semi_axes],
+                [*t.center, *t.semi_axes],
+            )
+        )
         for v, t in ((v, truth.true_zone(v)) for v in accuracy.SPEEDS)
     ]
     assert accuracy.largest_error(zone) == np.max(off)
     assert accuracy.largest_error(zone, speeds=(1.1,)) == np.max(off[2])
     larger = szlib.PlazaSettings(
-        slow_zone=szlib.Ellipse((0.04, 0.0), (0.98, 0.78)), fast_zone=szlib.Ellipse((0.06, 0.0), (1.1, 0.88))
+        slow_zone=szlib.Ellipse((0.04, 0.0), (0.98, 0.78)),
+        fast_zone=szlib.Ellipse((0.06, 0.0), (1.1, 0.88)),
     )
-    assert accuracy.largest_error(zone, larger) == pytest.approx(0.1, abs=accuracy.largest_error(zone))
+    assert accuracy.largest_error(zone, larger) == pytest.approx(
+        0.1, abs=accuracy.largest_error(zone)
+    )
     with pytest.raises(szlib.ZoneError, match="at 5 m/s is undefined"):
         accuracy.largest_error(zone, speeds=(5.0,))
 
@@ -81,14 +104,23 @@ def test_largest_error_is_that_of_centre_and_axes(plazas: list[pd.DataFrame]) ->
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_pipeline_finds_the_true_zone(plazas: list[pd.DataFrame], seed: int) -> None:
-    zone = szlib.SocialZone.fit(plazas[seed], method="hull", speeds=accuracy.SPEEDS, n_resamples=0)
+def test_the_pipeline_finds_the_true_zone(
+    plazas: list[pd.DataFrame], seed: int
+) -> None:
+    zone = szlib.SocialZone.fit(
+        plazas[seed], method="hull", speeds=accuracy.SPEEDS, n_resamples=0
+    )
     assert accuracy.largest_error(zone) < 0.05
-    turned = [zone.ellipse(v).angle - szlib.PlazaSettings().true_zone(v).angle for v in accuracy.SPEEDS]
+    turned = [
+        zone.ellipse(v).angle - szlib.PlazaSettings().true_zone(v).angle
+        for v in accuracy.SPEEDS
+    ]
     assert np.abs((np.degrees(turned) + 90) % 180 - 90).max() < 10
 
 
-@pytest.mark.parametrize(("share", "pace"), [(0.0, "rushing"), (0.01, "slow"), (0.02, "rushing")])
+@pytest.mark.parametrize(
+    ("share", "pace"), [(0.0, "rushing"), (0.01, "slow"), (0.02, "rushing")]
+)
 def test_whole_encounters_find_every_intruder(share: float, pace: str) -> None:
     settings = szlib.PlazaSettings(intruders=share, intruder_speeds=PACES[pace])
     found = judged(plaza_samples(7, settings), settings, {})
@@ -97,7 +129,9 @@ def test_whole_encounters_find_every_intruder(share: float, pace: str) -> None:
     assert not found["recall"] < 1  # nan: there are none
 
 
-def test_the_zone_does_not_shrink_at_the_size_of_the_paper(plazas: list[pd.DataFrame]) -> None:
+def test_the_zone_does_not_shrink_at_the_size_of_the_paper(
+    plazas: list[pd.DataFrame],
+) -> None:
     samples = pooled(plazas)
     assert samples["encounter"].nunique() > 15_000
     found = judged(samples, szlib.PlazaSettings(), {})

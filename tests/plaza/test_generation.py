@@ -15,7 +15,12 @@ import pytest
 import szlib
 from szlib.plaza import generation
 from szlib.plaza.generation import KINDS, make_plaza, positions, stage_encounters
-from szlib.plaza.settings import ANY_SPEED_INTRUDERS, RUSHING_INTRUDERS, SLOW_INTRUDERS, PlazaSettings
+from szlib.plaza.settings import (
+    ANY_SPEED_INTRUDERS,
+    RUSHING_INTRUDERS,
+    SLOW_INTRUDERS,
+    PlazaSettings,
+)
 from szlib.tracks.clock import nearest_tick, to_clock
 from szlib.zones.polar import ellipse_reach
 
@@ -50,7 +55,9 @@ def hull_of(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
 def tracks_of(seed: int, settings: PlazaSettings) -> pd.DataFrame:
     """Tracks of a plaza, made once: copy them to change them."""
     with tempfile.TemporaryDirectory() as folder:
-        return szlib.read_tracks(make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings))
+        return szlib.read_tracks(
+            make_plaza(Path(folder) / "plaza.csv", seed=seed, settings=settings)
+        )
 
 
 @cache
@@ -67,12 +74,20 @@ def errors(zone: szlib.SocialZone, settings: PlazaSettings) -> tuple[float, floa
     metres, degrees = [], []
     for speed in SPEEDS:
         fit, truth = zone.ellipse(speed), settings.true_zone(speed)
-        metres += list(np.subtract([*fit.center, *fit.semi_axes], [*truth.center, *truth.semi_axes]))
-        degrees.append(np.degrees((fit.angle - truth.angle + np.pi / 2) % np.pi - np.pi / 2))
+        metres += list(
+            np.subtract(
+                [*fit.center, *fit.semi_axes], [*truth.center, *truth.semi_axes]
+            )
+        )
+        degrees.append(
+            np.degrees((fit.angle - truth.angle + np.pi / 2) % np.pi - np.pi / 2)
+        )
     return float(np.max(np.abs(metres))), float(np.max(np.abs(degrees)))
 
 
-def in_frame(staged: pd.DataFrame, moments: int = 86) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def in_frame(
+    staged: pd.DataFrame, moments: int = 86
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of both people, every 0.04 s: speed, and bearing and distance of the partner, each (n, moments, 2)."""
     t = (staged["start"].to_numpy()[:, None] + np.arange(moments) * 0.04).ravel()
     where, moves = positions(staged.iloc[np.repeat(np.arange(len(staged)), moments)], t)
@@ -88,12 +103,19 @@ def in_frame(staged: pd.DataFrame, moments: int = 86) -> tuple[np.ndarray, np.nd
 
 
 def levels(
-    settings: PlazaSettings, speed: np.ndarray, bearing: np.ndarray, distance: np.ndarray
+    settings: PlazaSettings,
+    speed: np.ndarray,
+    bearing: np.ndarray,
+    distance: np.ndarray,
 ) -> np.ndarray:
     """Level of each point in the true zone of its own speed, one `Ellipse` a point."""
-    points = np.stack([distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1).reshape(-1, 2)
+    points = np.stack(
+        [distance * np.cos(bearing), distance * np.sin(bearing)], axis=-1
+    ).reshape(-1, 2)
     zones = (settings.true_zone(v) for v in speed.ravel())
-    return np.array([zone.level(p) for zone, p in zip(zones, points, strict=True)]).reshape(speed.shape)
+    return np.array(
+        [zone.level(p) for zone, p in zip(zones, points, strict=True)]
+    ).reshape(speed.shape)
 
 
 @pytest.fixture(scope="module")
@@ -103,14 +125,18 @@ def staged() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def raw(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pl.DataFrame]:
-    path = make_plaza(tmp_path_factory.mktemp("raw") / "atc-20000102.csv", seed=1, settings=FEW)
+    path = make_plaza(
+        tmp_path_factory.mktemp("raw") / "atc-20000102.csv", seed=1, settings=FEW
+    )
     return path, raw_rows(path)
 
 
 def plaza_of(truth: str, n_encounters: int = 300, **others: object) -> PlazaSettings:
     """A plaza without intruders and without gaps, with one of `TRUTHS` at every speed."""
     zone = TRUTHS[truth]
-    settings = PlazaSettings(n_encounters, zone, zone, intruders=0.0, short_gaps=0.0, long_gaps=0.0)
+    settings = PlazaSettings(
+        n_encounters, zone, zone, intruders=0.0, short_gaps=0.0, long_gaps=0.0
+    )
     return dataclasses.replace(settings, **others)  # type: ignore[arg-type]
 
 
@@ -120,7 +146,9 @@ def test_zones_of_any_form_are_respected_and_touched(truth: str) -> None:
     staged = stage_encounters(seed=8, settings=plaza_of(truth, 200, together=0.0))
     speed, bearing, distance = in_frame(staged)
     zone = TRUTHS[truth]
-    reach = ellipse_reach(np.array([*zone.center, *zone.semi_axes, zone.angle]), bearing.ravel())
+    reach = ellipse_reach(
+        np.array([*zone.center, *zone.semi_axes, zone.angle]), bearing.ravel()
+    )
     gap = distance - reach.reshape(bearing.shape)
     assert gap[speed > 0.3].min() > -0.01  # a path is checked at moments: mm in between
     sector = (bearing // (np.pi / 3) % 6).astype(int)
@@ -130,7 +158,9 @@ def test_zones_of_any_form_are_respected_and_touched(truth: str) -> None:
 def test_size_is_found_and_offset_and_turn_in_part() -> None:
     """Half the offset and two thirds of the turn, whatever the seed: the notes of `PlazaSettings` say why."""
     ahead, turned = (
-        szlib.SocialZone.fit(samples_of(8, plaza_of(truth, 500)), speeds=[1.1], n_resamples=0).ellipse(1.1)
+        szlib.SocialZone.fit(
+            samples_of(8, plaza_of(truth, 500)), speeds=[1.1], n_resamples=0
+        ).ellipse(1.1)
         for truth in ("ahead", "turned")
     )
     np.testing.assert_allclose(ahead.semi_axes, TRUTHS["ahead"].semi_axes, atol=0.05)
@@ -139,11 +169,18 @@ def test_size_is_found_and_offset_and_turn_in_part() -> None:
     assert turned.angle == pytest.approx(2 / 3 * 0.5, abs=0.1)
 
 
-def test_zones_without_space_around_them_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_zones_without_space_around_them_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(generation, "_MAX_ROUNDS", 200)
     zone = szlib.Ellipse((0.0, 0.0), (1.9, 1.9))
-    settings = PlazaSettings(n_encounters=20, slow_zone=zone, fast_zone=zone, standing=0.2)
-    with pytest.raises(szlib.ZoneError, match=r"\d+ of 20 pairs find no .*\(first: \w+, at \d\.\d\d m/s\)"):
+    settings = PlazaSettings(
+        n_encounters=20, slow_zone=zone, fast_zone=zone, standing=0.2
+    )
+    with pytest.raises(
+        szlib.ZoneError,
+        match=r"\d+ of 20 pairs find no .*\(first: \w+, at \d\.\d\d m/s\)",
+    ):
         stage_encounters(settings=settings)
 
 
@@ -153,7 +190,9 @@ def test_plaza_at_1_hz_has_encounters_and_shows_the_zone() -> None:
     def thinned(tracked: float) -> pd.DataFrame:
         tracks = tracks_of(9, plaza_of("centred", 400, tracked=tracked))
         each_second = nearest_tick(tracks["t"].to_numpy()) % 10 == 0
-        return to_clock(tracks.loc[each_second, ["day", "id", "t", "x", "y"]], max_gap=1.0)
+        return to_clock(
+            tracks.loc[each_second, ["day", "id", "t", "x", "y"]], max_gap=1.0
+        )
 
     samples = szlib.find_encounters(thinned(5.4))
     assert samples["encounter"].nunique() > 400
@@ -167,10 +206,15 @@ def test_pairs_are_seen_as_long_as_asked_and_walk_straight_before() -> None:
     staged = stage_encounters(seed=1, settings=settings)
     assert np.diff(staged["start"]).min() > 12
     assert (staged["closest"] - staged["start"]).between(0.5 + 4.3, 2.5 + 4.3).all()
-    early = [positions(staged, staged["closest"] - since)[1] for since in (2.5, 3.0, 4.8)]
+    early = [
+        positions(staged, staged["closest"] - since)[1] for since in (2.5, 3.0, 4.8)
+    ]
     np.testing.assert_array_equal(early[0], early[1])
     np.testing.assert_array_equal(early[0], early[2])
-    late, step = [positions(staged, staged["closest"] - since)[0] for since in (2.51, 2.49)], 0.02
+    late, step = (
+        [positions(staged, staged["closest"] - since)[0] for since in (2.51, 2.49)],
+        0.02,
+    )
     np.testing.assert_allclose((late[1] - late[0]) / step, early[0], atol=0.01)
     tracks = tracks_of(1, settings)
     assert (tracks.groupby("id")["t"].agg(np.ptp) > 11.7).all()
@@ -182,7 +226,9 @@ def test_tilted_truth_is_found() -> None:
     metres, degrees = errors(zone, ASIDE)
     assert metres < 0.05
     assert degrees < 10
-    assert all(zone.ellipse(v).angle > 0 and zone.ellipse(v).center[1] < -0.03 for v in SPEEDS)
+    assert all(
+        zone.ellipse(v).angle > 0 and zone.ellipse(v).center[1] < -0.03 for v in SPEEDS
+    )
 
 
 def test_truth_without_intruders_is_found_with_and_without_outlier_removal() -> None:
@@ -223,7 +269,8 @@ def test_only_intruders_enter_a_zone(staged: pd.DataFrame) -> None:
     speed, bearing, distance = in_frame(some)
     level = levels(DEFAULT, speed, bearing, distance)
     walks = speed > 0.3
-    respected = ((level > 0.98) | ~walks).all(axis=(1, 2))  # a path is checked at moments: mm in between
+    # a path is checked at moments: mm in between
+    respected = ((level > 0.98) | ~walks).all(axis=(1, 2))
     assert respected[(some["kind"] != "intruder").to_numpy()].all()
     intruders = staged[staged["kind"] == "intruder"]
     assert (levels(DEFAULT, *in_frame(intruders))[..., 0].min(axis=1) < 0.4).all()
@@ -233,23 +280,29 @@ def test_all_kinds_of_motion_occur(staged: pd.DataFrame) -> None:
     assert set(staged["kind"]) == set(KINDS)
     other = np.hypot(staged["other_vx"], staged["other_vy"])
     walker = np.hypot(staged["walker_vx"], staged["walker_vy"])
-    cosine = (staged["other_vx"] * staged["walker_vx"] + staged["other_vy"] * staged["walker_vy"]) / (
-        walker * other.clip(lower=1e-9)
-    )
+    cosine = (
+        staged["other_vx"] * staged["walker_vx"]
+        + staged["other_vy"] * staged["walker_vy"]
+    ) / (walker * other.clip(lower=1e-9))
     kind = staged["kind"]
     assert (other[kind == "standing"] < 1e-9).all()
     assert (other[kind != "standing"] > 0.4).all()
     assert (cosine[kind == "head-on"] < -0.7).all()
     assert (cosine[kind.isin(["overtaking", "together"])] > 0.7).all()
     assert (cosine[kind == "crossing"].abs() < 0.71).all()
-    drift = np.hypot(staged["other_vx"] - staged["walker_vx"], staged["other_vy"] - staged["walker_vy"])
+    drift = np.hypot(
+        staged["other_vx"] - staged["walker_vx"],
+        staged["other_vy"] - staged["walker_vy"],
+    )
     assert (drift[kind == "together"] <= 0.25).all()
     assert (kind.value_counts() > 100).drop("intruder").all()
 
 
 def test_shares_match_the_settings() -> None:
     counts = stage_encounters(
-        settings=PlazaSettings(n_encounters=400, standing=0.1, together=0.2, intruders=0.05)
+        settings=PlazaSettings(
+            n_encounters=400, standing=0.1, together=0.2, intruders=0.05
+        )
     )
     counts = counts["kind"].value_counts()
     assert (counts["standing"], counts["together"], counts["intruder"]) == (40, 80, 20)
@@ -262,19 +315,30 @@ def test_slow_intruders_leave_more_samples(tmp_path: Path) -> None:
         settings = PlazaSettings(n_encounters=300, intruders=0.3, intruder_speeds=pace)
         staged = stage_encounters(settings=settings).query("kind == 'intruder'")
         relative = np.hypot(
-            staged["other_vx"] - staged["walker_vx"], staged["other_vy"] - staged["walker_vy"]
+            staged["other_vx"] - staged["walker_vx"],
+            staged["other_vy"] - staged["walker_vy"],
         )
         assert relative.between(*pace).all()
         distance = in_frame(staged)[2][..., 0]
-        inside[pace], nearest[pace] = (distance < 0.6).mean(), distance.min(axis=1).mean()
+        inside[pace], nearest[pace] = (
+            (distance < 0.6).mean(),
+            distance.min(axis=1).mean(),
+        )
     assert inside[SLOW_INTRUDERS] > 2 * inside[RUSHING_INTRUDERS]
-    assert nearest[SLOW_INTRUDERS] == pytest.approx(nearest[RUSHING_INTRUDERS], abs=0.05)
+    assert nearest[SLOW_INTRUDERS] == pytest.approx(
+        nearest[RUSHING_INTRUDERS], abs=0.05
+    )
 
 
 def test_intruders_of_any_speed_are_slow_and_rushing() -> None:
-    settings = PlazaSettings(n_encounters=400, intruders=0.5, intruder_speeds=ANY_SPEED_INTRUDERS)
+    settings = PlazaSettings(
+        n_encounters=400, intruders=0.5, intruder_speeds=ANY_SPEED_INTRUDERS
+    )
     staged = stage_encounters(settings=settings).query("kind == 'intruder'")
-    pace = np.hypot(staged["other_vx"] - staged["walker_vx"], staged["other_vy"] - staged["walker_vy"])
+    pace = np.hypot(
+        staged["other_vx"] - staged["walker_vx"],
+        staged["other_vy"] - staged["walker_vy"],
+    )
     shares = np.histogram(pace, [0.25, 1.0, 1.5, 2.0, 4.4])[0] / len(pace)
     assert shares.min() > 0.1
     assert shares.sum() == 1
@@ -304,13 +368,17 @@ def test_file_has_the_format_of_the_sensor(raw: tuple[Path, pl.DataFrame]) -> No
     steps = np.rint(1000 * frames.diff().drop_nulls().to_numpy())
     within = steps[steps < 500]
     assert within.min() >= 33
-    assert np.mean(within <= 50) > 0.98  # longer where both people of a frame are in a gap
+    # longer where both people of a frame are in a gap
+    assert np.mean(within <= 50) > 0.98
     assert len(np.unique(within)) > 10
     assert rows.group_by("time").len()["len"].max() == 2
     assert rows["id"].min() == 9_190_600
     assert (rows["id"] % 100 == 0).all()
     assert rows["x"].dtype == pl.Int64
-    assert rows.select(pl.col("motion_angle", "facing_angle").abs().max()).row(0) <= (3.142, 3.142)
+    assert rows.select(pl.col("motion_angle", "facing_angle").abs().max()).row(0) <= (
+        3.142,
+        3.142,
+    )
     assert rows["z"].is_between(1_300, 2_000).all()
 
 
@@ -324,14 +392,22 @@ def test_the_velocity_column_is_inflated(tmp_path: Path) -> None:
 def test_tracks_have_gaps_short_and_long(tmp_path: Path) -> None:
     broken = PlazaSettings(n_encounters=300, short_gaps=0.5, long_gaps=0.3)
     rows = raw_rows(make_plaza(tmp_path / "gaps.csv", settings=broken))
-    steps = rows.select(pl.col("time").diff().over("id")).drop_nulls().to_series().to_numpy()
+    steps = (
+        rows.select(pl.col("time").diff().over("id"))
+        .drop_nulls()
+        .to_series()
+        .to_numpy()
+    )
     assert 250 < ((steps > 0.1) & (steps < 0.5)).sum() < 350  # 300 of 600 tracks
     assert 150 < (steps > 0.5).sum() < 210  # 180
 
 
 def test_day_matches_the_date(tmp_path: Path) -> None:
     tracks = szlib.read_tracks(
-        make_plaza(tmp_path / "p.csv", settings=PlazaSettings(n_encounters=5, date="2001-05-06"))
+        make_plaza(
+            tmp_path / "p.csv",
+            settings=PlazaSettings(n_encounters=5, date="2001-05-06"),
+        )
     )
     assert list(tracks["day"].unique()) == ["2001-05-06"]
 
@@ -373,7 +449,8 @@ def test_invalid_settings_are_refused(given: dict[str, object]) -> None:
 
 
 @pytest.mark.parametrize(
-    "zone", [szlib.Ellipse((1.0, 0.0), (0.9, 0.7)), szlib.Ellipse((0.0, 0.0), (2.1, 2.0))]
+    "zone",
+    [szlib.Ellipse((1.0, 0.0), (0.9, 0.7)), szlib.Ellipse((0.0, 0.0), (2.1, 2.0))],
 )
 def test_truth_that_is_no_zone_within_r_max_is_refused(zone: szlib.Ellipse) -> None:
     with pytest.raises(szlib.ZoneError, match="contain the person"):

@@ -64,7 +64,10 @@ def test_other_baselines_go_around_a_standing_person(factory):
 
 
 def test_social_force_passes_a_person_straight_ahead_on_the_right():
-    assert run(SocialForceController, (person(0.0, 0.0),)).metrics()["passing_side"] == "right"
+    assert (
+        run(SocialForceController, (person(0.0, 0.0),)).metrics()["passing_side"]
+        == "right"
+    )
 
 
 @pytest.mark.parametrize("factory", [StraightController, DynamicWindowController])
@@ -76,9 +79,12 @@ def test_baselines_stop_before_a_wall(factory):
 @pytest.mark.parametrize("factory", [StraightController, SocialForceController])
 # Of equal velocities the dynamic window takes the first one, so that it has no such symmetry.
 def test_rotating_the_world_rotates_the_path(factory):
-    turn = np.array([[0.0, -1.0], [1.0, 0.0]])  # by a right angle: the box of accelerations stays a box
+    # by a right angle: the box of accelerations stays a box
+    turn = np.array([[0.0, -1.0], [1.0, 0.0]])
     people = (person(0.0, 0.4, (-0.3, 0.1)),)
-    turned = (szlib.Person(tuple(turn @ (0.0, 0.4)), tuple(turn @ (-0.3, 0.1)), heading=0.0),)
+    turned = (
+        szlib.Person(tuple(turn @ (0.0, 0.4)), tuple(turn @ (-0.3, 0.1)), heading=0.0),
+    )
     one = run(factory, people)
     other = run(factory, turned, start=(*(turn @ START[:2]), 0, 0), goal=turn @ GOAL)
     assert one.states[:, :2] @ turn.T == pytest.approx(other.states[:, :2], abs=1e-6)
@@ -122,6 +128,9 @@ def test_the_social_force_between_two_people_is_that_of_its_source():
     model = SocialForceController(szlib.Scenario("two", START, GOAL), equal)
     # the source has no bias of the angle here; it turns theta by 0.005 B
     state, goal = np.array([0.0, 0.0, v, 0.0]), np.array(GOAL)
-    alone, beside = (model.desired_velocity(state, goal, people) for people in ((), (person(*offset),)))
+    alone, beside = (
+        model.desired_velocity(state, goal, people)
+        for people in ((), (person(*offset),))
+    )
     found = (beside - alone) / equal.dt
     assert found == pytest.approx(slow * t + turn * n, abs=0.05)

@@ -68,28 +68,40 @@ def test_a_foreign_controller_drives_and_missing_reports_are_empty(tmp_path):
 
 
 def test_violations_count_for_a_controller_without_safety_claims():
-    scenario = szlib.Scenario("blind", WALK.start, WALK.goal, (person(0.0, 0.0, zone=ZONE),))
+    scenario = szlib.Scenario(
+        "blind", WALK.start, WALK.goal, (person(0.0, 0.0, zone=ZONE),)
+    )
     log = szlib.simulate(scenario, Straight())
     metrics = log.metrics()
     inside = int((log.h[1:].min(axis=1) < -1e-6).sum())
     assert metrics["violations"] == inside > 0
     assert metrics["overlaps"] == int((log.clearance[1:].min(axis=1) < -1e-6).sum()) > 0
-    assert metrics["claimed_safe_steps"] == metrics["flagged_steps"] == metrics["unflagged_violations"] == 0
+    assert (
+        metrics["claimed_safe_steps"]
+        == metrics["flagged_steps"]
+        == metrics["unflagged_violations"]
+        == 0
+    )
     assert metrics["outcome"] == "drove in"
     assert np.isnan(metrics["time_yielding"])
 
 
 def test_every_step_of_mpc_cbf_is_claimed_safe_or_flagged():
     log = szlib.simulate(
-        szlib.SCENARIOS["corridor"], szlib.MPCCBF(ZONE, walls=szlib.SCENARIOS["corridor"].walls)
+        szlib.SCENARIOS["corridor"],
+        szlib.MPCCBF(ZONE, walls=szlib.SCENARIOS["corridor"].walls),
     )
     metrics = log.metrics()
-    assert metrics["claimed_safe_steps"] + metrics["flagged_steps"] == len(log.states) - 1
+    assert (
+        metrics["claimed_safe_steps"] + metrics["flagged_steps"] == len(log.states) - 1
+    )
     assert metrics["violations"] == metrics["overlaps"] == 0
 
 
 def test_people_without_a_zone_get_that_of_the_controller_or_their_body():
-    scenario = szlib.Scenario("met", WALK.start, WALK.goal, (person(0.0, 3.0), person(1.0, 3.0, zone=ZONE)))
+    scenario = szlib.Scenario(
+        "met", WALK.start, WALK.goal, (person(0.0, 3.0), person(1.0, 3.0, zone=ZONE))
+    )
     assert szlib.simulate(scenario, Straight()).zones == (BODY_ZONE, ZONE)
     other = szlib.Ellipse((0.0, 0.0), (0.5, 0.5))
     log = szlib.simulate(scenario, szlib.MPCCBF(other))
@@ -100,7 +112,9 @@ def test_plans_of_different_lengths_are_kept():
     class Planner(Straight):
         def step(self, state, goal, people):
             control = super().step(state, goal, people).control
-            return SimpleNamespace(control=control, predicted=np.tile(state, (2 + len(self.seen) % 2, 1)))
+            return SimpleNamespace(
+                control=control, predicted=np.tile(state, (2 + len(self.seen) % 2, 1))
+            )
 
     log = szlib.simulate(WALK, Planner())
     assert log.predicted.shape == (len(log.states), 3, 4)
@@ -126,7 +140,14 @@ class Cart:
     def advance(self, own, control, dt):
         (x, y, angle, _), (v, omega) = own, control
         middle = angle + dt * omega / 2
-        return np.array([x + dt * v * np.cos(middle), y + dt * v * np.sin(middle), angle + dt * omega, v])
+        return np.array(
+            [
+                x + dt * v * np.cos(middle),
+                y + dt * v * np.sin(middle),
+                angle + dt * omega,
+                v,
+            ]
+        )
 
 
 class Steered:
@@ -147,12 +168,15 @@ class Steered:
 
 
 def test_another_robot_is_logged_by_its_disc():
-    scenario = szlib.Scenario("turn", (0.0, 0.0, 0.0, 0.0), (0.0, 4.0), (person(5.0, 0.0),), duration=20)
+    scenario = szlib.Scenario(
+        "turn", (0.0, 0.0, 0.0, 0.0), (0.0, 4.0), (person(5.0, 0.0),), duration=20
+    )
     log = szlib.simulate(scenario, Steered())
     assert log.success
     moved = np.diff(log.states[:, :2], axis=0) / 0.1
     after = log.states[1:, 2:]
-    assert np.hypot(*moved.T) == pytest.approx(np.hypot(*after.T))  # arcs of 5 deg at most: chords
+    # arcs of 5 deg at most: chords
+    assert np.hypot(*moved.T) == pytest.approx(np.hypot(*after.T))
     assert log.inputs == ("v", "omega")
     assert log.table["omega"].to_numpy() == pytest.approx(log.controls[:, 1])
     assert log.clearance[0, 0] == pytest.approx(5.0 - 0.25 - 0.5)
@@ -171,7 +195,9 @@ def test_absent_people_are_nan_in_the_log(controller):
     assert np.isnan(log.people[:, 1]).all() and np.isnan(log.h[:, 1]).all()
     metrics = log.metrics()
     assert metrics["people"] == 2
-    assert metrics["min_h"] == np.nanmin(log.h) and metrics["min_clearance"] == np.nanmin(log.clearance)
+    assert metrics["min_h"] == np.nanmin(log.h) and metrics[
+        "min_clearance"
+    ] == np.nanmin(log.clearance)
     assert metrics["outcome"] == "arrived" and metrics["violations"] == 0
     assert log.table["clearance"][0] == np.inf
 
@@ -188,7 +214,10 @@ def test_residuals_belong_to_people_who_are_present():
     log = szlib.simulate(WALK, szlib.MPCCBF(ZONE, max_people=2), crowd=visitor)
     there = (log.time >= 2) & (log.time < 4)
     assert np.array_equal(~np.isnan(log.residual[:, 0, 0]), there)
-    assert np.isfinite(log.cbf_people[there]).all() and (log.cbf_people[~there] == np.inf).all()
+    assert (
+        np.isfinite(log.cbf_people[there]).all()
+        and (log.cbf_people[~there] == np.inf).all()
+    )
     assert log.metrics()["time_yielding"] == 0
 
 
@@ -233,7 +262,9 @@ def test_people_without_a_heading_get_a_circle_or_keep_their_last_heading():
     log = szlib.simulate(WALK, szlib.MPCCBF(ZONE, max_people=2), crowd=crowd)
     assert log.zones == (circle_around(ZONE), ZONE)
     assert np.isfinite(log.h).all() and (log.people[:, :, 2] == 0).all()
-    barriers = szlib.MPCCBF(ZONE).barriers(log.states[0, :2], [szlib.Person((0.0, 2.0))])
+    barriers = szlib.MPCCBF(ZONE).barriers(
+        log.states[0, :2], [szlib.Person((0.0, 2.0))]
+    )
     assert log.h[0, 0] == pytest.approx(barriers[0])
     assert log.metrics()["violations"] == 0
 
@@ -251,9 +282,13 @@ def test_a_crowd_model_needs_only_two_methods():
     class Circling:
         def start(self, scenario, seed):
             center = (
-                np.mean([p.position for p in scenario.people], axis=0) if scenario.people else np.zeros(2)
+                np.mean([p.position for p in scenario.people], axis=0)
+                if scenario.people
+                else np.zeros(2)
             )
-            return lambda t, _: [person(center[0] + np.cos(t), center[1] + 3 + np.sin(t), (0.1, 0), ZONE)]
+            return lambda t, _: [
+                person(center[0] + np.cos(t), center[1] + 3 + np.sin(t), (0.1, 0), ZONE)
+            ]
 
         def observe(self, people, rng):
             return people
@@ -278,7 +313,11 @@ class Broken(Straight):
 @pytest.mark.parametrize(
     ("controller", "crowd", "message"),
     [
-        (Broken(control=[np.nan, 0.0]), None, r"the controller gave \[nan, 0.0\] at 0 s"),
+        (
+            Broken(control=[np.nan, 0.0]),
+            None,
+            r"the controller gave \[nan, 0.0\] at 0 s",
+        ),
         (
             Broken(residual=np.zeros((1, 2))),
             lambda t, _: [person(0.0, y) for y in (2, 3)],
@@ -303,7 +342,13 @@ def test_settings_with_another_dt_are_rejected():
 def test_rollouts_accepts_any_controller():
     rows = rollouts(3, worlds=ALONE, controller=straight, n_jobs=1, progress=False)
     assert rows["success"].all() and (rows["claimed_safe_steps"] == 0).all()
-    slow = rollouts(3, worlds=ALONE, controller=partial(straight, pace=0.5), n_jobs=1, progress=False)
+    slow = rollouts(
+        3,
+        worlds=ALONE,
+        controller=partial(straight, pace=0.5),
+        n_jobs=1,
+        progress=False,
+    )
     assert (slow["max_speed"] <= 0.5 + 1e-9).all()
     again = rerun_world(1, worlds=ALONE, controller=straight).metrics()
     assert again["path_length"] == rows["path_length"][1]
@@ -311,7 +356,9 @@ def test_rollouts_accepts_any_controller():
 
 
 def scene(seed):
-    return szlib.Scenario(f"{seed}", (0.0, 0.0, 0.0, 0.0), (1.0 + seed, 0.0), duration=8.0)
+    return szlib.Scenario(
+        f"{seed}", (0.0, 0.0, 0.0, 0.0), (1.0 + seed, 0.0), duration=8.0
+    )
 
 
 def test_any_function_of_the_seed_makes_worlds():
@@ -321,7 +368,14 @@ def test_any_function_of_the_seed_makes_worlds():
 
 def test_stored_chunks_depend_on_the_controller(tmp_path):
     def run(controller):
-        rollouts(1, worlds=ALONE, controller=controller, out=tmp_path, n_jobs=1, progress=False)
+        rollouts(
+            1,
+            worlds=ALONE,
+            controller=controller,
+            out=tmp_path,
+            n_jobs=1,
+            progress=False,
+        )
         return sum(path.is_dir() for path in tmp_path.iterdir())
 
     assert run(straight) == run(straight) == 1
@@ -333,10 +387,25 @@ def test_stored_chunks_depend_on_the_controller(tmp_path):
 
 
 def test_parts_are_identified_by_their_content():
-    parts = [None, straight, Straight, szlib.MPCSettings(), szlib.MPCSettings(gamma=0.1), Behaviour(), ALONE]
-    parts += [partial(straight, pace=0.5), partial(straight, pace=0.4), Worlds().__call__, ALONE.__call__]
+    parts = [
+        None,
+        straight,
+        Straight,
+        szlib.MPCSettings(),
+        szlib.MPCSettings(gamma=0.1),
+        Behaviour(),
+        ALONE,
+    ]
+    parts += [
+        partial(straight, pace=0.5),
+        partial(straight, pace=0.4),
+        Worlds().__call__,
+        ALONE.__call__,
+    ]
     assert len({identify(part) for part in parts}) == len(parts)
-    assert identify(partial(straight, pace=0.5)) == identify(partial(straight, pace=0.5))
+    assert identify(partial(straight, pace=0.5)) == identify(
+        partial(straight, pace=0.5)
+    )
 
 
 class Failing(Straight):
@@ -355,7 +424,9 @@ def test_a_failing_controller_is_reported_with_its_world():
 
 
 def half(zone):
-    return szlib.Ellipse(zone.center, (zone.semi_axes[0] / 2, zone.semi_axes[1] / 2), zone.angle)
+    return szlib.Ellipse(
+        zone.center, (zone.semi_axes[0] / 2, zone.semi_axes[1] / 2), zone.angle
+    )
 
 
 def test_compare_takes_names_and_objects():

@@ -45,7 +45,9 @@ def test_robots_start_outside_each_zone(seed):
     scenario = WORLDS(seed)
     for zone in ZONES.values():
         controller = szlib.MPCCBF(zone(scenario.people[0].zone), walls=scenario.walls)
-        people = [szlib.Person(p.position, p.velocity, p.heading) for p in scenario.people]
+        people = [
+            szlib.Person(p.position, p.velocity, p.heading) for p in scenario.people
+        ]
         assert controller.barriers(scenario.start[:2], people).min() >= 0
 
 
@@ -54,17 +56,23 @@ def test_time_inside_is_measured_with_the_zones_of_the_world():
     inside = measure_time_inside(log)
     bodies = log.clearance[:, : len(log.scenario.people)]
     assert inside["inside none"] == pytest.approx(0.1 * (bodies.min(axis=1) < 0).sum())
-    assert inside["inside none"] <= inside["inside equal circle"] <= inside["inside Hall"]
+    assert (
+        inside["inside none"] <= inside["inside equal circle"] <= inside["inside Hall"]
+    )
 
 
 def test_compare_is_paired():
-    rows = compare(2, zones=("none", "fitted"), formulations=("szlib",), n_jobs=1, progress=False)
+    rows = compare(
+        2, zones=("none", "fitted"), formulations=("szlib",), n_jobs=1, progress=False
+    )
     assert len(rows) == 4
     assert rows.groupby("zone")["seed"].apply(list).tolist() == [[0, 1], [0, 1]]
     assert rows["people"].tolist()[:2] == rows["people"].tolist()[2:]
     found = summarise(rows, against={"zone": "fitted"}).set_index(["zone", "metric"])
     assert (found.loc["fitted"][["mean", "low", "high"]] == 0).all(axis=None)
-    with pytest.raises(szlib.SolverError, match="unknown names: Hull; expected none, equal circle"):
+    with pytest.raises(
+        szlib.SolverError, match="unknown names: Hull; expected none, equal circle"
+    ):
         compare(1, zones=("Hull",))
 
 
@@ -81,8 +89,12 @@ def test_intervals_cover_the_mean_and_pairs_sharpen_them():
     assert (alone["low"] < alone["mean"]).all()
     assert (alone["mean"] < alone["high"]).all()
     spread = np.std(x[:200]) / np.sqrt(200)
-    assert alone.loc["a", "high"] - alone.loc["a", "low"] == pytest.approx(2 * 1.96 * spread, rel=0.15)
-    paired = summarise(table(x=x), ["zone"], ["x"], against={"zone": "b"}).set_index("zone")
+    assert alone.loc["a", "high"] - alone.loc["a", "low"] == pytest.approx(
+        2 * 1.96 * spread, rel=0.15
+    )
+    paired = summarise(table(x=x), ["zone"], ["x"], against={"zone": "b"}).set_index(
+        "zone"
+    )
     assert paired.loc["a", "mean"] == pytest.approx(1, abs=0.05)
     assert paired.loc["a", "high"] - paired.loc["a", "low"] < 0.1
     assert paired.loc["b", ["low", "high"]].tolist() == [0, 0]

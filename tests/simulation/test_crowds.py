@@ -14,14 +14,20 @@ import pandas as pd
 import pytest
 from helpers.crowd_models import PACKAGES, scene
 from helpers.track_tables import make_tracks, make_walk
+from szlib.control.people import Person
 
 import szlib
-from szlib.control.person import Person
 from szlib.simulation.crowds.reacting import MODELS, ReactingPeople
 from szlib.simulation.crowds.social_force import SocialForceModel
 from szlib.simulation.crowds.walking_model import ModelFactory, Walkers
 from szlib.simulation.monte_carlo import identify
-from szlib.simulation.replay import MIN_START_DISTANCE, SENSING_RANGE, ReplacedWalker, Replay, find_replays
+from szlib.simulation.replay import (
+    MIN_START_DISTANCE,
+    SENSING_RANGE,
+    ReplacedWalker,
+    Replay,
+    find_replays,
+)
 from szlib.simulation.scenario import Crowd
 from szlib.zones.ellipses import BODY_RADIUS
 
@@ -35,7 +41,9 @@ def walk(crowd: Crowd, robot: np.ndarray = FAR, seconds: float = 20.0) -> np.nda
     rows = []
     for k in range(round(seconds * 10) + 1):
         here = np.r_[robot[:2] + 0.1 * k * robot[2:], robot[2:]]
-        rows.append([(*p.position, *p.velocity, p.heading) for p in crowd(0.1 * k, here)])
+        rows.append(
+            [(*p.position, *p.velocity, p.heading) for p in crowd(0.1 * k, here)]
+        )
     return np.array(rows)
 
 
@@ -45,16 +53,23 @@ def gaps(paths: np.ndarray) -> np.ndarray:
 
 
 def test_a_person_alone_walks_straight_to_the_goal_at_their_pace(model: Model) -> None:
-    path = walk(ReactingPeople(model, jitter=0).start(scene(TWO[0], duration=10.0), 0), seconds=10.0)[:, 0]
+    path = walk(
+        ReactingPeople(model, jitter=0).start(scene(TWO[0], duration=10.0), 0),
+        seconds=10.0,
+    )[:, 0]
     assert path[0, :2] == pytest.approx((-4, 0))
     assert np.abs(path[:, 1]).max() < 1e-6
     assert np.hypot(*path[20:60, 2:4].T) == pytest.approx(0.5, abs=1e-3)
-    assert abs(path[-1, 0] - 1.0) <= 0.61, "within the 0.5 m where PySocialForce stops, and a start from rest"
+    assert abs(path[-1, 0] - 1.0) <= 0.61, (
+        "within the 0.5 m where PySocialForce stops, and a start from rest"
+    )
 
 
 def test_velocity_is_the_displacement_per_time_step(model: Model) -> None:
     paths = walk(ReactingPeople(model).start(scene(*TWO), 3))
-    assert np.diff(paths[:, :, :2], axis=0) == pytest.approx(0.1 * paths[1:, :, 2:4], abs=1e-6)
+    assert np.diff(paths[:, :, :2], axis=0) == pytest.approx(
+        0.1 * paths[1:, :, 2:4], abs=1e-6
+    )
 
 
 def test_two_people_who_meet_head_on_pass_each_other(model: Model) -> None:
@@ -68,11 +83,15 @@ def test_people_avoid_the_robot_only_if_they_see_it(model: Model) -> None:
     alone = scene(Person((-4.0, 0.1), (0.5, 0.0)))
     robot = np.array([0.0, 0.0, 0.0, 0.0])
     nearest = {
-        sees: np.hypot(*walk(ReactingPeople(model, sees=sees).start(alone, 0), robot)[:, 0, :2].T).min()
+        sees: np.hypot(
+            *walk(ReactingPeople(model, sees=sees).start(alone, 0), robot)[:, 0, :2].T
+        ).min()
         for sees in ("robot", "person", "nothing")
     }
     assert nearest["nothing"] < 0.25
-    assert nearest["person"] > 2 * BODY_RADIUS - 0.11, "JuPedSim's bodies are 5 cm smaller"
+    assert nearest["person"] > 2 * BODY_RADIUS - 0.11, (
+        "JuPedSim's bodies are 5 cm smaller"
+    )
     assert nearest["robot"] >= nearest["person"] - 1e-6
     if model != "social force":
         assert nearest["robot"] > 0.5 + BODY_RADIUS - 0.11
@@ -80,7 +99,9 @@ def test_people_avoid_the_robot_only_if_they_see_it(model: Model) -> None:
 
 def test_people_do_not_walk_through_walls(model: Model) -> None:
     wall = [[(0.0, -1.0), (0.0, 1.5)]]
-    paths = walk(ReactingPeople(model).start(scene(TWO[0], walls=wall), 2), seconds=40.0)[:, 0, :2]
+    paths = walk(
+        ReactingPeople(model).start(scene(TWO[0], walls=wall), 2), seconds=40.0
+    )[:, 0, :2]
     crossing = np.flatnonzero(np.diff(np.sign(paths[:, 0])) != 0)
     assert all(not -1.0 <= paths[k, 1] <= 1.5 for k in crossing)
 
@@ -100,15 +121,21 @@ def test_people_walk_to_given_goals(model: Model) -> None:
     assert np.hypot(*(path[-1, :2] - (3.0, 4.0))) < 0.6
 
 
-def test_the_same_seed_gives_the_same_people_and_another_seed_others(model: Model) -> None:
-    first, again, other = (walk(ReactingPeople(model).start(scene(*TWO), seed)) for seed in (1, 1, 2))
+def test_the_same_seed_gives_the_same_people_and_another_seed_others(
+    model: Model,
+) -> None:
+    first, again, other = (
+        walk(ReactingPeople(model).start(scene(*TWO), seed)) for seed in (1, 1, 2)
+    )
     assert (first == again).all()
     assert not np.allclose(first, other, atol=1e-4)
 
 
 def test_people_keep_their_zones_and_an_empty_crowd_stays_empty(model: Model) -> None:
     zone = szlib.Ellipse((0.1, 0.0), (1.0, 0.7))
-    crowd = ReactingPeople(model).start(scene(Person((0.0, 0.0), (0.5, 0.0), zone=zone)), 0)
+    crowd = ReactingPeople(model).start(
+        scene(Person((0.0, 0.0), (0.5, 0.0), zone=zone)), 0
+    )
     assert [crowd(t, FAR)[0].zone for t in (0.0, 0.1, 0.2)] == [zone] * 3
     empty = ReactingPeople(model).start(scene(), 0)
     assert [len(empty(t, FAR)) for t in (0.0, 0.1)] == [0, 0]
@@ -120,13 +147,17 @@ class Straight:
     def __init__(self, walkers: Walkers) -> None:
         self.walking = walkers.velocities
 
-    def velocities(self, positions: np.ndarray, robot: np.ndarray, dt: float) -> np.ndarray:
+    def velocities(
+        self, positions: np.ndarray, robot: np.ndarray, dt: float
+    ) -> np.ndarray:
         return self.walking
 
 
 def test_a_class_can_be_the_model_of_walking() -> None:
     paths = walk(ReactingPeople(Straight).start(scene(*TWO), 0))
-    assert paths[:, :, 2:4] == pytest.approx(np.tile([(0.5, 0.0), (-0.5, 0.0)], (201, 1, 1)))
+    assert paths[:, :, 2:4] == pytest.approx(
+        np.tile([(0.5, 0.0), (-0.5, 0.0)], (201, 1, 1))
+    )
     assert paths[-1, :, :2] == pytest.approx(np.array([(6.0, 0.0), (-6.0, 0.1)]))
 
 
@@ -156,7 +187,8 @@ def test_a_missing_package_is_named_with_its_install_command(
 
 def test_invalid_parameters_are_rejected() -> None:
     with pytest.raises(
-        szlib.SolverError, match="orca, social force, or make a model from walkers; got 'boids'"
+        szlib.SolverError,
+        match="orca, social force, or make a model from walkers; got 'boids'",
     ):
         ReactingPeople("boids")
     with pytest.raises(szlib.SolverError, match="robot, person, nothing"):
@@ -179,7 +211,9 @@ def test_social_force_leaves_no_file_and_restores_logging(tmp_path: Path) -> Non
     )
     env = {**os.environ, "PYTHONPATH": str(Path(szlib.__file__).parents[1])}
     command = [sys.executable, "-W", "error", "-c", code]
-    said = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=env, check=True)
+    said = subprocess.run(
+        command, capture_output=True, text=True, cwd=tmp_path, env=env, check=True
+    )
     assert said.stdout.strip() == f"{logging.WARNING} [] []\n0 FileHandler 0"
     assert said.stderr == ""
 
@@ -187,9 +221,22 @@ def test_social_force_leaves_no_file_and_restores_logging(tmp_path: Path) -> Non
 def test_the_extra_adds_less_than_300_megabytes() -> None:
     """What pyrvo and PySocialForce bring that szlib does not need otherwise."""
     pytest.importorskip("numba")
-    brought = ("pyrvo", "ir-sim", "imageio", "loguru", "pysocialforce", "numba", "llvmlite", "toml")
+    brought = (
+        "pyrvo",
+        "ir-sim",
+        "imageio",
+        "loguru",
+        "pysocialforce",
+        "numba",
+        "llvmlite",
+        "toml",
+    )
     files = [file for name in brought for file in metadata.files(name) or ()]
-    size = sum(Path(file.locate()).stat().st_size for file in files if Path(file.locate()).is_file())
+    size = sum(
+        Path(file.locate()).stat().st_size
+        for file in files
+        if Path(file.locate()).is_file()
+    )
     assert 100e6 < size < 300e6
 
 
@@ -213,7 +260,9 @@ def replay_of(tracks: pd.DataFrame, person: int) -> Replay:
 
 def test_a_replay_has_the_start_and_goal_of_the_walker_and_all_other_people() -> None:
     replay = replay_of(recording(), 1)
-    assert replay.scenario.start == pytest.approx((0, 0, 0.99, 0)), "as fast as they were, or as it may be"
+    assert replay.scenario.start == pytest.approx((0, 0, 0.99, 0)), (
+        "as fast as they were, or as it may be"
+    )
     assert replay.scenario.goal == pytest.approx((8, 0))
     assert replay.scenario.duration == 16.0
     assert {other.id for other in replay.others} == {2, 3, 4, 5}
@@ -221,20 +270,34 @@ def test_a_replay_has_the_start_and_goal_of_the_walker_and_all_other_people() ->
 
 def test_replayed_people_are_at_their_recorded_positions() -> None:
     tracks = recording()
-    crowd, robot = replay_of(tracks, 1).start(scene(), 0), np.array([4.0, 0.0, 0.0, 0.0])
+    crowd, robot = (
+        replay_of(tracks, 1).start(scene(), 0),
+        np.array([4.0, 0.0, 0.0, 0.0]),
+    )
     for t in np.arange(0.0, 16.0, 0.1):
         seen = [p for p in crowd(t, robot) if p is not None]
         now = tracks[np.isclose(tracks["t"], 10.0 + t) & (tracks["id"] != 1)]
         near = now[np.hypot(now["x"] - 4.0, now["y"]) <= SENSING_RANGE]
-        was, true = sorted(p.position for p in seen), sorted(zip(near["x"], near["y"], strict=True))
+        was, true = (
+            sorted(p.position for p in seen),
+            sorted(zip(near["x"], near["y"], strict=True)),
+        )
         assert np.reshape(was, (-1, 2)) == pytest.approx(np.reshape(true, (-1, 2)))
         assert {p.velocity for p in seen if p.heading} <= {(0.0, 1.0), (-1.0, 0.0)}
-    assert [len([p for p in crowd(t, robot) if p]) for t in (0.0, 5.0, 15.0)] == [2, 3, 1]
+    assert [len([p for p in crowd(t, robot) if p]) for t in (0.0, 5.0, 15.0)] == [
+        2,
+        3,
+        1,
+    ]
 
 
 def test_positions_between_ticks_are_interpolated() -> None:
     crowd = replay_of(recording(), 1).start(scene(), 0)
-    (other,) = (p for p in crowd(1.23, np.array([4.0, -2.0, 0, 0])) if p is not None and p.velocity[1])
+    (other,) = (
+        p
+        for p in crowd(1.23, np.array([4.0, -2.0, 0, 0]))
+        if p is not None and p.velocity[1]
+    )
     assert other.position == pytest.approx((4.0, -4.0 + 1.0 + 1.23))
 
 
@@ -256,29 +319,48 @@ def test_the_walker_replaced_can_be_driven_like_a_controller() -> None:
     bodies = []
     for _ in range(101):
         bodies.append(walker.robot.body(own))
-        own = walker.robot.advance(own, walker.step(own, replay.scenario.goal, ()).control, 0.1)
+        own = walker.robot.advance(
+            own, walker.step(own, replay.scenario.goal, ()).control, 0.1
+        )
     assert np.array(bodies)[:81] == pytest.approx(replay.walker.states[:, :4])
     assert np.array(bodies)[81:, :2] == pytest.approx(np.tile((8.0, 0.0), (20, 1)))
 
 
 def test_replays_start_and_end_in_the_area_away_from_people() -> None:
     area = szlib.Square(x=(1.0, 7.0), y=(-5.0, 5.0))
-    (replay,) = (each for each in find_replays(recording(), 99, area=area) if each.walker.id == 1)
-    assert (replay.scenario.start[0], replay.scenario.goal[0]) == pytest.approx((1.0, 7.0))
-    beside = make_walk((0, MIN_START_DISTANCE - 0.1), (1.0, 0.0), person=9, begin=10.0, duration=8.0)
-    ids = {each.walker.id for each in find_replays(make_tracks(recording(), beside), 99)}
+    (replay,) = (
+        each for each in find_replays(recording(), 99, area=area) if each.walker.id == 1
+    )
+    assert (replay.scenario.start[0], replay.scenario.goal[0]) == pytest.approx(
+        (1.0, 7.0)
+    )
+    beside = make_walk(
+        (0, MIN_START_DISTANCE - 0.1), (1.0, 0.0), person=9, begin=10.0, duration=8.0
+    )
+    ids = {
+        each.walker.id for each in find_replays(make_tracks(recording(), beside), 99)
+    }
     assert ids.isdisjoint({1, 9}), "the robot has no companions"
     with pytest.raises(szlib.DataError, match=r"no walker covers 5.0 m"):
         find_replays(recording(), 5, area=szlib.Square(x=(0.0, 1.0), y=(0.0, 1.0)))
 
 
 def test_the_seed_selects_the_walkers() -> None:
-    ids = [[each.walker.id for each in find_replays(recording(), 2, seed=seed)] for seed in (0, 0, 1, 2, 3)]
+    ids = [
+        [each.walker.id for each in find_replays(recording(), 2, seed=seed)]
+        for seed in (0, 0, 1, 2, 3)
+    ]
     assert ids[0] == ids[1]
     assert len({tuple(each) for each in ids}) > 1
 
 
 def test_each_day_is_a_separate_scene() -> None:
-    other_day = make_walk((4, 1), (0.0, 1.0), person=2, begin=10.0, duration=9.0, day="2012-10-28")
-    first = next(r for r in find_replays(make_tracks(recording(), other_day), 99) if r.walker.id == 1)
+    other_day = make_walk(
+        (4, 1), (0.0, 1.0), person=2, begin=10.0, duration=9.0, day="2012-10-28"
+    )
+    first = next(
+        r
+        for r in find_replays(make_tracks(recording(), other_day), 99)
+        if r.walker.id == 1
+    )
     assert [other.id for other in first.others].count(2) == 1

@@ -45,10 +45,13 @@ def test_a_controller_has_the_run_of_the_closed_loop(example: Any, name: str) ->
     assert np.array(states) == pytest.approx(log.states, abs=1e-6) and log.success
     assert info["min_h"] == pytest.approx(log.metrics()["min_h"], abs=1e-6)
     way = scenario.goal - log.states[[0, -1], :2]
-    assert total == pytest.approx(-np.diff(np.hypot(*way.T))[0], abs=1e-4)  # progress alone
+    # progress alone
+    assert total == pytest.approx(-np.diff(np.hypot(*way.T))[0], abs=1e-4)
 
 
-def test_the_observation_has_the_nearest_people_and_walls_with_their_h(example: Any) -> None:
+def test_the_observation_has_the_nearest_people_and_walls_with_their_h(
+    example: Any,
+) -> None:
     scenario = szlib.Scenario(
         "hall",
         start=(1.0, 2.0, 0.5, 0.0),
@@ -63,7 +66,9 @@ def test_the_observation_has_the_nearest_people_and_walls_with_their_h(example: 
     assert rows[:2, :4].tolist() == [[-3.0, 0.0, 0.0, 0.4], [9.0, 0.0, 0.0, 0.4]]
     assert rows[example.PEOPLE, :4].tolist() == [-1.0, -2.0, 4.0, -2.0]
     log = szlib.simulation.drive(
-        scenario, szlib.MPCCBF(env.zone, walls=scenario.walls, settings=env.settings), max_time=0.1
+        scenario,
+        szlib.MPCCBF(env.zone, walls=scenario.walls, settings=env.settings),
+        max_time=0.1,
     )
     assert rows[[1, 0, example.PEOPLE], 4] == pytest.approx(log.h[0])
     assert (rows[2 : example.PEOPLE] == example.FAR).all() and (
@@ -73,12 +78,17 @@ def test_the_observation_has_the_nearest_people_and_walls_with_their_h(example: 
 
 def test_being_too_close_too_fast_or_too_late_is_seen(example: Any) -> None:
     person = szlib.Person((0.5, 0.0), (0.4, 0.0))
-    scenario = szlib.Scenario("close", (0.0, 0.0, 3.0, 0.0), (9.0, 0.0), (person,), duration=0.2)
+    scenario = szlib.Scenario(
+        "close", (0.0, 0.0, 3.0, 0.0), (9.0, 0.0), (person,), duration=0.2
+    )
     env = example.SocialEnv(lambda _: scenario)
     env.reset()
     _, reward, arrived, late, info = env.step((-9.0, 0.0))  # beyond the limit of 1 m/s2
     assert env.state[2] == pytest.approx(2.9) and not (arrived or late)
-    assert reward == pytest.approx(0.295 + 10 * env.h[0] - 1.9) and info["min_h"] <= env.h[0] < 0
+    assert (
+        reward == pytest.approx(0.295 + 10 * env.h[0] - 1.9)
+        and info["min_h"] <= env.h[0] < 0
+    )
     assert env.step((0.0, 0.0))[2:4] == (False, True)
 
 

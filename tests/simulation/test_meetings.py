@@ -10,7 +10,12 @@ import szlib
 from szlib.simulation.baseline_controllers import StraightController
 from szlib.simulation.closed_loop import drive
 from szlib.simulation.monte_carlo import identify, rollouts
-from szlib.simulation.scenarios.meetings import MEETINGS, Variations, VisiblePeople, is_visible
+from szlib.simulation.scenarios.meetings import (
+    MEETINGS,
+    Variations,
+    VisiblePeople,
+    is_visible,
+)
 
 ZONE = szlib.Ellipse((0.05, 0.0), (1.0, 0.7))
 SETTINGS = szlib.MPCSettings()
@@ -72,11 +77,15 @@ def test_variations_are_close_to_the_scene_and_the_same_for_a_seed():
             assert 0.9 <= np.hypot(*now.velocity) / np.hypot(*before.velocity) <= 1.1
             assert now.heading == before.heading and now.zone == ZONE
     assert vary(7).people == drawn[7].people and vary(8).people != drawn[7].people
-    assert np.array_equal(vary(7).goal, scene.goal) and np.array_equal(vary(7).walls, scene.walls)
+    assert np.array_equal(vary(7).goal, scene.goal) and np.array_equal(
+        vary(7).walls, scene.walls
+    )
 
 
 def test_variations_without_a_zone_keep_the_zones_of_people():
-    own = replace(MEETINGS["overtaking"], people=(szlib.Person((0, 0), (0.3, 0), zone=ZONE),))
+    own = replace(
+        MEETINGS["overtaking"], people=(szlib.Person((0, 0), (0.3, 0), zone=ZONE),)
+    )
     assert Variations(own)(0).people[0].zone == ZONE
     assert Variations(MEETINGS["overtaking"])(0).people[0].zone is None
 
@@ -120,7 +129,8 @@ def test_hidden_people_are_present_but_not_seen():
     log = drive(scenario, controller, behaviour=VisiblePeople())
     given = ~np.isnan(log.residual[:, 0, 0])
     sight = [
-        is_visible(x[:2], p[:2], scenario.walls) for x, p in zip(log.states, log.people[:, 0], strict=True)
+        is_visible(x[:2], p[:2], scenario.walls)
+        for x, p in zip(log.states, log.people[:, 0], strict=True)
     ]
     assert given.tolist() == sight
     assert 0 < given.sum() < len(given)

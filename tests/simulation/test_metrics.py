@@ -33,15 +33,23 @@ def make_run(
     states = np.array(states, float)
     n = len(states)
     placed = [np.broadcast_to(at, (n, 2)) for at in people]
-    scenario = szlib.Scenario("made", states[0], goal, tuple(szlib.Person((9, 9)) for _ in people), walls)
-    given = {"fallback": np.full(n, "warm"), "safe": np.ones(n, bool), "slack": np.zeros(n)}
+    scenario = szlib.Scenario(
+        "made", states[0], goal, tuple(szlib.Person((9, 9)) for _ in people), walls
+    )
+    given = {
+        "fallback": np.full(n, "warm"),
+        "safe": np.ones(n, bool),
+        "slack": np.zeros(n),
+    }
     return Run(
         scenario,
         SETTINGS,
         (CIRCLE,) * len(people),
         states,
         np.zeros((n, 2)),
-        people=np.array([np.pad(at, ((0, 0), (0, 3))) for at in placed]).reshape(-1, n, 5).swapaxes(0, 1),
+        people=np.array([np.pad(at, ((0, 0), (0, 3))) for at in placed])
+        .reshape(-1, n, 5)
+        .swapaxes(0, 1),
         predicted=np.zeros((n, 0, 4)),
         residual=np.full((n, len(people) + len(walls), 2), residual),
         arrival=arrival,
@@ -56,7 +64,13 @@ def with_speeds(speeds: object) -> np.ndarray:
     return np.column_stack([x, 0 * x, speeds, 0 * x])
 
 
-STAND, START, CRUISE, SLOW, BRAKE = [0.0] * 3, [0.5] * 7, [1.0] * 10, [0.6] * 5, [0.97, 0.5, 0.0]
+STAND, START, CRUISE, SLOW, BRAKE = (
+    [0.0] * 3,
+    [0.5] * 7,
+    [1.0] * 10,
+    [0.6] * 5,
+    [0.97, 0.5, 0.0],
+)
 JOURNEY = STAND + START + CRUISE + [0.04] * 4 + SLOW + CRUISE + BRAKE
 
 
@@ -69,8 +83,12 @@ def test_speeds_and_times_of_a_journey() -> None:
     assert found["mean_speed"] == pytest.approx(np.mean(JOURNEY))
     assert found["max_speed"] == 1.0
     assert found["min_speed"] == 0.04, "neither the start nor the braking counts"
-    assert found["time_stopped"] == pytest.approx(0.4), "neither the start nor the last state counts"
-    alone = compute_metrics(make_run(with_speeds(STAND + START + CRUISE + BRAKE), arrival=22))
+    assert found["time_stopped"] == pytest.approx(0.4), (
+        "neither the start nor the last state counts"
+    )
+    alone = compute_metrics(
+        make_run(with_speeds(STAND + START + CRUISE + BRAKE), arrival=22)
+    )
     assert alone["min_speed"] == 0.97
 
 
@@ -97,7 +115,9 @@ def test_distances_to_people_and_walls_are_separate() -> None:
     states = with_speeds([1.0] * 41)
     wall = [[(-5.0, -2.0), (20.0, -2.0)]]
     found = compute_metrics(make_run(states, (2.0, 1.5), FAR_AWAY, walls=wall))
-    assert found["min_h_people"] == pytest.approx(1.5 - 0.7 - 0.5 - SETTINGS.eps, abs=1e-6)
+    assert found["min_h_people"] == pytest.approx(
+        1.5 - 0.7 - 0.5 - SETTINGS.eps, abs=1e-6
+    )
     assert found["min_clearance_people"] == pytest.approx(1.5 - 0.25 - 0.5)
     assert found["min_clearance_walls"] == pytest.approx(2.0 - 0.5)
     assert found["min_h"] == found["min_h_people"] < found["min_h_walls"]
@@ -111,17 +131,29 @@ def test_steps_are_counted_if_their_control_is_applied() -> None:
     """The person is in the way: h < 0 within 1.25 m of them, an overlap within 0.75 m."""
     states = with_speeds([2.0] * 11)  # x = 0, 0.2, ..., 2.0
     n, person = len(states), (2.0, 0.0)
-    fallback = np.array(["cold"] * 2 + ["kept"] + ["relaxed"] * 3 + ["braking"] * 4 + ["cold"])
+    fallback = np.array(
+        ["cold"] * 2 + ["kept"] + ["relaxed"] * 3 + ["braking"] * 4 + ["cold"]
+    )
     safe = np.arange(n) != 7
     slack = np.array([0.0, 2e-6, *[0.1] * 8, 5.0])
     found = compute_metrics(
-        make_run(states, person, fallback=fallback, safe=safe, slack=slack, solve_time=np.arange(n) / 10)
+        make_run(
+            states,
+            person,
+            fallback=fallback,
+            safe=safe,
+            slack=slack,
+            solve_time=np.arange(n) / 10,
+        )
     )
     assert (found["violations"], found["overlaps"]) == (7, 4)
     assert (found["claimed_safe_steps"], found["flagged_steps"]) == (9, 1)
     assert (found["unflagged_violations"], found["unflagged_overlaps"]) == (6, 3)
     assert (found["infeasible_steps"], found["max_slack"]) == (9, 0.1)
-    counts = [found[f"steps_{name}"] for name in ("warm", "cold", "kept", "relaxed", "braking")]
+    counts = [
+        found[f"steps_{name}"]
+        for name in ("warm", "cold", "kept", "relaxed", "braking")
+    ]
     assert counts == [0, 2, 1, 3, 4]
     assert found["solve_time_median"] == pytest.approx(0.5)
     assert found["solve_time_p95"] == pytest.approx(0.95)
@@ -137,7 +169,10 @@ def test_a_start_in_violation_is_no_step() -> None:
 def test_the_robot_yields_while_a_person_holds_it_back() -> None:
     speeds = [1.0] * 12 + [0.049] * 5 + [0.051] * 5 + [-0.5] * 3 + [1.0] * 3
     run = make_run(with_speeds(speeds), FAR_AWAY, residual=1e-4)
-    assert np.flatnonzero(find_yielding_steps(run)).tolist() == [*range(12, 17), *range(22, 25)]
+    assert np.flatnonzero(find_yielding_steps(run)).tolist() == [
+        *range(12, 17),
+        *range(22, 25),
+    ]
     assert compute_metrics(run)["time_yielding"] == pytest.approx(0.8)
     free = make_run(with_speeds(speeds), FAR_AWAY, residual=2e-4)
     assert compute_metrics(free)["time_yielding"] == 0
@@ -149,7 +184,9 @@ def test_neither_the_first_second_nor_standing_at_the_goal_is_yielding() -> None
     early = make_run(with_speeds([0.0] * 15), FAR_AWAY, residual=0.0)
     assert np.flatnonzero(find_yielding_steps(early)).tolist() == [10, 11, 12, 13]
     for distance, steps in ((0.09, 0), (0.11, 4)):
-        near = make_run(with_speeds([0.0] * 15), FAR_AWAY, residual=0.0, goal=(distance, 0.0))
+        near = make_run(
+            with_speeds([0.0] * 15), FAR_AWAY, residual=0.0, goal=(distance, 0.0)
+        )
         assert find_yielding_steps(near).sum() == steps
     over = make_run(with_speeds([0.0] * 25), FAR_AWAY, residual=0.0, arrival=14)
     assert len(find_yielding_steps(over)) == 14
@@ -157,7 +194,9 @@ def test_neither_the_first_second_nor_standing_at_the_goal_is_yielding() -> None
 
 def test_the_course_has_the_goal_ahead() -> None:
     states = np.array([[0, 0, 0, 0], [3, 4, 0, 0]], float)
-    ahead, left = locate_along_course(make_run(states, (-4.0, 3.0), (3.0, 4.0), goal=(6.0, 8.0)), 0)
+    ahead, left = locate_along_course(
+        make_run(states, (-4.0, 3.0), (3.0, 4.0), goal=(6.0, 8.0)), 0
+    )
     assert ahead == pytest.approx([0, -5]) and left == pytest.approx([5, 5])
 
 
@@ -165,10 +204,17 @@ def test_the_course_has_the_goal_ahead() -> None:
 def test_the_side_is_that_of_the_nearest_person(y: float, side: str) -> None:
     states = with_speeds([1.0] * 41)
     assert find_passing_side(make_run(states, (2.0, y))) == side
-    assert find_passing_side(make_run(states, (1.0, -2.0 * y), (2.0, y), (3.0, -2.0 * y))) == side
+    assert (
+        find_passing_side(make_run(states, (1.0, -2.0 * y), (2.0, y), (3.0, -2.0 * y)))
+        == side
+    )
     assert find_passing_side(make_run(states, (4.5, y))) == "none", "never abeam"
-    assert find_passing_side(make_run(states, (-0.5, y))) == "none", "behind from the start"
-    assert find_passing_side(make_run(states, (2.0, y), goal=(0.0, 0.0))) == "none", "no course"
+    assert find_passing_side(make_run(states, (-0.5, y))) == "none", (
+        "behind from the start"
+    )
+    assert find_passing_side(make_run(states, (2.0, y), goal=(0.0, 0.0))) == "none", (
+        "no course"
+    )
     assert find_passing_side(make_run(states)) == "none"
 
 
@@ -180,7 +226,8 @@ def test_who_is_overtaken_twice_is_passed_on_the_last_side() -> None:
 
 
 def test_avoidance_starts_at_a_tenth_of_a_metre_from_the_line() -> None:
-    states = np.array([[0, 0, 0, 0], [3, 4, 0, 0], [6.16, 7.88, 0, 0], [9, 12, 0, 0]])  # 0.2 m beside
+    # 0.2 m beside
+    states = np.array([[0, 0, 0, 0], [3, 4, 0, 0], [6.16, 7.88, 0, 0], [9, 12, 0, 0]])
     run = make_run(states, (9.0, 12.0), goal=(9.0, 12.0))
     distance, h = find_avoidance_start(run)
     halfway = np.array([4.58, 5.94])

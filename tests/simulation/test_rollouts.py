@@ -12,7 +12,8 @@ from szlib.simulation.monte_carlo import rerun_world, rollouts
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
-MODULE = importlib.import_module("szlib.simulation.monte_carlo")  # the name of its function, too
+# the name of its function, too
+MODULE = importlib.import_module("szlib.simulation.monte_carlo")
 SETTINGS = szlib.MPCSettings()
 TIMES = ["solve_time_median", "solve_time_p95", "solve_time_p99", "solve_time_max"]
 SHORT = Worlds(duration=2.0)
@@ -21,7 +22,9 @@ SHORT = Worlds(duration=2.0)
 def scenario(goal=(4.0, 0.0), people=(), walls=(), duration=15.0, velocity=(0.0, 0.0)):
     start = np.array([-2.0, 0.0, *velocity])
     walls = np.reshape(np.array(walls, float), (-1, 2, 2))
-    return szlib.Scenario("", start, np.array(goal), people=people, walls=walls, duration=duration)
+    return szlib.Scenario(
+        "", start, np.array(goal), people=people, walls=walls, duration=duration
+    )
 
 
 def person(position, velocity=(0.0, 0.0), heading=0.0):
@@ -30,17 +33,32 @@ def person(position, velocity=(0.0, 0.0), heading=0.0):
 
 def whole(world):
     """A drive to the end of time with the controller's default zone."""
-    return drive(world, szlib.MPCCBF(ZONE, walls=world.walls, settings=SETTINGS), until_arrival=False)
+    return drive(
+        world,
+        szlib.MPCCBF(ZONE, walls=world.walls, settings=SETTINGS),
+        until_arrival=False,
+    )
 
 
 def test_driving_after_the_arrival_does_not_change_earlier_rows():
     world = scenario(people=(person((1.0, 0.3)),), walls=[[(-3, 2.5), (5, 2.5)]])
-    log, longer = szlib.simulate(world, szlib.MPCCBF(ZONE, walls=world.walls)), whole(world)
+    log, longer = (
+        szlib.simulate(world, szlib.MPCCBF(ZONE, walls=world.walls)),
+        whole(world),
+    )
     n = len(log.states)
     assert len(longer.states) == 151 > n
     assert np.array_equal(longer.states[:n], log.states)
     ours, theirs = longer.metrics(), log.metrics()
-    same = ["success", "time_to_goal", "path_length", "time_stopped", "time_yielding", "passing_side", "jerk"]
+    same = [
+        "success",
+        "time_to_goal",
+        "path_length",
+        "time_stopped",
+        "time_yielding",
+        "passing_side",
+        "jerk",
+    ]
     assert {k: ours[k] for k in same} == {k: theirs[k] for k in same}
     assert set(ours) == set(theirs)
 
@@ -51,28 +69,40 @@ def test_parallel_and_interrupted_calls_give_the_same_rows(tmp_path, monkeypatch
     kept = rollouts(3, worlds=SHORT, n_jobs=1, progress=False, out=tmp_path)
     more = rollouts(5, worlds=SHORT, n_jobs=1, progress=False, out=tmp_path)
     pd.testing.assert_frame_equal(alone.drop(columns=TIMES), more.drop(columns=TIMES))
-    pd.testing.assert_frame_equal(kept[:2], more[:2])  # solve times too: the finished chunk was read
+    # solve times too: the finished chunk was read
+    pd.testing.assert_frame_equal(kept[:2], more[:2])
     assert {path.name for path in tmp_path.rglob(".szlib-*")} <= {".szlib-lock"}
     other = rollouts(
-        2, worlds=SHORT, settings=szlib.MPCSettings(gamma=0.1), n_jobs=1, progress=False, out=tmp_path
+        2,
+        worlds=SHORT,
+        settings=szlib.MPCSettings(gamma=0.1),
+        n_jobs=1,
+        progress=False,
+        out=tmp_path,
     )
     assert len(other) == 2
     assert sum(path.is_dir() for path in tmp_path.iterdir()) == 2
 
 
 def test_rerun_world_gives_exactly_the_row_of_rollouts():
-    alike = Worlds(people=(3, 3), walls=1.0, max_walls=1, duration=3.0)  # of one size: they share one
+    # of one size: they share one
+    alike = Worlds(people=(3, 3), walls=1.0, max_walls=1, duration=3.0)
     rows = rollouts(3, seed=7, worlds=alike, n_jobs=1, progress=False)
-    again = pd.DataFrame([rerun_world(seed, worlds=alike).metrics() for seed in rows["seed"]])
+    again = pd.DataFrame(
+        [rerun_world(seed, worlds=alike).metrics() for seed in rows["seed"]]
+    )
     pd.testing.assert_frame_equal(
         rows.drop(columns=[*TIMES, "seed"]), again.drop(columns=TIMES), check_exact=True
     )
 
 
 def test_columns_are_numbers_and_each_violation_is_flagged():
-    table = rollouts(12, worlds=Worlds(people=(3, 5), walls=1.0), n_jobs=1, progress=False)
+    table = rollouts(
+        12, worlds=Worlds(people=(3, 5), walls=1.0), n_jobs=1, progress=False
+    )
     assert table["seed"].tolist() == list(range(12))
-    assert not table.drop(columns="time_to_goal").isna().any().any()  # walls and people in every world
+    # walls and people in every world
+    assert not table.drop(columns="time_to_goal").isna().any().any()
     assert table["time_to_goal"].isna().equals(~table["success"])
     assert (table["unflagged_violations"] == 0).all()
     assert (table.filter(like="steps_").sum(axis=1) == 150).all()
@@ -86,10 +116,16 @@ ENDINGS = {
     "out of time": scenario(goal=(20.0, 0.0)),
     "deadlock": scenario(walls=[[(0, -8), (0, 8)]]),
     "boxed in": scenario(walls=[*ROOM, [(0, -9), (0, 9)]]),
-    "drove in": scenario(people=(person((-0.3, 0.0)),), velocity=(1.0, 0.0), goal=(8.0, 0.0)),
-    "hit wall": scenario(walls=[[(-1.4, -3), (-1.4, 3)]], velocity=(1.0, 0.0), goal=(8.0, 0.0)),
+    "drove in": scenario(
+        people=(person((-0.3, 0.0)),), velocity=(1.0, 0.0), goal=(8.0, 0.0)
+    ),
+    "hit wall": scenario(
+        walls=[[(-1.4, -3), (-1.4, 3)]], velocity=(1.0, 0.0), goal=(8.0, 0.0)
+    ),
     "run into": scenario(people=(person((1.0, 0.0), (-4.0, 0.0), np.pi),)),
-    "squeezed": scenario(people=(person((1.0, 0.0), (-2.0, 0.0), np.pi),), walls=DEAD_END),
+    "squeezed": scenario(
+        people=(person((1.0, 0.0), (-2.0, 0.0), np.pi),), walls=DEAD_END
+    ),
 }
 
 
@@ -98,24 +134,38 @@ def test_each_outcome_is_classified(ending):
     assert whole(ENDINGS[ending]).metrics()["outcome"] == ending
 
 
-PILLARS = Worlds(walls=1.0, max_walls=4, wall_length=(0.1, 1.0), size=6.0, travel=(2.0, 5.0))
+PILLARS = Worlds(
+    walls=1.0, max_walls=4, wall_length=(0.1, 1.0), size=6.0, travel=(2.0, 5.0)
+)
 
 
 def test_the_euclidean_margin_avoids_short_walls_and_the_papers_does_not():
-    hasty = [szlib.MPCSettings(margin=margin, gamma=0.5, N_h=8) for margin in ("euclidean", "paper")]
+    hasty = [
+        szlib.MPCSettings(margin=margin, gamma=0.5, N_h=8)
+        for margin in ("euclidean", "paper")
+    ]
     careful, paper = (
-        rollouts(4, seed=4, worlds=PILLARS, settings=settings, n_jobs=1, progress=False) for settings in hasty
+        rollouts(4, seed=4, worlds=PILLARS, settings=settings, n_jobs=1, progress=False)
+        for settings in hasty
     )
     assert careful["min_clearance_walls"].min() >= -1e-6
     assert paper["min_clearance_walls"].min() < -0.1
     for rows in (careful, paper):
-        assert rows["unflagged_overlaps"].sum() == rows["unflagged_violations"].sum() == 0
+        assert (
+            rows["unflagged_overlaps"].sum() == rows["unflagged_violations"].sum() == 0
+        )
         gaps = rows[["min_clearance_people", "min_clearance_walls"]].min(axis=1)
         assert (rows["min_clearance"] == gaps).all()
 
 
 def test_the_whole_barrier_horizon_is_safe_around_one_person():
-    table = rollouts(10, worlds=ONE_PERSON, settings=szlib.MPCSettings(N_h=8), n_jobs=1, progress=False)
+    table = rollouts(
+        10,
+        worlds=ONE_PERSON,
+        settings=szlib.MPCSettings(N_h=8),
+        n_jobs=1,
+        progress=False,
+    )
     assert table["min_h"].min() >= -1e-6
 
 
@@ -125,7 +175,10 @@ def test_a_number_of_worlds_below_one_is_rejected():
 
 
 def test_a_failing_world_is_named_by_its_seed():
-    with pytest.raises(szlib.SolverError, match="the controller failed in world 5: a zone must lie within"):
+    with pytest.raises(
+        szlib.SolverError,
+        match="the controller failed in world 5: a zone must lie within",
+    ):
         rerun_world(5, worlds=Worlds(standing=1.0), zone_transform=huge)
 
 

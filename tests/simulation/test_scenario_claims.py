@@ -15,13 +15,17 @@ SETTINGS = szlib.MPCSettings()
 ACTIVE, INACTIVE = 0.0, 1.0
 
 
-def make_run(name: str, xy: object, *, arrives: bool = True, residual: float = INACTIVE) -> Run:
+def make_run(
+    name: str, xy: object, *, arrives: bool = True, residual: float = INACTIVE
+) -> Run:
     """A run of the paper's scenario of this `name` along given positions, one a time step."""
     positions, dt = np.array(xy, float), SETTINGS.dt
     n, scenario = len(positions), szlib.SCENARIOS[name]
     velocity = np.gradient(positions, dt, axis=0)
     persons = [person.after(k * dt) for k in range(n) for person in scenario.people]
-    people = np.array([(*p.position, p.heading, *p.velocity) for p in persons]).reshape(n, -1, 5)
+    people = np.array([(*p.position, p.heading, *p.velocity) for p in persons]).reshape(
+        n, -1, 5
+    )
     return Run(
         scenario,
         SETTINGS,
@@ -52,7 +56,9 @@ def walk(*corners: tuple[float, float], speed: float = 1.0) -> np.ndarray:
 def evade_at(distance: float, side: float = -0.2) -> np.ndarray:
     """Straight at the person of the first scenario; 0.1 m beside the line at about this distance."""
     x = -distance
-    return np.vstack([walk((-4.0, 0.0), (x, 0.0)), [(x, side)], walk((x, side), (4.0, side))])
+    return np.vstack(
+        [walk((-4.0, 0.0), (x, 0.0)), [(x, side)], walk((x, side), (4.0, side))]
+    )
 
 
 def stand(at: tuple[float, float], seconds: float) -> np.ndarray:
@@ -74,12 +80,23 @@ FAILURES: dict[tuple[str, str], Callable[[], list[Run]]] = {
     ],
     ("corridor", "The robot slows down while passing."): lambda: [
         make_run("corridor", walk((-4.0, -1.5), (4.0, -1.5))),
-        make_run("corridor", stand((-4.0, -1.5), 2.0) + np.linspace(0, 1, 20)[:, None] ** 2 * (1, 0)),
+        make_run(
+            "corridor",
+            stand((-4.0, -1.5), 2.0) + np.linspace(0, 1, 20)[:, None] ** 2 * (1, 0),
+        ),
     ],
     ("waiting", "The robot waits."): lambda: [
         make_run("waiting", wait_and_enter(20.0)),  # nothing holds it back
-        make_run("waiting", np.vstack([stand((-2.0, 0.0), 1.5), wait_and_enter(2.0)]), residual=ACTIVE),
-        make_run("waiting", np.vstack([stand((-2.2, 0.0), 9.0), wait_and_enter(2.0)]), residual=ACTIVE),
+        make_run(
+            "waiting",
+            np.vstack([stand((-2.0, 0.0), 1.5), wait_and_enter(2.0)]),
+            residual=ACTIVE,
+        ),
+        make_run(
+            "waiting",
+            np.vstack([stand((-2.2, 0.0), 9.0), wait_and_enter(2.0)]),
+            residual=ACTIVE,
+        ),
     ],
     ("waiting", "The robot enters the pathway after the person has left it."): lambda: [
         make_run("waiting", wait_and_enter(7.5)),  # the person leaves at 8 s
@@ -92,8 +109,14 @@ FAILURES: dict[tuple[str, str], Callable[[], list[Run]]] = {
     ("making_room", "The robot is in the way and goes back to make room."): lambda: [
         make_run("making_room", walk((1.2, 0.0), (0.8, 0.0), (6.0, 0.0)))
     ],
-    ("making_room", "The robot enters the pathway after the person has left it."): lambda: [
-        make_run("making_room", np.vstack([walk((1.2, 0.0), (-1.0, 0.0)), walk((-1.0, 0.0), (6.0, 0.0))]))
+    (
+        "making_room",
+        "The robot enters the pathway after the person has left it.",
+    ): lambda: [
+        make_run(
+            "making_room",
+            np.vstack([walk((1.2, 0.0), (-1.0, 0.0)), walk((-1.0, 0.0), (6.0, 0.0))]),
+        )
     ],
     ("making_room", "The robot goes on to its goal."): lambda: [
         make_run("making_room", wait_and_enter(12.0), arrives=False)
@@ -117,7 +140,9 @@ def check(name: str, text: str, run: Run) -> tuple[bool, float]:
     return claim.check(run)
 
 
-@pytest.mark.parametrize(("distance", "holds"), [(1.70, False), (1.80, True), (2.5, True)])
+@pytest.mark.parametrize(
+    ("distance", "holds"), [(1.70, False), (1.80, True), (2.5, True)]
+)
 def test_well_before_the_zone_is_half_a_metre(distance: float, holds: bool) -> None:
     found, h = check("passing", "well before", make_run("passing", evade_at(distance)))
     assert found == holds
@@ -125,27 +150,50 @@ def test_well_before_the_zone_is_half_a_metre(distance: float, holds: bool) -> N
     assert h == pytest.approx(halfway - 0.7 - SETTINGS.r_robot - SETTINGS.eps)
 
 
-@pytest.mark.parametrize(("entry", "holds"), [(7.5, False), (8.0, False), (8.5, True), (12.0, True)])
-def test_the_time_between_leaving_and_entering_decides(entry: float, holds: bool) -> None:
+@pytest.mark.parametrize(
+    ("entry", "holds"), [(7.5, False), (8.0, False), (8.5, True), (12.0, True)]
+)
+def test_the_time_between_leaving_and_entering_decides(
+    entry: float, holds: bool
+) -> None:
     """The person leaves the pathway at 8 s; the robot is outside until one step before it enters."""
-    found, between = check("waiting", "enters", make_run("waiting", wait_and_enter(entry)))
+    found, between = check(
+        "waiting", "enters", make_run("waiting", wait_and_enter(entry))
+    )
     assert found == holds
     assert between == pytest.approx(entry - 0.1 - 8.0)
 
 
 @pytest.mark.parametrize(("share", "holds"), [(0.85, False), (0.75, True)])
-def test_slow_is_less_than_four_fifths_of_the_greatest_speed(share: float, holds: bool) -> None:
+def test_slow_is_less_than_four_fifths_of_the_greatest_speed(
+    share: float, holds: bool
+) -> None:
     """The robot passes within 1 m of the person, who walks at 0.5 m/s towards it."""
     fast = walk((-4.0, -1.5), (0.0, -1.5))
-    run = make_run("corridor", np.vstack([fast[:-1], walk((0.0, -1.5), (4.0, -1.5), speed=share)]))
-    assert check("corridor", "slows down", run) == (holds, pytest.approx(share, abs=0.01))
+    run = make_run(
+        "corridor", np.vstack([fast[:-1], walk((0.0, -1.5), (4.0, -1.5), speed=share)])
+    )
+    assert check("corridor", "slows down", run) == (
+        holds,
+        pytest.approx(share, abs=0.01),
+    )
 
 
 def test_the_robot_waits_for_a_second_without_going_back() -> None:
-    held = make_run("waiting", np.vstack([stand((-2.0, 0.0), 3.0), wait_and_enter(2.0)]), residual=ACTIVE)
+    held = make_run(
+        "waiting",
+        np.vstack([stand((-2.0, 0.0), 3.0), wait_and_enter(2.0)]),
+        residual=ACTIVE,
+    )
     holds, waited = check("waiting", "waits", held)
     assert holds and 1.9 <= waited <= 2.1, "the first second is the start-up"
-    back = np.vstack([walk((-2.0, 0.0), (-2.2, 0.0)), stand((-2.2, 0.0), 3.0), walk((-2.2, 0.0), (6.0, 0.0))])
+    back = np.vstack(
+        [
+            walk((-2.0, 0.0), (-2.2, 0.0)),
+            stand((-2.2, 0.0), 3.0),
+            walk((-2.2, 0.0), (6.0, 0.0)),
+        ]
+    )
     assert not check("waiting", "waits", make_run("waiting", back, residual=ACTIVE))[0]
 
 

@@ -26,7 +26,9 @@ KEYS = {
 
 
 def run(scenario, zone=ZONE, **settings):
-    controller = szlib.MPCCBF(zone, walls=scenario.walls, settings=szlib.MPCSettings(**settings))
+    controller = szlib.MPCCBF(
+        zone, walls=scenario.walls, settings=szlib.MPCSettings(**settings)
+    )
     return szlib.simulate(scenario, controller)
 
 
@@ -83,23 +85,38 @@ def test_the_papers_claims_hold_for_other_zones(name, zone):
 def test_a_zone_without_a_front_starts_avoidance_at_the_same_distance_from_either_side():
     symmetric = szlib.Ellipse((0.0, 0.0), (1.0, 0.7))
     scenario = szlib.SCENARIOS["passing"]
-    front, back = (find_avoidance_start(run(s, symmetric))[0] for s in (scenario, scenario.turn_people()))
+    front, back = (
+        find_avoidance_start(run(s, symmetric))[0]
+        for s in (scenario, scenario.turn_people())
+    )
     assert front == pytest.approx(back, abs=1e-3)
-    assert not scenario.claims[0].check(run(scenario, szlib.Ellipse((-0.2, 0.0), (1.0, 0.7))))[0]
+    assert not scenario.claims[0].check(
+        run(scenario, szlib.Ellipse((-0.2, 0.0), (1.0, 0.7)))
+    )[0]
 
 
 def test_the_other_passing_side_gives_the_mirror_image():
     for name in ("passing", "corridor"):
-        right, left = run(szlib.SCENARIOS[name]), run(szlib.SCENARIOS[name], pass_side="left")
-        assert (right.metrics()["passing_side"], left.metrics()["passing_side"]) == ("right", "left")
-        assert right.table["y"].to_numpy() == pytest.approx(-left.table["y"].to_numpy(), abs=1e-3)
+        right, left = (
+            run(szlib.SCENARIOS[name]),
+            run(szlib.SCENARIOS[name], pass_side="left"),
+        )
+        assert (right.metrics()["passing_side"], left.metrics()["passing_side"]) == (
+            "right",
+            "left",
+        )
+        assert right.table["y"].to_numpy() == pytest.approx(
+            -left.table["y"].to_numpy(), abs=1e-3
+        )
 
 
 def test_a_run_is_repeatable(logs):
     log = logs["making_room"]
     again = run(log.scenario)
     pd.testing.assert_frame_equal(
-        log.table.drop(columns="solve_time"), again.table.drop(columns="solve_time"), check_exact=True
+        log.table.drop(columns="solve_time"),
+        again.table.drop(columns="solve_time"),
+        check_exact=True,
     )
 
 
@@ -107,16 +124,23 @@ def test_the_table_has_motion_and_barriers(logs):
     log = logs["waiting"]
     table, dt, controller = log.table, 0.1, szlib.MPCCBF(ZONE, walls=log.scenario.walls)
     assert len(table) == len(log.predicted)
-    x, v, a = (table[list(columns)].to_numpy() for columns in (("x", "y"), ("vx", "vy"), ("ax", "ay")))
+    x, v, a = (
+        table[list(columns)].to_numpy()
+        for columns in (("x", "y"), ("vx", "vy"), ("ax", "ay"))
+    )
     assert table["t"].to_numpy() == pytest.approx(np.arange(len(table)) * dt)
     assert x[1:] == pytest.approx(x[:-1] + dt * v[:-1] + dt**2 / 2 * a[:-1], abs=1e-12)
     assert v[1:] == pytest.approx(v[:-1] + dt * a[:-1], abs=1e-12)
     assert log.predicted[:-1, 1] == pytest.approx(np.c_[x, v][1:], abs=1e-9)
-    assert table["person_0_x"].to_numpy() == pytest.approx(4 - 0.5 * table["t"].to_numpy())
+    assert table["person_0_x"].to_numpy() == pytest.approx(
+        4 - 0.5 * table["t"].to_numpy()
+    )
     for i in (0, 57, len(table) - 1):
         person = log.scenario.people[0].after(table["t"][i])
         expected = controller.barriers(x[i], [person])
-        found = table.loc[i, ["h_person_0", *(f"h_wall_{j}" for j in range(4))]].to_numpy(float)
+        found = table.loc[
+            i, ["h_person_0", *(f"h_wall_{j}" for j in range(4))]
+        ].to_numpy(float)
         assert found == pytest.approx(expected, abs=1e-9)
         robot = shapely.Point(x[i])
         gaps = [robot.distance(shapely.LineString(wall)) for wall in log.scenario.walls]
@@ -145,22 +169,31 @@ def test_a_run_that_ends_early_is_no_success():
 def test_a_robot_that_is_boxed_in_stands_without_yielding_and_one_that_is_held_yields():
     box = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     walls = np.stack([box, np.roll(box, -1, axis=0)], axis=1)
-    boxed = szlib.Scenario("boxed", (0.0, 0.0, 0.0, 0.0), (5.0, 0.0), walls=walls, duration=20)
+    boxed = szlib.Scenario(
+        "boxed", (0.0, 0.0, 0.0, 0.0), (5.0, 0.0), walls=walls, duration=20
+    )
     metrics = run(boxed).metrics()
     assert metrics["time_stopped"] > 8 and metrics["time_yielding"] == 0
     # walls too close for a way around: the person who stands there holds the robot
     lane = [((-6, y), (6, y)) for y in (1.0, -1.0)]
     standing = szlib.Person((0.0, 0.0), heading=np.pi)
-    held = szlib.Scenario("held", (-4.0, 0, 0, 0), (4.0, 0), (standing,), lane, duration=20)
+    held = szlib.Scenario(
+        "held", (-4.0, 0, 0, 0), (4.0, 0), (standing,), lane, duration=20
+    )
     metrics = run(held).metrics()
-    assert metrics["time_yielding"] > 5 and metrics["min_h"] >= 0 and not metrics["success"]
+    assert (
+        metrics["time_yielding"] > 5
+        and metrics["min_h"] >= 0
+        and not metrics["success"]
+    )
 
 
 def test_steps_that_had_to_be_relaxed_are_counted_and_the_robot_recovers():
     close = szlib.Person((0.0, 0.0), (-0.5, 0.0))
     log = run(szlib.Scenario("close", (-1.9, 0.0, 0.0, 0.0), (4.0, 0.0), (close,)))
     relaxed = log.table["status"] != "optimal"
-    assert 0 < log.metrics()["infeasible_steps"] == relaxed.sum() < 20  # the last step is not among them
+    # the last step is not among them
+    assert 0 < log.metrics()["infeasible_steps"] == relaxed.sum() < 20
     assert (log.table["slack"][relaxed] > 0).all()
     assert log.success
 
@@ -168,8 +201,12 @@ def test_steps_that_had_to_be_relaxed_are_counted_and_the_robot_recovers():
 def test_several_people_with_own_zones_and_velocities_among_several_walls():
     people = (
         szlib.Person((0.0, 1.0), (-0.5, 0.0)),
-        szlib.Person((2.0, -1.5), (-0.2, 0.3), zone=szlib.Ellipse((0.2, 0.0), (0.8, 0.6))),
-        szlib.Person((5.0, -3.0), heading=2.0, zone=szlib.Ellipse((0.0, 0.0), (1.3, 0.9))),
+        szlib.Person(
+            (2.0, -1.5), (-0.2, 0.3), zone=szlib.Ellipse((0.2, 0.0), (0.8, 0.6))
+        ),
+        szlib.Person(
+            (5.0, -3.0), heading=2.0, zone=szlib.Ellipse((0.0, 0.0), (1.3, 0.9))
+        ),
     )
     walls = [((-8, 5), (8, 5)), ((-8, -5), (8, -5))]
     log = run(szlib.Scenario("busy", (-5.0, 0, 0, 0), (6.0, 1.0), people, walls))
@@ -183,14 +220,27 @@ def test_several_people_with_own_zones_and_velocities_among_several_walls():
 
 def passing_log(y, x=(-2.0, -1.0, 0.5, 2.0)):
     """A made-up run past a person at the origin, who is only looked at."""
-    scenario = szlib.Scenario("made", (-2.0, 0, 0, 0), (2.0, 0), (szlib.Person((0, 0), heading=0.0),))
+    scenario = szlib.Scenario(
+        "made", (-2.0, 0, 0, 0), (2.0, 0), (szlib.Person((0, 0), heading=0.0),)
+    )
     states, settings = np.zeros((4, 4)), szlib.MPCSettings()
     states[:, 0], states[:, 1] = x, y
-    plans = {"predicted": np.zeros((4, 9, 4)), "residual": np.zeros((4, 1, 2)), "controls": np.zeros((4, 2))}
+    plans = {
+        "predicted": np.zeros((4, 9, 4)),
+        "residual": np.zeros((4, 1, 2)),
+        "controls": np.zeros((4, 2)),
+    }
     steps = {"fallback": np.full(4, "warm"), "safe": np.ones(4, bool)}
-    times = {"slack": np.zeros(4), "solve_time": np.zeros(4), "stuck": np.zeros(4), "arrival": 3}
+    times = {
+        "slack": np.zeros(4),
+        "solve_time": np.zeros(4),
+        "stuck": np.zeros(4),
+        "arrival": 3,
+    }
     people = np.zeros((4, 1, 5))
-    return SimulationLog(scenario, settings, (ZONE,), states, people=people, **plans, **steps, **times)
+    return SimulationLog(
+        scenario, settings, (ZONE,), states, people=people, **plans, **steps, **times
+    )
 
 
 def test_the_passing_side_is_opposite_to_the_person():
@@ -200,12 +250,14 @@ def test_the_passing_side_is_opposite_to_the_person():
 
 
 def test_avoidance_starts_where_the_line_is_left():
-    distance, h = find_avoidance_start(
-        passing_log(y=[0.0, -0.05, -0.2, 0.0])
-    )  # 0.1 m beside it at x = -0.5 m
+    # 0.1 m beside it at x = -0.5 m
+    distance, h = find_avoidance_start(passing_log(y=[0.0, -0.05, -0.2, 0.0]))
     assert distance == pytest.approx(np.hypot(0.5, 0.1))
     person = szlib.Person((0, 0), heading=0.0)
-    before, after = (szlib.MPCCBF(ZONE).barriers(at, [person])[0] for at in ((-1.0, -0.05), (0.5, -0.2)))
+    before, after = (
+        szlib.MPCCBF(ZONE).barriers(at, [person])[0]
+        for at in ((-1.0, -0.05), (0.5, -0.2))
+    )
     assert h == pytest.approx(before + (after - before) / 3)
     assert np.isnan(find_avoidance_start(passing_log(y=0.0))).all()
 
@@ -214,13 +266,19 @@ def test_turn_people_changes_only_headings():
     scenario = szlib.SCENARIOS["corridor"]
     turned = scenario.turn_people().people[0]
     assert np.cos(turned.heading) == pytest.approx(1)
-    assert (turned.position, turned.velocity) == (scenario.people[0].position, scenario.people[0].velocity)
+    assert (turned.position, turned.velocity) == (
+        scenario.people[0].position,
+        scenario.people[0].velocity,
+    )
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"start": (-1.2, 0, 0, 0)}, r"'passing': the run starts in violation: h = -0\.\d+ m for person 0"),
+        (
+            {"start": (-1.2, 0, 0, 0)},
+            r"'passing': the run starts in violation: h = -0\.\d+ m for person 0",
+        ),
         ({"start": (-4, 0, 1.2, 0)}, "starts at 1.200 m/s; the limit is 1.0 m/s"),
         ({"goal": (0.3, 0.0)}, "cannot be reached"),
         ({"walls": [((-5, 0.3), (5, 0.3))]}, "starts in violation: .* for wall 0"),
@@ -246,7 +304,9 @@ def test_invalid_scenarios_are_rejected(change, message):
 
 
 def test_a_controller_with_other_walls_is_rejected():
-    with pytest.raises(szlib.SolverError, match="knows 0 walls, and not the 2 of 'corridor'"):
+    with pytest.raises(
+        szlib.SolverError, match="knows 0 walls, and not the 2 of 'corridor'"
+    ):
         szlib.simulate(szlib.SCENARIOS["corridor"], szlib.MPCCBF(ZONE))
 
 
@@ -266,7 +326,9 @@ def test_a_log_is_saved_and_loaded_unchanged(logs, name, tmp_path):
     back = szlib.SimulationLog.load(tmp_path / "run")
     pd.testing.assert_frame_equal(back.table, log.table, check_exact=True)
     assert back.metrics() == log.metrics()
-    assert np.array_equal(back.predicted, log.predicted) and np.array_equal(back.residual, log.residual)
+    assert np.array_equal(back.predicted, log.predicted) and np.array_equal(
+        back.residual, log.residual
+    )
     assert (back.settings, back.zones) == (log.settings, log.zones)
     assert back.scenario.claims == ()
 
@@ -284,7 +346,9 @@ def test_a_log_of_another_version_of_szlib_is_loaded(logs, tmp_path):
 def test_a_log_without_people_is_saved_and_loaded(tmp_path):
     log = run(szlib.Scenario("alone", (0.0, 0.0, 0.0, 0.0), (3.0, 4.0)))
     log.save(tmp_path / "alone")
-    pd.testing.assert_frame_equal(szlib.SimulationLog.load(tmp_path / "alone").table, log.table)
+    pd.testing.assert_frame_equal(
+        szlib.SimulationLog.load(tmp_path / "alone").table, log.table
+    )
 
 
 @pytest.mark.parametrize(
@@ -292,7 +356,12 @@ def test_a_log_without_people_is_saved_and_loaded(tmp_path):
     [
         (lambda folder: (folder / "run.json").unlink(), "FileNotFoundError"),
         (lambda folder: (folder / "run.parquet").write_bytes(b"PAR1"), "Arrow|Parquet"),
-        (lambda folder: (folder / "run.json").write_text('{"format": "other", "version": 1}'), "other 1"),
+        (
+            lambda folder: (folder / "run.json").write_text(
+                '{"format": "other", "version": 1}'
+            ),
+            "other 1",
+        ),
         (lambda folder: (folder / "run.json").write_text("[]"), "TypeError"),
     ],
 )
@@ -311,6 +380,10 @@ def test_a_log_that_cannot_be_written_is_an_error(logs, tmp_path):
 def test_the_repr_of_a_log_is_short(logs):
     shown = repr(logs["corridor"])
     assert len(shown.splitlines()) <= 3 and len(shown) < 300
-    assert "'corridor'" in shown and "outcome arrived" in shown and "1 people, 2 walls" in shown
+    assert (
+        "'corridor'" in shown
+        and "outcome arrived" in shown
+        and "1 people, 2 walls" in shown
+    )
     html = logs["corridor"]._repr_html_()
     assert "time_to_goal" in html and "Avoiding a person" in html

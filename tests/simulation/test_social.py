@@ -6,7 +6,10 @@ import pytest
 import szlib
 from szlib.simulation import social_metrics
 from szlib.simulation.log import SimulationLog
-from szlib.simulation.social_metrics import compute_replay_metrics, compute_social_metrics
+from szlib.simulation.social_metrics import (
+    compute_replay_metrics,
+    compute_social_metrics,
+)
 
 ZONE = szlib.Ellipse((0.0, 0.0), (0.8, 0.8))
 
@@ -17,8 +20,15 @@ def made(states, people=(), walls=(), arrival=None, goal=(10.0, 0.0)):
     n, known = len(states), [np.asarray(p, float) for p in people]
     scenario = szlib.Scenario("made", states[0], goal, walls=walls)
     at = np.stack(known, axis=1) if known else np.zeros((n, 0, 5))
-    empty = {"predicted": np.zeros((n, 0, 4)), "residual": np.zeros((n, len(known) + len(walls), 0))}
-    steps = {"fallback": np.full(n, ""), "safe": np.zeros(n, bool), "slack": np.full(n, np.nan)}
+    empty = {
+        "predicted": np.zeros((n, 0, 4)),
+        "residual": np.zeros((n, len(known) + len(walls), 0)),
+    }
+    steps = {
+        "fallback": np.full(n, ""),
+        "safe": np.zeros(n, bool),
+        "slack": np.full(n, np.nan),
+    }
     return SimulationLog(
         scenario,
         szlib.MPCSettings(),
@@ -37,7 +47,9 @@ def made(states, people=(), walls=(), arrival=None, goal=(10.0, 0.0)):
 
 def line(xs, v=1.0):
     xs = np.asarray(xs, float)
-    return np.column_stack([xs, np.zeros_like(xs), np.full_like(xs, v), np.zeros_like(xs)])
+    return np.column_stack(
+        [xs, np.zeros_like(xs), np.full_like(xs, v), np.zeros_like(xs)]
+    )
 
 
 def still(n, x, y, velocity=(0.0, 0.0)):
@@ -48,7 +60,11 @@ def test_halls_distances_are_fractions_of_time():
     # distances of the disc (0.5 m) to a person at the origin: 0.2, 0.44, 0.45, 1.1, 1.2, 3.5, 3.6, 9
     gaps = np.array([0.2, 0.44, 0.451, 1.1, 1.201, 3.5, 3.601, 9.0])
     found = compute_social_metrics(made(line(0.5 + gaps), [still(8, 0.0, 0.0)]))
-    assert (found["intimate"], found["personal"], found["social"]) == (2 / 8, 2 / 8, 2 / 8)
+    assert (found["intimate"], found["personal"], found["social"]) == (
+        2 / 8,
+        2 / 8,
+        2 / 8,
+    )
     assert found["closest_person"] == pytest.approx((gaps - 0.25).mean())
 
 
@@ -109,11 +125,17 @@ def test_a_person_who_appears_in_the_robot_is_a_collision():
 
 def test_heading_changes_of_a_square_a_turn_back_and_a_circle():
     def changes(velocities):
-        return compute_social_metrics(made(np.pad(velocities, ((0, 0), (2, 0)))))["heading_changes"]
+        return compute_social_metrics(made(np.pad(velocities, ((0, 0), (2, 0)))))[
+            "heading_changes"
+        ]
 
-    assert changes([[1.0, 0], [0, 1], [-1, 0], [0, -1], [1, 0]]) == pytest.approx(2 * np.pi)
+    assert changes([[1.0, 0], [0, 1], [-1, 0], [0, -1], [1, 0]]) == pytest.approx(
+        2 * np.pi
+    )
     angle = np.linspace(0, -2 * np.pi, 500)
-    assert changes(np.column_stack([np.cos(angle), np.sin(angle)])) == pytest.approx(2 * np.pi)
+    assert changes(np.column_stack([np.cos(angle), np.sin(angle)])) == pytest.approx(
+        2 * np.pi
+    )
     nearly_at_rest = [0.01, 0.01]  # has no direction
     assert changes([[1.0, 0], nearly_at_rest, [-1, 0]]) == pytest.approx(np.pi)
     assert changes(np.zeros((3, 2))) == 0
@@ -122,22 +144,30 @@ def test_heading_changes_of_a_square_a_turn_back_and_a_circle():
 def test_time_not_moving_is_until_the_arrival():
     states = line([0.0, 0.0, 1.0, 2.0, 10.0, 10.0, 10.0])
     states[[0, 1, 4, 5, 6], 2] = 0.0
-    assert compute_social_metrics(made(states, arrival=4))["time_not_moving"] == pytest.approx(0.3)
+    assert compute_social_metrics(made(states, arrival=4))[
+        "time_not_moving"
+    ] == pytest.approx(0.3)
     assert compute_social_metrics(made(states))["time_not_moving"] == pytest.approx(0.5)
 
 
 def test_path_efficiency():
     straight = line([0.0, 5.0, 10.0])
     assert compute_social_metrics(made(straight, arrival=2))["path_efficiency"] == 1
-    corner = np.array([[0, 0, 0, 0], [0, 10, 0, 0], [10, 10, 0, 0], [10, 0, 0, 0]], float)
-    assert compute_social_metrics(made(corner, arrival=3))["path_efficiency"] == pytest.approx(1 / 3)
+    corner = np.array(
+        [[0, 0, 0, 0], [0, 10, 0, 0], [10, 10, 0, 0], [10, 0, 0, 0]], float
+    )
+    assert compute_social_metrics(made(corner, arrival=3))[
+        "path_efficiency"
+    ] == pytest.approx(1 / 3)
     assert np.isnan(compute_social_metrics(made(straight))["path_efficiency"])
     across = [[(5.0, -3.0), (5.0, 3.0)]]
-    assert np.isnan(compute_social_metrics(made(corner, walls=across, arrival=3))["path_efficiency"])
-    beside = [[(0.0, 3.0), (9.0, 3.0)]]
-    assert compute_social_metrics(made(corner, walls=beside, arrival=3))["path_efficiency"] == pytest.approx(
-        1 / 3
+    assert np.isnan(
+        compute_social_metrics(made(corner, walls=across, arrival=3))["path_efficiency"]
     )
+    beside = [[(0.0, 3.0), (9.0, 3.0)]]
+    assert compute_social_metrics(made(corner, walls=beside, arrival=3))[
+        "path_efficiency"
+    ] == pytest.approx(1 / 3)
 
 
 def test_a_replay_is_measured_until_half_a_metre_from_the_goal():
@@ -154,8 +184,13 @@ def test_a_replay_is_measured_until_half_a_metre_from_the_goal():
     with_larger = compute_replay_metrics(
         made(states, [person, late], goal=(3.0, 0.0)), szlib.Ellipse((0, 0), (1.3, 1.3))
     )
-    assert (with_larger["intrusions"], with_larger["time_intruding"]) == (2, pytest.approx(1.3))
-    apart = compute_replay_metrics(made(states, [still(20, 1.0, 2.0)], goal=(30.0, 0.0)))
+    assert (with_larger["intrusions"], with_larger["time_intruding"]) == (
+        2,
+        pytest.approx(1.3),
+    )
+    apart = compute_replay_metrics(
+        made(states, [still(20, 1.0, 2.0)], goal=(30.0, 0.0))
+    )
     assert (apart["reached"], apart["intrusions"], apart["time_intruding"]) == (0, 0, 0)
     assert np.isnan(apart["time_to_goal"]) and np.isnan(apart["path_efficiency"])
     assert apart["nearest"] == pytest.approx(1.9)
@@ -164,7 +199,9 @@ def test_a_replay_is_measured_until_half_a_metre_from_the_goal():
 def test_social_metrics_do_not_depend_on_the_frame():
     t = np.linspace(0, 6, 61)
     states = np.column_stack([t, 0.3 * np.sin(t), np.ones_like(t), 0.3 * np.cos(t)])
-    people = np.column_stack([3 - 0.5 * t, 0.5 + 0 * t, np.pi + 0 * t, -0.5 + 0 * t, 0 * t])
+    people = np.column_stack(
+        [3 - 0.5 * t, 0.5 + 0 * t, np.pi + 0 * t, -0.5 + 0 * t, 0 * t]
+    )
     moved = np.add(people, [7.0, -3.0, 0, 0, 0])
     one = compute_social_metrics(made(states, [people], arrival=60, goal=(6.0, 0.0)))
     other = compute_social_metrics(

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from szlib.control.verification import euclidean_to_segment
 
 import szlib
-from szlib.control.distances import euclidean_to_segment
 from szlib.simulation.scenario import Behaviour
 from szlib.simulation.scenarios.random_worlds import ONE_PERSON, Worlds
 
@@ -26,13 +26,22 @@ def test_the_start_is_safe_and_the_goal_can_be_reached(seed):
     scenario = Worlds()(seed)
     controller = szlib.MPCCBF(scenario.people[0].zone, walls=scenario.walls)
     assert controller.barriers(scenario.start[:2], scenario.people).min() >= 0
-    assert controller.barriers(scenario.goal, [p for p in scenario.people if p.stands]).min(initial=1) >= 0
+    assert (
+        controller.barriers(
+            scenario.goal, [p for p in scenario.people if p.stands]
+        ).min(initial=1)
+        >= 0
+    )
     assert 1 <= len(scenario.people) <= 5
     assert len(scenario.walls) <= 4
     assert np.hypot(*scenario.start[2:]) <= 1
     for person in scenario.people:
-        path = np.array([person.after(t).position for t in np.linspace(0, scenario.duration, 31)])
-        assert all(euclidean_to_segment(path, *wall).min() >= 0.25 for wall in scenario.walls)
+        path = np.array(
+            [person.after(t).position for t in np.linspace(0, scenario.duration, 31)]
+        )
+        assert all(
+            euclidean_to_segment(path, *wall).min() >= 0.25 for wall in scenario.walls
+        )
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -58,7 +67,9 @@ def test_one_person_in_open_space(seed):
 def test_half_have_walls_and_half_of_the_people_stand():
     worlds = [Worlds()(seed) for seed in range(400)]
     assert np.mean([len(w.walls) > 0 for w in worlds]) == pytest.approx(0.5, abs=0.1)
-    assert np.mean([p.stands for w in worlds for p in w.people]) == pytest.approx(0.5, abs=0.1)
+    assert np.mean([p.stands for w in worlds for p in w.people]) == pytest.approx(
+        0.5, abs=0.1
+    )
 
 
 def test_invalid_worlds_are_rejected():
@@ -100,6 +111,11 @@ def test_behaviours_change_velocities_without_jumps(behaviour, pace, turn):
 
 def test_noise_changes_observations_and_not_people():
     rng = np.random.default_rng(0)
-    seen = [Behaviour(noise=0.1).observe((WALKER,), rng)[0].position for _ in range(2000)]
+    seen = [
+        Behaviour(noise=0.1).observe((WALKER,), rng)[0].position for _ in range(2000)
+    ]
     assert np.std(seen, axis=0) == pytest.approx([0.1, 0.1], rel=0.1)
-    assert Behaviour(noise=0.1).start(MEETING, 0)(2.0, np.zeros(4)) == [WALKER.after(2.0), STANDING]
+    assert Behaviour(noise=0.1).start(MEETING, 0)(2.0, np.zeros(4)) == [
+        WALKER.after(2.0),
+        STANDING,
+    ]

@@ -36,9 +36,13 @@ def main() -> int:
                 if not verdict.passed and message in verdict.message:
                     refused += 1
                 else:
-                    faults.append(f"    seed {seed}, expected {message!r}: {str(verdict)[:200]}")
+                    faults.append(
+                        f"    seed {seed}, expected {message!r}: {str(verdict)[:200]}"
+                    )
         n = len(WRONG[name])
-        print(f"{name}: solution {passed} of {options.seeds}; {n} wrong answers refused {refused} of {total}")
+        print(
+            f"{name}: solution {passed} of {options.seeds}; {n} wrong answers refused {refused} of {total}"
+        )
         print("\n".join(faults[:8]) + "\n" * bool(faults), end="", flush=True)
         failures += len(faults) + options.seeds - passed
     return min(failures, 1)

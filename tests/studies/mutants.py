@@ -48,7 +48,10 @@ from scipy.stats import binomtest
 ROOT = Path(__file__).parents[2]
 DRAWN = ["control", "encounters", "zones"]
 DRAWN += [f"simulation/{name}.py" for name in ("metrics", "social_metrics")]
-ROOMS = [f"tests/{room}" for room in ("control", "encounters", "zones", "simulation", "plaza")]
+ROOMS = [
+    f"tests/{room}"
+    for room in ("control", "encounters", "zones", "simulation", "plaza")
+]
 PRELOADED = "numpy pandas polars scipy.optimize scipy.stats sklearn.neighbors shapely casadi pytest"
 PRELOADED += " hypothesis jupytext joblib pyarrow.parquet"
 COLUMNS = [
@@ -82,17 +85,27 @@ def find_places(module: str) -> list[Place]:
     from cosmic_ray.plugins import get_operator, operator_names
 
     source = (ROOT / module).read_text()
-    nodes, left_alone = list(ast_nodes(get_ast(source))), list(find_left_alone(ast.parse(source)))
+    nodes, left_alone = (
+        list(ast_nodes(get_ast(source))),
+        list(find_left_alone(ast.parse(source))),
+    )
     changes = defaultdict[Any, list[tuple[str, int]]](list)
     for name in operator_names():
         replaced = set(name.split("_")[1:])
-        if get_operator(name).arguments() or not (not replaced or any(replaced <= each for each in ALIKE)):
+        if get_operator(name).arguments() or not (
+            not replaced or any(replaced <= each for each in ALIKE)
+        ):
             continue
         operator = get_operator(name)()
-        found = [(node, span) for node in nodes for span in operator.mutation_positions(node)]
+        found = [
+            (node, span) for node in nodes for span in operator.mutation_positions(node)
+        ]
         for occurrence, (node, span) in enumerate(found):
-            is_marker = node.parent and node.parent.type == "parameters"  # keyword-only from here on
-            if not is_marker and not any(first <= span[0] < last for first, last in left_alone):
+            # keyword-only from here on
+            is_marker = node.parent and node.parent.type == "parameters"
+            if not is_marker and not any(
+                first <= span[0] < last for first, last in left_alone
+            ):
                 changes[span].append((name, occurrence))
     return [Place(module, span, tuple(each)) for span, each in sorted(changes.items())]
 
@@ -105,18 +118,25 @@ def find_left_alone(tree: ast.AST) -> Iterator[tuple[tuple[int, int], tuple[int,
             parts = [node if "repr" in node.name else node.returns]
         elif isinstance(node, ast.arg | ast.AnnAssign):
             parts = [node.annotation]
-        elif isinstance(node, ast.Raise) or (isinstance(node, ast.Call) and "warn" in ast.unparse(node.func)):
+        elif isinstance(node, ast.Raise) or (
+            isinstance(node, ast.Call) and "warn" in ast.unparse(node.func)
+        ):
             parts = [node]
         for part in filter(None, parts):
             yield (part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset)  # type: ignore[attr-defined]
 
 
-def draw(places: Sequence[Place], n: int, seed: int) -> list[tuple[Place, tuple[str, int]]]:
+def draw(
+    places: Sequence[Place], n: int, seed: int
+) -> list[tuple[Place, tuple[str, int]]]:
     """`n` places at equal distances in the shuffled places of all modules, and a change of each."""
     rng = random.Random(seed)
     shuffled = sorted(places, key=lambda place: (place.module, rng.random()))
     begin = rng.random()
-    drawn = [shuffled[int((k + begin) * len(shuffled) / n)] for k in range(min(n, len(shuffled)))]
+    drawn = [
+        shuffled[int((k + begin) * len(shuffled) / n)]
+        for k in range(min(n, len(shuffled)))
+    ]
     mutants = [(place, rng.choice(place.changes)) for place in drawn]
     rng.shuffle(mutants)
     return mutants
@@ -132,7 +152,11 @@ class Reach:
     def seconds(self) -> dict[str, float]:
         """Time of each test that passed."""
         cases = ET.parse(self.folder / "times.xml").iter("testcase")
-        return {f"{c.get('file')}::{c.get('name')}": float(c.get("time", 0)) for c in cases if not len(c)}
+        return {
+            f"{c.get('file')}::{c.get('name')}": float(c.get("time", 0))
+            for c in cases
+            if not len(c)
+        }
 
     @cached_property
     def lines(self) -> dict[str, dict[int, set[str]]]:
@@ -143,7 +167,8 @@ class Reach:
         data.read()
         return {
             file[file.rindex("szlib/") :]: {
-                line: {context.split("|")[0] for context in contexts} & self.seconds.keys()
+                line: {context.split("|")[0] for context in contexts}
+                & self.seconds.keys()
                 for line, contexts in data.contexts_by_lineno(file).items()
             }
             for file in data.measured_files()
@@ -158,14 +183,19 @@ class Reach:
         """The quickest tests that reach the statement, then others of their files, up to `seconds` in all."""
         reaching = self._reaching(module, line)
         files = {test.split("::")[0] for test in reaching}
-        mates = {test for test in self.seconds if test.split("::")[0] in files} - reaching
+        mates = {
+            test for test in self.seconds if test.split("::")[0] in files
+        } - reaching
         found, total = [], 0.0
         for group in (reaching, mates):
             for test in sorted(group, key=lambda each: self.seconds[each]):
                 total += self.seconds[test]
                 if total <= seconds or not found:
                     found.append(test)
-        times = {file: [self.seconds[test] for test in found if test.startswith(file)] for file in files}
+        times = {
+            file: [self.seconds[test] for test in found if test.startswith(file)]
+            for file in files
+        }
         return sorted(found, key=lambda test: fmean(times[test.split("::")[0]]))
 
     def _reaching(self, module: str, line: int) -> set[str]:
@@ -173,22 +203,34 @@ class Reach:
         around = [
             node
             for node in ast.walk(tree)
-            if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or line)
+            if isinstance(node, ast.stmt)
+            and node.lineno <= line <= (node.end_lineno or line)
         ]
-        for node in sorted(around, key=lambda each: each.lineno - (each.end_lineno or 0), reverse=True):
+        for node in sorted(
+            around, key=lambda each: each.lineno - (each.end_lineno or 0), reverse=True
+        ):
             if found := set().union(
-                *(lines.get(k, ()) for k in range(node.lineno, (node.end_lineno or 0) + 1))
+                *(
+                    lines.get(k, ())
+                    for k in range(node.lineno, (node.end_lineno or 0) + 1)
+                )
             ):
                 return found
-            target = getattr(node, "target", None) or getattr(node, "targets", [None])[0]
-            if isinstance(target, ast.Name):  # a constant or a field: where its name is used
+            target = (
+                getattr(node, "target", None) or getattr(node, "targets", [None])[0]
+            )
+            if isinstance(
+                target, ast.Name
+            ):  # a constant or a field: where its name is used
                 return self._using(target.id) or set().union(*lines.values())
         return set().union(*lines.values())
 
     def _using(self, name: str) -> set[str]:
         found = set[str]()
         for module, lines in self.lines.items():
-            for number, text in enumerate((ROOT / module).read_text().splitlines(), start=1):
+            for number, text in enumerate(
+                (ROOT / module).read_text().splitlines(), start=1
+            ):
                 if re.search(rf"\b{name}\b", text):
                     found |= lines.get(number, set())
         return found
@@ -202,7 +244,9 @@ class Selection:
 
     def pytest_collection_modifyitems(self, items: list[Any]) -> None:
         items[:] = [
-            item for item in items if item.nodeid in self.tests or item.nodeid.split("::")[0] in self.tests
+            item
+            for item in items
+            if item.nodeid in self.tests or item.nodeid.split("::")[0] in self.tests
         ]
 
     def pytest_runtest_logreport(self, report: Any) -> None:
@@ -221,7 +265,14 @@ def run_tests(folder: Path, tests: Sequence[str], report: Path) -> None:
     import pytest
 
     files = dict.fromkeys(test.split("::")[0] for test in tests) or ["tests/helpers"]
-    options = ["-x", "-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]
+    options = [
+        "-x",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-W",
+        "ignore::pytest.PytestAssertRewriteWarning",
+    ]
     code = pytest.main([*options, *files], plugins=[Selection(tests, report)])
     os._exit(int(code))
 
@@ -243,8 +294,15 @@ def mutate(row: dict[str, Any]) -> dict[str, Any]:
     if row["operator"] == "none":
         return row | {"code": before, "before": "", "after": ""}
     code = str(mutate_code(before, get_operator(row["operator"])(), row["occurrence"]))
-    changes = [line for line in difflib.ndiff(before.splitlines(), code.splitlines()) if line[0] in "-+"]
-    old, new = (" ".join(line[2:].strip() for line in changes if line[0] == sign) for sign in "-+")
+    changes = [
+        line
+        for line in difflib.ndiff(before.splitlines(), code.splitlines())
+        if line[0] in "-+"
+    ]
+    old, new = (
+        " ".join(line[2:].strip() for line in changes if line[0] == sign)
+        for sign in "-+"
+    )
     return row | {"code": code, "before": old, "after": new}
 
 
@@ -267,7 +325,11 @@ def try_mutant(folder: Path, trial: Trial) -> dict[str, Any]:
         row["outcome"] = "lives" if process.exitcode in (0, NO_TEST) else failed
     shutil.copy2(ROOT / row["module"], file)
     test = report.read_text() if report.exists() else ""
-    return {"judgement": ""} | row | {"test": test, "seconds": round(time.monotonic() - began, 1)}
+    return (
+        {"judgement": ""}
+        | row
+        | {"test": test, "seconds": round(time.monotonic() - began, 1)}
+    )
 
 
 def run(trials: Iterable[Trial], asked: argparse.Namespace) -> Iterator[dict[str, Any]]:
@@ -287,7 +349,13 @@ def run(trials: Iterable[Trial], asked: argparse.Namespace) -> Iterator[dict[str
     with TemporaryDirectory() as top, ThreadPoolExecutor(asked.jobs) as pool:
         for k in range(asked.jobs):
             folder = Path(top) / f"copy{k}"
-            for name in ("szlib", "tests", "notebooks/examples", "notebooks/tables", "notebooks/studies"):
+            for name in (
+                "szlib",
+                "tests",
+                "notebooks/examples",
+                "notebooks/tables",
+                "notebooks/studies",
+            ):
                 shutil.copytree(ROOT / name, folder / name)
             shutil.copy2(ROOT / "pyproject.toml", folder)
             free.put(folder)
@@ -302,17 +370,32 @@ def find_modules(path: Path) -> list[Path]:
     return [path] if path.suffix else list(path.rglob("*.py"))
 
 
-def plan_run(n: int, modules: Sequence[str], asked: argparse.Namespace) -> Iterator[Trial]:
+def plan_run(
+    n: int, modules: Sequence[str], asked: argparse.Namespace
+) -> Iterator[Trial]:
     """The unchanged code, then `n` mutants of `modules`."""
     reach = Reach(asked.out)
     places = [place for module in modules for place in find_places(module)]
-    print(f"{len(places)} places, {sum(len(place.changes) for place in places)} mutants", flush=True)
-    for place, (operator, occurrence) in [(places[0], ("none", 0)), *draw(places, n, asked.seed)]:
+    print(
+        f"{len(places)} places, {sum(len(place.changes) for place in places)} mutants",
+        flush=True,
+    )
+    for place, (operator, occurrence) in [
+        (places[0], ("none", 0)),
+        *draw(places, n, asked.seed),
+    ]:
         line = place.span[0][0]
         tests = (
-            reach.find_tests(place.module, line, asked.seconds) if operator != "none" else reach.quickest()
+            reach.find_tests(place.module, line, asked.seconds)
+            if operator != "none"
+            else reach.quickest()
         )
-        row = {"seed": asked.seed, "module": place.module, "line": line, "operator": operator}
+        row = {
+            "seed": asked.seed,
+            "module": place.module,
+            "line": line,
+            "operator": operator,
+        }
         limit = 60 + 10 * sum(reach.seconds[test] for test in tests)
         yield Trial(row | {"occurrence": occurrence}, tests, limit)
 
@@ -320,7 +403,9 @@ def plan_run(n: int, modules: Sequence[str], asked: argparse.Namespace) -> Itera
 def plan_again(table: Path, asked: argparse.Namespace) -> Iterator[Trial]:
     """The mutants in `table` that live and are not judged."""
     rows = pd.read_csv(table, dtype=str).fillna("")
-    for row in rows[(rows["outcome"] == "lives") & (rows["judgement"] == "")].to_dict("records"):
+    for row in rows[(rows["outcome"] == "lives") & (rows["judgement"] == "")].to_dict(
+        "records"
+    ):
         if row["module"] in asked.modules:
             yield Trial(row | {"occurrence": int(row["occurrence"])}, asked.what, 600.0)
 
@@ -331,7 +416,8 @@ def append(table: Path, row: dict[str, Any]) -> None:
     if table.exists():
         old = pd.read_csv(table, dtype=str).fillna("")
         same = (
-            old[["module", "operator", "occurrence"]] == rows.loc[0, ["module", "operator", "occurrence"]]
+            old[["module", "operator", "occurrence"]]
+            == rows.loc[0, ["module", "operator", "occurrence"]]
         ).all(axis=1)
         rows = pd.concat([old[~same], rows])
     rows.to_csv(table, index=False)
@@ -344,39 +430,77 @@ def tabulate(outcomes: pd.DataFrame, modules: Sequence[str]) -> pd.DataFrame:
     for name, part in [*drawn.groupby("module"), ("all", drawn)]:
         counted = part[part["judgement"] == ""]
         n, killed = len(counted), int(counted["outcome"].str.startswith("killed").sum())
-        low, high = binomtest(killed, n).proportion_ci(method="wilson") if n else (0.0, 1.0)
-        places = sum(len(find_places(m)) for m in ([name] if name != "all" else modules))
+        low, high = (
+            binomtest(killed, n).proportion_ci(method="wilson") if n else (0.0, 1.0)
+        )
+        places = sum(
+            len(find_places(m)) for m in ([name] if name != "all" else modules)
+        )
         rows.append((name, places, len(part), n, killed, killed / max(n, 1), low, high))
     columns = ["module", "places", "drawn", "counted", "killed", "share", "low", "high"]
     return pd.DataFrame(rows, columns=columns).set_index("module").round(2)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("verb", choices=["cover", "run", "again", "table"])
-    parser.add_argument("what", nargs="*", help="run: number of mutants; again: test files")
-    parser.add_argument("--only", nargs="+", default=DRAWN, help="modules or folders of szlib")
+    parser.add_argument(
+        "what", nargs="*", help="run: number of mutants; again: test files"
+    )
+    parser.add_argument(
+        "--only", nargs="+", default=DRAWN, help="modules or folders of szlib"
+    )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=20.0, help="time of the tests on one mutant")
+    parser.add_argument(
+        "--seconds", type=float, default=20.0, help="time of the tests on one mutant"
+    )
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument(
-        "--out", type=Path, default=ROOT / "results" / "mutants", help="folder of the results"
+        "--out",
+        type=Path,
+        default=ROOT / "results" / "mutants",
+        help="folder of the results",
     )
     parser.add_argument("--pause", type=Path, help="pause while this file exists")
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
-    os.environ |= {"SZLIB_CACHE": "off", "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+    os.environ |= {
+        "SZLIB_CACHE": "off",
+        "OMP_NUM_THREADS": "1",
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
     os.environ.pop("SZLIB_DATA_DIR", None)
-    files = [file for part in asked.only for file in find_modules(ROOT / "szlib" / part)]
+    files = [
+        file for part in asked.only for file in find_modules(ROOT / "szlib" / part)
+    ]
     asked.modules = sorted(str(file.relative_to(ROOT)) for file in files)
     table = asked.out / "outcomes.csv"
     if asked.verb == "cover":
         os.environ["COVERAGE_FILE"] = str(asked.out / "coverage")
-        options = ["--cov=szlib", "--cov-context=test", "--cov-report=", "-o", "junit_family=xunit1"]
-        command = [sys.executable, "-m", "pytest", *ROOMS, *options, f"--junitxml={asked.out / 'times.xml'}"]
+        options = [
+            "--cov=szlib",
+            "--cov-context=test",
+            "--cov-report=",
+            "-o",
+            "junit_family=xunit1",
+        ]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            *ROOMS,
+            *options,
+            f"--junitxml={asked.out / 'times.xml'}",
+        ]
         subprocess.run(command, cwd=ROOT, check=False)
     elif asked.verb == "table":
-        print(tabulate(pd.read_csv(table, dtype=str).fillna(""), asked.modules).to_string())
+        print(
+            tabulate(
+                pd.read_csv(table, dtype=str).fillna(""), asked.modules
+            ).to_string()
+        )
     else:
         trials = (
             plan_run(int(asked.what[0]), asked.modules, asked)
@@ -386,7 +510,9 @@ def main() -> None:
         for row in run(trials, asked):
             append(table, row)
             if row["operator"] == "none" and row["outcome"] != "lives":
-                raise SystemExit(f"the unchanged code fails: {row['test'] or 'a test cannot be imported'}")
+                raise SystemExit(
+                    f"the unchanged code fails: {row['test'] or 'a test cannot be imported'}"
+                )
             print(*(row[name] for name in COLUMNS[1:-1]), flush=True)
 
 

@@ -18,8 +18,16 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[2]
 TABLES = ROOT / "notebooks" / "tables"
-BARRIER = "control/barriers.py", "return h_next - (1 - gamma) * h", "return h_next - (1 - 2 * gamma) * h"
-HULL = "zones/hulls.py", "(self.r_max - self.reach(theta))", "(self.r_max - 0.95 * self.reach(theta))"
+BARRIER = (
+    "control/barriers.py",
+    "return h_next - (1 - gamma) * h",
+    "return h_next - (1 - 2 * gamma) * h",
+)
+HULL = (
+    "zones/hulls.py",
+    "(self.r_max - self.reach(theta))",
+    "(self.r_max - 0.95 * self.reach(theta))",
+)
 PATHS = "zones/quantile.py", "_DEGREE = 2  #", "_DEGREE = 1  #"
 LEVEL = "zones/uncertainty.py", "LEVEL = 0.95  #", "LEVEL = 0.8  #"
 RESPECT = (
@@ -52,15 +60,36 @@ def run_with(regression: tuple[str, str, str], notebook: str) -> tuple[int, list
         file, text, change = regression
         code = (copy / "szlib" / file).read_text(encoding="utf-8")
         if code.count(text) != 1:
-            raise SystemExit(f"{file}: expected {text!r} once; found it {code.count(text)} times")
+            raise SystemExit(
+                f"{file}: expected {text!r} once; found it {code.count(text)} times"
+            )
         (copy / "szlib" / file).write_text(code.replace(text, change), encoding="utf-8")
-        command = [sys.executable, "-c", RUN, "run", "--only", notebook, "--out", str(out)]
+        command = [
+            sys.executable,
+            "-c",
+            RUN,
+            "run",
+            "--only",
+            notebook,
+            "--out",
+            str(out),
+        ]
         done = subprocess.run(
-            command, cwd=copy, env={**os.environ, "PYTHONPATH": str(copy)}, capture_output=True, check=False
+            command,
+            cwd=copy,
+            env={**os.environ, "PYTHONPATH": str(copy)},
+            capture_output=True,
+            check=False,
         )
         records = list(out.glob(f"*/records/{notebook}_*.json"))
-        checks = [each for record in records for each in json.loads(record.read_text())["checks"]]
-    return done.returncode, [c["name"] for c in checks if c["kind"] == "check" and not c["passed"]]
+        checks = [
+            each
+            for record in records
+            for each in json.loads(record.read_text())["checks"]
+        ]
+    return done.returncode, [
+        c["name"] for c in checks if c["kind"] == "check" and not c["passed"]
+    ]
 
 
 def main(asked: list[str]) -> int:

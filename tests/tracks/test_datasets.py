@@ -26,10 +26,14 @@ def served(tmp_path, monkeypatch):
     home = tmp_path / "server"
     home.mkdir()
     (home / "a.csv").write_text("1351051200.0,1,0.0,0.0,0.0,0.0\n")
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(QuietHandler, directory=str(home)))
+    server = ThreadingHTTPServer(
+        ("127.0.0.1", 0), partial(QuietHandler, directory=str(home))
+    )
     threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     monkeypatch.delenv(datasets.DATA_DIR_VARIABLE, raising=False)
-    monkeypatch.setattr(datasets.pooch, "os_cache", lambda name: tmp_path / "cache" / name)
+    monkeypatch.setattr(
+        datasets.pooch, "os_cache", lambda name: tmp_path / "cache" / name
+    )
     url = f"http://127.0.0.1:{server.server_port}/"
     change(monkeypatch, "atc-1hz", url=url, hashes={"a.csv": sha256(home / "a.csv")})
     yield home
@@ -39,7 +43,9 @@ def served(tmp_path, monkeypatch):
 
 def change(monkeypatch, name, **changes):
     """Change the URL or the hashes of a data set."""
-    monkeypatch.setitem(datasets.DATA_SETS, name, replace(datasets.DATA_SETS[name], **changes))
+    monkeypatch.setitem(
+        datasets.DATA_SETS, name, replace(datasets.DATA_SETS[name], **changes)
+    )
 
 
 def sha256(file: Path) -> str:
@@ -66,17 +72,29 @@ def served_days(served, monkeypatch):
     (served / "1024.csv").write_text(
         "".join(f"{36000 + t},7,{t - 20.0},{0.1 * t},1.0,0.0\n" for t in range(9))
     )
-    (served / "1028.csv").write_text("".join(f"{1351386000 + t},7,{-t},0.0,1.0,3.1\n" for t in range(9)))
-    days = {name: datasets.git_blob_id(served / name) for name in ("1024.csv", "1028.csv")}
-    change(monkeypatch, "atc-10-days", url=datasets.DATA_SETS["atc-1hz"].url, hashes=days)
+    (served / "1028.csv").write_text(
+        "".join(f"{1351386000 + t},7,{-t},0.0,1.0,3.1\n" for t in range(9))
+    )
+    days = {
+        name: datasets.git_blob_id(served / name) for name in ("1024.csv", "1028.csv")
+    }
+    change(
+        monkeypatch, "atc-10-days", url=datasets.DATA_SETS["atc-1hz"].url, hashes=days
+    )
     return served
 
 
 def test_git_blob_ids_are_those_of_git(tmp_path):
     (tmp_path / "a").write_bytes(b"hello world\n")
-    assert datasets.git_blob_id(tmp_path / "a") == "3b18e512dba79e4c8300dd08aeb37f8e728b8dad"
+    assert (
+        datasets.git_blob_id(tmp_path / "a")
+        == "3b18e512dba79e4c8300dd08aeb37f8e728b8dad"
+    )
     (tmp_path / "a").write_bytes(b"")
-    assert datasets.git_blob_id(tmp_path / "a") == "e69de29bb2d1d6434b8b29ae775ad8c2e48c5391"
+    assert (
+        datasets.git_blob_id(tmp_path / "a")
+        == "e69de29bb2d1d6434b8b29ae775ad8c2e48c5391"
+    )
 
 
 def test_ten_days_are_downloaded_once_and_verified_by_blob_id(served_days, tmp_path):
@@ -85,11 +103,17 @@ def test_ten_days_are_downloaded_once_and_verified_by_blob_id(served_days, tmp_p
     assert files[0].parent == tmp_path / "cache" / "szlib" / "atc-10-days"
     for name in ("1024.csv", "1028.csv"):
         (served_days / name).write_text("tampered")
-    assert datasets.find("atc-10-days") == files, "a cached file with the right hash needs no server"
+    assert datasets.find("atc-10-days") == files, (
+        "a cached file with the right hash needs no server"
+    )
     files[1].write_text("damaged")
-    with pytest.raises(DataError, match=r"atc-10-days could not be downloaded.*1028\.csv: its hash is"):
+    with pytest.raises(
+        DataError, match=r"atc-10-days could not be downloaded.*1028\.csv: its hash is"
+    ):
         datasets.find("atc-10-days")
-    assert files[0].exists() and not files[1].exists(), "a file with a wrong hash is removed"
+    assert files[0].exists() and not files[1].exists(), (
+        "a file with a wrong hash is removed"
+    )
 
 
 def test_ten_days_are_read_from_a_data_folder(served_days, tmp_path, monkeypatch):
@@ -110,8 +134,13 @@ def test_ten_days_are_dated_by_file_name_in_japan(served_days, tmp_path):
     begin = tracks.groupby("day", observed=True)["t"].min()
     assert begin.tolist() == [1351040400.0, 1351386000.0], "10 o'clock of either day"
     here = szlib.read_tracks(datasets.find("atc-10-days"), tz="UTC")
-    assert here["t"].tolist() == tracks["t"].tolist(), "the start of a day in Japan does not depend on tz"
-    assert quality.summarise_seconds(served_days / "1024.csv")["sensor_speed"].tolist() == [1.0] * 9
+    assert here["t"].tolist() == tracks["t"].tolist(), (
+        "the start of a day in Japan does not depend on tz"
+    )
+    assert (
+        quality.summarise_seconds(served_days / "1024.csv")["sensor_speed"].tolist()
+        == [1.0] * 9
+    )
     extracted = szlib.extract_days("atc-10-days", out=tmp_path / "days", progress=False)
     assert extracted.table["day"].tolist() == ["2012-10-24", "2012-10-28"]
     assert (extracted.table["status"] == "done").all()
@@ -121,7 +150,9 @@ def test_every_file_of_a_named_data_set_has_a_hash():
     for name, n_files, n_digits in (("atc-1hz", 23, 64), ("atc-10-days", 10, 40)):
         hashes = datasets.DATA_SETS[name].hashes
         assert len(hashes) == n_files
-        assert all(len(digits) == n_digits and int(digits, 16) for digits in hashes.values())
+        assert all(
+            len(digits) == n_digits and int(digits, 16) for digits in hashes.values()
+        )
     assert hashes["1024.csv"] == "0c7f0c52acc32fc37123141de8ce0b0bbb38100d"
 
 
@@ -190,13 +221,17 @@ class UnreliableHandler(QuietHandler):
                 self.wfile.write(bytes([byte]))
                 threading.Event().wait(0.01)  # pooch's sleep is replaced, this is not
         else:
-            self.wfile.write(b"x" * len(content) if fault == "wrong content" else content)
+            self.wfile.write(
+                b"x" * len(content) if fault == "wrong content" else content
+            )
 
 
 @pytest.fixture
 def server_faults(served, monkeypatch):
     """The faults that the same server shows; retries do not wait."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(UnreliableHandler, directory=str(served)))
+    server = ThreadingHTTPServer(
+        ("127.0.0.1", 0), partial(UnreliableHandler, directory=str(served))
+    )
     threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     change(monkeypatch, "atc-1hz", url=f"http://127.0.0.1:{server.server_port}/")
     monkeypatch.setattr("pooch.core.time.sleep", lambda seconds: None)
@@ -207,7 +242,9 @@ def server_faults(served, monkeypatch):
 
 
 @pytest.mark.parametrize("fault", ["error 500", "truncated", "slow", "wrong content"])
-def test_a_download_is_repeated_until_the_server_recovers(server_faults, served, tmp_path, fault):
+def test_a_download_is_repeated_until_the_server_recovers(
+    server_faults, served, tmp_path, fault
+):
     server_faults += [fault] * 2
     (file,) = datasets.find("atc-1hz")
     assert file.read_bytes() == (served / "a.csv").read_bytes()
@@ -224,7 +261,9 @@ def test_a_failed_download_leaves_no_partial_file(server_faults, tmp_path, fault
     assert datasets.find("atc-1hz"), "the next attempt downloads again"
 
 
-def test_an_interrupted_download_leaves_no_partial_file(server_faults, tmp_path, monkeypatch):
+def test_an_interrupted_download_leaves_no_partial_file(
+    server_faults, tmp_path, monkeypatch
+):
     def interrupt(*args, **kwargs):
         raise KeyboardInterrupt
 

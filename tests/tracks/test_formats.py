@@ -23,10 +23,15 @@ def expected(rows: pd.DataFrame) -> pd.DataFrame:
     return to_clock(in_seconds(rows).assign(day="any"))
 
 
-def assert_same_people(tracks: pd.DataFrame, rows: pd.DataFrame, *, within: float = 1e-9) -> None:
+def assert_same_people(
+    tracks: pd.DataFrame, rows: pd.DataFrame, *, within: float = 1e-9
+) -> None:
     check_tracks(tracks)
     right = expected(rows)
-    assert tracks[["id", "t"]].to_numpy().tolist() == right[["id", "t"]].to_numpy().tolist()
+    assert (
+        tracks[["id", "t"]].to_numpy().tolist()
+        == right[["id", "t"]].to_numpy().tolist()
+    )
     np.testing.assert_allclose(tracks[["x", "y"]], right[["x", "y"]], atol=within)
 
 
@@ -36,10 +41,14 @@ COLUMN_NAMES = {"frame": "Frame", "id": "ped", "x": "X pos", "y": "Y pos"}
 
 
 def renamed(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.rename(columns=COLUMN_NAMES).assign(note="a")[["note", "Y pos", "ped", "Frame", "X pos"]]
+    return rows.rename(columns=COLUMN_NAMES).assign(note="a")[
+        ["note", "Y pos", "ped", "Frame", "X pos"]
+    ]
 
 
-@pytest.mark.parametrize("form", ["frame", "csv", "semicolons", "tabs", "gz", "parquet"])
+@pytest.mark.parametrize(
+    "form", ["frame", "csv", "semicolons", "tabs", "gz", "parquet"]
+)
 def test_columns_may_have_any_name_and_order(tmp_path: Path, form: str) -> None:
     table, file = renamed(people()), tmp_path / "hall.csv"
     separator = {"semicolons": ";", "tabs": "\t"}.get(form, ",")
@@ -49,7 +58,9 @@ def test_columns_may_have_any_name_and_order(tmp_path: Path, form: str) -> None:
     else:
         file.write_bytes(gzip.compress(text) if form == "gz" else text)
     source = table if form == "frame" else file
-    assert_same_people(szlib.read_tracks(source, columns=COLUMN_NAMES, frame_rate=RATE), people())
+    assert_same_people(
+        szlib.read_tracks(source, columns=COLUMN_NAMES, frame_rate=RATE), people()
+    )
 
 
 @pytest.mark.parametrize(("unit", "metres"), {"m": 1, "cm": 0.01, "mm": 0.001}.items())
@@ -57,7 +68,9 @@ def test_columns_may_have_any_name_and_order(tmp_path: Path, form: str) -> None:
 def test_columns_of_a_file_without_header_are_chosen_by_number(
     tmp_path: Path, unit: str, metres: float, separator: str
 ) -> None:
-    table = people().assign(x=lambda t: t["x"] / metres, y=lambda t: t["y"] / metres, z=1.7)
+    table = people().assign(
+        x=lambda t: t["x"] / metres, y=lambda t: t["y"] / metres, z=1.7
+    )
     file = tmp_path / "hall.txt"
     table.to_csv(file, index=False, header=False, sep=separator)
     columns = {"id": 0, "frame": 1, "x": 2, "y": 3}
@@ -67,7 +80,10 @@ def test_columns_of_a_file_without_header_are_chosen_by_number(
 
 def test_a_column_named_frame_is_found() -> None:
     assert_same_people(szlib.read_tracks(people(), frame_rate=RATE), people())
-    assert "at 12.5 frames/s" in funnels.get(szlib.read_tracks(people(), frame_rate=RATE))[0]["stage"]
+    assert (
+        "at 12.5 frames/s"
+        in funnels.get(szlib.read_tracks(people(), frame_rate=RATE))[0]["stage"]
+    )
 
 
 def test_a_dataframe_is_not_changed() -> None:
@@ -76,7 +92,9 @@ def test_a_dataframe_is_not_changed() -> None:
     before = table.copy(deep=True)
     szlib.read_tracks(table.sample(frac=1, random_state=0))
     pd.testing.assert_frame_equal(table, before)
-    assert_same_people(szlib.read_tracks(table.set_index(np.arange(len(table)) % 7)), people())
+    assert_same_people(
+        szlib.read_tracks(table.set_index(np.arange(len(table)) % 7)), people()
+    )
 
 
 def test_unusable_rows_of_a_table_are_rejected_and_counted() -> None:
@@ -84,7 +102,8 @@ def test_unusable_rows_of_a_table_are_rejected_and_counted() -> None:
     table.loc[[3, 40], "x"] = [None, "far"]
     table.loc[7, "t"] = np.inf
     with pytest.warns(
-        szlib.DataWarning, match=r"table-1, first at line 4 .column 'x'.: rejected rows: 2 x missing"
+        szlib.DataWarning,
+        match=r"table-1, first at line 4 .column 'x'.: rejected rows: 2 x missing",
     ):
         tracks = szlib.read_tracks(table)
     assert sum(funnels.get(tracks)[0]["rejected"].values()) == 3
@@ -99,7 +118,9 @@ def test_times_may_be_datetimes(zone: str | None) -> None:
     tracks = szlib.read_tracks(table, tz="Europe/Berlin")
     assert set(tracks["day"]) == {"2024-05-07"}
     shifted = tracks.assign(t=(tracks["t"] - moment.timestamp()).round(1))
-    np.testing.assert_allclose(shifted[["t", "x", "y"]], expected(people())[["t", "x", "y"]], atol=1e-5)
+    np.testing.assert_allclose(
+        shifted[["t", "x", "y"]], expected(people())[["t", "x", "y"]], atol=1e-5
+    )
 
 
 def test_several_tables_are_different_recordings() -> None:
@@ -167,7 +188,10 @@ def as_juelich(
     header: str = "#framerate: 12.5\n#ID frame x/m y/m z/m\n",
     metres: float = 1.0,
 ) -> Path:
-    lines = [f"{r.id} {r.frame} {r.x / metres:.6f} {r.y / metres:.6f} 1.7" for r in rows.itertuples()]
+    lines = [
+        f"{r.id} {r.frame} {r.x / metres:.6f} {r.y / metres:.6f} 1.7"
+        for r in rows.itertuples()
+    ]
     return write(path, header + "\n".join(lines) + "\n")
 
 
@@ -175,7 +199,9 @@ def as_hdf5(rows: pd.DataFrame, path: Path) -> Path:
     h5py = pytest.importorskip("h5py")
     kinds = [("id", "i8"), ("frame", "i8"), ("x", "f8"), ("y", "f8"), ("z", "f8")]
     with h5py.File(path, "w") as file:
-        table = np.array([(r.id, r.frame, r.x, r.y, 1.7) for r in rows.itertuples()], dtype=kinds)
+        table = np.array(
+            [(r.id, r.frame, r.x, r.y, 1.7) for r in rows.itertuples()], dtype=kinds
+        )
         file.create_dataset("trajectory", data=table).attrs["fps"] = RATE
         file.attrs["wkt_geometry"] = "POLYGON ((0 0, 12 0, 12 8, 0 8, 0 0))"
     return path
@@ -192,21 +218,39 @@ def as_vadere(rows: pd.DataFrame, path: Path) -> Path:
     body = []
     for _, one in rows.groupby("id"):
         steps = one.iloc[::5]  # footsteps, each from one place to the next
-        for now, after in zip(steps.itertuples(), list(steps.itertuples())[1:], strict=False):
-            body.append((now.id, now.frame / 10, after.frame / 10, now.x, now.y, after.x, after.y))
+        for now, after in zip(
+            steps.itertuples(), list(steps.itertuples())[1:], strict=False
+        ):
+            body.append(
+                (
+                    now.id,
+                    now.frame / 10,
+                    after.frame / 10,
+                    now.x,
+                    now.y,
+                    after.x,
+                    after.y,
+                )
+            )
     body.sort(key=lambda row: (row[1], row[0]))
     return write(path, head + "\n".join(" ".join(map(str, row)) for row in body) + "\n")
 
 
 def as_jupedsim(rows: pd.DataFrame, path: Path) -> Path:
     with sqlite3.connect(path) as file:
-        file.execute("CREATE TABLE metadata(key TEXT NOT NULL UNIQUE PRIMARY KEY, value TEXT NOT NULL)")
-        file.executemany("INSERT INTO metadata VALUES(?, ?)", [("version", "2"), ("fps", str(RATE))])
+        file.execute(
+            "CREATE TABLE metadata(key TEXT NOT NULL UNIQUE PRIMARY KEY, value TEXT NOT NULL)"
+        )
+        file.executemany(
+            "INSERT INTO metadata VALUES(?, ?)", [("version", "2"), ("fps", str(RATE))]
+        )
         file.execute(
             "CREATE TABLE trajectory_data(frame INTEGER NOT NULL, id INTEGER NOT NULL, "
             "pos_x REAL NOT NULL, pos_y REAL NOT NULL, ori_x REAL NOT NULL, ori_y REAL NOT NULL)"
         )
-        table = [(int(r.frame), int(r.id), r.x, r.y, 1.0, 0.0) for r in rows.itertuples()]
+        table = [
+            (int(r.frame), int(r.id), r.x, r.y, 1.0, 0.0) for r in rows.itertuples()
+        ]
         file.executemany("INSERT INTO trajectory_data VALUES(?, ?, ?, ?, ?, ?)", table)
     file.close()
     return path
@@ -223,7 +267,9 @@ pedpy_closes_late = pytest.mark.filterwarnings(
 @pedpy_closes_late
 @pytest.mark.parametrize("name", WRITERS_OF_PROGRAMS)
 @pytest.mark.parametrize("packed", [False, True])
-def test_files_of_other_programs_are_recognised(tmp_path: Path, name: str, packed: bool) -> None:
+def test_files_of_other_programs_are_recognised(
+    tmp_path: Path, name: str, packed: bool
+) -> None:
     pytest.importorskip("pedpy")
     file = WRITERS_OF_PROGRAMS[name](people(), tmp_path / "recording")
     if packed:
@@ -236,27 +282,44 @@ def test_files_of_other_programs_are_recognised(tmp_path: Path, name: str, packe
 def test_files_of_simulations_are_recognised(tmp_path: Path, name: str) -> None:
     pytest.importorskip("pedpy")
     rows = people()  # frames are tenths of a second here
-    file = {"viswalk": as_viswalk, "vadere": as_vadere}[name](rows, tmp_path / "simulated.csv")
+    file = {"viswalk": as_viswalk, "vadere": as_vadere}[name](
+        rows, tmp_path / "simulated.csv"
+    )
     tracks = szlib.read_tracks(file)
     check_tracks(tracks)
-    right = to_clock(rows.assign(day="any", t=rows["frame"] / 10)[["day", "id", "t", "x", "y"]])
+    right = to_clock(
+        rows.assign(day="any", t=rows["frame"] / 10)[["day", "id", "t", "x", "y"]]
+    )
     both = tracks.assign(tick=tracks["t"].round(1)).merge(
-        right.assign(tick=right["t"].round(1)), on=["id", "tick"], suffixes=("", "_right")
+        right.assign(tick=right["t"].round(1)),
+        on=["id", "tick"],
+        suffixes=("", "_right"),
     )
     assert len(both) == len(tracks) > 0.9 * len(right)
-    np.testing.assert_allclose(both[["x", "y"]], both[["x_right", "y_right"]], atol=1e-3)
+    np.testing.assert_allclose(
+        both[["x", "y"]], both[["x_right", "y_right"]], atol=1e-3
+    )
 
 
-def test_juelich_text_uses_the_unit_of_its_header_or_the_given_one(tmp_path: Path) -> None:
+def test_juelich_text_uses_the_unit_of_its_header_or_the_given_one(
+    tmp_path: Path,
+) -> None:
     pytest.importorskip("pedpy")
     centimetres = as_juelich(
-        people(), tmp_path / "a.txt", header="# framerate: 12.5 fps\n#id frame x/cm y/cm z/cm\n", metres=0.01
+        people(),
+        tmp_path / "a.txt",
+        header="# framerate: 12.5 fps\n#id frame x/cm y/cm z/cm\n",
+        metres=0.01,
     )
     assert_same_people(szlib.read_tracks(centimetres), people(), within=1e-5)
-    silent = as_juelich(people(), tmp_path / "b.txt", header="# a corridor\n", metres=0.01)
+    silent = as_juelich(
+        people(), tmp_path / "b.txt", header="# a corridor\n", metres=0.01
+    )
     with pytest.raises(szlib.DataError, match="pass frame_rate= and unit="):
         szlib.read_tracks(silent)
-    assert_same_people(szlib.read_tracks(silent, frame_rate=RATE, unit="cm"), people(), within=1e-5)
+    assert_same_people(
+        szlib.read_tracks(silent, frame_rate=RATE, unit="cm"), people(), within=1e-5
+    )
     bare = as_juelich(people(), tmp_path / "c.txt", header="")
     options = {"file_format": "juelich-text", "frame_rate": RATE, "unit": "m"}
     assert_same_people(szlib.read_tracks(bare, **options), people(), within=1e-5)
@@ -275,7 +338,9 @@ def test_juelich_text_uses_the_unit_of_its_header_or_the_given_one(tmp_path: Pat
         b"pedestrianId simTime\n1 2\n",
     ],
 )
-def test_damaged_files_of_other_programs_are_refused(tmp_path: Path, content: bytes) -> None:
+def test_damaged_files_of_other_programs_are_refused(
+    tmp_path: Path, content: bytes
+) -> None:
     pytest.importorskip("pedpy")
     with pytest.raises(szlib.DataError, match=r"broken: PedPy cannot read it as"):
         szlib.read_tracks(write(tmp_path / "broken", content))
@@ -284,5 +349,6 @@ def test_damaged_files_of_other_programs_are_refused(tmp_path: Path, content: by
 def test_a_csv_file_and_the_same_dataframe_give_the_same_tracks(tmp_path: Path) -> None:
     file = write(tmp_path / "a.csv", samples().to_csv(index=False))
     pd.testing.assert_frame_equal(
-        szlib.read_tracks(file).drop(columns="day"), szlib.read_tracks(samples()).drop(columns="day")
+        szlib.read_tracks(file).drop(columns="day"),
+        szlib.read_tracks(samples()).drop(columns="day"),
     )

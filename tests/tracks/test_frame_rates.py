@@ -34,8 +34,14 @@ def ewap(
         heading = rng.uniform(-np.pi, np.pi) + np.cumsum(rng.normal(0, 0.1, 30))
         steps = 1.2 * every / rate * np.column_stack([np.cos(heading), np.sin(heading)])
         path = np.cumsum(steps, axis=0) + rng.normal(0, noise, (30, 2))
-        first, last = (np.clip(np.arange(30) + reach, 0, 29) for reach in CONVENTIONS[convention])
-        velocity = (path[last] - path[first]) / np.maximum(frames[last] - frames[first], 1)[:, None] * rate
+        first, last = (
+            np.clip(np.arange(30) + reach, 0, 29) for reach in CONVENTIONS[convention]
+        )
+        velocity = (
+            (path[last] - path[first])
+            / np.maximum(frames[last] - frames[first], 1)[:, None]
+            * rate
+        )
         lines += [
             f"{frame:.7e} {person:.7e} {x:.7e} 0.0 {y:.7e} {vx:.7e} 0.0 {vy:.7e}\n"
             for frame, (x, y), (vx, vy) in zip(frames, path, velocity, strict=True)
@@ -55,8 +61,12 @@ def median_speed(tracks: pd.DataFrame) -> float:
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("rate", [15, 25])
-def test_the_frame_rate_is_estimated_from_velocities(tmp_path: Path, rate: int, convention: str) -> None:
-    tracks = szlib.read_tracks(ewap(tmp_path, rate=rate, convention=convention, noise=0.05))
+def test_the_frame_rate_is_estimated_from_velocities(
+    tmp_path: Path, rate: int, convention: str
+) -> None:
+    tracks = szlib.read_tracks(
+        ewap(tmp_path, rate=rate, convention=convention, noise=0.05)
+    )
     assert read_stage_name(tracks) == f"read sequence.txt at {rate} frames/s"
     assert median_speed(tracks) == pytest.approx(1.2, rel=0.06)
     assert tracks["t"].max() == pytest.approx(10 * 64 / rate, abs=0.1)
@@ -64,7 +74,8 @@ def test_the_frame_rate_is_estimated_from_velocities(tmp_path: Path, rate: int, 
 
 def test_an_unusual_frame_rate_warns(tmp_path: Path) -> None:
     with pytest.warns(
-        szlib.DataWarning, match="its velocities suggest 30 frames/s, EWAP files have 15 or 25"
+        szlib.DataWarning,
+        match="its velocities suggest 30 frames/s, EWAP files have 15 or 25",
     ):
         tracks = szlib.read_tracks(ewap(tmp_path, rate=30))
     assert median_speed(tracks) == pytest.approx(1.2, rel=0.05)
@@ -75,13 +86,22 @@ def test_an_unusual_frame_rate_warns(tmp_path: Path) -> None:
         )
 
 
-def test_a_given_frame_rate_is_used_and_warns_if_velocities_disagree(tmp_path: Path) -> None:
+def test_a_given_frame_rate_is_used_and_warns_if_velocities_disagree(
+    tmp_path: Path,
+) -> None:
     file = ewap(tmp_path, rate=25)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        pd.testing.assert_frame_equal(szlib.read_tracks(file, frame_rate=25), szlib.read_tracks(file))
-    with pytest.warns(szlib.DataWarning, match="read at 15 frames/s as given; its velocities suggest 25"):
-        assert median_speed(szlib.read_tracks(file, frame_rate=15)) == pytest.approx(1.2 * 15 / 25, rel=0.05)
+        pd.testing.assert_frame_equal(
+            szlib.read_tracks(file, frame_rate=25), szlib.read_tracks(file)
+        )
+    with pytest.warns(
+        szlib.DataWarning,
+        match="read at 15 frames/s as given; its velocities suggest 25",
+    ):
+        assert median_speed(szlib.read_tracks(file, frame_rate=15)) == pytest.approx(
+            1.2 * 15 / 25, rel=0.05
+        )
 
 
 def spoiled(file: Path, velocity: float | None) -> Path:
@@ -89,17 +109,29 @@ def spoiled(file: Path, velocity: float | None) -> Path:
     rng = np.random.default_rng(1)
     rows = [line.split() for line in file.read_text().splitlines()]
     for row in rows:
-        row[5], row[7] = (f"{v:.3f}" for v in (rng.normal(0, 1, 2) if velocity is None else [velocity] * 2))
+        row[5], row[7] = (
+            f"{v:.3f}"
+            for v in (rng.normal(0, 1, 2) if velocity is None else [velocity] * 2)
+        )
     file.write_text("".join(" ".join(row) + "\n" for row in rows))
     return file
 
 
-@pytest.mark.parametrize("velocity", [0.0, 1.0, None], ids=["none", "all the same", "noise"])
-def test_useless_velocities_require_a_given_frame_rate(tmp_path: Path, velocity: float | None) -> None:
+@pytest.mark.parametrize(
+    "velocity", [0.0, 1.0, None], ids=["none", "all the same", "noise"]
+)
+def test_useless_velocities_require_a_given_frame_rate(
+    tmp_path: Path, velocity: float | None
+) -> None:
     file = spoiled(ewap(tmp_path, rate=25), velocity)
-    with pytest.raises(szlib.DataError, match=r"cannot be estimated from the file's.*; pass frame_rate=15"):
+    with pytest.raises(
+        szlib.DataError,
+        match=r"cannot be estimated from the file's.*; pass frame_rate=15",
+    ):
         szlib.read_tracks(file)
-    assert median_speed(szlib.read_tracks(file, frame_rate=25)) == pytest.approx(1.2, rel=0.05)
+    assert median_speed(szlib.read_tracks(file, frame_rate=25)) == pytest.approx(
+        1.2, rel=0.05
+    )
 
 
 def test_too_few_steps_give_no_frame_rate(tmp_path: Path) -> None:
@@ -109,7 +141,9 @@ def test_too_few_steps_give_no_frame_rate(tmp_path: Path) -> None:
         szlib.read_tracks(file)
 
 
-def test_the_longest_gap_is_proportional_to_the_sampling_interval(tmp_path: Path) -> None:
+def test_the_longest_gap_is_proportional_to_the_sampling_interval(
+    tmp_path: Path,
+) -> None:
     for rate, every, longest in ((15, 6, 0.9), (25, 10, 0.9), (25, 25, 2.25)):
         raw = szlib.tracks.readers.read_raw(ewap(tmp_path, rate=rate, every=every))
         assert raw.attrs["max_gap"] == pytest.approx(longest)
@@ -117,11 +151,15 @@ def test_the_longest_gap_is_proportional_to_the_sampling_interval(tmp_path: Path
 
 def test_a_frame_rate_is_refused_where_times_are_in_seconds(tmp_path: Path) -> None:
     (tmp_path / "tidy.csv").write_text("t,id,x,y\n0,1,0,0\n0.1,1,1,0\n")
-    with pytest.raises(szlib.DataError, match="is tidy, whose times are in seconds; leave frame_rate out"):
+    with pytest.raises(
+        szlib.DataError,
+        match="is tidy, whose times are in seconds; leave frame_rate out",
+    ):
         szlib.read_tracks(tmp_path / "tidy.csv", frame_rate=25)
     for wrong in (0, -15, float("nan"), 1e10):
         with pytest.raises(
-            szlib.DataError, match=r"frame_rate must be frames a second from 1 to 1e\+09; got"
+            szlib.DataError,
+            match=r"frame_rate must be frames a second from 1 to 1e\+09; got",
         ):
             szlib.read_tracks(ewap(tmp_path, rate=25), frame_rate=wrong)
 
@@ -129,12 +167,16 @@ def test_a_frame_rate_is_refused_where_times_are_in_seconds(tmp_path: Path) -> N
 def test_quality_and_encounters_use_the_estimated_frame_rate(tmp_path: Path) -> None:
     file = ewap(tmp_path, rate=25)
     assert np.median(quality.measure_frame_intervals(file)) == pytest.approx(0.4)
-    assert quality.summarise_people(file).eval("last_seen - first_seen").to_numpy() == pytest.approx(29 * 0.4)
+    assert quality.summarise_people(file).eval(
+        "last_seen - first_seen"
+    ).to_numpy() == pytest.approx(29 * 0.4)
     square = szlib.Square(x=(-50, 50), y=(-50, 50))
     settings = szlib.EncounterSettings(area=square, min_distance=0.0)
     whole = szlib.find_encounters(szlib.read_tracks(file), settings=settings)
     for options in (szlib.ReadOptions(), szlib.ReadOptions(frame_rate=25)):
-        pd.testing.assert_frame_equal(find_encounters_in_files([file], settings, options), whole)
+        pd.testing.assert_frame_equal(
+            find_encounters_in_files([file], settings, options), whole
+        )
 
 
 def test_the_eth_sequence_has_15_frames_a_second() -> None:

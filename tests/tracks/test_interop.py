@@ -60,16 +60,23 @@ def test_check_tracks_requires_a_funnel_that_adds_up() -> None:
     tracks.attrs.clear()
     with pytest.raises(szlib.DataError, match="no funnel"):
         check_tracks(tracks)
-    tracks.attrs[funnels.KEY] = [{"stage": "read", "entered": 9, "kept": 7, "rejected": {"bad": 1}}]
+    tracks.attrs[funnels.KEY] = [
+        {"stage": "read", "entered": 9, "kept": 7, "rejected": {"bad": 1}}
+    ]
     with pytest.raises(szlib.SzlibError, match="does not add up"):
         check_tracks(tracks)
 
 
 def test_groups_of_the_eth_sequence_are_read() -> None:
     folder = real_data("eth")
-    with pytest.warns(szlib.DataWarning, match="line 37, 38"):  # 238 is in lines 36 and 37, 241 in 37 and 38
+    with pytest.warns(
+        szlib.DataWarning, match="line 37, 38"
+    ):  # 238 is in lines 36 and 37, 241 in 37 and 38
         groups = read_groups(folder / "seq_eth_groups.txt")
-    assert groups.loc[groups["id"] == 241, "group"].item() == groups.loc[groups["id"] == 240, "group"].item()
+    assert (
+        groups.loc[groups["id"] == 241, "group"].item()
+        == groups.loc[groups["id"] == 240, "group"].item()
+    )
     people = set(szlib.read_tracks(folder / "seq_eth_obsmat.txt")["id"])
     assert groups.groupby("group").size().min() == 2
     assert groups["id"].is_unique
@@ -85,7 +92,9 @@ def test_groups_of_the_eth_sequence_are_read() -> None:
         ("1 2\n3 4.5\n", "line 2"),
     ],
 )
-def test_invalid_groups_are_refused_with_their_line(tmp_path: Path, text: str, message: str) -> None:
+def test_invalid_groups_are_refused_with_their_line(
+    tmp_path: Path, text: str, message: str
+) -> None:
     (tmp_path / "groups.txt").write_text(text)
     with pytest.raises(szlib.DataError, match=message):
         read_groups(tmp_path / "groups.txt")
@@ -103,7 +112,10 @@ def test_group_lines_that_share_people_are_joined(tmp_path: Path) -> None:
     (tmp_path / "groups.txt").write_text("1 2\n3 4\n5 6\n4 2 7\n")
     with pytest.warns(szlib.DataWarning, match="line 4"):
         groups = read_groups(tmp_path / "groups.txt")
-    assert groups.groupby("group")["id"].apply(set).tolist() == [{1, 2, 3, 4, 7}, {5, 6}]
+    assert groups.groupby("group")["id"].apply(set).tolist() == [
+        {1, 2, 3, 4, 7},
+        {5, 6},
+    ]
 
 
 def test_tracks_are_the_same_after_conversion_to_pedpy_and_back() -> None:
@@ -114,7 +126,9 @@ def test_tracks_are_the_same_after_conversion_to_pedpy_and_back() -> None:
     assert trajectory.number_pedestrians == tracks["id"].nunique()
     back = szlib.read_tracks(trajectory)
     check_tracks(back)
-    pd.testing.assert_frame_equal(back[COLUMNS[1:]], tracks[COLUMNS[1:]], rtol=0, atol=1e-9)
+    pd.testing.assert_frame_equal(
+        back[COLUMNS[1:]], tracks[COLUMNS[1:]], rtol=0, atol=1e-9
+    )
 
 
 def test_pedpy_tracks_at_25_hz_are_brought_to_the_clock() -> None:
@@ -129,6 +143,8 @@ def test_pedpy_tracks_at_25_hz_are_brought_to_the_clock() -> None:
 
 def test_tracks_of_several_days_cannot_be_converted_to_pedpy() -> None:
     pytest.importorskip("pedpy")
-    both = make_tracks(make_walk((0, 0), (1, 0)), make_walk((0, 0), (1, 0), day="2012-10-28"))
+    both = make_tracks(
+        make_walk((0, 0), (1, 0)), make_walk((0, 0), (1, 0), day="2012-10-28")
+    )
     with pytest.raises(szlib.DataError, match="PedPy has no days, and the table has 2"):
         to_pedpy(both)

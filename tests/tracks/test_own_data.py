@@ -36,7 +36,10 @@ def proposed(text: str) -> list[str]:
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_shape_is_read_with_the_options_that_errors_propose(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    name: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     command = ["inspect", str(write_shape(name, tmp_path)), *AREA]
     for _ in range(3):
@@ -49,10 +52,18 @@ def test_every_shape_is_read_with_the_options_that_errors_propose(
             return
         command = proposed(message)
     printed = capsys.readouterr().out
-    kept = re.search(r"^read .*?kept +([\d,]+)", printed, flags=re.DOTALL | re.MULTILINE)
-    assert kept[1] == ("280" if name == "crowd.vsp" else "1,040")  # of splines only control points are given
+    kept = re.search(
+        r"^read .*?kept +([\d,]+)", printed, flags=re.DOTALL | re.MULTILINE
+    )
+    # of splines only control points are given
+    assert kept[1] == ("280" if name == "crowd.vsp" else "1,040")
     assert "40 people" in printed and re.search(r"speed 1\.\d+ m/s \(median\)", printed)
-    assert shlex.split(printed.splitlines()[-1])[3:7] == ["szlib", "run", "--data", command[1]]
+    assert shlex.split(printed.splitlines()[-1])[3:7] == [
+        "szlib",
+        "run",
+        "--data",
+        command[1],
+    ]
 
 
 SAME = [name for name in TEXTS if name not in ("crowd.vsp", "magni.csv", "obsmat.txt")]
@@ -84,21 +95,35 @@ def test_every_shape_holds_the_same_people(name: str, tmp_path: Path) -> None:
 
 
 def test_splines_pass_through_their_control_points(tmp_path: Path) -> None:
-    read = read_raw(write_shape("crowd.vsp", tmp_path), options=szlib.ReadOptions(scale=0.02))
+    read = read_raw(
+        write_shape("crowd.vsp", tmp_path), options=szlib.ReadOptions(scale=0.02)
+    )
     right = hall().groupby("id").nth(list(range(0, 26, 4))).sort_values(["id", "t"])
-    np.testing.assert_allclose(read[["id", "t", "x", "y"]], right[["id", "t", "x", "y"]], atol=1e-4)
+    np.testing.assert_allclose(
+        read[["id", "t", "x", "y"]], right[["id", "t", "x", "y"]], atol=1e-4
+    )
 
 
-def test_the_day_is_that_of_the_file_then_of_the_option_then_of_utc(tmp_path: Path) -> None:
+def test_the_day_is_that_of_the_file_then_of_the_option_then_of_utc(
+    tmp_path: Path,
+) -> None:
     """The recording begins at 22:13 UTC, when it is the next day in Tokyo."""
     with_zone = write_shape("iso-zone.csv", tmp_path)
     assert set(read_raw(with_zone)["day"]) == {"2023-11-15"}
-    assert set(read_raw(with_zone, options=szlib.ReadOptions(tz="UTC"))["day"]) == {"2023-11-14"}
+    assert set(read_raw(with_zone, options=szlib.ReadOptions(tz="UTC"))["day"]) == {
+        "2023-11-14"
+    }
     nanoseconds = write_shape("nanoseconds.csv", tmp_path)
     assert set(read_raw(nanoseconds)["day"]) == {"2023-11-14"}
-    assert set(read_raw(nanoseconds, options=szlib.ReadOptions(tz="Asia/Tokyo"))["day"]) == {"2023-11-15"}
-    moments = pd.to_datetime(hall()["t"] + BEGIN, unit="s", utc=True).dt.tz_convert("Asia/Tokyo")
-    assert set(read_raw(hall().assign(t=moments).drop(columns="frame"))["day"]) == {"2023-11-15"}
+    assert set(
+        read_raw(nanoseconds, options=szlib.ReadOptions(tz="Asia/Tokyo"))["day"]
+    ) == {"2023-11-15"}
+    moments = pd.to_datetime(hall()["t"] + BEGIN, unit="s", utc=True).dt.tz_convert(
+        "Asia/Tokyo"
+    )
+    assert set(read_raw(hall().assign(t=moments).drop(columns="frame"))["day"]) == {
+        "2023-11-15"
+    }
 
 
 def test_a_text_id_has_the_same_number_in_every_file(tmp_path: Path) -> None:
@@ -112,27 +137,39 @@ def test_a_text_id_has_the_same_number_in_every_file(tmp_path: Path) -> None:
 
 
 def test_a_unit_in_a_name_is_used_and_a_given_one_replaces_it(tmp_path: Path) -> None:
-    rows = hall()[["t", "id", "x", "y"]].assign(x=lambda r: r["x"] * 1e3, y=lambda r: r["y"] * 1e3)
+    rows = hall()[["t", "id", "x", "y"]].assign(
+        x=lambda r: r["x"] * 1e3, y=lambda r: r["y"] * 1e3
+    )
     table = rows.set_axis(["Time (s)", "Person ID", "X [mm]", "Y [mm]"], axis=1)
     assert read_raw(table)["x"].max() == hall()["x"].max()
     with pytest.warns(szlib.DataWarning, match="people move at"):
-        assert read_raw(table, options=szlib.ReadOptions(unit="cm"))["x"].max() == 10 * hall()["x"].max()
+        assert (
+            read_raw(table, options=szlib.ReadOptions(unit="cm"))["x"].max()
+            == 10 * hall()["x"].max()
+        )
     pixels = table.set_axis(["time", "id", "x_px", "y_px"], axis=1)
     with pytest.raises(szlib.DataError, match="positions are in pixels; pass scale="):
         read_raw(pixels)
 
 
 def test_columns_are_suggested_also_where_only_names_or_speeds_tell_the_unit() -> None:
-    rows = hall()[["t", "id", "x", "y"]].assign(x=lambda r: r["x"] * 1e3, y=lambda r: r["y"] * 1e3)
+    rows = hall()[["t", "id", "x", "y"]].assign(
+        x=lambda r: r["x"] * 1e3, y=lambda r: r["y"] * 1e3
+    )
     for names, options in (
         (["when", "who", "east (mm)", "north (mm)"], {}), (["when", "who", "east", "north"], {"unit": "mm"}),
     ):  # fmt: skip
         columns = dict(zip(("t", "id", "x", "y"), names, strict=True))
-        advice = " and ".join(f"{name}={value!r}" for name, value in {"columns": columns, **options}.items())
+        advice = " and ".join(
+            f"{name}={value!r}"
+            for name, value in {"columns": columns, **options}.items()
+        )
         table = rows.set_axis(names, axis=1)
         with pytest.raises(szlib.DataError, match=re.escape(f"; pass {advice}")):
             read_raw(table)
-        assert len(read_raw(table, options=szlib.ReadOptions(columns=columns, **options))) == len(rows)
+        assert len(
+            read_raw(table, options=szlib.ReadOptions(columns=columns, **options))
+        ) == len(rows)
 
 
 UNCLEAR = {
@@ -157,12 +194,20 @@ def test_an_exact_name_is_taken_before_a_usual_one() -> None:
     pd.testing.assert_frame_equal(read_raw(more), read_raw(rows))
 
 
-def test_a_value_that_is_no_number_is_named_with_its_column_and_line(tmp_path: Path) -> None:
+def test_a_value_that_is_no_number_is_named_with_its_column_and_line(
+    tmp_path: Path,
+) -> None:
     rows = ["Zeit;Person;X;Y", "0,0;1;0,0;1,0", "0,4;1;0,5;1,0", "0,8;1;k.A.;1,0"]
     file = write(tmp_path / "hall.csv", "\n".join(rows))
-    with pytest.warns(szlib.DataWarning, match=r"hall\.csv, first at line 4 \(column 'X' holds 'k\.A\.'\)"):
+    with pytest.warns(
+        szlib.DataWarning,
+        match=r"hall\.csv, first at line 4 \(column 'X' holds 'k\.A\.'\)",
+    ):
         assert len(read_raw(file)) == 2
-    with pytest.raises(szlib.DataError, match=r"line 2: missing or not a number \(column 'X' holds 'k\.A"):
+    with pytest.raises(
+        szlib.DataError,
+        match=r"line 2: missing or not a number \(column 'X' holds 'k\.A",
+    ):
         read_raw(write(tmp_path / "hall.csv", "\n".join([rows[0], rows[3]])))
 
 
@@ -177,19 +222,27 @@ class Points(pd.DataFrame):
         return Points
 
     geometry = property(lambda self: self["position"])
-    crs = property(lambda self: SimpleNamespace(is_geographic=bool(self["position"].iloc[0].x > 100)))
+    crs = property(
+        lambda self: SimpleNamespace(
+            is_geographic=bool(self["position"].iloc[0].x > 100)
+        )
+    )
 
 
 def points(rows: pd.DataFrame, east: float = 0.0) -> Points:
     table = Points(rows[["t", "id"]])
-    table["position"] = [shapely.Point(x + east, y) for x, y in zip(rows["x"], rows["y"], strict=True)]
+    table["position"] = [
+        shapely.Point(x + east, y) for x, y in zip(rows["x"], rows["y"], strict=True)
+    ]
     return table
 
 
 def moving(rows: pd.DataFrame) -> object:
     """As MovingPandas: people with points, whose times are the index."""
     table = points(rows).rename(columns={"id": "traj_id"})
-    table.index = pd.DatetimeIndex(pd.to_datetime(table.pop("t") + BEGIN, unit="s"), name="t")
+    table.index = pd.DatetimeIndex(
+        pd.to_datetime(table.pop("t") + BEGIN, unit="s"), name="t"
+    )
     return SimpleNamespace(to_point_gdf=lambda: table)
 
 
@@ -202,12 +255,16 @@ TABLES: dict[str, Callable[[pd.DataFrame], object]] = {
 def test_tables_of_other_libraries_are_read(library: str) -> None:
     rows = hall()[["t", "id", "x", "y"]]
     read, right = read_raw(TABLES[library](rows)), read_raw(rows)
-    np.testing.assert_allclose(read["t"] - (BEGIN if library == "movingpandas" else 0), right["t"], atol=1e-6)
+    np.testing.assert_allclose(
+        read["t"] - (BEGIN if library == "movingpandas" else 0), right["t"], atol=1e-6
+    )
     pd.testing.assert_frame_equal(read[["id", "x", "y"]], right[["id", "x", "y"]])
 
 
 def test_points_in_degrees_are_refused() -> None:
-    with pytest.raises(szlib.DataError, match="points are in degrees; project them to metres"):
+    with pytest.raises(
+        szlib.DataError, match="points are in degrees; project them to metres"
+    ):
         read_raw(points(hall(), east=139.0))
 
 
@@ -220,7 +277,8 @@ def test_tables_of_a_database_that_do_not_decide_are_refused(tmp_path: Path) -> 
             hall().to_sql(name, database, index=False)
     database.close()
     with pytest.raises(
-        szlib.DataError, match=r"several of the tables .* can be tracks; .* sqlite3 -header -csv"
+        szlib.DataError,
+        match=r"several of the tables .* can be tracks; .* sqlite3 -header -csv",
     ):
         read_raw(file)
 
@@ -229,37 +287,58 @@ def test_tables_of_a_database_that_do_not_decide_are_refused(tmp_path: Path) -> 
 
 
 def test_options_are_the_same_as_values_and_as_arguments() -> None:
-    options = szlib.ReadOptions(columns={"t": "Zeit", "id": 1}, unit="mm", tz="Asia/Tokyo", max_gap=2.0)
+    options = szlib.ReadOptions(
+        columns={"t": "Zeit", "id": 1}, unit="mm", tz="Asia/Tokyo", max_gap=2.0
+    )
     assert szlib.ReadOptions(**options.as_json()) == options
-    assert arguments(options.as_json()) == "--unit mm --columns t=Zeit,id=1 --max-gap 2 --tz Asia/Tokyo"
+    assert (
+        arguments(options.as_json())
+        == "--unit mm --columns t=Zeit,id=1 --max-gap 2 --tz Asia/Tokyo"
+    )
 
 
 @pytest.mark.parametrize("columns", ["Zeit", "t=", "when=Zeit", "t=Zeit,frame=Bild"])
 def test_columns_that_say_nothing_are_refused(
     columns: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["inspect", str(write_shape("plain.csv", tmp_path)), "--columns", columns]) == 2
+    assert (
+        main(["inspect", str(write_shape("plain.csv", tmp_path)), "--columns", columns])
+        == 2
+    )
     assert "columns" in capsys.readouterr().err
 
 
 def test_notebooks_read_with_the_options_of_their_parameter(tmp_path: Path) -> None:
     reading = {"columns": {"id": "track_id"}, "frame_rate": 25, "scale": 0.02}
     file = str(write_shape("pixels.csv", tmp_path))
-    assert check_parameters({"reading": reading}, folders.list_notebooks()) == {"reading": reading}
-    cache = DataCache(tmp_path / "results", file, "0 12 0 8", method=ZoneMethod(reading=reading))
+    assert check_parameters({"reading": reading}, folders.list_notebooks()) == {
+        "reading": reading
+    }
+    cache = DataCache(
+        tmp_path / "results", file, "0 12 0 8", method=ZoneMethod(reading=reading)
+    )
     tracks = szlib.read_tracks(file, **reading)
     pd.testing.assert_frame_equal(cache.tracks(), tracks)
     settings = cache.method.encounter_settings("0 12 0 8")
     found = cache.encounters()
     assert len(found) == len(szlib.find_encounters(tracks, settings=settings)) > 0
-    other = DataCache(tmp_path / "results", file, "0 12 0 8", method=ZoneMethod(reading={}))
+    other = DataCache(
+        tmp_path / "results", file, "0 12 0 8", method=ZoneMethod(reading={})
+    )
     with pytest.raises(szlib.DataError, match="counts frames"):
         other.encounters()  # not those that were stored with other options
 
 
-def test_extract_reads_with_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_extract_reads_with_options(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "data").mkdir()
     file = write_shape("pixels.csv", tmp_path / "data")
     days = ["extract", str(file), "--out", str(tmp_path / "days"), *AREA]
-    assert main([*days, "--frame-rate", "25", "--scale", "0.02", "--columns", "id=track_id"]) == 0
+    assert (
+        main(
+            [*days, "--frame-rate", "25", "--scale", "0.02", "--columns", "id=track_id"]
+        )
+        == 0
+    )
     assert re.search(r"pixels +done +1 +1040 ", capsys.readouterr().out)

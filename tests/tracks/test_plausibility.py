@@ -27,21 +27,30 @@ def table() -> pd.DataFrame:
 
 def walkers(speed: float) -> pd.DataFrame:
     """Ten people who walk at about this speed [units of x a second]."""
-    walks = [make_walk((0, k), (speed * (0.9 + k / 50), 0), person=k, duration=20) for k in range(10)]
+    walks = [
+        make_walk((0, k), (speed * (0.9 + k / 50), 0), person=k, duration=20)
+        for k in range(10)
+    ]
     return make_tracks(*walks)[["t", "id", "x", "y"]]
 
 
 def frames() -> pd.DataFrame:
     rows = people(3, count=40)
-    return pd.DataFrame({"t": rows["frame"], "id": rows["id"], "x": rows["x"], "y": rows["y"]})
+    return pd.DataFrame(
+        {"t": rows["frame"], "id": rows["id"], "x": rows["x"], "y": rows["y"]}
+    )
 
 
 SPOILED = {
-    "millimetres: pass unit='mm'": lambda: table().assign(x=lambda t: t["x"] * 1e3, y=lambda t: t["y"] * 1e3),
-    "centimetres: pass unit='cm'": lambda: table().assign(x=lambda t: t["x"] * 1e2, y=lambda t: t["y"] * 1e2),
+    "millimetres: pass unit='mm'": lambda: table().assign(
+        x=lambda t: t["x"] * 1e3, y=lambda t: t["y"] * 1e3
+    ),
+    "centimetres: pass unit='cm'": lambda: table().assign(
+        x=lambda t: t["x"] * 1e2, y=lambda t: t["y"] * 1e2
+    ),
     "feet: pass unit='ft'": lambda: walkers(1.0 / 0.3048),
-    "milliseconds: pass columns={'frame': 't'} and frame_rate=1000": lambda: table().assign(
-        t=lambda t: t["t"] * 1e3
+    "milliseconds: pass columns={'frame': 't'} and frame_rate=1000": lambda: (
+        table().assign(t=lambda t: t["t"] * 1e3)
     ),
     "numbers of frames: pass columns={'frame': 't'} and frame_rate=25": frames,
     "longitude and latitude": lambda: table().assign(
@@ -50,9 +59,15 @@ SPOILED = {
     "latitude and longitude": lambda: table().assign(
         x=lambda t: 34.7 + t["y"] / 111_000, y=lambda t: 135.5 + t["x"] / 90_000
     ),
-    "columns={'t': 'id', 'id': 't'}": lambda: table().rename(columns={"t": "id", "id": "t"}),
-    "columns={'t': 'x', 'x': 't'}": lambda: table().rename(columns={"t": "x", "x": "t"}),
-    "columns={'t': 'y', 'y': 't'}": lambda: table().rename(columns={"t": "y", "y": "t"}),
+    "columns={'t': 'id', 'id': 't'}": lambda: table().rename(
+        columns={"t": "id", "id": "t"}
+    ),
+    "columns={'t': 'x', 'x': 't'}": lambda: table().rename(
+        columns={"t": "x", "x": "t"}
+    ),
+    "columns={'t': 'y', 'y': 't'}": lambda: table().rename(
+        columns={"t": "y", "y": "t"}
+    ),
 }
 
 
@@ -62,14 +77,17 @@ def test_the_error_suggests_what_was_misread(message: str) -> None:
         read_raw(SPOILED[message]())
 
 
-@pytest.mark.parametrize("message", [t for t in SPOILED if "pass unit='m" in t or "{'t'" in t])
+@pytest.mark.parametrize(
+    "message", [t for t in SPOILED if "pass unit='m" in t or "{'t'" in t]
+)
 def test_the_suggested_options_give_the_right_table(message: str) -> None:
     with pytest.raises(szlib.DataError) as error:
         read_raw(SPOILED[message]())
     advice = re.search(r"pass (unit|columns)=('\w+'|\{.*?\})", str(error.value))
     options = {advice[1]: eval(advice[2])}
     pd.testing.assert_frame_equal(
-        read_raw(SPOILED[message](), options=szlib.ReadOptions(**options)), read_raw(table())
+        read_raw(SPOILED[message](), options=szlib.ReadOptions(**options)),
+        read_raw(table()),
     )
 
 
@@ -82,7 +100,9 @@ def test_the_suggestion_for_frames_gives_the_right_table() -> None:
 def test_implausible_files_are_refused_like_tables(tmp_path: Path) -> None:
     spoiled = SPOILED["centimetres: pass unit='cm'"]()
     spoiled.to_csv(tmp_path / "hall.csv", index=False)
-    with pytest.raises(szlib.DataError, match=r"hall\.csv: people move at .* m/s .* pass unit='cm'"):
+    with pytest.raises(
+        szlib.DataError, match=r"hall\.csv: people move at .* m/s .* pass unit='cm'"
+    ):
         read_raw(tmp_path / "hall.csv")
     without = tmp_path / "public.csv"
     spoiled.assign(v=1.0, a=0.1).to_csv(without, index=False, header=False)
@@ -94,7 +114,9 @@ def test_only_formats_that_leave_doubt_get_a_suggestion(tmp_path: Path) -> None:
     """Times in milliseconds since 1970: every row is rejected. Eight numbers in a row are atc-raw."""
     spoiled = table().assign(t=lambda t: (t["t"] + 1.7e9) * 1e3, v=1.0, a=0.1)
     spoiled.to_csv(tmp_path / "public.csv", index=False, header=False)
-    with pytest.raises(szlib.DataError, match="as atc-1hz; times look like milliseconds: pass columns="):
+    with pytest.raises(
+        szlib.DataError, match="as atc-1hz; times look like milliseconds: pass columns="
+    ):
         read_raw(tmp_path / "public.csv")
     raw = spoiled.assign(x=1e3 * spoiled["x"], y=1e3 * spoiled["y"], b=0.0, c=0.0)
     raw.to_csv(tmp_path / "raw.csv", index=False, header=False)
@@ -102,7 +124,9 @@ def test_only_formats_that_leave_doubt_get_a_suggestion(tmp_path: Path) -> None:
         read_raw(tmp_path / "raw.csv")
 
 
-def test_exchanged_columns_of_a_file_without_header_are_named_by_number(tmp_path: Path) -> None:
+def test_exchanged_columns_of_a_file_without_header_are_named_by_number(
+    tmp_path: Path,
+) -> None:
     wrong = table().assign(v=1.0, a=0.1)[["id", "t", "x", "y", "v", "a"]]
     wrong.to_csv(tmp_path / "a.csv", index=False, header=False)
     with pytest.raises(szlib.DataError, match="columns look exchanged") as error:
@@ -110,21 +134,28 @@ def test_exchanged_columns_of_a_file_without_header_are_named_by_number(tmp_path
     columns = eval(re.search(r"columns=(\{.*?\})", str(error.value))[1])
     assert columns == {"t": 1, "id": 0, "x": 2, "y": 3}
     read = read_raw(tmp_path / "a.csv", options=szlib.ReadOptions(columns=columns))
-    pd.testing.assert_frame_equal(read.drop(columns="day"), read_raw(table()).drop(columns="day"))
+    pd.testing.assert_frame_equal(
+        read.drop(columns="day"), read_raw(table()).drop(columns="day")
+    )
 
 
 def test_an_implausible_given_unit_warns() -> None:
     spoiled = SPOILED["centimetres: pass unit='cm'"]()
     with pytest.warns(szlib.DataWarning, match="people move at"):
-        assert len(read_raw(spoiled, options=szlib.ReadOptions(unit="m"))) == len(spoiled)
+        assert len(read_raw(spoiled, options=szlib.ReadOptions(unit="m"))) == len(
+            spoiled
+        )
 
 
 def test_pixels_get_no_advice_that_makes_people_slow() -> None:
     with pytest.raises(
-        szlib.DataError, match=r"people move at 3\d.* m/s .*; if they are pixels .*, pass scale=0\.032"
+        szlib.DataError,
+        match=r"people move at 3\d.* m/s .*; if they are pixels .*, pass scale=0\.032",
     ):
         read_raw(walkers(38.0))
-    with pytest.warns(szlib.DataWarning, match=r"the median of their speed is 0\.3\d m/s"):
+    with pytest.warns(
+        szlib.DataWarning, match=r"the median of their speed is 0\.3\d m/s"
+    ):
         read_raw(walkers(38.0), options=szlib.ReadOptions(unit="cm"))
 
 
@@ -138,13 +169,26 @@ def test_pixels_get_no_advice_that_makes_people_slow() -> None:
         (lambda rows: rows.assign(x=rows["x"] * 0.2), "nobody walks"),
     ],
 )
-def test_what_is_implausible_is_shown_by_every_command(tmp_path, capsys, spoil, text) -> None:
+def test_what_is_implausible_is_shown_by_every_command(
+    tmp_path, capsys, spoil, text
+) -> None:
     spoil(walkers(1.3)).to_csv(tmp_path / "hall.csv", index=False)
     area = ["--area", "0", "26", "-1", "10"]
     assert main(["inspect", str(tmp_path / "hall.csv"), *area]) == 0
     assert f"warning: {text}" in capsys.readouterr().out
     for _ in ("done", "kept"):
-        assert main(["extract", str(tmp_path / "hall.csv"), "--out", str(tmp_path / "days"), *area]) == 0
+        assert (
+            main(
+                [
+                    "extract",
+                    str(tmp_path / "hall.csv"),
+                    "--out",
+                    str(tmp_path / "days"),
+                    *area,
+                ]
+            )
+            == 0
+        )
         assert text in capsys.readouterr().out
     with pytest.warns(szlib.DataWarning, match=text):
         stages = funnels.get(read_raw(tmp_path / "hall.csv"))
@@ -154,7 +198,9 @@ def test_what_is_implausible_is_shown_by_every_command(tmp_path, capsys, spoil, 
 
 
 def test_a_table_of_standing_people_warns() -> None:
-    crowd = make_tracks(*(make_walk((k, 0), (0.01, 0), person=k, duration=30) for k in range(9)))
+    crowd = make_tracks(
+        *(make_walk((k, 0), (0.01, 0), person=k, duration=30) for k in range(9))
+    )
     with pytest.warns(szlib.DataWarning, match="nobody walks"):
         read_raw(crowd[["t", "id", "x", "y"]])
 
@@ -163,9 +209,16 @@ def test_a_table_of_standing_people_warns() -> None:
 def test_plausible_tables_give_no_warning(tmp_path: Path, seed: int) -> None:
     read_raw(in_seconds(people(seed, count=30)))
     plaza = pd.read_csv(
-        make_plaza(tmp_path / "plaza.csv", seed=seed, settings=PlazaSettings(n_encounters=60)), header=None
+        make_plaza(
+            tmp_path / "plaza.csv", seed=seed, settings=PlazaSettings(n_encounters=60)
+        ),
+        header=None,
     )
-    read_raw(pd.DataFrame({"t": plaza[0], "id": plaza[1], "x": plaza[2] / 1e3, "y": plaza[3] / 1e3}))
+    read_raw(
+        pd.DataFrame(
+            {"t": plaza[0], "id": plaza[1], "x": plaza[2] / 1e3, "y": plaza[3] / 1e3}
+        )
+    )
     standing = pd.DataFrame({"t": np.arange(9.0), "id": 1, "x": 0.0, "y": 0.0})
     read_raw(standing)
 

@@ -25,7 +25,9 @@ def day(tmp_path: Path) -> Path:
     stand = [(BEGIN + 3600 + k / 25, 2, 0, 0, 570) for k in range(250)]
     back = [(BEGIN + 3613 + k / 25, 2, 0, 0, 570) for k in range(25)]
     path = tmp_path / "atc-20121024.csv"
-    path.write_text("".join(LINE.format(*row) for row in [*walk, *stand, *back]) + "rubbish\n")
+    path.write_text(
+        "".join(LINE.format(*row) for row in [*walk, *stand, *back]) + "rubbish\n"
+    )
     return path
 
 
@@ -42,7 +44,9 @@ def test_seconds_have_sensor_speed_and_displacement(day: Path) -> None:
 
 
 def test_visits_and_standing_people_are_counted_by_hour(day: Path) -> None:
-    table = quality.count_visits_by_hour(quality.summarise_seconds(day), tz="Asia/Tokyo")
+    table = quality.count_visits_by_hour(
+        quality.summarise_seconds(day), tz="Asia/Tokyo"
+    )
     assert table[["day", "hour", "visits"]].to_numpy().tolist() == [
         ["2012-10-24", 10, 1],
         ["2012-10-24", 11, 1],
@@ -57,12 +61,16 @@ def test_frame_intervals_and_longest_gaps(day: Path) -> None:
     found = quality.summarise_people(day)
     assert found["id"].tolist() == [1, 2]
     np.testing.assert_allclose(found["longest_gap"], [0.04, 3.04], atol=1e-5)
-    np.testing.assert_allclose(found["last_seen"] - found["first_seen"], [9.96, 13.96], atol=1e-5)
+    np.testing.assert_allclose(
+        found["last_seen"] - found["first_seen"], [9.96, 13.96], atol=1e-5
+    )
     assert found["rows"].tolist() == [250, 275]
 
 
 def test_formats_without_a_speed_give_nan(tmp_path: Path) -> None:
-    rows = pd.DataFrame({"t": BEGIN + np.arange(5.0), "id": 1, "x": np.arange(5.0), "y": 0.0})
+    rows = pd.DataFrame(
+        {"t": BEGIN + np.arange(5.0), "id": 1, "x": np.arange(5.0), "y": 0.0}
+    )
     (tmp_path / "a.csv").write_text(as_tidy(rows))
     (tmp_path / "b.csv").write_text(as_1hz(rows))
     tidy, hourly = (
@@ -78,9 +86,12 @@ def test_thinning_error_of_a_bend_is_its_sagitta() -> None:
     turn = 2.0 * np.arange(0, 12.01, 0.1) / 5.0  # 2 m/s on a circle of 5 m
     walk = make_walk((0, 0), (1, 0), duration=12.0)
     walk[["x", "y"]] = 5 * np.column_stack([np.cos(turn), np.sin(turn)])
-    sagitta = 5 * (1 - np.cos(0.2))  # between samples 1 s apart the chord is so far from the bend
+    # between samples 1 s apart the chord is so far from the bend
+    sagitta = 5 * (1 - np.cos(0.2))
     rms, high = measure_thinning_error(make_tracks(walk))
-    assert rms == pytest.approx(sagitta * np.sqrt(8 / 15), rel=0.05), "the RMS of a parabola over its chord"
+    assert rms == pytest.approx(sagitta * np.sqrt(8 / 15), rel=0.05), (
+        "the RMS of a parabola over its chord"
+    )
     assert sagitta * 0.9 < high < sagitta * 1.01
     straight = make_tracks(make_walk((0, 0), (1, 0.5), duration=12.0))
     assert measure_thinning_error(straight)[0] < 1e-9
@@ -89,6 +100,8 @@ def test_thinning_error_of_a_bend_is_its_sagitta() -> None:
 
 
 def test_thinning_error_of_the_eth_sequence() -> None:
-    rms, high = measure_thinning_error(szlib.read_tracks(real_data("eth") / "seq_eth_obsmat.txt"))
+    rms, high = measure_thinning_error(
+        szlib.read_tracks(real_data("eth") / "seq_eth_obsmat.txt")
+    )
     assert 0.04 < rms < 0.06
     assert high < 0.13

@@ -39,7 +39,9 @@ from szlib.tracks.readers import read_raw
 
 def scaled(factor: float) -> pd.DataFrame:
     """The same in other units of position."""
-    return samples().assign(x=lambda rows: rows["x"] * factor, y=lambda rows: rows["y"] * factor)
+    return samples().assign(
+        x=lambda rows: rows["x"] * factor, y=lambda rows: rows["y"] * factor
+    )
 
 
 def read_quietly(path: Path) -> tuple[pd.DataFrame, str]:
@@ -64,34 +66,57 @@ def without_day(frame: pd.DataFrame) -> pd.DataFrame:
 
 @pytest.mark.parametrize("name", WRITERS)
 @pytest.mark.parametrize("packed", [False, True], ids=["plain", "gz"])
-def test_every_format_gives_the_same_table(tmp_path: Path, name: str, packed: bool) -> None:
+def test_every_format_gives_the_same_table(
+    tmp_path: Path, name: str, packed: bool
+) -> None:
     rows = samples()
     content = WRITERS[name](rows).encode()
-    path = write(tmp_path / ("rec.txt" + ".gz" * packed), gzip.compress(content) if packed else content)
+    path = write(
+        tmp_path / ("rec.txt" + ".gz" * packed),
+        gzip.compress(content) if packed else content,
+    )
     frame = read_raw(path)
     expected = rows.sort_values(["id", "t"], ignore_index=True)
-    pd.testing.assert_frame_equal(without_day(frame), expected[["id", "t", "x", "y"]], rtol=0, atol=1e-6)
-    assert list(frame["day"].unique()) == (["rec"] if name == "ewap" else ["2012-10-24"])
-    assert stage_of(frame, "read")["entered"] == len(rows) == stage_of(frame, "merge")["kept"]
-    assert frame.attrs["max_gap"] == (pytest.approx(0.9) if name == "ewap" else FORMATS[name].max_gap)
+    pd.testing.assert_frame_equal(
+        without_day(frame), expected[["id", "t", "x", "y"]], rtol=0, atol=1e-6
+    )
+    assert list(frame["day"].unique()) == (
+        ["rec"] if name == "ewap" else ["2012-10-24"]
+    )
+    assert (
+        stage_of(frame, "read")["entered"]
+        == len(rows)
+        == stage_of(frame, "merge")["kept"]
+    )
+    assert frame.attrs["max_gap"] == (
+        pytest.approx(0.9) if name == "ewap" else FORMATS[name].max_gap
+    )
 
 
 def test_parquet_gives_the_same_table_as_csv(tmp_path: Path) -> None:
     samples().to_parquet(tmp_path / "a.parquet")
-    write(tmp_path / "a.parquet.gz", gzip.compress((tmp_path / "a.parquet").read_bytes()))
+    write(
+        tmp_path / "a.parquet.gz", gzip.compress((tmp_path / "a.parquet").read_bytes())
+    )
     from_csv = read_raw(write(tmp_path / "a.csv", as_tidy(samples())))
     for name in ("a.parquet", "a.parquet.gz"):
         pd.testing.assert_frame_equal(read_raw(tmp_path / name), from_csv)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_tidy_columns_may_be_in_any_order_with_additional_ones(tmp_path: Path, seed: int) -> None:
+def test_tidy_columns_may_be_in_any_order_with_additional_ones(
+    tmp_path: Path, seed: int
+) -> None:
     rows = samples().assign(day="2013-01-06", note="", vx=1.0, vy=np.nan)
-    plain = read_raw(write(tmp_path / "plain.csv", as_tidy(rows[["day", "t", "id", "x", "y"]])))
+    plain = read_raw(
+        write(tmp_path / "plain.csv", as_tidy(rows[["day", "t", "id", "x", "y"]]))
+    )
     order = list(rows.columns)
     random.Random(seed).shuffle(order)
     rows[order].to_parquet(tmp_path / "mixed.parquet")
-    pd.testing.assert_frame_equal(read_raw(write(tmp_path / "mixed.csv", as_tidy(rows[order]))), plain)
+    pd.testing.assert_frame_equal(
+        read_raw(write(tmp_path / "mixed.csv", as_tidy(rows[order]))), plain
+    )
     pd.testing.assert_frame_equal(read_raw(tmp_path / "mixed.parquet"), plain)
     assert list(plain["day"].unique()) == ["2013-01-06"]
 
@@ -99,11 +124,14 @@ def test_tidy_columns_may_be_in_any_order_with_additional_ones(tmp_path: Path, s
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 def test_a_written_track_table_is_read_back(tmp_path: Path, suffix: str) -> None:
     tracks = szlib.read_tracks(write(tmp_path / "a.csv", as_1hz(samples())))
-    alone = tracks.iloc[:1].assign(id=99, vx=np.nan, vy=np.nan)  # a single tick has no velocity
+    # a single tick has no velocity
+    alone = tracks.iloc[:1].assign(id=99, vx=np.nan, vy=np.nan)
     tracks = pd.concat([tracks, alone], ignore_index=True)
     path = tmp_path / f"tracks.{suffix}"
     tracks.to_csv(path, index=False) if suffix == "csv" else tracks.to_parquet(path)
-    pd.testing.assert_frame_equal(szlib.read_tracks(path), tracks, check_categorical=False, rtol=1e-9)
+    pd.testing.assert_frame_equal(
+        szlib.read_tracks(path), tracks, check_categorical=False, rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("name", WRITERS)
@@ -117,11 +145,15 @@ def test_a_written_track_table_is_read_back(tmp_path: Path, suffix: str) -> None
     ],
     ids=["CRLF", "BOM", "no newline at the end", "all of it"],
 )
-def test_line_ends_and_byte_order_mark_are_ignored(tmp_path: Path, name: str, change: Callable) -> None:
+def test_line_ends_and_byte_order_mark_are_ignored(
+    tmp_path: Path, name: str, change: Callable
+) -> None:
     content = WRITERS[name](samples()).encode()
     (tmp_path / "a").mkdir()
     plain = read_raw(write(tmp_path / "rec.csv", content))
-    pd.testing.assert_frame_equal(read_raw(write(tmp_path / "a" / "rec.csv", change(content))), plain)
+    pd.testing.assert_frame_equal(
+        read_raw(write(tmp_path / "a" / "rec.csv", change(content))), plain
+    )
 
 
 # --- days and files ----------------------------------------------------------------------------------
@@ -136,15 +168,27 @@ def test_files_of_one_day_are_merged(tmp_path: Path) -> None:
     assert [s["entered"] for s in funnels.get(together)] == [30, 30, 30, 90]
 
 
-def test_the_day_of_the_mall_is_the_date_in_tokyo_of_others_in_utc(tmp_path: Path) -> None:
+def test_the_day_of_the_mall_is_the_date_in_tokyo_of_others_in_utc(
+    tmp_path: Path,
+) -> None:
     midnight = pd.Timestamp("2012-10-25", tz="Asia/Tokyo").timestamp()
-    path = write(tmp_path / "atc-20200101.csv", as_1hz(samples(people=1, count=4, begin=midnight - 0.8)))
+    path = write(
+        tmp_path / "atc-20200101.csv",
+        as_1hz(samples(people=1, count=4, begin=midnight - 0.8)),
+    )
     frame = read_raw(path)
     assert frame["day"].astype(str).tolist() == ["2012-10-24"] * 2 + ["2012-10-25"] * 2
-    assert set(read_raw(path, options=szlib.ReadOptions(tz="UTC"))["day"]) == {"2012-10-24"}
-    table = write(tmp_path / "hall.csv", as_tidy(samples(people=1, count=4, begin=midnight - 0.8)))
+    assert set(read_raw(path, options=szlib.ReadOptions(tz="UTC"))["day"]) == {
+        "2012-10-24"
+    }
+    table = write(
+        tmp_path / "hall.csv", as_tidy(samples(people=1, count=4, begin=midnight - 0.8))
+    )
     assert set(read_raw(table)["day"]) == {"2012-10-24"}
-    assert read_raw(table, options=szlib.ReadOptions(tz="Asia/Tokyo"))["day"].nunique() == 2
+    assert (
+        read_raw(table, options=szlib.ReadOptions(tz="Asia/Tokyo"))["day"].nunique()
+        == 2
+    )
     with pytest.raises(szlib.DataError, match="unknown time zone 'Mars/Olympus'"):
         read_raw(path, options=szlib.ReadOptions(tz="Mars/Olympus"))
 
@@ -152,11 +196,17 @@ def test_the_day_of_the_mall_is_the_date_in_tokyo_of_others_in_utc(tmp_path: Pat
 def test_excluded_days_are_left_out_and_counted(tmp_path: Path) -> None:
     first, second = samples(), samples(count=5, begin=BEGIN + 86_400)
     path = write(tmp_path / "two.csv", as_1hz(pd.concat([first, second])))
-    for exclude in (["2012-10-24"], "2012-10-24", iter([pd.Timestamp("2012-10-24").date()])):
+    for exclude in (
+        ["2012-10-24"],
+        "2012-10-24",
+        iter([pd.Timestamp("2012-10-24").date()]),
+    ):
         frame = read_raw(path, exclude=exclude)
         assert set(frame["day"]) == {"2012-10-25"}
         assert stage_of(frame, "merge")["rejected"] == {"excluded day": len(first)}
-    with pytest.raises(szlib.DataError, match=r"excluded days .*2012-10-24.*2012-10-25"):
+    with pytest.raises(
+        szlib.DataError, match=r"excluded days .*2012-10-24.*2012-10-25"
+    ):
         read_raw(path, exclude=["2012-10-25", "2012-10-24"])
 
 
@@ -167,7 +217,9 @@ def test_ewap_files_of_one_name_are_refused(tmp_path: Path) -> None:
         paths.append(write(tmp_path / name / "obsmat.txt", as_ewap(samples())))
     with pytest.raises(szlib.DataError, match="several files are called obsmat"):
         read_raw(paths)
-    assert set(read_raw([paths[0], write(tmp_path / "hotel.txt", as_ewap(samples()))])["day"]) == {
+    assert set(
+        read_raw([paths[0], write(tmp_path / "hotel.txt", as_ewap(samples()))])["day"]
+    ) == {
         "obsmat",
         "hotel",
     }
@@ -197,13 +249,18 @@ BAD_ROWS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("bad", "reason"), BAD_ROWS.items(), ids=[repr(row) for row in BAD_ROWS])
+@pytest.mark.parametrize(
+    ("bad", "reason"), BAD_ROWS.items(), ids=[repr(row) for row in BAD_ROWS]
+)
 def test_a_bad_row_is_rejected_with_a_warning_that_gives_its_line(
     tmp_path: Path, bad: str, reason: str
 ) -> None:
     content = "\n".join([*GOOD[:3], bad, *GOOD[3:], bad])
     frame, message = read_quietly(write(tmp_path / "a.csv", content + "\n"))
-    assert re.sub(r" \(column .*?\)", "", message) == f"a.csv, first at line 4: rejected rows: 2 x {reason}"
+    assert (
+        re.sub(r" \(column .*?\)", "", message)
+        == f"a.csv, first at line 4: rejected rows: 2 x {reason}"
+    )
     assert ("holds" in message) == (reason == "missing or not a number")
     assert stage_of(frame, "read") == {
         "stage": "read a.csv",
@@ -211,23 +268,37 @@ def test_a_bad_row_is_rejected_with_a_warning_that_gives_its_line(
         "kept": len(GOOD),
         "rejected": {reason: 2},
     }
-    pd.testing.assert_frame_equal(frame, read_raw(write(tmp_path / "a.csv", "\n".join(GOOD))))
+    pd.testing.assert_frame_equal(
+        frame, read_raw(write(tmp_path / "a.csv", "\n".join(GOOD)))
+    )
 
 
 @pytest.mark.parametrize(("name", "line"), [("atc-raw", 2), ("ewap", 2), ("tidy", 3)])
-def test_every_format_gives_the_line_of_a_bad_row(tmp_path: Path, name: str, line: int) -> None:
+def test_every_format_gives_the_line_of_a_bad_row(
+    tmp_path: Path, name: str, line: int
+) -> None:
     rows = WRITERS[name](samples(count=9)).splitlines()
     _, message = read_quietly(
-        write(tmp_path / "a.csv", "\n".join([*rows[: line - 1], "x", *rows[line - 1 :]]))
+        write(
+            tmp_path / "a.csv", "\n".join([*rows[: line - 1], "x", *rows[line - 1 :]])
+        )
     )
-    assert re.match(rf"a\.csv, first at line {line}\b.*: rejected rows: 1 x missing or", message)
+    assert re.match(
+        rf"a\.csv, first at line {line}\b.*: rejected rows: 1 x missing or", message
+    )
 
 
 def test_a_file_of_mostly_bad_rows_is_refused(tmp_path: Path) -> None:
-    frame, message = read_quietly(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z"])))
-    assert (len(frame), message) == (3, "a.csv, first at line 4: rejected rows: 3 x missing or extra fields")
+    frame, message = read_quietly(
+        write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z"]))
+    )
+    assert (len(frame), message) == (
+        3,
+        "a.csv, first at line 4: rejected rows: 3 x missing or extra fields",
+    )
     with pytest.raises(
-        szlib.DataError, match=r"a\.csv, line 4: missing or extra fields; 4 of 7 rows cannot be"
+        szlib.DataError,
+        match=r"a\.csv, line 4: missing or extra fields; 4 of 7 rows cannot be",
     ):
         read_raw(write(tmp_path / "a.csv", "\n".join([*GOOD[:3], "x", "y", "z", "x"])))
 
@@ -239,10 +310,14 @@ def test_rows_without_a_day_are_rejected(tmp_path: Path) -> None:
     assert message == "a.csv, first at line 5: rejected rows: 2 x no day"
 
 
-def test_the_first_of_duplicate_rows_is_kept_and_others_are_counted(tmp_path: Path) -> None:
+def test_the_first_of_duplicate_rows_is_kept_and_others_are_counted(
+    tmp_path: Path,
+) -> None:
     rows = samples()
     again = rows.assign(x=rows["x"] + 1).iloc[:4]
-    frame, message = read_quietly(write(tmp_path / "a.csv", as_1hz(pd.concat([rows, again]))))
+    frame, message = read_quietly(
+        write(tmp_path / "a.csv", as_1hz(pd.concat([rows, again])))
+    )
     assert message == "all files: rejected rows: 4 x duplicate (day, id, t)"
     assert stage_of(frame, "merge")["rejected"] == {"duplicate (day, id, t)": 4}
     alone = read_raw(write(tmp_path / "a.csv", as_1hz(rows)))
@@ -254,13 +329,20 @@ def test_unsorted_rows_are_sorted(tmp_path: Path, name: str) -> None:
     rows = samples()
     expected = read_raw(write(tmp_path / "rec.csv", WRITERS[name](rows)))
     shuffled = rows.sample(frac=1, random_state=3)
-    pd.testing.assert_frame_equal(read_raw(write(tmp_path / "rec.csv", WRITERS[name](shuffled))), expected)
+    pd.testing.assert_frame_equal(
+        read_raw(write(tmp_path / "rec.csv", WRITERS[name](shuffled))), expected
+    )
 
 
 def test_the_order_of_rows_does_not_matter(tmp_path: Path) -> None:
     rows = samples(people=5)
     tables = [
-        read_raw(write(tmp_path / "rec.csv", as_raw(rows.sort_values(by, kind="stable", ascending=way))))
+        read_raw(
+            write(
+                tmp_path / "rec.csv",
+                as_raw(rows.sort_values(by, kind="stable", ascending=way)),
+            )
+        )
         for by in (["id", "t"], ["t", "id"])
         for way in (True, False)
     ]
@@ -271,9 +353,8 @@ def test_the_order_of_rows_does_not_matter(tmp_path: Path) -> None:
 # --- files that cannot be used -----------------------------------------------------------------------
 
 TIDY_ROWS = "1351040400.0,7,5.0,5.0\n1351040400.4,7,5.4,5.0\n"
-PNG = (
-    b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x00\x00\x00\x01\x00\x00\x00\x01\x08\x06\x00\x00\x00\x1f\x15\xc4\x89"
-)
+PNG = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x00\x00\x00\x01\x00\x00\x00\x01"
+PNG += b"\x08\x06\x00\x00\x00\x1f\x15\xc4\x89"
 UNUSABLE: dict[str, tuple[str | bytes, str]] = {
     "empty": ("", "line 1: the file is empty"),
     "only blank lines": ("\n\n\n", "line 1: the file is empty or begins with a blank line"),
@@ -353,7 +434,11 @@ def test_parquet_columns_of_wrong_type_are_refused(tmp_path: Path) -> None:
     "times",
     [
         lambda t: pd.to_datetime(t, unit="s", utc=True).dt.round("ms").dt.as_unit("ms"),
-        lambda t: pd.to_datetime(t, unit="s", utc=True).dt.tz_convert("Asia/Tokyo").dt.tz_localize(None),
+        lambda t: (
+            pd.to_datetime(t, unit="s", utc=True)
+            .dt.tz_convert("Asia/Tokyo")
+            .dt.tz_localize(None)
+        ),
         lambda t: pd.to_timedelta(t, unit="s"),
     ],
     ids=["with a zone", "local", "duration"],
@@ -371,13 +456,18 @@ def test_parquet_times_with_a_type_are_read_in_seconds(
 
 LARGE_ID = 2**53
 LARGE = pd.DataFrame(
-    {"t": np.tile(BEGIN + 0.4 * np.arange(20), 2), "id": np.repeat([LARGE_ID, LARGE_ID + 1], 20)}
+    {
+        "t": np.tile(BEGIN + 0.4 * np.arange(20), 2),
+        "id": np.repeat([LARGE_ID, LARGE_ID + 1], 20),
+    }
 )
 LARGE["x"], LARGE["y"] = 5 + 0.4 * np.tile(np.arange(20), 2), np.repeat([5.0, 9.0], 20)
 
 
 @pytest.mark.parametrize("name", [*WRITERS, "parquet", "table"])
-def test_people_whose_ids_are_too_large_for_floats_stay_two(tmp_path: Path, name: str) -> None:
+def test_people_whose_ids_are_too_large_for_floats_stay_two(
+    tmp_path: Path, name: str
+) -> None:
     source: Any = LARGE
     if name == "parquet":
         source.to_parquet(tmp_path / "a.parquet")
@@ -385,7 +475,9 @@ def test_people_whose_ids_are_too_large_for_floats_stay_two(tmp_path: Path, name
     elif name != "table":
         text = WRITERS[name](LARGE).replace("9.0071993e+15", "9007199254740992")  # EWAP
         lines = text.splitlines(keepends=True)
-        lines[-20:] = [line.replace("9007199254740992", "9007199254740993") for line in lines[-20:]]
+        lines[-20:] = [
+            line.replace("9007199254740992", "9007199254740993") for line in lines[-20:]
+        ]
         source = write(tmp_path / "a.csv", "".join(lines))
     options = szlib.ReadOptions(frame_rate=15 if name == "ewap" else None)
     assert set(read_raw(source, options=options)["id"]) == {LARGE_ID, LARGE_ID + 1}
@@ -393,13 +485,17 @@ def test_people_whose_ids_are_too_large_for_floats_stay_two(tmp_path: Path, name
     assert tracks.groupby("id")["y"].std().max() < 1e-9, "each walks straight ahead"
 
 
-def test_streamed_people_whose_ids_are_too_large_for_floats_stay_two(tmp_path: Path) -> None:
+def test_streamed_people_whose_ids_are_too_large_for_floats_stay_two(
+    tmp_path: Path,
+) -> None:
     path = write(tmp_path / "a.csv", as_raw(LARGE.sort_values("t")))
     near = read_near_area(path, area=szlib.Square((0, 20), (0, 20)), duration=3.0)
     assert set(near["id"]) == {LARGE_ID, LARGE_ID + 1} and len(near) == 40
 
 
-@pytest.mark.parametrize("text", ["9007199254740993.0", "9007199254740992.0", "1e16", str(2**63), "-1e300"])
+@pytest.mark.parametrize(
+    "text", ["9007199254740993.0", "9007199254740992.0", "1e16", str(2**63), "-1e300"]
+)
 def test_ids_that_are_not_exact_are_rejected_by_line(tmp_path: Path, text: str) -> None:
     lines = [*GOOD, f"{BEGIN + 4},{text},5,5,1.2,0.1"]
     frame, message = read_quietly(write(tmp_path / "a.csv", "\n".join(lines)))
@@ -407,14 +503,18 @@ def test_ids_that_are_not_exact_are_rejected_by_line(tmp_path: Path, text: str) 
     assert len(frame) == 8
     floats = LARGE.assign(id=LARGE["id"].astype(float))
     floats.to_parquet(tmp_path / "a.parquet")
-    with pytest.raises(szlib.DataError, match="line 1: id not a whole number; 40 of 40 rows"):
+    with pytest.raises(
+        szlib.DataError, match="line 1: id not a whole number; 40 of 40 rows"
+    ):
         read_raw(tmp_path / "a.parquet")
 
 
 @pytest.mark.parametrize("name", ["می\u200cدان.csv", "👩\u200d🔬.csv.gz"])
 def test_names_with_zero_width_joiners_are_text(tmp_path: Path, name: str) -> None:
     content = as_raw(samples()).encode()
-    path = write(tmp_path / name, gzip.compress(content) if name.endswith("gz") else content)
+    path = write(
+        tmp_path / name, gzip.compress(content) if name.endswith("gz") else content
+    )
     assert len(read_raw(path)) == 60
     done = szlib.extract_days(path, out=tmp_path / "out", progress=False)
     assert list(done.table["status"]) == ["done"]
@@ -435,7 +535,9 @@ def test_missing_files_folders_and_locked_files_are_refused(
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(os, "open", refuse)
-    with pytest.raises(szlib.DataError, match=r"locked\.csv: cannot be opened .*Permission denied"):
+    with pytest.raises(
+        szlib.DataError, match=r"locked\.csv: cannot be opened .*Permission denied"
+    ):
         read_raw(path)
 
 
@@ -445,16 +547,24 @@ def test_unknown_options_are_refused(tmp_path: Path) -> None:
         read_raw(path, options=szlib.ReadOptions(file_format="csv"))
     with pytest.raises(szlib.DataError, match=r"unit must be one of .*; got 'yd'"):
         read_raw(path, options=szlib.ReadOptions(unit="yd"))
-    with pytest.raises(szlib.DataError, match=r"a\.csv, line 1: missing or extra fields; 60 of 60 rows"):
+    with pytest.raises(
+        szlib.DataError, match=r"a\.csv, line 1: missing or extra fields; 60 of 60 rows"
+    ):
         read_raw(path, options=szlib.ReadOptions(file_format="atc-1hz"))
 
 
 def test_a_given_unit_converts_positions(tmp_path: Path) -> None:
     rows = samples()
     millimetres = read_raw(write(tmp_path / "a.csv", as_raw(rows)))
-    in_metres = read_raw(write(tmp_path / "a.csv", as_raw(scaled(1e-3))), options=szlib.ReadOptions(unit="m"))
+    in_metres = read_raw(
+        write(tmp_path / "a.csv", as_raw(scaled(1e-3))),
+        options=szlib.ReadOptions(unit="m"),
+    )
     pd.testing.assert_frame_equal(in_metres, millimetres, rtol=0, atol=2e-6)
-    wide = read_raw(write(tmp_path / "a.csv", as_1hz(scaled(1e3))), options=szlib.ReadOptions(unit="mm"))
+    wide = read_raw(
+        write(tmp_path / "a.csv", as_1hz(scaled(1e3))),
+        options=szlib.ReadOptions(unit="mm"),
+    )
     pd.testing.assert_frame_equal(wide, millimetres, rtol=0, atol=2e-6)
 
 
@@ -486,7 +596,9 @@ def test_a_damaged_file_is_read_with_a_complete_funnel_or_refused(
         if packed and rng.random() < 0.3:
             path.write_bytes(mutate(gzip.compress(content), rng))
         else:
-            path.write_bytes(gzip.compress(mutate(content, rng)) if packed else mutate(content, rng))
+            path.write_bytes(
+                gzip.compress(mutate(content, rng)) if packed else mutate(content, rng)
+            )
         tracks = read_or_refuse(path)
         if tracks is None:
             continue
@@ -523,8 +635,16 @@ def test_the_real_day_is_read_completely(real_day: pd.DataFrame) -> None:
     assert list(real_day["day"].cat.categories) == ["2012-10-24"]
     *files, merged = funnels.get(real_day)
     assert len(files) == 23
-    assert sum(f["entered"] for f in files) == sum(f["kept"] for f in files) == merged["kept"] == 624_951
-    opened, closed = (pd.Timestamp(t, unit="s", tz="Asia/Tokyo") for t in real_day["t"].agg(["min", "max"]))
+    assert (
+        sum(f["entered"] for f in files)
+        == sum(f["kept"] for f in files)
+        == merged["kept"]
+        == 624_951
+    )
+    opened, closed = (
+        pd.Timestamp(t, unit="s", tz="Asia/Tokyo")
+        for t in real_day["t"].agg(["min", "max"])
+    )
     assert (opened.hour, closed.hour) == (9, 20)
 
 
@@ -532,7 +652,9 @@ def test_the_speed_column_of_the_real_day_is_too_large(real_day: pd.DataFrame) -
     """Speed is computed from positions: the sensor gives 0.57 m/s to people who stand (< 0.1 m in 1 s)."""
     names = ["t", "id", "x", "y", "speed", "angle"]
     files = sorted(real_data("atc-1hz").glob("*.csv"))
-    raw = pd.concat([pd.read_csv(file, names=names) for file in files]).sort_values(["id", "t"])
+    raw = pd.concat([pd.read_csv(file, names=names) for file in files]).sort_values(
+        ["id", "t"]
+    )
     step = raw.groupby("id")[["t", "x", "y"]].diff()
     moved = np.hypot(step["x"], step["y"]) / step["t"]
     said = raw.loc[(moved < 0.1) & (step["t"] < 1.2), "speed"].median()
@@ -545,6 +667,12 @@ def test_the_eth_sequence_is_read_completely() -> None:
     frame = read_raw(path)
     assert (len(frame), frame["id"].nunique()) == (8908, 360)
     assert list(frame["day"].cat.categories) == ["seq_eth_obsmat"]
-    given = pd.DataFrame(np.loadtxt(path)[:, [0, 1, 2, 4]], columns=["t", "id", "x", "y"])
-    given = given.assign(t=given["t"] / 15, id=given["id"].astype(int)).sort_values(["id", "t"])
-    pd.testing.assert_frame_equal(without_day(frame), given[["id", "t", "x", "y"]].reset_index(drop=True))
+    given = pd.DataFrame(
+        np.loadtxt(path)[:, [0, 1, 2, 4]], columns=["t", "id", "x", "y"]
+    )
+    given = given.assign(t=given["t"] / 15, id=given["id"].astype(int)).sort_values(
+        ["id", "t"]
+    )
+    pd.testing.assert_frame_equal(
+        without_day(frame), given[["id", "t", "x", "y"]].reset_index(drop=True)
+    )

@@ -27,7 +27,11 @@ def recording(
     x: float, *, begin: float = 0.0, people: range = range(1, 5), seconds: int = 30
 ) -> pd.DataFrame:
     """People who walk to the right from x, on parallel lines; two rows a second."""
-    rows = [(begin + k / 2, p, x + k / 2, float(p)) for p in people for k in range(2 * seconds)]
+    rows = [
+        (begin + k / 2, p, x + k / 2, float(p))
+        for p in people
+        for k in range(2 * seconds)
+    ]
     return pd.DataFrame(rows, columns=["t", "id", "x", "y"])
 
 
@@ -42,7 +46,10 @@ def fastest(tracks: pd.DataFrame) -> float:
 
 
 def test_recordings_with_clocks_from_zero_are_separated(tmp_path: Path) -> None:
-    files = [write(tmp_path / name / "rec.csv", recording(x)) for name, x in (("a", 0.0), ("b", 50.0))]
+    files = [
+        write(tmp_path / name / "rec.csv", recording(x))
+        for name, x in (("a", 0.0), ("b", 50.0))
+    ]
     tracks = szlib.read_tracks(files)
     assert set(tracks["day"]) == {"a-rec", "b-rec"}, "the same stem in two folders"
     assert fastest(tracks) < 1.5, "people do not jump"
@@ -53,7 +60,10 @@ def test_pieces_of_one_recording_are_joined(tmp_path: Path) -> None:
     for begin in (0.0, BEGIN):
         whole = recording(0.0, begin=begin)
         early = whole["t"] < begin + 12
-        files = [write(tmp_path / "one.csv", whole[early]), write(tmp_path / "two.csv", whole[~early])]
+        files = [
+            write(tmp_path / "one.csv", whole[early]),
+            write(tmp_path / "two.csv", whole[~early]),
+        ]
         tracks = szlib.read_tracks(files)
         assert tracks["day"].nunique() == 1
         assert tracks.groupby("id").size().tolist() == [296] * 4
@@ -62,7 +72,10 @@ def test_pieces_of_one_recording_are_joined(tmp_path: Path) -> None:
 def test_people_in_two_places_at_once_warn_or_are_refused(tmp_path: Path) -> None:
     one = write(tmp_path / "one.csv", recording(0.0, begin=BEGIN))
     other = write(tmp_path / "other.csv", recording(50.0, begin=BEGIN))
-    with pytest.warns(szlib.DataWarning, match="4 people are in two places at once; read as two recordings"):
+    with pytest.warns(
+        szlib.DataWarning,
+        match="4 people are in two places at once; read as two recordings",
+    ):
         tracks = szlib.read_tracks([one, other])
     assert set(tracks["day"]) == {"2012-10-24", "2012-10-24 other"}
     assert fastest(tracks) < 1.5
@@ -100,7 +113,10 @@ def test_globs_without_a_file_are_refused(glob: str) -> None:
 
 def test_a_doubled_column_is_refused_by_name(tmp_path: Path) -> None:
     columns = [pa.array([0.0, 1.0])] * 5
-    pq.write_table(pa.Table.from_arrays(columns, names=["t", "id", "x", "y", "x"]), tmp_path / "a.parquet")
+    pq.write_table(
+        pa.Table.from_arrays(columns, names=["t", "id", "x", "y", "x"]),
+        tmp_path / "a.parquet",
+    )
     with pytest.raises(szlib.DataError, match="names x twice; rename one of them"):
         read_raw(tmp_path / "a.parquet")
 
@@ -127,11 +143,20 @@ def test_files_too_large_for_memory_are_refused_before_reading(tmp_path: Path) -
     file = write(tmp_path / "a.csv", recording(0.0))
     for name in ("a.csv.gz", "a.csv"):
         (tmp_path / "a.csv.gz").write_bytes(gzip.compress(file.read_bytes()))
-        with memory.granted(10_000), pytest.raises(MemoryLimitError, match="to read 241 rows takes about"):
+        with (
+            memory.granted(10_000),
+            pytest.raises(MemoryLimitError, match="to read 241 rows takes about"),
+        ):
             read_raw(tmp_path / name)
     recording(0.0).to_parquet(tmp_path / "a.parquet")
-    with memory.granted(10_000), pytest.raises(MemoryLimitError, match="to read 240 rows"):
+    with (
+        memory.granted(10_000),
+        pytest.raises(MemoryLimitError, match="to read 240 rows"),
+    ):
         read_raw(tmp_path / "a.parquet")
     raw = read_raw(file)
-    with memory.granted(10_000), pytest.raises(MemoryLimitError, match=r"the clock: 1,180 ticks of 240 rows"):
+    with (
+        memory.granted(10_000),
+        pytest.raises(MemoryLimitError, match=r"the clock: 1,180 ticks of 240 rows"),
+    ):
         szlib.tracks.clock.to_clock(raw)

@@ -23,11 +23,15 @@ TILTED = np.array([[0.04, -0.03, 70.0], [0.14, -0.003, 8.0], [1.2e-3, -5e-5, 1.0
 
 def pixels(floor: np.ndarray) -> np.ndarray:
     """Column and row at which the camera sees points of the floor [m], shape (n, 2)."""
-    row, column, one = np.linalg.inv(TILTED) @ np.column_stack([floor / 0.8, np.ones(len(floor))]).T
+    row, column, one = (
+        np.linalg.inv(TILTED) @ np.column_stack([floor / 0.8, np.ones(len(floor))]).T
+    )
     return np.column_stack([column / one, row / one])
 
 
-def grand_central(folder: Path, people: dict[int, np.ndarray], *, first: int = 0) -> Path:
+def grand_central(
+    folder: Path, people: dict[int, np.ndarray], *, first: int = 0
+) -> Path:
     """An archive of people (paths (n, 2) [m]) annotated every 20th frame, and its homography."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "H.json").write_text(json.dumps({"homog": TILTED.tolist()}))
@@ -41,12 +45,16 @@ def grand_central(folder: Path, people: dict[int, np.ndarray], *, first: int = 0
     return folder / "Annotation.zip"
 
 
-def straight(start: tuple[float, float], velocity: tuple[float, float], count: int = 12) -> np.ndarray:
+def straight(
+    start: tuple[float, float], velocity: tuple[float, float], count: int = 12
+) -> np.ndarray:
     return np.asarray(start) + 0.8 * np.arange(count)[:, None] * np.asarray(velocity)
 
 
 def test_grand_central_is_projected_to_the_floor(tmp_path: Path) -> None:
-    archive = grand_central(tmp_path, {7: straight((10, 20), (1.0, 0.5)), 12: straight((30, 45), (0, -1.5))})
+    archive = grand_central(
+        tmp_path, {7: straight((10, 20), (1.0, 0.5)), 12: straight((30, 45), (0, -1.5))}
+    )
     tracks = sites.read_grand_central(archive)
     check_tracks(tracks)
     assert tracks["id"].unique().tolist() == [7, 12]
@@ -74,7 +82,9 @@ def test_gaps_of_grand_central_are_not_interpolated(tmp_path: Path) -> None:
 
 def test_damaged_grand_central_files_are_refused(tmp_path: Path) -> None:
     archive = grand_central(tmp_path / "a", {1: straight((10, 20), (1, 0))})
-    with pytest.raises(szlib.DataError, match=r"H\.json: no such file; expected the homography"):
+    with pytest.raises(
+        szlib.DataError, match=r"H\.json: no such file; expected the homography"
+    ):
         sites.read_grand_central(archive, homography=tmp_path / "H.json")
     (tmp_path / "a" / "H.json").write_text('{"homog": [[1, 2], [3, 4]]}')
     with pytest.raises(szlib.DataError, match="expected 3 x 3"):
@@ -85,7 +95,9 @@ def test_damaged_grand_central_files_are_refused(tmp_path: Path) -> None:
     archive = grand_central(tmp_path / "a", {1: straight((10, 20), (1, 0))})
     with zipfile.ZipFile(archive, "a") as packed:
         packed.writestr("Annotation/000002.txt", "1 2 3 4")
-    with pytest.raises(szlib.DataError, match=r"000002\.txt: expected column, row, frame"):
+    with pytest.raises(
+        szlib.DataError, match=r"000002\.txt: expected column, row, frame"
+    ):
         sites.read_grand_central(archive)
     archive.write_bytes(archive.read_bytes()[:100])
     with pytest.raises(szlib.DataError, match=r"Annotation\.zip: cannot be read"):
@@ -116,7 +128,9 @@ def test_edinburgh_has_nine_frames_a_second_and_y_points_up(tmp_path: Path) -> N
     tracks = sites.read_edinburgh(edinburgh(tmp_path / "tracks.Aug01.txt", {1: walk}))
     check_tracks(tracks)
     assert tracks["day"].unique().tolist() == ["tracks.Aug01"]
-    assert tracks["t"].iloc[[0, -1]].tolist() == pytest.approx([4471 / 9, 4515 / 9], abs=0.1)
+    assert tracks["t"].iloc[[0, -1]].tolist() == pytest.approx(
+        [4471 / 9, 4515 / 9], abs=0.1
+    )
     np.testing.assert_allclose(tracks["vx"], 6 * 0.0247 * 9, rtol=1e-6)
     np.testing.assert_allclose(tracks["vy"], 3 * 0.0247 * 9, rtol=1e-6)
     assert tracks["y"].iloc[0] == pytest.approx(0.0247 * 80, abs=0.1)
@@ -128,12 +142,23 @@ def test_repeated_blobs_of_edinburgh_are_rejected(tmp_path: Path) -> None:
     walk = [(100 + 6 * k, 200, k) for k in range(30)]
     ghost = [(100 + 6 * k, 260 - 4 * k if k < 15 else 200, k) for k in range(30)]
     twice = [*[(300, 50 + k, k) for k in range(20)], (310, 69, 19)]
-    tracks = sites.read_edinburgh(edinburgh(tmp_path / "tracks.Aug02.txt", {1: walk, 2: ghost, 5: twice}))
+    tracks = sites.read_edinburgh(
+        edinburgh(tmp_path / "tracks.Aug02.txt", {1: walk, 2: ghost, 5: twice})
+    )
     stage = funnels.get(tracks)[0]
-    assert stage["rejected"] == {"a blob of an earlier track": 15, "second position at a time": 1}
+    assert stage["rejected"] == {
+        "a blob of an earlier track": 15,
+        "second position at a time": 1,
+    }
     assert stage["entered"] == 81
-    assert tracks.groupby("id")["t"].max().round(1).to_dict() == {1: 3.2, 2: 1.5, 5: 2.1}
-    np.testing.assert_allclose(tracks[tracks["id"] == 5]["x"], 300 * 0.0247, err_msg="the first one counts")
+    assert tracks.groupby("id")["t"].max().round(1).to_dict() == {
+        1: 3.2,
+        2: 1.5,
+        5: 2.1,
+    }
+    np.testing.assert_allclose(
+        tracks[tracks["id"] == 5]["x"], 300 * 0.0247, err_msg="the first one counts"
+    )
 
 
 def test_edinburgh_files_are_separate_recordings(tmp_path: Path) -> None:
@@ -142,7 +167,9 @@ def test_edinburgh_files_are_separate_recordings(tmp_path: Path) -> None:
     tracks = sites.read_edinburgh(files)
     check_tracks(tracks)
     assert tracks["day"].unique().tolist() == ["tracks.Aug01", "tracks.Aug02"]
-    assert funnels.get(tracks)[0]["rejected"] == {}, "the same blob on another day is another one"
+    assert funnels.get(tracks)[0]["rejected"] == {}, (
+        "the same blob on another day is another one"
+    )
     with pytest.raises(szlib.DataError, match="several files are called"):
         sites.read_edinburgh([files[0], files[0]])
 
@@ -152,7 +179,9 @@ def test_damaged_edinburgh_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(szlib.DataError, match="cannot be read"):
         sites.read_edinburgh(file)
     file.write_text("% nothing\nProperties.R1=[1 2 3];\n")
-    with pytest.raises(szlib.DataError, match="holds no track; expected lines like TRACK"):
+    with pytest.raises(
+        szlib.DataError, match="holds no track; expected lines like TRACK"
+    ):
         sites.read_edinburgh(file)
     file.write_text("TRACK.R3=[[1 2 3];[4 5]];\n")
     with pytest.raises(szlib.DataError, match=r"TRACK\.R3: expected triples"):
@@ -174,10 +203,25 @@ def write_magni(path: Path, sessions: list[dict[int, str]]) -> Path:
         for place, (helmet, label) in enumerate(labels.items()):
             member = place % int(label[-1]) if "Group" in label else 0
             for t in times:
-                message = (round(t, 2), f"Helmet_{helmet}", t - begin, 6 * (place - member) + member)
+                message = (
+                    round(t, 2),
+                    f"Helmet_{helmet}",
+                    t - begin,
+                    6 * (place - member) + member,
+                )
                 rows.append((*message, 0, 0, 0, 0, f"Visitors-{label}"))
         begin = times[-1] + 0.01
-    names = ["Time", "ag_id", "x", "y", "speed", "x_speed", "y_speed", "theta_delta", "data_label"]
+    names = [
+        "Time",
+        "ag_id",
+        "x",
+        "y",
+        "speed",
+        "x_speed",
+        "y_speed",
+        "theta_delta",
+        "data_label",
+    ]
     pd.DataFrame(rows, columns=names).sort_values("Time").to_csv(path, index=False)
     return path
 
@@ -192,17 +236,38 @@ def test_a_helmet_is_another_person_in_each_session(tmp_path: Path) -> None:
     file = write_magni(tmp_path / "A.csv", SESSIONS)
     tracks = sites.read_magni(file)
     check_tracks(tracks)
-    assert tracks["id"].unique().tolist() == [101, 102, 103, 104, 105, 110, 201, 202, 203, 204, 205]
-    assert tracks.groupby("id")["t"].agg(lambda t: t.max() - t.min()).between(19.4, 19.7).all()
+    assert tracks["id"].unique().tolist() == [
+        101,
+        102,
+        103,
+        104,
+        105,
+        110,
+        201,
+        202,
+        203,
+        204,
+        205,
+    ]
+    assert (
+        tracks.groupby("id")["t"]
+        .agg(lambda t: t.max() - t.min())
+        .between(19.4, 19.7)
+        .all()
+    )
     np.testing.assert_allclose(tracks["vx"], 1.0, atol=1e-6)
 
 
 def test_magni_groups_are_found(tmp_path: Path) -> None:
     groups = sites.read_magni_groups(write_magni(tmp_path / "A.csv", SESSIONS))
     found = {frozenset(people) for people in groups.groupby("group")["id"].apply(set)}
-    assert found == {frozenset(g) for g in ((102, 110), (103, 104, 105), (202, 203), (204, 205))}
+    assert found == {
+        frozenset(g) for g in ((102, 110), (103, 104, 105), (202, 203), (204, 205))
+    }
     file = write_magni(tmp_path / "B.csv", [{1: "Alone", 2: "Group 2"}])
-    with pytest.raises(szlib.DataError, match="1 people are labelled 'Visitors-Group 2' in session 0"):
+    with pytest.raises(
+        szlib.DataError, match="1 people are labelled 'Visitors-Group 2' in session 0"
+    ):
         sites.read_magni_groups(file)
 
 
@@ -220,7 +285,9 @@ def test_damaged_magni_files_are_refused(tmp_path: Path) -> None:
     bad = rows.index % 100 == 3
     rows.assign(x=np.where(bad, np.nan, rows["x"])).to_csv(file, index=False)
     with pytest.warns(szlib.DataWarning, match=f"{bad.sum()} x not finite"):
-        assert funnels.get(sites.read_magni(file))[0]["rejected"] == {"not finite": bad.sum()}
+        assert funnels.get(sites.read_magni(file))[0]["rejected"] == {
+            "not finite": bad.sum()
+        }
 
 
 # --- the real files ----------------------------------------------------------------------------------

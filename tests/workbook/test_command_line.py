@@ -26,11 +26,15 @@ def day(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_plaza(path, settings=PlazaSettings(n_encounters=40))
 
 
-def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_inspect_prints_a_funnel_that_adds_up(
+    day: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     spoilt = day.with_name("spoilt.csv")
     spoilt.write_text(day.read_text() + "1,2\n")
     assert main(["inspect", str(spoilt)]) == 0
-    described, printed = re.split(r"^(?=area )", capsys.readouterr().out, flags=re.MULTILINE)
+    described, printed = re.split(
+        r"^(?=area )", capsys.readouterr().out, flags=re.MULTILINE
+    )
     assert described.startswith("spoilt.csv is read as atc-raw")
     assert re.search(r"speed 1\.\d+ m/s \(median\)", described)
     area, *lines, advice, command = (line.split() for line in printed.splitlines())
@@ -45,15 +49,22 @@ def test_inspect_prints_a_funnel_that_adds_up(day: Path, capsys: pytest.CaptureF
     assert lines[-1][0] == "kept"
 
 
-def test_area_takes_negative_numbers_in_exponent_form(day: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["inspect", str(day), "--square", "-1.85e1", "2e1", "-.2E+2", "30."]) == 0
+def test_area_takes_negative_numbers_in_exponent_form(
+    day: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (
+        main(["inspect", str(day), "--square", "-1.85e1", "2e1", "-.2E+2", "30."]) == 0
+    )
     printed = capsys.readouterr().out.splitlines()
     assert "area -18.5 20.0 -20.0 30.0" in printed
     assert printed[-1].endswith("--area -18.5 20 -20 30")
 
 
 def test_file_may_be_called_like_a_number(
-    day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    day: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "-1").write_bytes(day.read_bytes())
     monkeypatch.chdir(tmp_path)
@@ -110,7 +121,9 @@ def test_stopped_command_ends_with_the_code_of_the_signal(work: str) -> None:
     )  # fmt: skip
 
 
-def test_extract_prints_the_table(day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_extract_prints_the_table(
+    day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["extract", str(day), "--out", str(tmp_path / "out")]) == 0
     assert "1 done" in capsys.readouterr().out
     (tmp_path / "bad.csv").write_text("rubbish\n")
@@ -132,12 +145,16 @@ def test_error_is_one_line_and_a_traceback_if_asked_for(
     assert (first, last) == ("Traceback (most recent call last):", line)
 
 
-def test_memory_that_is_no_amount_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_memory_that_is_no_amount_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["inspect", str(tmp_path), "--memory", "much"]) == 2
     assert "memory 'much': expected an amount such as 4GB" in capsys.readouterr().err
 
 
-def test_error_names_an_address_without_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_names_an_address_without_scheduler(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     distributed = pytest.importorskip("distributed")
 
     def refuse(*_: object, **__: object) -> None:
@@ -145,7 +162,10 @@ def test_error_names_an_address_without_scheduler(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(distributed, "Client", refuse)
     message = r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"
-    with pytest.raises(szlib.SzlibError, match=message), parallel.cluster("tcp://127.0.0.1:9"):
+    with (
+        pytest.raises(szlib.SzlibError, match=message),
+        parallel.cluster("tcp://127.0.0.1:9"),
+    ):
         pass
     with parallel.cluster(None) as client:
         assert client is None
@@ -155,8 +175,17 @@ def test_extract_waits_for_workers_that_come_late(day: Path, tmp_path: Path) -> 
     """As in a queue: the scheduler is up, its workers start later; without `--wait` the error says so."""
     pytest.importorskip("distributed")
     scheduler_file = tmp_path / "scheduler.json"
-    dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
-    scheduler = subprocess.Popen([*dask, "--scheduler-file", str(scheduler_file)], stderr=subprocess.DEVNULL)
+    dask = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_scheduler",
+        "--port",
+        "0",
+        "--no-dashboard",
+    ]
+    scheduler = subprocess.Popen(
+        [*dask, "--scheduler-file", str(scheduler_file)], stderr=subprocess.DEVNULL
+    )
     worker = None
     try:
         end = time.monotonic() + 60
@@ -164,11 +193,21 @@ def test_extract_waits_for_workers_that_come_late(day: Path, tmp_path: Path) -> 
             time.sleep(0.1)
         address = json.loads(scheduler_file.read_text())["address"]
         with (
-            pytest.raises(szlib.SzlibError, match=r"no worker joined the scheduler .* --wait 600"),
+            pytest.raises(
+                szlib.SzlibError, match=r"no worker joined the scheduler .* --wait 600"
+            ),
             parallel.cluster(address, wait=0.5),
         ):
             pass
-        extract = [sys.executable, "-m", "szlib", "extract", str(day), "--out", str(tmp_path / "out")]
+        extract = [
+            sys.executable,
+            "-m",
+            "szlib",
+            "extract",
+            str(day),
+            "--out",
+            str(tmp_path / "out"),
+        ]
         program = subprocess.Popen([*extract, "--scheduler", address, "--wait", "60"])
         time.sleep(3.0)
         dask = [

@@ -31,14 +31,18 @@ def _close_figures():
 @pytest.fixture(scope="module")
 def log():
     scenario = szlib.SCENARIOS["corridor"]
-    return szlib.simulate(scenario, szlib.MPCCBF(ZONE, walls=scenario.walls), max_time=3.0)
+    return szlib.simulate(
+        scenario, szlib.MPCCBF(ZONE, walls=scenario.walls), max_time=3.0
+    )
 
 
 @pytest.fixture(scope="module")
 def step():
     scenario = szlib.SCENARIOS["making_room"]
     controller = szlib.MPCCBF(ZONE, walls=scenario.walls)
-    return controller.step([1.6, -0.1, -0.15, -0.16], (6.0, 0.0), [szlib.Person((4.0, 0.0), (-0.5, 0.0))])
+    return controller.step(
+        [1.6, -0.1, -0.15, -0.16], (6.0, 0.0), [szlib.Person((4.0, 0.0), (-0.5, 0.0))]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -57,23 +61,31 @@ def samples():
 
 @pytest.fixture(scope="module")
 def zone(samples):
-    return szlib.SocialZone.fit(samples, method="hull", speeds=(0.9, 1.1), n_resamples=20)
+    return szlib.SocialZone.fit(
+        samples, method="hull", speeds=(0.9, 1.1), n_resamples=20
+    )
 
 
 @pytest.fixture(scope="module")
 def tracks():
     t = np.arange(50) / 10
-    return pd.DataFrame({"day": "d", "id": 1, "t": t, "x": -13 + t, "y": 0 * t, "vx": 1.0, "vy": 0.0})
+    return pd.DataFrame(
+        {"day": "d", "id": 1, "t": t, "x": -13 + t, "y": 0 * t, "vx": 1.0, "vy": 0.0}
+    )
 
 
 def in_metres(ax) -> bool:
-    return "[m]" in ax.get_xlabel() and "[m]" in ax.get_ylabel() and ax.get_aspect() == 1
+    return (
+        "[m]" in ax.get_xlabel() and "[m]" in ax.get_ylabel() and ax.get_aspect() == 1
+    )
 
 
 def paths():
     t = np.arange(31) / 10
     rows = [(k, s, s, 0, 5 - s, 0.1 * k) for k in range(5) for s in t]
-    return pd.DataFrame(rows, columns=["encounter", "t", "ref_x", "ref_y", "other_x", "other_y"])
+    return pd.DataFrame(
+        rows, columns=["encounter", "t", "ref_x", "ref_y", "other_x", "other_y"]
+    )
 
 
 MAPS = {
@@ -83,11 +95,15 @@ MAPS = {
     ),
     "paths": lambda f: figures.plot_encounter_paths(paths(), n_shown=3),
     "los": lambda f: figures.plot_relative_positions(f("samples")),
-    "outliers": lambda f: figures.plot_outliers(np.eye(2).repeat(3, axis=0), np.arange(6) < 1),
+    "outliers": lambda f: figures.plot_outliers(
+        np.eye(2).repeat(3, axis=0), np.arange(6) < 1
+    ),
     "zone": lambda f: figures.plot_zone(f("zone"), 1.1, truth=ZONE),
     "zones": lambda f: figures.plot_zones(f("zone").ellipses),
     "ellipse": lambda f: figures.plot_distance(ZONE),
-    "segment": lambda f: figures.plot_distance((np.array([-1.0, 0]), np.array([1.0, 0]))),
+    "segment": lambda f: figures.plot_distance(
+        (np.array([-1.0, 0]), np.array([1.0, 0]))
+    ),
     "scenario": lambda f: figures.plot_scenario(f("log")),
     "step": lambda f: figures.plot_step(f("step")),
     "robot paths": lambda f: figures.plot_robot_paths({"a": f("log"), "b": f("log")}),
@@ -115,8 +131,15 @@ def test_the_cells_count_every_sample_within_r_max(samples):
 
 def test_an_arrow_points_along_the_end_of_each_path():
     ax = figures.plot_encounter_paths(paths(), n_shown=3)
-    marks = [line for line in ax.lines if isinstance(line.get_marker(), tuple) and len(line.get_xdata())]
-    assert sorted(round(line.get_marker()[2] + 90) % 360 for line in marks) == [0] * 3 + [180] * 3
+    marks = [
+        line
+        for line in ax.lines
+        if isinstance(line.get_marker(), tuple) and len(line.get_xdata())
+    ]
+    assert (
+        sorted(round(line.get_marker()[2] + 90) % 360 for line in marks)
+        == [0] * 3 + [180] * 3
+    )
 
 
 @pytest.mark.parametrize("name", GRAPHS)
@@ -146,14 +169,19 @@ def test_the_drawn_curve_is_the_ellipse(zone):
 def fit_few(samples):
     with pytest.warns(szlib.DataWarning, match="fewer than 20"):
         return szlib.SocialZone.fit(
-            samples[samples["encounter"] < 15], method="quantile", speeds=(0.9, 1.1), n_resamples=20
+            samples[samples["encounter"] < 15],
+            method="quantile",
+            speeds=(0.9, 1.1),
+            n_resamples=20,
         )
 
 
 def test_only_a_usable_zone_is_solid(zone, samples, monkeypatch):
     usable = szlib.SocialZone(**vars(zone))
     monkeypatch.setattr(
-        szlib.SocialZone, "verdict", lambda self, speed: "usable" if self is usable else "undecided"
+        szlib.SocialZone,
+        "verdict",
+        lambda self, speed: "usable" if self is usable else "undecided",
     )
     for known, line in ((usable, "-"), (fit_few(samples), "--")):
         ellipse = figures.plot_zone(known, 1.1).lines[known.method != "hull"]
@@ -176,8 +204,13 @@ def test_the_band_is_drawn_exactly_where_an_interval_is_known(zone, samples):
 
 
 def test_a_quantile_zone_shows_its_radii_and_has_no_hull(samples):
-    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), n_resamples=0)
-    labels = [text.get_text() for text in figures.plot_zone(zone, 1.1).get_legend().get_texts()]
+    zone = szlib.SocialZone.fit(
+        samples, method="quantile", speeds=(1.1,), n_resamples=0
+    )
+    labels = [
+        text.get_text()
+        for text in figures.plot_zone(zone, 1.1).get_legend().get_texts()
+    ]
     assert labels == ["radius by direction (quantile)", "fitted ellipse"]
     with pytest.raises(szlib.ZoneError, match="'quantile' has no hull to draw"):
         figures.plot_hull(zone)
@@ -197,7 +230,9 @@ def test_admissible_controls_name_the_person_and_the_walls_that_forbid_others(st
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     assert {"allowed", "chosen"} <= set(labels)
     assert {name.split(",")[0] for name in labels} >= {"person 0", "wall 1"}
-    styles = [line.get_linestyle() for line in ax.lines if "step" in str(line.get_label())]
+    styles = [
+        line.get_linestyle() for line in ax.lines if "step" in str(line.get_label())
+    ]
     assert len(set(styles)) == len(styles) == 2  # readable without colour
 
 
@@ -226,7 +261,11 @@ def test_every_plot_takes_axes_or_makes_them_and_needs_no_title(name):
 
 def test_every_plot_is_exported():
     folder = Path(figures.__file__).parent
-    defined = {d for f in folder.glob("*.py") for d in re.findall(r"^def (plot_\w+)", f.read_text(), re.M)}
+    defined = {
+        d
+        for f in folder.glob("*.py")
+        for d in re.findall(r"^def (plot_\w+)", f.read_text(), re.M)
+    }
     assert defined == set(PLOTS)
 
 
@@ -247,7 +286,9 @@ def test_alt_text_holds_titles_axes_and_legends():
     left.set(title="A run", xlabel="time [s]", ylabel="h [m]")
     left.legend()
     right.set(xlabel="speed\n[m/s]")
-    assert figures.alt_text(fig) == "A run: h [m] over time [s], with robot; speed [m/s]"
+    assert (
+        figures.alt_text(fig) == "A run: h [m] over time [s], with robot; speed [m/s]"
+    )
 
 
 # --- respect, claims, sensitivity, many runs ----------------------------------------------------------
@@ -256,34 +297,65 @@ def test_alt_text_holds_titles_axes_and_legends():
 def test_the_pair_correlation_is_in_metres_and_names_its_radius():
     direction, distance = np.linspace(0.1, 6.1, 36), np.linspace(0.05, 1.95, 40)
     g = np.tile(1 / (1 + np.exp(-(distance - 0.8) / 0.1)), (36, 1))
-    ax = figures.plot_pair_correlation(szlib.PairCorrelation(distance, direction, g), radius=0.8)
+    ax = figures.plot_pair_correlation(
+        szlib.PairCorrelation(distance, direction, g), radius=0.8
+    )
     assert in_metres(ax)
-    assert "all directions: 0.80 m" in [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "all directions: 0.80 m" in [
+        text.get_text() for text in ax.get_legend().get_texts()
+    ]
 
 
 def test_each_zone_size_has_a_band():
     sizes = {"a": [1.2, 1.0], "a_low": [1.0, 0.9], "a_high": [1.5, 1.1]}
-    ax = figures.plot_zone_sizes(pd.DataFrame({"encounters": [10, 100], **sizes}), {"a": "hull"})
+    ax = figures.plot_zone_sizes(
+        pd.DataFrame({"encounters": [10, 100], **sizes}), {"a": "hull"}
+    )
     assert ax.get_xscale() == "log" and "[m]" in ax.get_ylabel()
     assert len(ax.collections) == len(ax.lines) == 1
 
 
 def test_the_largest_sensitivity_is_on_top():
-    rows = [("default", "", 2.0), ("r_max", "1.5", 1.9), ("speed", "0.9", 0.5), ("speed", "1.3", 4.0)]
-    ax = figures.plot_sensitivity(pd.DataFrame(rows, columns=["parameter", "value", "area"]))
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["r_max\n1.5", "speed\n0.9; 1.3"]
+    rows = [
+        ("default", "", 2.0),
+        ("r_max", "1.5", 1.9),
+        ("speed", "0.9", 0.5),
+        ("speed", "1.3", 4.0),
+    ]
+    ax = figures.plot_sensitivity(
+        pd.DataFrame(rows, columns=["parameter", "value", "area"])
+    )
+    assert [label.get_text() for label in ax.get_yticklabels()] == [
+        "r_max\n1.5",
+        "speed\n0.9; 1.3",
+    ]
 
 
 def test_a_map_of_strategies_has_the_fill_of_its_strategy_in_each_cell():
-    cells = pd.DataFrame({"gamma": [0.1, 0.1, 0.2, 0.2], "width": [1.0, 2.0] * 2, "strategy": list("xyyz")})
-    ax = figures.plot_strategies(cells, names=["x", "y", "z"], rows="gamma", columns="width")
+    cells = pd.DataFrame(
+        {
+            "gamma": [0.1, 0.1, 0.2, 0.2],
+            "width": [1.0, 2.0] * 2,
+            "strategy": list("xyyz"),
+        }
+    )
+    ax = figures.plot_strategies(
+        cells, names=["x", "y", "z"], rows="gamma", columns="width"
+    )
     handles, names = ax.get_legend_handles_labels()
-    fills = {handle.get_facecolor(): name for handle, name in zip(handles, names, strict=True)}
+    fills = {
+        handle.get_facecolor(): name
+        for handle, name in zip(handles, names, strict=True)
+    }
     found = {
-        tuple(patch.get_center()): fills[patch.get_facecolor()] for bars in ax.containers for patch in bars
+        tuple(patch.get_center()): fills[patch.get_facecolor()]
+        for bars in ax.containers
+        for patch in bars
     }
     assert found == {(0, 0): "x", (1, 0): "y", (0, 1): "y", (1, 1): "z"}
-    assert ax.get_xlabel() == "width" and [each.get_text() for each in ax.get_yticklabels()] == ["0.1", "0.2"]
+    assert ax.get_xlabel() == "width" and [
+        each.get_text() for each in ax.get_yticklabels()
+    ] == ["0.1", "0.2"]
 
 
 def test_claims_differ_by_more_than_colour_and_keep_their_units():
@@ -295,11 +367,13 @@ def test_claims_differ_by_more_than_colour_and_keep_their_units():
     panels = figures.draw_claims(table).axes
     assert len({ax.lines[0].get_marker() for ax in panels}) == 3
     assert [ax.get_title(loc="left") for ax in panels] == list("abcd")
-    assert [ax.get_title(loc="right") for ax in panels[1:3]] == ["contradicted", "not decidable"]
+    assert [ax.get_title(loc="right") for ax in panels[1:3]] == [
+        "contradicted",
+        "not decidable",
+    ]
     assert [ax.get_xlabel() for ax in panels] == ["m", "m2", "s", "m"]
-    assert panels[1].get_xlim() == pytest.approx(
-        (-2.3, 2.3)
-    )  # the interval fills the panel, and 0 is in the middle
+    # the interval fills the panel, and 0 is in the middle
+    assert panels[1].get_xlim() == pytest.approx((-2.3, 2.3))
 
 
 def test_a_forest_plot_has_a_row_for_each_site_the_mean_and_a_new_site():
@@ -312,23 +386,41 @@ def test_a_forest_plot_has_a_row_for_each_site_the_mean_and_a_new_site():
     pooled = szlib.pool(sites)
     ax = figures.plot_forest(pooled)
     labels = [label.get_text() for label in ax.get_yticklabels()]
-    assert [label.partition(":")[0] for label in labels] == [*sites, "mean", "a new site"]
+    assert [label.partition(":")[0] for label in labels] == [
+        *sites,
+        "mean",
+        "a new site",
+    ]
     assert labels[1] == "mall: 1.20 (1.00 to 1.40)"
-    assert ax.get_xlabel().startswith("radius of the zone [m]") and ax.get_xscale() == "log"
+    assert (
+        ax.get_xlabel().startswith("radius of the zone [m]")
+        and ax.get_xscale() == "log"
+    )
     diamond = ax.patches[0].get_xy()[:, 0]
     assert (diamond.min(), diamond.max()) == (pooled.low, pooled.high)
     assert ax.lines[-1].get_xdata().tolist() == [pooled.new_low, pooled.new_high]
     few = figures.plot_forest(
-        szlib.pool({name: sites[name] for name in ("hall", "mall")}, quantity="center_x")
+        szlib.pool(
+            {name: sites[name] for name in ("hall", "mall")}, quantity="center_x"
+        )
     )
     assert len(few.get_yticklabels()) == 3 and few.get_xscale() == "linear"
 
 
 def test_an_interval_grid_has_a_panel_for_each_metric_and_one_legend():
-    rows = [(w, c, m, 0.5, 0.4, 0.6) for w in ("a", "b") for c in ("x", "y") for m in ("s", "t", "u", "v")]
-    table = pd.DataFrame(rows, columns=["crowd", "who", "metric", "mean", "low", "high"])
+    rows = [
+        (w, c, m, 0.5, 0.4, 0.6)
+        for w in ("a", "b")
+        for c in ("x", "y")
+        for m in ("s", "t", "u", "v")
+    ]
+    table = pd.DataFrame(
+        rows, columns=["crowd", "who", "metric", "mean", "low", "high"]
+    )
     labels = {"s": "share", "t": "time [s]", "u": "u", "v": "v"}
-    grid = figures.draw_interval_grid(table, labels, rows="crowd", colour="who", title="A and b")
+    grid = figures.draw_interval_grid(
+        table, labels, rows="crowd", colour="who", title="A and b"
+    )
     assert [ax.get_xlabel() for ax in grid.axes if ax.axison] == list(labels.values())
     assert [text.get_text() for text in grid.legends[0].get_texts()] == ["x", "y"]
 
@@ -342,14 +434,26 @@ def test_a_crowd_is_drawn_at_the_nearest_approach(log):
 
 
 def test_safety_violations_are_shares_of_the_steps_claimed_safe():
-    table = pd.DataFrame(0, index=["orca", "ETH"], columns=[*MOTION_CHANGES, "claimed_safe_steps"])
-    table["claimed_safe_steps"], table["turned"], table["came"] = [1000, 500], [3, 0], [0, 1]
-    widths = [bar.get_width() for bars in figures.plot_safety_claims(table).containers for bar in bars]
+    table = pd.DataFrame(
+        0, index=["orca", "ETH"], columns=[*MOTION_CHANGES, "claimed_safe_steps"]
+    )
+    table["claimed_safe_steps"], table["turned"], table["came"] = (
+        [1000, 500],
+        [3, 0],
+        [0, 1],
+    )
+    widths = [
+        bar.get_width()
+        for bars in figures.plot_safety_claims(table).containers
+        for bar in bars
+    ]
     assert sorted(widths)[-2:] == [2, 3]
 
 
 def test_recorded_encounter_is_animated_in_real_time(tmp_path: Path) -> None:
-    plaza = szlib.make_plaza(tmp_path / "plaza.csv", settings=szlib.PlazaSettings(n_encounters=20))
+    plaza = szlib.make_plaza(
+        tmp_path / "plaza.csv", settings=szlib.PlazaSettings(n_encounters=20)
+    )
     tracks = szlib.read_tracks(plaza)
     samples = szlib.find_encounters(tracks)
     number = int(samples["encounter"].iloc[-1])
@@ -363,11 +467,15 @@ def test_recorded_encounter_is_animated_in_real_time(tmp_path: Path) -> None:
         movie.seek(k)
         assert movie.info["duration"] == 500
         frames.append(np.asarray(movie.convert("RGB"), int))
-    assert all((np.abs(now - before) > 60).any() for before, now in pairwise(frames)), "people move"
+    assert all((np.abs(now - before) > 60).any() for before, now in pairwise(frames)), (
+        "people move"
+    )
     assert gif != figures.animate_encounter(
         tracks, samples, number, zone=szlib.Ellipse((0, 0), (1, 1)), **options
     )
-    with pytest.raises(szlib.DataError, match=r"encounter -1 is not among the \d+ encounters"):
+    with pytest.raises(
+        szlib.DataError, match=r"encounter -1 is not among the \d+ encounters"
+    ):
         figures.animate_encounter(tracks, samples, -1)
     with pytest.raises(szlib.DataError, match="its people are not in these tracks"):
         figures.animate_encounter(tracks.head(0), samples, number)

@@ -41,25 +41,45 @@ def test_zone_from_tracks_is_that_of_the_library(
     printed, zone = capsys.readouterr().out, szlib.SocialZone.load(out)
     tracks = szlib.read_tracks(recording)
     null = szlib.null_encounters(tracks, shifts=3, progress=False)
-    expected = szlib.SocialZone.fit(szlib.find_encounters(tracks), null=null, n_resamples=20)
+    expected = szlib.SocialZone.fit(
+        szlib.find_encounters(tracks), null=null, n_resamples=20
+    )
     assert zone.ellipses == expected.ellipses
     assert zone.null_test == expected.null_test and zone.null_test is not None
     assert printed.splitlines()[-1] == f"zone at 1.1 m/s: {zone.verdict(1.1).sentence}"
     rows = [line.split() for line in printed.splitlines()[2:8]]
     assert [float(row[0]) for row in rows] == list(zone.ellipses)
-    assert [float(row[1]) for row in rows] == [round(e.semi_axes[0], 2) for e in zone.ellipses.values()]
-    assert {" ".join(row[10:]) for row in rows} == {str(zone.verdict(speed)) for speed in zone.ellipses}
+    assert [float(row[1]) for row in rows] == [
+        round(e.semi_axes[0], 2) for e in zone.ellipses.values()
+    ]
+    assert {" ".join(row[10:]) for row in rows} == {
+        str(zone.verdict(speed)) for speed in zone.ellipses
+    }
     assert (tmp_path / "zone.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_columns_of_other_names_and_units_are_read(recording: Path, tmp_path: Path) -> None:
+def test_columns_of_other_names_and_units_are_read(
+    recording: Path, tmp_path: Path
+) -> None:
     tracks = szlib.read_tracks(recording)[["t", "id", "x", "y"]]
     tracks[["x", "y"]] *= 100
-    tracks.set_axis(["Zeit", "Person", "Ost", "Nord"], axis=1).to_csv(tmp_path / "hall.csv", index=False)
+    tracks.set_axis(["Zeit", "Person", "Ost", "Nord"], axis=1).to_csv(
+        tmp_path / "hall.csv", index=False
+    )
     out, columns = tmp_path / "zone.json", "t=Zeit,id=Person,x=Ost,y=Nord"
-    given = ["--columns", columns, "--unit", "cm", "--area", *map(float, str(szlib.ATC_SQUARE).split())]
+    given = [
+        "--columns",
+        columns,
+        "--unit",
+        "cm",
+        "--area",
+        *map(float, str(szlib.ATC_SQUARE).split()),
+    ]
     assert fit(tmp_path / "hall.csv", "--out", out, "--method", "quantile", *given) == 0
-    zone, expected = szlib.SocialZone.load(out), szlib.find_encounters(szlib.read_tracks(recording))
+    zone, expected = (
+        szlib.SocialZone.load(out),
+        szlib.find_encounters(szlib.read_tracks(recording)),
+    )
     assert zone.provenance["encounters"] == expected["encounter"].nunique()
 
 
@@ -81,12 +101,22 @@ def test_kinds_are_those_of_the_library(recording: Path, tmp_path: Path) -> None
     days, out = recording.with_name("days"), tmp_path / "zone.json"
     assert fit(days, "--out", out, "--kind", "opposite", "crossing") == 0
     samples = szlib.Extraction.load(days).samples()
-    expected = szlib.SocialZone.fit(szlib.of_kind(samples, ["opposite", "crossing"]), n_resamples=20)
+    expected = szlib.SocialZone.fit(
+        szlib.of_kind(samples, ["opposite", "crossing"]), n_resamples=20
+    )
     assert szlib.SocialZone.load(out).ellipses == expected.ellipses
 
 
-def test_excluded_day_is_not_fitted(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    arguments = [recording.with_name("days"), "--out", tmp_path / "zone.json", "--exclude", "2012-10-24"]
+def test_excluded_day_is_not_fitted(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    arguments = [
+        recording.with_name("days"),
+        "--out",
+        tmp_path / "zone.json",
+        "--exclude",
+        "2012-10-24",
+    ]
     assert fit(*arguments) == 2
     assert "no day is left; all of 2012-10-24 are excluded" in capsys.readouterr().err
 
@@ -99,20 +129,48 @@ def test_excluded_day_is_not_fitted(recording: Path, tmp_path: Path, capsys: pyt
             "method respect needs a null model; no null model",
         ),
         (["{days}", "--kind", "friends"], "unknown kinds ['friends']"),
-        (["{days}", "--out", "{day}"], "atc-20121024.csv: expected a file that ends in .json"),
-        (["{days}", "--out", "{folder}/other.json"], "other.json: exists, and is no zone of szlib"),
+        (
+            ["{days}", "--out", "{day}"],
+            "atc-20121024.csv: expected a file that ends in .json",
+        ),
+        (
+            ["{days}", "--out", "{folder}/other.json"],
+            "other.json: exists, and is no zone of szlib",
+        ),
         (["{days}", "--out", "{folder}/plan.json"], "plan.png: exists without a zone"),
-        (["{days}", "--out", "{folder}/nowhere/zone.json"], "nowhere: is no folder that can be written"),
-        (["{days}", "--out", "{day}/zone.json"], "atc-20121024.csv: is no folder that can be written"),
-        (["{days}", "{day}"], "atc-20121024.csv: give one folder of extracted days, or files of tracks"),
-        (["{days}", "--tracks", "{other}"], "other.csv: is none of the files of the extracted days"),
-        (["{day}", "--tracks", "{day}"], "--tracks belongs to a folder of extracted days"),
+        (
+            ["{days}", "--out", "{folder}/nowhere/zone.json"],
+            "nowhere: is no folder that can be written",
+        ),
+        (
+            ["{days}", "--out", "{day}/zone.json"],
+            "atc-20121024.csv: is no folder that can be written",
+        ),
+        (
+            ["{days}", "{day}"],
+            "atc-20121024.csv: give one folder of extracted days, or files of tracks",
+        ),
+        (
+            ["{days}", "--tracks", "{other}"],
+            "other.csv: is none of the files of the extracted days",
+        ),
+        (
+            ["{day}", "--tracks", "{day}"],
+            "--tracks belongs to a folder of extracted days",
+        ),
         (["{missing}"], "missing.csv: no such file"),
-        (["{day}", "--exclude", "2012-10-24"], "--exclude belongs to a folder of extracted days"),
+        (
+            ["{day}", "--exclude", "2012-10-24"],
+            "--exclude belongs to a folder of extracted days",
+        ),
     ],
 )
 def test_what_cannot_be_fitted_is_refused_at_once(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+    recording: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    message: str,
 ) -> None:
     (tmp_path / "other.json").write_text("{}")
     (tmp_path / "plan.png").write_bytes(b"a map of the hall")
@@ -132,18 +190,25 @@ def test_what_cannot_be_fitted_is_refused_at_once(
 def test_too_few_encounters_are_said_with_what_is_missing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    day = szlib.make_plaza(tmp_path / "few.csv", settings=szlib.PlazaSettings(n_encounters=1))
+    day = szlib.make_plaza(
+        tmp_path / "few.csv", settings=szlib.PlazaSettings(n_encounters=1)
+    )
     assert fit(day, "--out", tmp_path / "zone.json") == 2
     assert "encounters were found, 600 are needed" in capsys.readouterr().err
     assert not (tmp_path / "zone.json").exists()
 
 
-def test_damaged_day_is_named(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_damaged_day_is_named(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     szlib.extract_days(recording, out=tmp_path / "days", progress=False)
     file = tmp_path / "days" / "2012-10-24.parquet"
     file.write_bytes(file.read_bytes()[:-9])
     assert fit(tmp_path / "days", "--out", tmp_path / "zone.json") == 2
-    assert "2012-10-24.parquet: is not the result of this extraction" in capsys.readouterr().err
+    assert (
+        "2012-10-24.parquet: is not the result of this extraction"
+        in capsys.readouterr().err
+    )
 
 
 def test_a_full_disk_leaves_the_earlier_zone(

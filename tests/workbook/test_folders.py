@@ -28,12 +28,17 @@ def workbook(notebooks, without_kernels):
     """Two notebooks, one with a parameter of its own."""
     folder = notebooks(_01_one='record.check("ok", True)', _08_two=CHECK)
     script = folder / "08_two.py"
-    script.write_text(script.read_text().replace("seed = 0\n", "seed = 0\ngamma = 0.05\n"))
+    script.write_text(
+        script.read_text().replace("seed = 0\n", "seed = 0\ngamma = 0.05\n")
+    )
     return folder
 
 
 def run(*arguments):
-    assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1", *arguments]) == 0
+    assert (
+        main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1", *arguments])
+        == 0
+    )
 
 
 def contents(folder):
@@ -49,14 +54,18 @@ def test_other_parameters_have_another_folder(workbook, tmp_path):
     before = contents(tmp_path / "out")
     run("--only", "08", "-p", "gamma=0.1")
     (other,) = (tmp_path / "out").glob("mine-*")
-    assert json.loads((other / "parameters.json").read_text())["parameters"] == {"gamma": 0.1}
-    assert json.loads((other / "summary.json").read_text())["notebooks"]["08_two"]["key_figures"] == {
+    assert json.loads((other / "parameters.json").read_text())["parameters"] == {
         "gamma": 0.1
     }
+    assert json.loads((other / "summary.json").read_text())["notebooks"]["08_two"][
+        "key_figures"
+    ] == {"gamma": 0.1}
     after = contents(tmp_path / "out")
     assert {name: after[name] for name in before} == before
     run("--only", "08", "-p", "gamma=0.05")
-    assert len(list((tmp_path / "out").glob("mine-*"))) == 1, "a default is no other parameter"
+    assert len(list((tmp_path / "out").glob("mine-*"))) == 1, (
+        "a default is no other parameter"
+    )
 
 
 def test_summary_keeps_the_other_notebooks_of_the_same_data(workbook, tmp_path):
@@ -67,21 +76,36 @@ def test_summary_keeps_the_other_notebooks_of_the_same_data(workbook, tmp_path):
     second = json.loads((folder / "summary.json").read_text())["notebooks"]
     assert list(second) == ["01_one", "08_two"]
     assert second["01_one"] == first["01_one"]
-    (tmp_path / "mine.csv").write_text((tmp_path / "mine.csv").read_text() + "9,9,9,9\n")
+    (tmp_path / "mine.csv").write_text(
+        (tmp_path / "mine.csv").read_text() + "9,9,9,9\n"
+    )
     run("--only", "08")
-    assert list(json.loads((folder / "summary.json").read_text())["notebooks"]) == ["08_two"], "other data"
+    assert list(json.loads((folder / "summary.json").read_text())["notebooks"]) == [
+        "08_two"
+    ], "other data"
 
 
 def test_summary_has_not_passed_before_the_run_ends(workbook, tmp_path, monkeypatch):
     run()
-    monkeypatch.setattr(runner, "wait", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
-    assert main(["run", "--data", "mine.csv", "--out", "out", "--only", "08", "--force"]) == 130
+    monkeypatch.setattr(
+        runner, "wait", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
+    assert (
+        main(["run", "--data", "mine.csv", "--out", "out", "--only", "08", "--force"])
+        == 130
+    )
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
-    assert (left["passed"], left["unfinished"], list(left["notebooks"])) == (False, ["08_two"], ["01_one"])
+    assert (left["passed"], left["unfinished"], list(left["notebooks"])) == (
+        False,
+        ["08_two"],
+        ["01_one"],
+    )
 
 
 @pytest.mark.parametrize("gamma", [0.05, 0.8])
-def test_notebook_executed_by_hand_changes_no_run(workbook, tmp_path, monkeypatch, gamma):
+def test_notebook_executed_by_hand_changes_no_run(
+    workbook, tmp_path, monkeypatch, gamma
+):
     run()
     before = contents(tmp_path / "out")
     script = workbook / "08_two.py"
@@ -99,12 +123,16 @@ def test_notebook_executed_by_hand_changes_no_run(workbook, tmp_path, monkeypatc
     assert json.loads(left.read_text())["key_figures"] == {"gamma": gamma}
 
 
-def test_relative_results_folder_is_beside_the_notebooks(workbook, tmp_path, monkeypatch):
+def test_relative_results_folder_is_beside_the_notebooks(
+    workbook, tmp_path, monkeypatch
+):
     monkeypatch.chdir("/")
     assert folders.results_root(folders.RESULTS) == tmp_path / "results"
 
 
-def test_a_folder_is_locked_until_the_process_that_writes_there_ends(workbook, tmp_path, capsys):
+def test_a_folder_is_locked_until_the_process_that_writes_there_ends(
+    workbook, tmp_path, capsys
+):
     run()
     program = f"""
 from szlib.files import folder_lock
@@ -112,7 +140,9 @@ with folder_lock({str(tmp_path / "out" / "mine")!r}):
     print("locked", flush=True)
     input()
 """
-    with subprocess.Popen([sys.executable, "-c", program], stdin=-1, stdout=-1, env=ENVIRONMENT) as holder:
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=-1, stdout=-1, env=ENVIRONMENT
+    ) as holder:
         if holder.stdout is None or holder.stdout.readline() != b"locked\n":
             pytest.fail("the folder is not locked")
         before = contents(tmp_path / "out")
@@ -128,7 +158,9 @@ with folder_lock({str(tmp_path / "out" / "mine")!r}):
 def test_clean_removes_what_a_run_wrote_and_nothing_else(workbook, tmp_path):
     script = runpy.run_path(str(Path(__file__).parents[2] / ".ci" / "clean.py"))
     (workbook / "01_one.py").write_text(
-        (workbook / "01_one.py").read_text().replace('record.check("ok", True)', PRODUCES)
+        (workbook / "01_one.py")
+        .read_text()
+        .replace('record.check("ok", True)', PRODUCES)
     )
     run()
     run("-p", "gamma=0.1")
@@ -136,21 +168,41 @@ def test_clean_removes_what_a_run_wrote_and_nothing_else(workbook, tmp_path):
     for name in ("encounters.parquet", "zone.json", "area.txt", "plaza-0.csv"):
         store_cached(results / "mine" / name, b"", {})
     szlib.extract_days(tmp_path / "mine.csv", out=results / "days", progress=False)
-    site = claim_folder(results / "site" / "notebooks", "results of the committed notebooks").parent
-    for name in ("index.html", "szlib.Step.html", "notebooks/report.html", "notebooks/01_one.ipynb"):
+    site = claim_folder(
+        results / "site" / "notebooks", "results of the committed notebooks"
+    ).parent
+    for name in (
+        "index.html",
+        "szlib.Step.html",
+        "notebooks/report.html",
+        "notebooks/01_one.ipynb",
+    ):
         (site / name).write_text("of make docs")
     slides = claim_folder(results / "slides", "slides of the notebooks")
     (slides / "figures").mkdir()
     for name in ("01_one.html", "figures/01_one-map.png"):
         (slides / name).write_text("of make slides")
-    own = [results / "thesis.txt", results / "mine" / "notes.csv", results / "mine" / "figures" / "mine.png"]
+    own = [
+        results / "thesis.txt",
+        results / "mine" / "notes.csv",
+        results / "mine" / "figures" / "mine.png",
+    ]
     for file in own:
         file.write_text("mine")
     days = [file for file in (results / "days").iterdir() if file.name != ".szlib-lock"]
     script["clean"](results)
-    left = {file for file in results.rglob("*") if file.is_file() and not file.name.startswith(".szlib")}
-    assert left == {*own, *(file for file in days if not file.name.startswith(".szlib"))}
-    assert not list(results.glob("mine-*")) and not site.exists() and not slides.exists()
+    left = {
+        file
+        for file in results.rglob("*")
+        if file.is_file() and not file.name.startswith(".szlib")
+    }
+    assert left == {
+        *own,
+        *(file for file in days if not file.name.startswith(".szlib")),
+    }
+    assert (
+        not list(results.glob("mine-*")) and not site.exists() and not slides.exists()
+    )
     for file in own:
         file.unlink()
     for file in (results / "days").iterdir():

@@ -18,7 +18,11 @@ from szlib import files
 from szlib.workbook import cli, report, runner
 from szlib.workbook.cli import main
 
-STALE = {"argv": ["/nowhere/python", "{connection_file}"], "display_name": "stale", "language": "python"}
+STALE = {
+    "argv": ["/nowhere/python", "{connection_file}"],
+    "display_name": "stale",
+    "language": "python",
+}
 DRAW = """
 import matplotlib.pyplot as plt
 fig, ax = plt.subplots()
@@ -34,7 +38,12 @@ from studies import evil"""
 
 
 def images(notebook):
-    return [o for cell in notebook.cells for o in cell.get("outputs", ()) if "image/png" in o.get("data", {})]
+    return [
+        o
+        for cell in notebook.cells
+        for o in cell.get("outputs", ())
+        if "image/png" in o.get("data", {})
+    ]
 
 
 @pytest.fixture
@@ -52,7 +61,9 @@ def foreign(tmp_path, monkeypatch):
 def test_figures_and_kernel_are_the_runs_own(notebooks, tmp_path):
     notebooks(_01_draw=DRAW)
     assert runner.run("mine.csv", out=tmp_path / "out")["passed"]
-    assert len(images(nbformat.read(tmp_path / "out" / "mine" / "01_draw.ipynb", 4))) == 2
+    assert (
+        len(images(nbformat.read(tmp_path / "out" / "mine" / "01_draw.ipynb", 4))) == 2
+    )
 
 
 @pytest.mark.usefixtures("foreign")
@@ -69,26 +80,44 @@ def test_kernel_imports_nothing_from_its_folder_and_leaves_no_temporary_file(
     assert summary["passed"], summary
     found = {name: each["key_figures"] for name, each in summary["notebooks"].items()}
     assert not {"", ".", str(folder), str(tmp_path)} & {*found["01_look"]["path"]}
-    assert found["06_import"]["path"][-1] == str(folder), "the notebook imports a package beside it"
+    assert found["06_import"]["path"][-1] == str(folder), (
+        "the notebook imports a package beside it"
+    )
     assert found["01_look"]["python"] == sys.executable
-    assert found["01_look"]["ipython"] == str(Path(found["01_look"]["temporary"]).parent)
+    assert found["01_look"]["ipython"] == str(
+        Path(found["01_look"]["temporary"]).parent
+    )
     assert not Path(found["01_look"]["temporary"]).exists()
     assert os.environ["MPLBACKEND"] == "Agg" and "PYTHONSAFEPATH" not in os.environ
     assert not list((tmp_path / "temporary").glob("*.json"))
 
 
-@pytest.mark.parametrize(("limits", "raised"), [((64, -1), (112, -1)), ((256, 4096), None)])
+@pytest.mark.parametrize(
+    ("limits", "raised"), [((64, -1), (112, -1)), ((256, 4096), None)]
+)
 def test_too_low_a_limit_of_open_files_is_raised_where_the_system_allows_it(
     notebooks, tmp_path, monkeypatch, limits, raised
 ):
     resource = pytest.importorskip("resource")
     given = []
     monkeypatch.setattr(
-        resource, "getrlimit", lambda what: limits if what == resource.RLIMIT_NOFILE else (-1, -1)
+        resource,
+        "getrlimit",
+        lambda what: limits if what == resource.RLIMIT_NOFILE else (-1, -1),
     )
     monkeypatch.setattr(resource, "setrlimit", lambda _, pair: given.append(pair))
-    done = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
-    monkeypatch.setattr(runner, "_execute_all", lambda scripts, *_: [(script, done) for script in scripts])
+    done = {
+        "status": "done",
+        "seconds": 0.0,
+        "checks": [],
+        "key_figures": {},
+        "figures": [],
+    }
+    monkeypatch.setattr(
+        runner,
+        "_execute_all",
+        lambda scripts, *_: [(script, done) for script in scripts],
+    )
     notebooks(_01_one="")
     runner.run("mine.csv", out=tmp_path / "out")
     assert given == ([raised] if raised else [])
@@ -100,7 +129,8 @@ def test_limit_of_open_files_is_named(notebooks, monkeypatch, capsys):
     notebooks(_01_one="")
     assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
     assert (
-        "may open 64 files on this machine, and a run needs 112; raise the limit" in capsys.readouterr().err
+        "may open 64 files on this machine, and a run needs 112; raise the limit"
+        in capsys.readouterr().err
     )
 
 
@@ -109,13 +139,18 @@ def test_limit_of_memory_is_named(notebooks, monkeypatch, capsys):
     monkeypatch.setattr(resource, "getrlimit", lambda _: (1_500_000_000, -1))
     notebooks(_01_one="")
     assert main(["run", "--data", "mine.csv", "--out", "out"]) == 2
-    assert "may use 1.5 GB of memory on this machine (ulimit -v), and a run needs 2.0 GB" in (
-        capsys.readouterr().err
+    assert (
+        "may use 1.5 GB of memory on this machine (ulimit -v), and a run needs 2.0 GB"
+        in (capsys.readouterr().err)
     )
 
 
 @pytest.mark.parametrize(
-    "error", [MemoryError(), ImportError("ft2font.so: failed to map segment from shared object")]
+    "error",
+    [
+        MemoryError(),
+        ImportError("ft2font.so: failed to map segment from shared object"),
+    ],
 )
 def test_memory_that_is_used_up_is_named(error, monkeypatch, capsys):
     def fail(_):
@@ -126,18 +161,25 @@ def test_memory_that_is_used_up_is_named(error, monkeypatch, capsys):
     assert "szlib: this process has no more memory" in capsys.readouterr().err
 
 
-def test_run_is_refused_at_once_where_kernels_cannot_be_reached(notebooks, tmp_path, monkeypatch, capsys):
+def test_run_is_refused_at_once_where_kernels_cannot_be_reached(
+    notebooks, tmp_path, monkeypatch, capsys
+):
     def fail(*_, **__):
         raise OSError(errno.ENETUNREACH, "Network is unreachable")
 
     monkeypatch.setattr(socket, "create_connection", fail)
     notebooks(_01_one="")
     assert main(["run", "--data", "mine.csv", "--out", "out"]) == 2
-    assert "127.0.0.1 cannot be reached (Network is unreachable)" in capsys.readouterr().err
+    assert (
+        "127.0.0.1 cannot be reached (Network is unreachable)"
+        in capsys.readouterr().err
+    )
     assert not (tmp_path / "out").exists()
 
 
-def test_umask_that_forbids_everything_is_named(notebooks, tmp_path, monkeypatch, capsys):
+def test_umask_that_forbids_everything_is_named(
+    notebooks, tmp_path, monkeypatch, capsys
+):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     files.process_folder.cache_clear()
     notebooks(_01_one="")

@@ -20,7 +20,9 @@ record.animation(b"GIF89a", "movie")"""
 
 
 @pytest.fixture
-def executed(notebooks: Callable[..., Path], tmp_path: Path) -> Callable[..., list[str]]:
+def executed(
+    notebooks: Callable[..., Path], tmp_path: Path
+) -> Callable[..., list[str]]:
     """Run two notebooks and the summary of all; return which of them were executed."""
     log = tmp_path / "log"
     names = ("01_one", "03_two", "28_all")
@@ -28,7 +30,10 @@ def executed(notebooks: Callable[..., Path], tmp_path: Path) -> Callable[..., li
 
     def run(*arguments: str, code: int = 0) -> list[str]:
         log.write_text("")
-        assert main(["run", "--data", "mine.csv", "--out", "out", "-j", "1", *arguments]) == code
+        assert (
+            main(["run", "--data", "mine.csv", "--out", "out", "-j", "1", *arguments])
+            == code
+        )
         return log.read_text().split()
 
     assert run() == list(names)
@@ -36,18 +41,26 @@ def executed(notebooks: Callable[..., Path], tmp_path: Path) -> Callable[..., li
 
 
 def outputs(folder: Path) -> dict[str, bytes]:
-    return {str(file.relative_to(folder)): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+    return {
+        str(file.relative_to(folder)): file.read_bytes()
+        for file in folder.rglob("*")
+        if file.is_file()
+    }
 
 
 def test_an_identical_run_executes_nothing_and_changes_nothing(
-    executed: Callable[..., list[str]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    executed: Callable[..., list[str]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert executed("--force") == ["01_one", "03_two", "28_all"]
     before, printed = outputs(tmp_path / "out"), capsys.readouterr().out
     assert executed() == []
     assert outputs(tmp_path / "out") == before
     again = capsys.readouterr().out
-    assert "3 of 3 notebooks are kept from an earlier run; --force repeats them" in again
+    assert (
+        "3 of 3 notebooks are kept from an earlier run; --force repeats them" in again
+    )
     assert [line for line in printed.splitlines() if line[:2].isdigit()] == [
         line for line in again.splitlines() if line[:2].isdigit()
     ]
@@ -66,9 +79,13 @@ def test_a_changed_notebook_runs_again_with_the_summary_of_all(
 @pytest.mark.parametrize(
     "change",
     [
-        lambda tmp_path, _: (tmp_path / "mine.csv").write_text("t,id,x,y\n0,1,0,0\n1,1,1,0.5\n"),
+        lambda tmp_path, _: (tmp_path / "mine.csv").write_text(
+            "t,id,x,y\n0,1,0,0\n1,1,1,0.5\n"
+        ),
         lambda _, patch: patch.setattr(runner, "__version__", "9.9"),
-        lambda _, patch: patch.setattr(runner, "package_checksum", lambda _: "other code"),
+        lambda _, patch: patch.setattr(
+            runner, "package_checksum", lambda _: "other code"
+        ),
     ],
     ids=["data", "version", "code"],
 )
@@ -81,7 +98,9 @@ def test_other_data_version_or_code_runs_everything_again(
     assert executed() == []
 
 
-@pytest.mark.parametrize("name", ["01_one.ipynb", "records/01_one.json", "figures/01_one-movie.gif"])
+@pytest.mark.parametrize(
+    "name", ["01_one.ipynb", "records/01_one.json", "figures/01_one-movie.gif"]
+)
 @pytest.mark.parametrize("damage", ["missing", "changed"])
 def test_a_damaged_result_is_made_again(
     executed: Callable[..., list[str]], tmp_path: Path, name: str, damage: str
@@ -90,8 +109,13 @@ def test_a_damaged_result_is_made_again(
     whole = file.read_bytes()
     file.unlink() if damage == "missing" else file.write_bytes(whole[:-1])
     assert executed() == ["01_one", "28_all"]
-    assert file.suffix == ".ipynb" or file.read_bytes() == whole  # ids of cells are random
-    assert json.loads(file.read_bytes())["cells"] if file.suffix == ".ipynb" else file.exists()
+    # ids of cells are random
+    assert file.suffix == ".ipynb" or file.read_bytes() == whole
+    assert (
+        json.loads(file.read_bytes())["cells"]
+        if file.suffix == ".ipynb"
+        else file.exists()
+    )
 
 
 def test_a_notebook_that_is_gone_leaves_the_summary(
@@ -137,21 +161,31 @@ def test_a_stopped_run_keeps_what_it_had_finished_and_nothing_else(
     assert executed() == ["03_two", "28_all"]
 
 
-def test_figures_of_another_format_are_added_once(executed: Callable[..., list[str]], tmp_path: Path) -> None:
-    script, home = tmp_path / "notebooks" / "01_one.py", tmp_path / "out" / "mine" / "figures"
-    draw = (
-        "import matplotlib.figure as m\nf = m.Figure()\nf.subplots().plot([1, 2])\nrecord.figure(f, 'line')"
+def test_figures_of_another_format_are_added_once(
+    executed: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    script, home = (
+        tmp_path / "notebooks" / "01_one.py",
+        tmp_path / "out" / "mine" / "figures",
     )
-    script.write_text(script.read_text().replace("record.close()", f"{draw}\nrecord.close()"))
+    draw = "import matplotlib.figure as m\nf = m.Figure()\n"
+    draw += "f.subplots().plot([1, 2])\nrecord.figure(f, 'line')"
+    script.write_text(
+        script.read_text().replace("record.close()", f"{draw}\nrecord.close()")
+    )
     assert executed() == ["01_one", "28_all"]
     assert executed("--figures", "svg") == ["01_one", "28_all"]
-    assert (home / "01_one-line.svg").read_text().startswith("<?xml") and (home / "01_one-line.png").exists()
+    assert (home / "01_one-line.svg").read_text().startswith("<?xml") and (
+        home / "01_one-line.png"
+    ).exists()
     assert executed("--figures", "svg") == executed() == []
     assert executed("--figures", "pdf") == ["01_one", "28_all"]
     assert (home / "01_one-line.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_a_notebook_that_failed_is_repeated(executed: Callable[..., list[str]], tmp_path: Path) -> None:
+def test_a_notebook_that_failed_is_repeated(
+    executed: Callable[..., list[str]], tmp_path: Path
+) -> None:
     script = tmp_path / "notebooks" / "01_one.py"
     script.write_text(script.read_text().replace("record.close()", "1 / 0"))
     assert executed(code=1) == ["01_one", "28_all"]

@@ -48,45 +48,75 @@ def test_extract_never_writes_into_a_folder_of_tracks(tmp_path, monkeypatch, cap
     szlib.read_tracks(day).to_parquet(tmp_path / "tracks" / "day.parquet")
     before = (tmp_path / "tracks" / "day.parquet").read_bytes()
     refused(["extract", "tracks", "--out", "tracks"], capsys, "holds input data")
-    refused(["extract", "day.csv", "--out", "tracks"], capsys, "holds files that szlib did not write")
+    refused(
+        ["extract", "day.csv", "--out", "tracks"],
+        capsys,
+        "holds files that szlib did not write",
+    )
     assert (tmp_path / "tracks" / "day.parquet").read_bytes() == before
 
 
 def test_run_refuses_a_folder_with_other_files(notebooks, tmp_path, capsys):
     notebooks(_01_one="")
-    refused(["run", "--data", "mine.csv", "--out", "."], capsys, "holds files that szlib did not write")
+    refused(
+        ["run", "--data", "mine.csv", "--out", "."],
+        capsys,
+        "holds files that szlib did not write",
+    )
 
 
 @pytest.mark.usefixtures("without_kernels")
 def test_folder_name_of_links_globs_and_folders(notebooks, tmp_path):
-    notebooks(_01_one='record.table(__import__("pandas").DataFrame({"a": [1]}), "table")')
+    notebooks(
+        _01_one='record.table(__import__("pandas").DataFrame({"a": [1]}), "table")'
+    )
     (tmp_path / "dir").mkdir()
     (tmp_path / "dir" / "b.csv").write_bytes((tmp_path / "mine.csv").read_bytes())
     (tmp_path / "today.csv").symlink_to("mine.csv")
-    for data, name in (("dir/.", "dir"), ("di*/*.csv", "files"), ("today.csv", "today")):
+    for data, name in (
+        ("dir/.", "dir"),
+        ("di*/*.csv", "files"),
+        ("today.csv", "today"),
+    ):
         assert main(["run", "--data", data, "--out", "out", "--jobs", "1"]) == 0, data
         left = {path.name for path in (tmp_path / "out" / name).iterdir()}
         assert {"summary.json", "01_one.ipynb", "table.csv", "records"} <= left, data
-    assert {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()} == {"dir", "files", "today"}
+    assert {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()} == {
+        "dir",
+        "files",
+        "today",
+    }
 
 
 def test_data_sets_of_one_name_do_not_share_results(tmp_path):
     for name in ("a/day.csv", "b/day.csv", "synthetic.csv"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
-    homes = {folders.claim_results(tmp_path / "out", str(tmp_path / name / "day.csv")) for name in "ab"}
+    homes = {
+        folders.claim_results(tmp_path / "out", str(tmp_path / name / "day.csv"))
+        for name in "ab"
+    }
     assert len(homes) == 2
     again = folders.claim_results(tmp_path / "out", str(tmp_path / "a" / "day.csv"))
     assert again == tmp_path / "out" / "day" and again in homes
-    assert folders.claim_results(tmp_path / "out", str(tmp_path / "synthetic.csv")).name == "synthetic"
-    assert folders.claim_results(tmp_path / "out", "synthetic").name.startswith("synthetic-")
+    assert (
+        folders.claim_results(tmp_path / "out", str(tmp_path / "synthetic.csv")).name
+        == "synthetic"
+    )
+    assert folders.claim_results(tmp_path / "out", "synthetic").name.startswith(
+        "synthetic-"
+    )
     assert datasets.label("a/dir/.") == "dir"
 
 
-def test_cache_is_not_used_for_other_data_of_the_same_name_and_size(tmp_path, monkeypatch):
+def test_cache_is_not_used_for_other_data_of_the_same_name_and_size(
+    tmp_path, monkeypatch
+):
     file = tmp_path / "day.csv"
     make_plaza(file, settings=PlazaSettings(n_encounters=60))
-    samples = NotebookRecord("02", {"data": str(file), "results": tmp_path / "out"}).cache.encounters()
+    samples = NotebookRecord(
+        "02", {"data": str(file), "results": tmp_path / "out"}
+    ).cache.encounters()
     size, content = file.stat().st_size, file.read_text().splitlines(keepends=True)
     file.write_text("".join(content[len(content) // 2 :]))
     with file.open("a") as stream:  # a row that cannot be used, to make up the size
@@ -105,7 +135,9 @@ def test_foreign_file_with_the_name_of_the_plaza_is_replaced(tmp_path, monkeypat
     (tmp_path / "plaza-0.csv").write_text("1,2,3,4,5,6,7,8\n")
     small = PlazaSettings(n_encounters=3)
     monkeypatch.setattr(
-        data_cache, "make_plaza", lambda file, seed: make_plaza(file, seed=seed, settings=small)
+        data_cache,
+        "make_plaza",
+        lambda file, seed: make_plaza(file, seed=seed, settings=small),
     )
     cache = DataCache(tmp_path, "synthetic")
     (file,) = cache.files()
@@ -126,7 +158,10 @@ def test_extraction_refuses_samples_that_another_one_replaced(tmp_path):
 def test_failed_day_does_not_stop_the_others(tmp_path, monkeypatch):
     names = ("day.csv", os.fsdecode(b"latin\xe4.csv"), "unforeseen.csv")
     for k, name in enumerate(names, 1):
-        make_plaza(tmp_path / name, settings=PlazaSettings(n_encounters=5, date=f"2000-01-0{k}"))
+        make_plaza(
+            tmp_path / name,
+            settings=PlazaSettings(n_encounters=5, date=f"2000-01-0{k}"),
+        )
     (tmp_path / "rubbish.csv").write_text("rubbish\n")
     find = days.find_encounters_in_files
 
@@ -136,7 +171,9 @@ def test_failed_day_does_not_stop_the_others(tmp_path, monkeypatch):
         return find(files, *arguments)
 
     monkeypatch.setattr(days, "find_encounters_in_files", find_or_fail)
-    table = szlib.extract_days(tmp_path, out=tmp_path / "out", progress=False).table.set_index("day")
+    table = szlib.extract_days(
+        tmp_path, out=tmp_path / "out", progress=False
+    ).table.set_index("day")
     assert table["status"].to_dict() == {
         "2000-01-01": "done", "2000-01-02": "failed", "2000-01-03": "failed", "rubbish": "failed",
     }  # fmt: skip
@@ -146,7 +183,9 @@ def test_failed_day_does_not_stop_the_others(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_interrupted_run_leaves_no_summary_that_passed(notebooks, tmp_path, monkeypatch):
+def test_interrupted_run_leaves_no_summary_that_passed(
+    notebooks, tmp_path, monkeypatch
+):
     notebooks(_01_one='record.check("ok", True)')
     arguments = ["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]
     assert main(arguments) == 0
@@ -160,17 +199,24 @@ def test_interrupted_run_leaves_no_summary_that_passed(notebooks, tmp_path, monk
 def test_entry_that_blocks_results_is_named(notebooks, tmp_path, capsys, garbage):
     notebooks(_01_one="")
     home = folders.claim_results(tmp_path / "out", str(tmp_path / "mine.csv"))
-    (home / garbage).write_text("") if garbage == "records" else (home / garbage).mkdir()
+    (home / garbage).write_text("") if garbage == "records" else (
+        home / garbage
+    ).mkdir()
     refused(["run", "--data", "mine.csv", "--out", "out"], capsys, garbage)
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_notebook_without_disk_space_is_refused_with_exit_code_2(notebooks, tmp_path, capsys):
+def test_notebook_without_disk_space_is_refused_with_exit_code_2(
+    notebooks, tmp_path, capsys
+):
     full = 'from szlib.errors import StorageError\nraise StorageError("no room")'
     notebooks(_00_fine='record.check("ok", True)', _01_full=full, _06_later="")
     assert main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1"]) == 2
     printed = capsys.readouterr()
-    assert "01_full: could not be run: StorageError: no room; finished results stay" in printed.err
+    assert (
+        "01_full: could not be run: StorageError: no room; finished results stay"
+        in printed.err
+    )
     left = json.loads((tmp_path / "out" / "mine" / "summary.json").read_text())
     assert {n: r["status"] for n, r in left["notebooks"].items()} == {
         "00_fine": "done", "01_full": "refused", "06_later": "not started",
@@ -196,7 +242,10 @@ def test_notebook_without_disk_space_is_refused_with_exit_code_2(notebooks, tmp_
         ({"n_jobs": 0}, "n_jobs"),
         ({"results": "x"}, "use the option --out"),
         ({"reading": "mm"}, "reading: expected options of szlib.ReadOptions"),
-        ({"reading": {"units": "mm"}}, "reading: expected options of szlib.ReadOptions"),
+        (
+            {"reading": {"units": "mm"}},
+            "reading: expected options of szlib.ReadOptions",
+        ),
         ({"reading": {"unit": "inch"}}, "unit must be one of"),
     ],
 )
@@ -209,23 +258,36 @@ def test_defaults_of_the_notebooks_are_in_range():
     from szlib.workbook.record.parameters import read_defaults
 
     for source in folders.list_notebooks():
-        given = {n: v for n, v in read_defaults(source).items() if n not in ("data", "results")}
+        given = {
+            n: v
+            for n, v in read_defaults(source).items()
+            if n not in ("data", "results")
+        }
         check_parameters(given, [source])
 
 
-def test_kernel_gets_parameters_as_text_and_reports_errors(notebooks, tmp_path, monkeypatch):
+def test_kernel_gets_parameters_as_text_and_reports_errors(
+    notebooks, tmp_path, monkeypatch
+):
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     notebooks(_01_one='record.key["word"] = word', _02_crash="1 / 0")
     source = tmp_path / "notebooks" / "01_one.py"
-    source.write_text(source.read_text().replace("seed = 0\n", 'seed = 0\nword = ""\n', 1))
+    source.write_text(
+        source.read_text().replace("seed = 0\n", 'seed = 0\nword = ""\n', 1)
+    )
     code = "\"; __import__('pathlib').Path('executed').touch(); '\"\"\""
     summary = runner.run("mine.csv", out="out", parameters={"word": code})
     assert summary["notebooks"]["01_one"]["key_figures"]["word"] == code
     assert not list(tmp_path.rglob("executed"))
-    assert not list(tmp_path.glob("temporary/*.json")), "connection files of the kernels"
+    assert not list(tmp_path.glob("temporary/*.json")), (
+        "connection files of the kernels"
+    )
     assert summary["notebooks"]["02_crash"]["status"] == "error"
-    assert summary["notebooks"]["02_crash"]["error"] == "ZeroDivisionError: division by zero"
+    assert (
+        summary["notebooks"]["02_crash"]["error"]
+        == "ZeroDivisionError: division by zero"
+    )
     assert "1 / 0" in Path(summary["report"]).with_name("02_crash.ipynb").read_text()
 
 
@@ -303,10 +365,20 @@ time.sleep(120)"""
     assert not list(tmp_path.rglob("*.ipynb")), "an unfinished copy"
 
 
-def test_run_recovers_from_a_full_disk_at_any_write(notebooks, tmp_path, monkeypatch, capsys):
+def test_run_recovers_from_a_full_disk_at_any_write(
+    notebooks, tmp_path, monkeypatch, capsys
+):
     notebooks(_01_one="", _06_two="")
-    done = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
-    monkeypatch.setattr(runner, "execute_notebook", lambda script, *_: (Path(script).stem, done))
+    done = {
+        "status": "done",
+        "seconds": 0.0,
+        "checks": [],
+        "key_figures": {},
+        "figures": [],
+    }
+    monkeypatch.setattr(
+        runner, "execute_notebook", lambda script, *_: (Path(script).stem, done)
+    )
     command = ["run", "--data", "mine.csv", "--out", "out"]
     for failing in itertools.count():
         shutil.rmtree(tmp_path / "out", ignore_errors=True)
@@ -316,7 +388,10 @@ def test_run_recovers_from_a_full_disk_at_any_write(notebooks, tmp_path, monkeyp
             break
         *_, line = capsys.readouterr().err.splitlines()  # after the progress bar
         assert "No space left on device" in line
-        assert not any(json.loads(file.read_text())["passed"] for file in tmp_path.rglob("summary.json"))
+        assert not any(
+            json.loads(file.read_text())["passed"]
+            for file in tmp_path.rglob("summary.json")
+        )
         assert main(command) == 0
         assert main([*command, "--only", "06"]) == 0
         capsys.readouterr()
@@ -326,7 +401,10 @@ def test_run_recovers_from_a_full_disk_at_any_write(notebooks, tmp_path, monkeyp
 @pytest.mark.filterwarnings("default")
 def test_too_many_jobs_are_reduced_with_a_warning(tmp_path, capsys):
     day = make_plaza(tmp_path / "day.csv", settings=PlazaSettings(n_encounters=3))
-    assert main(["extract", str(day), "--out", str(tmp_path / "out"), "--jobs", "100000"]) == 0
+    assert (
+        main(["extract", str(day), "--out", str(tmp_path / "out"), "--jobs", "100000"])
+        == 0
+    )
     assert "n_jobs=100000 is reduced to 1" in capsys.readouterr().err
 
 
@@ -334,7 +412,9 @@ def test_memory_option_refuses_larger_data(tmp_path, capsys):
     file = tmp_path / "day.csv"
     file.write_text("t,id,x,y\n" + "0,1,0,0\n" * 20_000)
     refused(
-        ["inspect", str(file), "--memory", "1MB"], capsys, "to read 20,001 rows takes about 3 MB of memory"
+        ["inspect", str(file), "--memory", "1MB"],
+        capsys,
+        "to read 20,001 rows takes about 3 MB of memory",
     )
 
 

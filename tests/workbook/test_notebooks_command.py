@@ -25,24 +25,48 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
     """The wheel that a build front end makes of this tree."""
     out = tmp_path_factory.mktemp("wheel")
     code = f"import dist; print(dist.build_wheel({str(out)!r}))"
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, env={"PYTHONPATH": str(ROOT / ".ci")}, check=True)
+    subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env={"PYTHONPATH": str(ROOT / ".ci")},
+        check=True,
+    )
     (file,) = out.glob("*.whl")
     return zipfile.ZipFile(file)
 
 
 def test_the_wheel_holds_the_workbook_and_stays_small(wheel: zipfile.ZipFile) -> None:
-    inside = {name.removeprefix("szlib/workbook/notebooks/") for name in wheel.namelist()}
+    inside = {
+        name.removeprefix("szlib/workbook/notebooks/") for name in wheel.namelist()
+    }
     notebooks = ROOT / "notebooks"
-    rooms = ("laboratory", "studies", "exercises", "exercises/judges", "solutions", "examples")
+    rooms = (
+        "laboratory",
+        "studies",
+        "exercises",
+        "exercises/judges",
+        "solutions",
+        "examples",
+    )
     texts = ("laboratory/*.js", "exercises/judges/*.toml", "tables/*.csv")
     parts = ("[0-9]*.py", *texts, *(f"{room}/*.py" for room in rooms))
-    expected = {file.relative_to(notebooks).as_posix() for part in parts for file in notebooks.glob(part)}
+    expected = {
+        file.relative_to(notebooks).as_posix()
+        for part in parts
+        for file in notebooks.glob(part)
+    }
     assert len(expected) > 70 and expected <= inside
     assert {name for name in inside if name.startswith("figures/")} == {
         "figures/mall.png", "figures/making_room.gif",
     }  # fmt: skip
-    assert not [name for name in inside if name.endswith(".ipynb") or "__pycache__" in name]
-    size = sum(each.compress_size for each in wheel.infolist() if "/notebooks/" in each.filename)
+    assert not [
+        name for name in inside if name.endswith(".ipynb") or "__pycache__" in name
+    ]
+    size = sum(
+        each.compress_size
+        for each in wheel.infolist()
+        if "/notebooks/" in each.filename
+    )
     assert size < 600_000, f"{size} bytes"
 
 
@@ -60,7 +84,9 @@ def installed(
     def write(**codes: str) -> Path:
         folder = notebooks(**codes)
         (folder / "exercises").mkdir(exist_ok=True)
-        (folder / "exercises" / "sheet1_tracks.py").write_text("# %% [markdown]\n# # Sheet\n")
+        (folder / "exercises" / "sheet1_tracks.py").write_text(
+            "# %% [markdown]\n# # Sheet\n"
+        )
         monkeypatch.setattr(folders, "BUNDLED", folder)
         (tmp_path / "home").mkdir(exist_ok=True)
         monkeypatch.chdir(tmp_path / "home")
@@ -80,13 +106,21 @@ def test_an_installed_package_copies_its_notebooks_and_runs_the_copy(
     copy = Path("course") / "notebooks"
     assert (copy / "01_one.py").read_text() == (source / "01_one.py").read_text()
     assert len(nbformat.read(copy / "01_one.ipynb", 4).cells) == 4
-    assert nbformat.read(copy / "exercises" / "sheet1_tracks.ipynb", 4).cells[0].source == "# Sheet"
+    assert (
+        nbformat.read(copy / "exercises" / "sheet1_tracks.ipynb", 4).cells[0].source
+        == "# Sheet"
+    )
     mine = (copy / "01_one.py").read_text().replace('"ok"', '"mine"')
     (copy / "01_one.py").write_text(mine)
     assert main(["run", "--data", "mine.csv", "--notebooks", "course", "-j", "1"]) == 0
-    names = json.loads(Path("results/mine/summary.json").read_text())["notebooks"]["01_one"]["checks"]
+    names = json.loads(Path("results/mine/summary.json").read_text())["notebooks"][
+        "01_one"
+    ]["checks"]
     assert [check["name"] for check in names] == ["mine"]
-    assert not (tmp_path / "results").exists() and not (Path("course") / "results").exists()
+    assert (
+        not (tmp_path / "results").exists()
+        and not (Path("course") / "results").exists()
+    )
 
 
 @pytest.mark.usefixtures("without_kernels")
@@ -95,7 +129,9 @@ def test_run_takes_the_notebooks_of_the_current_folder_else_those_of_the_package
 ) -> None:
     installed(_01_one="")
     assert main(["run", "--data", "mine.csv", "-j", "1"]) == 0
-    assert list(json.loads(Path("results/mine/summary.json").read_text())["notebooks"]) == ["01_one"]
+    assert list(
+        json.loads(Path("results/mine/summary.json").read_text())["notebooks"]
+    ) == ["01_one"]
     assert main(["notebooks", "."]) == 0
     mine = Path("notebooks", "01_one.py").read_text().replace("01_one", "02_two")
     Path("notebooks", "02_two.py").write_text(mine)
@@ -110,7 +146,11 @@ def test_a_copy_never_replaces_a_file(
     Path("course/notebooks").mkdir(parents=True)
     Path("course/notebooks/my work.txt").write_text("mine")
     Path("taken").write_text("a file")
-    for place, message in [("course", "holds files"), ("taken", "cannot be made"), ("taken/in", "cannot")]:
+    for place, message in [
+        ("course", "holds files"),
+        ("taken", "cannot be made"),
+        ("taken/in", "cannot"),
+    ]:
         assert main(["notebooks", place]) == 2
         assert message in capsys.readouterr().err
     assert [file.name for file in Path("course/notebooks").iterdir()] == ["my work.txt"]
@@ -120,7 +160,9 @@ def test_a_folder_without_notebooks_and_a_misspelt_verb_are_refused(
     installed: Callable[..., Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     installed(_01_one="")
-    with pytest.raises(DataError, match="nowhere: there are no notebooks; expected a folder"):
+    with pytest.raises(
+        DataError, match="nowhere: there are no notebooks; expected a folder"
+    ):
         folders.find_notebooks("nowhere")
     with pytest.raises(SystemExit) as stop:
         main(["notebook", "course"])

@@ -29,7 +29,9 @@ def find_notebook(number: str) -> Path:
 def read_copy(script: Path) -> tuple[bool, str]:
     """Whether the executed copy has the cells of the script, and what it printed."""
     copy = nbformat.read(script.with_suffix(".ipynb"), as_version=4)
-    same = [c.source for c in copy.cells] == [c.source for c in jupytext.read(script).cells]
+    same = [c.source for c in copy.cells] == [
+        c.source for c in jupytext.read(script).cells
+    ]
     outputs = [out for cell in copy.cells for out in cell.get("outputs", ())]
     return same, "\n".join(out.text for out in outputs if out.output_type == "stream")
 
@@ -67,7 +69,9 @@ def test_cell_of_every_sentence_is_in_its_notebook():
 
 def test_verdict_of_every_claim_comes_from_the_run():
     typed = [
-        row["sentence"] for row in SENTENCES if row["kind"] == "claim" and not {*row["held_by"]} & CHECKS
+        row["sentence"]
+        for row in SENTENCES
+        if row["kind"] == "claim" and not {*row["held_by"]} & CHECKS
     ]
     assert typed == []
 
@@ -87,7 +91,9 @@ def test_every_named_check_is_made():
     for name in CHECKS:
         number, _, check = name.partition(": ")
         is_current, printed = read_copy(find_notebook(number))
-        if is_current and not any(f"\n{kind}: {check}: " in f"\n{printed}" for kind in ("check", "claim")):
+        if is_current and not any(
+            f"\n{kind}: {check}: " in f"\n{printed}" for kind in ("check", "claim")
+        ):
             missing.append(name)
     assert missing == []
 
@@ -98,7 +104,11 @@ RUN = {
     "07: arrives": {"passed": True, "result": "holds", "value": None},
     "07: is right": {"passed": True, "result": "supported", "value": 0.5},
     "07: is left": {"passed": False, "result": "not supported here", "value": 0.5},
-    "07: is neither": {"passed": False, "result": "not decidable here", "value": "n = 3"},
+    "07: is neither": {
+        "passed": False,
+        "result": "not decidable here",
+        "value": "n = 3",
+    },
     "07: breaks": {"passed": False, "result": "FAILED", "value": 1},
 }
 
@@ -114,7 +124,11 @@ RUN = {
         ("claim", ["07: is right", "tests/test_a.py::test_a"], "supported"),
         ("implemented", ["07: arrives"], "implemented"),
         ("implemented", ["tests/test_a.py::test_a"], "implemented"),
-        ("implemented", ["07: arrives", "07: breaks"], "implemented, but a check fails"),
+        (
+            "implemented",
+            ["07: arrives", "07: breaks"],
+            "implemented, but a check fails",
+        ),
         ("altered", ["08: arrives"], paper_sentences.NOT_RUN),
         ("altered", ["07: breaks"], "altered, but a check fails"),
         ("untestable", ["07: breaks"], "untestable here"),
@@ -128,14 +142,31 @@ def test_verdict_follows_from_the_checks(kind, names, verdict):
 def test_checks_come_from_the_records_of_the_run(tmp_path, monkeypatch):
     file = tmp_path / "mine.csv"
     file.write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n")
-    record = NotebookRecord("16_test", {"data": str(file), "results": tmp_path / "results"})
-    made = {"name": "arrives", "kind": "check", "passed": True, "value": 0.25, "result": "holds"}
+    record = NotebookRecord(
+        "16_test", {"data": str(file), "results": tmp_path / "results"}
+    )
+    made = {
+        "name": "arrives",
+        "kind": "check",
+        "passed": True,
+        "value": 0.25,
+        "result": "holds",
+    }
     (record.out / "records" / "07_test.json").write_text(json.dumps({"checks": [made]}))
     record.claim("is right", None, "n = 3")
-    names = [["07: arrives"], ["16: is right", "07: arrives"], ["07: stops"], ["08: arrives"]]
+    names = [
+        ["07: arrives"],
+        ["16: is right", "07: arrives"],
+        ["07: stops"],
+        ["08: arrives"],
+    ]
     rows = paper_sentences.load_sentences().head(4).assign(kind="claim", held_by=names)
     monkeypatch.setattr(paper_sentences, "load_sentences", rows.copy)
     table = paper_sentences.judge_sentences(record)
-    assert table["verdict"].tolist() == ["supported", "not decidable", *2 * [paper_sentences.NOT_RUN]]
+    assert table["verdict"].tolist() == [
+        "supported",
+        "not decidable",
+        *2 * [paper_sentences.NOT_RUN],
+    ]
     assert table["numbers"].iloc[0] == "07: arrives: holds (0.25)"
     assert table["unknown"].tolist() == [[], [], ["07: stops"], []]

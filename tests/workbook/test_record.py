@@ -42,11 +42,18 @@ def test_checks_and_claims_are_recorded(record, capsys):
     assert [c["passed"] for c in left["checks"]] == [True, False, False, False]
     assert [c["value"] for c in left["checks"]] == [0.5, [1, 2], {"n": 3}, None]
     assert left["key_figures"] == {"count": 7}
-    assert list(table.data["result"]) == ["holds", "FAILED", "not supported here", "not decidable here"]
+    assert list(table.data["result"]) == [
+        "holds",
+        "FAILED",
+        "not supported here",
+        "not decidable here",
+    ]
     assert "FAILED" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("unknown", [float("nan"), np.float32("nan"), np.array([np.nan]), pd.NaT])
+@pytest.mark.parametrize(
+    "unknown", [float("nan"), np.float32("nan"), np.array([np.nan]), pd.NaT]
+)
 def test_nan_passes_no_check_and_supports_no_claim(record, unknown):
     record.check("mean is small", unknown)
     record.claim("mean is small", unknown)
@@ -68,8 +75,13 @@ def test_check_with_changed_parameters_is_an_observation(record, capsys):
         ("observation", True, "holds with r_max = 1.5"),
         ("check", False, "FAILED"),
     ]
-    assert "with r_max = 1.5: checks that assume the defaults are observations" in capsys.readouterr().out
-    assert not NotebookRecord("01_test", given | {"r_max": 2.0, "n_jobs": 7, "area": "auto"}).changed
+    assert (
+        "with r_max = 1.5: checks that assume the defaults are observations"
+        in capsys.readouterr().out
+    )
+    assert not NotebookRecord(
+        "01_test", given | {"r_max": 2.0, "n_jobs": 7, "area": "auto"}
+    ).changed
 
 
 def test_method_parameters_change_encounters_and_zone(record, monkeypatch):
@@ -77,12 +89,21 @@ def test_method_parameters_change_encounters_and_zone(record, monkeypatch):
     found = pd.DataFrame({"encounter": [0], "distance": [1.0]})
     shape = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
     zone = szlib.SocialZone(shape, 1.5, {1.3: szlib.Ellipse((0, 0), (1, 1))})
-    monkeypatch.setattr(data_cache, "find_encounters", lambda *_, **k: searched.append(k) or found)
-    monkeypatch.setattr(data_cache.SocialZone, "fit", lambda _, **k: fitted.append(k) or zone)
-    given = {"data": record.cache.data, "results": record.out.parents[1], "area": record.cache.area}
+    monkeypatch.setattr(
+        data_cache, "find_encounters", lambda *_, **k: searched.append(k) or found
+    )
+    monkeypatch.setattr(
+        data_cache.SocialZone, "fit", lambda _, **k: fitted.append(k) or zone
+    )
+    given = {
+        "data": record.cache.data,
+        "results": record.out.parents[1],
+        "area": record.cache.area,
+    }
     NotebookRecord("02_test", given).cache.zone()
     turned = NotebookRecord(
-        "02_test", given | {"min_speed": 0.6, "space_length": 4.0, "r_max": 1.5, "q": 0.1}
+        "02_test",
+        given | {"min_speed": 0.6, "space_length": 4.0, "r_max": 1.5, "q": 0.1},
     )
     turned = replace(turned.cache, folder=record.out)
     turned.zone()
@@ -90,7 +111,10 @@ def test_method_parameters_change_encounters_and_zone(record, monkeypatch):
     assert [each["settings"].min_speed for each in searched] == [0.4, 0.6]
     assert searched[1]["settings"].space == szlib.AttentionalSpace(length=4.0)
     assert [(each["r_max"], each["q"]) for each in fitted] == [(2.0, 0.05), (1.5, 0.1)]
-    assert NotebookRecord("02_test", given | {"zone_speed": 1.3}).cache.method.zone_speed == 1.3
+    assert (
+        NotebookRecord("02_test", given | {"zone_speed": 1.3}).cache.method.zone_speed
+        == 1.3
+    )
 
 
 def test_encounters_are_cached_for_the_same_data_only(record, monkeypatch):
@@ -114,13 +138,17 @@ def test_encounters_are_cached_for_the_same_data_only(record, monkeypatch):
     NotebookRecord("02_test", other).cache.encounters()
     assert len(made) == 2
     record.cache.files()[0].write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n2,1,2,0\n")
-    with pytest.raises(szlib.DataError, match="has changed since it was first read; run again"):
+    with pytest.raises(
+        szlib.DataError, match="has changed since it was first read; run again"
+    ):
         record.cache.encounters()
     NotebookRecord("02_test", other).cache.encounters()
     assert len(made) == 3
 
 
-def test_rows_of_a_file_that_is_replaced_and_put_back_are_not_stored(record, monkeypatch):
+def test_rows_of_a_file_that_is_replaced_and_put_back_are_not_stored(
+    record, monkeypatch
+):
     file, read = record.cache.files()[0], data_cache.read_tracks
     content, before = file.read_bytes(), file.stat()
 
@@ -145,47 +173,67 @@ def test_notebook_of_a_run_uses_the_data_with_which_the_run_began(record, monkey
     given = {"data": record.cache.data}
     assert len(NotebookRecord("02_test", given).cache.tracks())
     record.cache.files()[0].write_text("t,id,x,y\n0,1,0,0\n1,1,1,0\n2,1,2,0\n")
-    with pytest.raises(szlib.DataError, match=r"mine\.csv: has changed since it was first read"):
+    with pytest.raises(
+        szlib.DataError, match=r"mine\.csv: has changed since it was first read"
+    ):
         NotebookRecord("02_test", given).cache.tracks()
 
 
 def test_zone_of_other_data_is_not_loaded_if_it_replaces_the_file(record, monkeypatch):
     shape = PolarZone([1.3], np.radians(np.arange(-180, 180, 5)), np.ones((1, 72)))
     zone = szlib.SocialZone(shape, 2.0, {1.3: szlib.Ellipse((0, 0), (1, 1))})
-    monkeypatch.setattr(DataCache, "encounters", lambda self: pd.DataFrame({"encounter": []}))
+    monkeypatch.setattr(
+        DataCache, "encounters", lambda self: pd.DataFrame({"encounter": []})
+    )
     monkeypatch.setattr(data_cache.SocialZone, "fit", lambda *_, **__: zone)
     stored, load = record.cache.zone(), szlib.SocialZone.load
     other = replace(stored, r_max=1.0, provenance={"source": "other data"})
-    monkeypatch.setattr(data_cache.SocialZone, "load", lambda file: (other.save(file), load(file))[1])
+    monkeypatch.setattr(
+        data_cache.SocialZone, "load", lambda file: (other.save(file), load(file))[1]
+    )
     assert record.cache.zone().r_max == 2.0
 
 
 @pytest.mark.parametrize(("n_encounters", "shifts"), [(4999, 39), (5000, 19)])
-def test_where_many_people_meet_the_null_model_has_fewer_shifts(record, monkeypatch, n_encounters, shifts):
+def test_where_many_people_meet_the_null_model_has_fewer_shifts(
+    record, monkeypatch, n_encounters, shifts
+):
     samples = pd.DataFrame({"encounter": np.arange(n_encounters)})
     monkeypatch.setattr(DataCache, "encounters", lambda self: samples)
-    monkeypatch.setattr(data_cache, "null_encounters", lambda tracks, **options: options["shifts"])
+    monkeypatch.setattr(
+        data_cache, "null_encounters", lambda tracks, **options: options["shifts"]
+    )
     assert record.cache.null_model() == shifts
     assert record.cache.null_model(few_shifts=4) == (39 if shifts == 39 else 4)
 
 
 def test_damaged_zone_is_fitted_again(record, monkeypatch, capsys):
     (record.out / "zone.json").write_text("{")
-    monkeypatch.setattr(DataCache, "encounters", lambda self: pd.DataFrame({"encounter": []}))
+    monkeypatch.setattr(
+        DataCache, "encounters", lambda self: pd.DataFrame({"encounter": []})
+    )
     monkeypatch.setattr(data_cache.SocialZone, "fit", lambda samples, **_: "zone")
     monkeypatch.setattr(DataCache, "store_zone", lambda self, zone: zone)
     assert record.cache.zone() == "zone"
     assert "zone is fitted again" in capsys.readouterr().out
 
 
-def test_zone_of_the_paper_is_fitted_once_at_the_speed_of_the_robot(record, monkeypatch):
-    path = szlib.make_plaza(record.out / "plaza.csv", settings=szlib.PlazaSettings(n_encounters=400))
+def test_zone_of_the_paper_is_fitted_once_at_the_speed_of_the_robot(
+    record, monkeypatch
+):
+    path = szlib.make_plaza(
+        record.out / "plaza.csv", settings=szlib.PlazaSettings(n_encounters=400)
+    )
     samples = szlib.find_encounters(szlib.read_tracks(path))
     monkeypatch.setattr(DataCache, "encounters", lambda self: samples)
     found = record.cache.paper_ellipse()
-    expected = szlib.SocialZone.fit(samples, method="paper", speeds=[1.1], n_resamples=0)
+    expected = szlib.SocialZone.fit(
+        samples, method="paper", speeds=[1.1], n_resamples=0
+    )
     assert found == expected.ellipses[1.1]
-    monkeypatch.setattr(data_cache.SocialZone, "fit", lambda *_, **__: pytest.fail("fitted again"))
+    monkeypatch.setattr(
+        data_cache.SocialZone, "fit", lambda *_, **__: pytest.fail("fitted again")
+    )
     assert record.cache.paper_ellipse() == found
     assert not (record.out / "zone.json").exists()
 
@@ -212,21 +260,40 @@ def test_committed_table_says_how_it_was_made_and_fails_if_a_row_is_not_reproduc
         monkeypatch.setattr(module, "TABLES", tmp_path)
     monkeypatch.setattr("sys.argv", ["somewhere/study.py", "3"])
     monkeypatch.setattr(committed, "_describe_commit", lambda: "1234567")
-    made = pd.DataFrame({"name": ["a", "b", "c"], "mean": [0.123456, np.nan, 1e6], "probe": [1, 2, np.nan]})
+    made = pd.DataFrame(
+        {
+            "name": ["a", "b", "c"],
+            "mean": [0.123456, np.nan, 1e6],
+            "probe": [1, 2, np.nan],
+        }
+    )
     committed.write_table(made, "99_made", seed=7)
     table = committed_tables.read_table("99_made")
-    assert table.attrs == {"command": "python -m studies.study 3", "seed": 7, "commit": "1234567"}
-    pd.testing.assert_frame_equal(table, made.astype({"probe": float}), check_exact=True)
+    assert table.attrs == {
+        "command": "python -m studies.study 3",
+        "seed": 7,
+        "commit": "1234567",
+    }
+    pd.testing.assert_frame_equal(
+        table, made.astype({"probe": float}), check_exact=True
+    )
     record.committed_table("99_made", lambda row: made.loc[row.name].to_dict())
-    record.committed_table("99_made", lambda row: {"mean": row["mean"] + 0.001}, where="name == 'a'")
-    record.committed_table("99_made", lambda row: {"name": "other"}, where="name == 'b'")
+    record.committed_table(
+        "99_made", lambda row: {"mean": row["mean"] + 0.001}, where="name == 'a'"
+    )
+    record.committed_table(
+        "99_made", lambda row: {"name": "other"}, where="name == 'b'"
+    )
     assert [c["passed"] for c in record.checks] == [True, False, False]
     assert record.checks[1]["value"] == {"mean": [0.123456, 0.124456]}
     assert record.checks[1]["name"] == "row 0 of tables/99_made.csv is reproduced"
     capsys.readouterr()
     whole = record.committed_table("99_made", lambda row: {}, where="name in []")
     assert len(whole) == 3 and len(record.checks) == 3
-    assert "not checked: tables/99_made.csv has no row that can be computed here" in capsys.readouterr().out
+    assert (
+        "not checked: tables/99_made.csv has no row that can be computed here"
+        in capsys.readouterr().out
+    )
 
 
 def test_every_committed_table_says_how_it_was_made():

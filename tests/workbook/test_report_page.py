@@ -27,7 +27,9 @@ ZONE = szlib.Ellipse((0.05, 0.0), (0.95, 0.75))
 @pytest.fixture(scope="module")
 def movie():
     scenario = szlib.SCENARIOS["corridor"]
-    log = szlib.simulate(scenario, szlib.MPCCBF(ZONE, walls=scenario.walls), max_time=1.0)
+    log = szlib.simulate(
+        scenario, szlib.MPCCBF(ZONE, walls=scenario.walls), max_time=1.0
+    )
     return log.animate(every=1.0, width=2.0)
 
 
@@ -38,7 +40,9 @@ def page(tmp_path_factory, movie):
     table = parameters([("gamma", 0.05, PAPER, "sec. 4")]).to_html()
     output = nbformat.v4.new_output
     cells = [
-        nbformat.v4.new_markdown_cell("# 10 - A corridor\n\n**Question.** Does it *barge* past?\n\nText."),
+        nbformat.v4.new_markdown_cell(
+            "# 10 - A corridor\n\n**Question.** Does it *barge* past?\n\nText."
+        ),
         nbformat.v4.new_markdown_cell(
             r"With $h \ge 0$:"
             "\n\n"
@@ -49,7 +53,9 @@ def page(tmp_path_factory, movie):
             "x < 1",
             outputs=[
                 output(
-                    "display_data", {"image/png": PIXEL}, metadata={"image/png": {"alt": 'h "over" time'}}
+                    "display_data",
+                    {"image/png": PIXEL},
+                    metadata={"image/png": {"alt": 'h "over" time'}},
                 ),
                 output("display_data", {"image/png": PIXEL}),
                 output("display_data", {"text/html": movie._repr_html_()}),
@@ -59,30 +65,64 @@ def page(tmp_path_factory, movie):
     ]
     nbformat.write(nbformat.v4.new_notebook(cells=cells), home / "10_corridor.ipynb")
     checks = [
-        {"kind": "check", "name": "h >= 0", "passed": False, "value": -0.25, "result": "FAILED"},
-        {"kind": "claim", "name": SLOWS, "passed": True, "value": 0.123456, "result": "supported"},
-        {"kind": "claim", "name": "gamma is tuned", "passed": True, "value": "yes", "result": "supported"},
+        {
+            "kind": "check",
+            "name": "h >= 0",
+            "passed": False,
+            "value": -0.25,
+            "result": "FAILED",
+        },
+        {
+            "kind": "claim",
+            "name": SLOWS,
+            "passed": True,
+            "value": 0.123456,
+            "result": "supported",
+        },
+        {
+            "kind": "claim",
+            "name": "gamma is tuned",
+            "passed": True,
+            "value": "yes",
+            "result": "supported",
+        },
     ]
-    record = {"status": "done", "seconds": 1.2, "checks": checks, "key_figures": {}, "figures": []}
+    record = {
+        "status": "done",
+        "seconds": 1.2,
+        "checks": checks,
+        "key_figures": {},
+        "figures": [],
+    }
     summary = {"data": "hall", "passed": False, "notebooks": {"10_corridor": record}}
-    (home / "parameters.json").write_text(json.dumps({"data": "hall", "files": [["hall.csv", 9, "x"]]}))
+    (home / "parameters.json").write_text(
+        json.dumps({"data": "hall", "files": [["hall.csv", 9, "x"]]})
+    )
     (home / "summary.json").write_text(json.dumps(summary))
     return BeautifulSoup(write_report(home).read_text(encoding="utf-8"), "html.parser")
 
 
 def test_report_needs_no_other_file_and_no_network(page):
-    asked = [tag.get(name) for tag in page.find_all(True) for name in ("src", "href") if tag.get(name)]
+    asked = [
+        tag.get(name)
+        for tag in page.find_all(True)
+        for name in ("src", "href")
+        if tag.get(name)
+    ]
     assert asked
     assert all(address.startswith(("data:", "#")) for address in asked)
     assert not re.search(
-        r"@import|url\((?!['\"]?data:)", " ".join(style.text for style in page.select("style"))
+        r"@import|url\((?!['\"]?data:)",
+        " ".join(style.text for style in page.select("style")),
     )
 
 
 def test_every_link_has_a_target(page):
     places = {tag["id"] for tag in page.select("[id]")} | {"top"}
     assert {link["href"][1:] for link in page.select("td a[href], p a[href]")} <= places
-    assert "next" in page.text and not [link for link in page.select("a") if link.text == "next"]
+    assert "next" in page.text and not [
+        link for link in page.select("a") if link.text == "next"
+    ]
 
 
 def test_every_picture_has_an_alt_text(page):
@@ -110,7 +150,11 @@ def test_front_page_lists_checks_claims_and_parameters(page):
 def test_claims_of_the_paper_stand_apart_from_those_of_the_workbook(page):
     paper, own = page.select_one("#claims"), page.select_one("#checks")
     claims = {row.td.text: row for row in paper.find_next("table").select("tbody tr")}
-    (slows,) = (row for text, row in claims.items() if text.startswith("CBF enables natural behaviors"))
+    (slows,) = (
+        row
+        for text, row in claims.items()
+        if text.startswith("CBF enables natural behaviors")
+    )
     assert [cell.text for cell in slows.select("td")][1:] == [
         "supported",
         "The robot slows down while passing: 0.123. (notebook 10)",
@@ -122,23 +166,56 @@ def test_claims_of_the_paper_stand_apart_from_those_of_the_workbook(page):
 
 def test_sections_stand_in_their_order_and_none_is_empty(page):
     sections = [heading["id"] for heading in page.select("h2[id]")]
-    assert sections == ["claims", "checks", "notebooks", "parameters", "run"]  # no zone, no funnel
+    # no zone, no funnel
+    assert sections == ["claims", "checks", "notebooks", "parameters", "run"]
     assert "Not part of this run" not in page.text
     assert page.h1.text == page.title.text == "Social zones of hall.csv"
     menus = [[link["href"] for link in menu.select("a")] for menu in page.select("nav")]
-    assert menus == [["#top", "#claims", "#checks", "#notebooks", "#10_corridor", "#parameters", "#run"]] * 2
-    order = [tag.get("id") or tag["class"][0] for tag in page.select("div.first, h2[id], details.notebook")]
-    assert order == ["first", "claims", "checks", "notebooks", "10_corridor", "parameters", "run"]
+    assert (
+        menus
+        == [
+            [
+                "#top",
+                "#claims",
+                "#checks",
+                "#notebooks",
+                "#10_corridor",
+                "#parameters",
+                "#run",
+            ]
+        ]
+        * 2
+    )
+    order = [
+        tag.get("id") or tag["class"][0]
+        for tag in page.select("div.first, h2[id], details.notebook")
+    ]
+    assert order == [
+        "first",
+        "claims",
+        "checks",
+        "notebooks",
+        "10_corridor",
+        "parameters",
+        "run",
+    ]
 
 
 def test_movie_is_on_the_front_page_and_in_its_notebook(page, movie):
     name = re.search("data-run=.(szlib-[0-9a-f]{8})", movie._repr_html_())[1]
     first, second = page.select("figure.szlib-player")
     assert first["data-run"] == second["data-run"] == name
-    assert first.img["src"].startswith("data:image/gif") and first.find_parent(class_="players")
-    assert second.text == first.img["alt"] and second.find_parent("details")["id"] == "10_corridor"
+    assert first.img["src"].startswith("data:image/gif") and first.find_parent(
+        class_="players"
+    )
+    assert (
+        second.text == first.img["alt"]
+        and second.find_parent("details")["id"] == "10_corridor"
+    )
     (script,) = page.select("script")
-    run = json.loads(re.search(r"^playAll\((.*)\);$", script.text, re.MULTILINE)[1])[name]
+    run = json.loads(re.search(r"^playAll\((.*)\);$", script.text, re.MULTILINE)[1])[
+        name
+    ]
     assert run == json.loads(json.dumps(movie.run))
     assert len(run["snapshots"]) == 11
     assert run["snapshots"][0]["robot"] == [-4, 0]
@@ -152,7 +229,9 @@ def test_code_is_folded(page):
 
 def test_report_without_notebooks_is_refused(tmp_path, capsys):
     claim_folder(tmp_path, "results of mine")
-    with pytest.raises(DataError, match="holds no executed notebooks; `szlib run` makes them"):
+    with pytest.raises(
+        DataError, match="holds no executed notebooks; `szlib run` makes them"
+    ):
         write_report(tmp_path)
     assert main(["report", str(tmp_path)]) == 2
     (tmp_path / "01_one.ipynb").write_text("{")
@@ -163,24 +242,36 @@ def test_report_without_notebooks_is_refused(tmp_path, capsys):
 def test_results_of_another_version_are_refused_in_one_line(tmp_path, capsys):
     claim_folder(tmp_path, "results of mine")
     nbformat.write(
-        nbformat.v4.new_notebook(cells=[nbformat.v4.new_markdown_cell("# 1")]), tmp_path / "01_a.ipynb"
+        nbformat.v4.new_notebook(cells=[nbformat.v4.new_markdown_cell("# 1")]),
+        tmp_path / "01_a.ipynb",
     )
     samples = pd.DataFrame({"encounter": [0]})
-    samples.attrs["funnel"] = [{"stage": "read", "entered": 1, "kept": 1, "set_aside": {}}]
+    samples.attrs["funnel"] = [
+        {"stage": "read", "entered": 1, "kept": 1, "set_aside": {}}
+    ]
     samples.to_parquet(tmp_path / "encounters.parquet")
     assert main(["report", str(tmp_path)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "encounters.parquet: is damaged or of another version of szlib (KeyError('rejected')); `sz" in line
+    assert (
+        "encounters.parquet: is damaged or of another version of szlib (KeyError('rejected')); `sz"
+        in line
+    )
 
 
 def test_pictures_of_the_notebooks_are_embedded(tmp_path):
     text = '![a zone](figures/zone.png)\n\n<img src="figures/making_room.gif" alt="a robot">'
     claim_folder(tmp_path, "results of mine")
     cells = [nbformat.v4.new_markdown_cell(f"# 0 - Pictures\n\n{text}")]
-    nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "00_pictures.ipynb")
-    page = BeautifulSoup(write_report(tmp_path).read_text(encoding="utf-8"), "html.parser")
+    nbformat.write(
+        nbformat.v4.new_notebook(cells=cells), tmp_path / "00_pictures.ipynb"
+    )
+    page = BeautifulSoup(
+        write_report(tmp_path).read_text(encoding="utf-8"), "html.parser"
+    )
     shown = {
-        picture["alt"]: picture["src"][:14] for picture in page.find_all("img") if "alt" in picture.attrs
+        picture["alt"]: picture["src"][:14]
+        for picture in page.find_all("img")
+        if "alt" in picture.attrs
     }
     assert shown["a zone"] == "data:image/png"
     assert shown["a robot"] == "data:image/gif"
@@ -191,21 +282,32 @@ def test_a_notebook_of_an_earlier_version_is_left_out(tmp_path):
     cell = nbformat.v4.new_markdown_cell("# 19 - Renamed since")
     for name in ("07_now", "19_before"):
         nbformat.write(nbformat.v4.new_notebook(cells=[cell]), home / f"{name}.ipynb")
-    record = {"status": "done", "seconds": 1.2, "checks": [], "key_figures": {}, "figures": []}
-    (home / "summary.json").write_text(json.dumps({"data": "mine", "notebooks": {"07_now": record}}))
+    record = {
+        "status": "done",
+        "seconds": 1.2,
+        "checks": [],
+        "key_figures": {},
+        "figures": [],
+    }
+    (home / "summary.json").write_text(
+        json.dumps({"data": "mine", "notebooks": {"07_now": record}})
+    )
     text = write_report(home).read_text(encoding="utf-8")
     assert "07_now" in text and "19_before" not in text
 
 
 def test_links_to_files_outside_of_the_report_leave_their_text(tmp_path):
-    text = (
-        "exercises: [5.1](exercises/sheet5.ipynb#5.1-Focal-distance-(15-min)), [5.2](exercises/sheet5.ipynb)"
-    )
+    text = "exercises: [5.1](exercises/sheet5.ipynb#5.1-Focal-distance-(15-min)), "
+    text += "[5.2](exercises/sheet5.ipynb)"
     claim_folder(tmp_path, "results of mine")
     cells = [nbformat.v4.new_markdown_cell(f"# 0 - Links\n\n{text}")]
     nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "00_links.ipynb")
-    page = BeautifulSoup(write_report(tmp_path).read_text(encoding="utf-8"), "html.parser")
-    assert "exercises: 5.1, 5.2" in [paragraph.get_text() for paragraph in page.find_all("p")]
+    page = BeautifulSoup(
+        write_report(tmp_path).read_text(encoding="utf-8"), "html.parser"
+    )
+    assert "exercises: 5.1, 5.2" in [
+        paragraph.get_text() for paragraph in page.find_all("p")
+    ]
 
 
 LONG = re.compile(r"(?<![\w.,])[-+]?(?:0\.0*)?((?:\d[\d,]*)(?:\.\d+)?)")
@@ -236,11 +338,17 @@ def test_no_claim_has_more_than_four_digits_and_each_is_a_sentence():
             claims += re.findall(r"^claim: (.*)", printed, re.MULTILINE)
     assert len(claims) > 90
     for claim in claims:
-        digits = [number.replace(",", "").replace(".", "") for number in LONG.findall(claim)]
+        digits = [
+            number.replace(",", "").replace(".", "") for number in LONG.findall(claim)
+        ]
         assert all(len(number.rstrip("0")) <= 4 for number in digits), claim
-        assert not re.match(r"(and|so|nor|which|there|it|its|the others|then)\b", claim, re.IGNORECASE), claim
+        assert not re.match(
+            r"(and|so|nor|which|there|it|its|the others|then)\b", claim, re.IGNORECASE
+        ), claim
     sentences = load_sentences().query("kind == 'claim'")["sentence"].tolist()
-    assert [s for s in sentences if not re.fullmatch(r"[A-Z].*[.]", s) or "..." in s] == []
+    assert [
+        s for s in sentences if not re.fullmatch(r"[A-Z].*[.]", s) or "..." in s
+    ] == []
 
 
 def test_the_report_of_all_notebooks_has_at_most_6_mb_and_four_players(tmp_path):

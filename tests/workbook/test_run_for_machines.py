@@ -37,7 +37,10 @@ def test_junit_has_a_suite_for_each_notebook_and_a_case_for_each_check(
     assert violations(root) == []
     suites = {suite.attrib["name"]: suite for suite in root}
     assert list(suites) == ["01_good", "02_bad", "03_crash"]
-    cases = {name: [(c.attrib["name"], [e.tag for e in c]) for c in suite] for name, suite in suites.items()}
+    cases = {
+        name: [(c.attrib["name"], [e.tag for e in c]) for c in suite]
+        for name, suite in suites.items()
+    }
     assert cases == {
         "01_good": [("01_good", []), ("sum", [])],
         "02_bad": [("02_bad", []), ("a < b & c", ["failure"]), ("fine", [])],
@@ -45,11 +48,22 @@ def test_junit_has_a_suite_for_each_notebook_and_a_case_for_each_check(
     }
     for suite in root:
         assert all(
-            case.tag == "testcase" and case.attrib["classname"] == suite.attrib["name"] for case in suite
+            case.tag == "testcase" and case.attrib["classname"] == suite.attrib["name"]
+            for case in suite
         )
-        found = {tag: len(suite.findall(f".//{tag}")) for tag in ("testcase", "failure", "error", "skipped")}
-        names = {"testcase": "tests", "failure": "failures", "error": "errors", "skipped": "skipped"}
-        assert {names[tag]: str(n) for tag, n in found.items()}.items() <= suite.attrib.items()
+        found = {
+            tag: len(suite.findall(f".//{tag}"))
+            for tag in ("testcase", "failure", "error", "skipped")
+        }
+        names = {
+            "testcase": "tests",
+            "failure": "failures",
+            "error": "errors",
+            "skipped": "skipped",
+        }
+        assert {
+            names[tag]: str(n) for tag, n in found.items()
+        }.items() <= suite.attrib.items()
         assert float(suite.attrib["time"]) >= 0
     assert "ZeroDivisionError" in suites["03_crash"][0][0].attrib["message"]
 
@@ -66,9 +80,17 @@ def test_undecided_and_not_started_notebooks_are_skipped_in_junit(
 
 
 @pytest.mark.parametrize("seconds", [0, 1e-5, 2.3456789, 98765.4])
-def test_junit_is_valid_in_the_schema_of_jenkins(tmp_path: Path, seconds: float) -> None:
+def test_junit_is_valid_in_the_schema_of_jenkins(
+    tmp_path: Path, seconds: float
+) -> None:
     """With every status, whatever the time, and with control characters in names and messages."""
-    check = {"kind": "check", "name": "\x00 < & \udc80", "result": "\x1b[0m", "value": None, "passed": False}
+    check = {
+        "kind": "check",
+        "name": "\x00 < & \udc80",
+        "result": "\x1b[0m",
+        "value": None,
+        "passed": False,
+    }
     each = {"seconds": seconds, "checks": [check], "error": "ValueError: \x08"}
     statuses = ("done", "error", "refused", "undecided", "not started")
     outcomes = {status: {"status": status, **each} for status in statuses}
@@ -80,14 +102,28 @@ def test_junit_is_valid_in_the_schema_of_jenkins(tmp_path: Path, seconds: float)
     ("suite", "problem"),
     [
         ('<testsuite name="a" failures="0" errors="0"/>', "<testsuite> lacks tests"),
-        ('<testsuite name="a" tests="0" failures="0" errors="0" passed="1"/>', "<testsuite> has passed"),
-        ('<testsuite name="a" tests="0" failures="0" errors="0" time="1e-05"/>', "time='1e-05' is not"),
-        ('<testsuite name="a" tests="0" failures="0" errors="0"><failure/></testsuite>', "has <failure>"),
-        ('<testsuite name="a" tests="0" failures="0" errors="0">b</testsuite>', "has the text 'b'"),
+        (
+            '<testsuite name="a" tests="0" failures="0" errors="0" passed="1"/>',
+            "<testsuite> has passed",
+        ),
+        (
+            '<testsuite name="a" tests="0" failures="0" errors="0" time="1e-05"/>',
+            "time='1e-05' is not",
+        ),
+        (
+            '<testsuite name="a" tests="0" failures="0" errors="0"><failure/></testsuite>',
+            "has <failure>",
+        ),
+        (
+            '<testsuite name="a" tests="0" failures="0" errors="0">b</testsuite>',
+            "has the text 'b'",
+        ),
     ],
 )
 def test_the_schema_of_jenkins_refuses(suite: str, problem: str) -> None:
-    assert problem in "\n".join(violations(ET.fromstring(f"<testsuites>{suite}</testsuites>")))
+    assert problem in "\n".join(
+        violations(ET.fromstring(f"<testsuites>{suite}</testsuites>"))
+    )
 
 
 @pytest.mark.parametrize(
@@ -100,7 +136,10 @@ def test_the_schema_of_jenkins_refuses(suite: str, problem: str) -> None:
     ],
 )
 def test_junit_file_that_cannot_be_written_is_refused_before_the_run(
-    notebooks: Callable[..., Path], capsys: pytest.CaptureFixture[str], place: str, message: str
+    notebooks: Callable[..., Path],
+    capsys: pytest.CaptureFixture[str],
+    place: str,
+    message: str,
 ) -> None:
     notebooks(_01_good=GOOD)
     Path("other.xml").write_text("<thesis/>")
@@ -119,7 +158,11 @@ def test_markdown_is_appended_where_github_asks_for_it(
     assert run() == 1
     lines = file.read_text().splitlines()
     assert lines[0] == "before"
-    rows = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines if line[:1] == "|"]
+    rows = [
+        [cell.strip() for cell in line.strip("|").split(" | ")]
+        for line in lines
+        if line[:1] == "|"
+    ]
     assert rows[0] == ["notebook", "seconds", "checks", "observed", "key figures"]
     assert [[row[0], *row[2:]] for row in rows[2:]] == [
         ["01_good", "1/1", "-", "seed 0"], ["02_bad", "0/1", "-", "seed 0"],
@@ -147,7 +190,9 @@ def test_a_log_has_no_progress_bar(
     assert capsys.readouterr().err == ""
 
 
-def test_help_lists_every_parameter_with_default_and_meaning(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_lists_every_parameter_with_default_and_meaning(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """Those of the workbook itself."""
     from szlib.workbook import folders
     from szlib.workbook.record.parameters import OPTIONS, read_defaults
@@ -159,5 +204,10 @@ def test_help_lists_every_parameter_with_default_and_meaning(capsys: pytest.Capt
     words = " ".join(text.split())
     for script in folders.list_notebooks():
         for name, value in read_defaults(script).items():
-            assert name in OPTIONS or f"{name} = {value!r} " in words, (script.stem, name)
-    assert all(len(row) == 4 for row in rows if len(row) > 1 and row[1] == "="), "each has a meaning"
+            assert name in OPTIONS or f"{name} = {value!r} " in words, (
+                script.stem,
+                name,
+            )
+    assert all(len(row) == 4 for row in rows if len(row) > 1 and row[1] == "="), (
+        "each has a meaning"
+    )

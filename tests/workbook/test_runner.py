@@ -17,11 +17,19 @@ from szlib.workbook.cli import main
 from szlib.workbook.record.data_cache import _load
 from szlib.workbook.record.parameters import check_parameters
 
-DONE = {"status": "done", "seconds": 0.0, "checks": [], "key_figures": {}, "figures": []}
+DONE = {
+    "status": "done",
+    "seconds": 0.0,
+    "checks": [],
+    "key_figures": {},
+    "figures": [],
+}
 
 
 def run(*arguments):
-    return main(["run", "--data", "mine.csv", "--out", "out", "--jobs", "1", *arguments])
+    return main(
+        ["run", "--data", "mine.csv", "--out", "out", "--jobs", "1", *arguments]
+    )
 
 
 def summary(tmp_path, folder="mine"):
@@ -30,7 +38,9 @@ def summary(tmp_path, folder="mine"):
 
 @pytest.mark.usefixtures("without_kernels")
 def test_run_records_checks_claims_and_key_figures(notebooks, tmp_path, capsys):
-    notebooks(_01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)')
+    notebooks(
+        _01_good='record.check("sum", 1 + 1 == 2, 2)\nrecord.claim("paper", False, 0.25)'
+    )
     assert run() == 0
     record = summary(tmp_path)["notebooks"]["01_good"]
     assert record["key_figures"] == {"seed": 0}
@@ -42,7 +52,10 @@ def test_run_records_checks_claims_and_key_figures(notebooks, tmp_path, capsys):
     assert "1/1" in printed
     assert "not supported here" in printed
     assert "all checks hold" in printed
-    assert "report.html" in printed and (tmp_path / "out" / "mine" / "report.html").exists()
+    assert (
+        "report.html" in printed
+        and (tmp_path / "out" / "mine" / "report.html").exists()
+    )
 
 
 ZONE = """
@@ -55,15 +68,22 @@ record.cache.store_zone(zone)
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_verdict_on_the_zone_ends_the_run_and_begins_the_report(notebooks, tmp_path, capsys):
+def test_verdict_on_the_zone_ends_the_run_and_begins_the_report(
+    notebooks, tmp_path, capsys
+):
     notebooks(_05_zone=ZONE)
     assert run() == 0
     last = capsys.readouterr().out.splitlines()[-1]
     assert last.startswith("zone at 1.1 m/s: undecided: no null model: ")
     page = (tmp_path / "out" / "mine" / "report.html").read_text(encoding="utf-8")
-    answer = re.search(r"<h1>Social zones of mine.*?</h1>\s*<p class=.answer.>(.*?)</p>", page, re.DOTALL)[1]
+    answer = re.search(
+        r"<h1>Social zones of mine.*?</h1>\s*<p class=.answer.>(.*?)</p>",
+        page,
+        re.DOTALL,
+    )[1]
     assert re.match(
-        r"At 1.1 m/s the social zone has semi-axes of \d\.\d\d m and \d\.\d\d m: <strong>un", answer
+        r"At 1.1 m/s the social zone has semi-axes of \d\.\d\d m and \d\.\d\d m: <strong>un",
+        answer,
     )
     assert last == summary(tmp_path)["verdict"]
 
@@ -81,15 +101,21 @@ record.check("after", False)""",
 
 @pytest.mark.usefixtures("without_kernels")
 @pytest.mark.parametrize("before", [True, False])
-def test_too_few_encounters_for_a_zone_end_in_a_verdict(notebooks, tmp_path, capsys, before):
+def test_too_few_encounters_for_a_zone_end_in_a_verdict(
+    notebooks, tmp_path, capsys, before
+):
     """The notebook that needs a zone ends early; its checks until then count, and later notebooks run."""
-    notebooks(**{name: code.replace("{before}", str(before)) for name, code in FEW.items()})
+    notebooks(
+        **{name: code.replace("{before}", str(before)) for name, code in FEW.items()}
+    )
     make_plaza(tmp_path / "mine.csv", settings=PlazaSettings(n_encounters=4))
     assert run() == (0 if before else 1)
     found = summary(tmp_path)
     states = {name: notebook["status"] for name, notebook in found["notebooks"].items()}
     assert states == {"02_few": "done", "04_hull": "undecided", "07_other": "done"}
-    assert [(c["name"], c["passed"]) for c in found["notebooks"]["04_hull"]["checks"]] == [("before", before)]
+    assert [
+        (c["name"], c["passed"]) for c in found["notebooks"]["04_hull"]["checks"]
+    ] == [("before", before)]
     lines = capsys.readouterr().out.splitlines()
     assert re.match(
         r"undecided: 4 encounters were found, 600 are needed: .* more hours of recording at this rate; one "
@@ -105,7 +131,9 @@ def test_too_few_encounters_for_a_zone_end_in_a_verdict(notebooks, tmp_path, cap
 @pytest.mark.parametrize("raised", ["szlib.errors.ZoneError", "szlib.errors.DataError"])
 def test_errors_of_other_causes_are_not_undecided(notebooks, tmp_path, raised, capsys):
     """An error about the data, and one about a zone where no encounters were stored, refuse the notebook."""
-    make = "import szlib\n" + ("record.cache.encounters()\n" if "Data" in raised else "")
+    make = "import szlib\n" + (
+        "record.cache.encounters()\n" if "Data" in raised else ""
+    )
     notebooks(_02_wrong=f"{make}raise {raised}('wrong')")
     make_plaza(tmp_path / "mine.csv", settings=PlazaSettings(n_encounters=4))
     assert run() == 2
@@ -129,7 +157,9 @@ def test_stored_zone_of_another_version_is_no_obstacle(notebooks, tmp_path, caps
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_with_changed_parameters_only_checks_that_always_hold_fail_the_run(notebooks, tmp_path, capsys):
+def test_with_changed_parameters_only_checks_that_always_hold_fail_the_run(
+    notebooks, tmp_path, capsys
+):
     notebooks(_01_good='record.check("no infeasible step", seed == 0, 4)')
     assert run("-p", "seed=3") == 0
     (folder,) = (path.name for path in (tmp_path / "out").glob("mine-*"))
@@ -137,7 +167,9 @@ def test_with_changed_parameters_only_checks_that_always_hold_fail_the_run(noteb
     printed = capsys.readouterr().out
     assert "01_good: no infeasible step: does not hold with seed = 3 (4)" in printed
     (line,) = (line for line in printed.splitlines() if line.startswith("01_good "))
-    assert line.split()[2:4] == ["-", "0/1"], "no check; one observation, which does not hold"
+    assert line.split()[2:4] == ["-", "0/1"], (
+        "no check; one observation, which does not hold"
+    )
     assert "all checks hold" in printed
     notebooks(_01_good='record.check("funnel", False, always=True)')
     assert run("-p", "seed=3") == 1
@@ -147,15 +179,25 @@ def test_default_of_one_notebook_is_passed_to_the_others(notebooks):
     folder = notebooks(_01_few="", _07_many="")
     for name, worlds in (("01_few", 2), ("07_many", 4)):
         script = folder / f"{name}.py"
-        script.write_text(script.read_text().replace("seed = 0\n", f"seed = 0\nworlds = {worlds}\n", 1))
+        script.write_text(
+            script.read_text().replace(
+                "seed = 0\n", f"seed = 0\nworlds = {worlds}\n", 1
+            )
+        )
     sources = sorted(folder.glob("*.py"))
     assert check_parameters({"worlds": 2, "seed": 0}, sources) == {"worlds": 2}
     assert check_parameters({"worlds": 4}, sources[1:]) == {}
 
 
 @pytest.mark.usefixtures("without_kernels")
-def test_failed_check_and_error_fail_the_run_but_not_other_notebooks(notebooks, tmp_path, capsys):
-    notebooks(_01_bad='record.check("sum", False, 3)', _02_crash="1 / 0", _03_fine='record.check("ok", True)')
+def test_failed_check_and_error_fail_the_run_but_not_other_notebooks(
+    notebooks, tmp_path, capsys
+):
+    notebooks(
+        _01_bad='record.check("sum", False, 3)',
+        _02_crash="1 / 0",
+        _03_fine='record.check("ok", True)',
+    )
     assert run() == 1
     found = summary(tmp_path)
     assert not found["passed"]
@@ -179,7 +221,8 @@ def test_notebooks_are_ordered_and_chosen_by_full_number(notebooks):
     names = ["00_start", "06_barriers", "06b_build", "07_passing", "10_room"]
     notebooks(**{f"_{name}": "" for name in reversed(names)})
     chosen = [
-        [s.stem for s in runner.choose_notebooks(only)] for only in ([], ["06"], ["06b"], ["10_room", "00"])
+        [s.stem for s in runner.choose_notebooks(only)]
+        for only in ([], ["06"], ["06b"], ["10_room", "00"])
     ]
     assert chosen == [names, ["06_barriers"], ["06b_build"], ["00_start", "10_room"]]
     with pytest.raises(DataError, match="no notebook 0; there are 00_start"):
@@ -199,17 +242,31 @@ def test_notebooks_wait_only_for_encounters_and_zone_and_the_summary_for_all(not
         "28_sentences",
     ]
     notebooks(**{f"_{name}": "" for name in names})
-    stems = [[s.stem for s in batch] for batch in runner.split_batches(runner.choose_notebooks([]))]
-    assert stems == [names[:3], names[3:5], ["06_robot", "06b_build", "17_a"], ["28_sentences"]]
+    stems = [
+        [s.stem for s in batch]
+        for batch in runner.split_batches(runner.choose_notebooks([]))
+    ]
+    assert stems == [
+        names[:3],
+        names[3:5],
+        ["06_robot", "06b_build", "17_a"],
+        ["28_sentences"],
+    ]
     one = runner.choose_notebooks(["06"])
     assert runner.split_batches(one) == [[], [], one, []]
 
 
 @pytest.mark.parametrize(("jobs", "threads"), [(1, "6"), (2, "3"), (4, "1")])
-def test_notebooks_that_run_at_the_same_time_share_the_cores(notebooks, monkeypatch, jobs, threads):
+def test_notebooks_that_run_at_the_same_time_share_the_cores(
+    notebooks, monkeypatch, jobs, threads
+):
     given = []
     monkeypatch.setattr(os, "cpu_count", lambda: 6)
-    monkeypatch.setattr(runner, "execute_notebook", lambda *task: given.append(task[-1]) or ("01_a", DONE))
+    monkeypatch.setattr(
+        runner,
+        "execute_notebook",
+        lambda *task: given.append(task[-1]) or ("01_a", DONE),
+    )
     notebooks(**{f"_0{n}_a": "" for n in range(1, 5)})
     monkeypatch.delenv("OMP_NUM_THREADS")
     runner.run("mine.csv", out="out", jobs=jobs, force=True)
@@ -222,7 +279,10 @@ def test_notebooks_that_run_at_the_same_time_share_the_cores(notebooks, monkeypa
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["-p", "sed=1"], "unknown parameter 'sed'; the notebooks know data, results, seed"),
+        (
+            ["-p", "sed=1"],
+            "unknown parameter 'sed'; the notebooks know data, results, seed",
+        ),
         (["-p", "seed"], "must be NAME=VALUE"),
         (["-p", "seed=abc"], "parameter seed: expected int, such as 0; got 'abc'"),
         (["-p", "seed=1.5"], "parameter seed: expected int"),
@@ -231,7 +291,9 @@ def test_notebooks_that_run_at_the_same_time_share_the_cores(notebooks, monkeypa
         (["--data", "nowhere.csv"], "nowhere.csv: no such file"),
     ],
 )
-def test_invalid_options_exit_with_2_and_one_reason(notebooks, capsys, arguments, message):
+def test_invalid_options_exit_with_2_and_one_reason(
+    notebooks, capsys, arguments, message
+):
     notebooks(_01_one="")
     assert run(*arguments) == 2
     assert message in capsys.readouterr().err
@@ -256,11 +318,15 @@ def test_invalid_number_of_jobs_is_refused(jobs, capsys):
 def test_missing_packages_are_named(monkeypatch, capsys):
     monkeypatch.setattr(cli, "_WORKBOOK_PACKAGES", ("nbclient", "no_such_package"))
     assert main(["run"]) == 2
-    assert "need no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
+    assert (
+        "need no_such_package: pip install 'szlib[workbook]'" in capsys.readouterr().err
+    )
 
 
 def test_missing_notebooks_are_explained(notebooks):
-    with pytest.raises(DataError, match="notebooks: there are no notebooks; expected a folder"):
+    with pytest.raises(
+        DataError, match="notebooks: there are no notebooks; expected a folder"
+    ):
         runner.run()
 
 
@@ -293,14 +359,18 @@ os.kill(os.getpid(), signal.SIGTERM)
 
 
 @pytest.mark.parametrize("stopped", [True, False])
-def test_a_signal_that_ends_a_kernel_and_the_run_leaves_no_unfinished_copy(tmp_path, monkeypatch, stopped):
+def test_a_signal_that_ends_a_kernel_and_the_run_leaves_no_unfinished_copy(
+    tmp_path, monkeypatch, stopped
+):
     script, folder = tmp_path / "01_one.py", tmp_path / "out"
     script.write_text(KILLS_ITS_KERNEL)
     folder.mkdir()
     monkeypatch.setattr(notebook_execution, "_SIGNAL_DELAY", 20.0 if stopped else 0.01)
     with ThreadPoolExecutor(1) as executor:
         given = {"file": str(tmp_path / "begun")}
-        execution = executor.submit(notebook_execution.execute_notebook, str(script), given, str(folder), {})
+        execution = executor.submit(
+            notebook_execution.execute_notebook, str(script), given, str(folder), {}
+        )
         while stopped and not (tmp_path / "begun").exists():
             time.sleep(0.05)
         if stopped:

@@ -25,9 +25,14 @@ def page(tmp_path_factory):
 
 def test_nothing_of_a_foreign_folder_runs_or_asks_a_server(page):
     (script,) = page.select("script")  # the player's
-    assert "attack()" not in re.sub(r'"[^"\n]*"', "", script.text), "it is in the data only"
+    assert "attack()" not in re.sub(r'"[^"\n]*"', "", script.text), (
+        "it is in the data only"
+    )
     policy = page.select_one("head > meta[http-equiv]")["content"]
-    assert policy.startswith("default-src 'none'; script-src 'sha256-") and policy.count("script-src") == 1
+    assert (
+        policy.startswith("default-src 'none'; script-src 'sha256-")
+        and policy.count("script-src") == 1
+    )
     assert not page.select(
         "svg, iframe, object, form, base, link, embed, button, input, template, body style"
     )
@@ -53,10 +58,15 @@ def test_what_a_foreign_folder_says_is_shown_as_text(page):
 def results(tmp_path):
     """Results of one notebook."""
     home = claim_folder(tmp_path / "mine", "results of mine")
-    cells = [nbformat.v4.new_markdown_cell("# 1\n\n$h$"), nbformat.v4.new_code_cell("1")]
+    cells = [
+        nbformat.v4.new_markdown_cell("# 1\n\n$h$"),
+        nbformat.v4.new_code_cell("1"),
+    ]
     nbformat.write(nbformat.v4.new_notebook(cells=cells), home / "01_a.ipynb")
     outcome = {"status": "done", "seconds": 1, "checks": []}
-    (home / "summary.json").write_text(json.dumps({"data": "mine", "notebooks": {"01_a": outcome}}))
+    (home / "summary.json").write_text(
+        json.dumps({"data": "mine", "notebooks": {"01_a": outcome}})
+    )
     write_report(home)
     return home
 
@@ -69,7 +79,9 @@ def notebook(**changes):
         "outputs": [],
         "execution_count": None,
     } | changes
-    return json.dumps({"cells": [cell], "metadata": {}, "nbformat": 4, "nbformat_minor": 4})
+    return json.dumps(
+        {"cells": [cell], "metadata": {}, "nbformat": 4, "nbformat_minor": 4}
+    )
 
 
 DISPLAY = {"output_type": "display_data", "metadata": {}}
@@ -93,9 +105,13 @@ MALFORMED = [
 
 
 @pytest.mark.parametrize(("name", "content"), MALFORMED)
-def test_malformed_results_are_refused_with_the_name_of_the_file(results, name, content):
+def test_malformed_results_are_refused_with_the_name_of_the_file(
+    results, name, content
+):
     report = (results / "report.html").read_bytes()
-    (results / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    (results / name).write_bytes(
+        content.encode() if isinstance(content, str) else content
+    )
     with pytest.raises(SzlibError, match=re.escape(str(results / name))):
         write_report(results)
     assert (results / "report.html").read_bytes() == report
@@ -109,7 +125,11 @@ def test_a_notebook_that_never_ends_is_refused(results):
 
 
 def test_a_folder_that_szlib_did_not_mark_gets_no_report(results, tmp_path):
-    shutil.copytree(results, tmp_path / "foreign", ignore=shutil.ignore_patterns(".szlib*", "report.html"))
+    shutil.copytree(
+        results,
+        tmp_path / "foreign",
+        ignore=shutil.ignore_patterns(".szlib*", "report.html"),
+    )
     with pytest.raises(DataError, match=r"foreign/\.szlib: .*`szlib run` makes"):
         write_report(tmp_path / "foreign")
     assert not (tmp_path / "foreign" / "report.html").exists()

@@ -29,7 +29,11 @@ def compute_cell_by_cell(people, grid, zone):
                 ray = shapely.LineString([m, m + 100 * (at - m)])
                 edge = np.hypot(*(ray.intersection(around.exterior).coords[0] - m))
                 far = np.hypot(*(at - m))
-                cost = 99 - 49 * far / edge if far <= edge else max(0, 50 * (1 - (far - edge) / FADE))
+                cost = (
+                    99 - 49 * far / edge
+                    if far <= edge
+                    else max(0, 50 * (1 - (far - edge) / FADE))
+                )
                 if np.hypot(*(at - (x, y))) <= BODY_RADIUS:
                     cost = 100
                 costs[i, j] = max(costs[i, j], cost)
@@ -38,8 +42,13 @@ def compute_cell_by_cell(people, grid, zone):
 
 def test_costs_equal_a_computation_cell_by_cell():
     grid = szlib.Grid((-2.5, -1.0), 0.17, (18, 25))
-    people = np.array([[0.0, 0.0, 0.5, 0.2], [1.3, 0.4, -0.4, 0.0], [-2.4, 1.9, 0.3, -0.9]])
-    costs, expected = draw_costmap(ZONE, people, grid), compute_cell_by_cell(people, grid, ZONE)
+    people = np.array(
+        [[0.0, 0.0, 0.5, 0.2], [1.3, 0.4, -0.4, 0.0], [-2.4, 1.9, 0.3, -0.9]]
+    )
+    costs, expected = (
+        draw_costmap(ZONE, people, grid),
+        compute_cell_by_cell(people, grid, ZONE),
+    )
     assert costs.dtype == np.int8
     assert costs.shape == (18, 25)
     assert np.abs(costs - expected).max() <= 1.001  # rounding to whole numbers
@@ -48,7 +57,9 @@ def test_costs_equal_a_computation_cell_by_cell():
 
 def test_costs_of_half_and_more_mark_zones_and_bodies():
     rng = np.random.default_rng(0)
-    people = np.column_stack([rng.uniform((-4, -3), (4, 3), (6, 2)), rng.uniform(-1, 1, (6, 2))])
+    people = np.column_stack(
+        [rng.uniform((-4, -3), (4, 3), (6, 2)), rng.uniform(-1, 1, (6, 2))]
+    )
     inside = np.zeros(GRID.shape, bool)
     for x, y, vx, vy in people:
         inside |= ZONE.placed((x, y), np.arctan2(vy, vx)).level(GRID.centers()) <= 1
@@ -58,11 +69,17 @@ def test_costs_of_half_and_more_mark_zones_and_bodies():
 
 
 def test_rows_are_y_and_columns_are_x():
-    costs = draw_costmap(ZONE, [[1.96, -1.04, 1.0, 0.0]], szlib.Grid((0.0, -2.0), 0.1, (20, 50)), fade=0.0)
+    costs = draw_costmap(
+        ZONE,
+        [[1.96, -1.04, 1.0, 0.0]],
+        szlib.Grid((0.0, -2.0), 0.1, (20, 50)),
+        fade=0.0,
+    )
     assert costs[9, 19] == 100
     assert GRID.centers()[0, 0] == pytest.approx([-3.95, -2.95])
     assert GRID.centers()[59, 79] == pytest.approx([3.95, 2.95])
-    assert costs.ravel()[9 * 50 + 19] == 100  # OccupancyGrid.data: row by row, x fastest
+    # OccupancyGrid.data: row by row, x fastest
+    assert costs.ravel()[9 * 50 + 19] == 100
 
 
 def test_costmap_moves_and_rotates_with_the_people():
@@ -70,13 +87,21 @@ def test_costmap_moves_and_rotates_with_the_people():
     people = np.column_stack([rng.uniform(-2, 2, (4, 2)), rng.uniform(-1, 1, (4, 2))])
     grid = szlib.Grid((-3.2, -3.2), 0.1, (64, 64))
     costs = draw_costmap(ZONE, people, grid)
-    moved = draw_costmap(ZONE, people + np.array([0.3, -0.5, 0, 0]), szlib.Grid((-2.9, -3.7), 0.1, (64, 64)))
+    moved = draw_costmap(
+        ZONE,
+        people + np.array([0.3, -0.5, 0, 0]),
+        szlib.Grid((-2.9, -3.7), 0.1, (64, 64)),
+    )
     turned = draw_costmap(ZONE, people[:, [1, 0, 3, 2]] * [-1, 1, -1, 1], grid)
-    assert np.abs(moved - costs).max() <= 1  # a cell whose cost is a half may round either way
+    # a cell whose cost is a half may round either way
+    assert np.abs(moved - costs).max() <= 1
     assert np.abs(turned - costs.T[:, ::-1]).max() <= 1
     assert np.array_equal(draw_costmap(ZONE, people[::-1], grid), costs)
     assert np.array_equal(
-        np.maximum(draw_costmap(ZONE, people[:2], grid), draw_costmap(ZONE, people[2:], grid)), costs
+        np.maximum(
+            draw_costmap(ZONE, people[:2], grid), draw_costmap(ZONE, people[2:], grid)
+        ),
+        costs,
     )
 
 
@@ -84,9 +109,12 @@ def test_person_without_heading_gets_the_circle():
     circle = circle_around(ZONE)
     standing = draw_costmap(ZONE, [[0.0, 0.0, 0.0, 0.0]], GRID)
     assert np.array_equal(standing >= 50, circle.level(GRID.centers()) <= 1)
-    assert np.array_equal(standing, draw_costmap(ZONE, [[0.0, 0.0, 0.1, -0.1]], GRID))  # a tracker's noise
+    # a tracker's noise
+    assert np.array_equal(standing, draw_costmap(ZONE, [[0.0, 0.0, 0.1, -0.1]], GRID))
     facing = draw_costmap(ZONE, [szlib.Person((0.0, 0.0), heading=1.0)], GRID)
-    assert np.array_equal(facing >= 50, ZONE.placed((0.0, 0.0), 1.0).level(GRID.centers()) <= 1)
+    assert np.array_equal(
+        facing >= 50, ZONE.placed((0.0, 0.0), 1.0).level(GRID.centers()) <= 1
+    )
 
 
 def test_person_zone_replaces_the_common_zone_and_social_zone_depends_on_speed():
@@ -96,11 +124,17 @@ def test_person_zone_replaces_the_common_zone_and_social_zone_depends_on_speed()
     shape = PolarZone(np.array([0.5, 1.1]), DIRECTIONS, np.ones((2, len(DIRECTIONS))))
     zone = szlib.SocialZone(shape, 2.0, {0.5: own, 1.1: ZONE})
     people = [[0.0, 0.0, 1.0, 0.0], [1.0, 1.0, 1.0, 0.0]]
-    with pytest.warns(szlib.DataWarning, match="quality of the zone is unknown") as caught:
-        assert np.array_equal(draw_costmap(zone, people, GRID), draw_costmap(ZONE, people, GRID))
+    with pytest.warns(
+        szlib.DataWarning, match="quality of the zone is unknown"
+    ) as caught:
+        assert np.array_equal(
+            draw_costmap(zone, people, GRID), draw_costmap(ZONE, people, GRID)
+        )
     assert len(caught) == 1
     with pytest.warns(szlib.DataWarning):
-        assert np.array_equal(draw_costmap(zone, people, GRID, speed=0.5), draw_costmap(own, people, GRID))
+        assert np.array_equal(
+            draw_costmap(zone, people, GRID, speed=0.5), draw_costmap(own, people, GRID)
+        )
 
 
 @pytest.mark.parametrize("empty", [[], (), np.zeros((0, 4))])
@@ -111,7 +145,10 @@ def test_costmap_without_people_is_empty(empty):
 def test_costs_do_not_depend_on_the_grid_border():
     large = szlib.Grid((-8.0, -7.0), 0.1, (140, 160))
     people = [[-4.3, 0.0, 1.0, 0.0], [30.0, 0.0, 1.0, 0.0], [4.2, 3.3, 0.0, -1.0]]
-    assert np.array_equal(draw_costmap(ZONE, people, GRID), draw_costmap(ZONE, people, large)[40:100, 40:120])
+    assert np.array_equal(
+        draw_costmap(ZONE, people, GRID),
+        draw_costmap(ZONE, people, large)[40:100, 40:120],
+    )
     assert draw_costmap(ZONE, people, GRID).any()
 
 

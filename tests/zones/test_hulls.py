@@ -15,14 +15,18 @@ from szlib.zones.estimators import Estimator
 from szlib.zones.hulls import HullEstimator, Slice, hull_vertices, slice_hull
 
 R_MAX = 2.0
-CUBE = np.array([(x, y, v) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for v in (0.0, 2.0)])
+CUBE = np.array(
+    [(x, y, v) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for v in (0.0, 2.0)]
+)
 
 
 def cloud(seed: int, n: int = 60) -> np.ndarray:
     """Points all around the origin of the complementary plane, at all speeds."""
     rng = np.random.default_rng(seed)
     angle, radius = rng.uniform(-np.pi, np.pi, n), 1.5 * np.sqrt(rng.uniform(0, 1, n))
-    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0.3, 1.8, n)])
+    return np.column_stack(
+        [radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0.3, 1.8, n)]
+    )
 
 
 def within_hull(points: np.ndarray, query: np.ndarray) -> bool:
@@ -44,12 +48,16 @@ def test_vertices_are_the_points_outside_the_hull_of_the_others(seed: int) -> No
     points = cloud(seed, 30)
     vertices = {tuple(v) for v in hull_vertices(points)}
     for k, point in enumerate(points):
-        assert (tuple(point) in vertices) == (not within_hull(np.delete(points, k, axis=0), point))
+        assert (tuple(point) in vertices) == (
+            not within_hull(np.delete(points, k, axis=0), point)
+        )
 
 
 def test_points_inside_and_copies_add_no_vertex() -> None:
     rng = np.random.default_rng(0)
-    more = np.vstack([CUBE, CUBE, rng.uniform(-0.9, 0.9, (50, 3)) + np.array([0, 0, 1])])
+    more = np.vstack(
+        [CUBE, CUBE, rng.uniform(-0.9, 0.9, (50, 3)) + np.array([0, 0, 1])]
+    )
     assert {tuple(v) for v in hull_vertices(more)} == {tuple(v) for v in CUBE}
 
 
@@ -78,21 +86,29 @@ def test_points_without_a_hull_are_refused(points: np.ndarray, message: str) -> 
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("speed", [0.7, 1.1])
-def test_a_point_is_in_the_slice_where_it_is_in_the_hull(seed: int, speed: float) -> None:
+def test_a_point_is_in_the_slice_where_it_is_in_the_hull(
+    seed: int, speed: float
+) -> None:
     points = cloud(seed)
     section = Polygon(slice_hull(points, speed, r_max=R_MAX).polygon)
     rng = np.random.default_rng(seed)
     inside = 0
     for x, y in rng.uniform(-1.6, 1.6, (40, 2)):
-        assert section.contains(Point(x, y)) == within_hull(points, np.array([x, y, speed]))
+        assert section.contains(Point(x, y)) == within_hull(
+            points, np.array([x, y, speed])
+        )
         inside += section.contains(Point(x, y))
     assert 0 < inside < 40
 
 
 def test_slice_exists_at_the_speed_of_a_vertex() -> None:
-    pyramid = np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0), (0, 0, 2), (1.5, 0, 1)], float)
+    pyramid = np.array(
+        [(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0), (0, 0, 2), (1.5, 0, 1)], float
+    )
     section = Polygon(slice_hull(pyramid, 1.0, r_max=R_MAX).polygon)
-    expected = MultiPoint([(x / 2, y / 2) for x, y, _ in pyramid[:4]] + [(1.5, 0)]).convex_hull
+    expected = MultiPoint(
+        [(x / 2, y / 2) for x, y, _ in pyramid[:4]] + [(1.5, 0)]
+    ).convex_hull
     assert section.symmetric_difference(expected).area < 1e-12
 
 
@@ -104,7 +120,9 @@ def test_slice_exists_in_the_plane_of_many_vertices() -> None:
 
 def test_slices_of_the_vertices_are_slices_of_the_points() -> None:
     points = cloud(5)
-    all_points, vertices = (slice_hull(p, 1.0, r_max=R_MAX).polygon for p in (points, hull_vertices(points)))
+    all_points, vertices = (
+        slice_hull(p, 1.0, r_max=R_MAX).polygon for p in (points, hull_vertices(points))
+    )
     assert Polygon(all_points).symmetric_difference(Polygon(vertices)).area < 1e-12
 
 
@@ -118,14 +136,18 @@ def test_polygons_are_convex_and_counter_clockwise(seed: int) -> None:
 
 @pytest.mark.parametrize("speed", [-1.0, 0.0, 2.0, 5.0, np.nan, np.inf])
 def test_a_speed_outside_the_data_names_the_range(speed: float) -> None:
-    with pytest.raises(szlib.ZoneError, match=rf"at {speed:g} m/s .* covers 0.000 to 2.000 m/s"):
+    with pytest.raises(
+        szlib.ZoneError, match=rf"at {speed:g} m/s .* covers 0.000 to 2.000 m/s"
+    ):
         slice_hull(CUBE, speed, r_max=R_MAX)
 
 
 @pytest.mark.parametrize("speed", [1e-300, 1e-15, 1e-9, 2 - 1e-15])
 def test_a_slice_at_the_very_edge_is_whole_or_undefined(speed: float) -> None:
     """A cone's tip has no extent; the box has it to its very end."""
-    assert Polygon(slice_hull(CUBE, speed, r_max=R_MAX).polygon).area == pytest.approx(4)
+    assert Polygon(slice_hull(CUBE, speed, r_max=R_MAX).polygon).area == pytest.approx(
+        4
+    )
     cone = np.vstack([CUBE[CUBE[:, 2] > 1] * [1, 1, 1], [0, 0, 0]])
     try:
         section = slice_hull(cone, speed, r_max=R_MAX)
@@ -147,7 +169,9 @@ def test_boundary_is_the_rest_of_a_ray_through_the_slice(seed: int) -> None:
         direction = np.array([np.cos(angle), np.sin(angle)])
         hit = rim.intersection(LineString([(0, 0), 9 * direction]))
         assert hit.geom_type == "Point"
-        np.testing.assert_allclose(point, (R_MAX - np.hypot(hit.x, hit.y)) * direction, atol=1e-9)
+        np.testing.assert_allclose(
+            point, (R_MAX - np.hypot(hit.x, hit.y)) * direction, atol=1e-9
+        )
 
 
 def test_shapes_follow_theta() -> None:
@@ -155,8 +179,12 @@ def test_shapes_follow_theta() -> None:
     theta = np.linspace(0, 6, 12).reshape(3, 4)
     assert section.reach(theta).shape == (3, 4)
     assert section.boundary(theta).shape == (3, 4, 2)
-    np.testing.assert_array_equal(section.boundary(theta[1, 2]), section.boundary(theta)[1, 2])
-    np.testing.assert_allclose(section.boundary(theta + 2 * np.pi), section.boundary(theta), atol=1e-12)
+    np.testing.assert_array_equal(
+        section.boundary(theta[1, 2]), section.boundary(theta)[1, 2]
+    )
+    np.testing.assert_allclose(
+        section.boundary(theta + 2 * np.pi), section.boundary(theta), atol=1e-12
+    )
 
 
 def test_between_corner_angles_the_boundary_is_that_of_one_edge() -> None:
@@ -164,7 +192,9 @@ def test_between_corner_angles_the_boundary_is_that_of_one_edge() -> None:
     section = slice_hull(cloud(2), 1.0, r_max=R_MAX)
     angles = section.corner_angles
     assert len(angles) == len(section.polygon)
-    for low, high in zip(angles, np.append(angles[1:], angles[0] + 2 * np.pi), strict=True):
+    for low, high in zip(
+        angles, np.append(angles[1:], angles[0] + 2 * np.pi), strict=True
+    ):
         theta = np.linspace(low, high, 7)
         basis = np.column_stack([np.cos(theta), np.sin(theta)])
         inverse = 1 / section.reach(theta)
@@ -176,7 +206,9 @@ def test_between_corner_angles_the_boundary_is_that_of_one_edge() -> None:
 def test_no_sample_is_within_the_zone(r_max: float) -> None:
     points = cloud(3)
     section = slice_hull(points, 1.0, r_max=r_max)
-    same = np.array([p for p in points if within_hull(points, np.array([p[0], p[1], 1.0]))])
+    same = np.array(
+        [p for p in points if within_hull(points, np.array([p[0], p[1], 1.0]))]
+    )
     distance = r_max - np.hypot(same[:, 0], same[:, 1])
     zone = r_max - section.reach(np.arctan2(same[:, 1], same[:, 0]))
     assert (distance >= zone - 1e-9).all()
@@ -186,7 +218,9 @@ def test_no_sample_is_within_the_zone(r_max: float) -> None:
 
 
 def missing_directions(message: str) -> tuple[int, int]:
-    low, high = re.search(r"directions from (-?\d+) counter-clockwise to (-?\d+) deg", message).groups()
+    low, high = re.search(
+        r"directions from (-?\d+) counter-clockwise to (-?\d+) deg", message
+    ).groups()
     return int(low), int(high)
 
 
@@ -195,8 +229,12 @@ def test_the_missing_directions_are_those_that_miss_the_slice(towards: int) -> N
     angle = np.radians(towards)
     corners = np.array([(0.2, 0.1), (1.0, -0.3), (1.4, 0.2), (0.9, 0.6)])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    box = np.vstack([np.column_stack([corners @ turn.T, np.full(4, v)]) for v in (0.5, 1.5)])
-    with pytest.raises(szlib.ZoneError, match=r"at 1\.1 m/s is undefined: no person was seen") as error:
+    box = np.vstack(
+        [np.column_stack([corners @ turn.T, np.full(4, v)]) for v in (0.5, 1.5)]
+    )
+    with pytest.raises(
+        szlib.ZoneError, match=r"at 1\.1 m/s is undefined: no person was seen"
+    ) as error:
         slice_hull(box, 1.1, r_max=R_MAX)
     low, high = missing_directions(str(error.value))
     assert max(abs(low), abs(high)) <= 180
@@ -205,7 +243,9 @@ def test_the_missing_directions_are_those_that_miss_the_slice(towards: int) -> N
         direction = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
         missing = 1 < (degrees - low) % 360 < (high - low) % 360 - 1
         met = polygon.intersects(LineString([(0, 0), 9 * direction]))
-        near_an_end = min(abs((degrees - end + 180) % 360 - 180) for end in (low, high)) < 1
+        near_an_end = (
+            min(abs((degrees - end + 180) % 360 - 180) for end in (low, high)) < 1
+        )
         assert near_an_end or missing != met
 
 
@@ -217,7 +257,9 @@ def test_the_missing_directions_are_those_that_miss_the_slice(towards: int) -> N
         ([(-1, -0.5), (-0.2, 0), (-1, 0.5)], -153, 153),
     ],
 )
-def test_origin_on_or_outside_the_rim_is_undefined(corners: list, low: int, high: int) -> None:
+def test_origin_on_or_outside_the_rim_is_undefined(
+    corners: list, low: int, high: int
+) -> None:
     with pytest.raises(szlib.ZoneError) as error:
         Slice(np.array(corners, float), 1.1, R_MAX)
     assert missing_directions(str(error.value)) == (low, high)

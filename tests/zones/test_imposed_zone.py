@@ -39,19 +39,29 @@ def entering(tracks: pd.DataFrame, samples: pd.DataFrame) -> set[int]:
     rows = match_rows(tracks, samples)
     inside = np.zeros(len(samples), bool)
     for own, partner in (rows, rows[::-1]):
-        for k, (me, you) in enumerate(zip(own.itertuples(), partner.itertuples(), strict=True)):
+        for k, (me, you) in enumerate(
+            zip(own.itertuples(), partner.itertuples(), strict=True)
+        ):
             placed = ZONE.placed((me.x, me.y), np.arctan2(me.vy, me.vx))
-            inside[k] |= bool(placed.level((you.x, you.y)) < 1) and np.hypot(me.vx, me.vy) >= 0.4
+            inside[k] |= (
+                bool(placed.level((you.x, you.y)) < 1) and np.hypot(me.vx, me.vy) >= 0.4
+            )
     return set(pairs_of(samples)[inside])
 
 
-def test_nobody_within_the_zone_remains_and_everybody_else_does(tracks: pd.DataFrame) -> None:
+def test_nobody_within_the_zone_remains_and_everybody_else_does(
+    tracks: pd.DataFrame,
+) -> None:
     shifted = szlib.time_shifted(tracks, seed=2, minutes=MINUTES)
     everybody = szlib.find_encounters(shifted, settings=SETTINGS, kinds="crossing")
     expected = entering(shifted, everybody)
     assert len(expected) > 20
-    imposed = szlib.impose_zone(tracks, ZONE, seed=2, minutes=MINUTES, settings=SETTINGS, kinds="crossing")
-    pd.testing.assert_frame_equal(imposed, everybody[~pairs_of(everybody).isin(expected)])
+    imposed = szlib.impose_zone(
+        tracks, ZONE, seed=2, minutes=MINUTES, settings=SETTINGS, kinds="crossing"
+    )
+    pd.testing.assert_frame_equal(
+        imposed, everybody[~pairs_of(everybody).isin(expected)]
+    )
     stage = funnels.get(imposed)[-1]
     assert stage["entered"] == everybody["encounter"].nunique()
     assert stage["kept"] == imposed["encounter"].nunique()
@@ -76,7 +86,9 @@ def test_careless_share_is_recovered_and_nested(paired: PairedSamples) -> None:
         return inside & set(paired.pair[np.isin(paired.samples.index, kept.index)])
 
     shares = [len(careless_pairs(0.2, seed)) / len(inside) for seed in range(40)]
-    assert np.mean(shares) == pytest.approx(0.2, abs=4 * np.sqrt(0.16 / 40 / len(inside)))
+    assert np.mean(shares) == pytest.approx(
+        0.2, abs=4 * np.sqrt(0.16 / 40 / len(inside))
+    )
     assert careless_pairs(0.1, 3) < careless_pairs(0.3, 3)
     assert careless_pairs(0.3, 3) != careless_pairs(0.3, 4)
     assert careless_pairs(0.0, 3) == set()
@@ -90,7 +102,9 @@ def test_both_orders_of_a_pair_share_their_fate(paired: PairedSamples) -> None:
     for seed in range(10):
         kept = paired.impose(ZONE, careless=0.5, seed=seed).index
         removed = people.index.difference(kept)
-        assert set(both.reindex(removed).dropna()), "pairs in both orders are among the removed"
+        assert set(both.reindex(removed).dropna()), (
+            "pairs in both orders are among the removed"
+        )
         assert not set(people[kept]) & set(people[removed])
 
 
@@ -100,8 +114,12 @@ def test_an_ellipse_of_no_size_removes_nothing(paired: PairedSamples) -> None:
     assert funnels.get(kept)[-1]["rejected"] == {}
 
 
-def test_a_turned_and_moved_world_changes_nothing(tracks: pd.DataFrame, paired: PairedSamples) -> None:
-    turned = tracks.assign(x=30 - tracks["y"], y=tracks["x"] - 7, vx=-tracks["vy"], vy=tracks["vx"])
+def test_a_turned_and_moved_world_changes_nothing(
+    tracks: pd.DataFrame, paired: PairedSamples
+) -> None:
+    turned = tracks.assign(
+        x=30 - tracks["y"], y=tracks["x"] - 7, vx=-tracks["vy"], vy=tracks["vx"]
+    )
     (x0, x1), (y0, y1) = szlib.ATC_SQUARE.x, szlib.ATC_SQUARE.y
     square = szlib.Square(x=(30 - y1, 30 - y0), y=(x0 - 7, x1 - 7))
     found = szlib.impose_zone(
@@ -137,9 +155,13 @@ def test_without_encounters_the_result_is_empty(tracks: pd.DataFrame) -> None:
 
 def test_invalid_arguments_raise(tracks: pd.DataFrame, paired: PairedSamples) -> None:
     for share in (-0.1, 1.1, np.nan):
-        with pytest.raises(szlib.DataError, match=r"careless must be a share of pairs, 0 to 1; got"):
+        with pytest.raises(
+            szlib.DataError, match=r"careless must be a share of pairs, 0 to 1; got"
+        ):
             paired.impose(ZONE, careless=share)
-    with pytest.raises(szlib.ZoneError, match=r"ellipse must be an Ellipse; got \(0.9, 0.6\)"):
+    with pytest.raises(
+        szlib.ZoneError, match=r"ellipse must be an Ellipse; got \(0.9, 0.6\)"
+    ):
         paired.impose((0.9, 0.6))  # type: ignore[arg-type]
     with pytest.raises(szlib.DataError, match="too short for shifts"):
         szlib.impose_zone(tracks, ZONE, minutes=(1, 50))

@@ -49,13 +49,22 @@ def with_intruders(samples: pd.DataFrame, count: int = 5) -> pd.DataFrame:
     """Add a few people who come far too close."""
     rng = np.random.default_rng(9)
     intruders = pd.DataFrame(
-        {"los_angle": np.linspace(-3, 2.5, count), "distance": rng.uniform(0.05, 0.2, count), "speed": 1.0}
+        {
+            "los_angle": np.linspace(-3, 2.5, count),
+            "distance": rng.uniform(0.05, 0.2, count),
+            "speed": 1.0,
+        }
     )
     return pd.concat([samples, intruders], ignore_index=True)
 
 
 def make_encounters(
-    n: int = 600, *, seed: int = 0, edge: float = 0.9, intruders: int = 0, pace: float = 1.5
+    n: int = 600,
+    *,
+    seed: int = 0,
+    edge: float = 0.9,
+    intruders: int = 0,
+    pace: float = 1.5,
 ) -> pd.DataFrame:
     """Straight walks past a person, 31 samples each, none nearer than `edge` but for the first few.
 
@@ -63,14 +72,22 @@ def make_encounters(
     """
     rng = np.random.default_rng(seed)
     intrudes = np.arange(n) < intruders
-    nearest = np.where(intrudes, rng.uniform(0.2, 0.4, n), edge + rng.exponential(0.15, n))
-    bearing = np.where(intrudes, 2 * np.pi * np.arange(n) / max(intruders, 1), rng.uniform(0, 2 * np.pi, n))
+    nearest = np.where(
+        intrudes, rng.uniform(0.2, 0.4, n), edge + rng.exponential(0.15, n)
+    )
+    bearing = np.where(
+        intrudes,
+        2 * np.pi * np.arange(n) / max(intruders, 1),
+        rng.uniform(0, 2 * np.pi, n),
+    )
     along = np.where(intrudes, pace, 1.0)[:, None] * np.arange(-1.5, 1.55, 0.1)
     speed = rng.uniform(0.4, 1.6, n)
     return pd.DataFrame(
         {
             "encounter": np.repeat(np.arange(n), 31),
-            "los_angle": (bearing[:, None] + np.arctan2(along, nearest[:, None])).ravel(),
+            "los_angle": (
+                bearing[:, None] + np.arctan2(along, nearest[:, None])
+            ).ravel(),
             "distance": np.hypot(along, nearest[:, None]).ravel(),
             "speed": np.repeat(speed, 31),
         }
@@ -84,14 +101,20 @@ def make_encounters(
 def test_complementary_plane_is_the_plane_inside_out(r_max: float) -> None:
     samples = close(make_samples())
     points = complementary_points(samples, r_max=r_max)
-    np.testing.assert_allclose(np.hypot(*points.T), r_max - samples["distance"], atol=1e-12)
     np.testing.assert_allclose(
-        np.arctan2(*points.T[::-1])[samples["distance"] < 2], samples["los_angle"], atol=1e-9
+        np.hypot(*points.T), r_max - samples["distance"], atol=1e-12
+    )
+    np.testing.assert_allclose(
+        np.arctan2(*points.T[::-1])[samples["distance"] < 2],
+        samples["los_angle"],
+        atol=1e-9,
     )
 
 
 def test_r_max_maps_to_the_origin_and_contact_to_the_rim() -> None:
-    samples = pd.DataFrame({"los_angle": [1.0, np.pi / 2, np.pi], "distance": [2.0, 0.0, 0.5]})
+    samples = pd.DataFrame(
+        {"los_angle": [1.0, np.pi / 2, np.pi], "distance": [2.0, 0.0, 0.5]}
+    )
     points = complementary_points(samples)
     np.testing.assert_allclose(points, [[0, 0], [0, 2], [-1.5, 0]], atol=1e-12)
 
@@ -111,7 +134,10 @@ def test_samples_without_a_complement_are_refused(change: dict[str, float]) -> N
     row = samples.index[7]
     for name, value in change.items():
         samples.loc[row, name] = value
-    with pytest.raises(szlib.DataError, match=rf"row {row}: got .*; expected 0 <= distance <= r_max = 2.0 m"):
+    with pytest.raises(
+        szlib.DataError,
+        match=rf"row {row}: got .*; expected 0 <= distance <= r_max = 2.0 m",
+    ):
         complementary_points(samples)
 
 
@@ -133,15 +159,21 @@ def brute_force_factors(points: np.ndarray, k: int) -> np.ndarray:
     np.fill_diagonal(distance, np.inf)
     nearest = np.argsort(distance, axis=1)[:, :k]
     reach = np.sort(distance, axis=1)[:, k - 1]
-    reachability = np.maximum(np.take_along_axis(distance, nearest, axis=1), reach[nearest])
+    reachability = np.maximum(
+        np.take_along_axis(distance, nearest, axis=1), reach[nearest]
+    )
     density = 1 / reachability.mean(axis=1)
     return density[nearest].mean(axis=1) / density
 
 
 @pytest.mark.parametrize("k", [5, 20, 60])
 def test_factor_equals_its_definition(k: int) -> None:
-    points = complementary_points(nearest_approaches(close(make_encounters(300, intruders=5))))
-    np.testing.assert_allclose(local_outlier_factors(points, k), brute_force_factors(points, k), rtol=1e-6)
+    points = complementary_points(
+        nearest_approaches(close(make_encounters(300, intruders=5)))
+    )
+    np.testing.assert_allclose(
+        local_outlier_factors(points, k), brute_force_factors(points, k), rtol=1e-6
+    )
 
 
 def test_nearest_approach_is_the_nearest_sample_of_an_encounter() -> None:
@@ -154,7 +186,9 @@ def test_nearest_approach_is_the_nearest_sample_of_an_encounter() -> None:
 @pytest.mark.parametrize("pace", [0.2, 3.0])
 @pytest.mark.parametrize("intruders", [0, 1, 6, 12, 30])
 @pytest.mark.parametrize("seed", range(3))
-def test_intruders_are_found_whatever_their_number_and_pace(seed: int, intruders: int, pace: float) -> None:
+def test_intruders_are_found_whatever_their_number_and_pace(
+    seed: int, intruders: int, pace: float
+) -> None:
     """Up to 5 % of the encounters; no other encounter is removed."""
     samples = make_encounters(seed=seed, intruders=intruders, pace=pace)
     assert removed_encounters(samples) == set(range(intruders))
@@ -163,7 +197,8 @@ def test_intruders_are_found_whatever_their_number_and_pace(seed: int, intruders
 def test_fixed_share_misses_slow_intruders() -> None:
     samples = make_encounters(intruders=6, pace=0.2)
     near = close(samples)
-    by_quota = is_outlier(near, fraction=6 * 31 / len(near))  # the very number, were they known
+    # the very number, were they known
+    by_quota = is_outlier(near, fraction=6 * 31 / len(near))
     assert by_quota[near["encounter"] < 6].mean() < 0.5
     assert is_outlier(near)[near["encounter"] < 6].all()
 
@@ -173,7 +208,9 @@ def test_middle_of_a_crowd_is_found_in_a_later_round() -> None:
     samples = make_encounters(2000, intruders=100)
     samples.loc[samples["encounter"] < 100, "los_angle"] *= 0.25
     nearest = nearest_approaches(close(samples))
-    once = local_outlier_factors(complementary_points(nearest), 40)[:100] > OUTLIER_FACTOR
+    once = (
+        local_outlier_factors(complementary_points(nearest), 40)[:100] > OUTLIER_FACTOR
+    )
     assert not once.all()
     assert set(range(100)) <= removed_encounters(samples)
 
@@ -188,7 +225,9 @@ def test_distant_encounters_are_no_outliers() -> None:
 
 
 @pytest.mark.parametrize(("factor", "is_removed"), [(1.9, False), (2.1, True)])
-def test_an_encounter_is_an_outlier_above_a_factor_of_two(factor: float, is_removed: bool) -> None:
+def test_an_encounter_is_an_outlier_above_a_factor_of_two(
+    factor: float, is_removed: bool
+) -> None:
     ring = make_samples(300, nearest=0.9, farthest=1.1)
 
     def with_one_at(distance: float) -> pd.DataFrame:
@@ -196,7 +235,9 @@ def test_an_encounter_is_an_outlier_above_a_factor_of_two(factor: float, is_remo
         return pd.concat([ring, one], ignore_index=True).assign(encounter=range(301))
 
     def factor_at(distance: float) -> float:
-        return local_outlier_factors(complementary_points(with_one_at(distance)), N_NEIGHBOURS)[-1]
+        return local_outlier_factors(
+            complementary_points(with_one_at(distance)), N_NEIGHBOURS
+        )[-1]
 
     distance = brentq(lambda d: factor_at(d) - factor, 0.5, 0.9, xtol=1e-4)
     assert removed_encounters(with_one_at(distance)) == ({300} if is_removed else set())
@@ -206,7 +247,9 @@ def test_number_of_neighbours_is_a_share_of_the_encounters() -> None:
     samples = make_encounters(2000, intruders=40)
     expected = math.ceil(NEIGHBOUR_SHARE * samples["encounter"].nunique())
     assert expected > N_NEIGHBOURS
-    assert removed_encounters(samples) == removed_encounters(samples, n_neighbours=expected)
+    assert removed_encounters(samples) == removed_encounters(
+        samples, n_neighbours=expected
+    )
     few = make_encounters(300, intruders=5)
     assert removed_encounters(few) == removed_encounters(few, n_neighbours=N_NEIGHBOURS)
 
@@ -220,7 +263,9 @@ def test_numbers_order_and_direction_of_encounters_change_nothing() -> None:
     others = np.random.default_rng(3).permutation(600)
     renumbered = samples.assign(encounter=others[samples["encounter"]])
     assert remove_outliers(renumbered).index.equals(kept.index)
-    named = samples.assign(encounter=samples["encounter"].map("pair {:04}".format).astype("category"))
+    named = samples.assign(
+        encounter=samples["encounter"].map("pair {:04}".format).astype("category")
+    )
     assert remove_outliers(named).index.equals(kept.index)
     turned = remove_outliers(samples.assign(los_angle=samples["los_angle"] + 1.1))
     assert turned.index.equals(kept.index)
@@ -233,7 +278,9 @@ def test_unique_speed_is_an_outlier_if_speed_counts() -> None:
     near = samples["encounter"] == samples["encounter"][samples["distance"].idxmin()]
     samples.loc[near, "speed"] = 6.0
     assert removed_encounters(samples) == set()
-    assert removed_encounters(samples, speed_scale=1.0) == set(samples.loc[near, "encounter"])
+    assert removed_encounters(samples, speed_scale=1.0) == set(
+        samples.loc[near, "encounter"]
+    )
 
 
 def test_the_funnel_counts_the_samples_of_outlying_encounters() -> None:
@@ -247,7 +294,10 @@ def test_the_funnel_counts_the_samples_of_outlying_encounters() -> None:
 
 def test_few_encounters_warn_and_stay() -> None:
     few = make_encounters(N_NEIGHBOURS, intruders=1)
-    with pytest.warns(szlib.DataWarning, match=r"20 encounters are too few to find outliers .* add data"):
+    with pytest.warns(
+        szlib.DataWarning,
+        match=r"20 encounters are too few to find outliers .* add data",
+    ):
         kept = remove_outliers(few)
     assert len(kept) == len(close(few))
     remove_outliers(few, n_neighbours=5)  # asked for, so without a warning
@@ -256,14 +306,22 @@ def test_few_encounters_warn_and_stay() -> None:
 def test_copies_of_an_encounter_count_once() -> None:
     """Or a denser place than any other would make outliers of all around it."""
     samples = make_encounters(intruders=5)
-    copies = pd.concat([samples.query("encounter == 77").assign(encounter=1000 + k) for k in range(200)])
+    copies = pd.concat(
+        [
+            samples.query("encounter == 77").assign(encounter=1000 + k)
+            for k in range(200)
+        ]
+    )
     both = pd.concat([samples, copies], ignore_index=True)
     assert removed_encounters(both) == removed_encounters(samples) >= set(range(5))
 
 
 def test_encounters_of_different_days_are_separate() -> None:
     """Otherwise, an intruder would remove the encounter with the same number on another day."""
-    days = [make_encounters(seed=k, intruders=6 * k).assign(day=f"2012-11-0{k + 1}") for k in range(2)]
+    days = [
+        make_encounters(seed=k, intruders=6 * k).assign(day=f"2012-11-0{k + 1}")
+        for k in range(2)
+    ]
     both = pd.concat(days, ignore_index=True)
     near = close(both)
     found = near[is_outlier(near)]
@@ -275,12 +333,15 @@ def test_samples_without_encounter_count_individually() -> None:
     samples = with_intruders(close(make_samples(2500)))
     found = is_outlier(samples)
     assert np.flatnonzero(found).tolist() == list(range(len(samples) - 5, len(samples)))
-    np.testing.assert_array_equal(found, is_outlier(samples.assign(encounter=range(len(samples)))))
+    np.testing.assert_array_equal(
+        found, is_outlier(samples.assign(encounter=range(len(samples))))
+    )
 
 
 def test_too_many_neighbours_are_refused() -> None:
     with pytest.raises(
-        szlib.DataError, match=r"smaller than the number of samples \(or encounters\) .* got 600 neigh"
+        szlib.DataError,
+        match=r"smaller than the number of samples \(or encounters\) .* got 600 neigh",
     ):
         remove_outliers(make_encounters(), n_neighbours=600)
 
@@ -296,7 +357,9 @@ def test_real_day_has_no_outliers(real_samples: pd.DataFrame) -> None:
 @pytest.mark.parametrize("speed_scale", [None, 0.5])
 @pytest.mark.parametrize("neighbours", [5, 20])
 @pytest.mark.parametrize("fraction", [0.002, 0.05])
-def test_outliers_equal_scikit_learn(fraction: float, neighbours: int, speed_scale: float | None) -> None:
+def test_outliers_equal_scikit_learn(
+    fraction: float, neighbours: int, speed_scale: float | None
+) -> None:
     samples = close(make_samples())
     radius, angle = 2 - samples["distance"], samples["los_angle"]
     features = [radius * np.cos(angle), radius * np.sin(angle)]
@@ -304,7 +367,9 @@ def test_outliers_equal_scikit_learn(fraction: float, neighbours: int, speed_sca
         features.append(speed_scale * samples["speed"])
     lof = LocalOutlierFactor(n_neighbors=neighbours, contamination=fraction)
     expected = lof.fit_predict(np.column_stack(features)) == -1
-    found = is_outlier(samples, fraction=fraction, n_neighbours=neighbours, speed_scale=speed_scale)
+    found = is_outlier(
+        samples, fraction=fraction, n_neighbours=neighbours, speed_scale=speed_scale
+    )
     np.testing.assert_array_equal(found, expected)
 
 
@@ -330,7 +395,9 @@ def test_row_order_and_rotation_change_nothing() -> None:
     kept = remove_outliers(samples, fraction=0.01)
     shuffled = remove_outliers(samples.sample(frac=1, random_state=1), fraction=0.01)
     pd.testing.assert_frame_equal(shuffled.sort_index(), kept)
-    turned = remove_outliers(samples.assign(los_angle=samples["los_angle"] + 1.1), fraction=0.01)
+    turned = remove_outliers(
+        samples.assign(los_angle=samples["los_angle"] + 1.1), fraction=0.01
+    )
     assert turned.index.equals(kept.index)
 
 
@@ -351,12 +418,16 @@ def test_rows_and_input_do_not_change() -> None:
 
 def test_identical_samples_warn_and_are_separated() -> None:
     samples = pd.concat(
-        [close(make_samples(600)), close(make_samples(30))] + [close(make_samples(30)).head(1)] * 40
+        [close(make_samples(600)), close(make_samples(30))]
+        + [close(make_samples(30)).head(1)] * 40
     )
-    with pytest.warns(szlib.DataWarning, match=r"up to 4\d samples coincide.*1 mm of noise"):
+    with pytest.warns(
+        szlib.DataWarning, match=r"up to 4\d samples coincide.*1 mm of noise"
+    ):
         kept = remove_outliers(samples, fraction=0.05)
     assert not kept.empty
-    assert set(kept["distance"]) <= set(samples["distance"])  # the noise is for LOF only
+    # the noise is for LOF only
+    assert set(kept["distance"]) <= set(samples["distance"])
     with pytest.warns(szlib.DataWarning):
         pd.testing.assert_frame_equal(remove_outliers(samples, fraction=0.05), kept)
     assert JITTER < 0.01
@@ -375,16 +446,25 @@ def test_a_few_identical_samples_need_no_noise() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"fraction": -0.1}, r"fraction must be within \[0, 0.5\], or None .*; got -0.1"),
+        (
+            {"fraction": -0.1},
+            r"fraction must be within \[0, 0.5\], or None .*; got -0.1",
+        ),
         ({"fraction": 0.6}, "got 0.6"),
         ({"fraction": np.nan}, "got nan"),
         ({"r_max": 0}, "r_max must be a positive distance"),
         ({"r_max": np.nan}, "r_max must be a positive distance"),
         ({"r_max": np.inf}, "r_max must be a positive distance"),
-        ({"r_max": 0.5}, r"none of 1000 samples is within r_max = 0.5 m \(nearest: 0.90 m\)"),
+        (
+            {"r_max": 0.5},
+            r"none of 1000 samples is within r_max = 0.5 m \(nearest: 0.90 m\)",
+        ),
         ({"n_neighbours": 0}, "got 0 neighbours"),
         ({"n_neighbours": 2.5}, "got 2.5 neighbours"),
-        ({"n_neighbours": 1000}, r"got 1000 neighbours, \d+ samples; add data, or pass a smaller"),
+        (
+            {"n_neighbours": 1000},
+            r"got 1000 neighbours, \d+ samples; add data, or pass a smaller",
+        ),
         ({"speed_scale": 0}, "speed_scale must be a positive number"),
         ({"speed_scale": np.nan}, "speed_scale must be a positive number"),
     ],
@@ -400,12 +480,22 @@ def test_invalid_samples_are_refused() -> None:
         remove_outliers(samples.drop(columns="distance"))
     with pytest.raises(szlib.DataError, match="the table is empty"):
         remove_outliers(samples.iloc[:0])
-    with pytest.raises(szlib.DataError, match=r"row 4: got .*nan.*; expected a distance"):
-        remove_outliers(samples.assign(distance=samples["distance"].where(samples.index != 4)))
-    with pytest.raises(szlib.DataError, match=r"row \d+: got .*nan.*; expected a finite speed"):
-        remove_outliers(samples.assign(speed=np.nan), fraction=FRACTION, speed_scale=1.0)
+    with pytest.raises(
+        szlib.DataError, match=r"row 4: got .*nan.*; expected a distance"
+    ):
+        remove_outliers(
+            samples.assign(distance=samples["distance"].where(samples.index != 4))
+        )
+    with pytest.raises(
+        szlib.DataError, match=r"row \d+: got .*nan.*; expected a finite speed"
+    ):
+        remove_outliers(
+            samples.assign(speed=np.nan), fraction=FRACTION, speed_scale=1.0
+        )
     with pytest.raises(szlib.DataError, match=r"columns \['speed'\] are missing"):
-        remove_outliers(samples.drop(columns="speed"), fraction=FRACTION, speed_scale=1.0)
+        remove_outliers(
+            samples.drop(columns="speed"), fraction=FRACTION, speed_scale=1.0
+        )
 
 
 def test_fixed_share_is_removed_from_the_real_day(real_samples: pd.DataFrame) -> None:

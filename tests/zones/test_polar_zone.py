@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 import szlib
-from szlib.zones.polar import DIRECTIONS, PolarZone, _parametric_reach, ellipse_reach, fill_gaps, fit_ellipses
+from szlib.zones.polar import (
+    DIRECTIONS,
+    PolarZone,
+    _parametric_reach,
+    ellipse_reach,
+    fill_gaps,
+    fit_ellipses,
+)
 
 KNOWN = np.array(
     [
@@ -29,9 +36,13 @@ def same(found: np.ndarray, expected: np.ndarray, metres: float) -> None:
 def test_the_reach_of_an_ellipse_ends_on_it() -> None:
     for row, reach in zip(KNOWN, ellipse_reach(KNOWN), strict=True):
         ellipse = szlib.Ellipse(row[:2], row[2:4], row[4])
-        points = reach[:, None] * np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+        points = reach[:, None] * np.column_stack(
+            [np.cos(DIRECTIONS), np.sin(DIRECTIONS)]
+        )
         np.testing.assert_allclose(ellipse.level(points), 1, rtol=1e-12)
-    assert np.isnan(ellipse_reach(np.array([2.0, 0.0, 1.0, 0.5, 0.0]))).all()  # the person is outside
+    assert np.isnan(
+        ellipse_reach(np.array([2.0, 0.0, 1.0, 0.5, 0.0]))
+    ).all()  # the person is outside
 
 
 def test_the_slope_of_the_reach_is_that_of_small_changes() -> None:
@@ -39,8 +50,12 @@ def test_the_slope_of_the_reach_is_that_of_small_changes() -> None:
     unit = np.column_stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
     slope = _parametric_reach(parameters, unit)[1]
     for k, small in enumerate(1e-6 * np.eye(5)):
-        ends = [_parametric_reach(parameters + sign * small, unit)[0] for sign in (1, -1)]
-        np.testing.assert_allclose(slope[..., k], (ends[0] - ends[1]) / 2e-6, rtol=1e-6, atol=1e-8)
+        ends = [
+            _parametric_reach(parameters + sign * small, unit)[0] for sign in (1, -1)
+        ]
+        np.testing.assert_allclose(
+            slope[..., k], (ends[0] - ends[1]) / 2e-6, rtol=1e-6, atol=1e-8
+        )
 
 
 def test_fit_recovers_an_ellipse_from_its_radii() -> None:
@@ -58,7 +73,9 @@ def test_no_ellipse_is_nearer_to_noisy_radii() -> None:
 
 
 @pytest.mark.parametrize("turn", [1, 18, 36, -25])
-def test_turned_mirrored_and_scaled_radii_give_turned_mirrored_and_scaled_ellipses(turn: int) -> None:
+def test_turned_mirrored_and_scaled_radii_give_turned_mirrored_and_scaled_ellipses(
+    turn: int,
+) -> None:
     rng = np.random.default_rng(0)
     radii = ellipse_reach(KNOWN[:1]) * rng.uniform(0.9, 1.1, (1, len(DIRECTIONS)))
     m, n, a, b, angle = fit_ellipses(radii)[0]
@@ -66,7 +83,11 @@ def test_turned_mirrored_and_scaled_radii_give_turned_mirrored_and_scaled_ellips
     cos, sin = np.cos(theta), np.sin(theta)
     turned = np.array([[m * cos - n * sin, m * sin + n * cos, a, b, angle + theta]])
     same(fit_ellipses(np.roll(radii, turn, axis=1)), turned, 1e-8)
-    same(fit_ellipses(np.roll(radii[:, ::-1], 1, axis=1)), np.array([[m, -n, a, b, -angle]]), 1e-8)
+    same(
+        fit_ellipses(np.roll(radii[:, ::-1], 1, axis=1)),
+        np.array([[m, -n, a, b, -angle]]),
+        1e-8,
+    )
     same(fit_ellipses(3 * radii), np.array([[3 * m, 3 * n, 3 * a, 3 * b, angle]]), 1e-7)
 
 
@@ -87,7 +108,9 @@ def test_gap_of_half_a_turn_is_undefined_and_named() -> None:
     radii = ellipse_reach(KNOWN[:1])
     radii[0, 10:50] = np.nan
     zone = PolarZone(np.array([1.1]), DIRECTIONS, radii)
-    with pytest.raises(szlib.ZoneError, match=r"at 1\.1 m/s .* from -135 counter-clockwise to 70 deg"):
+    with pytest.raises(
+        szlib.ZoneError, match=r"at 1\.1 m/s .* from -135 counter-clockwise to 70 deg"
+    ):
         zone.ellipse(1.1)
     assert np.isnan(zone.boundary(1.1, np.radians([0.0]))).all()
     assert np.isfinite(zone.boundary(1.1, np.radians([100.0]))).all()
@@ -99,12 +122,16 @@ def test_gap_of_half_a_turn_is_undefined_and_named() -> None:
 
 
 def test_between_speeds_radii_are_linear() -> None:
-    zone = PolarZone(np.array([0.5, 1.5]), DIRECTIONS, np.array([np.full(72, 0.8), np.full(72, 1.0)]))
+    zone = PolarZone(
+        np.array([0.5, 1.5]), DIRECTIONS, np.array([np.full(72, 0.8), np.full(72, 1.0)])
+    )
     np.testing.assert_allclose(zone.radii_at(1.0), 0.9)
     np.testing.assert_array_equal(zone.radii_at(1.5), 1.0)
     np.testing.assert_allclose(np.hypot(*zone.boundary(0.75, DIRECTIONS).T), 0.85)
     for speed in (0.4, 1.6, np.nan):
-        with pytest.raises(szlib.ZoneError, match=r"undefined: it was fitted for 0\.5 to 1\.5 m/s"):
+        with pytest.raises(
+            szlib.ZoneError, match=r"undefined: it was fitted for 0\.5 to 1\.5 m/s"
+        ):
             zone.radii_at(speed)
 
 
@@ -119,7 +146,9 @@ def test_between_speeds_radii_are_linear() -> None:
         ([1.0], [0.0], [[-1.0]], "must not be negative; got -1"),
     ],
 )
-def test_invalid_radii_are_refused(speeds: list, directions: list, radii: list, message: str) -> None:
+def test_invalid_radii_are_refused(
+    speeds: list, directions: list, radii: list, message: str
+) -> None:
     with pytest.raises(szlib.ZoneError, match=message):
         PolarZone(np.array(speeds), np.array(directions), np.array(radii))
 
@@ -127,16 +156,24 @@ def test_invalid_radii_are_refused(speeds: list, directions: list, radii: list, 
 @pytest.mark.parametrize(("speeds", "directions"), [((), (0.0, 1.0)), ((1.1,), ())])
 def test_a_zone_without_radii_is_refused(speeds: tuple, directions: tuple) -> None:
     radii = np.zeros((len(speeds), len(directions)))
-    with pytest.raises(szlib.ZoneError, match=r"radii must have shape \(speeds, directions\)"):
+    with pytest.raises(
+        szlib.ZoneError, match=r"radii must have shape \(speeds, directions\)"
+    ):
         PolarZone(speeds=speeds, directions=directions, radii=radii)
 
 
 def test_the_boundary_is_linear_between_directions_all_around() -> None:
     directions = np.radians([-120.0, -30.0, 60.0, 150.0])
-    zone = PolarZone(speeds=[1.0, 2.0], directions=directions, radii=[[1.0, 2.0, 3.0, 4.0], [3.0] * 4])
+    zone = PolarZone(
+        speeds=[1.0, 2.0],
+        directions=directions,
+        radii=[[1.0, 2.0, 3.0, 4.0], [3.0] * 4],
+    )
     theta = np.radians([-120.0, -75.0, 60.0, 105.0, 195.0, 217.5, -150.0])
     expected = [1.0, 1.5, 3.0, 3.5, 2.5, 1.75, 2.0]
     found = zone.boundary(1.0, theta)
     np.testing.assert_allclose(np.hypot(*found.T), expected)
-    np.testing.assert_allclose(found, np.array(expected)[:, None] * np.c_[np.cos(theta), np.sin(theta)])
+    np.testing.assert_allclose(
+        found, np.array(expected)[:, None] * np.c_[np.cos(theta), np.sin(theta)]
+    )
     np.testing.assert_allclose(zone.radii_at(1.5), [2.0, 2.5, 3.0, 3.5])

@@ -18,10 +18,17 @@ BCG = """
 4 119 11 128; 6 300 29 274; 3 228 11 209; 62 13536 248 12619; 33 5036 47 5761; 180 1361 372 1079;
 8 2537 10 619; 505 87886 499 87892; 29 7470 45 7232; 17 1699 65 1600; 186 50448 141 27197; 5 2493 3 2338;
 27 16886 29 17825"""
-SITES = {"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4), "lab": (0.6, 0.5, 0.7), "yard": (1.0, 0.7, 1.4)}
+SITES = {
+    "hall": (0.9, 0.8, 1.0),
+    "mall": (1.2, 1.0, 1.4),
+    "lab": (0.6, 0.5, 0.7),
+    "yard": (1.0, 0.7, 1.4),
+}
 
 
-def triples(y: NDArray[np.float64], errors: NDArray[np.float64]) -> dict[str, tuple[float, float, float]]:
+def triples(
+    y: NDArray[np.float64], errors: NDArray[np.float64]
+) -> dict[str, tuple[float, float, float]]:
     pairs = zip(y, errors, strict=True)
     return {f"{i}": (v, v - Z * e, v + Z * e) for i, (v, e) in enumerate(pairs)}
 
@@ -33,20 +40,37 @@ def numbers(pooled: szlib.Pooled) -> list[float]:
 def test_bcg_trials_give_the_published_numbers() -> None:
     """tau^2 = 0.318 by Paule and Mandel; by restricted likelihood it is 0.313, with mean -0.7145."""
     a, b, c, d = np.array([row.split() for row in BCG.split(";")], float).T
-    ratio, variance = np.log(a / (a + b) / (c / (c + d))), 1 / a - 1 / (a + b) + 1 / c - 1 / (c + d)
+    ratio, variance = (
+        np.log(a / (a + b) / (c / (c + d))),
+        1 / a - 1 / (a + b) + 1 / c - 1 / (c + d),
+    )
     pooled = szlib.pool(triples(ratio, np.sqrt(variance)), quantity="center_x")
     assert pooled.tau**2 == pytest.approx(0.318, abs=5e-4)
     assert pooled.mean == pytest.approx(-0.715, abs=5e-4)
     standard = 1 / np.sqrt((1 / (variance + pooled.tau**2)).sum())
     assert pooled.high - pooled.mean == pytest.approx(stats.t.ppf(0.975, 12) * standard)
-    likelihood = {tau2: restricted_likelihood(ratio, variance, tau2) for tau2 in np.arange(0.2, 0.5, 0.0001)}
-    assert max(likelihood, key=lambda tau2: likelihood[tau2]) == pytest.approx(0.3132, abs=1e-4)
+    likelihood = {
+        tau2: restricted_likelihood(ratio, variance, tau2)
+        for tau2 in np.arange(0.2, 0.5, 0.0001)
+    }
+    assert max(likelihood, key=lambda tau2: likelihood[tau2]) == pytest.approx(
+        0.3132, abs=1e-4
+    )
 
 
-def restricted_likelihood(y: NDArray[np.float64], variance: NDArray[np.float64], tau2: float) -> float:
+def restricted_likelihood(
+    y: NDArray[np.float64], variance: NDArray[np.float64], tau2: float
+) -> float:
     weight = 1 / (variance + tau2)
     mean = (weight * y).sum() / weight.sum()
-    return float(np.log(weight).sum() - np.log(weight.sum()) - (weight * (y - mean) ** 2).sum()) / 2
+    return (
+        float(
+            np.log(weight).sum()
+            - np.log(weight.sum())
+            - (weight * (y - mean) ** 2).sum()
+        )
+        / 2
+    )
 
 
 def test_equal_errors_give_the_interval_of_the_ordinary_t_test() -> None:
@@ -61,7 +85,9 @@ def test_equal_errors_give_the_interval_of_the_ordinary_t_test() -> None:
 
 
 def test_sites_that_differ_less_than_by_chance_have_one_value() -> None:
-    pooled = szlib.pool({"a": (1.0, 0.5, 1.5), "b": (1.01, 0.5, 1.5), "c": (0.99, 0.9, 1.1)})
+    pooled = szlib.pool(
+        {"a": (1.0, 0.5, 1.5), "b": (1.01, 0.5, 1.5), "c": (0.99, 0.9, 1.1)}
+    )
     assert pooled.tau == 0
     assert pooled.table["weight"].iloc[2] > 0.8
 
@@ -72,7 +98,10 @@ def test_intervals_hold_mean_and_new_site(k: int, tau: float) -> None:
     for _ in range(n):
         errors = np.exp(rng.normal(np.log(0.1), 0.4, k))
         y = rng.normal(0, tau, k) + rng.normal(0, errors)
-        pooled, new = szlib.pool(triples(y, errors), quantity="center_x"), rng.normal(0, tau)
+        pooled, new = (
+            szlib.pool(triples(y, errors), quantity="center_x"),
+            rng.normal(0, tau),
+        )
         held += [pooled.low < 0 < pooled.high, pooled.new_low < new < pooled.new_high]
     assert (held / n >= 0.9).all() and (held / n <= 0.98).all(), held / n
 
@@ -106,17 +135,30 @@ def test_offsets_of_the_centre_move_with_their_origin() -> None:
 
 def zone(seed: int, n_resamples: int = 30) -> szlib.SocialZone:
     rng, n = np.random.default_rng(seed), 600
-    table = {"encounter": np.arange(n), "los_angle": rng.uniform(-np.pi, np.pi, n), "speed": 1.1}
+    table = {
+        "encounter": np.arange(n),
+        "los_angle": rng.uniform(-np.pi, np.pi, n),
+        "speed": 1.1,
+    }
     samples = pd.DataFrame(table).assign(distance=rng.uniform(0.9, 2.5, n))
     return szlib.SocialZone.fit(samples, speeds=[1.1], n_resamples=n_resamples)
 
 
 def test_zones_are_pooled_by_their_ellipse_and_its_interval() -> None:
     zones = {"first": zone(1), "second": zone(2), "third": zone(3)}
-    for quantity, column in (("radius", "area"), ("a", "a"), ("center_x", "center_x"), ("area", "area")):
+    for quantity, column in (
+        ("radius", "area"),
+        ("a", "a"),
+        ("center_x", "center_x"),
+        ("area", "area"),
+    ):
         given = {}
         for name, each in zones.items():
-            row = each.table().iloc[0][[column, f"{column}_low", f"{column}_high"]].astype(float)
+            row = (
+                each.table()
+                .iloc[0][[column, f"{column}_low", f"{column}_high"]]
+                .astype(float)
+            )
             given[name] = tuple(np.sqrt(row / np.pi) if quantity == "radius" else row)
         expected = szlib.pool(given, quantity=quantity)
         assert numbers(szlib.pool(zones, quantity=quantity)) == numbers(expected)
@@ -126,7 +168,10 @@ def test_zones_are_pooled_by_their_ellipse_and_its_interval() -> None:
 
 def test_zones_without_an_interval_or_at_other_speeds_are_refused() -> None:
     zones = {"hall": zone(1), "bare": zone(2, n_resamples=0)}
-    with pytest.raises(szlib.ZoneError, match=r"site 'bare': radius at 1.1 m/s: the zone has no interval"):
+    with pytest.raises(
+        szlib.ZoneError,
+        match=r"site 'bare': radius at 1.1 m/s: the zone has no interval",
+    ):
         szlib.pool(zones)
     with pytest.raises(szlib.ZoneError, match=r"site 'hall': .* fitted at \[1.1\] m/s"):
         szlib.pool(zones, speed=0.9)
@@ -161,7 +206,9 @@ def test_it_prints_one_line_with_units() -> None:
         (szlib.Ellipse(center=(0, 0), semi_axes=(1, 0.7)), "expected a SocialZone"),
     ],
 )
-def test_site_without_an_interval_around_its_value_is_named(site: Any, said: str) -> None:
+def test_site_without_an_interval_around_its_value_is_named(
+    site: Any, said: str
+) -> None:
     with pytest.raises(szlib.ZoneError, match="site 'wrong'") as raised:
         szlib.pool({**SITES, "wrong": site})
     assert said in str(raised.value)
@@ -171,5 +218,7 @@ def test_one_site_and_an_unknown_quantity_are_refused() -> None:
     for sites in ({}, {"hall": SITES["hall"]}, [SITES["hall"]] * 2):
         with pytest.raises(szlib.ZoneError, match="two or more sites by name"):
             szlib.pool(sites)  # type: ignore[arg-type]
-    with pytest.raises(szlib.ZoneError, match="'growth' cannot be pooled; expected one of radius"):
+    with pytest.raises(
+        szlib.ZoneError, match="'growth' cannot be pooled; expected one of radius"
+    ):
         szlib.pool(SITES, quantity="growth")

@@ -9,11 +9,19 @@ from helpers.passers import TRUTH, passers
 
 import szlib
 from szlib.zones.polar import DIRECTIONS, ellipse_reach
-from szlib.zones.quantile import SPEED_BAND, Approaches, encounter_numbers, quantile_radii, smooth_paths
+from szlib.zones.quantile import (
+    SPEED_BAND,
+    Approaches,
+    encounter_numbers,
+    quantile_radii,
+    smooth_paths,
+)
 
 
 def ellipse(samples: pd.DataFrame, **options: object) -> np.ndarray:
-    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), n_resamples=0, **options)
+    zone = szlib.SocialZone.fit(
+        samples, method="quantile", speeds=(1.1,), n_resamples=0, **options
+    )
     found = zone.ellipses[1.1]
     return np.array([*found.center, *found.semi_axes, found.angle])
 
@@ -37,14 +45,19 @@ def test_noise_does_not_shrink_the_zone() -> None:
 
 def test_few_intruders_change_little(samples: pd.DataFrame) -> None:
     through = samples["encounter"] % 50 == 0  # 2 %
-    intruders = samples.assign(distance=np.where(through, samples["distance"] / 3, samples["distance"]))
+    intruders = samples.assign(
+        distance=np.where(through, samples["distance"] / 3, samples["distance"])
+    )
     np.testing.assert_allclose(ellipse(intruders)[:4], ellipse(samples)[:4], atol=0.03)
 
 
 def test_at_most_a_share_q_of_encounters_is_nearer(samples: pd.DataFrame) -> None:
     known = Approaches.from_samples(samples, r_max=2.0)
     encounters, nearest = known.nearest(1.1)
-    assert (np.abs(samples.groupby("encounter")["speed"].mean()[encounters] - 1.1) <= SPEED_BAND).all()
+    assert (
+        np.abs(samples.groupby("encounter")["speed"].mean()[encounters] - 1.1)
+        <= SPEED_BAND
+    ).all()
     for q in (0.01, 0.05, 0.3):
         radii = quantile_radii(known, 1.1, q)[0]
         seen = np.isfinite(nearest).sum(axis=0)
@@ -61,17 +74,23 @@ def test_more_may_enter_a_larger_zone(samples: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize("turn", [np.pi / 2, np.radians(35), 1.0])
-def test_rotated_samples_rotate_the_quantile_zone(samples: pd.DataFrame, turn: float) -> None:
+def test_rotated_samples_rotate_the_quantile_zone(
+    samples: pd.DataFrame, turn: float
+) -> None:
     """Exactly by multiples of 5 deg, which the directions are apart; else nearly."""
     m, n, a, b, angle = ellipse(samples)
     cos, sin = np.cos(turn), np.sin(turn)
     expected = [m * cos - n * sin, m * sin + n * cos, a, b]
     found = ellipse(samples.assign(los_angle=samples["los_angle"] + turn))
     np.testing.assert_allclose(found[:4], expected, atol=0.005 if turn == 1.0 else 1e-6)
-    assert abs((found[4] - angle - turn + np.pi / 2) % np.pi - np.pi / 2) < (0.02 if turn == 1.0 else 1e-5)
+    assert abs((found[4] - angle - turn + np.pi / 2) % np.pi - np.pi / 2) < (
+        0.02 if turn == 1.0 else 1e-5
+    )
 
 
-def test_mirrored_people_mirror_the_zone_and_larger_people_enlarge_it(samples: pd.DataFrame) -> None:
+def test_mirrored_people_mirror_the_zone_and_larger_people_enlarge_it(
+    samples: pd.DataFrame,
+) -> None:
     m, n, a, b, angle = ellipse(samples)
     mirrored = ellipse(samples.assign(los_angle=-samples["los_angle"]))
     np.testing.assert_allclose(mirrored, [m, -n, a, b, -angle], atol=1e-6)
@@ -83,16 +102,24 @@ def test_neither_order_nor_numbers_of_encounters_matter(samples: pd.DataFrame) -
     before = samples.copy(deep=True)
     expected = ellipse(samples)
     pd.testing.assert_frame_equal(samples, before)
-    shuffled = samples.sample(frac=1, random_state=0).assign(encounter=lambda d: 7 * d["encounter"] + 3)
+    shuffled = samples.sample(frac=1, random_state=0).assign(
+        encounter=lambda d: 7 * d["encounter"] + 3
+    )
     np.testing.assert_allclose(ellipse(shuffled), expected, atol=1e-9)
     days = samples.assign(day=np.where(samples["encounter"] < 1000, "a", "b"))
-    days["encounter"] = np.where(days["day"] == "a", days["encounter"], days["encounter"] - 1000)
+    days["encounter"] = np.where(
+        days["day"] == "a", days["encounter"], days["encounter"] - 1000
+    )
     np.testing.assert_allclose(ellipse(days), expected, atol=1e-9)
 
 
 def test_weights_equal_copies(samples: pd.DataFrame) -> None:
     known = Approaches.from_samples(samples, r_max=2.0)
-    weights = np.random.default_rng(0).integers(0, 4, (3, len(known.encounters))).astype(float)
+    weights = (
+        np.random.default_rng(0)
+        .integers(0, 4, (3, len(known.encounters)))
+        .astype(float)
+    )
     lines = quantile_radii(known, 1.1, 0.05, weights)
     for weight, line in zip(weights, lines, strict=True):
         first = known.encounters["encounter"].to_numpy()
@@ -103,7 +130,8 @@ def test_weights_equal_copies(samples: pd.DataFrame) -> None:
             ]
         )
         np.testing.assert_array_equal(
-            quantile_radii(Approaches.from_samples(copies, r_max=2.0), 1.1, 0.05)[0], line
+            quantile_radii(Approaches.from_samples(copies, r_max=2.0), 1.1, 0.05)[0],
+            line,
         )
     empty = quantile_radii(known, 1.1, 0.05, np.zeros((1, len(known.encounters))))
     assert np.isnan(empty).all()
@@ -115,7 +143,14 @@ def test_weights_equal_copies(samples: pd.DataFrame) -> None:
 def test_smoothing_keeps_straight_and_evenly_curved_paths() -> None:
     t = np.arange(31) / 10
     x, y = 3 - 1.5 * t + 0.2 * t**2, 0.7 + 0.1 * t - 0.05 * t**2
-    path = pd.DataFrame({"encounter": 0, "t": t, "los_angle": np.arctan2(y, x), "distance": np.hypot(x, y)})
+    path = pd.DataFrame(
+        {
+            "encounter": 0,
+            "t": t,
+            "los_angle": np.arctan2(y, x),
+            "distance": np.hypot(x, y),
+        }
+    )
     angle, distance = smooth_paths(path)
     np.testing.assert_allclose(angle, path["los_angle"], atol=1e-12)
     np.testing.assert_allclose(distance, path["distance"], atol=1e-12)
@@ -126,7 +161,10 @@ def test_smoothing_stops_at_gaps_and_at_other_encounters(samples: pd.DataFrame) 
     gap = some[(some["encounter"] != 1) | ((some["t"] - 10).abs() > 0.25)]
     together = smooth_paths(gap)
     parts = [gap[gap["encounter"] == 0], gap[(gap["encounter"] == 1) & (gap["t"] < 10)]]
-    parts += [gap[(gap["encounter"] == 1) & (gap["t"] > 10)], gap[gap["encounter"] == 2]]
+    parts += [
+        gap[(gap["encounter"] == 1) & (gap["t"] > 10)],
+        gap[gap["encounter"] == 2],
+    ]
     for k in (0, 1):
         np.testing.assert_allclose(
             np.concatenate([smooth_paths(p)[k] for p in parts]), together[k], atol=1e-12
@@ -154,14 +192,26 @@ def test_smoothing_reduces_noise() -> None:
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [
-        ({"speed": np.nan}, szlib.DataError, "row 0: got .*nan.*; expected finite numbers"),
+        (
+            {"speed": np.nan},
+            szlib.DataError,
+            "row 0: got .*nan.*; expected finite numbers",
+        ),
         (
             {"distance": 5.0},
             szlib.DataError,
             "none of 77500 samples is within r_max = 2.0 m",
         ),
-        ({"speed": 3.0}, szlib.ZoneError, r"at 1\.1 m/s is undefined: no person was seen"),
-        ({"los_angle": 0.3}, szlib.ZoneError, r"from 35 counter-clockwise to 360 deg|no speed has a zone"),
+        (
+            {"speed": 3.0},
+            szlib.ZoneError,
+            r"at 1\.1 m/s is undefined: no person was seen",
+        ),
+        (
+            {"los_angle": 0.3},
+            szlib.ZoneError,
+            r"from 35 counter-clockwise to 360 deg|no speed has a zone",
+        ),
     ],
 )
 def test_samples_without_a_quantile_zone_are_refused(
@@ -178,17 +228,26 @@ def test_encounters_are_numbered_in_order_of_appearance() -> None:
     number, first = encounter_numbers(table)
     assert number.tolist() == [0, 0, 1, 2]
     assert first.index.tolist() == [0, 2, 3]
-    assert encounter_numbers(table.drop(columns="encounter"))[0].tolist() == [0, 1, 2, 3]
+    assert encounter_numbers(table.drop(columns="encounter"))[0].tolist() == [
+        0,
+        1,
+        2,
+        3,
+    ]
 
 
 def test_provenance_names_the_sector_in_degrees(samples: pd.DataFrame) -> None:
-    zone = szlib.SocialZone.fit(samples, method="quantile", speeds=(1.1,), n_resamples=0)
+    zone = szlib.SocialZone.fit(
+        samples, method="quantile", speeds=(1.1,), n_resamples=0
+    )
     assert zone.provenance["parameters"]["sector_deg"] == 35
 
 
 def test_radii_are_those_of_the_truth_within_a_sector() -> None:
     """Who touches a nearer part of the rim within 17.5 deg counts as well: so much too small they may be."""
-    radii = quantile_radii(Approaches.from_samples(passers(4000, clearance=1e-6), r_max=2.0), 1.1, 0.02)[0]
+    radii = quantile_radii(
+        Approaches.from_samples(passers(4000, clearance=1e-6), r_max=2.0), 1.1, 0.02
+    )[0]
     truth = ellipse_reach(TRUTH)
     around = np.min([np.roll(truth, turn) for turn in range(-4, 5)], axis=0)
     assert (around - 0.005 < radii).all()

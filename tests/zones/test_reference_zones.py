@@ -17,7 +17,12 @@ def test_each_zone_can_be_kept_by_a_robot_and_says_what_it_rests_on(name: str) -
     a, b = zone.ellipse.semi_axes
     assert 0.2 < b <= a < 2.0
     assert zone.ellipse.level(np.zeros(2)) < 1, "it contains the person"
-    values = {"a": a, "b": b, "center_x": zone.ellipse.center[0], "radius": np.sqrt(a * b)}
+    values = {
+        "a": a,
+        "b": b,
+        "center_x": zone.ellipse.center[0],
+        "radius": np.sqrt(a * b),
+    }
     for quantity, (low, high) in zone.intervals.items():
         assert low - 1e-3 <= values[quantity] <= high + 1e-3, quantity
     assert zone.verdict in ("usable", "undecided")
@@ -30,14 +35,19 @@ def test_each_zone_can_be_kept_by_a_robot_and_says_what_it_rests_on(name: str) -
 
 def test_the_pooled_zone_lies_between_the_sites() -> None:
     names = ("atc-strangers", "grand-central-strangers")
-    sites, shipped = [szlib.reference_zone(name) for name in names], szlib.reference_zone("pooled-strangers")
+    sites, shipped = (
+        [szlib.reference_zone(name) for name in names],
+        szlib.reference_zone("pooled-strangers"),
+    )
     radii = sorted(zone.ellipse.semi_axes[1] for zone in sites)
     assert radii[0] < shipped.ellipse.semi_axes[0] < radii[1]
     assert shipped.n_encounters == sum(zone.n_encounters for zone in sites)
 
 
 def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
-    with pytest.raises(szlib.ZoneError, match=r"name must be one of atc-strangers, .*; got 'atc'"):
+    with pytest.raises(
+        szlib.ZoneError, match=r"name must be one of atc-strangers, .*; got 'atc'"
+    ):
         szlib.reference_zone("atc")
 
 

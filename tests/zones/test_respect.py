@@ -25,9 +25,13 @@ def prepare(samples: pd.DataFrame, null: szlib.NullEncounters) -> RespectEstimat
     return RespectEstimator.from_samples(samples, r_max=R_MAX, null=null)
 
 
-def fitted(samples: pd.DataFrame, null: szlib.NullEncounters, speed: float = 1.1) -> np.ndarray:
+def fitted(
+    samples: pd.DataFrame, null: szlib.NullEncounters, speed: float = 1.1
+) -> np.ndarray:
     """Centre, semi-axes and angle."""
-    return respect_likelihood.zone_ellipses(prepare(samples, null).best[None], [speed])[0, 0]
+    return respect_likelihood.zone_ellipses(prepare(samples, null).best[None], [speed])[
+        0, 0
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +55,9 @@ def estimator(data: pd.DataFrame, null: szlib.NullEncounters) -> RespectEstimato
 
 
 def random_parameters(seed: int) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(0.7 * respect_likelihood._LOW, 0.7 * respect_likelihood._HIGH)
+    return np.random.default_rng(seed).uniform(
+        0.7 * respect_likelihood._LOW, 0.7 * respect_likelihood._HIGH
+    )
 
 
 # --- truth -------------------------------------------------------------------------------------------
@@ -59,21 +65,31 @@ def random_parameters(seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("zone", "careless"),
-    [(ZONE, 0.15), (szlib.Ellipse((-0.1, 0.0), (0.8, 0.6)), 0.05), (szlib.Ellipse((0, 0), (0.5, 0.5)), 0.05)],
+    [
+        (ZONE, 0.15),
+        (szlib.Ellipse((-0.1, 0.0), (0.8, 0.6)), 0.05),
+        (szlib.Ellipse((0, 0), (0.5, 0.5)), 0.05),
+    ],
 )
 def test_an_imposed_zone_is_found(
     zone: szlib.Ellipse, careless: float, large_null: szlib.NullEncounters
 ) -> None:
     """How far it reaches ahead and behind is known less well: few straight paths touch it there."""
-    m, n, a, b, _ = fitted(respecting(passing_pairs(4000, 5), zone, careless), large_null)
+    m, n, a, b, _ = fitted(
+        respecting(passing_pairs(4000, 5), zone, careless), large_null
+    )
     assert (n, b) == pytest.approx((0.0, zone.semi_axes[1]), abs=0.05)
     assert (m, a) == pytest.approx((zone.center[0], zone.semi_axes[0]), abs=0.1)
 
 
-def test_the_zone_grows_with_speed_if_people_do_so(large_null: szlib.NullEncounters) -> None:
+def test_the_zone_grows_with_speed_if_people_do_so(
+    large_null: szlib.NullEncounters,
+) -> None:
     samples = passing_pairs(4000, 7)
     larger = 0.4 + 0.4 * samples[["speed", "other_speed"]].max(axis=1)
-    of_all, of_fast = (samples["encounter"][samples["distance"] < r].unique() for r in (0.84, larger))
+    of_all, of_fast = (
+        samples["encounter"][samples["distance"] < r].unique() for r in (0.84, larger)
+    )
     alike, grown = (
         prepare(samples[~samples["encounter"].isin(entered)], large_null).best[[4, 6]]
         for entered in (of_all, of_fast)
@@ -83,8 +99,12 @@ def test_the_zone_grows_with_speed_if_people_do_so(large_null: szlib.NullEncount
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_people_who_ignore_each_other_have_no_zone(seed: int, null: szlib.NullEncounters) -> None:
-    with pytest.raises(szlib.ZoneError, match=r"no respect zone: .* explain the data nearly as well"):
+def test_people_who_ignore_each_other_have_no_zone(
+    seed: int, null: szlib.NullEncounters
+) -> None:
+    with pytest.raises(
+        szlib.ZoneError, match=r"no respect zone: .* explain the data nearly as well"
+    ):
         fitted(passing_pairs(300, 50 + seed), null)
 
 
@@ -97,7 +117,9 @@ def test_it_does_not_matter_who_is_the_reference(
     half = data["encounter"] % 2 == 0
     mixed = pd.concat([exchanged(data[half]), data[~half]])
     exchange = prepare(mixed, null)
-    found, expected = (Likelihood.of(each.data, each.null) for each in (exchange, estimator))
+    found, expected = (
+        Likelihood.of(each.data, each.null) for each in (exchange, estimator)
+    )
     for seed in range(20):
         p = random_parameters(seed)
         assert found.cost(p)[0] == pytest.approx(expected.cost(p)[0], rel=1e-9)
@@ -107,7 +129,9 @@ def test_a_mirror_image_has_the_mirrored_zone(
     data: pd.DataFrame, null: szlib.NullEncounters, estimator: RespectEstimator
 ) -> None:
     def mirror(samples: pd.DataFrame) -> pd.DataFrame:
-        return samples.assign(**{name: -samples[name] for name in ("los_angle", "other_los_angle")})
+        return samples.assign(
+            **{name: -samples[name] for name in ("los_angle", "other_los_angle")}
+        )
 
     found = fitted(mirror(data), null_of(mirror(null.samples)))
     expected = respect_likelihood.zone_ellipses(estimator.best[None], [1.1])[0, 0]
@@ -119,13 +143,19 @@ def test_the_order_of_rows_does_not_matter(
 ) -> None:
     expected = respect_likelihood.zone_ellipses(estimator.best[None], [1.1])[0, 0]
     found = fitted(data.sample(frac=1, random_state=0), null)
-    assert found == pytest.approx(expected, abs=0.005), "to the accuracy of the optimiser"
+    assert found == pytest.approx(expected, abs=0.005), (
+        "to the accuracy of the optimiser"
+    )
 
 
-def test_a_weight_of_two_is_an_encounter_twice(data: pd.DataFrame, null: szlib.NullEncounters) -> None:
+def test_a_weight_of_two_is_an_encounter_twice(
+    data: pd.DataFrame, null: szlib.NullEncounters
+) -> None:
     few = data[data["encounter"] < 400]
     once = PairPaths.from_samples(few)
-    twice = PairPaths.from_samples(pd.concat([few, few.assign(encounter=few["encounter"] + 10_000)]))
+    twice = PairPaths.from_samples(
+        pd.concat([few, few.assign(encounter=few["encounter"] + 10_000)])
+    )
     model = PairPaths.from_samples(null.samples)
     p = random_parameters(3)
     weighted = Likelihood.of(once, model, np.full(len(once.kind), 2.0)).cost(p)
@@ -137,9 +167,15 @@ def test_a_weight_of_two_is_an_encounter_twice(data: pd.DataFrame, null: szlib.N
 def test_other_kinds_do_not_count(
     data: pd.DataFrame, null: szlib.NullEncounters, estimator: RespectEstimator
 ) -> None:
-    companions = respecting(passing_pairs(200, 9), szlib.Ellipse((0.0, 0.0), (1.5, 1.5)))
-    companions = companions.assign(kind="same direction", encounter=companions["encounter"] + 10_000)
-    assert prepare(pd.concat([data, companions]), null).best == pytest.approx(estimator.best, abs=1e-3)
+    companions = respecting(
+        passing_pairs(200, 9), szlib.Ellipse((0.0, 0.0), (1.5, 1.5))
+    )
+    companions = companions.assign(
+        kind="same direction", encounter=companions["encounter"] + 10_000
+    )
+    assert prepare(pd.concat([data, companions]), null).best == pytest.approx(
+        estimator.best, abs=1e-3
+    )
 
 
 # --- independent computations ------------------------------------------------------------------------
@@ -147,7 +183,8 @@ def test_other_kinds_do_not_count(
 
 @pytest.mark.parametrize("seed", range(3))
 def test_distances_are_those_of_a_loop_over_all_samples(seed: int) -> None:
-    samples = passing_pairs(60, seed).drop(columns="t")  # without times, paths are not smoothed
+    # without times, paths are not smoothed
+    samples = passing_pairs(60, seed).drop(columns="t")
     p = random_parameters(seed)
     p[[0, 1, 2, 7]] /= 2
     p[3:7:2] = np.log([0.9, 0.6])
@@ -163,17 +200,24 @@ def test_distances_are_those_of_a_loop_over_all_samples(seed: int) -> None:
                 if own < WALKING:
                     continue
                 v = own - 1.1
-                at = sample.distance * np.array([np.cos(angle), np.sin(angle)]) - [p[0] + p[1] * v, p[2]]
+                at = sample.distance * np.array([np.cos(angle), np.sin(angle)]) - [
+                    p[0] + p[1] * v,
+                    p[2],
+                ]
                 axes = a * np.exp(p[4] * v), b * np.exp(p[6] * v)
                 norm = np.hypot(at[0] / axes[0], (at[1] - shear * at[0]) / axes[1])
                 found.append((norm, (norm - 1) * np.sqrt(axes[0] * axes[1])))
         expected.append(min(found)[1])
     distances = PairPaths.from_samples(samples).distances(p)[0]
-    assert np.mean(np.abs(distances - expected)) < 0.01, "a sample left out may have been a little nearer"
+    assert np.mean(np.abs(distances - expected)) < 0.01, (
+        "a sample left out may have been a little nearer"
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_the_gradient_is_that_of_finite_differences(seed: int, estimator: RespectEstimator) -> None:
+def test_the_gradient_is_that_of_finite_differences(
+    seed: int, estimator: RespectEstimator
+) -> None:
     weights = np.random.default_rng(seed).random(len(estimator.data.kind))
     likelihood = Likelihood.of(estimator.data, estimator.null, weights)
     p = random_parameters(seed)
@@ -187,7 +231,9 @@ def test_the_likelihood_is_that_of_the_formula(estimator: RespectEstimator) -> N
     h, h_null = (each.distances(p)[0] for each in (estimator.data, estimator.null))
 
     def g(h: float) -> float:
-        return f + (1 - f) * (1 + excess * np.exp(-max(h, 0) / reach)) / (1 + np.exp(-h / w))
+        return f + (1 - f) * (1 + excess * np.exp(-max(h, 0) / reach)) / (
+            1 + np.exp(-h / w)
+        )
 
     for kind in ("opposite", "crossing"):
         mean = np.mean([g(x) for x in h_null[estimator.null.kind == kind]])
@@ -196,7 +242,9 @@ def test_the_likelihood_is_that_of_the_formula(estimator: RespectEstimator) -> N
     assert likelihood.log_ratios(p).sum() == pytest.approx(total)
 
 
-def test_the_posterior_has_the_curvature_of_its_density(estimator: RespectEstimator) -> None:
+def test_the_posterior_has_the_curvature_of_its_density(
+    estimator: RespectEstimator,
+) -> None:
     """Of well determined parameters the standard deviation is that of the Gaussian with this curvature."""
     likelihood = Likelihood.of(estimator.data, estimator.null)
     names, step = [3, 5], 0.02
@@ -220,20 +268,31 @@ def test_intervals_are_those_of_the_posterior(estimator: RespectEstimator) -> No
     at = found.intervals[found.intervals["speed"] == 1.1].set_index("quantity")
     for name, truth in {"a": 0.95, "b": 0.7, "center_x": 0.1, "center_y": 0.0}.items():
         low, high = at.loc[name, ["low", "high"]]
-        assert abs(truth - (low + high) / 2) <= 0.75 * (high - low), f"{name}: three standard deviations"
+        assert abs(truth - (low + high) / 2) <= 0.75 * (high - low), (
+            f"{name}: three standard deviations"
+        )
     of_b = estimator.draws[:, 5]
-    assert at.loc["b", "high"] == pytest.approx(np.exp(np.quantile(of_b, 0.975)), abs=0.03)
+    assert at.loc["b", "high"] == pytest.approx(
+        np.exp(np.quantile(of_b, 0.975)), abs=0.03
+    )
 
 
-def test_the_posterior_is_never_surer_than_the_model_is_right(estimator: RespectEstimator) -> None:
+def test_the_posterior_is_never_surer_than_the_model_is_right(
+    estimator: RespectEstimator,
+) -> None:
     middle = estimator.draws.mean(axis=0)
     for scale in (0.01, 1.0):
         sure = replace(estimator)
         sure.__dict__["draws"] = middle + scale * (estimator.draws - middle)
-        raw, found = respect_likelihood.zone_ellipses(sure.draws, [1.1])[:, 0, :4], sure.posterior([1.1])
+        raw, found = (
+            respect_likelihood.zone_ellipses(sure.draws, [1.1])[:, 0, :4],
+            sure.posterior([1.1]),
+        )
         assert found[:, 0, :4].mean(axis=0) == pytest.approx(raw.mean(axis=0))
         least = np.array([0.05, 0.012, 0.05, 0.012])
-        assert found[:, 0, :4].std(axis=0) == pytest.approx(np.maximum(raw.std(axis=0), least))
+        assert found[:, 0, :4].std(axis=0) == pytest.approx(
+            np.maximum(raw.std(axis=0), least)
+        )
 
 
 # --- the default, and what is refused ----------------------------------------------------------------
@@ -244,10 +303,15 @@ def test_the_default_is_the_quantile_where_the_null_model_is_small_or_shows_no_r
     data: pd.DataFrame, null: szlib.NullEncounters
 ) -> None:
     def method(samples: pd.DataFrame, model: szlib.NullEncounters | None) -> str:
-        return szlib.SocialZone.fit(samples, null=model, speeds=(1.1,), n_resamples=0).method
+        return szlib.SocialZone.fit(
+            samples, null=model, speeds=(1.1,), n_resamples=0
+        ).method
 
     assert method(data, None) == "quantile"
-    assert method(data, null_of(null.samples[null.samples["encounter"] < 1500])) == "quantile"
+    assert (
+        method(data, null_of(null.samples[null.samples["encounter"] < 1500]))
+        == "quantile"
+    )
     assert method(passing_pairs(300, 60), null) == "quantile"
     assert method(data.drop(columns="other_speed"), null) == "quantile"
     assert method(data[data["encounter"] < 200], null) == "quantile"
@@ -260,28 +324,49 @@ def test_a_zone_that_does_not_contain_its_person_is_no_default(
     shifted[[0, 3, 5]] = 0.5, np.log(0.4), np.log(0.4)
     monkeypatch.setattr(RespectEstimator, "best", shifted)
     with pytest.raises(szlib.ZoneError, match="does not contain its person"):
-        szlib.SocialZone.fit(data, method="respect", null=null, speeds=(1.1,), n_resamples=0)
-    assert szlib.SocialZone.fit(data, null=null, speeds=(1.1,), n_resamples=0).method == "quantile"
+        szlib.SocialZone.fit(
+            data, method="respect", null=null, speeds=(1.1,), n_resamples=0
+        )
+    assert (
+        szlib.SocialZone.fit(data, null=null, speeds=(1.1,), n_resamples=0).method
+        == "quantile"
+    )
 
 
-def test_what_cannot_be_compared_is_refused(data: pd.DataFrame, null: szlib.NullEncounters) -> None:
-    with pytest.raises(szlib.ZoneError, match=r"needs a null model; pass null=szlib\.null_encounters"):
+def test_what_cannot_be_compared_is_refused(
+    data: pd.DataFrame, null: szlib.NullEncounters
+) -> None:
+    with pytest.raises(
+        szlib.ZoneError, match=r"needs a null model; pass null=szlib\.null_encounters"
+    ):
         RespectEstimator.from_samples(data, r_max=R_MAX)
-    with pytest.raises(szlib.ZoneError, match=r"r_max is 1\.5 m, that of the null model 2\.0 m"):
+    with pytest.raises(
+        szlib.ZoneError, match=r"r_max is 1\.5 m, that of the null model 2\.0 m"
+    ):
         RespectEstimator.from_samples(data, r_max=1.5, null=null)
-    with pytest.raises(szlib.ZoneError, match=r"0 encounters of the data and \d+ of the null model"):
+    with pytest.raises(
+        szlib.ZoneError, match=r"0 encounters of the data and \d+ of the null model"
+    ):
         prepare(data.assign(distance=3.0), null)
     with pytest.raises(
-        szlib.ZoneError, match="0 encounters of the data and 0 of the null model, of the kinds opposite"
+        szlib.ZoneError,
+        match="0 encounters of the data and 0 of the null model, of the kinds opposite",
     ):
         prepare(data.assign(kind="following"), null)
     with pytest.raises(szlib.DataError, match="other_speed"):
         prepare(data.drop(columns="other_speed"), null)
     with pytest.raises(szlib.DataError, match="finite"):
-        prepare(data.assign(distance=np.where(np.arange(len(data)) == 5, np.nan, data["distance"])), null)
+        prepare(
+            data.assign(
+                distance=np.where(np.arange(len(data)) == 5, np.nan, data["distance"])
+            ),
+            null,
+        )
 
 
-def test_a_person_who_stands_or_has_no_velocity_carries_no_ellipse(data: pd.DataFrame) -> None:
+def test_a_person_who_stands_or_has_no_velocity_carries_no_ellipse(
+    data: pd.DataFrame,
+) -> None:
     few = data[data["encounter"] < 200]
     unknown = few.assign(other_speed=np.nan, other_los_angle=np.nan)
     standing = PairPaths.from_samples(few.assign(other_speed=0.2))

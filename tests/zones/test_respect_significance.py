@@ -19,11 +19,17 @@ SHIFTS = 39
 
 def encounters(seed: int, *shifts: int, n: int = 40, away: float = 0.0) -> pd.DataFrame:
     """`n` single samples of each shift, their nearest approach even between `away` and 3 m."""
-    draws = [np.random.default_rng([seed, k]).uniform([[-3], [away]], 3, (2, n)) for k in shifts]
+    draws = [
+        np.random.default_rng([seed, k]).uniform([[-3], [away]], 3, (2, n))
+        for k in shifts
+    ]
     angle, distance = np.concatenate(draws, axis=1)
     shift = np.repeat(shifts, n)
     table = pd.DataFrame(
-        {"encounter": 1000 * (shift + 1) + np.tile(np.arange(n), len(shifts)), "shift": shift}
+        {
+            "encounter": 1000 * (shift + 1) + np.tile(np.arange(n), len(shifts)),
+            "shift": shift,
+        }
     )
     return table.assign(los_angle=angle, distance=distance, speed=1.0)
 
@@ -62,11 +68,16 @@ def test_different_mix_of_kinds_is_no_respect() -> None:
     def mixed(seed: int, shift: int, crossing: float) -> pd.DataFrame:
         """Encounters of two kinds, a share of them crossing, which come nearer."""
         table = encounters(seed, shift)
-        cross = np.random.default_rng([seed, shift, 1]).uniform(size=len(table)) < crossing
-        table["kind"] = pd.Categorical(
-            np.where(cross, "crossing", "same direction"), categories=["crossing", "same direction"]
+        cross = (
+            np.random.default_rng([seed, shift, 1]).uniform(size=len(table)) < crossing
         )
-        return table.assign(distance=np.where(cross, table["distance"], 1 + table["distance"] / 2))
+        table["kind"] = pd.Categorical(
+            np.where(cross, "crossing", "same direction"),
+            categories=["crossing", "same direction"],
+        )
+        return table.assign(
+            distance=np.where(cross, table["distance"], 1 + table["distance"] / 2)
+        )
 
     by_kind, in_one = [], []
     for seed in range(20):
@@ -85,9 +96,16 @@ def test_attraction_is_no_respect(tmp_path: Path) -> None:
     """A plaza without clearance whose zones are tiny: everybody walks right at everybody."""
     tiny = szlib.Ellipse((0, 0), (0.15, 0.15))
     settings = szlib.PlazaSettings(
-        n_encounters=250, clearance=0, slow_zone=tiny, fast_zone=tiny, intruders=0, together=0
+        n_encounters=250,
+        clearance=0,
+        slow_zone=tiny,
+        fast_zone=tiny,
+        intruders=0,
+        together=0,
     )
-    tracks = szlib.read_tracks(szlib.make_plaza(tmp_path / "plaza.csv", settings=settings))
+    tracks = szlib.read_tracks(
+        szlib.make_plaza(tmp_path / "plaza.csv", settings=settings)
+    )
     null = szlib.null_encounters(tracks, shifts=39, minutes=(1, 6), progress=False)
     test = null_test(szlib.find_encounters(tracks), null)
     assert test.p_value > 0.5
@@ -118,11 +136,17 @@ def test_excluded_encounters_do_not_count() -> None:
     """0.5 m that no two bodies can be within: no respect in that alone."""
     null = null_of(0)
     assert null_test(encounters(1, SHIFTS, n=200, away=0.5), null).is_significant
-    assert not null_test(encounters(1, SHIFTS, n=200, away=0.5), null, excluded_below=0.55).is_significant
-    assert null_test(encounters(1, SHIFTS, n=200, away=1.0), null, excluded_below=0.55).is_significant
+    assert not null_test(
+        encounters(1, SHIFTS, n=200, away=0.5), null, excluded_below=0.55
+    ).is_significant
+    assert null_test(
+        encounters(1, SHIFTS, n=200, away=1.0), null, excluded_below=0.55
+    ).is_significant
 
 
-def test_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.DataFrame) -> None:
+def test_real_day_shows_respect(
+    real_tracks: pd.DataFrame, real_samples: pd.DataFrame
+) -> None:
     null = szlib.null_encounters(real_tracks, shifts=20, progress=False)
     for kinds in ("strangers", KINDS):
         data, model = szlib.of_kind(real_samples, kinds), null.of_kind(kinds)
@@ -137,11 +161,19 @@ def test_real_day_shows_respect(real_tracks: pd.DataFrame, real_samples: pd.Data
 def test_kind_on_one_side_only_warns() -> None:
     null, data = null_of(0), encounters(1, SHIFTS, n=100)
     kind = np.where(np.arange(len(null.encounters)) % 2, "crossing", "opposite")
-    null = szlib.NullEncounters(null.samples, null.encounters.assign(kind=kind), SHIFTS, 2.0)
-    with pytest.warns(DataWarning, match="the data has no encounter of the kind 'opposite'"):
+    null = szlib.NullEncounters(
+        null.samples, null.encounters.assign(kind=kind), SHIFTS, 2.0
+    )
+    with pytest.warns(
+        DataWarning, match="the data has no encounter of the kind 'opposite'"
+    ):
         null_test(data.assign(kind="crossing"), null)
-    mixed = np.where(data["encounter"] % 3 == 0, "standing", np.where(data["encounter"] % 2, *KINDS))
-    with pytest.warns(DataWarning, match="the null model has no encounter of the kind 'standing'"):
+    mixed = np.where(
+        data["encounter"] % 3 == 0, "standing", np.where(data["encounter"] % 2, *KINDS)
+    )
+    with pytest.warns(
+        DataWarning, match="the null model has no encounter of the kind 'standing'"
+    ):
         null_test(data.assign(kind=mixed), null)
 
 

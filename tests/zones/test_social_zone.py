@@ -36,15 +36,26 @@ def distance_to(ellipse: szlib.Ellipse, angles: np.ndarray) -> np.ndarray:
     """From the origin, inside the ellipse, to the ellipse in directions `angles`: a quadratic equation."""
     cos, sin = np.cos(ellipse.angle), np.sin(ellipse.angle)
     turn = np.array([[cos, sin], [-sin, cos]]) / np.reshape(ellipse.semi_axes, (2, 1))
-    away, start = turn @ np.stack([np.cos(angles), np.sin(angles)]), turn @ -np.asarray(ellipse.center)
+    away, start = (
+        turn @ np.stack([np.cos(angles), np.sin(angles)]),
+        turn @ -np.asarray(ellipse.center),
+    )
     a, b, c = np.sum(away**2, axis=0), start @ away, start @ start - 1
     return (-b + np.sqrt(b * b - a * c)) / a
 
 
-def people_around(rim: Callable[[float], np.ndarray], *, speeds: tuple[float, ...] = STEPS) -> pd.DataFrame:
+def people_around(
+    rim: Callable[[float], np.ndarray], *, speeds: tuple[float, ...] = STEPS
+) -> pd.DataFrame:
     """People at just the given distances, all around and at every speed, and others farther away."""
     tables = [
-        pd.DataFrame({"los_angle": ANGLES, "distance": np.minimum(rim(v) + extra, 2.4), "speed": v})
+        pd.DataFrame(
+            {
+                "los_angle": ANGLES,
+                "distance": np.minimum(rim(v) + extra, 2.4),
+                "speed": v,
+            }
+        )
         for v in speeds
         for extra in (0.0, 0.3)
     ]
@@ -57,10 +68,14 @@ def fit(samples: pd.DataFrame, **options: object) -> SocialZone:
 
 
 def fit_around(ellipse: szlib.Ellipse, **options: object) -> SocialZone:
-    return fit(people_around(lambda _: distance_to(ellipse, ANGLES)), fraction=0, **options)
+    return fit(
+        people_around(lambda _: distance_to(ellipse, ANGLES)), fraction=0, **options
+    )
 
 
-def assert_same_ellipse(found: szlib.Ellipse, expected: szlib.Ellipse, metres: float) -> None:
+def assert_same_ellipse(
+    found: szlib.Ellipse, expected: szlib.Ellipse, metres: float
+) -> None:
     np.testing.assert_allclose(found.center, expected.center, rtol=0, atol=metres)
     np.testing.assert_allclose(found.semi_axes, expected.semi_axes, rtol=0, atol=metres)
     a, b = expected.semi_axes
@@ -106,42 +121,60 @@ def test_a_zone_that_shrinks_with_speed_is_recovered() -> None:
     def radius(speed: float) -> float:
         return 1.2 - 0.5 * math.sqrt(speed - 0.3)
 
-    zone = fit(people_around(lambda v: np.full(len(ANGLES), radius(v))), fraction=0, speeds=STEPS[1:-1])
+    zone = fit(
+        people_around(lambda v: np.full(len(ANGLES), radius(v))),
+        fraction=0,
+        speeds=STEPS[1:-1],
+    )
     for speed, ellipse in zone.ellipses.items():
         expected = szlib.Ellipse((0, 0), (radius(speed), radius(speed)))
         assert_same_ellipse(ellipse, expected, 4 * SAGITTA)
 
 
-def test_the_zone_is_the_mirror_of_close_approaches_not_the_ellipse_of_the_slice(zone: SocialZone) -> None:
+def test_the_zone_is_the_mirror_of_close_approaches_not_the_ellipse_of_the_slice(
+    zone: SocialZone,
+) -> None:
     """Map first, enclose second: the boundary is where the complement leaves off."""
     section = zone.shape.slice(1.1)
     theta = np.linspace(-np.pi, np.pi, 50)
-    np.testing.assert_allclose(np.hypot(*section.boundary(theta).T), 2.0 - section.reach(theta))
+    np.testing.assert_allclose(
+        np.hypot(*section.boundary(theta).T), 2.0 - section.reach(theta)
+    )
 
 
 @pytest.mark.parametrize("speed", [0.7, 0.9, 1.0, 1.1, 1.3])
-def test_the_ellipse_contains_the_whole_boundary(zone: SocialZone, speed: float) -> None:
+def test_the_ellipse_contains_the_whole_boundary(
+    zone: SocialZone, speed: float
+) -> None:
     level = zone.ellipse(speed).level(zone.boundary(speed, n=50_001))
     assert level.max() <= 1 + 1e-9
     assert level.max() > 1 - 1e-4  # and touches it
 
 
 @pytest.mark.parametrize("turn", [0.3, -2.0, np.pi / 2])
-def test_rotated_samples_rotate_the_zone(samples: pd.DataFrame, zone: SocialZone, turn: float) -> None:
+def test_rotated_samples_rotate_the_zone(
+    samples: pd.DataFrame, zone: SocialZone, turn: float
+) -> None:
     turned = fit(samples.assign(los_angle=samples["los_angle"] + turn))
     for speed in (0.9, 1.1, 1.3):
         expected = zone.ellipse(speed).placed((0, 0), turn)
         assert_same_ellipse(turned.ellipse(speed), expected, 1e-5)
 
 
-def test_mirrored_samples_mirror_the_zone(samples: pd.DataFrame, zone: SocialZone) -> None:
+def test_mirrored_samples_mirror_the_zone(
+    samples: pd.DataFrame, zone: SocialZone
+) -> None:
     mirrored = fit(samples.assign(los_angle=-samples["los_angle"])).ellipse(1.1)
     known = zone.ellipse(1.1)
     x, y = known.center
-    assert_same_ellipse(mirrored, szlib.Ellipse((x, -y), known.semi_axes, -known.angle), 1e-5)
+    assert_same_ellipse(
+        mirrored, szlib.Ellipse((x, -y), known.semi_axes, -known.angle), 1e-5
+    )
 
 
-def test_the_same_samples_in_any_order_give_the_same_zone(samples: pd.DataFrame, zone: SocialZone) -> None:
+def test_the_same_samples_in_any_order_give_the_same_zone(
+    samples: pd.DataFrame, zone: SocialZone
+) -> None:
     before = samples.copy(deep=True)
     again = fit(samples)
     pd.testing.assert_frame_equal(samples, before)
@@ -149,7 +182,9 @@ def test_the_same_samples_in_any_order_give_the_same_zone(samples: pd.DataFrame,
     assert again.ellipses == zone.ellipses
     assert again.provenance == zone.provenance
     shuffled = fit(samples.sample(frac=1, random_state=0))
-    assert {tuple(v) for v in shuffled.shape.vertices} == {tuple(v) for v in zone.shape.vertices}
+    assert {tuple(v) for v in shuffled.shape.vertices} == {
+        tuple(v) for v in zone.shape.vertices
+    }
 
 
 # --- asking ------------------------------------------------------------------------------------------
@@ -161,12 +196,17 @@ def test_a_fitted_speed_is_the_one_in_the_table(zone: SocialZone) -> None:
     for row in table.itertuples():
         ellipse = zone.ellipse(row.speed)
         assert ellipse is zone.ellipses[row.speed]
-        assert (row.center_x, row.center_y, row.a, row.b) == (*ellipse.center, *ellipse.semi_axes)
+        assert (row.center_x, row.center_y, row.a, row.b) == (
+            *ellipse.center,
+            *ellipse.semi_axes,
+        )
         assert np.radians(row.angle_deg) == pytest.approx(ellipse.angle)
         assert row.area == pytest.approx(np.pi * row.a * row.b)
 
 
-def test_speed_between_fitted_speeds_is_fitted_on_demand(samples: pd.DataFrame, zone: SocialZone) -> None:
+def test_speed_between_fitted_speeds_is_fitted_on_demand(
+    samples: pd.DataFrame, zone: SocialZone
+) -> None:
     fitted = fit(samples, speeds=[1.05]).ellipses[1.05]
     assert zone.ellipse(1.05) == fitted
     assert 1.05 not in zone.ellipses
@@ -176,12 +216,19 @@ def test_a_speed_outside_the_data_names_the_range(zone: SocialZone) -> None:
     low, high = zone.speed_range
     for speed in (low - 0.1, high + 0.1):
         for ask in (zone.ellipse, zone.boundary):
-            with pytest.raises(szlib.ZoneError, match=rf"at {speed:g} m/s .* {low:.3f} to {high:.3f} m/s"):
+            with pytest.raises(
+                szlib.ZoneError,
+                match=rf"at {speed:g} m/s .* {low:.3f} to {high:.3f} m/s",
+            ):
                 ask(speed)
 
 
-def test_undefined_speeds_warn_and_are_saved(samples: pd.DataFrame, tmp_path: Path) -> None:
-    with pytest.warns(szlib.DataWarning, match=r"at 0\.1 m/s is undefined.*; .*at 9 m/s is undefined"):
+def test_undefined_speeds_warn_and_are_saved(
+    samples: pd.DataFrame, tmp_path: Path
+) -> None:
+    with pytest.warns(
+        szlib.DataWarning, match=r"at 0\.1 m/s is undefined.*; .*at 9 m/s is undefined"
+    ):
         zone = fit(samples, speeds=(0.1, 1.1, 9))
     assert list(zone.ellipses) == [1.1]
     assert list(zone.undefined) == [0.1, 9.0]
@@ -192,7 +239,8 @@ def test_undefined_speeds_warn_and_are_saved(samples: pd.DataFrame, tmp_path: Pa
 def test_people_seen_from_one_side_only_have_no_zone(samples: pd.DataFrame) -> None:
     ahead = samples[samples["los_angle"].abs() < np.pi / 3]
     with pytest.raises(
-        szlib.ZoneError, match=r"no speed has a zone: .* no person was seen in the directions from"
+        szlib.ZoneError,
+        match=r"no speed has a zone: .* no person was seen in the directions from",
     ):
         fit(ahead)
 
@@ -200,33 +248,51 @@ def test_people_seen_from_one_side_only_have_no_zone(samples: pd.DataFrame) -> N
 # --- the funnel --------------------------------------------------------------------------------------
 
 
-def test_the_provenance_counts_every_sample(samples: pd.DataFrame, zone: SocialZone) -> None:
+def test_the_provenance_counts_every_sample(
+    samples: pd.DataFrame, zone: SocialZone
+) -> None:
     near, inliers, hull = zone.provenance["funnel"]
     assert near["entered"] == len(samples)
     assert (near["kept"], inliers["kept"]) == (inliers["entered"], hull["entered"])
     assert hull["kept"] == len(zone.shape.vertices)
     assert zone.provenance["days"] == ["2012-10-24"]
     assert zone.provenance["encounters"] == samples["encounter"].nunique()
-    options = {"method": "hull", "r_max": 2.0} | dict.fromkeys(("fraction", "n_neighbours", "speed_scale"))
+    options = {"method": "hull", "r_max": 2.0} | dict.fromkeys(
+        ("fraction", "n_neighbours", "speed_scale")
+    )
     assert zone.provenance["parameters"] == options
     table = funnels.table(zone.provenance["funnel"])
     assert table.columns.tolist() == ["stage", "what", "rows"]
-    entered, kept = (table.loc[table["what"] == what, "rows"].sum() for what in ("entered", "kept"))
+    entered, kept = (
+        table.loc[table["what"] == what, "rows"].sum() for what in ("entered", "kept")
+    )
     assert entered - kept == table.loc[table["what"].str.startswith("- "), "rows"].sum()
 
 
 def test_a_stage_that_does_not_add_up_is_refused() -> None:
-    with pytest.raises(szlib.SzlibError, match="funnel stage 'sieve' does not add up: 10 != 7"):
+    with pytest.raises(
+        szlib.SzlibError, match="funnel stage 'sieve' does not add up: 10 != 7"
+    ):
         funnels.stage("sieve", 10, 7, {"too long": 2})
-    assert funnels.stage("sieve", 10, 7, {"too long": 3, "too short": 0})["rejected"] == {"too long": 3}
+    assert funnels.stage("sieve", 10, 7, {"too long": 3, "too short": 0})[
+        "rejected"
+    ] == {"too long": 3}
 
 
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [
-        (lambda d: d.drop(columns="speed"), szlib.DataError, r"columns \['speed'\] are missing"),
+        (
+            lambda d: d.drop(columns="speed"),
+            szlib.DataError,
+            r"columns \['speed'\] are missing",
+        ),
         (lambda d: d.iloc[:0], szlib.DataError, "the table is empty"),
-        (lambda d: d.assign(distance=5.0), szlib.DataError, "none of 4000 samples is within r_max = 2.0 m"),
+        (
+            lambda d: d.assign(distance=5.0),
+            szlib.DataError,
+            "none of 4000 samples is within r_max = 2.0 m",
+        ),
         (lambda d: d.assign(speed=1.0), szlib.ZoneError, "points lie in one plane"),
         (lambda d: d.assign(speed=np.nan), szlib.ZoneError, "must be finite"),
     ],
@@ -264,7 +330,9 @@ def test_plot_shows_one_speed_or_all(zone: SocialZone) -> None:
 # --- files -------------------------------------------------------------------------------------------
 
 
-def test_saved_zone_loads_bit_by_bit(samples: pd.DataFrame, zone: SocialZone, tmp_path: Path) -> None:
+def test_saved_zone_loads_bit_by_bit(
+    samples: pd.DataFrame, zone: SocialZone, tmp_path: Path
+) -> None:
     zone.save(tmp_path / "zone.json")
     loaded = SocialZone.load(tmp_path / "zone.json")
     np.testing.assert_array_equal(loaded.shape.vertices, zone.shape.vertices)
@@ -273,7 +341,9 @@ def test_saved_zone_loads_bit_by_bit(samples: pd.DataFrame, zone: SocialZone, tm
     assert loaded.provenance == zone.provenance
     assert loaded.ellipse(1.23) == zone.ellipse(1.23)
     loaded.save(tmp_path / "again.json")
-    assert (tmp_path / "again.json").read_bytes() == (tmp_path / "zone.json").read_bytes()
+    assert (tmp_path / "again.json").read_bytes() == (
+        tmp_path / "zone.json"
+    ).read_bytes()
     numpy_options = fit(
         samples,
         r_max=np.float64(2),
@@ -292,7 +362,9 @@ def test_file_states_format_version_and_units(zone: SocialZone, tmp_path: Path) 
     assert content["provenance"]["szlib"] == szlib.__version__
 
 
-def test_zone_of_another_version_of_szlib_loads(zone: SocialZone, tmp_path: Path) -> None:
+def test_zone_of_another_version_of_szlib_loads(
+    zone: SocialZone, tmp_path: Path
+) -> None:
     old = replace(zone, provenance=zone.provenance | {"szlib": "0.1.0"})
     old.save(tmp_path / "zone.json")
     loaded = SocialZone.load(tmp_path / "zone.json")
@@ -381,7 +453,9 @@ def test_damaged_file_is_refused_by_name(
 
 def test_missing_file_is_refused(tmp_path: Path) -> None:
     for path in (tmp_path / "missing.json", tmp_path):
-        with pytest.raises(szlib.ZoneError, match=f"{path.name}: cannot be read as a zone"):
+        with pytest.raises(
+            szlib.ZoneError, match=f"{path.name}: cannot be read as a zone"
+        ):
             SocialZone.load(path)
 
 
@@ -397,7 +471,9 @@ def test_invalid_r_max_is_refused(zone: SocialZone, r_max: float) -> None:
 @pytest.mark.parametrize("method", ["hull", "quantile"])
 def test_every_method_finds_the_known_zone(samples: pd.DataFrame, method: str) -> None:
     """One person in thirty is within 6 cm of the rim: so near are both ways to it."""
-    zone = fit(samples, method=method, **({"fraction": 0.0} if method == "hull" else {}))
+    zone = fit(
+        samples, method=method, **({"fraction": 0.0} if method == "hull" else {})
+    )
     assert zone.method == method
     assert_same_ellipse(zone.ellipse(1.1), KNOWN["off centre and tilted"], 0.12)
     for speed in (1.1, 1.0):  # fitted, and between
@@ -418,17 +494,27 @@ def test_zone_of_every_method_drives_the_robot_and_reloads(
         assert szlib.MPCCBF(zone).zone == zone.ellipse(1.1)
     zone.save(tmp_path / "zone.json")
     loaded = SocialZone.load(tmp_path / "zone.json")
-    assert (loaded.method, loaded.ellipses, loaded.provenance) == (method, zone.ellipses, zone.provenance)
+    assert (loaded.method, loaded.ellipses, loaded.provenance) == (
+        method,
+        zone.ellipses,
+        zone.provenance,
+    )
     assert loaded.ellipse(1.05) == zone.ellipse(1.05)
     np.testing.assert_array_equal(loaded.boundary(1.05), zone.boundary(1.05))
     pd.testing.assert_frame_equal(loaded.table(), zone.table())
     for name in ("intervals", "bands", "influence"):
-        pd.testing.assert_frame_equal(getattr(loaded.uncertainty, name), getattr(zone.uncertainty, name))
+        pd.testing.assert_frame_equal(
+            getattr(loaded.uncertainty, name), getattr(zone.uncertainty, name)
+        )
     loaded.save(tmp_path / "again.json")
-    assert (tmp_path / "again.json").read_bytes() == (tmp_path / "zone.json").read_bytes()
+    assert (tmp_path / "again.json").read_bytes() == (
+        tmp_path / "zone.json"
+    ).read_bytes()
 
 
-def test_intervals_do_not_change_the_zone(samples: pd.DataFrame, zone: SocialZone) -> None:
+def test_intervals_do_not_change_the_zone(
+    samples: pd.DataFrame, zone: SocialZone
+) -> None:
     plain = fit(samples)
     assert plain.ellipses == zone.ellipses
     np.testing.assert_array_equal(plain.shape.vertices, zone.shape.vertices)
@@ -448,7 +534,9 @@ def test_intervals_do_not_change_the_zone(samples: pd.DataFrame, zone: SocialZon
         ({"n_resamples": 1}, "resamples must be a whole number, 0 .no intervals. or at least 2; got 1"),
     ],
 )  # fmt: skip
-def test_invalid_options_are_refused(samples: pd.DataFrame, options: dict, message: str) -> None:
+def test_invalid_options_are_refused(
+    samples: pd.DataFrame, options: dict, message: str
+) -> None:
     with pytest.raises(szlib.SzlibError, match=message):
         fit(samples, **options)
 
@@ -457,7 +545,8 @@ def test_quantile_zone_is_undefined_outside_its_speeds(samples: pd.DataFrame) ->
     zone = fit(samples, method="quantile", speeds=(0.9, 1.1))
     assert zone.speed_range == (0.9, 1.1)
     with pytest.raises(
-        szlib.ZoneError, match=r"at 1\.2 m/s is undefined: it was fitted for 0\.9 to 1\.1 m/s"
+        szlib.ZoneError,
+        match=r"at 1\.2 m/s is undefined: it was fitted for 0\.9 to 1\.1 m/s",
     ):
         zone.ellipse(1.2)
 
@@ -465,13 +554,19 @@ def test_quantile_zone_is_undefined_outside_its_speeds(samples: pd.DataFrame) ->
 def made_null(n: int = 3000, *, r_max: float = 2.0) -> szlib.NullEncounters:
     samples = wanderers(n).assign(shift=lambda d: d["encounter"] % 20)
     first = samples.groupby("encounter")
-    encounters = pd.DataFrame({"shift": first["shift"].first(), "nearest": first["distance"].min()})
+    encounters = pd.DataFrame(
+        {"shift": first["shift"].first(), "nearest": first["distance"].min()}
+    )
     close = samples[samples["distance"] < r_max]
-    return szlib.NullEncounters(close, encounters.reset_index().assign(kind="crossing"), 20, r_max)
+    return szlib.NullEncounters(
+        close, encounters.reset_index().assign(kind="crossing"), 20, r_max
+    )
 
 
 def test_respect_zone_is_found_and_saved_with_its_test(tmp_path: Path) -> None:
-    people = respecting(passing_pairs(1200, 1), szlib.Ellipse((0.0, 0.0), (0.8, 0.7)), careless=0.05)
+    people = respecting(
+        passing_pairs(1200, 1), szlib.Ellipse((0.0, 0.0), (0.8, 0.7)), careless=0.05
+    )
     null = null_of(passing_pairs(2500, 0))
     zone = SocialZone.fit(people, null=null, speeds=(1.1,), n_resamples=4)
     assert (zone.method, zone.null_radii) == ("respect", {1.1: 0.0})
@@ -485,7 +580,9 @@ def test_respect_zone_is_found_and_saved_with_its_test(tmp_path: Path) -> None:
 
 
 def test_any_zone_can_be_tested_against_a_null(samples: pd.DataFrame) -> None:
-    zone = fit(wanderers(300, seed=5), method="quantile", speeds=(1.1,), null=made_null())
+    zone = fit(
+        wanderers(300, seed=5), method="quantile", speeds=(1.1,), null=made_null()
+    )
     assert zone.null_test.p_value > 0.05
     assert fit(samples).null_test is None
 
@@ -494,7 +591,10 @@ def test_any_zone_can_be_tested_against_a_null(samples: pd.DataFrame) -> None:
     ("options", "message"),
     [
         ({}, r"needs a null model; pass null=szlib\.null_encounters"),
-        ({"null": made_null(20), "r_max": 1.5}, r"r_max is 1\.5 m, that of the null model 2\.0 m"),
+        (
+            {"null": made_null(20), "r_max": 1.5},
+            r"r_max is 1\.5 m, that of the null model 2\.0 m",
+        ),
     ],
 )
 def test_respect_without_valid_null_is_refused(options: dict, message: str) -> None:
@@ -510,7 +610,8 @@ def test_low_sample_zone_warns(samples: pd.DataFrame, tmp_path: Path) -> None:
     six = samples[samples["encounter"] < 6]
     for method in ("hull", "quantile"):
         with pytest.warns(
-            szlib.DataWarning, match=r"at 1\.1 m/s fewer than 20 encounters were seen ahead \("
+            szlib.DataWarning,
+            match=r"at 1\.1 m/s fewer than 20 encounters were seen ahead \(",
         ):
             zone = fit(six, method=method, speeds=(1.1,))
         assert not zone.adequate(1.1)
@@ -523,9 +624,13 @@ def test_low_sample_zone_warns(samples: pd.DataFrame, tmp_path: Path) -> None:
 
 def test_side_with_few_encounters_is_named(samples: pd.DataFrame) -> None:
     left = np.abs(samples["los_angle"] - np.pi / 2) < np.pi / 8
-    with pytest.warns(szlib.DataWarning, match=r"fewer than 20 encounters were seen left \([0-9]\)$"):
+    with pytest.warns(
+        szlib.DataWarning, match=r"fewer than 20 encounters were seen left \([0-9]\)$"
+    ):
         zone = fit(samples[~left | (samples["encounter"] < 10)], speeds=(1.1,))
-    assert zone.missing_data(1.1).endswith("seen left (9)") or "left (" in zone.missing_data(1.1)
+    assert zone.missing_data(1.1).endswith(
+        "seen left (9)"
+    ) or "left (" in zone.missing_data(1.1)
 
 
 def test_speed_without_encounters_is_not_adequate(zone: SocialZone) -> None:
@@ -533,7 +638,8 @@ def test_speed_without_encounters_is_not_adequate(zone: SocialZone) -> None:
     assert enough.adequate(1.0)  # between 0.9 and 1.1
     assert not zone.adequate(1.0)  # 130 encounters
     with pytest.warns(
-        szlib.DataWarning, match=r"at 1\.6 m/s no encounters were counted \(only at 0\.5 to 1\.5 m/s\)"
+        szlib.DataWarning,
+        match=r"at 1\.6 m/s no encounters were counted \(only at 0\.5 to 1\.5 m/s\)",
     ):
         zone.ellipse(1.6)
 
@@ -572,11 +678,16 @@ def test_damaged_content_with_a_matching_checksum_is_refused(
     assert message in str(error.value)
 
 
-def test_samples_without_encounter_give_a_zone_of_unknown_quality(samples: pd.DataFrame) -> None:
+def test_samples_without_encounter_give_a_zone_of_unknown_quality(
+    samples: pd.DataFrame,
+) -> None:
     with pytest.warns(
-        szlib.DataWarning, match="^the quality of the zone is unknown.*samples without `encounter`.*again$"
+        szlib.DataWarning,
+        match="^the quality of the zone is unknown.*samples without `encounter`.*again$",
     ):
-        zone = SocialZone.fit(samples.drop(columns="encounter"), method="hull", fraction=0.002)
+        zone = SocialZone.fit(
+            samples.drop(columns="encounter"), method="hull", fraction=0.002
+        )
     assert (zone.side_counts, zone.uncertainty) == (None, None)
 
 
@@ -587,8 +698,13 @@ def test_default_speeds_are_those_of_walking_people() -> None:
 # --- the real day ------------------------------------------------------------------------------------
 
 
-def test_real_day_has_zones_at_walking_speeds(real_samples: pd.DataFrame, tmp_path: Path) -> None:
-    with pytest.warns(szlib.DataWarning, match=r"at 1\.1 m/s fewer than 20 encounters were seen .*behind \("):
+def test_real_day_has_zones_at_walking_speeds(
+    real_samples: pd.DataFrame, tmp_path: Path
+) -> None:
+    with pytest.warns(
+        szlib.DataWarning,
+        match=r"at 1\.1 m/s fewer than 20 encounters were seen .*behind \(",
+    ):
         zone = fit(real_samples)
     assert sorted(zone.ellipses) == list(SPEEDS)
     assert zone.undefined == {}
@@ -597,7 +713,10 @@ def test_real_day_has_zones_at_walking_speeds(real_samples: pd.DataFrame, tmp_pa
         assert ellipse.level([0.0, 0.0]) < 1  # the person is inside the own zone
         assert 0.3 < ellipse.semi_axes[1] <= ellipse.semi_axes[0] < 2.0
     stages = zone.provenance["funnel"]
-    assert sum(stage["entered"] for stage in stages if stage["stage"].startswith("read ")) == 624_951
+    assert (
+        sum(stage["entered"] for stage in stages if stage["stage"].startswith("read "))
+        == 624_951
+    )
     assert all(s["entered"] == s["kept"] + sum(s["rejected"].values()) for s in stages)
     assert not any(map(zone.adequate, SPEEDS))  # hardly anybody is seen behind
     zone.save(tmp_path / "zone.json")
@@ -613,7 +732,9 @@ def test_the_papers_method_is_a_hull_after_lof_over_samples() -> None:
     assert [stage["rejected"] for stage in paper.provenance["funnel"]] == [
         stage["rejected"] for stage in same.provenance["funnel"]
     ]
-    with pytest.raises(szlib.ZoneError, match="method 'paper' has no option 'fraction'"):
+    with pytest.raises(
+        szlib.ZoneError, match="method 'paper' has no option 'fraction'"
+    ):
         fit(samples, method="paper", fraction=0.01)
 
 
@@ -623,9 +744,15 @@ def test_the_papers_zone_is_saved_under_its_name(tmp_path: Path) -> None:
     assert SocialZone.load(tmp_path / "zone.json").method == "paper"
 
 
-@pytest.mark.parametrize(("people", "size"), [("everybody", (1.01, 0.77)), ("strangers", (1.31, 1.03))])
+@pytest.mark.parametrize(
+    ("people", "size"), [("everybody", (1.01, 0.77)), ("strangers", (1.31, 1.03))]
+)
 @pytest.mark.filterwarnings("ignore::szlib.DataWarning")
-def test_the_papers_zone_of_the_real_day(people: str, size: tuple[float, float], real_samples) -> None:
-    samples = real_samples if people == "everybody" else szlib.of_kind(real_samples, people)
+def test_the_papers_zone_of_the_real_day(
+    people: str, size: tuple[float, float], real_samples
+) -> None:
+    samples = (
+        real_samples if people == "everybody" else szlib.of_kind(real_samples, people)
+    )
     zone = fit(samples, method="paper")
     assert tuple(round(axis, 2) for axis in zone.ellipse(1.1).semi_axes) == size

@@ -30,7 +30,9 @@ SPEEDS = (1.1,)
 
 
 def fit(samples: pd.DataFrame, **options: object) -> szlib.SocialZone:
-    return szlib.SocialZone.fit(samples, speeds=SPEEDS, **{"method": "quantile", **options})
+    return szlib.SocialZone.fit(
+        samples, speeds=SPEEDS, **{"method": "quantile", **options}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -49,37 +51,53 @@ def test_each_side_counts_encounters_not_samples() -> None:
     seen = count_by_side(table, (1.0, 1.5), r_max=2.0)
     assert seen["encounters"].tolist() == [4, 1]
     one = {"ahead": 1, "behind": 2, "left": 1, "right": 1}
-    assert seen.loc[0, list(SIDES)].to_dict() == {side: one.get(side, 0) for side in SIDES}
+    assert seen.loc[0, list(SIDES)].to_dict() == {
+        side: one.get(side, 0) for side in SIDES
+    }
     assert seen.loc[1, list(SIDES)].sum() == seen.loc[1, "ahead left"] == 1
 
 
 def test_missing_sides_are_named() -> None:
     seen = pd.DataFrame(
-        [[1.0, 99, *[MIN_ENCOUNTERS] * 8], [1.2, 99, *[MIN_ENCOUNTERS] * 7, MIN_ENCOUNTERS - 1]]
+        [
+            [1.0, 99, *[MIN_ENCOUNTERS] * 8],
+            [1.2, 99, *[MIN_ENCOUNTERS] * 7, MIN_ENCOUNTERS - 1],
+        ]
     )
     seen.columns = ["speed", "encounters", *SIDES]
     assert describe_missing_sides(seen, 1.0) == ""
     for speed in (1.1, 1.2):  # between, the poorer neighbour counts
-        message = f"at {speed:g} m/s fewer than 20 encounters were seen ahead right (19)"
+        message = (
+            f"at {speed:g} m/s fewer than 20 encounters were seen ahead right (19)"
+        )
         assert describe_missing_sides(seen, speed) == message
-    assert describe_missing_sides(seen, 1.3) == "at 1.3 m/s no encounters were counted (only at 1 to 1.2 m/s)"
+    assert (
+        describe_missing_sides(seen, 1.3)
+        == "at 1.3 m/s no encounters were counted (only at 1 to 1.2 m/s)"
+    )
 
 
 def test_pairs_are_resampled_or_days_if_there_are_many() -> None:
-    table = pd.DataFrame({"day": ["a", "a", "a", "b"], "ref_id": [1, 2, 1, 1], "other_id": [2, 1, 3, 2]})
+    table = pd.DataFrame(
+        {"day": ["a", "a", "a", "b"], "ref_id": [1, 2, 1, 1], "other_id": [2, 1, 3, 2]}
+    )
     unit, member = resampling_units(table)
     assert unit == "pairs"
     assert member[0] == member[1]  # whoever looks at whom
     assert len(set(member)) == 3
     unit, member = resampling_units(table.drop(columns=["ref_id"]))
     assert (unit, member.tolist()) == ("encounters", [0, 1, 2, 3])
-    days = pd.DataFrame({"day": np.arange(2 * MIN_DAYS) // 2, "ref_id": 1, "other_id": 2})
+    days = pd.DataFrame(
+        {"day": np.arange(2 * MIN_DAYS) // 2, "ref_id": 1, "other_id": 2}
+    )
     unit, member = resampling_units(days)
     assert (unit, member.tolist()) == ("days", days["day"].tolist())
 
 
 def test_intervals_are_the_same_for_the_same_seed_only(samples: pd.DataFrame) -> None:
-    one, same, other = (fit(samples, n_resamples=30, seed=seed).uncertainty for seed in (0, 0, 1))
+    one, same, other = (
+        fit(samples, n_resamples=30, seed=seed).uncertainty for seed in (0, 0, 1)
+    )
     pd.testing.assert_frame_equal(one.intervals, same.intervals)
     assert not one.intervals.equals(other.intervals)
     assert one.intervals["quantity"].tolist() == list(QUANTITIES)
@@ -89,22 +107,35 @@ def test_intervals_are_the_same_for_the_same_seed_only(samples: pd.DataFrame) ->
 
 
 def test_more_people_make_narrower_intervals() -> None:
-    few, many = (fit(passers(n), n_resamples=60).uncertainty.intervals for n in (150, 2400))
+    few, many = (
+        fit(passers(n), n_resamples=60).uncertainty.intervals for n in (150, 2400)
+    )
     ratio = (many["high"] - many["low"]) / (few["high"] - few["low"])
     assert ratio.median() == pytest.approx(1 / 4, abs=0.12)
 
 
 @pytest.mark.parametrize("method", ["quantile", "hull"])
-def test_second_view_of_a_pair_does_not_narrow_the_interval(samples: pd.DataFrame, method: str) -> None:
+def test_second_view_of_a_pair_does_not_narrow_the_interval(
+    samples: pd.DataFrame, method: str
+) -> None:
     """The other person's view of the same encounter makes the interval no narrower."""
-    twice = pd.concat([samples, samples.assign(encounter=samples["encounter"] + 1000, t=samples["t"] + 0.01)])
+    twice = pd.concat(
+        [
+            samples,
+            samples.assign(
+                encounter=samples["encounter"] + 1000, t=samples["t"] + 0.01
+            ),
+        ]
+    )
     options = {"method": method, "n_resamples": 30}
     if method == "hull":
         options |= {"fraction": 0.0}
     one, two = (fit(table, **options).uncertainty for table in (samples, twice))
     assert f"of {samples['encounter'].nunique()} pairs" in one.description
     assert one.description == two.description
-    np.testing.assert_allclose(one.intervals[["low", "high"]], two.intervals[["low", "high"]], atol=1e-9)
+    np.testing.assert_allclose(
+        one.intervals[["low", "high"]], two.intervals[["low", "high"]], atol=1e-9
+    )
 
 
 def test_hull_interval_lies_inside_the_hull() -> None:
@@ -123,25 +154,48 @@ def test_intervals_contain_the_limit() -> None:
     limit = fit(passers(20_000, seed=99), n_resamples=0).table().iloc[0]
     held = []
     for seed in range(25):
-        known = fit(passers(200, seed=seed), n_resamples=60).uncertainty.intervals.set_index("quantity")
-        held.append([known.loc[q, "low"] <= limit[q] <= known.loc[q, "high"] for q in QUANTITIES])
-    assert np.mean(held) >= 0.85  # 95 %, less four standard errors of 25 x 6 that are not independent
+        known = fit(
+            passers(200, seed=seed), n_resamples=60
+        ).uncertainty.intervals.set_index("quantity")
+        held.append(
+            [
+                known.loc[q, "low"] <= limit[q] <= known.loc[q, "high"]
+                for q in QUANTITIES
+            ]
+        )
+    # 95 %, less four standard errors of 25 x 6 that are not independent
+    assert np.mean(held) >= 0.85
 
 
-def test_influence_equals_the_change_without_one_encounter(samples: pd.DataFrame) -> None:
+def test_influence_equals_the_change_without_one_encounter(
+    samples: pd.DataFrame,
+) -> None:
     for method, options in (("quantile", {}), ("hull", {"fraction": 0.0})):
         zone = fit(samples, method=method, n_resamples=2, **options)
         influence = zone.uncertainty.influence.iloc[0]
         without = fit(
-            samples[samples["encounter"] != influence["encounter"]], method=method, n_resamples=0, **options
+            samples[samples["encounter"] != influence["encounter"]],
+            method=method,
+            n_resamples=0,
+            **options,
         )
         before, after = zone.table().iloc[0], without.table().iloc[0]
         moved = max(abs(before[q] - after[q]) for q in QUANTITIES[:4])
-        assert moved == pytest.approx(influence["metres"], abs=2e-3)  # the hull's, around 72 directions
-        some = np.random.default_rng(0).choice(samples["encounter"].unique(), 3, replace=False)
+        # the hull's, around 72 directions
+        assert moved == pytest.approx(influence["metres"], abs=2e-3)
+        some = np.random.default_rng(0).choice(
+            samples["encounter"].unique(), 3, replace=False
+        )
         for encounter in some:
-            rest = fit(samples[samples["encounter"] != encounter], method=method, n_resamples=0, **options)
-            other = max(abs(before[q] - rest.table().iloc[0][q]) for q in QUANTITIES[:4])
+            rest = fit(
+                samples[samples["encounter"] != encounter],
+                method=method,
+                n_resamples=0,
+                **options,
+            )
+            other = max(
+                abs(before[q] - rest.table().iloc[0][q]) for q in QUANTITIES[:4]
+            )
             assert other <= influence["metres"] + 2e-3
 
 
@@ -155,20 +209,31 @@ def test_resamples_without_a_zone_leave_no_interval() -> None:
 
 
 @pytest.mark.parametrize("resamples", [1, -3, 2.5])
-def test_invalid_n_resamples_is_refused(samples: pd.DataFrame, resamples: float) -> None:
+def test_invalid_n_resamples_is_refused(
+    samples: pd.DataFrame, resamples: float
+) -> None:
     with pytest.raises(szlib.DataError, match="resamples must be a whole number"):
         estimate_uncertainty(
-            QuantileEstimator.from_samples(samples, r_max=2.0), SPEEDS, n_resamples=resamples, seed=0
+            QuantileEstimator.from_samples(samples, r_max=2.0),
+            SPEEDS,
+            n_resamples=resamples,
+            seed=0,
         )
 
 
 def test_intervals_are_quantiles_of_the_differences() -> None:
-    differences = np.random.default_rng(0).permuted(np.linspace(-1, 3, 4001))[:, None, None]
+    differences = np.random.default_rng(0).permuted(np.linspace(-1, 3, 4001))[
+        :, None, None
+    ]
     values = np.full((1, 1, 1), 5.0)
     low, high = _interval(values, differences, 0.5).ravel()
-    assert (low, high) == pytest.approx((5 - 0.5 * 2.9, 5 + 0.5 * 0.9)), "mirrored, times the factor"
+    assert (low, high) == pytest.approx((5 - 0.5 * 2.9, 5 + 0.5 * 0.9)), (
+        "mirrored, times the factor"
+    )
     centred = differences - 1
-    assert _interval(values, centred, 0.0).ravel() == pytest.approx((5 - 1.9, 5 + 1.9)), "no bias"
+    assert _interval(values, centred, 0.0).ravel() == pytest.approx(
+        (5 - 1.9, 5 + 1.9)
+    ), "no bias"
 
 
 def test_percentiles_are_corrected_for_bias() -> None:
@@ -197,7 +262,9 @@ class Turning(Estimator):
 
     def refit(self, weights: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
         angle = np.radians(89 if len(weights) == 1 else -89)
-        return np.broadcast_to([0.0, 0.0, 1.0, 0.7, angle], (len(weights), len(speeds), 5))
+        return np.broadcast_to(
+            [0.0, 0.0, 1.0, 0.7, angle], (len(weights), len(speeds), 5)
+        )
 
     def find_influential(self, speeds: Sequence[float]) -> np.ndarray:
         return np.arange(1)
@@ -226,4 +293,6 @@ def test_an_encounter_that_only_turns_the_zone_has_no_influence() -> None:
     encounters = pd.DataFrame({"encounter": range(10, 40)})
     estimator = TurningAlone(encounters=encounters, parameters={}, funnel=[])
     found = estimate_uncertainty(estimator, SPEEDS, n_resamples=5, seed=0).influence
-    assert found.to_dict("records") == [{"speed": 1.1, "encounter": 10, "metres": pytest.approx(0.1)}]
+    assert found.to_dict("records") == [
+        {"speed": 1.1, "encounter": 10, "metres": pytest.approx(0.1)}
+    ]

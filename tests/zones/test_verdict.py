@@ -18,7 +18,9 @@ from szlib.zones.verdict import describe_missing_encounters
 SHIFTS, SPEED = 39, 1.1
 
 
-def walkers(seed: int, n: int, *, core: float = 0.0, careless: float = 0.0) -> pd.DataFrame:
+def walkers(
+    seed: int, n: int, *, core: float = 0.0, careless: float = 0.0
+) -> pd.DataFrame:
     """Straight paths past a person, as evenly near as chance has it; within `core` only the careless."""
     rng = np.random.default_rng(seed)
     tries = 4 * n
@@ -27,10 +29,16 @@ def walkers(seed: int, n: int, *, core: float = 0.0, careless: float = 0.0) -> p
     along, t = np.linspace(-2, 2, 31), np.arange(31) / 10
     path = (along + 1j * nearest[kept, None]) * np.exp(1j * heading[kept, None])
     table = pd.DataFrame({"encounter": np.repeat(np.arange(n), 31), "day": "a"})
-    table["ref_id"], table["other_id"] = 2 * table["encounter"], 2 * table["encounter"] + 1
+    table["ref_id"], table["other_id"] = (
+        2 * table["encounter"],
+        2 * table["encounter"] + 1,
+    )
     table["t"] = (np.arange(n)[:, None] * 20.0 + t).ravel().round(1)
     return table.assign(
-        los_angle=np.angle(path).ravel(), distance=np.abs(path).ravel(), speed=SPEED, kind="crossing"
+        los_angle=np.angle(path).ravel(),
+        distance=np.abs(path).ravel(),
+        speed=SPEED,
+        kind="crossing",
     )
 
 
@@ -39,14 +47,20 @@ def null() -> szlib.NullEncounters:
     samples = walkers(99, SHIFTS * 100)
     samples["shift"] = samples["encounter"] % SHIFTS
     first = samples.groupby("encounter")
-    encounters = pd.DataFrame({"shift": first["shift"].first(), "nearest": first["distance"].min()})
+    encounters = pd.DataFrame(
+        {"shift": first["shift"].first(), "nearest": first["distance"].min()}
+    )
     near = samples[samples["distance"] < 2]
-    return szlib.NullEncounters(near, encounters.reset_index().assign(kind="crossing"), SHIFTS, 2.0)
+    return szlib.NullEncounters(
+        near, encounters.reset_index().assign(kind="crossing"), SHIFTS, 2.0
+    )
 
 
 @pytest.mark.filterwarnings("ignore:at 1.1 m/s fewer than 20")
 def fit(samples: pd.DataFrame, **options: Any) -> szlib.SocialZone:
-    return szlib.SocialZone.fit(samples, **{"speeds": [SPEED], "null": null(), "n_resamples": 60} | options)
+    return szlib.SocialZone.fit(
+        samples, **{"speeds": [SPEED], "null": null(), "n_resamples": 60} | options
+    )
 
 
 @pytest.fixture(scope="module")
@@ -84,14 +98,19 @@ def test_few_strangers_are_undecided_and_told_the_hours() -> None:
     assert few.verdict(SPEED) == "undecided"
     hours = (151 - 1) * 20 / 3600
     more = f"{(600 / 151 - 1) * hours:.2g} more hours"
-    assert f"151 encounters were found, 600 are needed: {more}" in few.verdict(SPEED).reasons[0]
+    assert (
+        f"151 encounters were found, 600 are needed: {more}"
+        in few.verdict(SPEED).reasons[0]
+    )
     assert not few.adequate(SPEED)
 
 
 def test_without_a_null_model_nothing_is_decided() -> None:
     zone = fit(walkers(1, 1500, core=0.8), null=None)
     assert zone.verdict(SPEED) == "undecided"
-    assert any("null_encounters(tracks)" in reason for reason in zone.verdict(SPEED).reasons)
+    assert any(
+        "null_encounters(tracks)" in reason for reason in zone.verdict(SPEED).reasons
+    )
 
 
 # --- each condition alone ----------------------------------------------------------------------------
@@ -109,12 +128,17 @@ def test_careless_share_above_q_is_noticed() -> None:
     ("change", "reason"),
     [
         ({"uncertainty": None}, "the interval of the semi-axis a cannot be given"),
-        ({"null_radii": {SPEED: 1.5}}, "a zone with a mean radius of 1.50 m, and this one is not clearly"),
+        (
+            {"null_radii": {SPEED: 1.5}},
+            "a zone with a mean radius of 1.50 m, and this one is not clearly",
+        ),
         ({"null_radii": {SPEED: np.nan}}, "not clearly larger"),
         ({"side_counts": None}, "encounters were not counted by side"),
     ],
 )
-def test_every_condition_is_needed(careful: szlib.SocialZone, change: dict[str, Any], reason: str) -> None:
+def test_every_condition_is_needed(
+    careful: szlib.SocialZone, change: dict[str, Any], reason: str
+) -> None:
     verdict = replace(careful, **change).verdict(SPEED)
     assert verdict == "undecided"
     assert any(reason in each for each in verdict.reasons)
@@ -134,19 +158,26 @@ def test_speed_without_data_is_undecided(careful: szlib.SocialZone) -> None:
 
 
 def test_missing_encounters_need_no_times() -> None:
-    assert describe_missing_encounters({"encounters": 300, "hours": None}).endswith("600 are needed")
+    assert describe_missing_encounters({"encounters": 300, "hours": None}).endswith(
+        "600 are needed"
+    )
     assert describe_missing_encounters({"encounters": 600, "hours": 1.0}) == ""
 
 
 def test_null_model_must_reach_as_far_as_the_zone() -> None:
-    with pytest.raises(szlib.ZoneError, match=r"r_max must be at most the null model's 2\.0 m; got 2\.5"):
+    with pytest.raises(
+        szlib.ZoneError,
+        match=r"r_max must be at most the null model's 2\.0 m; got 2\.5",
+    ):
         fit(walkers(1, 50), r_max=2.5)
 
 
 # --- where it is shown -------------------------------------------------------------------------------
 
 
-def test_verdict_is_saved_and_made_again(careful: szlib.SocialZone, tmp_path: Any) -> None:
+def test_verdict_is_saved_and_made_again(
+    careful: szlib.SocialZone, tmp_path: Any
+) -> None:
     careful.save(tmp_path / "zone.json")
     loaded = szlib.SocialZone.load(tmp_path / "zone.json")
     assert loaded.verdict(SPEED).sentence == careful.verdict(SPEED).sentence
@@ -155,7 +186,10 @@ def test_verdict_is_saved_and_made_again(careful: szlib.SocialZone, tmp_path: An
 
 def test_controller_warns_unless_usable(careful: szlib.SocialZone) -> None:
     szlib.MPCCBF(careful)
-    with pytest.warns(szlib.DataWarning, match=r"at 1\.1 m/s should not be relied on: no respect shown"):
+    with pytest.warns(
+        szlib.DataWarning,
+        match=r"at 1\.1 m/s should not be relied on: no respect shown",
+    ):
         szlib.MPCCBF(fit(walkers(2, 1500)))
 
 
@@ -164,7 +198,10 @@ def test_controller_warns_unless_usable(careful: szlib.SocialZone) -> None:
 
 @pytest.mark.parametrize("core", [0.5, 0.8, 1.0])
 def test_core_is_found_and_held(core: float) -> None:
-    radii = [fit_radius(Approaches.of(walkers(k, 400, core=core, careless=0.05), null())) for k in range(30)]
+    radii = [
+        fit_radius(Approaches.of(walkers(k, 400, core=core, careless=0.05), null()))
+        for k in range(30)
+    ]
     assert np.mean([each.radius for each in radii]) == pytest.approx(core, abs=0.03)
     held = np.mean([each.low <= core <= each.high for each in radii])
     assert held >= 0.83  # 90 % or more are expected; fewer than 25 of 30: 1 %
@@ -172,15 +209,22 @@ def test_core_is_found_and_held(core: float) -> None:
 
 def test_radius_does_not_shrink_as_encounters_are_added() -> None:
     small = [
-        fit_radius(Approaches.of(walkers(k, 150, core=0.8, careless=0.05), null())).radius for k in range(20)
+        fit_radius(
+            Approaches.of(walkers(k, 150, core=0.8, careless=0.05), null())
+        ).radius
+        for k in range(20)
     ]
-    many = fit_radius(Approaches.of(walkers(7, 8000, core=0.8, careless=0.05), null())).radius
+    many = fit_radius(
+        Approaches.of(walkers(7, 8000, core=0.8, careless=0.05), null())
+    ).radius
     assert np.mean(small) == pytest.approx(many, abs=0.04)
 
 
 def test_mix_of_kinds_does_not_matter() -> None:
     """One kind comes nearer by chance, and is rarer in the data."""
-    far = null().encounters.assign(kind="opposite", nearest=lambda d: 1.2 + d["nearest"] / 4)
+    far = null().encounters.assign(
+        kind="opposite", nearest=lambda d: 1.2 + d["nearest"] / 4
+    )
     mixed = replace(null(), encounters=pd.concat([null().encounters, far]))
     crossing = walkers(8, 300)
     crossing = crossing.assign(encounter=crossing["encounter"] + 10_000)

@@ -49,7 +49,9 @@ def solve_with_fallbacks(
         if fallback == "warm" and solver.budget.is_spent(HARD_SHARE / 2):
             timed_out = True
             break
-    shifted = solver.evaluate(last_plan if s.grid else np.append(last_plan[2:], (0.0, 0.0)), parameters)
+    shifted = solver.evaluate(
+        last_plan if s.grid else np.append(last_plan[2:], (0.0, 0.0)), parameters
+    )
     has_end = s.terminal != "none"
     if has_end and shifted.slack <= TOLERANCE:
         return "kept", shifted, timed_out
@@ -64,8 +66,16 @@ def solve_with_fallbacks(
     is_usable = converged or (solver.timed_out and relaxed.slack <= full_braking.slack)
     is_usable &= bool(np.isfinite(relaxed.inputs).all())
     if is_usable and (not shifted_is_safe or _reaches_safe_end(relaxed, parameters)):
-        return "warm" if converged and relaxed.slack <= TOLERANCE else "relaxed", relaxed, timed_out
-    return ("kept", shifted, timed_out) if shifted_is_safe else ("braking", full_braking, timed_out)
+        return (
+            "warm" if converged and relaxed.slack <= TOLERANCE else "relaxed",
+            relaxed,
+            timed_out,
+        )
+    return (
+        ("kept", shifted, timed_out)
+        if shifted_is_safe
+        else ("braking", full_braking, timed_out)
+    )
 
 
 def _continue_trend(s: MPCSettings, last_plan: Array, change: Array) -> Array:

@@ -59,7 +59,9 @@ class Ipopt(ProblemSolver):
         super().__init__(settings, n_people, n_walls)
         with CASADI_LOCK:
             self._hard, self._relaxed = _build(settings, n_people, n_walls)
-        self._upper = np.zeros(self._hard.numel_out("g"))  # 0 for the terminal condition
+        self._upper = np.zeros(
+            self._hard.numel_out("g")
+        )  # 0 for the terminal condition
         self._upper[: self.evaluate.n_rows] = inf
         self.remembered = np.zeros(0)
 
@@ -68,13 +70,19 @@ class Ipopt(ProblemSolver):
         a_max = self.settings.a_max
         if self.settings.crowding:
             prices = np.asarray(self.evaluate.find_prices(parameters)).ravel()
-            return self._solve_with_slack(guess, parameters, prices < self.settings.slack_weight)
-        return self._solve(self._hard, parameters, x0=guess, p=parameters, lbx=-a_max, ubx=a_max)
+            return self._solve_with_slack(
+                guess, parameters, prices < self.settings.slack_weight
+            )
+        return self._solve(
+            self._hard, parameters, x0=guess, p=parameters, lbx=-a_max, ubx=a_max
+        )
 
     def relaxed(self, guess: Array, parameters: Array) -> tuple[PlanEvaluation, bool]:
         """The plan of the relaxed problem from a `guess` and `parameters`; True if IPOPT converged."""
         is_free = np.ones(self.evaluate.n_rows, bool)
-        is_free[self.evaluate.n_cbf :] = np.hypot(*parameters[2:4]) > self.settings.v_max
+        is_free[self.evaluate.n_cbf :] = (
+            np.hypot(*parameters[2:4]) > self.settings.v_max
+        )
         return self._solve_with_slack(guess, parameters, is_free)
 
     def _solve_with_slack(
@@ -93,12 +101,17 @@ class Ipopt(ProblemSolver):
             ubx=np.r_[np.full(guess.size, s.a_max), np.where(is_free, np.inf, 0.0)],
         )
 
-    def _solve(self, solver: Any, parameters: Array, **problem: Any) -> tuple[PlanEvaluation, bool]:
+    def _solve(
+        self, solver: Any, parameters: Array, **problem: Any
+    ) -> tuple[PlanEvaluation, bool]:
         """The plan that `solver` finds, and True if it converged."""
         with _CALL_LOCK:
             found, stats = solver(lbg=0, ubg=self._upper, **problem), solver.stats()
         s = self.settings
-        self.timed_out = stats["return_status"] in ("Maximum_CpuTime_Exceeded", "Maximum_WallTime_Exceeded")
+        self.timed_out = stats["return_status"] in (
+            "Maximum_CpuTime_Exceeded",
+            "Maximum_WallTime_Exceeded",
+        )
         inputs = np.clip(np.asarray(found["x"]).ravel()[: 2 * s.N], -s.a_max, s.a_max)
         return self.evaluate(inputs, parameters), bool(stats["success"])
 
@@ -115,12 +128,22 @@ def _build(settings: MPCSettings, n_people: int, n_walls: int) -> tuple[Any, Any
         if limit < inf:
             options[f"ipopt.max_{name}_time"] = HARD_SHARE * limit
     # Slack counted by its penalty, in the unit of the cost: IPOPT would scale the rest away.
-    penalty, weight = ca.SX.sym("penalty", p.rows.numel()), ca.SX.sym("weight", p.rows.numel())
-    hard = {"x": p.inputs, "p": p.parameters, "f": p.cost, "g": ca.vertcat(p.rows, p.terminal)}
+    penalty, weight = (
+        ca.SX.sym("penalty", p.rows.numel()),
+        ca.SX.sym("weight", p.rows.numel()),
+    )
+    hard = {
+        "x": p.inputs,
+        "p": p.parameters,
+        "f": p.cost,
+        "g": ca.vertcat(p.rows, p.terminal),
+    }
     relaxed = {
         "x": ca.vertcat(p.inputs, penalty),
         "p": ca.vertcat(p.parameters, weight),
         "f": p.cost + ca.sum1(penalty),
         "g": ca.vertcat(p.rows + penalty / weight, p.terminal),
     }
-    return ca.nlpsol("hard", "ipopt", hard, options), ca.nlpsol("relaxed", "ipopt", relaxed, options)
+    return ca.nlpsol("hard", "ipopt", hard, options), ca.nlpsol(
+        "relaxed", "ipopt", relaxed, options
+    )

@@ -27,7 +27,9 @@ from ..settings import MPCSettings
 from .ipopt import Ipopt
 from .sqp import Sqp
 
-DEFAULT_MAX_PEOPLE = 8  # number of people for whom solvers are built by default (assumed)
+DEFAULT_MAX_PEOPLE = (
+    8  # number of people for whom solvers are built by default (assumed)
+)
 INACTIVE_H = 1e9  # smallest h of an unused slot [m]
 _AWAY = 1e6  # distance of an unused slot from the robot [m]: its distance has a gradient there, of length 1
 
@@ -48,10 +50,17 @@ class SolverPool:
     n_walls : number of walls at the start.
     """
 
-    def __init__(self, settings: MPCSettings, max_people: int | None, n_walls: int) -> None:
-        self.settings, self.budget = settings, TimeBudget(settings.time_limit, settings.deadline)
+    def __init__(
+        self, settings: MPCSettings, max_people: int | None, n_walls: int
+    ) -> None:
+        self.settings, self.budget = (
+            settings,
+            TimeBudget(settings.time_limit, settings.deadline),
+        )
         self._grows = max_people is None
-        self.max_people = round_up_size(DEFAULT_MAX_PEOPLE if max_people is None else max_people)
+        self.max_people = round_up_size(
+            DEFAULT_MAX_PEOPLE if max_people is None else max_people
+        )
         self._solvers: dict[tuple[int, int], ProblemSolver] = {}
         self._begun = {(self.max_people, round_up_size(n_walls))}
         self._builder: Thread | None = None
@@ -62,7 +71,9 @@ class SolverPool:
         people, walls = size = round_up_size(n_people), round_up_size(n_walls)
         if people > self.max_people:
             logging.getLogger("szlib").info(
-                "the controller was built for %d people and now grows to %d", self.max_people, people
+                "the controller was built for %d people and now grows to %d",
+                self.max_people,
+                people,
             )
             self.max_people, self._grows = people, True
         if size not in self._solvers:
@@ -73,15 +84,25 @@ class SolverPool:
             if (self.max_people, walls) not in self._begun:
                 self._begun.add((self.max_people, walls))
                 self._builder = Thread(
-                    target=self._build, args=(self.max_people, walls), name="szlib solver pool"
+                    target=self._build,
+                    args=(self.max_people, walls),
+                    name="szlib solver pool",
                 )
                 self._builder.start()
         return self._solvers[size]
 
     def __getstate__(self) -> dict[str, Any]:
-        remembered = {size: solver.remembered.copy() for size, solver in list(self._solvers.items())}
+        remembered = {
+            size: solver.remembered.copy()
+            for size, solver in list(self._solvers.items())
+        }
         settings, max_people, grows = self.settings, self.max_people, self._grows
-        return {"settings": settings, "max_people": max_people, "grows": grows, "solvers": remembered}
+        return {
+            "settings": settings,
+            "max_people": max_people,
+            "grows": grows,
+            "solvers": remembered,
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Build the same sizes, with the same multipliers."""
@@ -129,12 +150,19 @@ def padded_parameters(
     away, y = x[0] + _AWAY, x[1]
     no_person = (away, y, away, y, -INACTIVE_H, 0.0, 0.0, 1.0, INACTIVE_H)
     no_wall = (away, y, away, y + 1.0, -INACTIVE_H)
-    slots = [*barriers, *[no_person] * (size[0] - len(barriers)), *walls, *[no_wall] * (size[1] - len(walls))]
+    slots = [
+        *barriers,
+        *[no_person] * (size[0] - len(barriers)),
+        *walls,
+        *[no_wall] * (size[1] - len(walls)),
+    ]
     return list(chain.from_iterable(slots))
 
 
 @lru_cache
-def active_rows(n_people: int, n_walls: int, size: tuple[int, int]) -> slice | NDArray[np.intp]:
+def active_rows(
+    n_people: int, n_walls: int, size: tuple[int, int]
+) -> slice | NDArray[np.intp]:
     """Rows of `n_people` and `n_walls` among the slots of a solver of this `size`."""
     if n_people == size[0] or n_walls == 0:
         return slice(n_people + n_walls)

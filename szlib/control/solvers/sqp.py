@@ -26,7 +26,13 @@ import daqp
 import numpy as np
 
 from ...checks import Array
-from ..problem import CASADI_LOCK, HARD_SHARE, BufferedFunction, PlanEvaluation, ProblemSolver
+from ..problem import (
+    CASADI_LOCK,
+    HARD_SHARE,
+    BufferedFunction,
+    PlanEvaluation,
+    ProblemSolver,
+)
 from ..settings import MPCSettings
 from .sqp_functions import QuadraticProgram, SqpFunctions, build_sqp_functions
 
@@ -66,19 +72,37 @@ class Sqp(ProblemSolver):
         self._inputs, self._step, self._share = np.zeros(n), np.zeros(n), np.ones(1)
         self._parameters, self._multipliers = np.zeros(derive.nnz_in(1)), np.zeros(m)
         arguments = self._inputs, self._parameters, self._multipliers
-        self._at_inputs = program = QuadraticProgram(functions, self.settings.N_h, *arguments)
-        self._measure = BufferedFunction(functions.measure, *arguments, self._step, self._share)
+        self._at_inputs = program = QuadraticProgram(
+            functions, self.settings.N_h, *arguments
+        )
+        self._measure = BufferedFunction(
+            functions.measure, *arguments, self._step, self._share
+        )
         free = functions.free
         self._free = None if free is None else BufferedFunction(free, self._parameters)
-        self._before, self._lower, self._upper = program.merit, program.lower, program.upper
+        self._before, self._lower, self._upper = (
+            program.merit,
+            program.lower,
+            program.upper,
+        )
         self._after, self._trial, self._values, states, h = self._measure.results
-        self._program = (program.exact, program.gradient, program.jacobian, program.upper, program.lower)
-        self._sense = np.repeat(np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows])
+        self._program = (
+            program.exact,
+            program.gradient,
+            program.jacobian,
+            program.upper,
+            program.lower,
+        )
+        self._sense = np.repeat(
+            np.array([_HARD, _SOFT, _EQUAL], np.intc), [n, n_rows, m - n_rows]
+        )
         self._measured = (self._trial, *self.evaluate.shaped(self._values, states, h))
         self._has_multipliers, self._model = False, daqp.Model()
         self._model.settings = _DAQP
         self._model.setup(np.eye(n), *self._program[1:], self._sense)
-        self._find_prices = BufferedFunction(self.evaluate.find_prices, self._parameters)
+        self._find_prices = BufferedFunction(
+            self.evaluate.find_prices, self._parameters
+        )
         self._prices = np.full(n + m, self.settings.slack_weight)
         self._model.soft_weights(w_l=self._prices, w_u=self._prices)
 
@@ -90,7 +114,10 @@ class Sqp(ProblemSolver):
     @remembered.setter
     def remembered(self, multipliers: Array) -> None:
         """Continue from these multipliers."""
-        self._multipliers[:], self._has_multipliers = multipliers, bool(multipliers.any())
+        self._multipliers[:], self._has_multipliers = (
+            multipliers,
+            bool(multipliers.any()),
+        )
 
     def reset(self) -> None:
         """Forget every multiplier."""
@@ -106,12 +133,16 @@ class Sqp(ProblemSolver):
         plan, outcome = self._solve(guess, parameters, 1.0)
         return plan, outcome in ("converged", "stalled")
 
-    def _solve(self, guess: Array, parameters: Array, share: float) -> tuple[PlanEvaluation, Outcome]:
+    def _solve(
+        self, guess: Array, parameters: Array, share: float
+    ) -> tuple[PlanEvaluation, Outcome]:
         """The plan from a `guess`, within this share of the budget, and how the search for it ended."""
         self._parameters[:] = parameters
         if self.settings.crowding:
             self._find_prices.call()
-            self._prices[self._inputs.size :][: self.evaluate.n_rows] = self._find_prices.results[0]
+            self._prices[self._inputs.size :][: self.evaluate.n_rows] = (
+                self._find_prices.results[0]
+            )
             self._model.soft_weights(w_l=self._prices, w_u=self._prices)
         outcome: Outcome = "converged"
         # If a row had a multiplier in the last step, it nearly always has one now.
@@ -124,7 +155,9 @@ class Sqp(ProblemSolver):
                 self._measure_inputs()
         self.timed_out = outcome == "timed out"
         cost, slack = self._after[2:4].tolist()
-        return PlanEvaluation(cost, slack, *[array.copy() for array in self._measured]), outcome
+        return PlanEvaluation(
+            cost, slack, *[array.copy() for array in self._measured]
+        ), outcome
 
     def _is_free(self) -> bool:
         """True if the minimum of the cost alone satisfies all bounds and rows; then it is the plan."""
@@ -138,11 +171,15 @@ class Sqp(ProblemSolver):
         self._measure_inputs()
         return True
 
-    @np.errstate(all="ignore")  # on the focus of a zone the slopes are not finite; DAQP refuses them
+    @np.errstate(
+        all="ignore"
+    )  # on the focus of a zone the slopes are not finite; DAQP refuses them
     def _iterate(self, share: float) -> Outcome:
         """Improve `_inputs`, within this share of the budget; no price goes above the weight of slack."""
         price, rises, best, limit = 0.0, 0, (0.0, 0.0), self.settings.slack_weight
-        sense: Any = self._sense  # a copy has only the multipliers: forget which rows are active
+        sense: Any = (
+            self._sense
+        )  # a copy has only the multipliers: forget which rows are active
         patience = inf if self.settings.crowding is None else PATIENCE
         for k in range(self.settings.max_iterations):
             if self.budget.is_spent(share):
@@ -154,10 +191,14 @@ class Sqp(ProblemSolver):
             self._step[:], self._multipliers[:] = step, info["lam"][step.size :]
             self._share[0] = 1.0
             self._measure.call()
-            cost, violation, _, _, size, largest_multiplier, on_rows = self._after.tolist()
+            cost, violation, _, _, size, largest_multiplier, on_rows = (
+                self._after.tolist()
+            )
             self._has_multipliers = largest_multiplier > 0
             price = max(price, min(PRICE * largest_multiplier, limit))
-            cost_before, violation_before, on_rows_before, on_speed = self._before.tolist()
+            cost_before, violation_before, on_rows_before, on_speed = (
+                self._before.tolist()
+            )
             curved = on_rows_before if exact else on_speed
             if rises == 0:
                 best = cost_before, violation_before
@@ -166,7 +207,9 @@ class Sqp(ProblemSolver):
                 return "failed"
             moved, violated = (CONVERGED if k < patience else LATE)[exact]
             is_satisfied = violation <= violated or largest_multiplier >= limit
-            has_converged = curved == on_rows == violation == 0 or (size <= moved and is_satisfied)
+            has_converged = curved == on_rows == violation == 0 or (
+                size <= moved and is_satisfied
+            )
             if has_converged or after <= before * (1 + ROUNDING):
                 rises = 0
             elif rises < RISES:

@@ -21,7 +21,13 @@ import casadi as ca
 import numpy as np
 
 from ...checks import Array
-from ..problem import BufferedFunction, Problem, build_problem, dense_function, remaining_distance
+from ..problem import (
+    BufferedFunction,
+    Problem,
+    build_problem,
+    dense_function,
+    remaining_distance,
+)
 from ..settings import MPCSettings
 
 
@@ -69,11 +75,17 @@ class QuadraticProgram:
     exact, gauss : Hessian of the Lagrangian, with and without the curvature of the barriers, shape (2N, 2N).
     """
 
-    def __init__(self, functions: SqpFunctions, n_steps: int, *arguments: Array) -> None:
+    def __init__(
+        self, functions: SqpFunctions, n_steps: int, *arguments: Array
+    ) -> None:
         n, n_cbf = arguments[0].size, functions.n_cbf
         self.jacobian, self.exact = np.zeros((arguments[2].size, n)), np.zeros((n, n))
-        self._function = BufferedFunction(functions.derive, *arguments, last_results=[self.jacobian[n_cbf:]])
-        self.merit, self.lower, self.upper, self.gradient, gauss, slopes, bends, _ = self._function.results
+        self._function = BufferedFunction(
+            functions.derive, *arguments, last_results=[self.jacobian[n_cbf:]]
+        )
+        self.merit, self.lower, self.upper, self.gradient, gauss, slopes, bends, _ = (
+            self._function.results
+        )
         self.gauss = gauss.reshape(n, n)
         to_ends = functions.to_positions[1:]
         to_steps = np.concatenate([to_ends, functions.to_positions[:-1]], axis=1)
@@ -90,21 +102,28 @@ class QuadraticProgram:
 
 
 @lru_cache(maxsize=256)
-def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> SqpFunctions:
+def build_sqp_functions(
+    settings: MPCSettings, n_people: int, n_walls: int
+) -> SqpFunctions:
     """Build the functions for `settings`, `n_people` and `n_walls`, or reuse them."""
     p, s = build_problem(settings, n_people, n_walls), settings
     u, n_rows = p.inputs, p.rows.numel()
     scale = 1 / remaining_distance(*(p.parameters[i] for i in (0, 1, 4, 5)))
     gradient, is_hard = ca.gradient(p.cost, u), p.is_hard(s)
     values = ca.vertcat(p.rows, p.terminal)
-    of_hard, of_priced = is_hard * p.violations, (1 - is_hard[:n_rows]) * p.violations[:n_rows]
+    of_hard, of_priced = (
+        is_hard * p.violations,
+        (1 - is_hard[:n_rows]) * p.violations[:n_rows],
+    )
     cost = scale * p.cost + ca.dot(p.prices, of_priced)
     violation, slack = ca.sum1(of_hard), ca.mmax(of_hard)
     multipliers = ca.SX.sym("multiplier", values.numel())
     on_rows = ca.norm_inf(multipliers[:n_rows])
     arguments = [u, p.parameters, multipliers]
 
-    map_of = np.asarray(ca.evalf(ca.jacobian(ca.vec(p.states), u))).reshape(s.N + 1, 4, 2 * s.N)
+    map_of = np.asarray(ca.evalf(ca.jacobian(ca.vec(p.states), u))).reshape(
+        s.N + 1, 4, 2 * s.N
+    )
     to_positions, on_speed = map_of[: s.N_h + 1, :2], multipliers[p.n_cbf : n_rows]
     curvature = scale * ca.evalf(ca.jacobian(gradient, u))
     gauss = ca.cse(ca.tril2symm(ca.tril(curvature + _hessian_of_speed(s, on_speed))))
@@ -121,8 +140,12 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
     found = [cost, violation, p.cost, slack, values, p.states, p.h.T]
     there = ca.Function("there", [u, p.parameters], found)
     *totals, values, states, h = there(trial, p.parameters)
-    merit = ca.vertcat(*totals, ca.norm_inf(step), ca.norm_inf(is_hard * multipliers), on_rows)
-    measure = dense_function("measure", [*arguments, step, share], [merit, trial, values, states, h])
+    merit = ca.vertcat(
+        *totals, ca.norm_inf(step), ca.norm_inf(is_hard * multipliers), on_rows
+    )
+    measure = dense_function(
+        "measure", [*arguments, step, share], [merit, trial, values, states, h]
+    )
     if p.terminal.numel():
         return SqpFunctions(derive, measure, None, to_positions, p.n_cbf)
     given = p.parameters[:10]
@@ -130,7 +153,9 @@ def build_sqp_functions(settings: MPCSettings, n_people: int, n_walls: int) -> S
     free = -ca.solve(to_inputs, to_given) @ given
     beyond = ca.sum1(ca.fmax(0, ca.fabs(free) - s.a_max))
     violated = ca.Function("violated", [u, p.parameters], [ca.sum1(p.violations)])
-    free_plan = dense_function("unbound", [p.parameters], [free, beyond + violated(free, p.parameters)])
+    free_plan = dense_function(
+        "unbound", [p.parameters], [free, beyond + violated(free, p.parameters)]
+    )
     return SqpFunctions(derive, measure, free_plan, to_positions, p.n_cbf)
 
 
@@ -142,7 +167,9 @@ def _slopes(p: Problem, s: MPCSettings) -> Any:
     none = ca.SX(p.h.shape[0], 1)
     ends = [slope[:, 1:] for slope in p.slope]
     starts = [ca.horzcat(none, -p.kept[:, 1:] * slope[:, 1:-1]) for slope in p.slope]
-    return ca.horzcat(*(ca.horzcat(*(of[:, k] for of in ends + starts)).T for k in range(s.N_h)))
+    return ca.horzcat(
+        *(ca.horzcat(*(of[:, k] for of in ends + starts)).T for k in range(s.N_h))
+    )
 
 
 def _hessian_of_speed(s: MPCSettings, multipliers: Any) -> Any:
@@ -151,15 +178,22 @@ def _hessian_of_speed(s: MPCSettings, multipliers: Any) -> Any:
     lengths = s.dt * np.array(s.step_lengths)
     later = np.maximum.outer(range(s.N), range(s.N)).ravel(order="F")
     after = ca.DM(np.triu(np.ones((s.N, s.N)))) @ multipliers
-    of_one_axis = ca.reshape((-2 * after)[later.tolist()], s.N, s.N) * np.outer(lengths, lengths)
+    of_one_axis = ca.reshape((-2 * after)[later.tolist()], s.N, s.N) * np.outer(
+        lengths, lengths
+    )
     return ca.kron(of_one_axis, ca.DM.eye(2))
 
 
 def _bends(p: Problem, s: MPCSettings, multipliers: Any, to_positions: Array) -> Any:
     """S_k P_k of each step k, by the position at its end: S_k is weighted by the multipliers of the rows."""
     # h_k is in two rows: with lambda_{k-1}, where a step ends, and -kept_k lambda_k, where the next begins.
-    on_rows, none = ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0]).T, ca.SX(p.h.shape[0], 1)
+    on_rows, none = (
+        ca.reshape(multipliers[: p.n_cbf], s.N_h, p.h.shape[0]).T,
+        ca.SX(p.h.shape[0], 1),
+    )
     weights = on_rows - ca.horzcat((p.kept * on_rows)[:, 1:], none)
     xx, xy, yy = (ca.sum1(weights * bend[:, 1:]) for bend in p.bend)
     bends = [ca.blockcat([[xx[k], xy[k]], [xy[k], yy[k]]]) for k in range(s.N_h)]
-    return ca.horzcat(*((bends[k] @ ca.sparsify(ca.DM(to_positions[k + 1]))).T for k in range(s.N_h)))
+    return ca.horzcat(
+        *((bends[k] @ ca.sparsify(ca.DM(to_positions[k + 1]))).T for k in range(s.N_h))
+    )

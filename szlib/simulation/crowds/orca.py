@@ -15,7 +15,8 @@ from ...checks import Array
 from ...zones.ellipses import BODY_RADIUS
 from .walking_model import INSTALL_CROWDS, MAX_SPEED_FACTOR, Walkers, import_package
 
-HORIZON, WALL_HORIZON = 3.0, 1.0  # time for which people keep apart from others and from walls [s] (assumed)
+# time for which people keep apart from others and from walls [s] (assumed)
+HORIZON, WALL_HORIZON = (3.0, 1.0)
 SENSING_RANGE, MAX_NEIGHBOURS = 10.0, 10
 """How far they see [m], and to how many at once they react (as in RVO2's examples)."""
 STEP_ASIDE_SPEED = 0.5  # largest speed of people who stand [m/s] (assumed)
@@ -28,9 +29,15 @@ class OrcaModel:
         rvo = import_package("pyrvo", INSTALL_CROWDS)
         near = (SENSING_RANGE, MAX_NEIGHBOURS, HORIZON, WALL_HORIZON)
         sim: Any = rvo.RVOSimulator(0.1, *near, BODY_RADIUS, 1.0)
-        fastest = np.where(walkers.speeds > 0, MAX_SPEED_FACTOR * walkers.speeds, STEP_ASIDE_SPEED).tolist()
-        for position, velocity, speed in zip(walkers.positions, walkers.velocities, fastest, strict=True):
-            sim.add_agent(position.tolist(), *near, BODY_RADIUS, speed, velocity.tolist())
+        fastest = np.where(
+            walkers.speeds > 0, MAX_SPEED_FACTOR * walkers.speeds, STEP_ASIDE_SPEED
+        ).tolist()
+        for position, velocity, speed in zip(
+            walkers.positions, walkers.velocities, fastest, strict=True
+        ):
+            sim.add_agent(
+                position.tolist(), *near, BODY_RADIUS, speed, velocity.tolist()
+            )
         if walkers.r_robot is not None:
             sim.add_agent((0.0, 0.0), *near, walkers.r_robot, 1.0, (0.0, 0.0))
         for wall in walkers.walls:
@@ -43,8 +50,13 @@ class OrcaModel:
         w, sim, n = self._walkers, self._sim, len(positions)
         offset = w.goals - positions
         distance = np.hypot(*offset.T)
-        speed = np.minimum(np.where(w.speeds > 0, w.speeds, STEP_ASIDE_SPEED), distance / dt)
-        preferred = offset * np.divide(speed, distance, out=np.zeros(n), where=distance > 0)[:, None]
+        speed = np.minimum(
+            np.where(w.speeds > 0, w.speeds, STEP_ASIDE_SPEED), distance / dt
+        )
+        preferred = (
+            offset
+            * np.divide(speed, distance, out=np.zeros(n), where=distance > 0)[:, None]
+        )
         for i in range(n):
             sim.set_agent_position(i, positions[i].tolist())
             sim.set_agent_pref_velocity(i, preferred[i].tolist())
@@ -55,4 +67,6 @@ class OrcaModel:
             sim.set_agent_pref_velocity(n, (vx, vy))
         sim.set_time_step(dt)
         sim.do_step()
-        return np.array([sim.get_agent_velocity(i).to_tuple() for i in range(n)], float).reshape(-1, 2)
+        return np.array(
+            [sim.get_agent_velocity(i).to_tuple() for i in range(n)], float
+        ).reshape(-1, 2)

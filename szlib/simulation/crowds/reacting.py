@@ -19,7 +19,10 @@ from .orca import OrcaModel
 from .social_force import SocialForceModel
 from .walking_model import ModelFactory, Walkers, WalkingModel
 
-MODELS: Mapping[str, ModelFactory] = {"orca": OrcaModel, "social force": SocialForceModel}
+MODELS: Mapping[str, ModelFactory] = {
+    "orca": OrcaModel,
+    "social force": SocialForceModel,
+}
 """Models of walking, by name; they need the extra `crowds`."""
 RobotAppearance = Literal["robot", "person", "nothing"]
 MIN_HEADING_SPEED = 0.2  # slower people keep their last heading [m/s] (assumed)
@@ -56,7 +59,13 @@ class ReactingPeople(CrowdModel):
     def __post_init__(self) -> None:
         models, appearances = ", ".join(MODELS), get_args(RobotAppearance)
         is_model = callable(self.model) or self.model in MODELS
-        require(is_model, "model", self.model, f"{models}, or make a model from walkers", SolverError)
+        require(
+            is_model,
+            "model",
+            self.model,
+            f"{models}, or make a model from walkers",
+            SolverError,
+        )
         expected = f"one of {', '.join(appearances)}"
         require(self.sees in appearances, "sees", self.sees, expected, SolverError)
         for name in ("pace", "jitter", "r_robot"):
@@ -74,7 +83,9 @@ class ReactingPeople(CrowdModel):
             decreases.
         """
         people = scenario.people
-        r_robot = {"robot": self.r_robot, "person": BODY_RADIUS, "nothing": None}[self.sees]
+        r_robot = {"robot": self.r_robot, "person": BODY_RADIUS, "nothing": None}[
+            self.sees
+        ]
         goals = self._shifted_goals(scenario, np.random.default_rng([seed, 3]))
         velocities = np.array([p.velocity for p in people]).reshape(-1, 2)
         speeds = np.hypot(*velocities.T)
@@ -92,9 +103,13 @@ class ReactingPeople(CrowdModel):
         else:
             goals = list(self.goals)
         if len(goals) != len(people):
-            raise SolverError(f"expected a goal for each of {len(people)} people; got {len(goals)}")
+            raise SolverError(
+                f"expected a goal for each of {len(people)} people; got {len(goals)}"
+            )
         unshifted = check_array("goals", np.reshape(goals, (-1, 2)), (len(people), 2))
-        stay = np.array([self.goals is None and person.stands for person in people], bool)
+        stay = np.array(
+            [self.goals is None and person.stands for person in people], bool
+        )
         shift = rng.normal(0.0, self.jitter, unshifted.shape)
         return unshifted + np.where(stay[:, None], 0.0, shift)
 
@@ -102,19 +117,25 @@ class ReactingPeople(CrowdModel):
 class _ReactingCrowd:
     """A crowd that walks: people decide from the robot's present state, and move for `dt`."""
 
-    def __init__(self, people: tuple[Person, ...], walkers: Walkers, model: WalkingModel) -> None:
+    def __init__(
+        self, people: tuple[Person, ...], walkers: Walkers, model: WalkingModel
+    ) -> None:
         self._people, self._model = people, model
         self._positions = walkers.positions.copy()
         self._time, self._robot = 0.0, np.zeros(4)
 
     def __call__(self, t: float, robot: Array) -> tuple[Person, ...]:
         if t < self._time:
-            raise SolverError(f"the time of a crowd cannot decrease: it is {self._time} s; got {t} s")
+            raise SolverError(
+                f"the time of a crowd cannot decrease: it is {self._time} s; got {t} s"
+            )
         if t > self._time and self._people:
             dt = round(t - self._time, 9)
             velocities = self._model.velocities(self._positions, self._robot, dt)
             self._positions += dt * velocities
-            pairs = zip(self._people, self._positions.tolist(), velocities.tolist(), strict=True)
+            pairs = zip(
+                self._people, self._positions.tolist(), velocities.tolist(), strict=True
+            )
             self._people = tuple(_move(*each) for each in pairs)
         self._time, self._robot = t, np.array(robot, float)
         return self._people
@@ -125,5 +146,9 @@ def _move(person: Person, at: list[float], velocity: list[float]) -> Person:
     (x, y), (vx, vy) = at, velocity
     heading = atan2(vy, vx) if hypot(vx, vy) >= MIN_HEADING_SPEED else person.heading
     return replace(
-        person, position=(x, y), velocity=(vx, vy), heading=heading, heading_unknown=heading is None
+        person,
+        position=(x, y),
+        velocity=(vx, vy),
+        heading=heading,
+        heading_unknown=heading is None,
     )

@@ -32,7 +32,9 @@ class SocialForceModel:
         speeds = walkers.speeds
         if self._robot:
             state, speeds = np.vstack([state, np.zeros(6)]), np.append(speeds, 1.0)
-        self._sim = module.Simulator(state, obstacles=[_obstacle(wall) for wall in walkers.walls])
+        self._sim = module.Simulator(
+            state, obstacles=[_obstacle(wall) for wall in walkers.walls]
+        )
         self._sim.peds.initial_speeds, self._sim.peds.max_speed_multiplier = speeds, 1.0
 
     def velocities(self, positions: Array, robot: Array, dt: float) -> Array:
@@ -50,12 +52,17 @@ class SocialForceModel:
         if self._robot:
             state[n, :6] = np.r_[robot, robot[:2] + _GOAL_TIME * robot[2:]]
         peds.step_width, peds.state = dt, state
-        with np.errstate(divide="ignore", invalid="ignore"):  # 0 / 0 for people who stand, which it sets to 0
+        with np.errstate(
+            divide="ignore", invalid="ignore"
+        ):  # 0 / 0 for people who stand, which it sets to 0
             self._sim.step_once()
-        peds.ped_states.clear(), peds.group_states.clear()  # it would keep the states of all steps
+        # it would keep the states of all steps
+        (peds.ped_states.clear(), peds.group_states.clear())
         velocities = np.array(peds.vel()[:n], float)
         if not np.isfinite(velocities).all():
-            raise SolverError(f"PySocialForce gave velocities that are not finite, for people at {positions}")
+            raise SolverError(
+                f"PySocialForce gave velocities that are not finite, for people at {positions}"
+            )
         return velocities
 
 
@@ -73,7 +80,11 @@ def _import_pysocialforce() -> ModuleType:
 
     Its import would open ``file.log`` in the working folder, and set the root logger to log everything.
     """
-    numba, root, handler = import_package("numba", INSTALL_CROWDS), logging.getLogger(), logging.FileHandler
+    numba, root, handler = (
+        import_package("numba", INSTALL_CROWDS),
+        logging.getLogger(),
+        logging.FileHandler,
+    )
     level, handlers, disabled = root.level, root.handlers[:], root.manager.disable
     jit_is_off = numba.config.DISABLE_JIT
     logging.disable(logging.CRITICAL)

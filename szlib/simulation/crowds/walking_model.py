@@ -13,7 +13,8 @@ from ...errors import SolverError
 
 # Largest speed of people who avoid others, as a multiple of their own (Helbing and Molnar 1995).
 MAX_SPEED_FACTOR = 1.3
-INSTALL_CROWDS = "pip install -e '.[crowds]'"  # command that installs pyrvo and PySocialForce
+# command that installs pyrvo and PySocialForce
+INSTALL_CROWDS = "pip install -e '.[crowds]'"
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ class WalkingModel(Protocol):
         """
 
 
-ModelFactory = Callable[[Walkers], WalkingModel]  # a function of a module, so that other processes find it
+# a function of a module, so that other processes find it
+ModelFactory = Callable[[Walkers], WalkingModel]
 
 
 def import_package(name: str, install: str) -> ModuleType:

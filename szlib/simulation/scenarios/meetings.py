@@ -68,7 +68,11 @@ def _crossing_walker(at: Place, distance: float = 0.7) -> Person:
 _DOOR = [((0.0, y), (0.0, 6 * y)) for y in (0.9, -0.9)]
 
 _MEETINGS: dict[str, tuple[str, Sequence[Person], Sequence[tuple[Place, Place]]]] = {
-    "frontal approach": ("A person comes straight towards the robot", [_walker((5.0, 0.0), (-5.0, 0.0))], []),
+    "frontal approach": (
+        "A person comes straight towards the robot",
+        [_walker((5.0, 0.0), (-5.0, 0.0))],
+        [],
+    ),
     "pedestrian obstruction": (
         "A person stands in the way",
         [_standing_person((0.0, 0.0), (-1.0, 0.0))],
@@ -79,12 +83,25 @@ _MEETINGS: dict[str, tuple[str, Sequence[Person], Sequence[tuple[Place, Place]]]
         [_walker((6.0, 0.7), (-6.0, 0.7))],
         _hall(1.6),
     ),
-    "narrow doorway": ("A person comes through a door 1.8 m wide", [_walker((2.5, 0.0), (-5.0, 0.0))], _DOOR),
-    "overtaking": ("A person walks ahead, at 0.3 m/s", [_walker((-2.5, 0.0), (5.0, 0.0), 0.3)], []),
+    "narrow doorway": (
+        "A person comes through a door 1.8 m wide",
+        [_walker((2.5, 0.0), (-5.0, 0.0))],
+        _DOOR,
+    ),
+    "overtaking": (
+        "A person walks ahead, at 0.3 m/s",
+        [_walker((-2.5, 0.0), (5.0, 0.0), 0.3)],
+        [],
+    ),
     "intersection": (
         "A person crosses where two halls meet",
         [_walker((0.0, -3.0), (0.0, 5.0))],
-        [wall for x in (-2, 2) for y in (-2, 2) for wall in _corner(x, y, x / 2, y / 2)],
+        [
+            wall
+            for x in (-2, 2)
+            for y in (-2, 2)
+            for wall in _corner(x, y, x / 2, y / 2)
+        ],
     ),
     "blind corner": (
         "A person comes from behind a corner",
@@ -163,7 +180,10 @@ class Variations:
         return replace(self.scenario, start=start, people=people)
 
     def _vary(self, person: Person, rng: np.random.Generator) -> Person:
-        (x, y), (dx, dy) = person.position, rng.uniform(-self.shift, self.shift, 2).tolist()
+        (x, y), (dx, dy) = (
+            person.position,
+            rng.uniform(-self.shift, self.shift, 2).tolist(),
+        )
         factor = rng.uniform(*self.pace)
         velocity = (factor * person.velocity[0], factor * person.velocity[1])
         zone = person.zone if self.zone is None else self.zone
@@ -185,9 +205,14 @@ class VisiblePeople:
 
         return crowd_and_robot
 
-    def observe(self, people: tuple[Person, ...], rng: np.random.Generator) -> tuple[Person | None, ...]:
+    def observe(
+        self, people: tuple[Person, ...], rng: np.random.Generator
+    ) -> tuple[Person | None, ...]:
         """The `people`, with None for those whom a wall hides; nothing is drawn from `rng`."""
-        return tuple(p if is_visible(self._robot, p.position, self._walls) else None for p in people)
+        return tuple(
+            p if is_visible(self._robot, p.position, self._walls) else None
+            for p in people
+        )
 
     def __reduce__(self) -> tuple[type[VisiblePeople], tuple[()]]:
         """A copy remembers nothing of a run."""

@@ -25,9 +25,13 @@ from ..run import Run
 from ..scenario import GOAL_RADIUS, Claim, Scenario
 from ..strategies import MIN_RETREAT, MIN_WAIT
 
-EARLY_H = 0.5  # avoidance that starts above this h starts well before the zone [m] (assumed)
+EARLY_H = (
+    0.5  # avoidance that starts above this h starts well before the zone [m] (assumed)
+)
 PASSING_DISTANCE = 1.0  # the robot passes a person who is within this distance ahead or behind [m] (assumed)
-SLOW_FRACTION = 0.8  # below this fraction of its greatest speed the robot has slowed down (assumed)
+SLOW_FRACTION = (
+    0.8  # below this fraction of its greatest speed the robot has slowed down (assumed)
+)
 MOUTH = 0.0  # x of the near end of the restricted pathway [m]
 
 _CORRIDOR = np.array([[(-6.0, y), (7.0, y)] for y in (2.3, -2.3)])
@@ -41,7 +45,9 @@ def _avoids_earlier_head_on(run: Run) -> tuple[bool, float]:
     """Difference of the two distances [m]."""
     head_on = find_avoidance_start(run)[0]
     controller = MPCCBF(run.zones[0], walls=run.scenario.walls, settings=run.settings)
-    from_behind = find_avoidance_start(simulate(run.scenario.turn_people(), controller))[0]
+    from_behind = find_avoidance_start(
+        simulate(run.scenario.turn_people(), controller)
+    )[0]
     return head_on > from_behind, head_on - from_behind
 
 
@@ -54,7 +60,9 @@ def _avoids_well_before(run: Run) -> tuple[bool, float]:
 def _slows_while_passing(run: Run) -> tuple[bool, float]:
     """Smallest speed beside the person, as a fraction of the greatest speed."""
     beside = np.abs(locate_along_course(run, 0)[0]) <= PASSING_DISTANCE
-    fraction = float(run.speed[beside].min() / run.speed.max()) if beside.any() else np.nan
+    fraction = (
+        float(run.speed[beside].min() / run.speed.max()) if beside.any() else np.nan
+    )
     return fraction < SLOW_FRACTION, fraction
 
 
@@ -89,7 +97,9 @@ def _goes_on(run: Run) -> tuple[bool, float]:
     return run.success, float(compute_metrics(run)["time_to_goal"])
 
 
-_OUT_FIRST = Claim("The robot enters the pathway after the person has left it.", _lets_person_out_first)
+_OUT_FIRST = Claim(
+    "The robot enters the pathway after the person has left it.", _lets_person_out_first
+)
 _GOES_ON = Claim("The robot goes on to its goal.", _goes_on)
 
 _SCENARIOS = (
@@ -100,7 +110,10 @@ _SCENARIOS = (
         goal=np.array([4.0, 0.0]),
         people=(Person((0.0, 0.0), heading=pi),),
         claims=(
-            Claim("Avoidance starts farther away head-on than from behind.", _avoids_earlier_head_on),
+            Claim(
+                "Avoidance starts farther away head-on than from behind.",
+                _avoids_earlier_head_on,
+            ),
             Claim("Avoidance starts well before the zone.", _avoids_well_before),
         ),
     ),

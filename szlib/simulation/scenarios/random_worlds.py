@@ -75,11 +75,23 @@ class Worlds:
     def __post_init__(self) -> None:
         for name in ("people", "pace", "wall_length", "travel"):
             low, high = getattr(self, name)
-            require(0 <= low <= high < np.inf, name, (low, high), "a range 0 <= low <= high", SolverError)
+            require(
+                0 <= low <= high < np.inf,
+                name,
+                (low, high),
+                "a range 0 <= low <= high",
+                SolverError,
+            )
         for name, value in (("standing", self.standing), ("walls", self.walls)):
             require(0 <= value <= 1, name, value, "a fraction in [0, 1]", SolverError)
         for name in ("max_walls", "size", "duration"):
-            require(0 < getattr(self, name) < np.inf, name, getattr(self, name), "positive", SolverError)
+            require(
+                0 < getattr(self, name) < np.inf,
+                name,
+                getattr(self, name),
+                "positive",
+                SolverError,
+            )
 
     def __call__(self, seed: int) -> Scenario:
         """The world of a `seed`: the same one each time, whatever controller drives in it.
@@ -94,7 +106,9 @@ class Worlds:
         """
         rng = np.random.default_rng(seed)
         for _ in range(_TRIES):
-            drawn = draw_zone(rng)  # in any case: the rest of the world does not depend on it
+            drawn = draw_zone(
+                rng
+            )  # in any case: the rest of the world does not depend on it
             zone, walls = self.zone or drawn, _draw_walls(rng, self)
             people = _draw_people(rng, self, walls, zone)
             x, goal = rng.uniform(-self.size / 2, self.size / 2, (2, 2))
@@ -102,12 +116,21 @@ class Worlds:
             velocity = speed * np.array([cos(heading), sin(heading)])
             if not self.travel[0] <= np.hypot(*(goal - x)) <= self.travel[1]:
                 continue
-            eps = max([_ROBOT.eps, *(required_margin(wall, _ROBOT.r_robot) for wall in walls)])
+            eps = max(
+                [_ROBOT.eps, *(required_margin(wall, _ROBOT.r_robot) for wall in walls)]
+            )
             placed = [place_zone(person, zone) for person in people]
-            standing = [each for each, person in zip(placed, people, strict=True) if person.stands]
+            standing = [
+                each
+                for each, person in zip(placed, people, strict=True)
+                if person.stands
+            ]
             stop = x + velocity * speed / (2 * _ROBOT.a_max)
             points = ((x, placed), (stop, placed), (goal, standing))
-            if all(_min_h(point, zones, walls, eps) >= self.min_h for point, zones in points):
+            if all(
+                _min_h(point, zones, walls, eps) >= self.min_h
+                for point, zones in points
+            ):
                 return Scenario(
                     name=f"world {seed}",
                     title=f"World {seed}",
@@ -134,14 +157,20 @@ def draw_zone(rng: np.random.Generator) -> Ellipse:
 
 
 def _draw_walls(rng: np.random.Generator, w: Worlds) -> Array:
-    count = int(rng.integers(1, w.max_walls, endpoint=True)) if rng.uniform() < w.walls else 0
+    count = (
+        int(rng.integers(1, w.max_walls, endpoint=True))
+        if rng.uniform() < w.walls
+        else 0
+    )
     middle = rng.uniform(-w.size / 2, w.size / 2, (count, 2))
     angle, half = rng.uniform(0, pi, count), rng.uniform(*w.wall_length, count) / 2
     along = half[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     return np.stack([middle - along, middle + along], axis=1)
 
 
-def _draw_people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellipse) -> list[Person]:
+def _draw_people(
+    rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellipse
+) -> list[Person]:
     """People one by one, clear of the walls and of each other; fewer where there is no space."""
     people: list[Person] = []
     times, ends = w.duration * _FRACTIONS, walls.reshape(-1, 4).T
@@ -154,7 +183,10 @@ def _draw_people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellips
             if any(dist((x, y), other.position) < 2 * BODY_RADIUS for other in people):
                 continue
             path = x + vx * times, y + vy * times
-            if not len(walls) or (euclidean_segment_formula(*path, *ends) >= BODY_RADIUS).all():
+            if (
+                not len(walls)
+                or (euclidean_segment_formula(*path, *ends) >= BODY_RADIUS).all()
+            ):
                 people.append(Person((x, y), (vx, vy), heading, zone))
                 break
     return people
@@ -162,5 +194,13 @@ def _draw_people(rng: np.random.Generator, w: Worlds, walls: Array, zone: Ellips
 
 def _min_h(point: Array, zones: list[PlacedZone], walls: Array, eps: float) -> float:
     """Smallest h of the people and walls at a point [m]."""
-    (x, y), rows = point.tolist(), [(*ends, eps) for ends in walls.reshape(-1, 4).tolist()]
-    return float(min(compute_h(x, y, zones, rows, r_robot=_ROBOT.r_robot, eps=eps), default=np.inf))
+    (x, y), rows = (
+        point.tolist(),
+        [(*ends, eps) for ends in walls.reshape(-1, 4).tolist()],
+    )
+    return float(
+        min(
+            compute_h(x, y, zones, rows, r_robot=_ROBOT.r_robot, eps=eps),
+            default=np.inf,
+        )
+    )

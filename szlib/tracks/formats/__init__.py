@@ -53,7 +53,9 @@ def open_file(
             found, scan = found.open(plain, path, head, options)
             yield found.in_metres(options.metres), scan, plain
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-            raise DataError(f"{path}: cannot be read as {found.name} ({error}); {EXPECTED}") from error
+            raise DataError(
+                f"{path}: cannot be read as {found.name} ({error}); {EXPECTED}"
+            ) from error
 
 
 def find_format(path: Path, options: ReadOptions) -> TrackFormat:

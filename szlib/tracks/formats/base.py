@@ -27,14 +27,17 @@ EXPECTED = (
     "Grand Central and Edinburgh are read by szlib.tracks.sites"
 )
 """The formats, for error messages."""
-MISSING = "missing or not a number"  # why a row is rejected, where a value cannot be read
+# why a row is rejected, where a value cannot be read
+MISSING = "missing or not a number"
 # A clock that stays below this (1973) does not count from 1970, and gives no calendar day.
 CALENDAR_BEGINS = 1e8
-_LAST_SECOND = 4_102_444_800.0  # 2100-01-01; later time stamps are not seconds since 1970
+# 2100-01-01; later time stamps are not seconds since 1970
+_LAST_SECOND = 4_102_444_800.0
 _FARTHEST = 2e7  # farther [m] from the origin of any grid is no place on Earth
 _DAY, _MINUTE = 86_400, 60  # [s]
 
-Opened = tuple["TrackFormat", pl.LazyFrame]  # the format of a file, and a scan of its rows
+# the format of a file, and a scan of its rows
+Opened = tuple["TrackFormat", pl.LazyFrame]
 
 
 @dataclass(frozen=True)
@@ -97,9 +100,13 @@ class TrackFormat:
     def recognises(self, head: bytes) -> bool:
         """Whether `head`, the first line of a file, looks like this format: numbers, as many as fields."""
         parts = self.split(decode_line(head))
-        return len(parts) == self.n_fields and sum(map(is_number, parts)) * 2 > len(parts)
+        return len(parts) == self.n_fields and sum(map(is_number, parts)) * 2 > len(
+            parts
+        )
 
-    def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> Opened:
+    def open(
+        self, plain: Path, path: Path, head: bytes, options: ReadOptions
+    ) -> Opened:
         """Complete the format with what a file says, and scan the file.
 
         Parameters
@@ -119,19 +126,27 @@ class TrackFormat:
         """
         first = decode_first_line(head, path)
         if options.frame_rate is not None:
-            raise DataError(f"{path}: is {self.name}, whose times are in seconds; leave frame_rate out")
+            raise DataError(
+                f"{path}: is {self.name}, whose times are in seconds; leave frame_rate out"
+            )
         found = replace(self, start=self.clock_start(path, first))
         return found, found.scan(plain)
 
     def in_metres(self, metres: float | None) -> Self:
         """The format with positions in units of `metres`, if they are given."""
-        return self if metres is None or self.is_in_metres else replace(self, metres=metres)
+        return (
+            self
+            if metres is None or self.is_in_metres
+            else replace(self, metres=metres)
+        )
 
     def split(self, line: str) -> list[str]:
         """The fields of a `line`."""
         if self.separator == " ":
             return line.split()
-        fields = next(csv.reader([line.replace("\r", " ")], delimiter=self.separator), [])
+        fields = next(
+            csv.reader([line.replace("\r", " ")], delimiter=self.separator), []
+        )
         return [field.strip(" \"'") for field in fields]
 
     def name_columns(self, **quantities: str) -> dict[str, str | int]:
@@ -140,8 +155,15 @@ class TrackFormat:
         A file without names needs all of them.
         """
         names = self.names if any(self.names) else range(self.n_fields)
-        whole = {} if any(self.names) else {name: name for name in self.columns if name not in ("t", "day")}
-        return {name: names[self.columns[of]] for name, of in {**quantities, **whole, **quantities}.items()}
+        whole = (
+            {}
+            if any(self.names)
+            else {name: name for name in self.columns if name not in ("t", "day")}
+        )
+        return {
+            name: names[self.columns[of]]
+            for name, of in {**quantities, **whole, **quantities}.items()
+        }
 
     def show_field(self, plain: Path | None, line: int, name: str) -> str:
         """The column that holds `name`, and what is in it at a `line` of file `plain`, for people."""
@@ -150,8 +172,14 @@ class TrackFormat:
         if k is None or plain is None or not self.separator:
             return f"column {shown}"
         with plain.open("rb") as stream:
-            fields = self.split(decode_line(next(islice(stream, line - 1, None), b"")[:LONGEST_LINE]))
-        return f"column {shown} holds {fields[k][:80]!r}" if k < len(fields) else f"column {shown} is missing"
+            fields = self.split(
+                decode_line(next(islice(stream, line - 1, None), b"")[:LONGEST_LINE])
+            )
+        return (
+            f"column {shown} holds {fields[k][:80]!r}"
+            if k < len(fields)
+            else f"column {shown} is missing"
+        )
 
     def clock_start(self, path: Path, first: str) -> float:
         """Midnight of the day that names file `path` [s since 1970], if its `first` line counts from it."""
@@ -162,13 +190,20 @@ class TrackFormat:
             since = float(self.split(first)[self.columns["t"]])
         except ValueError:  # named otherwise, or the first row is damaged
             return 0.0
-        return day.replace(tzinfo=ZoneInfo(self.tz)).timestamp() if 0 <= since < _DAY else 0.0
+        return (
+            day.replace(tzinfo=ZoneInfo(self.tz)).timestamp()
+            if 0 <= since < _DAY
+            else 0.0
+        )
 
     def rejection_reason(self) -> pl.Expr:
         """Why a row is rejected; null where it is usable."""
         numbers, place = ["t", "id", "x", "y"], (self.metres, _FARTHEST)
         limit = {"t": (self.seconds, _LAST_SECOND), "x": place, "y": place}
-        beyond = {name: pl.col(name).abs() * unit > most for name, (unit, most) in limit.items()}
+        beyond = {
+            name: pl.col(name).abs() * unit > most
+            for name, (unit, most) in limit.items()
+        }
         reasons = {
             "missing or extra fields": pl.col("ragged"),
             MISSING: pl.any_horizontal(pl.col(numbers).is_null()),
@@ -179,7 +214,9 @@ class TrackFormat:
         }
         if "day" in self.columns:
             reasons["no day"] = pl.col("day").is_null()
-        return pl.coalesce(pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons.items())
+        return pl.coalesce(
+            pl.when(holds).then(pl.lit(reason)) for reason, holds in reasons.items()
+        )
 
     def to_metres(self, good: pl.DataFrame, path: Path, tz: str | None) -> pl.DataFrame:
         """Convert the `good` rows of file `path` to day, id, t [s], x, y [m].
@@ -189,11 +226,20 @@ class TrackFormat:
         """
         if "day" not in good.columns:
             last = good["t"].max()
-            is_named = self.is_sequence or (isinstance(last, float) and last * self.seconds < CALENDAR_BEGINS)
-            day = pl.lit(file_stem(path)) if is_named else _find_days(good["t"], tz or self.tz)
+            is_named = self.is_sequence or (
+                isinstance(last, float) and last * self.seconds < CALENDAR_BEGINS
+            )
+            day = (
+                pl.lit(file_stem(path))
+                if is_named
+                else _find_days(good["t"], tz or self.tz)
+            )
             good = good.with_columns(day=day)
         units = {"t": self.seconds, "x": self.metres, "y": self.metres}
-        numbers = (pl.col(name) if unit == 1 else pl.col(name) * unit for name, unit in units.items())
+        numbers = (
+            pl.col(name) if unit == 1 else pl.col(name) * unit
+            for name, unit in units.items()
+        )
         return good.select("day", "id", *numbers)
 
     def scan(self, plain: Path) -> pl.LazyFrame:
@@ -207,8 +253,13 @@ class TrackFormat:
             text = plain.read_bytes().removeprefix(codecs.BOM_UTF8)
             lines = re.sub(rb"^[ \t\r]+|[ \t\r]+$", b"", text, flags=re.MULTILINE)
             source = io.BytesIO(re.sub(rb"[ \t]+", b" ", lines))
-        numbers = {index for name, index in self.columns.items() if name not in self.texts}
-        fields = {f"f{i}": pl.Float64 if i in numbers else pl.String for i in range(self.n_fields)}
+        numbers = {
+            index for name, index in self.columns.items() if name not in self.texts
+        }
+        fields = {
+            f"f{i}": pl.Float64 if i in numbers else pl.String
+            for i in range(self.n_fields)
+        }
         scan = pl.scan_csv(
             source, schema={**fields, "extra": pl.String}, has_header=False, skip_lines=int(self.has_header),
             separator=self.separator, quote_char=self.quote, encoding="utf8-lossy", ignore_errors=True,
@@ -244,7 +295,9 @@ def decode_first_line(head: bytes, path: Path) -> str:
         raise DataError(f"{path}, line 1: is binary, not text; {EXPECTED}")
     first = decode_line(head)
     if not first:
-        raise DataError(f"{path}, line 1: the file is empty or begins with a blank line; {EXPECTED}")
+        raise DataError(
+            f"{path}, line 1: the file is empty or begins with a blank line; {EXPECTED}"
+        )
     return first
 
 
@@ -261,17 +314,26 @@ def scan_table(rows: pl.DataFrame) -> pl.LazyFrame:
     """Scan table `rows` with columns t, id, x, y (, day) like a file; lines are counted from 1."""
     if "line" not in rows.columns:
         rows = rows.with_row_index("line", offset=1).with_columns(ragged=pl.lit(False))
-    day = [pl.col("day").cast(pl.String)] if rows.schema.get("day", pl.Date) != pl.Date else []
+    day = (
+        [pl.col("day").cast(pl.String)]
+        if rows.schema.get("day", pl.Date) != pl.Date
+        else []
+    )
     numbers = [pl.col(name).cast(pl.Float64, strict=False) for name in ("t", "x", "y")]
     return _with_exact_ids(rows.lazy().with_columns(*numbers, *day))
 
 
 def _with_exact_ids(scan: pl.LazyFrame) -> pl.LazyFrame:
     """The `scan` with column id as floats, and exact_id: an integer, or null where id does not tell it."""
-    number, text = pl.col("id").cast(pl.Float64, strict=False), pl.col("id").cast(pl.Int64, strict=False)
+    number, text = (
+        pl.col("id").cast(pl.Float64, strict=False),
+        pl.col("id").cast(pl.Int64, strict=False),
+    )
     whole = pl.when((number == number.floor()) & (number.abs() < 2.0**53)).then(number)
     texts = scan.with_columns(pl.col("id").cast(pl.String).str.strip_chars_start())
-    return texts.with_columns(id=number, exact_id=pl.coalesce(text, whole.cast(pl.Int64, strict=False)))
+    return texts.with_columns(
+        id=number, exact_id=pl.coalesce(text, whole.cast(pl.Int64, strict=False))
+    )
 
 
 def file_stem(path: Path) -> str:

@@ -32,7 +32,14 @@ _USUAL = {
     "y": "y posy ypos positiony yposition ycoord coordy ycoordinate centery y座標 y坐标",
     "day": "day",
 }
-_SECONDS = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # in a unit of time
+_SECONDS = {
+    "s": 1.0,
+    "sec": 1.0,
+    "seconds": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "ns": 1e-9,
+}  # in a unit of time
 _PIXELS = ("px", "pixel", "pixels")
 _GUESSED = 6  # number of columns that are tried out, as whose people walk
 _Format = TypeVar("_Format", bound=TrackFormat)
@@ -63,16 +70,28 @@ def find_columns(
     given, keys = dict(options.columns or {}), [_split_unit(name) for name in names]
     numbered = [k for k in given.values() if isinstance(k, int)]
     if beyond := [k for k in numbered if not 0 <= k < len(names)]:
-        raise DataError(f"{where} has no field {beyond[0]}; it has {len(names)}, the first is 0")
+        raise DataError(
+            f"{where} has no field {beyond[0]}; it has {len(names)}, the first is 0"
+        )
     at = {quantity: _candidates(quantity, given, names, keys) for quantity in _USUAL}
     is_free = "t" not in given and bool(at["frame"])
-    has_frames = "frame" in given or (is_free and (not at["t"] or options.frame_rate is not None))
-    quantities = ["frame" if has_frames else "t", "id", "x", "y", *(["day"] if at["day"] else [])]
+    has_frames = "frame" in given or (
+        is_free and (not at["t"] or options.frame_rate is not None)
+    )
+    quantities = [
+        "frame" if has_frames else "t",
+        "id",
+        "x",
+        "y",
+        *(["day"] if at["day"] else []),
+    ]
     for quantity in quantities:
         same = {names[k] for k in at[quantity]}
         if len(same) > 1:
             advice = advise(columns={**given, quantity: names[at[quantity][0]]})
-            raise DataError(f"{where}: {', '.join(sorted(same))} can all be {quantity}; {advice}")
+            raise DataError(
+                f"{where}: {', '.join(sorted(same))} can all be {quantity}; {advice}"
+            )
         if len(at[quantity]) > 1:
             raise DataError(f"{where} names {same.pop()} twice; rename one of them")
     found = {quantity: at[quantity][0] for quantity in quantities if at[quantity]}
@@ -94,7 +113,9 @@ def find_columns(
         )
     unit = keys[found["x"]][1] if keys[found["x"]][1] == keys[found["y"]][1] else ""
     if unit in _PIXELS and options.metres is None:
-        raise DataError(f"{where}: positions are in pixels; pass scale=, metres in a pixel")
+        raise DataError(
+            f"{where}: positions are in pixels; pass scale=, metres in a pixel"
+        )
     taken = {"frame" if has_frames else "t": time, **found}
     return replace(
         layout,
@@ -104,21 +125,28 @@ def find_columns(
         metres=UNITS.get(unit, layout.metres),
         seconds=1 / options.frame_rate if options.frame_rate else 1.0,
         time_unit=1.0 if has_frames else _SECONDS.get(keys[time][1]),
-        text=", ".join(f"{quantity} = {names[k] or k}" for quantity, k in taken.items()),
+        text=", ".join(
+            f"{quantity} = {names[k] or k}" for quantity, k in taken.items()
+        ),
     )
 
 
 def _split_unit(name: str) -> tuple[str, str]:
     """A name without blanks, accents and capitals, and its unit: ("posx", "mm") of "Pos X [mm]"."""
     letters = unicodedata.normalize("NFKD", name.casefold())
-    words = re.findall(r"[^\W_]+", "".join(each for each in letters if not unicodedata.combining(each)))
+    words = re.findall(
+        r"[^\W_]+", "".join(each for each in letters if not unicodedata.combining(each))
+    )
     has_unit = len(words) > 1 and words[-1] in (*UNITS, *_SECONDS, *_PIXELS)
     unit = words.pop() if has_unit else ""
     return "".join(words), unit
 
 
 def _candidates(
-    quantity: str, given: Mapping[str, str | int], names: Sequence[str], keys: Sequence[tuple[str, str]]
+    quantity: str,
+    given: Mapping[str, str | int],
+    names: Sequence[str],
+    keys: Sequence[tuple[str, str]],
 ) -> list[int]:
     """The columns that can hold a quantity: the one given, those with its name, or with a usual one."""
     name = given.get(quantity, quantity)
@@ -126,7 +154,11 @@ def _candidates(
         return [name]
     exact = [k for k, each in enumerate(names) if each == name]
     usual = {_split_unit(each)[0] for each in _USUAL[quantity].split()}
-    return exact or ([] if quantity in given else [k for k, (key, _) in enumerate(keys) if key in usual])
+    return exact or (
+        []
+        if quantity in given
+        else [k for k, (key, _) in enumerate(keys) if key in usual]
+    )
 
 
 def _suggest(
@@ -141,12 +173,23 @@ def _suggest(
     rows = sample()
     free = [k for k in range(rows.width) if k not in found.values()][:_GUESSED]
     numbers = {k: _as_floats(rows.to_series(k)) for k in [*found.values(), *free]}
-    usable = [k for k, values in numbers.items() if np.isfinite(values).sum() * 2 > rows.height]
+    usable = [
+        k
+        for k, values in numbers.items()
+        if np.isfinite(values).sum() * 2 > rows.height
+    ]
     known = {
-        quantities.index(q): usable.index(k) for q, k in found.items() if q in quantities and k in usable
+        quantities.index(q): usable.index(k)
+        for q, k in found.items()
+        if q in quantities and k in usable
     }
-    stated = {UNITS[unit] for _, unit in map(_split_unit, names) if unit in UNITS} | {options.metres} - {None}
-    readings = product((FRAMES,) if quantities[0] == "frame" else (1.0, FRAMES), stated or UNITS.values())
+    stated = {UNITS[unit] for _, unit in map(_split_unit, names) if unit in UNITS} | {
+        options.metres
+    } - {None}
+    readings = product(
+        (FRAMES,) if quantities[0] == "frame" else (1.0, FRAMES),
+        stated or UNITS.values(),
+    )
     given = dict(options.columns or {})
     for rate, metres in readings if usable else ():
         values = np.array([numbers[k] for k in usable])
@@ -154,11 +197,24 @@ def _suggest(
             time = "t" if rate == 1 else "frame"
             shown = [names[usable[k]] or usable[k] for k in order]
             columns = {**given, **dict(zip((time, "id", "x", "y"), shown, strict=True))}
-            unit = next((name for name, each in UNITS.items() if each == metres != 1 and not stated), None)
+            unit = next(
+                (
+                    name
+                    for name, each in UNITS.items()
+                    if each == metres != 1 and not stated
+                ),
+                None,
+            )
             more = {"frame_rate": None if rate == 1 else rate, "unit": unit}
-            advice = advise(columns=columns, **{name: value for name, value in more.items() if value})
+            advice = advise(
+                columns=columns,
+                **{name: value for name, value in more.items() if value},
+            )
             return f"people walk if these are {columns}; {advice}"
-    listed = ", ".join(map(repr, filter(None, names[:12]))) or f"{len(names)} fields without a header"
+    listed = (
+        ", ".join(map(repr, filter(None, names[:12])))
+        or f"{len(names)} fields without a header"
+    )
     named = {**given, **dict.fromkeys(missing, "...")}
     return f"it has {listed}; {advise(columns=named)}"
 

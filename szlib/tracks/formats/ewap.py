@@ -19,7 +19,8 @@ from .base import TrackFormat, decode_first_line
 
 # Sampling intervals without a sample after which a track ends: 0.9 s where samples are 0.4 s apart.
 _GAP = 2.25
-_USUAL_RATES = (15.0, 25.0)  # frames a second of EWAP files: ETH 15; hotel, zara and students 25
+# frames a second of EWAP files: ETH 15; hotel, zara and students 25
+_USUAL_RATES = (15.0, 25.0)
 # A rate needs at least so many steps, and quartiles of their rates at most this share of the median apart;
 # it is rounded to a whole number within 1 % of one.
 _FEWEST_STEPS, _SPREAD, _WHOLE = 10, 0.1, 0.01
@@ -31,11 +32,15 @@ _STEP = 0.02  # shorter steps [m] are ignored
 class _Ewap(TrackFormat):
     """Rows of 8 numbers: frame, id, x, z, y [m], vx, vz, vy [m/s]; z is the height."""
 
-    def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
+    def open(
+        self, plain: Path, path: Path, head: bytes, options: ReadOptions
+    ) -> tuple[Self, pl.LazyFrame]:
         """As `TrackFormat.open`; the frame rate is the one given, or estimated from the velocities."""
         decode_first_line(head, path)
         rows = self.scan(plain).collect()
-        seconds, max_gap = measure_frames(rows.with_columns(id="exact_id"), path, options.frame_rate)
+        seconds, max_gap = measure_frames(
+            rows.with_columns(id="exact_id"), path, options.frame_rate
+        )
         return replace(self, seconds=seconds, max_gap=max_gap), rows.lazy()
 
 
@@ -43,14 +48,17 @@ _COLUMNS = {"t": 0, "id": 1, "x": 2, "y": 4, "vx": 5, "vy": 7}
 EWAP = _Ewap("ewap", 8, _COLUMNS, separator=" ", is_sequence=True)
 
 
-def measure_frames(rows: pl.DataFrame, path: Path, given: float | None) -> tuple[float, float | None]:
+def measure_frames(
+    rows: pl.DataFrame, path: Path, given: float | None
+) -> tuple[float, float | None]:
     """Duration of a frame, and of the longest gap within a track [s], which follows the sampling interval.
 
     `rows` of file `path` have id, t [frames], x, y, and vx, vy in the same unit of length a second.  `given`
     is the frame rate; None estimates it.  Raises DataError where the velocities give no rate.
     """
     sane = pl.all_horizontal(pl.col("t", "x", "y", "vx", "vy").abs() < _FARTHEST_NUMBER)
-    rows = rows.filter(sane, pl.col("id").is_not_null()).sort("id", "t")  # drops NaN as well
+    # drops NaN as well
+    rows = rows.filter(sane, pl.col("id").is_not_null()).sort("id", "t")
     estimated, reason = estimate_frame_rate(rows)
     rate = estimated if given is None else float(given)
     if rate is None:
@@ -58,8 +66,14 @@ def measure_frames(rows: pl.DataFrame, path: Path, given: float | None) -> tuple
             f"{path}: the frame rate cannot be estimated from the file's velocities ({reason}); pass "
             "frame_rate=15 (ETH) or 25 (hotel, zara, students), or what the video has"
         )
-    if given is not None and estimated is not None and abs(given - estimated) > _SPREAD * estimated:
-        warn(f"{path.name}: read at {rate:g} frames/s as given; its velocities suggest {estimated:.4g}")
+    if (
+        given is not None
+        and estimated is not None
+        and abs(given - estimated) > _SPREAD * estimated
+    ):
+        warn(
+            f"{path.name}: read at {rate:g} frames/s as given; its velocities suggest {estimated:.4g}"
+        )
     elif given is None and rate not in _USUAL_RATES:
         warn(
             f"{path.name}: its velocities suggest {rate:.4g} frames/s, EWAP files have 15 or 25; if that "
@@ -78,7 +92,10 @@ def estimate_frame_rate(rows: pl.DataFrame) -> tuple[float | None, str]:
     from the last one (zara) or over both (ETH, hotel): the convention with the smallest spread counts.
     """
     person, frame = rows["id"].to_numpy(), rows["t"].to_numpy()
-    position, velocity = rows.select("x", "y").to_numpy(), rows.select("vx", "vy").to_numpy()
+    position, velocity = (
+        rows.select("x", "y").to_numpy(),
+        rows.select("vx", "vy").to_numpy(),
+    )
     here = np.arange(len(rows))
     conventions = [
         (here[:-1], here[1:], here[:-1]),
@@ -90,7 +107,11 @@ def estimate_frame_rate(rows: pl.DataFrame) -> tuple[float | None, str]:
         frames, step = frame[after] - frame[before], position[after] - position[before]
         length = np.einsum("ij,ij->i", step, step)
         usable = (person[after] == person[before]) & (frames > 0) & (length >= _STEP**2)
-        rates = np.einsum("ij,ij->i", velocity[at], step)[usable] * frames[usable] / length[usable]
+        rates = (
+            np.einsum("ij,ij->i", velocity[at], step)[usable]
+            * frames[usable]
+            / length[usable]
+        )
         if len(rates) >= _FEWEST_STEPS:
             low, rate, high = np.quantile(rates, [0.25, 0.5, 0.75])
             found.append(((high - low) / abs(rate) if rate else np.inf, rate))
@@ -99,4 +120,8 @@ def estimate_frame_rate(rows: pl.DataFrame) -> tuple[float | None, str]:
     spread, rate = min(found)
     if not (spread <= _SPREAD and FRAME_RATES[0] <= rate <= FRAME_RATES[1]):
         return None, f"they give {rate:.3g} frames/s, with quartiles {spread:.0%} apart"
-    return (float(np.rint(rate)) if abs(rate - np.rint(rate)) <= _WHOLE * rate else float(rate)), ""
+    return (
+        float(np.rint(rate))
+        if abs(rate - np.rint(rate)) <= _WHOLE * rate
+        else float(rate)
+    ), ""

@@ -43,15 +43,24 @@ class _Table(TrackFormat):
         """True for any `head`: what no other format recognises is read as a table."""
         return True
 
-    def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
+    def open(
+        self, plain: Path, path: Path, head: bytes, options: ReadOptions
+    ) -> tuple[Self, pl.LazyFrame]:
         """As `TrackFormat.open`, with the separator and the header of the file."""
         require_memory(plain, path)
         first = decode_first_line(head, path)
         separator = max(",;\t", key=first.count)
         separator = separator if separator in first else " "
         with plain.open("rb") as stream:
-            lines = [decode_line(line[:LONGEST_LINE]) for line in islice(stream, 1, _FIRST + 1)]
-        found = replace(self, separator=separator, quote='"' if any('"' in line for line in lines) else None)
+            lines = [
+                decode_line(line[:LONGEST_LINE])
+                for line in islice(stream, 1, _FIRST + 1)
+            ]
+        found = replace(
+            self,
+            separator=separator,
+            quote='"' if any('"' in line for line in lines) else None,
+        )
         parts = found.split(first)
         has_header = not all(map(is_number, parts))
         names = parts if has_header else [""] * len(parts)
@@ -62,31 +71,47 @@ class _Table(TrackFormat):
             every = {f"f{k}": k for k in range(len(parts))}
             whole = replace(found, columns=every, texts=frozenset(every))
             rows = whole.scan_rows(plain).head(_SAMPLE).collect()
-            return rows.select(pl.col(name).str.replace(",", ".", literal=True) for name in every)
+            return rows.select(
+                pl.col(name).str.replace(",", ".", literal=True) for name in every
+            )
 
         shown = first if len(first) <= 80 else first[:77] + "..."
-        found = find_columns(found, names, options, f"{path}, line 1: {shown!r}", sample)
+        found = find_columns(
+            found, names, options, f"{path}, line 1: {shown!r}", sample
+        )
         fields = [found.split(line) for line in lines if line]
-        is_text = {k for row in fields for k, text in enumerate(row) if not is_number(text)}
+        is_text = {
+            k for row in fields for k, text in enumerate(row) if not is_number(text)
+        }
         texts = {name for name, k in found.columns.items() if k in is_text}
         found = replace(found, texts=frozenset(texts | {"day", "id"}))
         return found.with_values(found.scan_rows(plain).collect(), options)
 
-    def with_values(self, rows: pl.DataFrame, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
+    def with_values(
+        self, rows: pl.DataFrame, options: ReadOptions
+    ) -> tuple[Self, pl.LazyFrame]:
         """The format completed with what its times are, and a scan of `rows` as from `TrackFormat.open`."""
         decimal = "," if self.separator in (";", "\t", " ") else "."
         found, t = self, rows["t"]
-        if self.time_unit is not None and 2 * to_numbers(t, decimal).null_count() <= len(t):
+        if self.time_unit is not None and 2 * to_numbers(
+            t, decimal
+        ).null_count() <= len(t):
             t = to_numbers(t, decimal) * self.time_unit
         else:
             times = to_times(t, options.tz or self.tz, decimal)
             t = times.seconds
             if times.kind:
                 found = replace(self, text=f"{self.text}; t: {times.kind}")
-            if times.day is not None and options.tz is None and "day" not in rows.columns:
+            if (
+                times.day is not None
+                and options.tz is None
+                and "day" not in rows.columns
+            ):
                 rows = rows.with_columns(day=times.day)
         x, y = (to_numbers(rows[name], decimal) for name in "xy")
-        return found, scan_table(rows.with_columns(t=t, id=to_ids(rows["id"]), x=x, y=y))
+        return found, scan_table(
+            rows.with_columns(t=t, id=to_ids(rows["id"]), x=x, y=y)
+        )
 
 
 @dataclass(frozen=True)
@@ -97,13 +122,25 @@ class _ArrowTable(_Table):
         """Whether `head` begins as Parquet and Feather do."""
         return head.startswith((b"PAR1", b"ARROW1"))
 
-    def open(self, plain: Path, path: Path, head: bytes, options: ReadOptions) -> tuple[Self, pl.LazyFrame]:
+    def open(
+        self, plain: Path, path: Path, head: bytes, options: ReadOptions
+    ) -> tuple[Self, pl.LazyFrame]:
         """As `TrackFormat.open`."""
         kind = "Parquet" if head.startswith(b"PAR1") else "Feather"
         try:
-            schema = pq.read_schema(plain) if kind == "Parquet" else pa.ipc.open_file(plain).schema
+            schema = (
+                pq.read_schema(plain)
+                if kind == "Parquet"
+                else pa.ipc.open_file(plain).schema
+            )
             data, names = pa.dataset.dataset(plain, schema, kind.lower()), schema.names
-            found = find_columns(self, names, options, f"{path}", lambda: pl.DataFrame(data.head(_SAMPLE)))
+            found = find_columns(
+                self,
+                names,
+                options,
+                f"{path}",
+                lambda: pl.DataFrame(data.head(_SAMPLE)),
+            )
             n_rows = data.count_rows()
             memory.require(n_rows * BYTES_PER_ROW, f"{path}: to read {n_rows:,} rows")
             table = data.to_table(columns=[names[at] for at in found.columns.values()])
@@ -111,9 +148,12 @@ class _ArrowTable(_Table):
         except DataError:
             raise
         except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
-            raise DataError(f"{path}: damaged {kind} ({error}); fetch or write the file again") from error
+            raise DataError(
+                f"{path}: damaged {kind} ({error}); fetch or write the file again"
+            ) from error
         named = {name: table[names[at]] for name, at in found.columns.items()}
-        return found.with_values(pl.DataFrame(pa.table(named)), options)  # without metadata
+        # without metadata
+        return found.with_values(pl.DataFrame(pa.table(named)), options)
 
 
 TIDY = _Table("tidy", has_header=True)
@@ -124,11 +164,15 @@ ARROW = _ArrowTable("tidy", has_header=True, separator="")
 def is_table(source: object) -> bool:
     """Whether `source` is a table of pandas, Polars, Arrow, GeoPandas, MovingPandas or PedPy, and no path."""
     names = ("__arrow_c_stream__", "to_point_gdf")
-    is_known = isinstance(source, pd.DataFrame) or any(hasattr(source, name) for name in names)
+    is_known = isinstance(source, pd.DataFrame) or any(
+        hasattr(source, name) for name in names
+    )
     return is_known or (hasattr(source, "data") and hasattr(source, "frame_rate"))
 
 
-def open_table(source: Any, where: Path, options: ReadOptions) -> tuple[TrackFormat, pl.LazyFrame]:
+def open_table(
+    source: Any, where: Path, options: ReadOptions
+) -> tuple[TrackFormat, pl.LazyFrame]:
     """The format and a scan of table `source`, as from `TrackFormat.open`; `where` is its name in messages.
 
     Times may be datetimes; without a zone they are those of the time zone in `options`.
@@ -138,7 +182,10 @@ def open_table(source: Any, where: Path, options: ReadOptions) -> tuple[TrackFor
     elif hasattr(source, "frame_rate"):  # PedPy's, which counts frames
         rate = float(options.frame_rate or source.frame_rate)
         columns = {"frame": "frame"} | dict(options.columns or {})
-        source, options = source.data, replace(options, columns=columns, frame_rate=rate)
+        source, options = (
+            source.data,
+            replace(options, columns=columns, frame_rate=rate),
+        )
     if isinstance(source, pd.DataFrame):
         source = _with_points(source, where)
         names = [str(name) for name in source.columns]
@@ -152,12 +199,16 @@ def open_table(source: Any, where: Path, options: ReadOptions) -> tuple[TrackFor
         if isinstance(source, pl.DataFrame):
             return source.to_series(at)
         values = source.iloc[:, at].reset_index(drop=True)
-        is_mixed = values.dtype == object or isinstance(values.dtype, pd.CategoricalDtype)
+        is_mixed = values.dtype == object or isinstance(
+            values.dtype, pd.CategoricalDtype
+        )
         return pl.Series(values.astype("string") if is_mixed else values)
 
     def sample() -> pl.DataFrame:
         """The first rows."""
-        return pl.DataFrame({f"f{k}": column(k).head(_SAMPLE) for k in range(len(names))})
+        return pl.DataFrame(
+            {f"f{k}": column(k).head(_SAMPLE) for k in range(len(names))}
+        )
 
     try:
         found = find_columns(TABLE, names, options, shown, sample)
@@ -165,8 +216,15 @@ def open_table(source: Any, where: Path, options: ReadOptions) -> tuple[TrackFor
         found, scan = found.with_values(rows, options)
     except DataError:
         raise
-    except (pl.exceptions.PolarsError, pa.ArrowException, TypeError, ValueError) as error:
-        raise DataError(f"{shown}: cannot be read ({error}); expected numbers in t, id, x and y") from error
+    except (
+        pl.exceptions.PolarsError,
+        pa.ArrowException,
+        TypeError,
+        ValueError,
+    ) as error:
+        raise DataError(
+            f"{shown}: cannot be read ({error}); expected numbers in t, id, x and y"
+        ) from error
     return found.in_metres(options.metres), scan
 
 
@@ -186,7 +244,9 @@ def _with_points(table: pd.DataFrame, where: Path) -> pd.DataFrame:
     return flat.assign(x=shapely.get_x(shapes), y=shapely.get_y(shapes))
 
 
-def open_database(plain: Path, path: Path, options: ReadOptions) -> tuple[TrackFormat, pl.LazyFrame] | None:
+def open_database(
+    plain: Path, path: Path, options: ReadOptions
+) -> tuple[TrackFormat, pl.LazyFrame] | None:
     """The format and a scan of the tracks in the SQLite file `plain`, given as `path`.
 
     None where it is JuPedSim's, or damaged.
@@ -196,16 +256,27 @@ def open_database(plain: Path, path: Path, options: ReadOptions) -> tuple[TrackF
     readable, refused = [], []
     with closing(sqlite3.connect(plain)) as file:
         try:
-            names = [name for (name,) in file.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
+            names = [
+                name
+                for (name,) in file.execute(
+                    "SELECT name FROM sqlite_master WHERE type = 'table'"
+                )
+            ]
         except sqlite3.DatabaseError:
             return None
         for name in [] if "trajectory_data" in names else names:
             try:
-                readable.append(open_table(pd.read_sql(f'SELECT * FROM "{name}"', file), path, options))
+                readable.append(
+                    open_table(
+                        pd.read_sql(f'SELECT * FROM "{name}"', file), path, options
+                    )
+                )
             except DataError as error:
                 refused.append(error)
     if len(readable) > 1:
-        command = f"sqlite3 -header -csv {path.name} 'SELECT * FROM {names[0]}' > tracks.csv"
+        command = (
+            f"sqlite3 -header -csv {path.name} 'SELECT * FROM {names[0]}' > tracks.csv"
+        )
         raise DataError(
             f"{path}: several of the tables {names} can be tracks; write one to a file: {command}"
         )

@@ -29,7 +29,9 @@ def unpacked(path: Path) -> Iterator[Path]:
     if not path.is_file():
         raise DataError(f"{printable(path)}: {_describe_missing(path)}")
     if printable(path.name) != path.name:
-        raise DataError(f"{printable(path)}: its name is no readable text (UTF-8); rename the file")
+        raise DataError(
+            f"{printable(path)}: its name is no readable text (UTF-8); rename the file"
+        )
     with unchanged_files([path]):
         if not _is_packed(readable_path(path)):
             yield readable_path(path)
@@ -52,7 +54,9 @@ def _unpack(path: Path, unpacked: Path) -> None:
         with gzip.open(readable_path(path)) as source, unpacked.open("wb") as target:
             shutil.copyfileobj(source, target, 1 << 22)
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        raise DataError(f"{path}: damaged .gz ({error}); fetch the file again") from error
+        raise DataError(
+            f"{path}: damaged .gz ({error}); fetch the file again"
+        ) from error
     except OSError as error:
         raise StorageError(
             f"{path}: no room to unpack it in {unpacked.parent.parent} ({error.strerror or error}); make "
@@ -63,7 +67,9 @@ def _unpack(path: Path, unpacked: Path) -> None:
 def _describe_missing(path: Path) -> str:
     if path.is_dir():
         return "is a folder; pass the files in it"
-    return "is no regular file; only those are read" if path.exists() else "no such file"
+    return (
+        "is no regular file; only those are read" if path.exists() else "no such file"
+    )
 
 
 def require_memory(plain: Path, path: Path) -> None:

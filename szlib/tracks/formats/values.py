@@ -9,7 +9,11 @@ import polars as pl
 
 # Times without a unit that are larger than this are counts since 1970, in units of so many seconds: as
 # seconds they would be later than the year 5000.
-_SINCE_1970 = {1e17: ("nanoseconds", 1e-9), 1e14: ("microseconds", 1e-6), 1e11: ("milliseconds", 1e-3)}
+_SINCE_1970 = {
+    1e17: ("nanoseconds", 1e-9),
+    1e14: ("microseconds", 1e-6),
+    1e11: ("milliseconds", 1e-3),
+}
 _DATE = r"^(?:19|20)\d{2}-\d{2}-\d{2}"  # beginning of an ISO time
 _ZONE = r"(?:Z|[+-]\d{2}:?\d{2})$"  # end of an ISO time that states its zone
 _SHORT = 11  # bits of a hash that are left out: a float holds the others exactly
@@ -34,7 +38,9 @@ def to_numbers(values: pl.Series, decimal: str = ".") -> pl.Series:
     """The numbers in a column of `values`; null where one is no number.  `decimal` is the point of texts."""
     if values.dtype == pl.String:
         values = values.str.strip_chars(" \"'")
-        values = values.str.replace(",", ".", literal=True) if decimal == "," else values
+        values = (
+            values.str.replace(",", ".", literal=True) if decimal == "," else values
+        )
     return values.cast(pl.Float64, strict=False)
 
 
@@ -45,7 +51,9 @@ def to_times(values: pl.Series, tz: str, decimal: str = ".") -> Times:
     """
     if values.dtype == pl.Duration:
         return Times(values.dt.total_nanoseconds() / 1e9, None, "durations")
-    if values.dtype == pl.String and 2 * (numbers := to_numbers(values, decimal)).null_count() > len(values):
+    if values.dtype == pl.String and 2 * (
+        numbers := to_numbers(values, decimal)
+    ).null_count() > len(values):
         text = values.str.strip_chars(" \"'")
         has_zone = text.str.contains(_ZONE).fill_null(False)
         dates = text.set(~text.str.contains(_DATE).fill_null(False), None).to_pandas()
@@ -54,14 +62,28 @@ def to_times(values: pl.Series, tz: str, decimal: str = ".") -> Times:
             return Times(numbers, None, "")
         if has_zone.any():
             day = text.str.slice(0, 10).str.to_date("%Y-%m-%d", strict=False)
-            return Times(_since_1970(parsed.where(has_zone.to_numpy())), day, "ISO times with a zone")
-        return Times(_since_1970(_localize(parsed.dt.tz_localize(None), tz)), None, f"ISO times in {tz}")
+            return Times(
+                _since_1970(parsed.where(has_zone.to_numpy())),
+                day,
+                "ISO times with a zone",
+            )
+        return Times(
+            _since_1970(_localize(parsed.dt.tz_localize(None), tz)),
+            None,
+            f"ISO times in {tz}",
+        )
     if not isinstance(values.dtype, pl.Datetime | pl.Date):
         return _scale(to_numbers(values, decimal))
-    dates = values.cast(pl.Datetime("ns", getattr(values.dtype, "time_zone", None))).to_pandas()
+    dates = values.cast(
+        pl.Datetime("ns", getattr(values.dtype, "time_zone", None))
+    ).to_pandas()
     if dates.dt.tz is None:
         return Times(_since_1970(_localize(dates, tz)), None, f"times in {tz}")
-    return Times(_since_1970(dates), values.dt.replace_time_zone(None).dt.date(), f"times in {dates.dt.tz}")
+    return Times(
+        _since_1970(dates),
+        values.dt.replace_time_zone(None).dt.date(),
+        f"times in {dates.dt.tz}",
+    )
 
 
 def to_ids(values: pl.Series) -> pl.Series:
@@ -74,10 +96,15 @@ def to_ids(values: pl.Series) -> pl.Series:
         return values
     text = values.cast(pl.String).str.strip_chars(" \"'")
     text = text.set(text == "", None)
-    if 2 * text.cast(pl.Float64, strict=False).null_count() <= len(text) + text.null_count():
+    if (
+        2 * text.cast(pl.Float64, strict=False).null_count()
+        <= len(text) + text.null_count()
+    ):
         return text
     names = text.drop_nulls().unique()
-    numbers = pd.util.hash_array(names.to_numpy().astype(object), categorize=False) >> _SHORT
+    numbers = (
+        pd.util.hash_array(names.to_numpy().astype(object), categorize=False) >> _SHORT
+    )
     return text.replace_strict(names, pl.Series(numbers.astype("int64")), default=None)
 
 
@@ -97,4 +124,6 @@ def _localize(times: Any, tz: str) -> Any:
 
 def _since_1970(times: Any) -> pl.Series:
     """Times with a zone as seconds since 1970; null where they are missing."""
-    return pl.Series(((times - pd.Timestamp(0, tz="UTC")).dt.total_seconds()).to_numpy()).fill_nan(None)
+    return pl.Series(
+        ((times - pd.Timestamp(0, tz="UTC")).dt.total_seconds()).to_numpy()
+    ).fill_nan(None)

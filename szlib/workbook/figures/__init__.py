@@ -23,7 +23,13 @@ from .comparisons import (
     plot_sweep,
     plot_zone_sizes,
 )
-from .control import draw_step, plot_admissible_controls, plot_distance, plot_distance_error, plot_step
+from .control import (
+    draw_step,
+    plot_admissible_controls,
+    plot_distance,
+    plot_distance_error,
+    plot_step,
+)
 from .encounters import (
     animate_encounter,
     plot_attentional_space,
@@ -42,4 +48,10 @@ from .simulation import (
 )
 from .style import add_legend_below, add_shared_legend, alt_text, get_axes, label_metres
 from .tracks import plot_funnel, plot_map, plot_speed_histogram
-from .zones import plot_hull, plot_outliers, plot_pair_correlation, plot_zone, plot_zones
+from .zones import (
+    plot_hull,
+    plot_outliers,
+    plot_pair_correlation,
+    plot_zone,
+    plot_zones,
+)

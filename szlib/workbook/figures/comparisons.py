@@ -26,7 +26,14 @@ _BARS = {
     "faced elsewhere": (BLUE, "|||"),
 }
 # Fill of each strategy in a map: colour and hatching, so that they differ in grey as well.
-_FILLS = (("#F0F0F0", ""), ("#A9D5F0", ""), (BLUE, ""), (BLACK, ""), (ORANGE, "//"), (RED, "xxx"))
+_FILLS = (
+    ("#F0F0F0", ""),
+    ("#A9D5F0", ""),
+    (BLUE, ""),
+    (BLACK, ""),
+    (ORANGE, "//"),
+    (RED, "xxx"),
+)
 _VERDICTS = {"supported": (GREEN, "o"), "contradicted": (RED, "X"), "not": (GREY, "s")}
 
 
@@ -48,14 +55,28 @@ def plot_sweep(table: pd.DataFrame, *, worst: float, ax: Axes | None = None) -> 
     """
     values = table.to_numpy(float)
     ax = get_axes(ax, size=(5, 3.5))
-    ax.imshow(np.clip(values / worst, 0, 1), cmap="Oranges", vmin=0, vmax=1.3, aspect="auto")
+    ax.imshow(
+        np.clip(values / worst, 0, 1), cmap="Oranges", vmin=0, vmax=1.3, aspect="auto"
+    )
     for (row, column), value in np.ndenumerate(values):
-        ax.text(column, row, f"{round(value, 3) + 0.0:.3g}", ha="center", va="center", fontsize=9)
+        ax.text(
+            column,
+            row,
+            f"{round(value, 3) + 0.0:.3g}",
+            ha="center",
+            va="center",
+            fontsize=9,
+        )
     return _label_cells(ax, table)
 
 
 def plot_strategies(
-    table: pd.DataFrame, *, names: Sequence[str], rows: str, columns: str, ax: Axes | None = None
+    table: pd.DataFrame,
+    *,
+    names: Sequence[str],
+    rows: str,
+    columns: str,
+    ax: Axes | None = None,
 ) -> Axes:
     """Plot which strategy a robot used for each pair of parameters, as the fill of a cell.
 
@@ -138,7 +159,12 @@ def draw_interval_grid(
 def _plot_intervals(ax: Axes, table: pd.DataFrame, *, rows: str, colour: str) -> None:
     """Plot the means of one metric with their intervals."""
     names, groups = list(dict.fromkeys(table[rows])), list(dict.fromkeys(table[colour]))
-    styles = zip(groups, (BLUE, ORANGE, GREEN, RED, BLACK), ("o", "s", "^", "D", "v"), strict=False)
+    styles = zip(
+        groups,
+        (BLUE, ORANGE, GREEN, RED, BLACK),
+        ("o", "s", "^", "D", "v"),
+        strict=False,
+    )
     for i, (group, shade, marker) in enumerate(styles):
         part = table[table[colour] == group].set_index(rows).reindex(names)
         at = np.arange(len(names)) + 0.16 * (i - (len(groups) - 1) / 2)
@@ -149,7 +175,9 @@ def _plot_intervals(ax: Axes, table: pd.DataFrame, *, rows: str, colour: str) ->
     ax.grid(axis="x", color=GREY, alpha=0.3)
 
 
-def plot_zone_sizes(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes | None = None) -> Axes:
+def plot_zone_sizes(
+    table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes | None = None
+) -> Axes:
     """Plot sizes of zones by the number of encounters, with their intervals.
 
     Parameters
@@ -170,9 +198,18 @@ def plot_zone_sizes(table: pd.DataFrame, columns: Mapping[str, str], *, ax: Axes
     styles = zip(("-o", "--s", ":^", "-.D"), (RED, BLUE, GREY, GREEN), strict=True)
     for (name, label), (style, colour) in zip(columns.items(), styles, strict=False):
         n = table["encounters"]
-        ax.fill_between(n, table[f"{name}_low"], table[f"{name}_high"], color=colour, alpha=0.18, linewidth=0)
+        ax.fill_between(
+            n,
+            table[f"{name}_low"],
+            table[f"{name}_high"],
+            color=colour,
+            alpha=0.18,
+            linewidth=0,
+        )
         ax.plot(n, table[name], style, color=colour, markersize=4, label=label)
-    ax.set(xscale="log", xlabel="encounters", ylabel="size of the zone [m]", ylim=(0, None))
+    ax.set(
+        xscale="log", xlabel="encounters", ylabel="size of the zone [m]", ylim=(0, None)
+    )
     ax.legend(fontsize=8)
     return ax
 
@@ -199,15 +236,30 @@ def plot_sensitivity(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     groups = varied.groupby("parameter", sort=False)["area"]
     low, high = groups.min().clip(upper=default), groups.max().clip(lower=default)
     width = (high - low).sort_values()
-    ax.barh(range(len(width)), width, left=low[width.index], color=BLUE, alpha=0.35, height=0.6)
+    ax.barh(
+        range(len(width)),
+        width,
+        left=low[width.index],
+        color=BLUE,
+        alpha=0.35,
+        height=0.6,
+    )
     names = []
     for row, name in enumerate(width.index):
         values = varied[varied["parameter"] == name].sort_values("area")
-        ax.plot(values["area"], np.full(len(values), row), "o", color=BLUE, markersize=5)
-        names.append(f"{name}\n{'; '.join(map(str, values['value']))}")  # beside the axis: no overlap
-    ax.axvline(default, color=BLACK, linewidth=1.2, label=f"defaults: {default:.2f} m$^2$")
+        ax.plot(
+            values["area"], np.full(len(values), row), "o", color=BLUE, markersize=5
+        )
+        # beside the axis: no overlap
+        names.append(f"{name}\n{'; '.join(map(str, values['value']))}")
+    ax.axvline(
+        default, color=BLACK, linewidth=1.2, label=f"defaults: {default:.2f} m$^2$"
+    )
     ax.set_yticks(range(len(width)), names)
-    ax.set(xlabel="area of the zone [m$^2$]; values from left to right", ylim=(-0.6, len(width) - 0.2))
+    ax.set(
+        xlabel="area of the zone [m$^2$]; values from left to right",
+        ylim=(-0.6, len(width) - 0.2),
+    )
     ax.use_sticky_edges = False
     ax.margins(x=0.1)
     add_legend_below(ax, gap=0.14)
@@ -230,16 +282,24 @@ def draw_claims(table: pd.DataFrame, *, title: str = "") -> Figure:
     >>> claim = {"claim": "zones grow with speed", "effect": 0.1, "low": 0.05, "high": 0.2, "unit": "m2"}
     >>> figure = figures.draw_claims(pd.DataFrame([claim | {"verdict": "supported"}]))
     """
-    figure, grid = plt.subplots(n := len(table), figsize=(8, 1.1 * n), layout="constrained", squeeze=False)
+    figure, grid = plt.subplots(
+        n := len(table), figsize=(8, 1.1 * n), layout="constrained", squeeze=False
+    )
     for ax, row in zip(grid.flat, table.to_dict("records"), strict=True):
         colour, marker = _VERDICTS[row["verdict"].split()[0]]
         ax.hlines(0, row["low"], row["high"], color=colour, linewidth=3)
         ax.plot(row["effect"], 0, marker, color=colour, markersize=9)
         ax.axvline(0, color=BLACK, linewidth=1)
         reach = 1.15 * max(abs(row["low"]), abs(row["high"])) or 1.0
-        ax.set(yticks=[], xlabel=row["unit"], xlim=(-reach, reach) if np.isfinite(reach) else (-1, 1))
+        ax.set(
+            yticks=[],
+            xlabel=row["unit"],
+            xlim=(-reach, reach) if np.isfinite(reach) else (-1, 1),
+        )
         ax.set_title(row["claim"], loc="left", fontsize=10)
-        ax.set_title(row["verdict"].partition(" with")[0], loc="right", fontsize=10, color=colour)
+        ax.set_title(
+            row["verdict"].partition(" with")[0], loc="right", fontsize=10, color=colour
+        )
     figure.suptitle(title)
     return figure
 
@@ -260,7 +320,10 @@ def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
     >>> ax = figures.plot_forest(szlib.pool({"hall": (0.9, 0.8, 1.0), "mall": (1.2, 1.0, 1.4)}))
     """
     n, sites = pooled.n_sites, pooled.table.set_index("site")[["value", "low", "high"]]
-    labels = [f"{name}: {mid:.2f} ({low:.2f} to {high:.2f})" for name, mid, low, high in sites.itertuples()]
+    labels = [
+        f"{name}: {mid:.2f} ({low:.2f} to {high:.2f})"
+        for name, mid, low, high in sites.itertuples()
+    ]
     labels.append(f"mean: {pooled.mean:.2f}")
     ax = get_axes(ax, size=(7.5, 0.35 * n + 1.9))
     if pooled.quantity in POSITIVE:
@@ -268,17 +331,36 @@ def plot_forest(pooled: Pooled, *, ax: Axes | None = None) -> Axes:
         ax.xaxis.set(major_locator=LogLocator(subs=(1, 2, 5)), major_formatter="{x:g}")
         ax.minorticks_off()
     ax.hlines(range(n), sites["low"], sites["high"], color=BLACK, linewidth=1.5)
-    ax.scatter(sites["value"], range(n), 25 + 150 * pooled.table["weight"], color=BLACK, marker="s")
+    ax.scatter(
+        sites["value"],
+        range(n),
+        25 + 150 * pooled.table["weight"],
+        color=BLACK,
+        marker="s",
+    )
     ax.axvline(pooled.mean, color=GREY, linestyle="--", linewidth=1)
     ax.margins(x=0.4)
     ax.set_xlim(ax.get_xlim())  # also where the next interval is wider
     if np.isfinite(pooled.new_high):
-        ax.fill([pooled.low, pooled.mean, pooled.high, pooled.mean], [n, n - 0.3, n, n + 0.3], color=BLUE)
+        ax.fill(
+            [pooled.low, pooled.mean, pooled.high, pooled.mean],
+            [n, n - 0.3, n, n + 0.3],
+            color=BLUE,
+        )
         labels[-1] += f" ({pooled.low:.2f} to {pooled.high:.2f})"
-        ax.plot([pooled.new_low, pooled.new_high], [n + 1, n + 1], "-|", color=ORANGE, linewidth=3, ms=12)
+        ax.plot(
+            [pooled.new_low, pooled.new_high],
+            [n + 1, n + 1],
+            "-|",
+            color=ORANGE,
+            linewidth=3,
+            ms=12,
+        )
         labels.append(f"a new site: {pooled.new_low:.2f} to {pooled.new_high:.2f}")
     ax.set_yticks(range(len(labels)), labels)
-    text = f"{pooled.quantity} of the zone [{UNITS[pooled.quantity]}], with 95 % intervals"
+    text = (
+        f"{pooled.quantity} of the zone [{UNITS[pooled.quantity]}], with 95 % intervals"
+    )
     ax.set(xlabel=text, ylim=(len(labels) - 0.4, -0.6))
     return ax
 
@@ -303,13 +385,30 @@ def plot_safety_claims(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     ax = get_axes(ax, size=(8, 3.5))
     left = np.zeros(len(table))
     for kind in MOTION_CHANGES:
-        share = 1000 * table[kind].to_numpy(float) / table["claimed_safe_steps"].to_numpy(float)
+        share = (
+            1000
+            * table[kind].to_numpy(float)
+            / table["claimed_safe_steps"].to_numpy(float)
+        )
         if kind in _BARS or share.any():
             colour, hatch = _BARS.get(kind, ("magenta", "ooo"))
-            ax.barh(table.index, share, left=left, label=kind, color=colour, hatch=hatch, edgecolor="white")
+            ax.barh(
+                table.index,
+                share,
+                left=left,
+                label=kind,
+                color=colour,
+                hatch=hatch,
+                edgecolor="white",
+            )
         left += share
     ax.set_xlim(0, 1.08 * max(float(left.max(initial=0)), 1e-9))
     ax.set(xlabel="steps that led to h < 0, per 1,000 steps claimed safe")
     ax.invert_yaxis()
-    ax.legend(fontsize=8, title="what the people did", loc="center left", bbox_to_anchor=(1.01, 0.5))
+    ax.legend(
+        fontsize=8,
+        title="what the people did",
+        loc="center left",
+        bbox_to_anchor=(1.01, 0.5),
+    )
     return ax

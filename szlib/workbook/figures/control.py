@@ -16,7 +16,11 @@ from shapely.plotting import patch_from_polygon
 from ...checks import Array
 from ...control.acceleration_polygon import BarrierLimit, find_admissible_controls
 from ...control.barriers import barrier, check_wall, ellipse_distance, segment_distance
-from ...control.distances import compute_distance_error, find_safe_boundary, required_margin
+from ...control.distances import (
+    compute_distance_error,
+    find_safe_boundary,
+    required_margin,
+)
 from ...control.step import Step
 from ...zones.ellipses import Ellipse
 from .palette import BLACK, BLUE, GREEN, GREY, RED
@@ -27,7 +31,11 @@ _WALL_LINES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
 
 
 def plot_distance(
-    shape: Ellipse | ArrayLike, *, extent: float = 2.5, margin: float = 0.55, ax: Axes | None = None
+    shape: Ellipse | ArrayLike,
+    *,
+    extent: float = 2.5,
+    margin: float = 0.55,
+    ax: Axes | None = None,
 ) -> Axes:
     """Plot level lines of the paper's approximate distance to an ellipse or a wall, and h = 0.
 
@@ -49,8 +57,18 @@ def plot_distance(
     grid = _grid(extent, 241)
     name = "the zone" if isinstance(shape, Ellipse) else "the wall"
     distance = _distance(grid, shape)
-    levels = [d for d in np.arange(-0.5, 1.6, 0.25).tolist() if abs(d) > 0.1 and abs(d - margin) > 0.1]
-    lines = ax.contour(*np.moveaxis(grid, -1, 0), distance, levels=levels, cmap="viridis", linewidths=0.8)
+    levels = [
+        d
+        for d in np.arange(-0.5, 1.6, 0.25).tolist()
+        if abs(d) > 0.1 and abs(d - margin) > 0.1
+    ]
+    lines = ax.contour(
+        *np.moveaxis(grid, -1, 0),
+        distance,
+        levels=levels,
+        cmap="viridis",
+        linewidths=0.8,
+    )
     ray = np.linspace(0, extent, 500)[:, None] * (0.6, -0.8)
     along = _distance(ray, shape)
     crossed = [d for d in levels if max(0, along.min()) < d < along.max()]
@@ -65,7 +83,12 @@ def plot_distance(
 
 
 def plot_distance_error(
-    shape: Ellipse | ArrayLike, *, r_robot: float, eps: float, extent: float = 2.0, ax: Axes | None = None
+    shape: Ellipse | ArrayLike,
+    *,
+    r_robot: float,
+    eps: float,
+    extent: float = 2.0,
+    ax: Axes | None = None,
 ) -> Axes:
     """Plot the approximate minus the Euclidean distance near a zone or a wall, and h = 0 with two margins.
 
@@ -90,16 +113,30 @@ def plot_distance_error(
     x, y = np.moveaxis(grid, -1, 0)
     error = compute_distance_error(grid, shape)
     true = _distance(grid, shape) - error
-    shown = np.ma.masked_where((true < 0) | (true > 0.9), 100 * error)  # no error matters farther away
-    image = ax.pcolormesh(x, y, shown, cmap="RdBu_r", vmin=-25, vmax=25, rasterized=True)
-    ax.figure.colorbar(image, ax=ax, shrink=0.85, label="d - Euclidean [cm]; red is dangerous")
+    shown = np.ma.masked_where(
+        (true < 0) | (true > 0.9), 100 * error
+    )  # no error matters farther away
+    image = ax.pcolormesh(
+        x, y, shown, cmap="RdBu_r", vmin=-25, vmax=25, rasterized=True
+    )
+    ax.figure.colorbar(
+        image, ax=ax, shrink=0.85, label="d - Euclidean [cm]; red is dangerous"
+    )
     ax.plot(*_outline(shape).T, color=BLACK, linewidth=3)
     margins = dict.fromkeys((eps, max(eps, required_margin(shape, r_robot))))
     for margin, line in zip(margins, ("-", "--"), strict=False):
         edge = find_safe_boundary(shape, r_robot + margin)
         label = f"h = 0, eps = {100 * margin:.0f} cm"
-        ax.plot(*np.vstack([edge, edge[:1]]).T, line, color=BLACK, linewidth=1.8, label=label)
-    ax.contour(x, y, true, levels=[r_robot], colors=[BLACK], linestyles=[":"], linewidths=1.8)
+        ax.plot(
+            *np.vstack([edge, edge[:1]]).T,
+            line,
+            color=BLACK,
+            linewidth=1.8,
+            label=label,
+        )
+    ax.contour(
+        x, y, true, levels=[r_robot], colors=[BLACK], linestyles=[":"], linewidths=1.8
+    )
     ax.plot([], [], ":", color=BLACK, label="the robot's disc touches")
     ax.set(xlim=(-extent, extent), ylim=(-extent, extent))
     add_legend_below(ax)
@@ -144,8 +181,14 @@ def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
     ax, a_max = get_axes(ax, size=(5, 4.6)), step.scene.settings.a_max
     found, reach = find_admissible_controls(step), 1.25 * a_max
     if not found.polygon.is_empty:
-        ax.add_patch(patch_from_polygon(found.polygon, facecolor=GREEN, alpha=0.45, label="allowed"))
-    bounds = Rectangle((-a_max, -a_max), 2 * a_max, 2 * a_max, fill=False, edgecolor=GREY, lw=1)
+        ax.add_patch(
+            patch_from_polygon(
+                found.polygon, facecolor=GREEN, alpha=0.45, label="allowed"
+            )
+        )
+    bounds = Rectangle(
+        (-a_max, -a_max), 2 * a_max, 2 * a_max, fill=False, edgecolor=GREY, lw=1
+    )
     ax.add_patch(bounds).set_label("bound of the acceleration")
     for limit, forbidden in _strictest_limits(found.limits, reach):
         wall_line = _WALL_LINES[limit.number % len(_WALL_LINES)]
@@ -153,25 +196,56 @@ def plot_admissible_controls(step: Step, *, ax: Axes | None = None) -> Axes:
         name = f"{limit.kind} {limit.number}, step {limit.k} to {limit.k + 1}"
         ax.plot(*limit.curve.T, linestyle=line, color=colour, linewidth=1.8, label=name)
         if not forbidden.is_empty:
-            style = {"fill": False, "hatch": "///", "edgecolor": colour, "lw": 0, "alpha": 0.35}
+            style = {
+                "fill": False,
+                "hatch": "///",
+                "edgecolor": colour,
+                "lw": 0,
+                "alpha": 0.35,
+            }
             ax.add_patch(patch_from_polygon(forbidden, **style))
-    ax.plot((-reach, reach, np.nan, 0, 0), (0, 0, np.nan, -reach, reach), color=GREY, linewidth=0.6)
-    ax.plot(*step.control, "*", color=BLUE, markersize=15, markeredgecolor=BLACK, label="chosen")
-    ax.set(xlabel="a_x [m/s²]", ylabel="a_y [m/s²]", xlim=(-reach, reach), ylim=(-reach, reach))
-    what = "No acceleration is allowed" if found.polygon.is_empty else "Green: the accelerations allowed"
+    ax.plot(
+        (-reach, reach, np.nan, 0, 0),
+        (0, 0, np.nan, -reach, reach),
+        color=GREY,
+        linewidth=0.6,
+    )
+    ax.plot(
+        *step.control,
+        "*",
+        color=BLUE,
+        markersize=15,
+        markeredgecolor=BLACK,
+        label="chosen",
+    )
+    ax.set(
+        xlabel="a_x [m/s²]",
+        ylabel="a_y [m/s²]",
+        xlim=(-reach, reach),
+        ylim=(-reach, reach),
+    )
+    what = (
+        "No acceleration is allowed"
+        if found.polygon.is_empty
+        else "Green: the accelerations allowed"
+    )
     ax.set(aspect="equal", title=what)
     add_legend_below(ax, gap=0.16)
     return ax
 
 
-def _strictest_limits(limits: tuple[BarrierLimit, ...], reach: float) -> list[tuple[BarrierLimit, Any]]:
+def _strictest_limits(
+    limits: tuple[BarrierLimit, ...], reach: float
+) -> list[tuple[BarrierLimit, Any]]:
     """The limit of each person and wall that forbids most of the figure, and the part that it forbids."""
     box = shapely.box(-reach, -reach, reach, reach)
     strictest: dict[tuple[str, int], tuple[BarrierLimit, Any]] = {}
     for limit in limits:
         (x0, y0), (x1, y1) = limit.curve[0], limit.curve[-1]
         right = np.array([y1 - y0, x0 - x1]) / np.hypot(x1 - x0, y1 - y0)
-        side = shapely.Polygon(np.vstack([limit.curve, limit.curve[::-1] + 4 * reach * right]))
+        side = shapely.Polygon(
+            np.vstack([limit.curve, limit.curve[::-1] + 4 * reach * right])
+        )
         forbidden, source = side.intersection(box), (limit.kind, limit.number)
         if source not in strictest or forbidden.area > strictest[source][1].area:
             strictest[source] = limit, forbidden
@@ -213,11 +287,28 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
     """
     ax, scene = get_axes(ax, size=(5, 4.6)), step.scene
     x, y, vx, vy = scene.state
-    ax.add_patch(Circle((x, y), scene.settings.r_robot, color=BLUE, alpha=0.45, lw=0, label="robot"))
+    ax.add_patch(
+        Circle(
+            (x, y), scene.settings.r_robot, color=BLUE, alpha=0.45, lw=0, label="robot"
+        )
+    )
     curves = [np.add((x, y), [(-1.5, -1.5), (1.5, 1.5)])]
-    arrow: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.008, "zorder": 3}
+    arrow: dict[str, Any] = {
+        "angles": "xy",
+        "scale_units": "xy",
+        "scale": 1,
+        "width": 0.008,
+        "zorder": 3,
+    }
     ax.quiver(x, y, vx, vy, color=BLUE, **arrow)
-    ax.plot(*step.predicted[:, :2].T, ".-", color=GREEN, markersize=4, linewidth=1, label="plan")
+    ax.plot(
+        *step.predicted[:, :2].T,
+        ".-",
+        color=GREEN,
+        markersize=4,
+        linewidth=1,
+        label="plan",
+    )
     for person, zone in zip(scene.people, scene.person_zones, strict=True):
         (px, py), heading = person.position, person.heading or 0.0
         curves.append(zone.placed((px, py), heading).curve())
@@ -225,14 +316,34 @@ def plot_step(step: Step, *, ax: Axes | None = None) -> Axes:
         draw_person(ax, px, py, heading, color=RED, markersize=7)
         ax.quiver(px, py, *person.velocity, color=RED, **arrow)
     for j, (xa, ya, xb, yb, _) in enumerate(scene.walls):
-        ax.plot((xa, xb), (ya, yb), color=BLACK, linewidth=3, solid_capstyle="round", label="wall")
+        ax.plot(
+            (xa, xb),
+            (ya, yb),
+            color=BLACK,
+            linewidth=3,
+            solid_capstyle="round",
+            label="wall",
+        )
         wall = shapely.LineString([(xa, ya), (xb, yb)])
-        beside = np.clip(wall.project(shapely.Point(x, y)), 0.6, max(0.6, wall.length - 0.6))
+        beside = np.clip(
+            wall.project(shapely.Point(x, y)), 0.6, max(0.6, wall.length - 0.6)
+        )
         near = wall.interpolate(beside)
         ax.text(near.x, near.y, f" wall {j}", fontsize=8, va="bottom", clip_on=True)
     drawn = np.vstack(curves)
-    (x0, y0), half = (drawn.min(axis=0) + drawn.max(axis=0)) / 2, np.ptp(drawn, axis=0).max() / 2 + 0.2
-    ax.plot(*zip((x, y), step.target, strict=True), ":", color=BLUE, label="direction to the target")
+    (x0, y0), half = (
+        (drawn.min(axis=0) + drawn.max(axis=0)) / 2,
+        np.ptp(drawn, axis=0).max() / 2 + 0.2,
+    )
+    ax.plot(
+        *zip((x, y), step.target, strict=True),
+        ":",
+        color=BLUE,
+        label="direction to the target",
+    )
     ax.set(xlim=(x0 - half, x0 + half), ylim=(y0 - half, y0 + half))
     add_legend_below(ax, gap=0.16, ncols=3)
-    return label_metres(ax, f"least h = {step.h.min(initial=np.inf):.2f} m, speed {np.hypot(vx, vy):.2f} m/s")
+    return label_metres(
+        ax,
+        f"least h = {step.h.min(initial=np.inf):.2f} m, speed {np.hypot(vx, vy):.2f} m/s",
+    )

@@ -23,12 +23,19 @@ from .style import add_legend_below, area_patch, draw_person, get_axes, label_me
 
 _HALF_TICK = 0.05  # half a step of the clock of tracks [s]
 _REFERENCE = "reference pedestrian"
-_PEOPLE = {_REFERENCE: ORANGE, "other person": BLUE}  # colours of the two people of an encounter
+_PEOPLE = {
+    _REFERENCE: ORANGE,
+    "other person": BLUE,
+}  # colours of the two people of an encounter
 _N_BINS = 40  # cells across r_max, or twice r_max: 5 or 10 cm for the paper's 2 m
 
 
 def plot_attentional_space(
-    space: AttentionalSpace, area: Area, *, pose: Sequence[float] = (), ax: Axes | None = None
+    space: AttentionalSpace,
+    area: Area,
+    *,
+    pose: Sequence[float] = (),
+    ax: Axes | None = None,
 ) -> Axes:
     """Plot the attentional space of a person in an area.
 
@@ -53,14 +60,21 @@ def plot_attentional_space(
     label = f"attentional space {space.width:g} m x {space.length:g} m"
     ax.add_patch(area_patch(area, edgecolor=BLACK, label="the area"))
     ax.add_patch(Polygon(corners, facecolor=BLUE, alpha=0.3, label=label))
-    ax.annotate("", (x + cos, y + sin), (x, y), arrowprops={"arrowstyle": "->", "color": RED, "lw": 2})
+    ax.annotate(
+        "",
+        (x + cos, y + sin),
+        (x, y),
+        arrowprops={"arrowstyle": "->", "color": RED, "lw": 2},
+    )
     ax.plot(x, y, "o", color=RED, label="reference pedestrian")
     ax.set(xlim=(x0 - 1, x1 + 1), ylim=(y0 - 1, y1 + 1))
     add_legend_below(ax, ncols=1)
     return label_metres(ax, "The space lies inside the area")
 
 
-def plot_encounter_paths(paths: pd.DataFrame, *, n_shown: int = 200, ax: Axes | None = None) -> Axes:
+def plot_encounter_paths(
+    paths: pd.DataFrame, *, n_shown: int = 200, ax: Axes | None = None
+) -> Axes:
     """Plot the paths of both people in the reference pedestrian's first frame (paper, fig. 2).
 
     A dot is the start of the other person's path. An arrow's head is the end of a path; it points in the
@@ -84,19 +98,51 @@ def plot_encounter_paths(paths: pd.DataFrame, *, n_shown: int = 200, ax: Axes | 
     """
     ax = get_axes(ax, size=(7, 5.5))
     every = [g for _, g in paths.groupby("encounter", sort=True)]
-    shown = [every[i] for i in np.unique(np.linspace(0, len(every) - 1, n_shown).round().astype(int))]
-    for prefix, colour, name in (("other", BLUE, "other person"), ("ref", ORANGE, "reference pedestrian")):
+    shown = [
+        every[i]
+        for i in np.unique(np.linspace(0, len(every) - 1, n_shown).round().astype(int))
+    ]
+    for prefix, colour, name in (
+        ("other", BLUE, "other person"),
+        ("ref", ORANGE, "reference pedestrian"),
+    ):
         lines = [g[[f"{prefix}_x", f"{prefix}_y"]].to_numpy() for g in shown]
-        ax.add_collection(LineCollection(lines, colors=colour, linewidths=0.6, alpha=0.5, label=name))
-        ends, before = (np.array([line[at] for line in lines]) for at in (-1, max(-6, -len(lines[0]))))
-        for (x, y), heading in zip(ends, np.arctan2(*(ends - before).T[::-1]), strict=True):
-            draw_person(ax, x, y, heading, color=colour, markersize=4, markeredgewidth=0)
+        ax.add_collection(
+            LineCollection(lines, colors=colour, linewidths=0.6, alpha=0.5, label=name)
+        )
+        ends, before = (
+            np.array([line[at] for line in lines])
+            for at in (-1, max(-6, -len(lines[0])))
+        )
+        for (x, y), heading in zip(
+            ends, np.arctan2(*(ends - before).T[::-1]), strict=True
+        ):
+            draw_person(
+                ax, x, y, heading, color=colour, markersize=4, markeredgewidth=0
+            )
     starts = np.array([[g["other_x"].iloc[0], g["other_y"].iloc[0]] for g in shown])
-    ax.plot(*starts.T, ".", color=BLACK, markersize=3, label="start of the other person's path")
+    ax.plot(
+        *starts.T,
+        ".",
+        color=BLACK,
+        markersize=3,
+        label="start of the other person's path",
+    )
     ax.autoscale_view()
-    ax.plot([], [], marker=(3, 0, -90), color=GREY, linestyle="", label="end of a path, and its direction")
+    ax.plot(
+        [],
+        [],
+        marker=(3, 0, -90),
+        color=GREY,
+        linestyle="",
+        label="end of a path, and its direction",
+    )
     add_legend_below(ax)
-    return label_metres(ax, f"Paths in the reference pedestrian's first frame, n = {len(shown)}", person=True)
+    return label_metres(
+        ax,
+        f"Paths in the reference pedestrian's first frame, n = {len(shown)}",
+        person=True,
+    )
 
 
 def animate_encounter(
@@ -140,26 +186,44 @@ def animate_encounter(
     b'GIF89a'
     """
     nearest = samples.groupby("encounter")["distance"].min().sort_values()
-    number = nearest.index[len(nearest) // 2] if encounter is None and len(nearest) else encounter
+    number = (
+        nearest.index[len(nearest) // 2]
+        if encounter is None and len(nearest)
+        else encounter
+    )
     shown = samples[samples["encounter"] == number]
     if shown.empty:
-        raise DataError(f"encounter {number!r} is not among the {len(nearest)} encounters of the samples")
+        raise DataError(
+            f"encounter {number!r} is not among the {len(nearest)} encounters of the samples"
+        )
     begin, end, day = shown["t"].min(), shown["t"].max(), str(shown["day"].iloc[0])
-    rows = tracks[(tracks["day"].astype(str) == day) & tracks["t"].between(begin - margin, end + margin)]
-    paths = [rows[rows["id"] == shown[name].iloc[0]].sort_values("t") for name in ("ref_id", "other_id")]
+    rows = tracks[
+        (tracks["day"].astype(str) == day)
+        & tracks["t"].between(begin - margin, end + margin)
+    ]
+    paths = [
+        rows[rows["id"] == shown[name].iloc[0]].sort_values("t")
+        for name in ("ref_id", "other_id")
+    ]
     if paths[0].empty or paths[1].empty:
-        raise DataError(f"encounter {number!r}: its people are not in these tracks on the day {day}")
+        raise DataError(
+            f"encounter {number!r}: its people are not in these tracks on the day {day}"
+        )
     figure = Figure(figsize=(width, width), layout="constrained", dpi=80)
     canvas, ax, frames = FigureCanvasAgg(figure), figure.subplots(), []
     both = pd.concat(paths)[["x", "y"]].to_numpy()
     low, high = both.min(0), both.max(0)
-    box = np.transpose([(low + high) / 2 + side * ((high - low).max() / 2 + 1) for side in (-1, 1)])
+    box = np.transpose(
+        [(low + high) / 2 + side * ((high - low).max() / 2 + 1) for side in (-1, 1)]
+    )
     for t in np.arange(begin - margin, end + margin + every / 2, every).tolist():
         ax.clear()
         ax.set(xlim=box[0], ylim=box[1])
         pasts = [path[path["t"] <= t + _HALF_TICK] for path in paths]
         here = {}
-        for path, past, (name, colour) in zip(paths, pasts, _PEOPLE.items(), strict=True):
+        for path, past, (name, colour) in zip(
+            paths, pasts, _PEOPLE.items(), strict=True
+        ):
             ax.plot(path["x"], path["y"], color=colour, alpha=0.25)
             ax.plot(past["x"], past["y"], color=colour, linewidth=2, label=name)
             if len(past) and t <= path["t"].iloc[-1] + _HALF_TICK:  # here now
@@ -178,13 +242,26 @@ def animate_encounter(
         canvas.draw()  # type: ignore[no-untyped-call]
         figure.set_layout_engine("none")  # that of the first frame stays
         pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-        frames.append(Image.fromarray(pixels).convert("RGB").quantize(method=Image.Quantize.FASTOCTREE))
+        frames.append(
+            Image.fromarray(pixels)
+            .convert("RGB")
+            .quantize(method=Image.Quantize.FASTOCTREE)
+        )
     gif = io.BytesIO()
-    frames[0].save(gif, "GIF", save_all=True, append_images=frames[1:], duration=1000 * every, loop=0)
+    frames[0].save(
+        gif,
+        "GIF",
+        save_all=True,
+        append_images=frames[1:],
+        duration=1000 * every,
+        loop=0,
+    )
     return gif.getvalue()
 
 
-def plot_relative_positions(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:
+def plot_relative_positions(
+    samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None
+) -> Axes:
     """Plot where the other person is around the reference pedestrian (paper, fig. 3a).
 
     One encounter in twenty comes nearer than the dotted circle.
@@ -210,12 +287,18 @@ def plot_relative_positions(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Ax
     edges = np.linspace(-r_max, r_max, _N_BINS + 1)
     _draw_density(ax, x, y, (edges, edges))
     radius = float(close.groupby("encounter")["distance"].min().quantile(0.05))
-    ax.add_patch(Circle((0, 0), radius, fill=False, linestyle=":", linewidth=2, color=RED))
+    ax.add_patch(
+        Circle((0, 0), radius, fill=False, linestyle=":", linewidth=2, color=RED)
+    )
     draw_person(ax, 0, 0, 0, color=RED, markersize=12)
-    return label_metres(ax, f"One encounter in twenty comes nearer than {radius:.2f} m", person=True)
+    return label_metres(
+        ax, f"One encounter in twenty comes nearer than {radius:.2f} m", person=True
+    )
 
 
-def plot_distance_by_direction(samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None) -> Axes:
+def plot_distance_by_direction(
+    samples: pd.DataFrame, *, r_max: float = 2.0, ax: Axes | None = None
+) -> Axes:
     """Plot the distance of the other person by line-of-sight angle (paper, fig. 3b).
 
     The line is the 5 % quantile of the nearest approaches in each 15 deg, where there are at least five.
@@ -241,19 +324,44 @@ def plot_distance_by_direction(samples: pd.DataFrame, *, r_max: float = 2.0, ax:
     _draw_density(ax, angle, close["distance"], edges)
     sector = (np.floor(angle / 15) * 15 + 7.5).rename("sector")
     nearest = close.groupby([sector, "encounter"])["distance"].min().groupby("sector")
-    edge = nearest.quantile(0.05).where(nearest.size() >= 5).reindex(np.arange(-172.5, 180, 15))
-    ax.plot(edge.index, edge, "o-", color=RED, markersize=4, label="one encounter in twenty comes nearer")
-    ax.set(xlabel="line-of-sight angle [deg] (left is positive)", ylabel="distance [m]", ylim=(0, r_max))
-    ax.set(xlim=(-180, 180), xticks=range(-180, 181, 45), title="How near people come, by direction")
+    edge = (
+        nearest.quantile(0.05)
+        .where(nearest.size() >= 5)
+        .reindex(np.arange(-172.5, 180, 15))
+    )
+    ax.plot(
+        edge.index,
+        edge,
+        "o-",
+        color=RED,
+        markersize=4,
+        label="one encounter in twenty comes nearer",
+    )
+    ax.set(
+        xlabel="line-of-sight angle [deg] (left is positive)",
+        ylabel="distance [m]",
+        ylim=(0, r_max),
+    )
+    ax.set(
+        xlim=(-180, 180),
+        xticks=range(-180, 181, 45),
+        title="How near people come, by direction",
+    )
     add_legend_below(ax, gap=0.16)
     return ax
 
 
-def _draw_density(ax: Axes, x: pd.Series, y: pd.Series, edges: tuple[np.ndarray, np.ndarray]) -> None:
+def _draw_density(
+    ax: Axes, x: pd.Series, y: pd.Series, edges: tuple[np.ndarray, np.ndarray]
+) -> None:
     """Draw the number of samples in each cell on a log scale; empty cells stay white."""
     counts = np.histogram2d(x, y, bins=edges)[0].T
     shown = np.ma.masked_equal(counts, 0)
     top = max(float(counts.max(initial=0)), 2.0)
-    image = ax.pcolormesh(*edges, shown, cmap=f"{SEQUENCE}_r", norm=LogNorm(1, top), rasterized=True)
+    image = ax.pcolormesh(
+        *edges, shown, cmap=f"{SEQUENCE}_r", norm=LogNorm(1, top), rasterized=True
+    )
     cell = " x ".join(f"{edge[1] - edge[0]:.2g}" for edge in edges)
-    ax.figure.colorbar(image, ax=ax, shrink=0.9, label=f"samples in a cell of {cell} (log scale)")
+    ax.figure.colorbar(
+        image, ax=ax, shrink=0.9, label=f"samples in a cell of {cell} (log scale)"
+    )

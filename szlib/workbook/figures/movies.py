@@ -24,7 +24,9 @@ from .palette import BLUE, GREEN, RED
 _STATIC = Path(__file__).parents[1] / "static"  # what a browser shows
 
 
-def scene_layout(scenario: Scenario, settings: MPCSettings, limits: Sequence[float]) -> dict[str, Any]:
+def scene_layout(
+    scenario: Scenario, settings: MPCSettings, limits: Sequence[float]
+) -> dict[str, Any]:
     """The part of a scene that does not move, for `static/scene.js`.
 
     Parameters
@@ -44,7 +46,13 @@ def scene_layout(scenario: Scenario, settings: MPCSettings, limits: Sequence[flo
 
 
 def snapshot(
-    t: float, state: Array, people: Array, zones: Iterable[Ellipse], plan: Array, h: Array, fallback: str
+    t: float,
+    state: Array,
+    people: Array,
+    zones: Iterable[Ellipse],
+    plan: Array,
+    h: Array,
+    fallback: str,
 ) -> dict[str, Any]:
     """One time of a run, for `static/scene.js`.
 
@@ -65,7 +73,9 @@ def snapshot(
         "robot": state[:2].round(3).tolist(),
         "speed": round(float(np.hypot(state[2], state[3])), 3),
         "people": people[present, :3].round(3).tolist(),
-        "zones": [np.round((*z.center, *z.semi_axes, z.angle), 3).tolist() for z in placed],
+        "zones": [
+            np.round((*z.center, *z.semi_axes, z.angle), 3).tolist() for z in placed
+        ],
         "plan": plan[np.isfinite(plan[:, 0]), :2].round(3).tolist(),
         "h": round(float(known.min()), 3) if known.size else None,
         "fallback": fallback,
@@ -75,7 +85,11 @@ def snapshot(
 def place_zones(zones: Iterable[Ellipse], people: Array) -> list[Ellipse]:
     """The zone of each person who is present, in the world frame; `zones` and `people` as of `snapshot`."""
     poses = people[:, :3].tolist()
-    return [z.placed((x, y), angle) for z, (x, y, angle) in zip(zones, poses, strict=True) if not isnan(x)]
+    return [
+        z.placed((x, y), angle)
+        for z, (x, y, angle) in zip(zones, poses, strict=True)
+        if not isnan(x)
+    ]
 
 
 class Movie(bytes):
@@ -114,8 +128,11 @@ class Movie(bytes):
         movie.run = {
             "layout": scene_layout(run.scenario, run.settings, limits),
             "snapshots": [
-                snapshot(t, state, people, run.zones, plan, h, fallback) | {"stuck": stuck}
-                for t, state, people, plan, h, fallback, stuck in zip(*columns, *steps, strict=True)
+                snapshot(t, state, people, run.zones, plan, h, fallback)
+                | {"stuck": stuck}
+                for t, state, people, plan, h, fallback, stuck in zip(
+                    *columns, *steps, strict=True
+                )
             ],
             "alt": f"{run.scenario.title or run.scenario.name}: a robot and {n} "
             f"{'person' if n == 1 else 'people'}, {run.time[-1]:.1f} s",
@@ -138,4 +155,6 @@ class Movie(bytes):
 
 def read_scripts(*names: str) -> str:
     """The text of the scripts `names`, one after the other."""
-    return "\n".join((_STATIC / f"{name}.js").read_text(encoding="utf-8") for name in names)
+    return "\n".join(
+        (_STATIC / f"{name}.js").read_text(encoding="utf-8") for name in names
+    )

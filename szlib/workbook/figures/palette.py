@@ -8,7 +8,14 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-BLUE, ORANGE, GREEN, RED, GREY, BLACK = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#999999", "#000000"
+BLUE, ORANGE, GREEN, RED, GREY, BLACK = (
+    "#0072B2",
+    "#E69F00",
+    "#009E73",
+    "#D55E00",
+    "#999999",
+    "#000000",
+)
 
 SEQUENCE = "viridis"
 

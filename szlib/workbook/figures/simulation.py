@@ -31,7 +31,9 @@ _ROBOT_COLOURS = LinearSegmentedColormap.from_list("robot", ["#D6E9F5", BLUE])
 _ZONE_COLOURS = LinearSegmentedColormap.from_list("person", ["#F8DCC8", RED])
 _PADDING = 0.2  # margin around everything that is drawn [m]
 _SAME_PLACE = 0.35  # positions nearer than this share one time label [m]
-_WALL_EXTENT = 3.0  # a wall is drawn to its end if the end is at most this far from all else [m]
+_WALL_EXTENT = (
+    3.0  # a wall is drawn to its end if the end is at most this far from all else [m]
+)
 _CROWD_MARGIN = 3.0  # margin around the robot's path in a crowd [m]
 
 
@@ -59,13 +61,24 @@ def plot_scenario(run: Run, *, every: float = 2.0, ax: Axes | None = None) -> Ax
     step = max(1, round(every / run.settings.dt))
     shown = np.arange(0, len(run.states), step)
     _draw_scenery(ax, run.scenario)
-    ax.plot(*run.states[:, :2].T, "o-", color=BLUE, markersize=1.5, linewidth=0.6, label="robot's path")
+    ax.plot(
+        *run.states[:, :2].T,
+        "o-",
+        color=BLUE,
+        markersize=1.5,
+        linewidth=0.6,
+        label="robot's path",
+    )
     for row in shown.tolist():
         depth = run.time[row] / max(run.time[-1], 1e-9)
-        _draw_moving(ax, run, row, robot=_ROBOT_COLOURS(depth), zone=_ZONE_COLOURS(depth))
+        _draw_moving(
+            ax, run, row, robot=_ROBOT_COLOURS(depth), zone=_ZONE_COLOURS(depth)
+        )
     _write_times(ax, run.time[shown], run.states[shown, :2], colour=BLACK, above=0)
     for i in range(len(run.zones)):
-        _write_times(ax, run.time[shown], run.people[shown, i, :2], colour="#7A2E00", above=8)  # dark red
+        _write_times(
+            ax, run.time[shown], run.people[shown, i, :2], colour="#7A2E00", above=8
+        )  # dark red
     ax.plot([], [], "o", color=BLUE, label="robot")
     ax.plot([], [], color=RED, label="zone")
     ax.plot([], [], marker=(3, 0, 0), color=RED, linestyle="", label="person")
@@ -95,7 +108,15 @@ def plot_speed(run: Run, *, ax: Axes | None = None) -> Axes:
     ax.axhline(run.settings.v_max, color=GREY, linestyle="--", label="limit")
     top = 1.15 * max(run.settings.v_max, float(run.speed.max()))
     if run.stuck.any():
-        ax.fill_between(run.time, 0, top, run.stuck > 0, color=ORANGE, alpha=0.25, label="no progress")
+        ax.fill_between(
+            run.time,
+            0,
+            top,
+            run.stuck > 0,
+            color=ORANGE,
+            alpha=0.25,
+            label="no progress",
+        )
     ax.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(0, top))
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1), fontsize=8)
     return ax
@@ -122,7 +143,13 @@ def plot_barriers(run: Run, *, ax: Axes | None = None) -> Axes:
     for i, h in enumerate(run.h[:, :n].T):
         ax.plot(run.time, h, color=RED, label="person" if i == 0 else None)
     if run.h.shape[1] > n:
-        ax.plot(run.time, run.h[:, n:].min(axis=1), color=BLACK, linestyle=":", label="nearest wall")
+        ax.plot(
+            run.time,
+            run.h[:, n:].min(axis=1),
+            color=BLACK,
+            linestyle=":",
+            label="nearest wall",
+        )
     ax.axhline(0, color=GREY, linewidth=1)
     ax.set_yscale("symlog", linthresh=0.5, linscale=1.5)
     ticks = [0, 0.25, 0.5, 1, 2, 5, 10]
@@ -156,13 +183,17 @@ def plot_robot_paths(runs: Mapping[str, Run], *, ax: Axes | None = None) -> Axes
         _draw_zone(ax, zone, _ZONE_COLOURS(0.5))
     styles = zip((BLUE, ORANGE, GREEN, BLACK), ("-", "--", "-.", ":"), strict=True)
     for (name, run), (colour, line) in zip(runs.items(), styles, strict=False):
-        ax.plot(*run.states[:, :2].T, color=colour, linestyle=line, linewidth=2, label=name)
+        ax.plot(
+            *run.states[:, :2].T, color=colour, linestyle=line, linewidth=2, label=name
+        )
     _set_limits(ax, [(run, np.zeros(1, int)) for run in runs.values()])
     add_legend_below(ax, gap=0.15, ncols=4)
     return label_metres(ax, first.scenario.title)
 
 
-def plot_crowd(run: Run, *, replay: Replay | None = None, ax: Axes | None = None) -> Axes:
+def plot_crowd(
+    run: Run, *, replay: Replay | None = None, ax: Axes | None = None
+) -> Axes:
     """Plot the paths of the robot and of all people, with a dot each second.
 
     The robot, people and zones are drawn at the time when the robot is nearest to a person.
@@ -186,10 +217,18 @@ def plot_crowd(run: Run, *, replay: Replay | None = None, ax: Axes | None = None
     distance = np.hypot(run.relative[..., 0], run.relative[..., 1])
     row = int(nanmin(distance, axis=1).argmin())
     for i, (x, y) in enumerate(np.moveaxis(run.people[:, :, :2], 0, -1)):
-        ax.plot(x, y, color=RED, linewidth=1, alpha=0.5, label="people" if i == 0 else None)
+        ax.plot(
+            x, y, color=RED, linewidth=1, alpha=0.5, label="people" if i == 0 else None
+        )
         ax.plot(x[::second], y[::second], ".", color=RED, markersize=3, alpha=0.5)
     if replay is not None:
-        ax.plot(*replay.walker.states[:, :2].T, "--", color=GREEN, linewidth=2, label="person replaced")
+        ax.plot(
+            *replay.walker.states[:, :2].T,
+            "--",
+            color=GREEN,
+            linewidth=2,
+            label="person replaced",
+        )
     ax.plot(*run.states[:, :2].T, color=BLUE, linewidth=2, label="robot")
     ax.plot(*run.states[::second, :2].T, ".", color=BLUE, markersize=5)
     _draw_scenery(ax, run.scenario)
@@ -229,57 +268,98 @@ def animate(run: Run, *, every: float = 0.4, width: float = 6.0) -> Movie:
 
     def draw_frame(row: int) -> Image.Image:
         """The scene at a row of the run."""
-        moving: list[Artist] = [*ax.plot(*run.states[: row + 1, :2].T, color=BLUE, linewidth=1)]
+        moving: list[Artist] = [
+            *ax.plot(*run.states[: row + 1, :2].T, color=BLUE, linewidth=1)
+        ]
         moving += ax.plot(*run.predicted[row, :, :2].T, ".", color=GREEN, markersize=3)
         moving += _draw_moving(ax, run, row, robot=BLUE, zone=RED)
-        ax.set_title(f"t = {run.time[row]:4.1f} s, robot at {run.speed[row]:.2f} m/s (shown twice as fast)")
+        ax.set_title(
+            f"t = {run.time[row]:4.1f} s, robot at {run.speed[row]:.2f} m/s (shown twice as fast)"
+        )
         canvas.draw()  # type: ignore[no-untyped-call]
         for artist in moving:
             artist.remove()
         pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
         picture = Image.fromarray(pixels).convert("RGB")
-        return picture.quantize(method=Image.Quantize.FASTOCTREE)  # nine times as fast as the default
+        return picture.quantize(
+            method=Image.Quantize.FASTOCTREE
+        )  # nine times as fast as the default
 
     first, *more = [draw_frame(row) for row in rows.tolist()]
     gif = io.BytesIO()
-    first.save(gif, "GIF", save_all=True, append_images=more, duration=500 * every, loop=0)
+    first.save(
+        gif, "GIF", save_all=True, append_images=more, duration=500 * every, loop=0
+    )
     return Movie(gif.getvalue(), run, (*ax.get_xlim(), *ax.get_ylim()))
 
 
 def _draw_scenery(ax: Axes, scenario: Scenario) -> None:
     """Draw what does not move: walls and the goal."""
     for i, wall in enumerate(scenario.walls):
-        ax.plot(*wall.T, color=BLACK, linewidth=3, solid_capstyle="round", label="wall" if i == 0 else None)
-    ax.plot(*scenario.goal, "D", color=BLUE, markersize=8, markeredgecolor=BLACK, label="goal")
+        ax.plot(
+            *wall.T,
+            color=BLACK,
+            linewidth=3,
+            solid_capstyle="round",
+            label="wall" if i == 0 else None,
+        )
+    ax.plot(
+        *scenario.goal,
+        "D",
+        color=BLUE,
+        markersize=8,
+        markeredgecolor=BLACK,
+        label="goal",
+    )
 
 
 def _draw_zone(ax: Axes, zone: Ellipse, colour: Any) -> Artist:
     (a, b), angle = zone.semi_axes, np.degrees(zone.angle)
-    patch = EllipsePatch(zone.center, 2 * a, 2 * b, angle=angle, fill=False, edgecolor=colour, lw=1.6)
+    patch = EllipsePatch(
+        zone.center, 2 * a, 2 * b, angle=angle, fill=False, edgecolor=colour, lw=1.6
+    )
     return ax.add_patch(patch)
 
 
-def _draw_moving(ax: Axes, run: Run, row: int, *, robot: Any, zone: Any) -> list[Artist]:
+def _draw_moving(
+    ax: Axes, run: Run, row: int, *, robot: Any, zone: Any
+) -> list[Artist]:
     """Draw robot, zones and people at one time."""
-    drawn = [_draw_zone(ax, ellipse, zone) for ellipse in place_zones(run.zones, run.people[row])]
+    drawn = [
+        _draw_zone(ax, ellipse, zone)
+        for ellipse in place_zones(run.zones, run.people[row])
+    ]
     position = run.states[row, :2].tolist()
-    drawn.append(ax.add_patch(Circle(position, run.settings.r_robot, color=robot, alpha=0.6, lw=0)))
+    drawn.append(
+        ax.add_patch(
+            Circle(position, run.settings.r_robot, color=robot, alpha=0.6, lw=0)
+        )
+    )
     for x, y, heading in run.people[row, :, :3].tolist():
         drawn += draw_person(ax, x, y, heading, color=RED, markersize=6)
     return drawn
 
 
-def _write_times(ax: Axes, time: Array, positions: Array, *, colour: str, above: float) -> None:
+def _write_times(
+    ax: Axes, time: Array, positions: Array, *, colour: str, above: float
+) -> None:
     """Write the times, shape (n,) [s], beside the positions, shape (n, 2) [m]; NaN for an absent person."""
     labels: list[tuple[Array, list[str]]] = []
     first = 0
     for row in range(1, len(time) + 1):
-        if row < len(time) and np.hypot(*(positions[row] - positions[first])) < _SAME_PLACE:
+        if (
+            row < len(time)
+            and np.hypot(*(positions[row] - positions[first])) < _SAME_PLACE
+        ):
             continue
         if not isnan(positions[first, 0]):
             here = positions[first:row].mean(axis=0)
             until = f"-{time[row - 1]:.3g}" if row - 1 > first else ""
-            near = [texts for place, texts in labels if np.hypot(*(here - place)) < _SAME_PLACE]
+            near = [
+                texts
+                for place, texts in labels
+                if np.hypot(*(here - place)) < _SAME_PLACE
+            ]
             if not near:
                 labels.append((here, []))
                 near = [labels[-1][1]]
@@ -287,7 +367,9 @@ def _write_times(ax: Axes, time: Array, positions: Array, *, colour: str, above:
         first = row
     halo = [Stroke(linewidth=2, foreground="white"), Normal()]
     for here, texts in labels:
-        label = ax.annotate(", ".join(texts), (here[0], here[1]), (0, above), textcoords="offset points")
+        label = ax.annotate(
+            ", ".join(texts), (here[0], here[1]), (0, above), textcoords="offset points"
+        )
         label.set(color=colour, ha="center", va="center", fontsize=8, path_effects=halo)
 
 

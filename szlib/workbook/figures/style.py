@@ -48,7 +48,10 @@ def label_metres(ax: Axes, title: str = "", *, person: bool = False) -> Axes:
     >>> figures.label_metres(figures.get_axes(None), person=True).get_xlabel()
     'x, ahead [m]'
     """
-    ax.set(xlabel="x, ahead [m]" if person else "x [m]", ylabel="y, to the left [m]" if person else "y [m]")
+    ax.set(
+        xlabel="x, ahead [m]" if person else "x [m]",
+        ylabel="y, to the left [m]" if person else "y [m]",
+    )
     if title:
         ax.set_title(title)
     ax.set_aspect("equal")
@@ -90,10 +93,14 @@ def add_shared_legend(panels: Sequence[Axes]) -> None:
     >>> figures.add_shared_legend(panels)
     """
     handles, names = panels[0].get_legend_handles_labels()
-    panels[0].figure.legend(handles, names, loc="outside lower center", ncols=len(names))
+    panels[0].figure.legend(
+        handles, names, loc="outside lower center", ncols=len(names)
+    )
 
 
-def draw_person(ax: Axes, x: float, y: float, heading: float, **style: Any) -> list[Any]:
+def draw_person(
+    ax: Axes, x: float, y: float, heading: float, **style: Any
+) -> list[Any]:
     """Draw a triangle on `ax` at the position (`x`, `y`) [m]; its tip points along `heading` [rad].
 
     The options of `style` are those of matplotlib's lines.  Returns the lines.
@@ -115,7 +122,13 @@ def alt_text(figure: Figure) -> str:
     parts = [figure.get_suptitle()]
     for ax in figure.axes:
         x, y, legend = ax.get_xlabel(), ax.get_ylabel(), ax.get_legend()
-        part = ": ".join(text for text in (ax.get_title(), f"{y} over {x}" if x and y else x or y) if text)
-        names = ", ".join(text.get_text() for text in legend.get_texts()) if legend else ""
+        part = ": ".join(
+            text
+            for text in (ax.get_title(), f"{y} over {x}" if x and y else x or y)
+            if text
+        )
+        names = (
+            ", ".join(text.get_text() for text in legend.get_texts()) if legend else ""
+        )
         parts.append(f"{part}, with {names}" if names else part)
     return " ".join("; ".join(part for part in parts if part).split())

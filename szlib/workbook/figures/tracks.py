@@ -11,7 +11,9 @@ from .palette import BLUE, GREY, RED, SEQUENCE
 from .style import add_legend_below, area_patch, get_axes, label_metres
 
 
-def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes | None = None) -> Axes:
+def plot_map(
+    tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes | None = None
+) -> Axes:
     """Plot where people walked: person-seconds per square metre on a log scale (paper, fig. 1).
 
     Parameters
@@ -31,14 +33,24 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     """
     ax = get_axes(ax, size=(9, 5))
     x, y = tracks["x"].to_numpy(), tracks["y"].to_numpy()
-    while max(np.ptp(x), np.ptp(y)) / cell > 2000:  # cells along an axis; those of a larger site are larger
+    while (
+        max(np.ptp(x), np.ptp(y)) / cell > 2000
+    ):  # cells along an axis; those of a larger site are larger
         cell *= 2
-    edges = [np.arange(np.floor(v.min()), np.ceil(v.max()) + cell, cell) for v in (x, y)]
+    edges = [
+        np.arange(np.floor(v.min()), np.ceil(v.max()) + cell, cell) for v in (x, y)
+    ]
     seconds = np.histogram2d(x, y, bins=edges)[0] / 10 / cell**2
     shown = np.ma.masked_less_equal(np.log10(np.maximum(seconds, 1e-9)), -0.5)
     image = ax.pcolormesh(edges[0], edges[1], shown.T, cmap=SEQUENCE, rasterized=True)
-    ax.figure.colorbar(image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$")
-    ax.add_patch(area_patch(area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"))
+    ax.figure.colorbar(
+        image, ax=ax, shrink=0.8, label="log10 of person-seconds per m$^2$"
+    )
+    ax.add_patch(
+        area_patch(
+            area, edgecolor=RED, linewidth=2, label=f"the area, {area.area:.0f} m$^2$"
+        )
+    )
     add_legend_below(ax)
     for axis, edge, ends in zip("xy", edges, (area.box.x, area.box.y), strict=True):
         low, high = min(edge[0], ends[0]), max(edge[-1], ends[1])
@@ -47,7 +59,9 @@ def plot_map(tracks: pd.DataFrame, area: Area, *, cell: float = 0.25, ax: Axes |
     return label_metres(ax, "Where people walked, and the area")
 
 
-def plot_speed_histogram(recorded: np.ndarray, displaced: np.ndarray, *, ax: Axes | None = None) -> Axes:
+def plot_speed_histogram(
+    recorded: np.ndarray, displaced: np.ndarray, *, ax: Axes | None = None
+) -> Axes:
     """Plot the distribution of recorded speeds and of speeds from displacement.
 
     Parameters
@@ -63,10 +77,18 @@ def plot_speed_histogram(recorded: np.ndarray, displaced: np.ndarray, *, ax: Axe
     >>> ax = figures.plot_speed_histogram(np.full(9, 1.0), np.linspace(0, 1.6, 9))
     """
     ax = get_axes(ax)
-    style = {"bins": np.linspace(0, 2.5, 101).tolist(), "histtype": "step", "linewidth": 1.6}
+    style = {
+        "bins": np.linspace(0, 2.5, 101).tolist(),
+        "histtype": "step",
+        "linewidth": 1.6,
+    }
     ax.hist(displaced, color=BLUE, label="from displacement", **style)
     ax.hist(recorded, color=RED, linestyle="--", label="the file's column", **style)
-    ax.set(xlabel="speed [m/s]", ylabel="samples", title="Recorded speed, and speed from displacement")
+    ax.set(
+        xlabel="speed [m/s]",
+        ylabel="samples",
+        title="Recorded speed, and speed from displacement",
+    )
     add_legend_below(ax)
     return ax
 
@@ -92,7 +114,14 @@ def plot_funnel(funnel: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
     ax = get_axes(ax, size=(8, 0.4 * len(kept) + 1))
     ax.plot(rows, kept["stage"], "o-", color=BLUE, markersize=7, linewidth=1)
     for at, n in enumerate(rows):
-        ax.annotate(f"{n:,}", (n, at), (9, 0), textcoords="offset points", va="center", fontsize=8)
+        ax.annotate(
+            f"{n:,}",
+            (n, at),
+            (9, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=8,
+        )
     ax.invert_yaxis()
     ax.grid(axis="x", color=GREY, alpha=0.3)
     ax.set(xscale="log", xlabel="rows kept (log scale)")

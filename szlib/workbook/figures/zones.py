@@ -31,7 +31,11 @@ _LINES = ("-", "--", ":", "-.")
 
 
 def plot_outliers(
-    points: np.ndarray, outlier: np.ndarray, *, r_max: float = 2.0, ax: Axes | None = None
+    points: np.ndarray,
+    outlier: np.ndarray,
+    *,
+    r_max: float = 2.0,
+    ax: Axes | None = None,
 ) -> Axes:
     """Plot inliers and outliers in complementary coordinates (paper, fig. 4a).
 
@@ -50,9 +54,32 @@ def plot_outliers(
     >>> ax = figures.plot_outliers(points, np.arange(50) < 2)
     """
     ax, inliers = get_axes(ax, size=(6, 5)), points[~outlier]
-    ax.plot(*inliers.T, ".", color=GREY, markersize=2, rasterized=True, label=f"{len(inliers):,} inliers")
-    ax.plot(*points[outlier].T, "x", color=RED, markersize=7, mew=1.8, label=f"{outlier.sum():,} outliers")
-    ax.add_patch(Circle((0, 0), r_max, fill=False, linestyle=":", color=BLACK, label="contact, r = 0"))
+    ax.plot(
+        *inliers.T,
+        ".",
+        color=GREY,
+        markersize=2,
+        rasterized=True,
+        label=f"{len(inliers):,} inliers",
+    )
+    ax.plot(
+        *points[outlier].T,
+        "x",
+        color=RED,
+        markersize=7,
+        mew=1.8,
+        label=f"{outlier.sum():,} outliers",
+    )
+    ax.add_patch(
+        Circle(
+            (0, 0),
+            r_max,
+            fill=False,
+            linestyle=":",
+            color=BLACK,
+            label="contact, r = 0",
+        )
+    )
     ax.set(xlim=(-1.05 * r_max, 1.05 * r_max), ylim=(-1.05 * r_max, 1.05 * r_max))
     add_legend_below(ax, ncols=3)
     label_metres(ax, "The nearer a person, the farther from the centre")
@@ -91,21 +118,53 @@ def plot_hull(
     >>> ax = figures.plot_hull(zone, (0.9, 1.1))
     """
     if not isinstance(zone.shape, HullZone):
-        raise ZoneError(f'a zone of method {zone.method!r} has no hull to draw; fit it with method="hull"')
+        raise ZoneError(
+            f'a zone of method {zone.method!r} has no hull to draw; fit it with method="hull"'
+        )
     if ax is None:
-        ax = plt.figure(figsize=(7, 6), layout="constrained").add_subplot(projection="3d")
+        ax = plt.figure(figsize=(7, 6), layout="constrained").add_subplot(
+            projection="3d"
+        )
     faces = zone.shape.vertices[ConvexHull(zone.shape.vertices).simplices]
-    ax.add_collection3d(Poly3DCollection(faces, facecolor=GREY, edgecolor=GREY, alpha=0.12, linewidth=0.3))
+    ax.add_collection3d(
+        Poly3DCollection(
+            faces, facecolor=GREY, edgecolor=GREY, alpha=0.12, linewidth=0.3
+        )
+    )
     if points is not None:
         shown = points[:: max(1, len(points) // 4000)]  # more dots hide the hull
-        ax.plot(*shown.T, ".", color=BLUE, markersize=1.5, alpha=0.35, label=f"{len(shown):,} of the samples")
-    for speed, colour, line in zip(speeds, pick_colours(speeds), cycle(_LINES), strict=False):
+        ax.plot(
+            *shown.T,
+            ".",
+            color=BLUE,
+            markersize=1.5,
+            alpha=0.35,
+            label=f"{len(shown):,} of the samples",
+        )
+    for speed, colour, line in zip(
+        speeds, pick_colours(speeds), cycle(_LINES), strict=False
+    ):
         corners = zone.shape.slice(speed).polygon
         closed = np.vstack([corners, corners[:1]])
         level = np.full(len(closed), speed)
-        ax.plot(*closed.T, level, color=colour, linestyle=line, linewidth=2.5, label=f"{speed:g} m/s")
+        ax.plot(
+            *closed.T,
+            level,
+            color=colour,
+            linestyle=line,
+            linewidth=2.5,
+            label=f"{speed:g} m/s",
+        )
         right = closed[closed[:, 0].argmax()]
-        ax.text(right[0] + 0.15, right[1], speed, f"{speed:g}", color=colour, fontsize=9, weight="bold")
+        ax.text(
+            right[0] + 0.15,
+            right[1],
+            speed,
+            f"{speed:g}",
+            color=colour,
+            fontsize=9,
+            weight="bold",
+        )
     ax.auto_scale_xyz(*zone.shape.vertices.T)
     ax.set(xlabel="x' [m]", ylabel="y' [m]", zlabel="speed [m/s]")
     ax.set_title("The hull of the inliers, and its slices by speed")
@@ -115,7 +174,11 @@ def plot_hull(
 
 
 def plot_zone(
-    zone: FittedZone, speed: float, *, truth: Ellipse | None = None, ax: Axes | None = None
+    zone: FittedZone,
+    speed: float,
+    *,
+    truth: Ellipse | None = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Plot a zone's boundary at one speed, its ellipse and the ellipse's interval.
 
@@ -140,27 +203,47 @@ def plot_zone(
     'Minimum social zone at 1.1 m/s: undecided'
     """
     ax = get_axes(ax, size=(5, 4.5))
-    with warnings.catch_warnings(action="ignore", category=DataWarning):  # dashed, and said in the title
+    with warnings.catch_warnings(
+        action="ignore", category=DataWarning
+    ):  # dashed, and said in the title
         ellipse = zone.ellipse(speed)
-    boundary, verdict, is_hull = zone.boundary(speed), zone.verdict(speed), zone.method in ("hull", "paper")
+    boundary, verdict, is_hull = (
+        zone.boundary(speed),
+        zone.verdict(speed),
+        zone.method in ("hull", "paper"),
+    )
     if is_hull:
         ax.fill(*boundary.T, facecolor=GREY, alpha=0.4, label="zone: r_max - R'")
     else:
-        ax.plot(*boundary.T, color=GREY, linewidth=1.5, label=f"radius by direction ({zone.method})")
+        ax.plot(
+            *boundary.T,
+            color=GREY,
+            linewidth=1.5,
+            label=f"radius by direction ({zone.method})",
+        )
     name = "smallest enclosing ellipse" if is_hull else "fitted ellipse"
     line = "-" if verdict == "usable" else "--"
     ax.plot(*ellipse.curve().T, line, color=BLUE, linewidth=2, label=name)
     _draw_interval(ax, zone, speed, color=ORANGE, alpha=0.35, label="its 95 % interval")
     if ellipse.support is not None:
-        ax.plot(*ellipse.support.T, "o", color=BLUE, label=f"its {len(ellipse.support)} support points")
+        ax.plot(
+            *ellipse.support.T,
+            "o",
+            color=BLUE,
+            label=f"its {len(ellipse.support)} support points",
+        )
     if truth is not None:
         ax.plot(*truth.curve().T, ":", color=RED, linewidth=2, label="truth")
     draw_person(ax, 0, 0, 0, color=BLACK, markersize=10)
     add_legend_below(ax, gap=0.15)
-    return label_metres(ax, f"Minimum social zone at {speed:g} m/s: {verdict}", person=True)
+    return label_metres(
+        ax, f"Minimum social zone at {speed:g} m/s: {verdict}", person=True
+    )
 
 
-def plot_zones(zones: FittedZone | Mapping[float, Ellipse], *, ax: Axes | None = None) -> Axes:
+def plot_zones(
+    zones: FittedZone | Mapping[float, Ellipse], *, ax: Axes | None = None
+) -> Axes:
     """Plot ellipses by speed around a person who walks to the right (paper, fig. 5).
 
     Parameters
@@ -223,12 +306,18 @@ def plot_pair_correlation(
     turn = np.r_[correlation.direction, correlation.direction[0] + 2 * np.pi]
     g = np.vstack([correlation.g, correlation.g[:1]])
     x, y = (correlation.distance * part(turn)[:, None] for part in (np.cos, np.sin))
-    image = ax.pcolormesh(x, y, g, cmap="PuOr", vmin=0, vmax=2, shading="gouraud", rasterized=True)
+    image = ax.pcolormesh(
+        x, y, g, cmap="PuOr", vmin=0, vmax=2, shading="gouraud", rasterized=True
+    )
     ax.figure.colorbar(image, ax=ax, label="g (1: as often as without interaction)")
-    ax.contour(x, y, np.nan_to_num(g, nan=1.0), levels=[0.5], colors=[BLACK], linewidths=1.5)
+    ax.contour(
+        x, y, np.nan_to_num(g, nan=1.0), levels=[0.5], colors=[BLACK], linewidths=1.5
+    )
     ax.plot([], [], color=BLACK, linewidth=1.5, label="g = 1/2")
     if radius is not None:
-        ax.add_patch(Circle((0, 0), radius, fill=False, linestyle="--", color=BLUE, linewidth=2))
+        ax.add_patch(
+            Circle((0, 0), radius, fill=False, linestyle="--", color=BLUE, linewidth=2)
+        )
         ax.plot([], [], "--", color=BLUE, label=f"all directions: {radius:.2f} m")
     draw_person(ax, 0, 0, 0, color=RED, markersize=10)
     add_legend_below(ax)
@@ -245,5 +334,7 @@ def _draw_interval(ax: Axes, zone: FittedZone, speed: float, **style: Any) -> No
     unit = np.column_stack([np.cos(band["direction"]), np.sin(band["direction"])])
     low, high = (band[end].to_numpy()[:, None] * unit for end in ("low", "high"))
     known = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
-    quads = np.stack([low[:-1], low[1:], high[1:], high[:-1]], axis=1)[known[:-1] & known[1:]]
+    quads = np.stack([low[:-1], low[1:], high[1:], high[:-1]], axis=1)[
+        known[:-1] & known[1:]
+    ]
     ax.add_collection(PolyCollection(list(quads), linewidth=0, **style))

@@ -31,9 +31,15 @@ def read_table(name: str) -> pd.DataFrame:
     return table
 
 
-def find_differences(row: pd.Series[Any], again: Mapping[str, Any]) -> dict[str, list[Any]]:
+def find_differences(
+    row: pd.Series[Any], again: Mapping[str, Any]
+) -> dict[str, list[Any]]:
     """The values of a `row` and those computed `again`, by column, where they differ."""
-    return {name: [row[name], value] for name, value in again.items() if not _is_same(row[name], value)}
+    return {
+        name: [row[name], value]
+        for name, value in again.items()
+        if not _is_same(row[name], value)
+    }
 
 
 def _is_same(stored: Any, value: Any) -> bool:

@@ -31,7 +31,8 @@ from ...zones.social_zone import SocialZone, recorded_hours
 from ...zones.verdict import describe_missing_encounters
 from .parameters import ZoneMethod
 
-NULL_SHIFTS = 39  # time-shifted copies of the data that the zone is tested against (assumed)
+# time-shifted copies of the data that the zone is tested against (assumed)
+NULL_SHIFTS = 39
 # With so many encounters in the data, fewer copies decide (assumed): with 19, p can be 0.05 but not less.
 MANY_ENCOUNTERS, FEW_SHIFTS = 5000, 19
 
@@ -82,7 +83,11 @@ class DataCache:
         if not self.is_synthetic:
             return datasets.find(self.data)
         file = self._path(f"plaza-{self.seed}.csv")
-        source = {"plaza": repr(PlazaSettings()), "seed": self.seed, "szlib": __version__}
+        source = {
+            "plaza": repr(PlazaSettings()),
+            "seed": self.seed,
+            "szlib": __version__,
+        }
         if load_cached(file, source) is None:
             make_plaza(file, seed=self.seed)
             write_checksum(file, file.read_bytes(), source)
@@ -94,7 +99,11 @@ class DataCache:
         with self._unchanged_data() as files:
             options = self.method.read_options()
             tracks = read_tracks(files, options=options)
-            return tracks if one_day.known_area(settings, files, options) else place_apart(tracks)
+            return (
+                tracks
+                if one_day.known_area(settings, files, options)
+                else place_apart(tracks)
+            )
 
     def find_area(self, tracks: pd.DataFrame | None = None) -> Area:
         """The area in which encounters are found: the one given, or the default of the data.
@@ -106,8 +115,14 @@ class DataCache:
             return replace(as_area(text), reason=reason)
         settings = self.method.encounter_settings(self.area or None)
         with self._unchanged_data() as files:
-            area = as_area(one_day.with_area(settings, files, self.method.read_options(), tracks).area)
-        store_cached(self._path("area.txt"), f"{area}\n{area.reason}".encode(), self._source())
+            area = as_area(
+                one_day.with_area(
+                    settings, files, self.method.read_options(), tracks
+                ).area
+            )
+        store_cached(
+            self._path("area.txt"), f"{area}\n{area.reason}".encode(), self._source()
+        )
         return area
 
     def encounters(self) -> pd.DataFrame:
@@ -125,12 +140,19 @@ class DataCache:
         are few, ``.attrs["advice"]`` says what relaxing a condition would give.
         """
         advice = ""
-        if samples["encounter"].nunique() < one_day.FEW_ENCOUNTERS and "area" in samples.attrs:
-            advice = one_day.relax_conditions(samples, self.tracks(), self.method.encounter_settings())
+        if (
+            samples["encounter"].nunique() < one_day.FEW_ENCOUNTERS
+            and "area" in samples.attrs
+        ):
+            advice = one_day.relax_conditions(
+                samples, self.tracks(), self.method.encounter_settings()
+            )
         one_day.require_encounters(samples, advice).attrs["advice"] = advice
         content = io.BytesIO()
         samples.to_parquet(content)
-        store_cached(self._path("encounters.parquet"), content.getvalue(), self._source())
+        store_cached(
+            self._path("encounters.parquet"), content.getvalue(), self._source()
+        )
         return samples
 
     def zone(self) -> SocialZone:
@@ -139,13 +161,17 @@ class DataCache:
         if zone := _load(file, self._zone_source()):
             return zone
         if file.exists():
-            print("The zone is fitted again: zone.json was made from other data, or is damaged.")
+            print(
+                "The zone is fitted again: zone.json was made from other data, or is damaged."
+            )
         return self.fit_zone()
 
     def fit_zone(self) -> SocialZone:
         """Fit the zone, test it against the null model, and store it for later notebooks."""
         return self.store_zone(
-            SocialZone.fit(self.encounters(), null=self.null_model(), **self.method.fit_options())
+            SocialZone.fit(
+                self.encounters(), null=self.null_model(), **self.method.fit_options()
+            )
         )
 
     def null_model(self, few_shifts: int = FEW_SHIFTS) -> NullEncounters | None:
@@ -156,7 +182,11 @@ class DataCache:
         tracks = self.tracks()
         settings = self.method.encounter_settings(self.find_area(tracks))
         return find_null_model(
-            tracks, self.encounters(), settings, few_shifts=few_shifts, r_max=self.method.r_max
+            tracks,
+            self.encounters(),
+            settings,
+            few_shifts=few_shifts,
+            r_max=self.method.r_max,
         )
 
     def ellipse(self) -> Ellipse:
@@ -166,9 +196,16 @@ class DataCache:
     def paper_ellipse(self) -> Ellipse:
         """The ellipse of the paper's method at `zone_speed` (sec. 2), fitted once, in the person's frame."""
         r_max, speed = self.method.r_max, self.method.zone_speed
-        options: dict[str, Any] = {"method": "paper", "r_max": r_max, "speeds": [speed], "n_resamples": 0}
+        options: dict[str, Any] = {
+            "method": "paper",
+            "r_max": r_max,
+            "speeds": [speed],
+            "n_resamples": 0,
+        }
         file, source = self._path("paper_zone.json"), self._source() | {"fit": options}
-        zone = _load(file, source) or _store(SocialZone.fit(self.encounters(), **options), file, source)
+        zone = _load(file, source) or _store(
+            SocialZone.fit(self.encounters(), **options), file, source
+        )
         return zone.ellipse(speed)
 
     def store_zone(self, zone: SocialZone) -> SocialZone:
@@ -188,16 +225,30 @@ class DataCache:
         with unchanged_files(files):
             found = [[file.name, *file_content(file)] for file in files]
             self.contents.extend([] if self.contents else found)
-            if changed := [file for file, now in zip(files, found, strict=True) if now not in self.contents]:
-                raise DataError(f"{printable(changed[0])}: has changed since it was first read; run again")
+            if changed := [
+                file
+                for file, now in zip(files, found, strict=True)
+                if now not in self.contents
+            ]:
+                raise DataError(
+                    f"{printable(changed[0])}: has changed since it was first read; run again"
+                )
             yield files
 
     def _source(self) -> dict[str, Any]:
         """What encounters are made from: content of the files, parameters, version of szlib."""
         with self._unchanged_data():
             files = self.contents
-        source = {"data": datasets.label(self.data), "seed": self.seed, "files": files, "area": self.area}
-        source |= {"szlib": __version__, "parameters": self.method.encounter_settings().as_json()}
+        source = {
+            "data": datasets.label(self.data),
+            "seed": self.seed,
+            "files": files,
+            "area": self.area,
+        }
+        source |= {
+            "szlib": __version__,
+            "parameters": self.method.encounter_settings().as_json(),
+        }
         return source | {"reading": self.method.reading}
 
     def _zone_source(self) -> dict[str, Any]:
@@ -218,9 +269,13 @@ def find_null_model(
     It has `NULL_SHIFTS` shifts, or `few_shifts` where the `samples` are of `MANY_ENCOUNTERS` or more.
     `settings` and `options` are as for `szlib.null_encounters`.
     """
-    shifts = NULL_SHIFTS if samples["encounter"].nunique() < MANY_ENCOUNTERS else few_shifts
+    shifts = (
+        NULL_SHIFTS if samples["encounter"].nunique() < MANY_ENCOUNTERS else few_shifts
+    )
     try:
-        return null_encounters(tracks, settings=settings, shifts=shifts, **{"progress": False, **options})
+        return null_encounters(
+            tracks, settings=settings, shifts=shifts, **{"progress": False, **options}
+        )
     except DataError as error:
         print(f"The zone is not tested against a null model: {error}")
         return None
@@ -232,7 +287,9 @@ def describe_missing_data(file: Path) -> str:
         return ""
     samples = pd.read_parquet(file, columns=["day", "t", "encounter"])
     n_encounters = samples["encounter"].nunique()
-    return describe_missing_encounters({"encounters": n_encounters, "hours": recorded_hours(samples)})
+    return describe_missing_encounters(
+        {"encounters": n_encounters, "hours": recorded_hours(samples)}
+    )
 
 
 def read_stored_zone(file: Path) -> SocialZone | None:
@@ -246,7 +303,11 @@ def read_stored_zone(file: Path) -> SocialZone | None:
 def _load(file: Path, source: dict[str, Any]) -> SocialZone | None:
     """The zone in a file, if it was made from `source` and is not damaged."""
     zone = None if load_cached(file, source) is None else read_stored_zone(file)
-    return zone if zone and zone.provenance.get("source") == json.loads(json.dumps(source)) else None
+    return (
+        zone
+        if zone and zone.provenance.get("source") == json.loads(json.dumps(source))
+        else None
+    )
 
 
 def _store(zone: SocialZone, file: Path, source: dict[str, Any]) -> SocialZone:

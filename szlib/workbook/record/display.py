@@ -16,9 +16,16 @@ from ...control.settings import MPCSettings
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAPER, ASSUMED, MEASURED, TUNED, CHOSEN = "paper", "assumed", "measured", "tuned", "chosen"
+PAPER, ASSUMED, MEASURED, TUNED, CHOSEN = (
+    "paper",
+    "assumed",
+    "measured",
+    "tuned",
+    "chosen",
+)
 """Badges: the source of a parameter; tuned on the paper's four scenarios; chosen by the user."""
-_SHOWN_WIDTH = 2 / 3  # width of a figure in the notebook, as a fraction of the saved figure's
+# width of a figure in the notebook, as a fraction of the saved figure's
+_SHOWN_WIDTH = 2 / 3
 
 
 def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
@@ -39,17 +46,28 @@ def parameters(rows: Sequence[tuple[str, object, str, str]]) -> Styler:
     known = (PAPER, ASSUMED, MEASURED, TUNED, CHOSEN)
     if unknown := {badge for _, _, badge, _ in rows}.difference(known):
         raise ValueError(f"badges must be {', '.join(known)}; got {sorted(unknown)}")
-    return _style(_FoldedTable, pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"]))
+    return _style(
+        _FoldedTable, pd.DataFrame(rows, columns=["parameter", "value", "badge", "why"])
+    )
 
 
 def settings_table(settings: MPCSettings) -> Styler:
     """Make a table of the controller's `settings`, with the descriptions of the class's docstring."""
     descriptions: dict[str, str] = {}
-    entries = re.findall(r"^(\w+(?:, \w+)*) : (.*(?:\n    .*)*)", str(inspect.getdoc(settings)), re.MULTILINE)
+    entries = re.findall(
+        r"^(\w+(?:, \w+)*) : (.*(?:\n    .*)*)",
+        str(inspect.getdoc(settings)),
+        re.MULTILINE,
+    )
     for names, text in entries:
         descriptions |= dict.fromkeys(names.split(", "), " ".join(text.split()))
     badges = settings.badges().items()
-    return parameters([(name, getattr(settings, name), badge, descriptions[name]) for name, badge in badges])
+    return parameters(
+        [
+            (name, getattr(settings, name), badge, descriptions[name])
+            for name, badge in badges
+        ]
+    )
 
 
 class _Table(Styler):
@@ -74,7 +92,11 @@ def style_table(table: pd.DataFrame) -> Styler:
 
 def _style(kind: type[_Table], table: pd.DataFrame) -> Styler:
     left = [{"selector": "td, th", "props": "text-align: left"}]
-    styled = kind(table, uuid="szlib", cell_ids=False).format(format_value).hide(axis="index")
+    styled = (
+        kind(table, uuid="szlib", cell_ids=False)
+        .format(format_value)
+        .hide(axis="index")
+    )
     return styled.set_table_styles(left)  # type: ignore[arg-type]
 
 
@@ -111,7 +133,9 @@ def show_figure(figure: Figure, picture: bytes) -> None:
     size = round(drawn.width * _SHOWN_WIDTH), round(drawn.height * _SHOWN_WIDTH)
     shown = io.BytesIO()
     small = drawn.resize(size, Image.Resampling.LANCZOS)
-    small.quantize(128, Image.Quantize.MAXCOVERAGE, kmeans=1).save(shown, "PNG", optimize=True)
+    small.quantize(128, Image.Quantize.MAXCOVERAGE, kmeans=1).save(
+        shown, "PNG", optimize=True
+    )
     content = {"image/png": shown.getvalue(), "text/plain": repr(figure)}
     display(content, raw=True, metadata={"image/png": {"alt": alt_text(figure)}})  # type: ignore[no-untyped-call]
     plt.close(figure)
@@ -139,7 +163,11 @@ def format_outputs() -> None:
         with pd.option_context("display.precision", 3):
             return str(table._repr_html_())  # type: ignore[operator]
 
-    shell.display_formatter.mimebundle_formatter.for_type_by_name("matplotlib.figure", "Figure", describe)
+    shell.display_formatter.mimebundle_formatter.for_type_by_name(
+        "matplotlib.figure", "Figure", describe
+    )
     formatters = shell.display_formatter.formatters
     formatters["text/html"].for_type(pd.DataFrame, show_rounded)
-    formatters["text/plain"].for_type(Styler, lambda table, printer, _: printer.text(table.data.to_string()))
+    formatters["text/plain"].for_type(
+        Styler, lambda table, printer, _: printer.text(table.data.to_string())
+    )

@@ -23,8 +23,21 @@ from ...input_files import read_json_object
 from .. import folders
 from .committed_tables import find_differences, read_table
 from .data_cache import DataCache
-from .display import format_outputs, format_result, format_value, show_figure, style_table
-from .parameters import METHOD_DEFAULTS, NEUTRAL, OPTIONS, ZoneMethod, check_injected, read_defaults
+from .display import (
+    format_outputs,
+    format_result,
+    format_value,
+    show_figure,
+    style_table,
+)
+from .parameters import (
+    METHOD_DEFAULTS,
+    NEUTRAL,
+    OPTIONS,
+    ZoneMethod,
+    check_injected,
+    read_defaults,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,13 +83,19 @@ class NotebookRecord:
         self.figures: list[str] = []
         self.key: dict[str, Any] = {}
         check_injected(variables.get("In", ()))
-        script = next((each for each in folders.list_notebooks() if each.stem == name), None)
+        script = next(
+            (each for each in folders.list_notebooks() if each.stem == name), None
+        )
         own_defaults = read_defaults(script) if script else {"area": "", "seed": 0}
         defaults = {**METHOD_DEFAULTS, **own_defaults}
-        changed = {n: variables[n] for n, v in defaults.items() if variables.get(n, v) != v}
+        changed = {
+            n: variables[n] for n, v in defaults.items() if variables.get(n, v) != v
+        }
         self.changed = {n: v for n, v in changed.items() if n not in NEUTRAL}
         if self.changed:
-            print(f"{self._settings()}: checks that assume the defaults are observations; text may not apply")
+            print(
+                f"{self._settings()}: checks that assume the defaults are observations; text may not apply"
+            )
         data, contents = variables["data"], []
         if run := os.environ.get(folders.RUN_VARIABLE):
             self.out = Path(run)
@@ -93,7 +112,9 @@ class NotebookRecord:
         self.cache = DataCache(self.out, data, area, seed, method, contents)
         format_outputs()
 
-    def check(self, what: str, passed: object, value: object = None, *, always: bool = False) -> None:
+    def check(
+        self, what: str, passed: object, value: object = None, *, always: bool = False
+    ) -> None:
         """Record a check.
 
         Parameters
@@ -164,7 +185,9 @@ class NotebookRecord:
         table = read_table(name)
         rows = table.query(where)
         if rows.empty:
-            print(f"not checked: tables/{name}.csv has no row that can be computed here ({where})")
+            print(
+                f"not checked: tables/{name}.csv has no row that can be computed here ({where})"
+            )
             return table
         row = rows.sample(1, random_state=self.cache.seed).iloc[0]
         again = dict(recompute(row))
@@ -176,16 +199,33 @@ class NotebookRecord:
     def close(self) -> Styler:
         """Write the record for the summary of the run, and return a table of its checks and claims."""
         self._store(closed=True)
-        rows = [(c["kind"], c["name"], c["result"], format_value(c["value"])) for c in self.checks]
-        return style_table(pd.DataFrame(rows, columns=["kind", "name", "result", "value"]))
+        rows = [
+            (c["kind"], c["name"], c["result"], format_value(c["value"]))
+            for c in self.checks
+        ]
+        return style_table(
+            pd.DataFrame(rows, columns=["kind", "name", "result", "value"])
+        )
 
     def _settings(self) -> str:
         """The changed parameters as text: "with gamma = 0.2"."""
-        return "with " + ", ".join(f"{name} = {value}" for name, value in self.changed.items())
+        return "with " + ", ".join(
+            f"{name} = {value}" for name, value in self.changed.items()
+        )
 
-    def _record(self, kind: str, name: str, passed: bool, value: object, result: str) -> None:
+    def _record(
+        self, kind: str, name: str, passed: bool, value: object, result: str
+    ) -> None:
         value = _to_plain(value)
-        self.checks.append({"kind": kind, "name": name, "passed": passed, "value": value, "result": result})
+        self.checks.append(
+            {
+                "kind": kind,
+                "name": name,
+                "passed": passed,
+                "value": value,
+                "result": result,
+            }
+        )
         print(f"{kind}: {name}: {format_result(result, value)}")
         self._store(closed=False)
 

@@ -72,7 +72,13 @@ class ZoneMethod:
     @classmethod
     def from_variables(cls, variables: Mapping[str, Any]) -> ZoneMethod:
         """Take the values from the `variables` of a notebook; a missing variable has its default."""
-        return cls(**{each.name: variables[each.name] for each in fields(cls) if each.name in variables})
+        return cls(
+            **{
+                each.name: variables[each.name]
+                for each in fields(cls)
+                if each.name in variables
+            }
+        )
 
     def read_options(self) -> ReadOptions:
         """Options of `szlib.read_tracks`; raises DataError where `reading` holds something else."""
@@ -80,23 +86,33 @@ class ZoneMethod:
             return ReadOptions(**self.reading)
         except TypeError as error:
             expected = 'options of szlib.ReadOptions by name, such as {"unit": "mm"}'
-            raise DataError(f"parameter reading: expected {expected}; got {self.reading!a:.80}") from error
+            raise DataError(
+                f"parameter reading: expected {expected}; got {self.reading!a:.80}"
+            ) from error
 
     def encounter_settings(self, area: object = None) -> EncounterSettings:
         """Settings of `szlib.find_encounters` for encounters in an `area`."""
         space = AttentionalSpace(length=self.space_length, width=self.space_width)
         names = ("duration", "min_distance", "min_speed", "has_walls")
-        return EncounterSettings(area=area, space=space, **{name: getattr(self, name) for name in names})
+        return EncounterSettings(
+            area=area, space=space, **{name: getattr(self, name) for name in names}
+        )
 
     def fit_options(self) -> dict[str, Any]:
         """Keywords of `szlib.SocialZone.fit`."""
-        return {"r_max": self.r_max, "q": self.q, "speeds": sorted({*SPEEDS, self.zone_speed})}
+        return {
+            "r_max": self.r_max,
+            "q": self.q,
+            "speeds": sorted({*SPEEDS, self.zone_speed}),
+        }
 
 
 METHOD_DEFAULTS: Mapping[str, Any] = asdict(ZoneMethod())
 
 
-def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dict[str, Any]:
+def check_parameters(
+    given: Mapping[str, Any], notebooks: Sequence[Path]
+) -> dict[str, Any]:
     """Check parameters before any notebook starts.
 
     Parameters
@@ -115,9 +131,14 @@ def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dic
     if given.get("area") not in (None, "", AUTO):
         given = {**given, "area": str(as_area(given["area"]))}
     if "reading" in given:
-        given = {**given, "reading": ZoneMethod(reading=given["reading"]).read_options().as_json()}
+        given = {
+            **given,
+            "reading": ZoneMethod(reading=given["reading"]).read_options().as_json(),
+        }
     defaults: dict[str, list[Any]] = {}
-    for name, value in (each for notebook in notebooks for each in read_defaults(notebook).items()):
+    for name, value in (
+        each for notebook in notebooks for each in read_defaults(notebook).items()
+    ):
         defaults.setdefault(name, []).append(value)
     if unknown := sorted(given.keys() - defaults.keys()):
         raise DataError(
@@ -130,12 +151,18 @@ def check_parameters(given: Mapping[str, Any], notebooks: Sequence[Path]) -> dic
         default = defaults[name][0]
         _check_type(name, value, default)
         if isinstance(default, list) and default and not value:
-            raise DataError(f"parameter {name}: expected values such as {default!r}; got an empty list")
+            raise DataError(
+                f"parameter {name}: expected values such as {default!r}; got an empty list"
+            )
         for each in value if isinstance(value, list) else [value]:
             if isinstance(default, list):
                 _check_type(name, each, default[0] if default else "")
             _check_range(name, each)
-    return {name: value for name, value in given.items() if any(value != each for each in defaults[name])}
+    return {
+        name: value
+        for name, value in given.items()
+        if any(value != each for each in defaults[name])
+    }
 
 
 def check_injected(cells: Sequence[str]) -> None:
@@ -145,7 +172,10 @@ def check_injected(cells: Sequence[str]) -> None:
     """
     for own, injected in pairwise(cells):
         if injected.startswith("# Parameters\n"):
-            given, known = (set(re.findall(r"^(\w+) *=", cell, re.MULTILINE)) for cell in (injected, own))
+            given, known = (
+                set(re.findall(r"^(\w+) *=", cell, re.MULTILINE))
+                for cell in (injected, own)
+            )
             if unknown := given - known - METHOD_DEFAULTS.keys():
                 raise DataError(
                     f"unknown parameter {', '.join(sorted(unknown))}; "
@@ -154,7 +184,11 @@ def check_injected(cells: Sequence[str]) -> None:
 
 
 def _check_type(name: str, value: Any, default: Any) -> None:
-    is_whole = isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool)
+    is_whole = (
+        isinstance(default, float)
+        and isinstance(value, int)
+        and not isinstance(value, bool)
+    )
     if not is_whole and type(value) is not type(default):
         raise DataError(
             f"parameter {name}: expected {type(default).__name__}, such as {default!r}; got {value!a:.80}"
@@ -170,12 +204,20 @@ def _check_range(name: str, value: Any) -> None:
         raise DataError(f"parameter {name}: expected readable text; got {value!a:.80}")
     low, high = RANGES.get(name, (-math.inf, math.inf))
     if not isinstance(value, str) and not low <= value <= high:
-        raise DataError(f"parameter {name}: expected {low:g} to {high:g}; got {value!a:.80}")
+        raise DataError(
+            f"parameter {name}: expected {low:g} to {high:g}; got {value!a:.80}"
+        )
     if name == "n_jobs" and value == 0:
-        raise DataError("parameter n_jobs: expected a number of processes, or -1 for every core; got 0")
+        raise DataError(
+            "parameter n_jobs: expected a number of processes, or -1 for every core; got 0"
+        )
     setting = SETTINGS.get(name, name)
     if setting in MPCSettings.__dataclass_fields__:
         try:
-            MPCSettings(**{"N": max(value, 1), "N_h": value} if setting == "N_h" else {setting: value})
+            MPCSettings(
+                **{"N": max(value, 1), "N_h": value}
+                if setting == "N_h"
+                else {setting: value}
+            )
         except (SolverError, TypeError, OverflowError) as error:
             raise DataError(f"parameter {name}: {error}") from error
